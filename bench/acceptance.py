@@ -1,0 +1,34 @@
+"""A Markdown page of acceptance rows (what was wanted, what was measured, held or missed) and tables."""
+
+from __future__ import annotations
+
+import platform
+from dataclasses import dataclass, field
+
+
+@dataclass
+class Report:
+    """Collects sections and bars."""
+
+    title: str
+    command: str
+    lines: list[str] = field(default_factory=list)
+    bars: list[tuple[str, str, str, bool]] = field(default_factory=list)
+
+    def table(self, title: str, head: list[str], rows: list[list[str]]) -> None:
+        """Add a section with one table."""
+        self.lines += [f"## {title}", "", "| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+        self.lines += ["| " + " | ".join(row) + " |" for row in rows] + [""]
+
+    def bar(self, what: str, wanted: str, measured: str, held: bool) -> None:
+        """Add an acceptance row."""
+        self.bars.append((what, wanted, measured, held))
+
+    def markdown(self) -> str:
+        """The whole page."""
+        held = sum(bar[3] for bar in self.bars)
+        rows = [f"| {a} | {b} | {c} | {'held' if ok else '**missed**'} |" for a, b, c, ok in self.bars]
+        head = [f"# {self.title}", "", f"Written by `{self.command}`, {platform.machine()}, one process.", ""]
+        bars = [f"## Acceptance: {held} of {len(self.bars)} held", ""]
+        bars += ["| bar | wanted | measured | |", "|---|---|---|---|"]
+        return "\n".join([*head, *bars, *rows, "", *self.lines])

@@ -1,0 +1,106 @@
+"""One problem, many seeds: BiCRDT, then each stage of the post-processing, with everything that the bars ask for."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.shorten.axis import axis_cut, double_axis_cut
+from rrtik_ompl.shorten.axis_rounds import axis_cut_rounds, route_rank
+from rrtik_ompl.transitions import route_length, single_joint, transitions
+
+STAGES = ("raw", "pass 1", "pass 2", "extra rounds")
+
+
+@dataclass(frozen=True)
+class RouteRun:
+    """One plan and its post-processing; the lists follow STAGES."""
+
+    iterations: int
+    routes: list[np.ndarray]
+    search_seconds: float  # plan() with its own second check
+    post_seconds: float  # the double pass
+    search_motions: int
+    post_motions: int
+    sound: bool  # every stage: one joint at a time, valid at half resolution, ends exact
+
+    @property
+    def moves(self) -> list[int]:
+        """Transitions of each stage."""
+        return [transitions(route) for route in self.routes]
+
+    @property
+    def lengths(self) -> list[float]:
+        """Length of each stage [rad]."""
+        return [route_length(route) for route in self.routes]
+
+
+class CountedMotions:
+    """Counts the motions that the post-processing asks for."""
+
+    def __init__(self, world: Any) -> None:
+        self.world = world
+        self.count = 0
+
+    def __call__(self, a: np.ndarray, b: np.ndarray) -> bool:
+        """Whether the motion is free."""
+        self.count += 1
+        return bool(self.world.motion_valid(a, b))
+
+
+def route_run(problem: Problem, seed: int) -> RouteRun:
+    """Plan with BiCRDT and cut."""
+    plan = rrtik.plan(problem, planner="bicrdt", seconds=60.0, seed=seed, restarts=0)
+    if plan.path is None:
+        raise SystemExit(f"{problem.name}, seed {seed}: {plan.reason}")
+    motions, raw, begin = CountedMotions(problem.world), plan.path.waypoints, perf_counter()
+    twice = double_axis_cut(raw, motions)
+    post_seconds = perf_counter() - begin
+    test = problem.world.motion_valid
+    routes = [raw, axis_cut(raw, test), twice, axis_cut_rounds(raw, test, seed=seed)]
+    return RouteRun(
+        int(plan.statistics["iterations"]),
+        routes,
+        plan.seconds,
+        post_seconds,
+        int(plan.statistics["checked_motions"]),
+        motions.count,
+        all(sound(problem, route) for route in routes),
+    )
+
+
+def sound(problem: Problem, route: np.ndarray) -> bool:
+    """Whether a route moves one joint at a time, is valid at half resolution and has the ends of the problem."""
+    ends = (route[0] == problem.start).all() and (route[-1] == problem.goal.q).all()
+    valid = not JointPath.of(problem.world.robot, route).violations(problem.world)
+    return bool(ends and valid and single_joint(route))
+
+
+def best_of_groups(runs: list[RouteRun], stage: int, size: int) -> list[np.ndarray]:
+    """Restarts: the best route of a stage in each group of ``size`` runs with seeds of their own."""
+    groups = [runs[i : i + size] for i in range(0, len(runs) - size + 1, size)]
+    return [min((run.routes[stage] for run in group), key=route_rank) for group in groups]
+
+
+def share(items: list[Any], wanted: Callable[[Any], bool]) -> float:
+    """Share of the items for which ``wanted`` is true."""
+    return sum(bool(wanted(item)) for item in items) / max(len(items), 1)
+
+
+def joints_of(route: np.ndarray) -> tuple[int, ...]:
+    """Which joint each edge of a route moves, counted from 1."""
+    return tuple((np.diff(route, axis=0) != 0.0).argmax(axis=1) + 1)
+
+
+def histogram(values: list[int]) -> str:
+    """``3: 60 %, 5: 40 %``."""
+    counts = Counter(values)
+    return ", ".join(f"{value}: {100 * counts[value] / len(values):.0f} %" for value in sorted(counts))

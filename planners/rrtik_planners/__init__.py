@@ -1,0 +1,6 @@
+"""Our motion planners, each an ``ompl.base.Planner``, one idea per file."""
+
+from rrtik_planners.bicrdt import BiCRDT
+from rrtik_planners.crdt import CRDT
+
+__all__ = ["CRDT", "BiCRDT"]

@@ -1,0 +1,53 @@
+"""TITAN 4: a seven-function hydraulic subsea manipulator, six joints and a jaw."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.robot_build import JointLimits
+from rrtik_ompl.urdf import robot_from_urdf_text
+from rrtik_robots.titan4.geometry import JOINTS, LIMITS_ENVELOPE_DEG, LIMITS_PLANNING_DEG, TitanGeometry
+from rrtik_robots.titan4.geometry import geometry_from, limits_rad
+from rrtik_robots.titan4.urdf import titan4_urdf
+
+__all__ = ["JOINTS", "LIMITS_ENVELOPE_DEG", "LIMITS_PLANNING_DEG", "TitanGeometry", "titan4", "titan4_urdf"]
+
+FOLDER = Path(__file__).parent
+
+
+def titan4(
+    *,
+    limits: str = "planning",
+    lengths: Mapping[str, float] | TitanGeometry | None = None,
+    tip: str = "grip_point",
+    base_pose: Any | None = None,
+) -> Robot:
+    """The arm, its world origin on the azimuth axis at the height of the shoulder, x forward, z up.
+
+    All angles are physical ones: 0 is the arm stretched along x, wrist yaw 0 the straight wrist.
+
+    Args:
+        limits: ``"planning"`` (of the published planning tests) or ``"envelope"`` (measured from the
+            shoulder-elbow line: for everything about reach); they differ in the shoulder's stroke by 7.81 degrees.
+        lengths: Lengths [m] that differ from `TitanGeometry`'s, by name.
+        tip: Link that goals refer to.
+        base_pose: ``pinocchio.SE3`` T_world_base.
+
+    Raises:
+        InputError: If the limit set, a length or the tip makes no sense.
+    """
+    bounds = {joint: JointLimits(lower=low, upper=high) for joint, (low, high) in limits_rad(limits).items()}
+    return robot_from_urdf_text(
+        titan4_urdf(geometry_from(lengths)),
+        name="titan4",
+        where="titan4",
+        srdf=FOLDER / "titan4.srdf",
+        joint_limits=FOLDER / "joint_limits.yaml",
+        joints=JOINTS,
+        tip=tip,
+        base_pose=base_pose,
+        limits=bounds,
+    )

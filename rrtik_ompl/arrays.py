@@ -1,0 +1,50 @@
+"""Array types and the checks that every array from outside passes: shape, finiteness, a private read-only copy."""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.errors import InputError
+
+Vector: TypeAlias = NDArray[np.float64]  # shape (n,)
+Matrix: TypeAlias = NDArray[np.float64]  # shape (m, n)
+Mask: TypeAlias = NDArray[np.bool_]  # shape (m,)
+
+
+def frozen(values: ArrayLike, dtype: Any = np.float64) -> NDArray[Any]:
+    """Return a read-only, contiguous private copy of ``values``."""
+    array = np.array(values, dtype=dtype, order="C", copy=True)
+    array.setflags(write=False)
+    return array
+
+
+def finite_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) -> NDArray[np.float64]:
+    """Check an array given by a user and return it as float64.
+
+    Args:
+        values: Anything numpy can turn into numbers.
+        shape: Wanted shape; ``None`` stands for any length in that place.
+        what: Name of the value, used in the error message.
+
+    Raises:
+        InputError: If the values are not numbers, have another shape, or are not all finite.
+    """
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{what}: expected numbers, got {_short(values)}") from error
+    wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
+    if array.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, array.shape, strict=True)):
+        raise InputError(f"{what}: expected an array of shape {wanted}, got shape {array.shape}")
+    if not np.isfinite(array).all():
+        place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise InputError(f"{what}: every number must be finite, but entry {list(place)} is {array[place]}")
+    return array
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,173 @@
+"""The solids of a world, robot links and obstacles alike, and the pairs of them that must not touch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import Scene
+from rrtik_ompl.solids import pieces, robot_solids
+
+ALWAYS_COLLIDING_SAMPLES = 64
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """One coal geometry that moves with a joint.
+
+    Attributes:
+        name: The link, obstacle or attached object that it belongs to; several bodies may share a name.
+        joint: Pinocchio joint number; 0 stands still.
+        placement: ``pinocchio.SE3`` in the joint's frame.
+        geometry: The coal geometry.
+        kind: "link", "attached" or "obstacle".
+    """
+
+    name: str
+    joint: int
+    placement: Any
+    geometry: Any
+    kind: str
+
+
+def link_bodies(robot: Robot) -> tuple[Body, ...]:
+    """The robot's own bodies."""
+    return tuple(
+        Body(robot.link_of(item), item.parentJoint, item.placement, solid, "link")
+        for item, solid in zip(robot.collision.geometryObjects, robot_solids(robot), strict=True)
+    )
+
+
+def scene_bodies(robot: Robot, scene: Scene) -> tuple[Body, ...]:
+    """Bodies of all obstacles and attached objects.
+
+    Raises:
+        UnknownNameError: If an attached object names a link that the robot does not have.
+        InputError: If an obstacle has the name of a link.
+    """
+    links = robot.link_names
+    for name in scene.names:
+        if name in links:
+            raise InputError(f"scene: '{name}' is also the name of a link of robot '{robot.name}'; rename the obstacle")
+    found = [
+        Body(o.name, 0, o.pose * piece.placement, piece.geometry, "obstacle")
+        for o in scene.obstacles
+        for piece in pieces(o.shape)
+    ]
+    for item in scene.attached:
+        for link in (item.link, *item.allow):
+            if link not in links:
+                raise UnknownNameError(f"link of robot '{robot.name}'", link, links, where=f"attached '{item.name}'")
+        frame = robot.model.frames[robot.model.getFrameId(item.link, pin.FrameType.BODY)]
+        mount = frame.placement * item.pose
+        found += [
+            Body(item.name, frame.parentJoint, mount * piece.placement, piece.geometry, "attached")
+            for piece in pieces(item.shape)
+        ]
+    return tuple(found)
+
+
+def colliding_pairs(robot: Robot, scene: Scene, bodies: tuple[Body, ...]) -> tuple[tuple[int, int], ...]:
+    """Numbers of the bodies that must not touch: all but what is rigidly joined, adjacent, or allowed.
+
+    Raises:
+        UnknownNameError: If an allowed collision names something that does not exist.
+    """
+    allowed = _allowed(robot, scene)
+    parent = _carrying_parents(robot, bodies)
+    checked_links = _self_collision_names(robot)
+    found = []
+    for i, first in enumerate(bodies):
+        for j in range(i + 1, len(bodies)):
+            second = bodies[j]
+            if first.kind == "obstacle" and second.kind == "obstacle":
+                continue
+            names = frozenset((first.name, second.name))
+            if names in allowed or len(names) == 1:
+                continue
+            if "obstacle" not in (first.kind, second.kind):
+                if not robot.self_collision or _adjacent(first.joint, second.joint, parent):
+                    continue
+                if first.kind == second.kind == "link" and names not in checked_links:
+                    continue
+            found.append((i, j))
+    return tuple(found)
+
+
+def _allowed(robot: Robot, scene: Scene) -> set[frozenset[str]]:
+    known = {*robot.link_names, *scene.names}
+    for pair in scene.allowed_collisions:
+        for name in pair:
+            if name not in known:
+                raise UnknownNameError("link or obstacle", name, known, where="allowed_collisions")
+    allowed = {frozenset(pair) for pair in scene.allowed_collisions}
+    for item in scene.attached:
+        allowed |= {frozenset((item.name, link)) for link in (item.link, *item.allow)}
+    return allowed
+
+
+def _carrying_parents(robot: Robot, bodies: Iterable[Body]) -> dict[int, int]:
+    """For each joint that carries a body: the nearest joint towards the base that also does."""
+    carrying = {0} | {b.joint for b in bodies if b.kind != "obstacle"}
+    found = {}
+    for joint in carrying - {0}:
+        above = int(robot.model.parents[joint])
+        while above not in carrying:
+            above = int(robot.model.parents[above])
+        found[joint] = above
+    return found
+
+
+def _adjacent(first: int, second: int, parent: dict[int, int]) -> bool:
+    return first == second or parent.get(first) == second or parent.get(second) == first
+
+
+@lru_cache(maxsize=64)
+def _self_collision_names(robot: Robot) -> frozenset[frozenset[str]]:
+    """Pairs of links to check. Without a list of allowed pairs, those that always collide are left out.
+
+    A robot description without an SRDF says nothing about links that overlap by construction; a pair that collides in
+    every one of many random configurations can only be such a one.
+    """
+    bodies = link_bodies(robot)
+    parent = _carrying_parents(robot, bodies)
+    pairs = [
+        (i, j)
+        for i in range(len(bodies))
+        for j in range(i + 1, len(bodies))
+        if bodies[i].name != bodies[j].name
+        and not _adjacent(bodies[i].joint, bodies[j].joint, parent)
+        and frozenset((bodies[i].name, bodies[j].name)) not in robot.allowed_collisions
+    ]
+    names = frozenset(frozenset((bodies[i].name, bodies[j].name)) for i, j in pairs)
+    if robot.allowed_collisions or not robot.self_collision:
+        return names
+    return names - _always_colliding(robot, bodies, pairs)
+
+
+def _always_colliding(
+    robot: Robot, bodies: tuple[Body, ...], pairs: list[tuple[int, int]]
+) -> frozenset[frozenset[str]]:
+    rng = np.random.default_rng(0)
+    low, high = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
+    samples = robot.joint_frames(rng.uniform(low, high, (ALWAYS_COLLIDING_SAMPLES, robot.dof)))
+    suspects = set(pairs)
+    for frames in samples:
+        suspects = {p for p in suspects if _touch(bodies[p[0]], bodies[p[1]], frames)}
+    return frozenset(frozenset((bodies[i].name, bodies[j].name)) for i, j in suspects)
+
+
+def _touch(first: Body, second: Body, frames: Any) -> bool:
+    poses = [pin.SE3(frames[b.joint]) * b.placement for b in (first, second)]
+    transforms = [coal.Transform3s(p.rotation, p.translation) for p in poses]
+    result = coal.CollisionResult()
+    request = coal.CollisionRequest()
+    return bool(coal.collide(first.geometry, transforms[0], second.geometry, transforms[1], request, result))

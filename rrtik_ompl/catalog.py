@@ -1,0 +1,250 @@
+"""Names to things: robots, planners and problems that installed packages offer through entry points, and robot files.
+
+Another package adds its own by entry points in the groups ``rrtik_ompl.robots`` (name -> a function that takes keyword
+options and returns a `Robot`), ``rrtik_ompl.planners`` (name -> a class) and ``rrtik_ompl.problems`` (any name -> the
+``Path`` of a folder of problem files).
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import os
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import Any
+
+from rrtik_ompl.dh_file import DH_OPTIONS, robot_from_dh_file
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.robot_source import base_pose, plain, source_entry
+from rrtik_ompl.urdf import URDF_OPTIONS, robot_from_urdf
+
+FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh")
+FILE_KINDS = (".urdf", ".xml", ".yaml", ".yml")
+PARAMETRIC = ("planar", "point2d")  # robots that a problem file describes by a group of keys of their own
+CACHE_SIZE = 64
+
+
+def list_robots() -> tuple[str, ...]:
+    """Names that `load_robot` knows."""
+    return tuple(sorted(_offers("robots")))
+
+
+def list_planners() -> tuple[str, ...]:
+    """Names of the planners that packages offer (OMPL's own are not among them)."""
+    return tuple(sorted(_offers("planners")))
+
+
+def find_planner(name: str) -> Any:
+    """Planner class of a name.
+
+    Raises:
+        UnknownNameError: If no package offers it.
+    """
+    return _load("planner", "planners", name)
+
+
+def list_problems() -> tuple[str, ...]:
+    """Names of the problems that packages ship."""
+    return tuple(sorted(_problem_files()))
+
+
+def find_problem(name: str) -> Path:
+    """File of a shipped problem.
+
+    Raises:
+        UnknownNameError: If no package ships it.
+    """
+    files = _problem_files()
+    if name not in files:
+        raise UnknownNameError("problem", name, files)
+    return files[name]
+
+
+def load_robot(name: str | os.PathLike[str], **options: Any) -> Robot:
+    """Load a robot by name or from a file; the same call gives the same object, unless a file of it has changed.
+
+    Args:
+        name: A name from `list_robots`, or the path of a URDF (``.urdf``, ``.xml``) or of a DH table (``.yaml``).
+        **options: What the robot takes: any of them ``base_pose``, ``tip`` and ``locked`` where they apply; a URDF
+            ``srdf, group, joints, joint_limits, packages``; a shipped robot for instance ``limits="envelope"``.
+            ``base_pose`` is a ``pinocchio.SE3`` or ``{"xyz": [..], "quat_xyzw": [..]}``.
+
+    Raises:
+        UnknownNameError: If there is no robot of that name.
+        InputError: If the robot does not take an option, or a file or value cannot be used.
+    """
+    recipe = _recipe(name)
+    for option in options:
+        if option not in recipe.options:
+            raise InputError(
+                f"robot '{os.fspath(name)}' takes no option '{option}'; it takes {', '.join(recipe.options)}"
+            )
+    given = {key: _absolute(key, value) for key, value in options.items() if value is not None}
+    if "base_pose" in given:
+        given["base_pose"] = base_pose(given["base_pose"], f"robot '{os.fspath(name)}': base_pose")
+    key = json.dumps([recipe.target, plain(given)], sort_keys=True, default=repr)
+    cached = _cache.get(key)
+    if cached is None:
+        robot = recipe.make(**given)
+        cached = _cache.put(key, replace(robot, source=recipe.source(given)), [recipe.target, *_paths(given)])
+    return cached
+
+
+def robot_from_entry(entry: str | Mapping[str, Any], folder: str | os.PathLike[str] = ".") -> Robot:
+    """Robot that a problem file names under ``robot``.
+
+    Args:
+        entry: A name; or ``{name: .., options}``, ``{urdf: FILE, options}``, ``{dh: FILE, options}``,
+            ``{planar: {..}}``, ``{point2d: {..}}``; the last two take ``base_pose`` beside them.
+        folder: Folder of the problem file; files are named relative to it.
+
+    Raises:
+        InputError: If the entry has another form, or the robot cannot be loaded.
+    """
+    if isinstance(entry, str):
+        return load_robot(_beside(entry, folder) if Path(entry).suffix.lower() in FILE_KINDS else entry)
+    kinds = ("name", "urdf", "dh", *PARAMETRIC)
+    if not isinstance(entry, Mapping):
+        raise InputError(f"robot: expected a name or one of the keys {', '.join(kinds)}")
+    found = [key for key in kinds if key in entry]
+    if len(found) != 1:
+        raise InputError(f"robot: needs exactly one of the keys {', '.join(kinds)}; found {', '.join(found) or 'none'}")
+    kind = found[0]
+    options = {key: _resolved(key, value, folder) for key, value in entry.items() if key != kind}
+    if kind in PARAMETRIC:
+        if not isinstance(entry[kind], Mapping):
+            raise InputError(f"robot: {kind}: expected a group of keys such as {{radius: 0.1}}")
+        return load_robot(kind, **dict(entry[kind]), **options)
+    target = entry[kind]
+    if not isinstance(target, str):
+        raise InputError(f"robot: {kind}: expected text, found {target!r}")
+    return load_robot(target if kind == "name" else _beside(target, folder), **options)
+
+
+@dataclass(frozen=True, slots=True)
+class _Recipe:
+    """How to make a robot: from what, with which options."""
+
+    kind: str
+    target: str
+    make: Callable[..., Robot]
+    options: tuple[str, ...]
+
+    def source(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        options = source_entry(given)
+        if self.target not in PARAMETRIC:
+            return {self.kind: self.target} | options
+        beside = {key: options.pop(key) for key in ("base_pose",) if key in options}
+        return {self.target: options} | beside
+
+
+def _recipe(name: str | os.PathLike[str]) -> _Recipe:
+    text = os.fspath(name)
+    path = Path(text)
+    if isinstance(name, str) and text in _offers("robots"):
+        make = _load("robot", "robots", text)
+        return _Recipe("name", text, make, tuple(sorted(inspect.signature(make).parameters)))
+    suffix = path.suffix.lower()
+    if suffix == ".xacro":
+        raise InputError(f"{text}: xacro must be expanded first: xacro {path.name} > {path.stem}")
+    if suffix in (".yaml", ".yml"):
+        return _Recipe("dh", str(path.resolve()), lambda **given: robot_from_dh_file(path, **given), DH_OPTIONS)
+    if suffix in (".urdf", ".xml"):
+        return _Recipe("urdf", str(path.resolve()), lambda **given: robot_from_urdf(path, **given), URDF_OPTIONS)
+    if path.parent != Path() or path.exists():
+        raise InputError(f"{text}: not a robot file; expected a URDF (.urdf) or a DH table (.yaml)")
+    raise UnknownNameError("robot", text, list_robots())
+
+
+@lru_cache(maxsize=None)
+def _offers(group: str) -> dict[str, EntryPoint]:
+    return {entry.name: entry for entry in entry_points(group=f"rrtik_ompl.{group}")}
+
+
+def _load(what: str, group: str, name: str) -> Any:
+    offers = _offers(group)
+    if name not in offers:
+        raise UnknownNameError(what, name, offers)
+    try:
+        return offers[name].load()
+    except (ImportError, AttributeError) as error:
+        raise InputError(f"{what} '{name}': {offers[name].value} cannot be loaded: {error}; reinstall it") from error
+
+
+def _problem_files() -> dict[str, Path]:
+    folders = [Path(_load("problem folder", "problems", name)) for name in _offers("problems")]
+    return {file.stem: file for folder in folders for file in sorted(folder.glob("*.yaml"))}
+
+
+def _beside(path: str, folder: str | os.PathLike[str]) -> Path:
+    return Path(folder) / path
+
+
+def _resolved(key: str, value: Any, folder: str | os.PathLike[str]) -> Any:
+    if key in FILE_OPTIONS and isinstance(value, str):
+        return _beside(value, folder)
+    if key == "packages" and not isinstance(value, Mapping):
+        return [_beside(str(item), folder) for item in ([value] if isinstance(value, str) else value)]
+    return value
+
+
+def _absolute(key: str, value: Any) -> Any:
+    """Files by their absolute path, so that the cache does not depend on the current folder."""
+    if key in FILE_OPTIONS and isinstance(value, (str, os.PathLike)):
+        return Path(value).absolute()
+    if key == "packages":
+        return [Path(item).absolute() for item in ([value] if isinstance(value, (str, os.PathLike)) else value)]
+    return value
+
+
+def _paths(options: Mapping[str, Any]) -> list[str]:
+    return [os.fspath(options[key]) for key in FILE_OPTIONS if isinstance(options.get(key), (str, os.PathLike))]
+
+
+Stamp = tuple[str, int, int]
+
+
+class _Cache:
+    """The robots loaded last, each with the size and time of the files it came from."""
+
+    def __init__(self) -> None:
+        self._robots: OrderedDict[str, tuple[Robot, tuple[Stamp, ...]]] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def get(self, key: str) -> Robot | None:
+        with self._lock:
+            found = self._robots.get(key)
+            if found is None or _stamps(path for path, _, _ in found[1]) != found[1]:
+                return None
+            self._robots.move_to_end(key)
+            return found[0]
+
+    def put(self, key: str, robot: Robot, files: Iterable[str]) -> Robot:
+        solids = (*robot.collision.geometryObjects, *robot.visual.geometryObjects)
+        stamps = _stamps({*files, *(solid.meshPath for solid in solids)})
+        with self._lock:
+            self._robots[key] = (robot, stamps)
+            if len(self._robots) > CACHE_SIZE:
+                self._robots.popitem(last=False)
+        return robot
+
+
+def _stamps(paths: Iterable[str]) -> tuple[Stamp, ...]:
+    found = []
+    for path in sorted(paths):
+        try:
+            state = os.stat(path)
+        except (OSError, ValueError):  # a name, or a file that is gone: then the next load says so
+            continue
+        found.append((path, state.st_mtime_ns, state.st_size))
+    return tuple(found)
+
+
+_cache = _Cache()

@@ -1,0 +1,280 @@
+"""The command line `rrtik`. Exit 0: found or valid; 1: not found or not valid; 2: bad input; 130: interrupted."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rrtik_ompl.errors import InputError, RrtikError
+
+FOUND, NOT_FOUND, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+PATH_ENDINGS = (".json", ".csv", ".txt")
+UsageError: Any = typer.BadParameter.__bases__[0]  # click's, which typer carries under a private name
+
+app = typer.Typer(
+    help="Plan collision-free paths for robot arms.",
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+ProblemName = Annotated[str, typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.")]
+PathFile = Annotated[Path | None, typer.Argument(help="A path file: .json, .csv or .txt.")]
+HtmlFile = Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")]
+
+
+class Kind(str, Enum):
+    """What `rrtik list` can list."""
+
+    robots = "robots"
+    planners = "planners"
+    problems = "problems"
+
+
+class Shorten(str, Enum):
+    """What `rrtik plan` does to the raw path; `auto` is axis for a path of single-joint moves and none otherwise."""
+
+    auto = "auto"
+    axis = "axis"
+    none = "none"
+
+
+@app.callback(invoke_without_command=False)
+def _options(
+    version: Annotated[bool, typer.Option("--version", help="Print the version.", is_eager=True)] = False,
+) -> None:
+    if version:
+        from rrtik_ompl import __version__
+
+        print(f"rrtik {__version__}")
+        raise typer.Exit
+
+
+@app.command()
+def plan(
+    problem: ProblemName,
+    planner: Annotated[str, typer.Option(help="See: rrtik list planners.")] = "bicrdt",
+    seconds: Annotated[float, typer.Option(help="Time limit [s].")] = 5.0,
+    seed: Annotated[int | None, typer.Option(help="The same seed gives the same path.")] = None,
+    restarts: Annotated[int, typer.Option(help="New attempts at most, if one gives up early.")] = 20,
+    parameter: Annotated[
+        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="An option of the planner; repeatable.")
+    ] = None,
+    shorten: Annotated[Shorten, typer.Option(help="Post-processing.")] = Shorten.auto,
+    out: Annotated[Path | None, typer.Option(help="Save the path: .json, .csv or .txt (OMPL matrix).")] = None,
+    html: HtmlFile = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
+) -> int:
+    """Find a path and print its moves."""
+    _check_target(out, PATH_ENDINGS)
+    _check_target(html, (".html", ".htm"))
+    from rrtik_ompl import load_problem, report
+    from rrtik_ompl.plan import find_planner
+    from rrtik_ompl.plan import plan as find_path
+
+    find_planner(planner)
+    question = load_problem(problem)
+    with _progress(f"planning {question.name} with {planner}"):
+        found = find_path(
+            question, planner, seconds=seconds, seed=seed, restarts=restarts, parameters=_parameters(parameter or [])
+        )
+    with _progress("shortening"):
+        path, shorten_seconds = _shortened(found.path, question, shorten)
+    if path is not None and out is not None:
+        path.save(out)
+    if path is not None and html is not None:
+        from rrtik_ompl.viewer import view
+
+        with _progress("drawing"):
+            view(question, path, html=html)
+    if as_json:
+        print(json.dumps(report.document(question, found, path, shorten_seconds)))
+    else:
+        _print(*report.summary(question, found, path, shorten_seconds))
+        if path is not None:
+            _print(report.moves_table(path) if path.one_joint_at_a_time else report.waypoints_table(path))
+        _print(*(f"wrote {file}" for file in (out, html) if path is not None and file is not None))
+    return FOUND if found.found else NOT_FOUND
+
+
+@app.command()
+def check(problem: ProblemName, path: PathFile = None) -> int:
+    """Check a problem file, and a path for it, densely and independently of any planner."""
+    from rrtik_ompl import load_path, load_problem
+
+    question = load_problem(problem)
+    world = question.world
+    _print(f"{question.name}: start is free, clearance {_millimetres(world.clearance(question.start))}")
+    if path is None:
+        return FOUND
+    route = load_path(path, world.robot)
+    faults = [f"edge {v.edge + 1}: {v.reason}" for v in route.violations(world)]
+    if abs(route.start - question.start).max() > 1e-6:
+        faults.append("the path does not begin at the start of the problem")
+    if not question.reached(route.end):
+        faults.append("the path does not end at the goal of the problem")
+    for fault in faults:
+        _print(f"{path}: {fault}")
+    if faults:
+        return NOT_FOUND
+    step = 0.5 * world.motion_resolution
+    size = f"{len(route.waypoints)} waypoints, {route.transitions} moves, length {route.length:.2f} rad"
+    _print(f"{path}: valid, checked every {step:g} m; {size}")
+    return FOUND
+
+
+@app.command()
+def show(
+    problem: ProblemName,
+    path: PathFile = None,
+    html: HtmlFile = None,
+    port: Annotated[int, typer.Option(help="Port on 127.0.0.1; 0 takes a free one.", min=0, max=65535)] = 0,
+) -> int:
+    """Show a problem, and a path for it, in 3-D: a live page on 127.0.0.1, or a file."""
+    _check_target(html, (".html", ".htm"))
+    from rrtik_ompl import load_path, load_problem
+    from rrtik_ompl.viewer import view
+
+    question = load_problem(problem)
+    route = None if path is None else load_path(path, question.world.robot)
+    if html is not None:
+        view(question, route, html=html)
+        _print(f"wrote {html}")
+        return FOUND
+    view(question, route, port=port, on_ready=lambda url: _print(f"open {url} in a browser; Ctrl-C ends"))
+    return FOUND
+
+
+@app.command("list")
+def list_names(kind: Annotated[Kind | None, typer.Argument(help="All three kinds if left out.")] = None) -> int:
+    """List what is there by name."""
+    from rrtik_ompl import list_planners, list_problems, list_robots
+
+    sources = {Kind.robots: list_robots, Kind.planners: list_planners, Kind.problems: list_problems}
+    for each in Kind if kind is None else (kind,):
+        if kind is None:
+            _print(f"{each.value}:")
+        _print(*(name if kind else f"  {name}" for name in sources[each]()))
+    return FOUND
+
+
+@app.command()
+def convert(
+    source: Annotated[Path, typer.Argument(metavar="IN", help="A path file, or a problem (MotionBenchMaker too).")],
+    target: Annotated[Path, typer.Argument(metavar="OUT", help="The ending says which format.")],
+    robot: Annotated[str | None, typer.Option(help="Robot that the file is for, where the file does not say.")] = None,
+) -> int:
+    """Convert between path formats (.json, .csv, .txt), or write any problem as a problem file (.yaml)."""
+    from rrtik_ompl import load_path, load_problem, load_robot, save_problem
+
+    if source.suffix.lower() in PATH_ENDINGS:
+        _check_target(target, PATH_ENDINGS)
+        load_path(source, None if robot is None else load_robot(robot)).save(target)
+    else:
+        _check_target(target, (".yaml", ".yml"))
+        save_problem(load_problem(source, robot=robot), target)
+    _print(f"wrote {target}")
+    return FOUND
+
+
+def main() -> None:
+    """Run the command line and exit with its code."""
+    sys.exit(run())
+
+
+def run(arguments: list[str] | None = None) -> int:
+    """Run the command line with ``arguments`` (the process's own if None) and return the exit code."""
+    try:
+        code = app(args=arguments, prog_name="rrtik", standalone_mode=False)
+        sys.stdout.flush()
+        return int(code or 0)
+    except RrtikError as error:
+        return _fail(str(error))
+    except UsageError as error:
+        text = " ".join(error.format_message().split())
+        return _fail(f"{text} (see: rrtik --help)") if text and "--help" not in text else BAD_INPUT
+    except (KeyboardInterrupt, typer.Abort):
+        print("rrtik: interrupted; nothing was written", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the reader has gone; nobody is left to tell
+        return FOUND
+
+
+def _fail(message: str) -> int:
+    print(f"rrtik: {message}", file=sys.stderr)
+    return BAD_INPUT
+
+
+def _shortened(path: Any, problem: Any, method: Shorten) -> tuple[Any, float]:
+    from rrtik_ompl.shorten import shorten
+
+    wanted = method
+    if path is not None and method is Shorten.auto:
+        wanted = Shorten.axis if path.one_joint_at_a_time else Shorten.none
+    if path is None or wanted is Shorten.none:
+        return path, 0.0
+    begin = time.perf_counter()
+    return shorten(path, problem, method=wanted.value), time.perf_counter() - begin
+
+
+def _parameters(pairs: list[str]) -> dict[str, Any]:
+    """``--set range=0.5`` as {"range": 0.5}: JSON values, anything else is text."""
+    found = {}
+    for pair in pairs:
+        name, equals, value = pair.partition("=")
+        if not equals or not name:
+            raise InputError(f"--set {pair}: expected NAME=VALUE, for example --set range=0.5")
+        try:
+            found[name] = json.loads(value)
+        except json.JSONDecodeError:
+            found[name] = value
+    return found
+
+
+def _check_target(path: Path | None, endings: tuple[str, ...]) -> None:
+    """Refuse a file that cannot be written before the work is done, not after."""
+    if path is None:
+        return
+    if path.suffix.lower() not in endings:
+        raise InputError(f"{path}: unknown ending '{path.suffix}'; use {', '.join(endings)}")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: folder '{path.parent}' does not exist; create it")
+
+
+def _millimetres(distance: float) -> str:
+    return "unlimited" if distance == float("inf") else f"{1e3 * distance:.1f} mm"
+
+
+def _print(*items: Any) -> None:
+    from rich.console import Console
+
+    console = Console(highlight=False, soft_wrap=True, markup=False)
+    for item in items:
+        console.print(item)
+
+
+@contextmanager
+def _progress(message: str) -> Iterator[None]:
+    """A spinner on standard error while something takes time; nothing unless that is a terminal."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status(message):
+        yield
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,117 @@
+"""DH tables in YAML files: ``version: 1``, ``name``, ``dh: {convention, rows, radius, tool}``, ``postures_deg``."""
+
+from __future__ import annotations
+
+import os
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from rrtik_ompl.dh import DhRow, robot_from_dh
+from rrtik_ompl.file_format import Name, NotNegative, Number, Numbers, Positive, Section, Vector2, Vector3, Vector4, parse
+from rrtik_ompl.poses import IDENTITY_QUATERNION, pose
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.yaml_file import YamlDocument, read_yaml
+
+DH_OPTIONS = ("base_pose",)
+
+
+class RowEntry(Section):
+    """One joint. Angles in degrees in the keys that end in _deg, lengths in metres."""
+
+    joint: str = Field("", description="name; joint1, joint2, ... if absent")
+    type: Literal["revolute", "continuous", "prismatic"] = "revolute"
+    a: Number = 0.0
+    alpha_deg: Number = 0.0
+    d: Number = 0.0
+    theta_deg: Number = 0.0
+    limits_deg: Vector2 | None = Field(None, description="lower and upper limit of a revolute joint")
+    limits: Vector2 | None = Field(None, description="lower and upper limit [m] of a prismatic joint")
+    velocity: Positive | None = Field(None, description="[rad/s or m/s]")
+    acceleration: Positive | None = None
+    jerk: Positive | None = None
+
+
+class ToolEntry(Section):
+    """Pose of the tip in the frame of the last row."""
+
+    xyz: Vector3
+    quat_xyzw: Vector4 = list(IDENTITY_QUATERNION)
+
+
+class TableEntry(Section):
+    """The table."""
+
+    convention: Literal["standard", "modified"] = Field(description="standard (Paul) or modified (Craig)")
+    rows: Annotated[list[RowEntry], Field(min_length=1)]
+    radius: NotNegative | list[NotNegative] = Field(0.05, description="of the links [m], one number or one per row")
+    tool: ToolEntry | None = None
+
+
+class DhFile(Section):
+    """A robot given by a DH table."""
+
+    version: Literal[1]
+    name: Name
+    dh: TableEntry
+    postures_deg: dict[str, Numbers] = Field({}, description="named configurations [deg, m if prismatic]")
+
+
+def robot_from_dh_file(path: str | os.PathLike[str], *, base_pose: Any | None = None) -> Robot:
+    """Load a robot from a DH table file.
+
+    Args:
+        path: YAML file.
+        base_pose: ``pinocchio.SE3`` T_world_base.
+
+    Raises:
+        InputError: If the file cannot be read or a value in it makes no sense; with file, line and key.
+    """
+    document = read_yaml(path)
+    entry = parse(document, DhFile)
+    rows = [_row(document, k, row) for k, row in enumerate(entry.dh.rows)]
+    sliding = np.array([row.type == "prismatic" for row in entry.dh.rows])
+    tool = entry.dh.tool
+    postures = {}
+    for key, values in entry.postures_deg.items():
+        if len(values) != len(rows):
+            raise document.error(("postures_deg", key), f"expected {len(rows)} numbers, found {len(values)}")
+        postures[key] = np.where(sliding, values, np.radians(values))
+    with document.at(("dh",)):
+        return robot_from_dh(
+            entry.name,
+            rows,
+            convention=entry.dh.convention,
+            radius=entry.dh.radius,
+            tool=None if tool is None else pose(tool.xyz, tool.quat_xyzw),
+            base_pose=base_pose,
+            postures=postures,
+            source={"dh": os.path.abspath(path)},
+        )
+
+
+def _row(document: YamlDocument, number: int, row: RowEntry) -> DhRow:
+    place = ("dh", "rows", number)
+    given, wrong = ("limits", "limits_deg") if row.type == "prismatic" else ("limits_deg", "limits")
+    if getattr(row, wrong) is not None:
+        raise document.error((*place, wrong), f"a {row.type} joint takes {given}; rename the key")
+    limits = getattr(row, given)
+    if row.type == "prismatic" and limits is None:
+        raise document.error(place, "a prismatic joint needs limits: [lower, upper] in metres; add them")
+    lower, upper = (-180.0, 180.0) if limits is None else limits
+    if lower >= upper:
+        raise document.error((*place, given), f"lower limit {lower:g} is not below upper limit {upper:g}; swap them")
+    scale = 1.0 if row.type == "prismatic" else np.pi / 180.0
+    return DhRow(
+        a=row.a,
+        alpha=np.radians(row.alpha_deg),
+        d=row.d,
+        theta=np.radians(row.theta_deg),
+        joint=row.joint,
+        kind=row.type,
+        limits=(lower * scale, upper * scale),
+        velocity=row.velocity or np.inf,
+        acceleration=row.acceleration or np.inf,
+        jerk=row.jerk or np.inf,
+    )

@@ -1,0 +1,58 @@
+"""All errors of the toolkit: one root, each message is one line that names what is wrong and how to mend it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class RrtikError(Exception):
+    """Root of every error raised on purpose by the toolkit.
+
+    Its text is always a single line fit for a person: the file, the field, what was found, the remedy.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(" ".join(str(message).split()))
+
+
+class InputError(RrtikError):
+    """A file, an argument or a value given by the user cannot be used."""
+
+
+class UnknownNameError(InputError):
+    """A name was asked for that does not exist; carries the names that do.
+
+    Attributes:
+        name: The name that was asked for.
+        alternatives: The names that exist, sorted.
+    """
+
+    def __init__(self, kind: str, name: object, alternatives: Iterable[str], *, where: str = "") -> None:
+        self.name = str(name)
+        self.alternatives = tuple(sorted(alternatives))
+        near = get_close_matches(self.name, self.alternatives, n=1)
+        hint = f"; did you mean '{near[0]}'?" if near else ""
+        have = ", ".join(self.alternatives) or "none"
+        prefix = f"{where}: " if where else ""
+        super().__init__(f"{prefix}no {kind} '{self.name}'; have {have}{hint}")
+
+
+class ProblemError(RrtikError):
+    """A planning problem is ill-posed: start or goal in collision, outside limits, or unreachable by construction.
+
+    Attributes:
+        contacts: Pairs of names in collision, empty if the reason is another one.
+    """
+
+    def __init__(self, message: str, contacts: Iterable[tuple[str, str]] = ()) -> None:
+        self.contacts = tuple(contacts)
+        super().__init__(message)
+
+
+class PlannerError(RrtikError):
+    """A planner broke (as opposed to not finding a path, which is data: see ``Plan.reason``)."""
+
+
+class MeshWarning(UserWarning):
+    """A mesh can be used, but not as the solid that its author probably meant."""

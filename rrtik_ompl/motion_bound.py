@@ -1,0 +1,52 @@
+"""How far any point of the arm can move when joints move: the rule that turns a resolution in metres into steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from rrtik_ompl.arrays import Vector, frozen
+from rrtik_ompl.bodies import Body
+from rrtik_ompl.robot import Robot
+
+UNBOUNDED_STROKE = 1.0  # [m] assumed stroke of a prismatic joint without limits
+
+
+def displacement_weights(robot: Robot, bodies: Iterable[Body]) -> Vector:
+    """Weights w, shape (dof,), such that no point of the arm moves farther than ``w @ |b - a|`` [m] from a to b.
+
+    For a revolute joint the weight is the largest distance that any point beyond it can have from its axis (over all
+    postures), for a prismatic joint 1. The bound adds what each joint contributes, hence holds for joint motion along
+    a straight line in configuration space.
+    """
+    chain, count = robot.chain, len(robot.chain.parent)
+    around_origin, around_axis = np.zeros(count), np.zeros(count)
+    tip = robot.model.frames[robot.model.getFrameId(robot.tip)]
+    points = [(b.joint, b.placement.act(b.geometry.aabb_center), b.geometry.aabb_radius) for b in bodies]
+    points.append((tip.parentJoint, tip.placement.translation, 0.0))
+    for k in range(count - 1, -1, -1):  # children come after their parents, so they are done first
+        axis = chain.axis[k]
+        for joint, centre, radius in points:
+            if joint == k + 1:
+                around_origin[k] = max(around_origin[k], float(np.linalg.norm(centre)) + radius)
+                around_axis[k] = max(around_axis[k], _from_axis(centre, axis) + radius)
+        for child in (int(c) for c in np.flatnonzero(chain.parent == k)):
+            reach = around_origin[child] + (_stroke(robot, child) if chain.prismatic[child] else 0.0)
+            origin = chain.placement[child][:3, 3]
+            around_origin[k] = max(around_origin[k], float(np.linalg.norm(origin)) + reach)
+            around_axis[k] = max(around_axis[k], _from_axis(origin, axis) + reach)
+    weights = np.where(chain.prismatic, 1.0, around_axis)
+    return frozen(np.abs(chain.gain).T @ weights)
+
+
+def _from_axis(point: Vector, axis: Vector) -> float:
+    return float(np.linalg.norm(np.cross(axis, point)))
+
+
+def _stroke(robot: Robot, row: int) -> float:
+    """Largest distance of a sliding joint from its zero [m]."""
+    gain, offset = robot.chain.gain[row], robot.chain.offset[row]
+    finite = np.isfinite(robot.lower) & np.isfinite(robot.upper)
+    ends = np.where(finite, np.maximum(np.abs(robot.lower), np.abs(robot.upper)), UNBOUNDED_STROKE)
+    return float(np.abs(gain) @ ends + abs(offset))

@@ -1,0 +1,18 @@
+"""The one room where arrays become OMPL states and back: validity, motions, ownership rules, the safe planner base."""
+
+from rrtik_ompl.ompl_bridge.contract import check_planner
+from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker, WorldLike
+from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner, SearchResult
+from rrtik_ompl.ompl_bridge.states import StateIO, space_bounds
+
+__all__ = [
+    "MotionChecker",
+    "SafePlanner",
+    "SearchResult",
+    "SpaceChecker",
+    "StateIO",
+    "WorldChecker",
+    "WorldLike",
+    "check_planner",
+    "space_bounds",
+]

@@ -1,0 +1,152 @@
+"""One attempt of one planner at one problem, with every OMPL object living and dying inside the call."""
+
+from __future__ import annotations
+
+import re
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from ompl import base as ob
+from ompl import geometric as og
+from ompl import util as ou
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
+from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
+from rrtik_ompl.ompl_bridge.setup import Judge, exact_path, is_joint_goal, problem_definition, space_information
+from rrtik_ompl.problem import Problem
+
+# The planners of the wheel that grow a tree towards a goal of which no configuration is known.
+WORKSPACE_GOAL_PLANNERS = ("KPIECE1", "RRT")
+
+PlannerFactory = Callable[..., Any]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Attempt:
+    """What came out: rows of the path, shape (k, n), or None; OMPL's status in words; plain counts."""
+
+    rows: Matrix | None
+    status: str
+    statistics: Mapping[str, int | float]
+
+
+def ompl_planners() -> dict[str, Any]:
+    """OMPL's geometric planners of the installed wheel by their names."""
+    found = {key: value for key, value in vars(og).items() if isinstance(value, type) and issubclass(value, ob.Planner)}
+    return {key: value for key, value in found.items() if value is not ob.Planner}
+
+
+def attempt(
+    problem: Problem, factory: PlannerFactory, *, seconds: float, seed: int, parameters: Mapping[str, Any]
+) -> Attempt:
+    """Let a planner work on a problem for at most ``seconds``.
+
+    Raises:
+        InputError: If the planner does not take a parameter, or cannot work towards this kind of goal.
+        PlannerError: If the planner broke.
+        KeyboardInterrupt: After the planner has stopped in good order.
+    """
+    own = issubclass(factory, SafePlanner) if isinstance(factory, type) else False
+    name = getattr(factory, "__name__", str(factory))
+    if not is_joint_goal(problem.goal) and name not in WORKSPACE_GOAL_PLANNERS:
+        raise InputError(
+            f"planner {name} needs a goal in joint values, but {problem.name} gives a pose or position; "
+            f"use one of {', '.join(WORKSPACE_GOAL_PLANNERS)}, or give goal joints"
+        )
+    with _quiet():
+        ou.RNG.setSeed(1 + seed % (2**31 - 2))  # before any object that draws from it; OMPL does not take 0
+        judge = Judge(problem.world)
+        si = space_information(problem, judge)
+        definition = problem_definition(problem, si)
+        if own:
+            planner = _own_planner(factory, name, si, problem, seed, parameters)
+        else:
+            planner = _wheel_planner(factory, name, si, definition, parameters)
+        planner.setProblemDefinition(definition)
+        planner.setup()
+        condition = ob.timedPlannerTerminationCondition(seconds)
+        with _interrupt_ends(condition):
+            status = planner.solve(condition)
+        problem_in_planner = judge.error or (getattr(planner, "error", None) if str(status) == "Crash" else None)
+        if problem_in_planner is not None:
+            raise PlannerError(f"planner {name} broke: {str(problem_in_planner).splitlines()[-1]}")
+        counts = dict(planner.statistics) if own else {"checked_states": judge.states, "checked_motions": judge.motions}
+        return Attempt(exact_path(definition, si), str(status), counts)
+
+
+def _own_planner(
+    factory: PlannerFactory, name: str, si: Any, problem: Problem, seed: int, parameters: Mapping[str, Any]
+) -> Any:
+    try:
+        return factory(si, world=problem.world, seed=seed, **parameters)
+    except TypeError as error:
+        raise InputError(f"planner {name}: {error}") from None
+
+
+def _wheel_planner(factory: PlannerFactory, name: str, si: Any, definition: Any, parameters: Mapping[str, Any]) -> Any:
+    planner = factory(si)
+    try:
+        for key, value in parameters.items():
+            _set(planner, name, key, value)
+    except InputError:
+        planner.setProblemDefinition(definition)  # AORRTC ends the process if it is destroyed before it was set up
+        planner.setup()
+        raise
+    return planner
+
+
+def _set(planner: Any, name: str, key: str, value: Any) -> None:
+    """Set ``goal_bias`` through ``setGoalBias`` and so on."""
+    setters = {s for s in dir(planner) if s.startswith("set") and not hasattr(ob.Planner, s)}
+    setter = "set" + "".join(part[:1].upper() + part[1:] for part in key.split("_"))
+    if setter not in setters:
+        raise UnknownNameError(f"parameter of planner {name}", key, (_snake(s) for s in setters))
+    try:
+        getattr(planner, setter)(value)
+    except TypeError:
+        raise InputError(f"planner {name}: parameter {key} cannot be {value!r}") from None
+
+
+def _snake(setter: str) -> str:
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", setter.removeprefix("set")).lower()
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Silence OMPL's log, which goes to standard output, for the time of one attempt."""
+    level = ou.getLogLevel()
+    ou.setLogLevel(ou.LogLevel.LOG_NONE)
+    try:
+        yield
+    finally:
+        ou.setLogLevel(level)
+
+
+@contextmanager
+def _interrupt_ends(condition: Any) -> Iterator[None]:
+    """Ctrl-C ends the planner through its termination condition and is raised afterwards.
+
+    Raised inside a callback it would end the process under planners that run a second thread.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    interrupted = False
+
+    def stop(*_: Any) -> None:
+        nonlocal interrupted
+        interrupted = True
+        condition.terminate()
+
+    previous = signal.signal(signal.SIGINT, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)
+        if interrupted:
+            raise KeyboardInterrupt

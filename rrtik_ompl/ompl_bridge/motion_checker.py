@@ -1,0 +1,101 @@
+"""What a planner asks about the world: is this configuration free, is this motion free. With counters."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.ompl_bridge.states import StateIO
+
+
+class WorldLike(Protocol):
+    """Anything that judges configurations and straight motions: ``rrtik_ompl.World`` or a stand-in."""
+
+    def valid(self, q: Vector) -> bool:
+        """Whether q, shape (n,), is free."""
+
+    def motion_valid(self, a: Vector, b: Vector) -> bool:
+        """Whether the straight motion from a to b, shapes (n,), is free."""
+
+    def motion_valid_batch(self, A: Matrix, B: Matrix) -> Mask:
+        """Which of the motions from A to B, shapes (m, n), are free, shape (m,)."""
+
+
+class MotionChecker(Protocol):
+    """The questions of a planner, counted.
+
+    Attributes:
+        checked_states: Configurations asked for by name.
+        checked_motions: Motions asked for (each of them many configurations inside).
+    """
+
+    checked_states: int
+    checked_motions: int
+
+    def valid(self, q: Vector) -> bool:
+        """Whether q, shape (n,), is free."""
+
+    def motion_valid(self, a: Vector, b: Vector) -> bool:
+        """Whether the straight motion from a to b, shapes (n,), is free."""
+
+    def motion_valid_batch(self, A: Matrix, B: Matrix) -> Mask:
+        """Which of the motions from A to B, shapes (m, n), are free, shape (m,)."""
+
+
+class WorldChecker:
+    """Asks a World (see :class:`MotionChecker`)."""
+
+    def __init__(self, world: WorldLike) -> None:
+        self._world = world
+        self.checked_states = 0
+        self.checked_motions = 0
+
+    def valid(self, q: Vector) -> bool:
+        """Whether q, shape (n,), is free."""
+        self.checked_states += 1
+        return bool(self._world.valid(q))
+
+    def motion_valid(self, a: Vector, b: Vector) -> bool:
+        """Whether the straight motion from a to b, shapes (n,), is free."""
+        self.checked_motions += 1
+        return bool(self._world.motion_valid(a, b))
+
+    def motion_valid_batch(self, A: Matrix, B: Matrix) -> Mask:
+        """Which of the motions from A to B, shapes (m, n), are free, shape (m,)."""
+        self.checked_motions += len(A)
+        return self._world.motion_valid_batch(A, B)
+
+
+class SpaceChecker:
+    """Asks a SpaceInformation, so whatever validity checker its owner has set (see :class:`MotionChecker`).
+
+    Holds C++ objects: for local variables only.
+    """
+
+    def __init__(self, si: Any) -> None:
+        if not si.isSetup():  # before setup, checkMotion looks at the end point alone
+            si.setup()
+        self._si = si
+        self._io = StateIO(si)
+        self._a, self._b = si.allocState(), si.allocState()
+        self.checked_states = 0
+        self.checked_motions = 0
+
+    def valid(self, q: Vector) -> bool:
+        """Whether q, shape (n,), is within the bounds and free."""
+        self.checked_states += 1
+        self._io.write(self._a, q)
+        return bool(self._si.satisfiesBounds(self._a) and self._si.isValid(self._a))
+
+    def motion_valid(self, a: Vector, b: Vector) -> bool:
+        """Whether the straight motion from a to b, shapes (n,), is free; a itself is taken to be."""
+        self.checked_motions += 1
+        self._io.write(self._a, a)
+        self._io.write(self._b, b)
+        return bool(self._si.checkMotion(self._a, self._b))
+
+    def motion_valid_batch(self, A: Matrix, B: Matrix) -> Mask:
+        """Which of the motions from A to B, shapes (m, n), are free, shape (m,)."""
+        return np.array([self.motion_valid(a, b) for a, b in zip(A, B, strict=True)], dtype=bool)

@@ -1,0 +1,216 @@
+"""The base of every planner of the house: it handles OMPL's objects so that a planner only sees arrays.
+
+OMPL's Python bindings hand out borrowed C++ objects that must not outlive their owner, and an exception that leaves
+``solve`` ends a whole benchmark. Hence the rules kept here: C++ objects live in local variables, states are copied to
+arrays at once, and ``solve`` always returns a status.
+"""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from ompl import base as ob
+from ompl import geometric as og
+from ompl import util as ou
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.errors import InputError, PlannerError
+from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker, WorldLike
+from rrtik_ompl.ompl_bridge.states import StateIO, real_vector_space, space_bounds
+
+GOAL_SAMPLES = 32  # how often a goal that can give any number of configurations is asked for one
+WAIT_FOR_GOAL = 0.002  # [s] between two questions to a goal that is still computing its first sample
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SearchResult:
+    """What a search brings back.
+
+    Attributes:
+        path: Start first, shape (k, n), or None if there is none.
+        statistics: Plain counts of the search.
+        difference: Distance from the end of the path to the goal [unit of the space]; 0 if the path is exact.
+    """
+
+    path: Matrix | None
+    statistics: Mapping[str, int | float] = field(default_factory=dict)
+    difference: float = 0.0
+
+
+class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
+    """Base class: a subclass implements :meth:`search` on arrays and is a complete ``ompl.base.Planner``.
+
+    Every ``solve`` is a new attempt from the starts and goals of the problem definition; nothing is kept from an
+    earlier one except the state of the random generator. ``solve`` never raises an Exception: it returns ``CRASH`` and
+    keeps the text in :attr:`error`. KeyboardInterrupt and SystemExit pass.
+
+    Attributes:
+        seed: The seed in use; given, or drawn from OMPL's, so that ``ompl.util.RNG.setSeed`` fixes it too.
+        rng: The generator for :meth:`search`.
+        statistics: Counts of the last ``solve``, plain ints and floats.
+        error: Why the last ``solve`` could not be done, or None. The last line says it in short.
+    """
+
+    def __init__(self, si: Any, name: str, *, world: WorldLike | None = None, seed: int | None = None) -> None:
+        """Make a planner.
+
+        Args:
+            si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
+            name: Name for OMPL's reports.
+            world: Asked instead of ``si`` whether configurations and motions are free, if given.
+            seed: At least 0.
+
+        Raises:
+            InputError: If the space is of another kind or the seed is no such number.
+        """
+        real_vector_space(si)
+        used = _seed(seed)
+        super().__init__(si, name)
+        self.seed = used
+        self.rng = np.random.default_rng(self.seed)
+        self.statistics: dict[str, int | float] = {}
+        self.error: str | None = None
+        self._world = world
+
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+        """Look for a path from any start to any goal until ``ptc()`` is true. For subclasses.
+
+        Args:
+            starts: Free configurations, shape (s, n), s at least 1.
+            goals: Free configurations, shape (g, n), g at least 1.
+            checker: Judges configurations and motions.
+            ptc: Call it: true when it is time to stop.
+        """
+        raise NotImplementedError(f"{type(self).__name__} has no search()")
+
+    def solve(self, ptc: Any) -> Any:
+        """Solve the problem of the problem definition; called by OMPL.
+
+        Args:
+            ptc: ``PlannerTerminationCondition`` or a time in seconds.
+
+        Returns:
+            ``ompl.base.PlannerStatus``.
+        """
+        self.statistics, self.error = {}, None
+        try:
+            status = self._solve(_condition(ptc))
+        except Exception as error:
+            self.error = _explain(error)
+            status = ob.PlannerStatus.CRASH
+        return ob.PlannerStatus(status)
+
+    def clear(self) -> None:
+        """Forget the last attempt; called by OMPL."""
+        super().clear()
+        self.statistics, self.error = {}, None
+
+    def bounds(self) -> tuple[Vector, Vector]:
+        """Lower and upper bounds of the space, shapes (n,)."""
+        return space_bounds(self.getSpaceInformation())
+
+    def _solve(self, ptc: Any) -> Any:
+        si, pdef = self.getSpaceInformation(), self.getProblemDefinition()
+        if pdef is None:
+            raise PlannerError(f"{self.getName()}: no problem definition; use SimpleSetup or setProblemDefinition()")
+        space_bounds(si)  # refuses missing bounds in clearer words than OMPL
+        checker: MotionChecker = SpaceChecker(si) if self._world is None else WorldChecker(self._world)
+        inputs = self.getPlannerInputStates()
+        inputs.restart()
+        starts = self._starts(inputs, StateIO(si), checker)
+        if len(starts) == 0:
+            self.error = "no valid start: none is given, or all are in collision or outside the bounds"
+            return ob.PlannerStatus.INVALID_START
+        goal = pdef.getGoal()
+        if goal is not None and not isinstance(goal, ob.GoalSampleableRegion):
+            self.error = "the goal cannot be sampled; use a GoalState, GoalStates or a GoalSampleableRegion"
+            return ob.PlannerStatus.UNRECOGNIZED_GOAL_TYPE
+        goals = self._goals(inputs, StateIO(si), checker, ptc)
+        if len(goals) == 0:
+            self.error = "no valid goal: none is given, or all are in collision or outside the bounds"
+            return ob.PlannerStatus.INVALID_GOAL
+        result = self.search(starts, goals, checker, ptc)
+        self.statistics = {
+            **result.statistics,
+            "checked_states": checker.checked_states,
+            "checked_motions": checker.checked_motions,
+        }
+        return self._report(result)
+
+    def _starts(self, inputs: Any, io: StateIO, checker: MotionChecker) -> Matrix:
+        rows = []
+        while inputs.haveMoreStartStates():
+            state = inputs.nextStart()  # borrowed; None if invalid
+            if state is not None:
+                rows.append(io.read(state))
+            del state
+        return _free(rows, io.dof, checker)
+
+    def _goals(self, inputs: Any, io: StateIO, checker: MotionChecker, ptc: Any) -> Matrix:
+        """Goal configurations: all of a finite goal; else a number of samples, or as many as it takes to find one."""
+        goal = self.getProblemDefinition().getGoal()
+        limit = max(GOAL_SAMPLES, goal.getStateCount() if isinstance(goal, ob.GoalStates) else 0)
+        lazy = isinstance(goal, ob.GoalLazySamples)
+        rows: list[Vector] = []
+        asked = 0
+        while (asked < limit or not rows) and not ptc():
+            if inputs.haveMoreGoalStates():
+                asked += 1
+                state = inputs.nextGoal()  # borrowed, one buffer for all; None if invalid
+                if state is not None:
+                    rows.append(io.read(state))
+                del state
+            elif lazy and not rows and goal.isSampling():
+                time.sleep(WAIT_FOR_GOAL)  # lets the thread of the goal have the interpreter
+            else:
+                break
+        return _free(rows, io.dof, checker)
+
+    def _report(self, result: SearchResult) -> Any:
+        """Hand the path to OMPL; returns the status."""
+        if result.path is None:
+            return ob.PlannerStatus.TIMEOUT
+        si = self.getSpaceInformation()
+        io, path, state = StateIO(si), og.PathGeometric(si), si.allocState()
+        for row in result.path:
+            io.write(state, row)
+            path.append(state)  # copies
+        approximate = result.difference > 0.0
+        self.getProblemDefinition().addSolutionPath(path, approximate, float(result.difference), self.getName())
+        return ob.PlannerStatus.APPROXIMATE_SOLUTION if approximate else ob.PlannerStatus.EXACT_SOLUTION
+
+
+def _free(rows: list[Vector], dof: int, checker: MotionChecker) -> Matrix:
+    """The different free configurations among ``rows``, in their order, shape (m, dof)."""
+    different = {row.tobytes(): row for row in rows}
+    return np.array([row for row in different.values() if checker.valid(row)]).reshape(-1, dof)
+
+
+def _condition(ptc: Any) -> Any:
+    """A termination condition from what OMPL or a person hands to solve."""
+    return ob.timedPlannerTerminationCondition(float(ptc)) if isinstance(ptc, (int, float)) else ptc
+
+
+def _seed(seed: int | None) -> int:
+    if seed is None:
+        return int(ou.RNG().uniformInt(0, 2**31 - 1))
+    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise InputError(f"seed: expected a whole number of at least 0, got {seed!r}")
+    return int(seed)
+
+
+def _explain(error: BaseException) -> str:
+    """The text of an exception. Drops the frames, which would keep borrowed states of a callback alive."""
+    text = "".join(traceback.format_exception(error)).strip()
+    if "bad_cast" in str(error):
+        text += "; a callback returned a value of the wrong type: a validity checker must return a Python bool"
+    link: BaseException | None = error
+    while link is not None:
+        link.__traceback__ = None
+        link = link.__context__
+    return text

@@ -1,0 +1,59 @@
+"""Where a mesh named in a URDF stands: ``package://``, ``file://``, absolute, or beside the URDF."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from urllib.parse import unquote
+
+from rrtik_ompl.errors import InputError
+
+MESH_SUFFIXES = (".stl", ".obj", ".dae")
+
+
+def resolve_mesh(uri: str, folder: Path | None, packages: Iterable[Path], where: str) -> Path:
+    """Absolute path of an existing mesh file.
+
+    ``package://NAME/REST`` is looked for as DIR/NAME/REST in ``packages``, in the URDF's folder and in every folder
+    above it, and as DIR/REST where DIR itself is called NAME.
+
+    Args:
+        uri: What the URDF says.
+        folder: Folder of the URDF, if it came from a file.
+        packages: Further folders to search, first.
+        where: File and element, put in front of the error message.
+
+    Raises:
+        InputError: If there is no such file or its format is unknown.
+    """
+    scheme, _, rest = uri.rpartition("://")
+    if scheme not in ("", "file", "package", "model"):
+        raise InputError(f"{where}: mesh '{uri}' is not a file; use package://, file:// or a path")
+    roots = [Path(p) for p in packages]
+    roots += [] if folder is None else [folder, *folder.parents]
+    name = unquote(rest) if scheme else rest
+    candidates = _in_packages(name, roots) if scheme in ("package", "model") else _beside(name, folder)
+    found = next((path for path in candidates if path.is_file()), None)
+    if found is None:
+        package = name.partition("/")[0]
+        remedy = f"give packages=[the folder that holds '{package}']" if scheme in ("package", "model") else "check it"
+        raise InputError(f"{where}: mesh file '{uri}' does not exist; {remedy}")
+    if found.suffix.lower() not in MESH_SUFFIXES:
+        raise InputError(f"{where}: mesh format '{found.suffix}' of '{uri}' cannot be read; export it as STL, OBJ or DAE")
+    return found.resolve()
+
+
+def _in_packages(name: str, roots: Iterable[Path]) -> Iterator[Path]:
+    package, _, rest = name.partition("/")
+    for root in roots:
+        yield root / name
+        if root.name == package:
+            yield root / rest
+
+
+def _beside(name: str, folder: Path | None) -> Iterator[Path]:
+    path = Path(name)
+    if path.is_absolute() or folder is None:
+        yield path
+    else:
+        yield folder / path

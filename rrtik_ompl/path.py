@@ -1,0 +1,286 @@
+"""A path of configurations that measures itself, checks itself against a world, and is saved and read again."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.text_file import read_text, write_text
+from rrtik_ompl.transitions import merge_moves, moved, route_length, single_joint, transitions
+from rrtik_ompl.world import World
+
+FORMATS = (".json", ".csv", ".txt")
+
+
+class Move(NamedTuple):
+    """One joint moves: ``joint`` is its name, ``start`` and ``end`` its values [rad or m]."""
+
+    joint: str
+    start: float
+    end: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Violation:
+    """Why a path is not valid.
+
+    Attributes:
+        edge: Number of the edge, from 0; waypoint ``edge`` is its beginning.
+        q: The offending configuration, shape (n,).
+        reason: A line for a person: the pair in collision, or the joint and its limit.
+    """
+
+    edge: int
+    q: Vector
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointPath:
+    """Waypoints joined by straight lines in configuration space.
+
+    Attributes:
+        waypoints: Shape (k, n), read-only, rad (m for prismatic joints), start first.
+        joint_names: Names of the n joints.
+        prismatic: Which joints slide, shape (n,).
+        robot_name: Name of the robot it is for, or "".
+    """
+
+    waypoints: Matrix
+    joint_names: tuple[str, ...]
+    prismatic: Mask
+    robot_name: str = ""
+
+    def __init__(
+        self,
+        waypoints: ArrayLike,
+        joint_names: Iterable[str] | None = None,
+        prismatic: ArrayLike | None = None,
+        robot_name: str = "",
+    ) -> None:
+        rows = finite_array(waypoints, (None, None), "path waypoints")
+        if rows.size == 0:
+            raise InputError("path waypoints: a path needs at least one configuration of at least one joint")
+        count = rows.shape[1]
+        names = tuple(f"joint{k + 1}" for k in range(count)) if joint_names is None else tuple(joint_names)
+        sliding = np.zeros(count, dtype=bool) if prismatic is None else np.asarray(prismatic, dtype=bool)
+        if len(names) != count or sliding.shape != (count,):
+            raise InputError(f"path: waypoints have {count} columns, but {len(names)} joint names were given")
+        object.__setattr__(self, "waypoints", frozen(rows))
+        object.__setattr__(self, "joint_names", names)
+        object.__setattr__(self, "prismatic", frozen(sliding, bool))
+        object.__setattr__(self, "robot_name", robot_name)
+
+    @classmethod
+    def of(cls, robot: Robot, waypoints: ArrayLike) -> JointPath:
+        """A path of this robot through ``waypoints``, shape (k, dof).
+
+        Raises:
+            InputError: If the rows do not have one value per joint of the robot.
+        """
+        rows = finite_array(waypoints, (None, robot.dof), f"path waypoints of robot '{robot.name}'")
+        return cls(rows, robot.joint_names, robot.prismatic, robot.name)
+
+    def with_waypoints(self, waypoints: ArrayLike) -> JointPath:
+        """The same joints, other waypoints."""
+        return JointPath(waypoints, self.joint_names, self.prismatic, self.robot_name)
+
+    @property
+    def start(self) -> Vector:
+        """First waypoint, shape (n,)."""
+        first: Vector = self.waypoints[0]
+        return first
+
+    @property
+    def end(self) -> Vector:
+        """Last waypoint, shape (n,)."""
+        last: Vector = self.waypoints[-1]
+        return last
+
+    @property
+    def length(self) -> float:
+        """Sum of the Euclidean lengths of the edges [rad, metres counted alike]."""
+        return route_length(self.waypoints)
+
+    @property
+    def transitions(self) -> int:
+        """Number of moves after joining consecutive moves of the same joint (C-RDT's measure)."""
+        return transitions(self.waypoints)
+
+    @property
+    def one_joint_at_a_time(self) -> bool:
+        """Whether every edge moves exactly one joint."""
+        return single_joint(merge_moves(self.waypoints))
+
+    def moves(self) -> tuple[Move, ...]:
+        """The list of single-joint moves that the path consists of.
+
+        Raises:
+            InputError: If an edge moves several joints at once.
+        """
+        rows = merge_moves(self.waypoints)
+        changes = moved(rows[:-1], rows[1:])
+        several = np.flatnonzero(changes.sum(axis=1) != 1)
+        if len(several) and len(rows) > 1:
+            together = ", ".join(np.array(self.joint_names)[changes[several[0]]])
+            raise InputError(
+                f"path: edge {int(several[0])} moves several joints at once ({together}); it is no list of moves"
+            )
+        joints = changes.argmax(axis=1)
+        return tuple(Move(self.joint_names[j], float(rows[i, j]), float(rows[i + 1, j])) for i, j in enumerate(joints))
+
+    def resample(self, step: float) -> JointPath:
+        """The same path with further waypoints, none farther than ``step`` [rad] from the next; all old ones stay."""
+        size = float(finite_array(step, (), "resample step"))
+        if size <= 0.0:
+            raise InputError(f"resample step must be greater than 0, got {size:g}")
+        counts = np.ceil(np.linalg.norm(np.diff(self.waypoints, axis=0), axis=1) / size - 1e-9)
+        return self.with_waypoints(subdivided(self.waypoints, counts)[0])
+
+    def violations(self, world: World, *, resolution: float | None = None) -> tuple[Violation, ...]:
+        """Check the path again, densely and independently of the planner that made it.
+
+        Every edge is looked at in steps in which no point of the arm moves more than half of the world's motion
+        resolution (or ``resolution`` [m], if given), by :meth:`World.certify`.
+
+        Returns:
+            The first violation of every edge that has one; empty for a valid path.
+
+        Raises:
+            InputError: If the path has another number of joints than the world's robot.
+        """
+        rows = finite_array(self.waypoints, (None, world.robot.dof), f"path for robot '{world.robot.name}'")
+        fine = 0.5 * world.motion_resolution if resolution is None else resolution
+        counts = [world.steps(a, b, fine) for a, b in pairwise(rows)]
+        dense, edges = subdivided(rows, np.array(counts, dtype=np.float64))
+        bad = np.flatnonzero(~world.certify(dense))
+        _, first = np.unique(edges[bad], return_index=True)
+        return tuple(Violation(int(edges[k]), frozen(dense[k]), world.explain(dense[k])) for k in bad[first])
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the path to a file: .json (complete), .csv (a header of joint names), .txt (OMPL's matrix text).
+
+        The file is written whole or not at all.
+
+        Raises:
+            InputError: If the ending is another one or the file cannot be written.
+        """
+        ending = _ending(path)
+        if ending == ".json":
+            text = json.dumps(self._document(), indent=1) + "\n"
+        else:
+            comma = ending == ".csv"
+            lines = [",".join(self.joint_names)] if comma else []
+            lines += [("," if comma else " ").join(map(repr, row)) for row in self.waypoints.tolist()]
+            text = "\n".join(lines) + "\n"
+        write_text(path, text)
+
+    def _document(self) -> dict[str, Any]:
+        return {
+            "version": 1,
+            "kind": "joint_path",
+            "robot": self.robot_name,
+            "joint_names": list(self.joint_names),
+            "units": ["m" if sliding else "rad" for sliding in self.prismatic],
+            "length": self.length,
+            "transitions": self.transitions,
+            "waypoints": self.waypoints.tolist(),
+        }
+
+
+def subdivided(rows: Matrix, counts: Vector) -> tuple[Matrix, Vector]:
+    """Cut edge i of a polyline, shape (k, n), into ``counts[i]`` equal parts; also the edge number of every point."""
+    points, edges = [rows[:1]], [np.zeros(1, dtype=np.int64)]
+    for i, count in enumerate(np.maximum(counts, 1.0).astype(np.int64)):
+        shares = (np.arange(1, count + 1) / count)[:, None]
+        points.append((1.0 - shares) * rows[i] + shares * rows[i + 1])
+        edges.append(np.full(count, i, dtype=np.int64))
+    return np.vstack(points), np.concatenate(edges)
+
+
+def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> JointPath:
+    """Read a path written by :meth:`JointPath.save` or by OMPL (``printAsMatrix``).
+
+    Args:
+        path: A .json, .csv or .txt file.
+        robot: If given, the path must fit it, and takes its joint names.
+
+    Raises:
+        InputError: If the file is missing, malformed, or does not fit the robot; the message names file and line.
+    """
+    ending = _ending(path)
+    try:
+        if ending == ".json":
+            found = _from_json(read_text(path))
+        else:
+            found = _from_table(read_text(path), "," if ending == ".csv" else None)
+        return found if robot is None else _fitted(found, robot)
+    except InputError as error:
+        raise error if str(error).startswith(str(path)) else InputError(f"{path}: {error}") from None
+
+
+def _fitted(path: JointPath, robot: Robot) -> JointPath:
+    named = path.joint_names != tuple(f"joint{k + 1}" for k in range(len(path.joint_names)))
+    if path.waypoints.shape[1] != robot.dof or (named and path.joint_names != robot.joint_names):
+        raise InputError(
+            f"the path moves {', '.join(path.joint_names)}, but robot '{robot.name}' has the joints "
+            f"{', '.join(robot.joint_names)}"
+        )
+    return JointPath.of(robot, path.waypoints)
+
+
+def _ending(path: str | os.PathLike[str]) -> str:
+    ending = Path(path).suffix.lower()
+    if ending not in FORMATS:
+        raise InputError(f"{path}: unknown ending '{ending}' for a path; use {', '.join(FORMATS)}")
+    return ending
+
+
+def _from_json(text: str) -> JointPath:
+    try:
+        document = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise InputError(f"line {error.lineno}: not JSON: {error.msg}") from None
+    if not isinstance(document, dict) or "waypoints" not in document:
+        raise InputError("expected an object with the key 'waypoints'; is this a path file?")
+    if document.get("version", 1) != 1:
+        raise InputError(f"version: expected 1, got {document['version']!r}")
+    units, names = document.get("units"), document.get("joint_names")
+    for key, value in (("units", units), ("joint_names", names)):
+        if value is not None and not (isinstance(value, list) and all(isinstance(v, str) for v in value)):
+            raise InputError(f"{key}: expected a list of text, one per joint")
+    prismatic = None if units is None else [unit == "m" for unit in units]
+    return JointPath(document["waypoints"], names, prismatic, str(document.get("robot", "")))
+
+
+def _from_table(text: str, separator: str | None) -> JointPath:
+    lines = [(k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip()]
+    if not lines:
+        raise InputError("the file is empty; expected one configuration a line")
+    names = None
+    if separator is not None:
+        names = [name.strip() for name in next(csv.reader(io.StringIO(lines[0][1])))]
+        lines = lines[1:]
+    rows = []
+    for number, line in lines:
+        cells = line.split(separator)
+        try:
+            rows.append([float(cell) for cell in cells])
+        except ValueError:
+            raise InputError(f"line {number}: expected numbers, got {line.strip()[:60]!r}") from None
+        if len(rows[-1]) != len(names or rows[0]):
+            raise InputError(f"line {number}: expected {len(names or rows[0])} numbers, got {len(cells)}")
+    return JointPath(np.array(rows).reshape(len(rows), -1), names)

@@ -1,0 +1,148 @@
+"""`plan()`: from a problem to a path that has been checked twice, or to the reason why there is none."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl import catalog
+from rrtik_ompl.arrays import finite_array
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.ompl_bridge.attempt import Attempt, PlannerFactory, attempt, ompl_planners
+from rrtik_ompl.path import JointPath, Violation
+from rrtik_ompl.problem import Problem
+
+DEFAULT_PLANNER = "bicrdt"
+RESTARTS = 20
+_OMPL_PREFIX = "geometric::"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """The outcome of planning.
+
+    Attributes:
+        found: Whether there is a path.
+        path: The path, or None.
+        reason: "" if found, else a line that says why not.
+        seconds: Wall time of everything: planning, restarts and re-checks [s].
+        planner: Name of the planner.
+        seed: The seed that repeats this plan.
+        statistics: Plain counts, added up over all attempts: attempts, rejected paths, and the planner's own.
+    """
+
+    found: bool
+    path: JointPath | None
+    reason: str
+    seconds: float
+    planner: str
+    seed: int
+    statistics: Mapping[str, int | float]
+
+
+def plan(
+    problem: Problem,
+    planner: str | PlannerFactory = DEFAULT_PLANNER,
+    *,
+    seconds: float = 5.0,
+    seed: int | None = None,
+    restarts: int = RESTARTS,
+    parameters: Mapping[str, Any] | None = None,
+) -> Plan:
+    """Find a collision-free path from the start to the goal of a problem.
+
+    A path is returned only if a second check agrees, which is twice as dense as the planner's and shares nothing with
+    it (:meth:`JointPath.violations`). If that check rejects a path, or a planner gives up before its time, it is
+    started anew with another random stream.
+
+    Args:
+        problem: What to solve.
+        planner: Name of one of :func:`list_planners` (``geometric::`` may stand before OMPL's names), or a planner
+            class that is built from a SpaceInformation alone.
+        seconds: Time limit for all attempts together [s].
+        seed: The same seed gives the same path, as long as the time limit does not cut in; drawn if None.
+        restarts: Further attempts at most.
+        parameters: Options of the planner; of OMPL's planners in snake case, such as ``range`` or ``goal_bias``.
+
+    Raises:
+        UnknownNameError: If there is no planner of that name.
+        InputError: If a number or a parameter makes no sense, or the planner cannot work towards this kind of goal.
+        PlannerError: If the planner broke.
+    """
+    limit = float(finite_array(seconds, (), "seconds"))
+    if limit <= 0.0:
+        raise InputError(f"seconds must be greater than 0, got {limit:g}")
+    if isinstance(restarts, bool) or not isinstance(restarts, int) or restarts < 0:
+        raise InputError(f"restarts must be a whole number of at least 0, got {restarts!r}")
+    name, factory = (planner, find_planner(planner)) if isinstance(planner, str) else (planner.__name__, planner)
+    used = _seed(seed)
+    begin = time.perf_counter()
+    totals: dict[str, int | float] = {"attempts": 0, "rejected": 0}
+    reason, path = "", None
+    for child in np.random.SeedSequence(used).generate_state(restarts + 1, np.uint32):
+        left = limit - (time.perf_counter() - begin)
+        if left <= 0.0:
+            break
+        outcome = attempt(problem, factory, seconds=left, seed=int(child), parameters=parameters or {})
+        _count(totals, outcome)
+        path, reason = _judged(problem, outcome, name)
+        if path is not None:
+            break
+        totals["rejected"] += outcome.rows is not None
+    elapsed = time.perf_counter() - begin
+    if path is None and elapsed >= limit:
+        reason = f"no path within {limit:g} s ({totals['attempts']} attempts; the last one: {reason or 'out of time'})"
+    return Plan(path is not None, path, reason, elapsed, name, used, MappingProxyType(totals))
+
+
+def list_planners() -> tuple[str, ...]:
+    """Names of all planners: ours and those of other packages in lower case, OMPL's as OMPL writes them."""
+    return (*catalog.list_planners(), *sorted(ompl_planners()))
+
+
+def find_planner(name: str) -> PlannerFactory:
+    """The planner class of a name.
+
+    Raises:
+        UnknownNameError: If there is none; carries all names.
+    """
+    wheel = ompl_planners()
+    bare = name.removeprefix(_OMPL_PREFIX)
+    if bare in wheel:
+        found: PlannerFactory = wheel[bare]
+        return found
+    if name in catalog.list_planners():
+        return catalog.find_planner(name)  # type: ignore[no-any-return]
+    raise UnknownNameError("planner", name, list_planners())
+
+
+def _judged(problem: Problem, outcome: Attempt, name: str) -> tuple[JointPath | None, str]:
+    """The path of an attempt if the second check accepts it, or the reason why there is none."""
+    if outcome.rows is None:
+        return None, f"{name} ended with '{outcome.status}'"
+    path = JointPath.of(problem.world.robot, outcome.rows)
+    faults: tuple[Violation, ...] = path.violations(problem.world)
+    if faults:
+        return None, f"the path of {name} was rejected by the second check: {faults[0].reason}"
+    if not (path.start == problem.start).all() or not problem.reached(path.end):
+        return None, f"the path of {name} does not lead from the start to the goal"
+    return path, ""
+
+
+def _count(totals: dict[str, int | float], outcome: Attempt) -> None:
+    totals["attempts"] += 1
+    for key, value in outcome.statistics.items():
+        totals[key] = totals.get(key, 0) + value
+
+
+def _seed(seed: int | None) -> int:
+    if seed is None:
+        return int(np.random.default_rng().integers(2**31))
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise InputError(f"seed must be a whole number of at least 0, got {seed!r}")
+    return int(seed)

@@ -1,0 +1,83 @@
+"""A well-posed question: a world, a start and a goal. That a `Problem` exists proves that its start is usable."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import Vector, frozen
+from rrtik_ompl.errors import InputError, ProblemError
+from rrtik_ompl.goal import Goal, GoalRegion, JointGoal, PoseGoal, PositionGoal, joint_difference
+from rrtik_ompl.robot import LIMIT_TOLERANCE
+from rrtik_ompl.world import World
+
+
+class Problem:
+    """A planning problem.
+
+    Values up to 1e-6 outside a limit are moved onto it. For continuous joints the goal is turned to the equivalent
+    value nearest to the start, so that the straight motion goes the short way round.
+
+    Attributes:
+        world: Robot, scene and collision checks.
+        start: Shape (dof,), read-only.
+        goal: What to reach; a :class:`JointGoal` has been checked to be free.
+        name: For messages and files.
+
+    Args:
+        world: Robot and scene.
+        start: Configuration, shape (dof,), rad or m.
+        goal: A goal, or a configuration.
+        name: For messages and files.
+
+    Raises:
+        ProblemError: If start or goal is in collision or outside the limits; pair, joint and limit are named.
+        InputError: If start or goal has the wrong number of joints or is not finite.
+    """
+
+    def __init__(self, world: World, start: ArrayLike, goal: Goal | ArrayLike, *, name: str = "problem") -> None:
+        if not isinstance(world, World):
+            raise InputError(f"problem: world must be a World, got {type(world).__name__}; use World(robot, scene)")
+        self.world = world
+        self.name = name
+        self.start: Vector = frozen(_usable(world, start, "start"))
+        wanted: Any = goal
+        if not isinstance(wanted, JointGoal | PoseGoal | PositionGoal | GoalRegion):
+            wanted = JointGoal(wanted)
+        if isinstance(wanted, JointGoal):
+            q = _usable(world, wanted.q, "goal")
+            wanted = JointGoal(_nearest_turn(world, self.start, q), wanted.tolerance)
+        self.goal: Goal = wanted
+
+    @property
+    def robot(self) -> Any:
+        """The robot of the world."""
+        return self.world.robot
+
+    def reached(self, q: ArrayLike) -> bool:
+        """Whether a configuration, shape (dof,), satisfies the goal."""
+        return bool(self.goal.satisfied(self.world.robot, np.atleast_2d(np.asarray(q, dtype=np.float64)))[0])
+
+
+def _usable(world: World, values: ArrayLike, what: str) -> Vector:
+    """A configuration that can be a start or a goal: finite, inside the limits, free."""
+    robot = world.robot
+    q = robot.configuration(values, what)
+    outside = np.flatnonzero((q < robot.lower - LIMIT_TOLERANCE) | (q > robot.upper + LIMIT_TOLERANCE))
+    if len(outside):
+        raise ProblemError(f"{what}: {robot.limit_message(q, int(outside[0]))}")
+    q = robot.clamp(q)
+    # both opinions must agree, for the path through q will be certified by the second one
+    if not world.valid(q) or not world.certify(q[None])[0]:
+        touching = world.contacts(q)
+        pairs = [(c.first, c.second) for c in touching]
+        raise ProblemError(f"{what} is in collision: {world.explain(q)}; move it or allow the pair", pairs)
+    return q
+
+
+def _nearest_turn(world: World, start: Vector, q: Vector) -> Vector:
+    """The goal with its continuous joints turned by whole turns to lie nearest to the start."""
+    nearest: Vector = np.where(world.robot.continuous, start + joint_difference(world.robot, q, start), q)
+    return nearest

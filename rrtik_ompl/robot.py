@@ -1,0 +1,217 @@
+"""The arm: a Pinocchio model with its geometry, limits, named postures and tip frame. A robot never changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
+from rrtik_ompl.errors import InputError, UnknownNameError
+
+LIMIT_TOLERANCE = 1e-6  # [rad] or [m]; a value this far outside counts as inside and is moved onto the limit
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chain:
+    """The kinematic tree as plain arrays, one row per Pinocchio joint 1..n, parents first.
+
+    Attributes:
+        parent: Row of the parent joint, -1 for the world, shape (n,).
+        placement: Fixed transform from the parent joint's frame to this joint's frame at zero, shape (n, 4, 4).
+        axis: Unit axis in the joint's own frame, shape (n, 3).
+        prismatic: True for sliding joints, shape (n,).
+        gain: Joint value of the model = gain @ q + offset (mimic joints have a gain other than 1), shape (n, dof).
+        offset: See ``gain``, shape (n,).
+    """
+
+    parent: NDArray[np.int64]
+    placement: NDArray[np.float64]
+    axis: Matrix
+    prismatic: Mask
+    gain: Matrix
+    offset: Vector
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Robot:
+    """A read-only arm. Configurations ``q`` have one number per actuated joint: radians, or metres if prismatic.
+
+    Continuous joints have infinite limits and any real number as a value: q and q + 2 pi are the same posture, and a
+    straight motion between two values turns by their difference.
+
+    Attributes:
+        name: Name used in messages and files.
+        joint_names: The actuated joints, in the order of q.
+        lower, upper: Position limits, shape (dof,), -inf and +inf for continuous joints.
+        velocity, acceleration, jerk: Limits [rad/s, rad/s^2, rad/s^3 or m], shape (dof,), inf where unknown.
+        prismatic, continuous: Masks, shape (dof,).
+        tip: Name of the frame that goals refer to.
+        postures: Named configurations.
+        allowed_collisions: Pairs of link names that are never checked against each other.
+        model, collision, visual: Pinocchio's model and geometry; do not change them.
+        closed_form: The robot's own inverse kinematics, if it brings one.
+    """
+
+    name: str
+    joint_names: tuple[str, ...]
+    lower: Vector
+    upper: Vector
+    velocity: Vector
+    acceleration: Vector
+    jerk: Vector
+    prismatic: Mask
+    continuous: Mask
+    tip: str
+    postures: Mapping[str, Vector]
+    allowed_collisions: frozenset[frozenset[str]]
+    model: Any
+    collision: Any
+    visual: Any
+    chain: Chain
+    self_collision: bool = True
+    closed_form: Callable[..., Any] | None = None
+    planar: bool = False
+    source: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+
+    @property
+    def dof(self) -> int:
+        """Number of actuated joints."""
+        return len(self.joint_names)
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """Names of all links (bodies), base first."""
+        return tuple(f.name for f in self.model.frames if f.type == pin.FrameType.BODY)
+
+    def link_of(self, geometry: Any) -> str:
+        """Name of the link that carries a geometry object of this robot."""
+        return str(self.model.frames[geometry.parentFrame].name)
+
+    def configuration(self, values: ArrayLike, what: str = "configuration") -> Vector:
+        """Check a configuration given by a user: right length, finite. Shape (dof,).
+
+        Raises:
+            InputError: If the number of values is not ``dof`` or one of them is not finite.
+        """
+        array = np.asarray(values, dtype=object) if isinstance(values, (list, tuple)) else np.asarray(values)
+        if array.ndim == 1 and len(array) != self.dof:
+            raise InputError(
+                f"{what}: robot '{self.name}' has {self.dof} joints ({', '.join(self.joint_names)}), "
+                f"but {len(array)} values were given"
+            )
+        return finite_array(values, (self.dof,), what).copy()
+
+    def posture(self, name: str) -> Vector:
+        """Named configuration, shape (dof,).
+
+        Raises:
+            UnknownNameError: If there is no posture of that name.
+        """
+        try:
+            return self.postures[name]
+        except KeyError:
+            raise UnknownNameError(f"posture of robot '{self.name}'", name, self.postures) from None
+
+    def within_limits(self, Q: ArrayLike, tolerance: float = LIMIT_TOLERANCE) -> Mask:
+        """Which of the configurations Q, shape (m, dof), lie inside the limits. Shape (m,)."""
+        rows = np.atleast_2d(np.asarray(Q, dtype=np.float64))
+        inside: Mask = np.all((rows >= self.lower - tolerance) & (rows <= self.upper + tolerance), axis=1)
+        return inside
+
+    def limit_message(self, q: Vector, joint: int) -> str:
+        """A line that names a joint, its value and its limits, in degrees (metres for a prismatic joint)."""
+        factor, unit = (1.0, "m") if self.prismatic[joint] else (180.0 / np.pi, "deg")
+        value, low, high = (factor * float(x) for x in (q[joint], self.lower[joint], self.upper[joint]))
+        name = self.joint_names[joint]
+        return f"joint '{name}' is at {value:.6g} {unit}, outside its limits {low:.6g} .. {high:.6g} {unit}"
+
+    def clamp(self, q: Vector) -> Vector:
+        """Move values that lie up to any distance outside onto the limits. Shape as given."""
+        clamped: Vector = np.clip(q, self.lower, self.upper)
+        return clamped
+
+    def lift(self, Q: ArrayLike) -> Matrix:
+        """Pinocchio's configuration vectors for Q: adds mimic joints and (cos, sin) of continuous ones.
+
+        Args:
+            Q: Shape (m, dof) or (dof,).
+
+        Returns:
+            Shape (m, nq).
+        """
+        rows = np.atleast_2d(np.asarray(Q, dtype=np.float64))
+        values: Matrix = rows @ self.chain.gain.T + self.chain.offset
+        if self.model.nq == len(self.chain.parent):
+            return values
+        full = np.empty((len(rows), self.model.nq))
+        for k in range(self.model.njoints - 1):
+            start, size = self.model.idx_qs[k + 1], self.model.nqs[k + 1]
+            if size == 1:
+                full[:, start] = values[:, k]
+            else:
+                full[:, start], full[:, start + 1] = np.cos(values[:, k]), np.sin(values[:, k])
+        return full
+
+    def joint_frames(self, Q: ArrayLike) -> NDArray[np.float64]:
+        """Pose in the world of every Pinocchio joint frame, world first. Shape (m, joints + 1, 4, 4)."""
+        rows = np.atleast_2d(np.asarray(Q, dtype=np.float64))
+        values = rows @ self.chain.gain.T + self.chain.offset
+        frames = np.empty((len(rows), len(self.chain.parent) + 1, 4, 4))
+        frames[:, 0] = np.eye(4)
+        for k, parent in enumerate(self.chain.parent):
+            motion = _joint_motion(self.chain.axis[k], bool(self.chain.prismatic[k]), values[:, k])
+            frames[:, k + 1] = frames[:, parent + 1] @ self.chain.placement[k] @ motion
+        return frames
+
+    def fk_batch(self, Q: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
+        """Forward kinematics of a batch: T_world_tip (or another frame) as matrices.
+
+        Args:
+            Q: Shape (m, dof).
+            frame: Frame or link name; the tip if None.
+
+        Returns:
+            Shape (m, 4, 4).
+        """
+        target = self.model.frames[self._frame_id(frame)]
+        poses: NDArray[np.float64] = self.joint_frames(Q)[:, target.parentJoint] @ target.placement.homogeneous
+        return poses
+
+    def fk(self, q: ArrayLike, frame: str | None = None) -> Any:
+        """Forward kinematics: T_world_tip (or another frame) as ``pinocchio.SE3`` for q, shape (dof,)."""
+        return pin.SE3(self.fk_batch(self.configuration(q)[None], frame)[0])
+
+    def jacobian(self, q: ArrayLike, frame: str | None = None) -> Matrix:
+        """Geometric Jacobian at the tip in world axes, rows (linear; angular), shape (6, dof)."""
+        full = self.lift(self.configuration(q))[0]
+        jacobian = pin.computeFrameJacobian(
+            self.model, self.model.createData(), full, self._frame_id(frame), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        )
+        product: Matrix = jacobian @ self.chain.gain
+        return product
+
+    def _frame_id(self, frame: str | None) -> int:
+        name = self.tip if frame is None else frame
+        if not self.model.existFrame(name):
+            raise UnknownNameError(f"frame of robot '{self.name}'", name, (f.name for f in self.model.frames))
+        return int(self.model.getFrameId(name))
+
+
+def _joint_motion(axis: Vector, prismatic: bool, values: Vector) -> NDArray[np.float64]:
+    """Transforms of one joint for many values, shape (m, 4, 4): a translation, or Rodrigues' rotation formula."""
+    motion = np.zeros((len(values), 4, 4))
+    motion[:, [0, 1, 2, 3], [0, 1, 2, 3]] = 1.0
+    if prismatic:
+        motion[:, :3, 3] = values[:, None] * axis
+        return motion
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    sine, cosine = np.sin(values)[:, None, None], np.cos(values)[:, None, None]
+    motion[:, :3, :3] += sine * cross + (1.0 - cosine) * (cross @ cross)
+    return motion

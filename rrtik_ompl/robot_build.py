@@ -1,0 +1,209 @@
+"""From a tree of links and joints to a `Robot`: hold joints still, tie mimics, place the base, name the tip."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.arrays import finite_array, frozen
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.robot import Chain, Robot
+from rrtik_ompl.tree import Joint, Tree, build_models
+
+
+@dataclass(frozen=True, slots=True)
+class Mimic:
+    """Joint ``joint`` follows ``source``: value = multiplier * source + offset."""
+
+    joint: str
+    source: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class JointLimits:
+    """Limits of one joint; None keeps what the model says. Position in rad or m, the others per second."""
+
+    lower: float | None = None
+    upper: float | None = None
+    velocity: float | None = None
+    acceleration: float | None = None
+    jerk: float | None = None
+
+
+def build_robot(
+    name: str,
+    tree: Tree,
+    *,
+    joints: Iterable[str] | None = None,
+    mimics: Iterable[Mimic] = (),
+    locked: Mapping[str, float] | None = None,
+    tip: str | None = None,
+    base_pose: Any | None = None,
+    limits: Mapping[str, JointLimits] | None = None,
+    postures: Mapping[str, Mapping[str, float]] | None = None,
+    allowed_collisions: Iterable[Iterable[str]] = (),
+    self_collision: bool = True,
+    closed_form: Callable[..., Any] | None = None,
+    planar: bool = False,
+    source: Mapping[str, Any] | None = None,
+) -> Robot:
+    """Assemble a robot.
+
+    Args:
+        name: Name used in messages and files.
+        tree: Links and joints.
+        joints: Actuated joints, in the order wanted for q; every joint that does not mimic if None.
+        mimics: Joints that follow others (which follow nothing themselves).
+        locked: Values at which joints that are not actuated are held [rad or m]; 0, moved into the limits, if absent.
+        tip: Frame that goals refer to; the last link that every actuated joint moves if None.
+        base_pose: ``pinocchio.SE3`` T_world_base; identity if None.
+        limits: Limits by joint name; what is given replaces the tree's.
+        postures: Named configurations by joint name; only those that name every actuated joint are kept.
+        allowed_collisions: Pairs of link names never checked.
+        self_collision: Whether links are checked against each other.
+        closed_form: The robot's own inverse kinematics.
+        planar: Whether the arm moves in the xy-plane.
+        source: How to load it again (what a problem file says under ``robot``).
+
+    Raises:
+        InputError: If a joint, frame or limit does not make sense; the message names it.
+    """
+    ties = {m.joint: m for m in mimics}
+    movable = {joint.name: joint for joint in tree.walk() if joint.kind != "fixed"}
+    actuated = tuple(joints) if joints is not None else tuple(n for n in movable if n not in ties)
+    _check_joints(name, tuple(movable), actuated, ties, locked or {})
+    held = _held_values(name, movable, actuated, ties, locked or {})
+    model, collision, visual = build_models(tree.hold(held), base_pose)
+    tip_name = _last_link(tree, actuated) if tip is None else tip
+    if not model.existFrame(tip_name):
+        raise UnknownNameError(f"frame of robot '{name}' for the tip", tip_name, (f.name for f in model.frames))
+    named = {
+        key: frozen([values[j] for j in actuated])
+        for key, values in (postures or {}).items()
+        if all(j in values for j in actuated)
+    }
+    return Robot(
+        name=name,
+        joint_names=actuated,
+        tip=tip_name,
+        postures=MappingProxyType(named),
+        allowed_collisions=frozenset(frozenset(pair) for pair in allowed_collisions),
+        model=model,
+        collision=collision,
+        visual=visual,
+        chain=_chain(model, actuated, ties),
+        self_collision=self_collision,
+        closed_form=closed_form,
+        planar=planar,
+        source=MappingProxyType(dict(source or {"name": name})),
+        **_limits(name, [movable[joint] for joint in actuated], limits or {}),
+    )
+
+
+def _check_joints(
+    name: str, known: tuple[str, ...], actuated: tuple[str, ...], ties: Mapping[str, Mimic], locked: Mapping[str, float]
+) -> None:
+    if not actuated:
+        raise InputError(f"robot '{name}': no movable joint; its description holds only fixed joints")
+    for joint in (*actuated, *ties, *(m.source for m in ties.values()), *locked):
+        if joint not in known:
+            raise UnknownNameError(f"movable joint of robot '{name}'", joint, known)
+    for joint in actuated:
+        if actuated.count(joint) > 1:
+            raise InputError(f"robot '{name}': joint '{joint}' is listed twice")
+        if joint in ties:
+            raise InputError(f"robot '{name}': joint '{joint}' mimics '{ties[joint].source}' and cannot be moved alone")
+        if joint in locked:
+            raise InputError(f"robot '{name}': joint '{joint}' is both actuated and locked; leave it out of one")
+
+
+def _held_values(
+    name: str,
+    movable: Mapping[str, Joint],
+    actuated: tuple[str, ...],
+    ties: Mapping[str, Mimic],
+    locked: Mapping[str, float],
+) -> dict[str, float]:
+    """Value of every joint that is neither actuated nor follows an actuated one."""
+    values: dict[str, float] = {}
+    for joint in movable.values():
+        neutral = 0.0 if joint.kind == "continuous" else min(max(0.0, joint.lower), joint.upper)
+        given = locked.get(joint.name, neutral)
+        values[joint.name] = float(finite_array(given, (), f"robot '{name}': locked value of joint '{joint.name}'"))
+    for tie in ties.values():
+        if tie.joint not in locked:
+            values[tie.joint] = tie.multiplier * values[tie.source] + tie.offset
+    moving = {joint for joint in movable if joint in actuated or (joint in ties and ties[joint].source in actuated)}
+    return {joint: value for joint, value in values.items() if joint not in moving}
+
+
+def _chain(model: Any, actuated: tuple[str, ...], ties: Mapping[str, Mimic]) -> Chain:
+    count = model.njoints - 1
+    axis, prismatic = np.zeros((count, 3)), np.zeros(count, dtype=bool)
+    gain, offset = np.zeros((count, len(actuated))), np.zeros(count)
+    data = model.createData()
+    neutral = pin.neutral(model)
+    for k in range(count):
+        model.joints[k + 1].calc(data.joints[k + 1], neutral)
+        subspace = np.asarray(data.joints[k + 1].S).reshape(-1)  # (linear; angular)
+        prismatic[k] = np.linalg.norm(subspace[:3]) > 0.5
+        axis[k] = subspace[:3] if prismatic[k] else subspace[3:]
+        joint = model.names[k + 1]
+        tie = ties.get(joint)
+        if tie is None:
+            gain[k, actuated.index(joint)] = 1.0
+        else:
+            gain[k, actuated.index(tie.source)], offset[k] = tie.multiplier, tie.offset
+    return Chain(
+        parent=frozen([model.parents[k + 1] - 1 for k in range(count)], np.int64),
+        placement=frozen([model.jointPlacements[k + 1].homogeneous for k in range(count)]),
+        axis=frozen(axis),
+        prismatic=frozen(prismatic, bool),
+        gain=frozen(gain),
+        offset=frozen(offset),
+    )
+
+
+def _limits(name: str, joints: Iterable[Joint], given: Mapping[str, JointLimits]) -> dict[str, Any]:
+    rows = []
+    for joint in joints:
+        wanted = given.get(joint.name, JointLimits())
+        endless = joint.kind == "continuous"
+        low, high = (-np.inf, np.inf) if endless else (joint.lower, joint.upper)
+        low = low if wanted.lower is None else wanted.lower
+        high = high if wanted.upper is None else wanted.upper
+        if not low < high:
+            raise InputError(
+                f"robot '{name}': joint '{joint.name}' has limits {low:g} .. {high:g}; lower must be below upper"
+            )
+        rates = [joint.velocity if wanted.velocity is None else wanted.velocity]
+        rates += [np.inf if rate is None else rate for rate in (wanted.acceleration, wanted.jerk)]
+        for what, rate in zip(("velocity", "acceleration", "jerk"), rates, strict=True):
+            if not rate > 0.0:
+                raise InputError(
+                    f"robot '{name}': joint '{joint.name}' has {what} limit {rate:g}; it must be greater than 0"
+                )
+        rows.append((low, high, *rates, endless and bool(np.isinf(low) and np.isinf(high)), joint.kind == "prismatic"))
+    columns = list(zip(*rows, strict=True))
+    keys = ("lower", "upper", "velocity", "acceleration", "jerk")
+    found: dict[str, Any] = {key: frozen(column) for key, column in zip(keys, columns, strict=False)}
+    return found | {"continuous": frozen(columns[5], bool), "prismatic": frozen(columns[6], bool)}
+
+
+def _last_link(tree: Tree, actuated: tuple[str, ...]) -> str:
+    """The leaf with the most actuated joints above it; among equals the longest branch, then the last described."""
+    parents = {joint.parent for joint in tree.joints}
+
+    def rank(leaf: str) -> tuple[int, int]:
+        above = tree.chain(leaf)
+        return sum(joint.name in actuated for joint in above), sum(joint.kind != "fixed" for joint in above)
+
+    leaves = [link.name for link in tree.links if link.name not in parents]
+    return max(reversed(leaves), key=rank)

@@ -1,0 +1,61 @@
+"""Options of a robot as plain values: what a problem file says about it, and what tells two robots apart."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.poses import pose, pose_from_rpy, quaternion_xyzw
+
+POSE_KEYS = ("xyz", "quat_xyzw", "rpy_deg")
+
+
+def plain(value: Any) -> Any:
+    """The value with nothing but None, booleans, numbers, text, lists and dictionaries in it; paths become absolute."""
+    if isinstance(value, pin.SE3):
+        return {"xyz": value.translation.tolist(), "quat_xyzw": quaternion_xyzw(value).tolist()}
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, os.PathLike):
+        return str(Path(value).resolve())
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    if isinstance(value, Iterable) and not isinstance(value, str):
+        return [plain(item) for item in value]
+    return value
+
+
+def source_entry(options: Mapping[str, Any]) -> dict[str, Any]:
+    """The options that were given, as plain values; those that say nothing are left out."""
+    entry = {key: plain(value) for key, value in options.items()}
+    return {key: value for key, value in entry.items() if value is not None and value != [] and value != {}}
+
+
+def base_pose(value: Any, what: str = "base_pose") -> Any | None:
+    """A base pose given as ``pinocchio.SE3`` or as ``{xyz: .., quat_xyzw: .. | rpy_deg: ..}``.
+
+    Raises:
+        InputError: If it is neither, or a key or number in it makes no sense.
+    """
+    if value is None or isinstance(value, pin.SE3):
+        return value
+    if not isinstance(value, Mapping):
+        raise InputError(f"{what}: expected a pinocchio.SE3 or {{xyz: [x, y, z], quat_xyzw: [x, y, z, w]}}")
+    for key in value:
+        if key not in POSE_KEYS:
+            raise UnknownNameError("key", key, POSE_KEYS, where=what)
+    xyz = value.get("xyz", (0.0, 0.0, 0.0))
+    if "rpy_deg" not in value:
+        return pose(xyz, value.get("quat_xyzw", (0.0, 0.0, 0.0, 1.0)), what)
+    if "quat_xyzw" in value:
+        raise InputError(f"{what}: give quat_xyzw or rpy_deg, not both")
+    return pose_from_rpy(xyz, np.radians(np.asarray(value["rpy_deg"], dtype=np.float64)), what)

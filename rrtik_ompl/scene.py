@@ -1,0 +1,124 @@
+"""What surrounds the arm: named obstacles with poses, moving ones, attached objects, allowed collisions. Frozen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import Vector, finite_array, frozen
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.shapes import Shape
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConstantVelocity:
+    """A straight motion: position at time t is the obstacle's pose shifted by ``velocity * t`` [m/s, world axes]."""
+
+    velocity: Vector
+
+    def __init__(self, velocity: ArrayLike) -> None:
+        object.__setattr__(self, "velocity", frozen(finite_array(velocity, (3,), "motion velocity")))
+
+    def pose_at(self, start: Any, time: float) -> Any:
+        """Pose at ``time`` [s] of an obstacle that is at ``start`` at time 0."""
+        return pin.SE3(start.rotation, start.translation + time * self.velocity)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Waypoints:
+    """A motion through poses at given times: straight lines, shortest rotations, at rest before and after."""
+
+    times: Vector
+    poses: tuple[Any, ...]
+
+    def __init__(self, times: ArrayLike, poses: Iterable[Any]) -> None:
+        stamps, stations = finite_array(times, (None,), "motion times"), tuple(poses)
+        if len(stamps) == 0 or len(stamps) != len(stations):
+            raise InputError(
+                f"motion needs as many times as poses, at least one; got {len(stamps)} and {len(stations)}"
+            )
+        if (np.diff(stamps) <= 0.0).any():
+            raise InputError(f"motion times must increase, got {stamps.tolist()}")
+        object.__setattr__(self, "times", frozen(stamps))
+        object.__setattr__(self, "poses", stations)
+
+    def pose_at(self, start: Any, time: float) -> Any:
+        """Pose at ``time`` [s]; ``start`` does not matter, the waypoints are in the world."""
+        del start
+        k = int(np.searchsorted(self.times, time, side="right"))
+        if k == 0 or k == len(self.times):
+            return self.poses[max(k - 1, 0)].copy()
+        share = (time - self.times[k - 1]) / (self.times[k] - self.times[k - 1])
+        a, b = self.poses[k - 1], self.poses[k]
+        rotation = a.rotation @ pin.exp3(share * pin.log3(a.rotation.T @ b.rotation))
+        return pin.SE3(rotation, (1.0 - share) * a.translation + share * b.translation)
+
+
+Motion: TypeAlias = ConstantVelocity | Waypoints
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Obstacle:
+    """A named solid in the world. ``pose`` is T_world_obstacle; ``motion`` moves it over time, if given."""
+
+    name: str
+    shape: Shape
+    pose: Any = field(default_factory=pin.SE3.Identity)
+    motion: Motion | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AttachedObject:
+    """A solid held by a link. ``pose`` is T_link_object; ``allow`` names further links that it may touch."""
+
+    name: str
+    link: str
+    shape: Shape
+    pose: Any = field(default_factory=pin.SE3.Identity)
+    allow: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """Obstacles, attached objects and the pairs of names that may touch. ``Scene()`` is the empty one."""
+
+    obstacles: tuple[Obstacle, ...] = ()
+    attached: tuple[AttachedObject, ...] = ()
+    allowed_collisions: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "obstacles", tuple(self.obstacles))
+        object.__setattr__(self, "attached", tuple(self.attached))
+        object.__setattr__(self, "allowed_collisions", tuple((str(a), str(b)) for a, b in self.allowed_collisions))
+        names = self.names
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(f"scene: the name '{name}' is used {names.count(name)} times; names must differ")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all obstacles and attached objects."""
+        return (*(o.name for o in self.obstacles), *(o.name for o in self.attached))
+
+    def obstacle(self, name: str) -> Obstacle:
+        """The obstacle of that name.
+
+        Raises:
+            UnknownNameError: If there is none.
+        """
+        for obstacle in self.obstacles:
+            if obstacle.name == name:
+                return obstacle
+        raise UnknownNameError("obstacle", name, (o.name for o in self.obstacles))
+
+    def at(self, time: float) -> Scene:
+        """The scene as it stands at ``time`` [s]: moving obstacles are where their motion puts them."""
+        moved = tuple(
+            o if o.motion is None else replace(o, pose=o.motion.pose_at(o.pose, time)) for o in self.obstacles
+        )
+        return replace(self, obstacles=moved)

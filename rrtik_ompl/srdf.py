@@ -1,0 +1,151 @@
+"""SRDF (MoveIt's semantic description): groups of joints, named states, pairs of links that are never checked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from xml.etree.ElementTree import Element
+
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.tree import Tree
+from rrtik_ompl.urdf_read import attribute, numbers, parse_xml
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Group:
+    """One planning group: what its joints are collected from."""
+
+    name: str
+    chains: tuple[tuple[str, str], ...] = ()
+    joints: tuple[str, ...] = ()
+    links: tuple[str, ...] = ()
+    subgroups: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Srdf:
+    """What an SRDF says.
+
+    Attributes:
+        where: File name for messages.
+        groups: By name.
+        states: Joint values [rad or m] by (group, state).
+        allowed: Pairs of link names never checked against each other.
+        end_effectors: Pairs (group, link): the link at the end of that group.
+        passive: Joints that no motor moves.
+    """
+
+    where: str
+    groups: Mapping[str, Group] = field(default_factory=dict)
+    states: Mapping[tuple[str, str], Mapping[str, float]] = field(default_factory=dict)
+    allowed: frozenset[frozenset[str]] = frozenset()
+    end_effectors: tuple[tuple[str, str], ...] = ()
+    passive: frozenset[str] = frozenset()
+    virtual: frozenset[str] = frozenset()
+
+    def group_joints(self, group: str, tree: Tree) -> tuple[str, ...]:
+        """Movable joints of a group, parents before children.
+
+        Raises:
+            InputError: If the group does not exist, is empty, or names a joint or link that the robot does not have.
+        """
+        wanted = self._members(group, tree, ())
+        chosen = tuple(j.name for j in tree.walk() if j.name in wanted - self.passive and j.kind != "fixed")
+        if not chosen:
+            raise InputError(f"{self.where}: group '{group}' holds no movable joint; choose another group")
+        return chosen
+
+    def group_tip(self, group: str, tree: Tree) -> str:
+        """Link at the end of a group: its chain's, else its end effector's, else the child of its last joint."""
+        chains = self.groups[group].chains
+        if chains:
+            return chains[-1][1]
+        links = {link.name for link in tree.links}
+        for owner, link in self.end_effectors:
+            if owner == group and link in links:
+                return link
+        last = self.group_joints(group, tree)[-1]
+        return next(joint.child for joint in tree.joints if joint.name == last)
+
+    def postures(self, group: str | None) -> dict[str, dict[str, float]]:
+        """Named states merged over all groups; those of ``group`` win where two share a name."""
+        merged: dict[str, dict[str, float]] = {}
+        for (owner, state), values in sorted(self.states.items(), key=lambda item: item[0][0] == group):
+            merged.setdefault(state, {}).update(values)
+        return merged
+
+    def _members(self, name: str, tree: Tree, above: tuple[str, ...]) -> set[str]:
+        if name not in self.groups:
+            raise UnknownNameError("group", name, self.groups, where=self.where)
+        if name in above:
+            raise InputError(f"{self.where}: group '{name}' contains itself; take it out")
+        group, where = self.groups[name], f"{self.where}: group '{name}'"
+        joints = [joint.name for joint in tree.joints]
+        above_link = {joint.child: joint.name for joint in tree.joints}
+        members = set()
+        for joint in group.joints:
+            if joint not in joints and joint not in self.virtual:
+                raise UnknownNameError("joint", joint, joints, where=where)
+            members.add(joint)
+        for link in group.links:
+            if link not in above_link and link != tree.root.name:
+                raise UnknownNameError("link", link, [x.name for x in tree.links], where=where)
+            members |= {above_link[link]} if link in above_link else set()
+        for base, tip in group.chains:
+            members |= {joint.name for joint in tree.chain(tip, base)}
+        for subgroup in group.subgroups:
+            members |= self._members(subgroup, tree, (*above, name))
+        return members
+
+
+def read_srdf(text: str, where: str = "SRDF text") -> Srdf:
+    """Read SRDF text. Names are compared with the robot only when they are used.
+
+    Raises:
+        InputError: If the text is not XML, or an element lacks what it must have; the message names it.
+    """
+    robot = parse_xml(text, "robot", where)
+    groups = [_group(element, where) for element in robot.findall("group")]
+    states: dict[tuple[str, str], dict[str, float]] = {}
+    for element in robot.findall("group_state"):
+        name = attribute(element, "group_state", "name", where)
+        states[(element.get("group", ""), name)] = _state(element, f"{where}: group_state '{name}'")
+    ends = [
+        (owner, element.get("parent_link", ""))
+        for element in robot.findall("end_effector")
+        for owner in (element.get("parent_group", ""), element.get("group", ""))
+    ]
+    pairs = [frozenset((e.get("link1", ""), e.get("link2", ""))) for e in robot.findall("disable_collisions")]
+    return Srdf(
+        where=where,
+        groups={group.name: group for group in groups},
+        states=states,
+        allowed=frozenset(pair for pair in pairs if len(pair) == 2),
+        end_effectors=tuple(ends),
+        passive=frozenset(e.get("name", "") for e in robot.findall("passive_joint")),
+        virtual=frozenset(e.get("name", "") for e in robot.findall("virtual_joint")),
+    )
+
+
+def _group(element: Element, where: str) -> Group:
+    name = attribute(element, "group", "name", where)
+    place = f"{where}: group '{name}'"
+
+    def names(tag: str) -> tuple[str, ...]:
+        return tuple(attribute(item, tag, "name", place) for item in element.findall(tag))
+
+    chains = tuple(
+        (attribute(c, "chain", "base_link", place), attribute(c, "chain", "tip_link", place))
+        for c in element.findall("chain")
+    )
+    return Group(name, chains, names("joint"), names("link"), names("group"))
+
+
+def _state(element: Element, where: str) -> dict[str, float]:
+    values = {}
+    for joint in element.findall("joint"):
+        name = attribute(joint, "joint", "name", where)
+        words = (joint.get("value") or "").split()
+        if len(words) == 1:  # states of planar and floating joints hold more numbers and are not ours
+            values[name] = numbers(joint, "value", 1, None, f"{where}: joint '{name}'")[0]
+    return values

@@ -1,0 +1,83 @@
+"""Reading and writing text files: a failure is one line that names the file; a file is written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from difflib import get_close_matches
+from pathlib import Path
+
+from rrtik_ompl.errors import InputError
+
+MAX_BYTES = 64 * 1024 * 1024  # far above any problem or path file; keeps /dev/zero from filling the memory
+
+
+def read_text(path: str | os.PathLike[str]) -> str:
+    """Contents of a UTF-8 text file.
+
+    Raises:
+        InputError: If the file is missing, a folder, unreadable, larger than 64 MiB, or not UTF-8 text.
+    """
+    data = read_bytes(path)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path}: not a text file (byte {data[error.start]:#04x} at offset {error.start}); expected UTF-8 text"
+        ) from error
+
+
+def read_bytes(path: str | os.PathLike[str], limit: int = MAX_BYTES) -> bytes:
+    """Contents of a file of at most ``limit`` bytes.
+
+    Raises:
+        InputError: If the file is missing, a folder, unreadable or too large.
+    """
+    try:
+        with open(path, "rb") as file:
+            data = file.read(limit + 1)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file{_similar(Path(path))}") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: this is a folder; give a file") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
+    if len(data) > limit:
+        raise InputError(f"{path}: larger than {limit // 2**20} MiB, the most that is read")
+    return data
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """Write a UTF-8 text file so that an interruption leaves the old file or the new one, never a half.
+
+    The text goes to a temporary name in the same folder, which then takes the place of the old file. Devices and
+    pipes (``/dev/stdout``) are written directly.
+
+    Raises:
+        InputError: If the folder does not exist or the file cannot be written.
+    """
+    target = Path(os.path.realpath(path))  # a link stays a link: the file it points to is replaced
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+    try:
+        if target.exists() and not target.is_file() and not target.is_dir():
+            target.write_text(text, encoding="utf-8")
+            return
+        if target.is_dir():
+            raise IsADirectoryError(None, "this is a folder; give a file name")
+        try:
+            temporary.write_text(text, encoding="utf-8")
+            os.replace(temporary, target)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except FileNotFoundError:
+        raise InputError(f"{path}: cannot be written: folder '{target.parent}' does not exist; create it") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be written: {getattr(error, 'strerror', None) or error}") from error
+
+
+def _similar(path: Path) -> str:
+    """A hint at a file of nearly the same name in the same folder."""
+    try:
+        near = get_close_matches(path.name, os.listdir(path.parent), n=1, cutoff=0.8)
+    except (OSError, ValueError):
+        return f"; folder '{path.parent}' does not exist"
+    return f"; did you mean '{near[0]}'?" if near else "; check the name"

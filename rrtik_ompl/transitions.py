@@ -1,0 +1,114 @@
+"""Routes as lists of single-joint moves: what counts as a move, how many a route has, how few it could have.
+
+Source: the metric and the count of routes of the C-RDT paper.
+"""
+
+from __future__ import annotations
+
+from math import factorial, radians
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.arrays import Matrix, finite_array
+from rrtik_ompl.errors import InputError
+
+SAME = radians(1e-6)  # [rad] or [m]; a joint that changes by no more than this has not moved
+
+
+def moved(a: ArrayLike, b: ArrayLike, tolerance: float = SAME) -> NDArray[np.bool_]:
+    """The paper's sigma: which joints differ between a and b by more than ``tolerance``. Shape of a and b."""
+    difference = np.abs(np.asarray(a, dtype=np.float64) - np.asarray(b, dtype=np.float64))
+    mask: NDArray[np.bool_] = difference > tolerance
+    return mask
+
+
+def lower_bound(start: ArrayLike, goal: ArrayLike, tolerance: float = SAME) -> int:
+    """The paper's c: the fewest single-joint moves that lead from start to goal, each of shape (n,).
+
+    It is reached when nothing obstructs. If one joint alone is obstructed, c + 2 is the natural optimum.
+    """
+    first = finite_array(start, (None,), "start")
+    return int(np.count_nonzero(moved(first, finite_array(goal, (len(first),), "goal"), tolerance)))
+
+
+def merge_moves(waypoints: ArrayLike, tolerance: float = SAME) -> Matrix:
+    """Join consecutive moves of the same joint and delete null moves.
+
+    The merged move covers no new configuration, so a valid route stays valid. Start and end are kept exactly. With
+    ``tolerance = 0`` every edge of a single-joint route still moves exactly one coordinate.
+
+    Args:
+        waypoints: Shape (k, n), k at least 1.
+        tolerance: Largest change that counts as none, rad or m.
+
+    Returns:
+        Shape (m, n), m <= k; a single row if nothing moves.
+    """
+    rows = _rows(waypoints)
+    kept: list[int] = [0]
+    for i in range(1, len(rows)):
+        while len(kept) > 1 and _same_joint(rows, kept[-2], kept[-1], i, tolerance):
+            kept.pop()
+        if moved(rows[kept[-1]], rows[i], tolerance).any():
+            kept.append(i)
+        elif len(kept) > 1:  # a null move: its end takes the place of its beginning, so that the last row is exact
+            kept[-1] = i
+    return rows[kept]
+
+
+def transitions(waypoints: ArrayLike, tolerance: float = SAME) -> int:
+    """Number of moves of a route, shape (k, n): its edges after :func:`merge_moves`.
+
+    An edge that moves several joints at once counts as one; :func:`single_joint` tells whether there is such an edge.
+    """
+    return len(merge_moves(waypoints, tolerance)) - 1
+
+
+def single_joint(waypoints: ArrayLike, tolerance: float = 0.0) -> bool:
+    """Whether every edge of the route, shape (k, n), moves exactly one joint."""
+    rows = _rows(waypoints)
+    return bool((moved(rows[:-1], rows[1:], tolerance).sum(axis=1) == 1).all())
+
+
+def route_length(waypoints: ArrayLike) -> float:
+    """Sum of the Euclidean lengths of the edges of a route, shape (k, n) [rad, or m for sliding joints]."""
+    return float(np.linalg.norm(np.diff(_rows(waypoints), axis=0), axis=1).sum())
+
+
+def routes(n: int, l: int, m: int = 1) -> int:  # noqa: E741 - the paper's letter
+    """Ways to walk m edges one joint at a time on a grid: ``[(n l)! / (l!)^n]^m``, the order of the edges being fixed.
+
+    Args:
+        n: Number of joints.
+        l: Grid steps per joint and edge.
+        m: Number of edges.
+    """
+    return int(_edge_routes(n, l, m) ** m)
+
+
+def routes_published(n: int, l: int, m: int = 1) -> int:  # noqa: E741 - the paper's letter
+    """The count as printed, ``m! (n l)! / (l!)^n``. It agrees with :func:`routes` for m = 1 only.
+
+    The factor m! would permute the edges of the route, whose order is given.
+    """
+    return factorial(m) * _edge_routes(n, l, m)
+
+
+def _edge_routes(n: int, l: int, m: int) -> int:  # noqa: E741
+    if min(n, l, m) < 1:
+        raise InputError(f"routes: n, l and m must be at least 1, got n={n}, l={l}, m={m}")
+    return int(factorial(n * l) // factorial(l) ** n)
+
+
+def _same_joint(rows: Matrix, a: int, b: int, c: int, tolerance: float) -> bool:
+    """Whether a -> b and b -> c move one and the same joint."""
+    first, second = moved(rows[a], rows[b], tolerance), moved(rows[b], rows[c], tolerance)
+    return bool(first.sum() == 1 and np.array_equal(first, second))
+
+
+def _rows(waypoints: ArrayLike) -> Matrix:
+    rows = finite_array(waypoints, (None, None), "waypoints")
+    if len(rows) == 0:
+        raise InputError("waypoints: a route needs at least one configuration")
+    return rows

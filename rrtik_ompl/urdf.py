@@ -1,0 +1,132 @@
+"""Robots from URDF files or text, with SRDF (groups, postures, allowed collisions) and ``joint_limits.yaml``."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.joint_limits import merge_limits, read_joint_limits
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.robot_build import JointLimits, build_robot
+from rrtik_ompl.robot_source import source_entry
+from rrtik_ompl.srdf import Srdf, read_srdf
+from rrtik_ompl.text_file import read_text
+from rrtik_ompl.urdf_read import UrdfDescription, read_urdf
+
+FilePath = str | os.PathLike[str]
+URDF_OPTIONS = ("base_pose", "group", "joint_limits", "joints", "locked", "packages", "srdf", "tip")
+
+
+def robot_from_urdf(path: FilePath, *, name: str | None = None, **options: Any) -> Robot:
+    """Load a robot from a URDF file.
+
+    Args:
+        path: The URDF (expanded, no xacro).
+        name: Name for messages; the URDF's own if None.
+        **options: As for `robot_from_urdf_text`.
+
+    Raises:
+        InputError: If anything in the files or options cannot be used; one line names file, element and remedy.
+    """
+    text = read_text(path)
+    file = Path(path).resolve()
+    options = {"source": {"urdf": str(file)} | source_entry(options)} | options
+    return robot_from_urdf_text(text, name=name, where=str(path), folder=file.parent, **options)
+
+
+def robot_from_urdf_text(
+    text: str,
+    *,
+    name: str | None = None,
+    where: str = "URDF text",
+    folder: FilePath | None = None,
+    srdf: FilePath | None = None,
+    group: str | None = None,
+    joints: Iterable[str] | None = None,
+    tip: str | None = None,
+    joint_limits: FilePath | None = None,
+    packages: FilePath | Iterable[FilePath] = (),
+    locked: Mapping[str, float] | None = None,
+    base_pose: Any | None = None,
+    limits: Mapping[str, JointLimits] | None = None,
+    postures: Mapping[str, Mapping[str, float]] | None = None,
+    self_collision: bool = True,
+    closed_form: Callable[..., Any] | None = None,
+    source: Mapping[str, Any] | None = None,
+) -> Robot:
+    """Load a robot from URDF text.
+
+    The actuated joints are, in this order of precedence: ``joints``; those of ``group``; those between the base and
+    ``tip``; all that do not mimic another. Every other joint is held still. Soft limits (``safety_controller``) are
+    not used: put the limits you want into ``joint_limits``.
+
+    Args:
+        text: The XML.
+        name: Name for messages; the URDF's own if None.
+        where: What error messages call the text (its file name).
+        folder: Folder relative to which meshes are named.
+        srdf: SRDF file.
+        group: Group of the SRDF whose joints are actuated; its end is the default tip.
+        joints: Actuated joints, in the order wanted.
+        tip: Link that goals refer to.
+        joint_limits: File in the format of MoveIt's ``joint_limits.yaml``.
+        packages: Folders in which ``package://`` names are looked for first.
+        locked: Values [rad or m] of joints that are held still; 0, moved into the limits, if absent.
+        base_pose: ``pinocchio.SE3`` T_world_base.
+        limits: Limits that replace those of the URDF and of ``joint_limits``, by joint name.
+        postures: Further named postures.
+        self_collision: Whether links are checked against each other.
+        closed_form: The robot's own inverse kinematics.
+        source: What a problem file says under ``robot``.
+
+    Raises:
+        InputError: If anything in the text, the files or the options cannot be used.
+    """
+    roots = [packages] if isinstance(packages, (str, os.PathLike)) else list(packages)
+    home = None if folder is None else Path(folder)
+    description = read_urdf(text, where=where, folder=home, packages=[Path(root) for root in roots])
+    tree = description.tree
+    semantics = Srdf(where) if srdf is None else read_srdf(read_text(srdf), str(srdf))
+    if group is not None and srdf is None:
+        raise InputError(f"{where}: group '{group}' needs an SRDF file; give srdf=FILE, or joints=[...] in its place")
+    end = semantics.group_tip(group, tree) if group in semantics.groups and tip is None and group is not None else tip
+    actuated = _actuated(description, semantics, group, joints, tip)
+    from_file = {} if joint_limits is None else read_joint_limits(joint_limits, [j.name for j in tree.joints])
+    return build_robot(
+        name or description.name or Path(where).stem,
+        tree,
+        joints=actuated,
+        mimics=description.mimics,
+        locked=locked,
+        tip=end,
+        base_pose=base_pose,
+        limits=merge_limits(from_file, limits or {}),
+        postures=semantics.postures(group) | {key: dict(value) for key, value in (postures or {}).items()},
+        allowed_collisions=semantics.allowed,
+        self_collision=self_collision,
+        closed_form=closed_form,
+        source=source,
+    )
+
+
+def _actuated(
+    description: UrdfDescription, semantics: Srdf, group: str | None, joints: Iterable[str] | None, tip: str | None
+) -> tuple[str, ...]:
+    tree = description.tree
+    followers = {tie.joint for tie in description.mimics}
+    movable = tuple(j.name for j in tree.walk() if j.kind != "fixed" and j.name not in followers)
+    if joints is not None:
+        chosen = tuple(joints)
+        for joint in chosen:
+            if joint not in movable and joint not in followers:
+                raise UnknownNameError("movable joint", joint, movable, where=tree.where)
+        return chosen
+    if group is not None:
+        members = semantics.group_joints(group, tree)
+        return tuple(joint for joint in members if joint not in followers)
+    if tip is not None and tip in {link.name for link in tree.links}:
+        return tuple(joint.name for joint in tree.chain(tip) if joint.name in movable)
+    return movable

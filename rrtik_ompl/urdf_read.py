@@ -1,0 +1,262 @@
+"""URDF text to links and joints: every element is checked here, and every error names the file, the element, the remedy."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.errors import InputError, RrtikError, UnknownNameError
+from rrtik_ompl.package_path import resolve_mesh
+from rrtik_ompl.poses import pose_from_rpy
+from rrtik_ompl.robot_build import Mimic
+from rrtik_ompl.shapes import Box, Capsule, Cylinder, Sphere
+from rrtik_ompl.tree import KINDS, Joint, Link, MeshFile, Solid, Tree
+
+Colour = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UrdfDescription:
+    """What a URDF says: its name, its tree, and which joints follow others (followers of followers resolved)."""
+
+    name: str
+    tree: Tree
+    mimics: tuple[Mimic, ...]
+
+
+def read_urdf(
+    text: str, *, where: str = "URDF text", folder: Path | None = None, packages: Iterable[Path] = ()
+) -> UrdfDescription:
+    """Read URDF text.
+
+    Args:
+        text: The XML.
+        where: File name, put in front of every error message.
+        folder: Folder of the file, for meshes; None if meshes can only be found by absolute path or ``packages``.
+        packages: Folders that hold packages (``package://NAME/...``), or are packages themselves.
+
+    Raises:
+        InputError: If anything in the text cannot be used.
+    """
+    robot = parse_xml(text, "robot", where)
+    if robot.find(".//{http://www.ros.org/wiki/xacro}*") is not None:
+        raise InputError(f"{where}: holds xacro macros; expand them first (xacro FILE > robot.urdf) and load the result")
+    reader = _Reader(where, folder, tuple(packages), {})
+    for material in robot.iter("material"):
+        reader.learn_material(material)
+    links = [reader.link(element) for element in robot.findall("link")]
+    joints = [reader.joint(element) for element in robot.findall("joint")]
+    mimics = [tie for element in robot.findall("joint") for tie in reader.mimics(element)]
+    return UrdfDescription(robot.get("name", ""), Tree(where, links, joints), _flatten(where, joints, mimics))
+
+
+def parse_xml(text: str, root: str, where: str) -> Element:
+    """Top element of XML text.
+
+    Raises:
+        InputError: If the text is not XML (with the line) or its top element is not ``root``.
+    """
+    try:
+        element = ElementTree.fromstring(text.strip())
+    except (ElementTree.ParseError, ValueError) as error:
+        line = getattr(error, "position", (1, 0))[0]
+        raise InputError(f"{where}:{line}: not valid XML: {error}; correct the line or export the file again") from error
+    if element.tag != root:
+        raise InputError(f"{where}: the top element is <{element.tag}>, expected <{root}>; is it the right file?")
+    return element
+
+
+def numbers(element: Element, key: str, count: int, default: Sequence[float] | None, where: str) -> list[float]:
+    """The ``count`` finite numbers of an attribute.
+
+    Raises:
+        InputError: If the attribute is missing without a default, or does not hold that many finite numbers.
+    """
+    text = element.get(key)
+    if text is None:
+        if default is None:
+            raise InputError(f'{where}: <{element.tag}> has no {key}; add {key}="{" ".join(["0"] * count)}"')
+        return list(default)
+    try:
+        values = [float(word) for word in text.split()]
+    except ValueError:
+        values = []
+    if len(values) != count or not np.isfinite(values).all():
+        plural = "number" if count == 1 else "numbers"
+        raise InputError(f"{where}: <{element.tag} {key}=\"{text}\"> must hold {count} finite {plural}")
+    return values
+
+
+def attribute(element: Element | None, tag: str, key: str, where: str) -> str:
+    """A word that must be there, such as the link of ``<parent link="..."/>``.
+
+    Raises:
+        InputError: If the element or the attribute is missing.
+    """
+    value = "" if element is None else element.get(key, "")
+    if not value:
+        raise InputError(f'{where}: <{tag} {key}="..."> is missing; add it')
+    return value
+
+
+@dataclass(slots=True, eq=False)
+class _Reader:
+    where: str
+    folder: Path | None
+    packages: tuple[Path, ...]
+    materials: dict[str, Colour]
+
+    def learn_material(self, material: Element) -> None:
+        colour = material.find("color")
+        if colour is not None:
+            where = f"{self.where}: material '{material.get('name', '')}'"
+            red, green, blue, opacity = numbers(colour, "rgba", 4, None, where)
+            self.materials.setdefault(material.get("name", ""), (red, green, blue, opacity))
+
+    def link(self, element: Element) -> Link:
+        name = attribute(element, "link", "name", self.where)
+        where = f"{self.where}: link '{name}'"
+        capsules = {c.get("name", "") for c in element.findall("collision_checking/capsule")}
+        with _place(where):
+            collision = tuple(self.solid(item, where, capsules) for item in element.findall("collision"))
+            visual = tuple(self.solid(item, where, set()) for item in element.findall("visual"))
+            return Link(name, collision, visual, _inertia(element.find("inertial"), where))
+
+    def solid(self, element: Element, where: str, capsules: set[str]) -> Solid:
+        geometry = element.find("geometry")
+        shapes = [] if geometry is None else list(geometry)
+        if len(shapes) != 1:
+            raise InputError(f"{where}: <{element.tag}> must hold one <geometry> with one shape")
+        shape = self.shape(shapes[0], where)
+        if isinstance(shape, Cylinder) and element.get("name", "") in capsules:
+            shape = Capsule(shape.radius, shape.length)
+        return Solid(shape, _origin(element, where), self.colour(element.find("material"), where))
+
+    def shape(self, element: Element, where: str) -> Box | Sphere | Cylinder | Capsule | MeshFile:
+        if element.tag == "box":
+            return Box(numbers(element, "size", 3, None, where))
+        if element.tag == "sphere":
+            return Sphere(numbers(element, "radius", 1, None, where)[0])
+        if element.tag in ("cylinder", "capsule"):
+            kind = Cylinder if element.tag == "cylinder" else Capsule
+            return kind(numbers(element, "radius", 1, None, where)[0], numbers(element, "length", 1, None, where)[0])
+        if element.tag == "mesh":
+            uri = attribute(element, "mesh", "filename", where)
+            x, y, z = numbers(element, "scale", 3, (1.0, 1.0, 1.0), where)
+            if x * y * z == 0.0:
+                raise InputError(f"{where}: mesh '{uri}' has a scale of 0; every axis needs another number")
+            return MeshFile(resolve_mesh(uri, self.folder, self.packages, where), (x, y, z))
+        raise UnknownNameError("shape", element.tag, ("box", "sphere", "cylinder", "capsule", "mesh"), where=where)
+
+    def colour(self, material: Element | None, where: str) -> Colour | None:
+        if material is None:
+            return None
+        colour = material.find("color")
+        if colour is None:
+            return self.materials.get(material.get("name", ""))
+        red, green, blue, opacity = numbers(colour, "rgba", 4, None, where)
+        return red, green, blue, opacity
+
+    def joint(self, element: Element) -> Joint:
+        name = attribute(element, "joint", "name", self.where)
+        where = f"{self.where}: joint '{name}'"
+        kind = attribute(element, "joint", "type", where)
+        if kind not in KINDS:
+            raise UnknownNameError("usable joint type", kind, KINDS, where=where)
+        parent = attribute(element.find("parent"), "parent", "link", where)
+        child = attribute(element.find("child"), "child", "link", where)
+        axis_element = element.find("axis")
+        axis = [1.0, 0.0, 0.0] if axis_element is None else numbers(axis_element, "xyz", 3, (1.0, 0.0, 0.0), where)
+        lower, upper, velocity = _limit(element.find("limit"), kind, where)
+        with _place(self.where):
+            axis = [1.0, 0.0, 0.0] if kind == "fixed" else axis
+            return Joint(name, kind, parent, child, _origin(element, where), axis, lower, upper, velocity)
+
+    def mimics(self, element: Element) -> Iterator[Mimic]:
+        tie = element.find("mimic")
+        if tie is not None and element.get("type") != "fixed":
+            where = f"{self.where}: joint '{element.get('name')}'"
+            source = attribute(tie, "mimic", "joint", where)
+            multiplier = numbers(tie, "multiplier", 1, (1.0,), where)[0]
+            yield Mimic(element.get("name", ""), source, multiplier, numbers(tie, "offset", 1, (0.0,), where)[0])
+
+
+def _limit(limit: Element | None, kind: str, where: str) -> tuple[float, float, float]:
+    """Lower, upper and velocity limit; infinite where the kind of joint has none."""
+    bounded = kind in ("revolute", "prismatic")
+    if limit is None:
+        if bounded:
+            raise InputError(
+                f'{where}: a {kind} joint needs <limit lower=".." upper=".." velocity=".." effort=".."/>; add it'
+                + (', or make the type "continuous"' if kind == "revolute" else "")
+            )
+        return -np.inf, np.inf, np.inf
+    velocity = numbers(limit, "velocity", 1, (0.0,), where)[0] if kind != "fixed" else 0.0
+    if velocity < 0.0:
+        raise InputError(f"{where}: velocity limit {velocity:g} is negative; give its size")
+    if not bounded:
+        return -np.inf, np.inf, velocity or np.inf
+    lower, upper = (numbers(limit, key, 1, (0.0,), where)[0] for key in ("lower", "upper"))
+    if lower > upper:
+        raise InputError(f"{where}: lower limit {lower:g} is above upper limit {upper:g}; swap them")
+    return lower, upper, velocity or np.inf
+
+
+def _origin(element: Element, where: str) -> Any:
+    origin = element.find("origin")
+    if origin is None:
+        return pin.SE3.Identity()
+    zero = (0.0, 0.0, 0.0)
+    return pose_from_rpy(numbers(origin, "xyz", 3, zero, where), numbers(origin, "rpy", 3, zero, where), where)
+
+
+def _inertia(inertial: Element | None, where: str) -> Any | None:
+    mass = None if inertial is None else inertial.find("mass")
+    tensor = None if inertial is None else inertial.find("inertia")
+    if inertial is None or mass is None or tensor is None:
+        return None
+    xx, xy, xz, yy, yz, zz = (numbers(tensor, key, 1, (0.0,), where)[0] for key in "ixx ixy ixz iyy iyz izz".split())
+    placement = _origin(inertial, where)
+    matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    turned = placement.rotation @ matrix @ placement.rotation.T
+    return pin.Inertia(numbers(mass, "value", 1, None, where)[0], placement.translation, turned)
+
+
+def _flatten(where: str, joints: Sequence[Joint], mimics: Sequence[Mimic]) -> tuple[Mimic, ...]:
+    """Make every follower follow a joint that follows nothing."""
+    ties = {tie.joint: tie for tie in mimics}
+    movable = [joint.name for joint in joints if joint.kind != "fixed"]
+    flat = []
+    for tie in mimics:
+        source, multiplier, offset, seen = tie.source, tie.multiplier, tie.offset, {tie.joint}
+        while True:
+            if source not in movable:
+                raise UnknownNameError("movable joint to mimic", source, movable, where=f"{where}: joint '{tie.joint}'")
+            if source in seen:
+                raise InputError(f"{where}: joint '{tie.joint}' mimics itself by way of '{source}'; break the ring")
+            if source not in ties:
+                break
+            above = ties[source]
+            seen.add(source)
+            source, offset, multiplier = above.source, multiplier * above.offset + offset, multiplier * above.multiplier
+        flat.append(Mimic(tie.joint, source, multiplier, offset))
+    return tuple(flat)
+
+
+@contextmanager
+def _place(where: str) -> Iterator[None]:
+    """Put the file and the element in front of an error that does not name them yet."""
+    try:
+        yield
+    except RrtikError as error:
+        if not str(error).startswith(where):
+            raise InputError(f"{where}: {error}") from error
+        raise

@@ -1,0 +1,53 @@
+"""Pictures that a person can turn, play and step through: one HTML page, written to a file or served to this machine.
+
+Nothing below this package imports it, and it is imported only when something is to be shown.
+"""
+
+from __future__ import annotations
+
+import os
+import webbrowser
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from rrtik_ompl.text_file import write_text
+from rrtik_ompl.viewer.page import page
+from rrtik_ompl.viewer.serve import PageServer
+
+__all__ = ["PageServer", "page", "view"]
+
+
+def view(
+    shown: Any,
+    path: Any | None = None,
+    *,
+    html: str | os.PathLike[str] | None = None,
+    title: str | None = None,
+    port: int = 0,
+    on_ready: Callable[[str], object] = webbrowser.open,
+) -> Path | None:
+    """Show a problem and a path: robot, obstacles, start and goal as ghosts, the tip's trail, and a player.
+
+    Args:
+        shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
+        path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m]; what is shown stands still if None.
+        html: File to write. If None, the page is served on 127.0.0.1 until Ctrl-C is pressed.
+        title: Heading of the page; made from the problem's or the robot's name if None.
+        port: Port to serve on; a free one if 0.
+        on_ready: Called with the URL once the page is being served; opens the browser unless something else is given.
+
+    Returns:
+        The file that was written, or None after serving.
+
+    Raises:
+        InputError: If that cannot be shown, the file cannot be written or the port cannot be used.
+    """
+    text = page(shown, path, title=title)
+    if html is not None:
+        write_text(html, text)
+        return Path(html)
+    with PageServer(text, port) as server:
+        on_ready(server.url)
+        server.wait()
+    return None

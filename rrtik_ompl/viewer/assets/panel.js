@@ -1,0 +1,197 @@
+// The panel beside the picture: joints with units, list of moves, legend with switches.
+const HALF_MINUS = "\u2212";
+
+function make(tag, properties = {}, ...children) {
+  const element = Object.assign(document.createElement(tag), properties);
+  element.append(...children);
+  return element;
+}
+
+/** A joint value as a person reads it: degrees with one decimal, metres with three. */
+function reading(j, value) {
+  const inDegrees = robot.joints[j].unit === "deg";
+  const text = inDegrees ? ((value * 180) / Math.PI).toFixed(1) : value.toFixed(3);
+  return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", HALF_MINUS);
+}
+
+function withUnit(j, value) {
+  return `${reading(j, value)} ${robot.joints[j].unit}`;
+}
+
+const count = (number, noun) => `${number} ${noun}${number === 1 ? "" : "s"}`;
+
+document.getElementById("title").textContent = story.title;
+document.getElementById("subtitle").textContent = [
+  robot ? `robot ${robot.name}, ${count(robot.joints.length, "joint")}` : "",
+  count(story.obstacles.length, "obstacle"),
+  story.goal ? story.goal : "",
+].filter((text) => text).join("  \u00b7  ");
+
+// Joints -----------------------------------------------------------------------------------------------------------
+const jointRows = [];
+let onJointMoved = () => {};
+
+function addJointRow(joint, j) {
+  const bounded = joint.lower !== null && joint.upper !== null;
+  const cell = make("td", { className: "range" });
+  const row = { value: make("td", { className: "number" }), target: make("td", { className: "number" }), set: () => {} };
+  if (bounded) cell.title = `limits ${withUnit(j, joint.lower)} to ${withUnit(j, joint.upper)}`;
+  if (story.moves.length === 0) {
+    const around = joint.unit === "deg" ? Math.PI : 1;
+    const range = { type: "range", min: joint.lower ?? -around, max: joint.upper ?? around, step: "any" };
+    const slider = make("input", { ...range, ariaLabel: `move ${joint.name}` });
+    slider.addEventListener("input", () => onJointMoved(j, Number(slider.value)));
+    row.set = (value) => { slider.value = value; };
+    cell.append(slider);
+  } else if (bounded) {
+    const mark = make("i");
+    row.set = (value) => { mark.style.left = `${(100 * (value - joint.lower)) / (joint.upper - joint.lower)}%`; };
+    cell.append(make("div", { className: "meter" }, mark));
+  } else {
+    cell.append(make("span", { className: "endless", textContent: "no limits" }));
+  }
+  const name = make("td", { className: "name", textContent: joint.name, title: joint.name });
+  row.element = make("tr", {}, name, row.value, row.target, cell);
+  jointRows.push(row);
+  return row.element;
+}
+
+function buildJoints() {
+  document.getElementById("joints-section").hidden = false;
+  document.getElementById("joints-note").textContent =
+    story.moves.length ? "those that move are coloured" : "drag to move the arm";
+  const heads = ["joint", "now", story.moves.length ? "move to" : "", story.moves.length ? "limits" : ""];
+  const header = make("tr", {}, ...heads.map((textContent, k) => make("th", { textContent, className: k % 3 ? "number" : "" })));
+  const table = document.getElementById("joints");
+  table.classList.toggle("still", story.moves.length === 0);
+  table.append(header, ...robot.joints.map(addJointRow));
+}
+
+function showJoints(q, move, moving) {
+  q.forEach((value, j) => {
+    const row = jointRows[j];
+    const active = moving && move.joints.includes(j);
+    row.value.textContent = withUnit(j, value);
+    row.target.textContent = active ? `${"\u2192"} ${reading(j, move.to[j])}` : "";
+    row.element.className = active ? "moving" : "";
+    row.set(value);
+  });
+  const tip = tipPosition(q).toArray().map((x) => x.toFixed(3).replace("-", HALF_MINUS));
+  document.getElementById("tip").textContent = `tip (${robot.tip.name}): x ${tip[0]}, y ${tip[1]}, z ${tip[2]} m`;
+}
+
+// Moves ------------------------------------------------------------------------------------------------------------
+const moveRows = [];
+story.moves.forEach((move, k) => Object.assign(move, { from: story.waypoints[k], to: story.waypoints[k + 1] }));
+
+function describe(k) {
+  const { joints, from, to } = story.moves[k];
+  if (joints.length === 0) return "stand still";
+  const way = (j) => `${robot.joints[j].name} ${reading(j, from[j])} \u2192 ${withUnit(j, to[j])}`;
+  if (joints.length <= 2) return joints.map(way).join(", ");
+  const farthest = joints.reduce((best, j) => (Math.abs(to[j] - from[j]) > Math.abs(to[best] - from[best]) ? j : best));
+  return `${joints.length} joints, most ${way(farthest)}`;
+}
+
+function buildMoves(goTo) {
+  document.getElementById("moves-section").hidden = false;
+  const table = document.getElementById("moves");
+  table.append(make("tr", {}, make("th", { textContent: "no." }), make("th", { textContent: "joint and way" })));
+  story.moves.forEach((_, k) => {
+    const row = make("tr", {}, make("td", { textContent: k + 1 }), make("td", { textContent: describe(k) }));
+    row.addEventListener("click", () => goTo(story.times[k]));
+    moveRows.push(row);
+    table.append(row);
+  });
+}
+
+let shownMove = null;
+function showMove(k) {
+  if (k === shownMove) return;
+  if (shownMove !== null) moveRows[shownMove].className = "";
+  shownMove = k;
+  if (k === null) return;
+  moveRows[k].className = "moving";
+  const scroll = document.getElementById("moves-scroll");
+  const top = moveRows[k].offsetTop - scroll.offsetTop;
+  if (top < scroll.scrollTop || top > scroll.scrollTop + scroll.clientHeight - 40) scroll.scrollTop = top - 40;
+}
+
+// Legend -----------------------------------------------------------------------------------------------------------
+function addSwitch(text, color, opacity, change, on = true) {
+  const box = make("input", { type: "checkbox", checked: on });
+  const swatch = make("span", { className: color ? "swatch" : "swatch none" });
+  if (color) Object.assign(swatch.style, { background: color, opacity });
+  box.addEventListener("change", () => change(box.checked));
+  const label = make("label", {}, box, swatch, ...[].concat(text));
+  document.getElementById("legend").append(make("li", {}, label));
+  change(on);
+}
+
+const toggles = (...paths) => (on) => paths.forEach((path) => setVisible([path], on));
+
+function seeThrough(on) {
+  for (const group of node("obstacles").children) {
+    group.traverse((item) => {
+      if (!item.isMesh) return;
+      item.userData.opacity ??= item.material.opacity;
+      const opacity = on ? Math.min(0.3, item.userData.opacity) : item.userData.opacity;
+      Object.assign(item.material, { opacity, transparent: opacity < 1, depthWrite: opacity === 1 });
+    });
+  }
+  viewer.set_dirty();
+}
+
+function buildLegend() {
+  const { colors } = story;
+  const axes = ["x", "y", "z"].map((textContent, k) => {
+    const letter = make("span", { textContent, className: "axis" });
+    letter.style.color = ["#d55e00", "#009e73", "#0072b2"][k];
+    return letter;
+  });
+  if (robot) addSwitch("robot", colors.robot, 1, toggles("robot"));
+  if (story.start_ghost) addSwitch("start (ghost)", colors.start, 0.6, toggles("start ghost"));
+  if (story.goal_ghost) addSwitch("goal (ghost)", colors.goal, 0.6, toggles("goal ghost"));
+  if (story.goal && story.goal !== "joint values") addSwitch(story.goal, colors.goal, 1, toggles("goal"));
+  if (story.moves.length) addSwitch("way of the tip", colors.trail, 1, toggles("trail", "beads"));
+  if (story.attached.length) addSwitch(`held: ${story.attached.join(", ")}`, colors.attached, 1, () => {});
+  if (story.obstacles.length) {
+    addSwitch(count(story.obstacles.length, "obstacle"), colors.obstacle, 1, toggles("obstacles", "later"));
+    addSwitch("see-through", null, 1, seeThrough, false);
+    addSwitch("names of obstacles", null, 1, (on) => setLabels("obstacle", on), false);
+  }
+  if (labels.some((label) => label.kind === "waypoint")) {
+    addSwitch("numbers of moves", null, 1, (on) => setLabels("waypoint", on), story.moves.length <= 12);
+  }
+  addSwitch(["axes ", ...axes], null, 1, (on) => {
+    toggles("frames")(on);
+    if (robot) setVisible(["robot", robot.nodes[robot.tip.joint], "tip frame"], on);
+  });
+  addSwitch(`grid of ${story.grid} m`, "#d2d9e0", 1, toggles("grid"));
+}
+
+function addLabels() {
+  for (const obstacle of story.obstacles) {
+    const box = new THREE.Box3().setFromObject(node("obstacles", obstacle.node)).getCenter(new THREE.Vector3());
+    addLabel(obstacle.name, "obstacle", { x: box.x, y: -box.z, z: box.y });
+  }
+  if (story.moves.length === 0 || story.moves.length > 200) return;
+  const places = [];
+  story.waypoints.forEach((q, k) => {
+    const tip = tipPosition(q);
+    const text = k === 0 ? "start" : k === story.moves.length ? "goal" : `${k}`;
+    const same = places.find((place) => place.tip.distanceTo(tip) < 0.01 * size);
+    if (same) same.text += `, ${text}`;
+    else places.push({ tip, text, kind: k === 0 || k === story.moves.length ? "station" : "waypoint" });
+  });
+  places.forEach(({ tip, text, kind }) => addLabel(text, kind, tip));
+}
+
+viewer.scene.updateMatrixWorld(true);
+addLabels();
+buildLegend();
+for (const name of Object.keys(VIEWPOINTS)) {
+  const button = make("button", { textContent: name, title: `look from: ${name.toLowerCase()}` });
+  button.addEventListener("click", () => lookFrom(name));
+  document.getElementById("views").append(button);
+}

@@ -1,0 +1,109 @@
+// The player: one time, set by buttons, keys, the scrub bar, the list of moves, the address, or by playing.
+const total = story.times.length ? story.times[story.times.length - 1] : 0;
+const scrub = document.getElementById("scrub");
+let now = 0;
+let playingSince = null;
+
+function show(time) {
+  now = Math.min(Math.max(time, 0), total);
+  const q = postureAt(now);
+  setPosture(node("robot"), q);
+  const k = moveAt(now);
+  const arrived = now >= total;
+  showJoints(q, story.moves[k], !arrived);
+  showMove(arrived ? null : k);
+  highlightPiece(arrived ? null : story.moves[k].piece);
+  scrub.value = now;
+  document.getElementById("now").textContent = arrived
+    ? `Goal reached after ${count(story.moves.length, "move")}`
+    : `Move ${k + 1} of ${story.moves.length}: ${describe(k)}`;
+}
+
+function pause() {
+  playingSince = null;
+  document.getElementById("play").textContent = "Play";
+}
+
+function goTo(time) {
+  pause();
+  show(time);
+}
+
+function play() {
+  if (now >= total) show(0);
+  playingSince = performance.now();
+  document.getElementById("play").textContent = "Pause";
+  requestAnimationFrame(tick);
+}
+
+function tick(stamp) {
+  if (playingSince === null) return;
+  const seconds = Math.min(Math.max(stamp - playingSince, 0) / 1000, 0.25);
+  playingSince = stamp;
+  show(now + seconds * Number(document.getElementById("speed").value));
+  if (now >= total) pause();
+  else requestAnimationFrame(tick);
+}
+
+function step(direction) {
+  const ahead = story.times.filter((time) => (direction > 0 ? time > now + 1e-6 : time < now - 1e-6));
+  goTo(direction > 0 ? Math.min(...ahead, total) : Math.max(...ahead, 0));
+}
+
+const ACTIONS = {
+  " ": () => (playingSince === null ? play() : pause()),
+  ArrowRight: () => step(1),
+  ArrowLeft: () => step(-1),
+  Home: () => goTo(0),
+  End: () => goTo(total),
+};
+
+function addPlayer() {
+  document.getElementById("player").hidden = false;
+  scrub.max = total;
+  scrub.addEventListener("input", () => goTo(Number(scrub.value)));
+  const buttons = { play: " ", forward: "ArrowRight", back: "ArrowLeft", first: "Home", last: "End" };
+  for (const [id, action] of Object.entries(buttons)) {
+    document.getElementById(id).addEventListener("click", ACTIONS[action]);
+  }
+  addEventListener("keydown", (event) => {
+    const action = ACTIONS[event.key];
+    if (!action || event.ctrlKey || event.altKey || event.metaKey || event.target.tagName === "SELECT") return;
+    event.preventDefault();
+    action();
+  });
+  if (story.times.length <= 200) {
+    for (const time of story.times) {
+      const tick = document.createElement("i");
+      tick.style.left = `${(100 * time) / (total || 1)}%`;
+      document.getElementById("ticks").append(tick);
+    }
+  }
+  addEventListener("hashchange", followAddress);
+}
+
+/** #waypoint=3 or #time=2.5 opens the page there, #view=Top looks from there. */
+function followAddress() {
+  const wanted = new URLSearchParams(location.hash.slice(1));
+  const waypoint = Number(wanted.get("waypoint"));
+  if (VIEWPOINTS[wanted.get("view")]) lookFrom(wanted.get("view"));
+  if (story.moves.length === 0) return;
+  if (wanted.has("waypoint") && story.times[waypoint] !== undefined) goTo(story.times[waypoint]);
+  else goTo(Number(wanted.get("time")) || 0);
+}
+
+if (robot) {
+  buildJoints();
+  if (story.moves.length) {
+    buildMoves(goTo);
+    addPlayer();
+  } else {
+    const q = story.waypoints[0].slice();
+    const pose = () => { setPosture(node("robot"), q); showJoints(q, null, false); };
+    onJointMoved = (j, value) => { q[j] = value; pose(); };
+    pose();
+  }
+}
+followAddress();
+viewer.set_3d_pane_size();
+document.documentElement.dataset.ready = "yes";

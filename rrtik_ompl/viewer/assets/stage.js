@@ -1,0 +1,197 @@
+// The 3-D picture: meshcat's viewer with our light, ghosts, grid, labels and camera.
+const pane = document.getElementById("pane");
+const ROOT = ["meshcat"];
+let viewer;
+try {
+  viewer = new MeshCat.Viewer(pane);
+} catch (error) {
+  const sorry = document.createElement("p");
+  sorry.textContent = "This browser cannot draw in 3-D: WebGL is missing or switched off.";
+  pane.replaceChildren(sorry);
+  throw error;
+}
+const low = new THREE.Vector3(...story.frame.low);
+const high = new THREE.Vector3(...story.frame.high);
+if (story.planar) low.z = high.z = 0;
+const centre = low.clone().add(high).multiplyScalar(0.5);
+const size = low.distanceTo(high);
+
+for (const text of JSON.parse(document.getElementById("commands").textContent)) {
+  viewer.handle_command_bytearray(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)));
+}
+
+function node(...path) {
+  return viewer.scene_tree.find([...ROOT, ...path]).object;
+}
+
+function setVisible(path, on) {
+  viewer.scene_tree.find([...ROOT, ...path]).object.visible = on;
+  viewer.set_dirty();
+}
+
+// Light and ground -------------------------------------------------------------------------------------------------
+function rgb(color) {
+  return [1, 3, 5].map((k) => parseInt(color.slice(k, k + 2), 16) / 255);
+}
+viewer.set_property(["Background"], "top_color", rgb(story.colors.background_top));
+viewer.set_property(["Background"], "bottom_color", rgb(story.colors.background_bottom));
+for (const light of ["SpotLight", "PointLightNegativeX", "PointLightPositiveX", "AmbientLight", "FillLight"]) {
+  viewer.set_property(["Lights", light], "visible", false);
+}
+viewer.set_property(["Grid"], "visible", false);
+viewer.set_property(["Axes"], "visible", false);
+const key = new THREE.DirectionalLight(0xffffff, 0.5);
+key.position.set(0.4, -0.8, 1);
+const fill = new THREE.DirectionalLight(0xffffff, 0.25);
+fill.position.set(-1, 0.6, 0.3);
+const sky = new THREE.HemisphereLight(0xffffff, 0xb9c0c8, 0.55);
+sky.position.set(0, 0, 1);
+[key, fill, sky].forEach((light, k) => viewer.set_object(["Lights", `page ${k}`], light));
+
+function addGrid() {
+  const cell = story.grid;
+  const cells = 2 * Math.ceil(Math.max(high.x - low.x, high.y - low.y, size / 2) * 0.75 / cell);
+  const grid = new THREE.GridHelper(cells * cell, cells, 0xbcc6d0, 0xd2d9e0);
+  grid.rotation.x = Math.PI / 2;
+  const snap = (value) => Math.round(value / cell) * cell;
+  grid.position.set(snap(centre.x), snap(centre.y), low.z - 0.01 * size);
+  viewer.set_object([...ROOT, "grid"], grid);
+}
+addGrid();
+
+// Dark edges make flat-sided obstacles readable from every side.
+function outline(group, color) {
+  const meshes = [];
+  group.traverse((item) => { if (item.isMesh) meshes.push(item); });
+  for (const mesh of meshes) {
+    const index = mesh.geometry.index;
+    if ((index && index.count > 60000) || mesh.material.transparent) continue;
+    mesh.add(new THREE.LineSegments(new THREE.EdgesGeometry(mesh.geometry, 30), new THREE.LineBasicMaterial({ color })));
+  }
+}
+outline(node("obstacles"), 0x7a5a1e);
+
+// Postures ---------------------------------------------------------------------------------------------------------
+function setPosture(group, q) {
+  const frames = jointFrames(q);
+  robot.nodes.forEach((name, k) => {
+    const joint = group.children.find((child) => child.name === name);
+    if (joint) frames[k].decompose(joint.position, joint.quaternion, joint.scale);
+  });
+  viewer.set_dirty();
+}
+
+// Ghosts share the triangles of one coarser arm. The first copy of each only fills the depth buffer, so that the second one shows the
+// nearest surface alone and looks like tinted glass, not like a heap of overlapping shells.
+function addGhost(name, color, q) {
+  const depth = new THREE.MeshBasicMaterial({ colorWrite: false, transparent: true });
+  const glass = new THREE.MeshLambertMaterial({ color, transparent: true, opacity: 0.42, depthWrite: false });
+  glass.emissive = new THREE.Color(color).multiplyScalar(0.4);
+  const ghost = new THREE.Group();
+  [depth, glass].forEach((material, pass) => {
+    Object.assign(material, { side: THREE.DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 });
+    const copy = node("ghost").clone(true);
+    copy.visible = true;
+    copy.traverse((item) => { if (item.isMesh) { item.material = material; item.renderOrder = pass + 1; } });
+    setPosture(copy, q);
+    ghost.add(copy);
+  });
+  viewer.set_object([...ROOT, name], ghost);
+}
+setVisible(["ghost"], false);
+if (robot && story.start_ghost) addGhost("start ghost", story.colors.start, story.start_ghost);
+if (robot && story.goal_ghost) addGhost("goal ghost", story.colors.goal, story.goal_ghost);
+
+/** Show the piece of the trail that is being travelled in full colour, the others pale. */
+function highlightPiece(piece) {
+  for (const group of node("trail").children) {
+    const on = group.name === `piece ${piece}`;
+    group.traverse((item) => {
+      if (item.isMesh) Object.assign(item.material, { transparent: true, opacity: on ? 1 : 0.45 });
+    });
+  }
+}
+
+// Labels: HTML over the picture, moved along whenever it is drawn ----------------------------------------------------
+const labels = [];
+
+function addLabel(text, kind, position) {
+  const element = document.createElement("span");
+  element.textContent = text;
+  element.className = kind;
+  document.getElementById("labels").append(element);
+  labels.push({ element, kind, position: new THREE.Vector3(position.x, position.z, -position.y), on: true });
+}
+
+function setLabels(kind, on) {
+  labels.filter((label) => label.kind === kind).forEach((label) => { label.on = on; });
+  viewer.set_dirty();
+}
+
+function placeLabels() {
+  for (const { element, position, on } of labels) {
+    const place = position.clone().project(viewer.camera);
+    element.hidden = !on || Math.abs(place.z) > 1;
+    element.style.left = `${(0.5 + 0.5 * place.x) * pane.clientWidth}px`;
+    element.style.top = `${(0.5 - 0.5 * place.y) * pane.clientHeight}px`;
+  }
+}
+
+// Camera -----------------------------------------------------------------------------------------------------------
+const VIEWPOINTS = { Overview: story.overview, Front: [1, 0, 0.0], Side: [0, -1, 0], Top: [0, -0.001, 1] };
+let viewpoint = story.planar ? "Top" : "Overview";
+let turnedByHand = false;
+
+/** Place the camera in a direction so that the whole box fills the picture; meshcat's camera has y up: (x, z, -y). */
+function lookFrom(name) {
+  viewpoint = name;
+  turnedByHand = false;
+  const camera = viewer.camera;
+  camera.fov = 32;
+  camera.near = size / 200;
+  camera.far = size * 60;
+  const { eye, target } = fit(new THREE.Vector3(...VIEWPOINTS[name]).normalize(), Math.tan((camera.fov * Math.PI) / 360));
+  camera.position.set(eye.x, eye.z, -eye.y);
+  viewer.controls.target.set(target.x, target.z, -target.y);
+  viewer.controls.update();
+  camera.updateProjectionMatrix();
+  viewer.set_dirty();
+}
+
+/** Where the eye and its target must be to see the box from a direction, as large and as central as it goes. */
+function fit(away, tangent) {
+  const right = new THREE.Vector3(0, 0, 1).cross(away).normalize();
+  const up = away.clone().cross(right);
+  const tall = tangent * 0.88;
+  const wide = tall * (pane.clientWidth / Math.max(pane.clientHeight, 1));
+  const target = centre.clone();
+  let distance = 2 * size;
+  for (let round = 0; round < 12; round += 1) {
+    const spots = corners().map((corner) => {
+      const arm = corner.sub(target);
+      const depth = Math.max(distance - arm.dot(away), 1e-6 * size);
+      return [arm.dot(right) / depth / wide, arm.dot(up) / depth / tall];
+    });
+    const [x, y] = [0, 1].map((axis) => spots.map((spot) => spot[axis]));
+    target.addScaledVector(right, 0.5 * (Math.max(...x) + Math.min(...x)) * distance * wide);
+    target.addScaledVector(up, 0.5 * (Math.max(...y) + Math.min(...y)) * distance * tall);
+    distance *= Math.max(0.5 * (Math.max(...x) - Math.min(...x)), 0.5 * (Math.max(...y) - Math.min(...y)), 0.5);
+  }
+  return { eye: target.clone().addScaledVector(away, distance), target };
+}
+
+function corners() {
+  return [...Array(8).keys()].map(
+    (k) => new THREE.Vector3(k & 1 ? high.x : low.x, k & 2 ? high.y : low.y, k & 4 ? high.z : low.z),
+  );
+}
+
+viewer.controls.addEventListener("start", () => { turnedByHand = true; });
+const resize = viewer.set_3d_pane_size.bind(viewer);
+viewer.set_3d_pane_size = () => {
+  resize(pane.clientWidth, pane.clientHeight);
+  if (!turnedByHand) lookFrom(viewpoint);
+};
+viewer.set_3d_pane_size();
+const render = viewer.render.bind(viewer);
+viewer.render = () => { render(); placeLabels(); };

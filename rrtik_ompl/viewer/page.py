@@ -1,0 +1,65 @@
+"""One self-contained HTML file: meshcat's script, the recorded picture, and our own panel and player around it."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+from functools import cache
+from importlib.resources import files
+from string import Template
+from typing import Any
+
+from rrtik_ompl.viewer.picture import draw
+from rrtik_ompl.viewer.story import story_of
+from rrtik_ompl.viewer.subject import Subject, subject_of
+
+# The page may run its own script and nothing else: no request leaves the machine that shows it.
+POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
+SCRIPTS = ("kinematics.js", "stage.js", "panel.js", "player.js")
+
+
+def page(shown: Any, path: Any | None = None, *, title: str | None = None) -> str:
+    """The page that shows something, as the text of one HTML file that needs no other file and no network.
+
+    The same input gives the same text.
+
+    Args:
+        shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
+        path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m].
+        title: Heading; made from the problem's or the robot's name if None.
+
+    Raises:
+        InputError: If that cannot be shown.
+    """
+    subject = subject_of(shown, path)
+    window, frame = draw(subject)
+    heading = _title(subject) if title is None else title
+    story = json.dumps(story_of(subject, frame, heading), allow_nan=False, separators=(",", ":"))
+    return Template(_asset("page.html")).substitute(
+        title=html.escape(heading),
+        policy=html.escape(POLICY),
+        style=_asset("page.css"),
+        notice=_meshcat("main.min.js.LICENSE.txt").replace("--", "- -"),
+        meshcat=_meshcat("main.min.js"),
+        story=story.replace("<", "\\u003c"),  # so that no name can end the element that holds it
+        commands=json.dumps([base64.b64encode(command).decode("ascii") for command in window.commands], indent=0),
+        script="\n".join(_asset(name) for name in SCRIPTS),
+    )
+
+
+def _title(subject: Subject) -> str:
+    if not subject.is_path:
+        return subject.name
+    moves = len(subject.waypoints) - 1
+    return f"{subject.name}: path of {moves} move{'' if moves == 1 else 's'}"
+
+
+@cache
+def _asset(name: str) -> str:
+    return files("rrtik_ompl.viewer").joinpath("assets", name).read_text(encoding="utf-8")
+
+
+@cache
+def _meshcat(name: str) -> str:
+    return files("meshcat").joinpath("viewer", "dist", name).read_text(encoding="utf-8")

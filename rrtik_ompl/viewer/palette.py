@@ -1,0 +1,24 @@
+"""Colours of the page: told apart by colour-blind people too (hues of Okabe and Ito, Color Universal Design, 2008)."""
+
+from __future__ import annotations
+
+ROBOT = "#5b6b7c"
+ROBOT_ALTERNATE = "#8494a5"  # every second link, so that the joints can be seen
+START = "#0072b2"
+GOAL = "#009e73"
+OBSTACLE = "#e6b35a"
+ATTACHED = "#cc79a7"
+TRAIL = "#d55e00"
+AXES = ("#d55e00", "#009e73", "#0072b2")  # x, y, z
+BACKGROUND_TOP = "#fbfcfd"
+BACKGROUND_BOTTOM = "#e3e9ef"
+
+
+def number(color: str) -> int:
+    """The colour '#rrggbb' as the number that three.js takes."""
+    return int(color.removeprefix("#"), 16)
+
+
+def fractions(color: str) -> list[float]:
+    """The colour '#rrggbb' as red, green and blue between 0 and 1."""
+    return [int(color[k : k + 2], 16) / 255.0 for k in (1, 3, 5)]

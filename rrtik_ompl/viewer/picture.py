@@ -1,0 +1,86 @@
+"""The whole picture of a subject, recorded as meshcat commands, and the box that the camera has to take in."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import meshcat
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.viewer.framing import Frame, frame_around
+from rrtik_ompl.viewer.robot_picture import (
+    GHOST_TRIANGLES,
+    attached_parts,
+    draw_parts,
+    joint_nodes,
+    link_parts,
+    swept_points,
+)
+from rrtik_ompl.viewer.scene_picture import draw_goal, draw_scene, draw_triad
+from rrtik_ompl.viewer.subject import Subject
+from rrtik_ompl.viewer.trail import draw_trail
+from rrtik_ompl.viewer.window import RecordingWindow
+
+FRAMED_POSTURES = 100
+
+
+def draw(subject: Subject) -> tuple[RecordingWindow, Frame]:
+    """Draw a subject: arm in its first posture, obstacles, goal and trail (ghosts are the page's copies of the arm)."""
+    window = RecordingWindow()
+    vis = meshcat.Visualizer(window=window)
+    points = None
+    if subject.robot is not None:
+        points = _draw_robot(vis, subject.robot, subject)
+    frame = frame_around(points, subject.scene, _goal_points(subject.goal))
+    draw_scene(vis, subject.scene, frame)
+    draw_triad(vis["frames"]["world"], pin.SE3.Identity(), 0.1 * frame.arm)
+    if subject.robot is not None:
+        tip = subject.robot.model.frames[subject.robot.model.getFrameId(subject.robot.tip)]
+        node = vis["robot"][joint_nodes(subject.robot)[tip.parentJoint]]["tip frame"]
+        draw_triad(node, tip.placement, 0.07 * frame.arm)
+        draw_goal(vis, subject.goal, frame)
+        if len(subject.waypoints) > 1:
+            draw_trail(vis, subject.robot, subject.waypoints, 0.0035 * frame.arm)
+        if subject.robot.planar:
+            _flatten(vis, frame)
+    return window, frame
+
+
+def _draw_robot(vis: Any, robot: Robot, subject: Subject) -> Matrix:
+    """Draw the arm in its first posture and return points around all its postures, shape (p, 3) [m]."""
+    held = attached_parts(robot, subject.scene.attached)
+    parts = link_parts(robot) + held
+    shown = _spread(subject.waypoints)
+    if subject.end is not None:
+        shown = np.vstack([shown, subject.end])
+    frames = robot.joint_frames(shown)
+    draw_parts(vis["robot"], robot, parts, frames[0])
+    if subject.start is not None:  # the page copies this one for each ghost
+        draw_parts(vis["ghost"], robot, link_parts(robot, GHOST_TRIANGLES) + held, frames[0])
+    return swept_points(parts, frames)
+
+
+def _spread(waypoints: Matrix) -> Matrix:
+    """Postures spread over a path, shape (m, dof): those that the camera has to take in."""
+    places = np.arange(len(waypoints))
+    wanted = np.linspace(0.0, places[-1], FRAMED_POSTURES if len(places) > 1 else 1)
+    return np.stack([np.interp(wanted, places, column) for column in waypoints.T], 1)
+
+
+def _flatten(vis: Any, frame: Frame) -> None:
+    """Make the obstacles of a plane world thin, so that seen from above they stand beside the arm, not over it."""
+    height = max(2.0 * float(np.abs([frame.low[2], frame.high[2]]).max()), 1e-9)
+    squeeze = np.diag([1.0, 1.0, min(0.01 * frame.size / height, 1.0), 1.0])
+    vis["obstacles"].set_transform(squeeze)
+    vis["later"].set_transform(squeeze)
+
+
+def _goal_points(goal: Any) -> list[Matrix]:
+    members = goal.members if isinstance(goal, GoalRegion) else (goal,)
+    points = [m.T_world_tip.translation for m in members if isinstance(m, PoseGoal)]
+    points += [m.position for m in members if isinstance(m, PositionGoal)]
+    return [np.array(points)] if points else []

@@ -1,0 +1,108 @@
+"""A web server for one page, for this machine only."""
+
+from __future__ import annotations
+
+import socketserver
+import threading
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler
+from typing import Any
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.viewer.page import POLICY
+
+ADDRESS = "127.0.0.1"
+
+
+class PageServer:
+    """Serves one HTML text at ``url`` until it is left; use it as a context manager.
+
+    It listens on 127.0.0.1 alone and answers only requests that name this address themselves: a web site elsewhere
+    that makes its own name point here (DNS rebinding), or that asks from its own page, is refused.
+
+    Args:
+        text: The page.
+        port: Port to listen on; a free one if 0.
+
+    Raises:
+        InputError: If the port cannot be used.
+    """
+
+    def __init__(self, text: str, port: int = 0) -> None:
+        try:
+            self._server = _Server((ADDRESS, port), _Handler)
+        except (OSError, OverflowError, TypeError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise InputError(f"port {port}: cannot be used: {reason}; choose another one, or 0 for any") from error
+        self._server.body = text.encode("utf-8")
+        self._thread = threading.Thread(target=self._server.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True)
+
+    @property
+    def port(self) -> int:
+        """The port that it listens on."""
+        return int(self._server.server_address[1])
+
+    @property
+    def url(self) -> str:
+        """Where a browser on this machine finds the page."""
+        return f"http://{ADDRESS}:{self.port}/"
+
+    def __enter__(self) -> PageServer:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._server.shutdown()
+        self._server.server_close()
+        self._thread.join()
+
+    def wait(self) -> None:
+        """Return when Ctrl-C is pressed, which is how a person ends a live view."""
+        try:
+            threading.Event().wait()
+        except KeyboardInterrupt:
+            return
+
+
+class _Server(socketserver.ThreadingTCPServer):
+    allow_reuse_address = True
+    daemon_threads = True
+    body = b""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: _Server
+    timeout = 10.0  # [s] a silent connection is dropped
+
+    def do_GET(self) -> None:
+        """Answer with the page."""
+        self._answer(send_body=True)
+
+    def do_HEAD(self) -> None:
+        """Answer with the page's headers."""
+        self._answer(send_body=False)
+
+    def _answer(self, send_body: bool) -> None:
+        if not self._is_local():
+            self.send_error(HTTPStatus.FORBIDDEN)
+        elif self.path.split("?")[0] != "/":
+            self.send_error(HTTPStatus.NOT_FOUND)
+        else:
+            self.send_response(HTTPStatus.OK)
+            self.send_header("Content-Type", "text/html; charset=utf-8")
+            self.send_header("Content-Length", str(len(self.server.body)))
+            self.send_header("Content-Security-Policy", f"{POLICY}; frame-ancestors 'none'")
+            self.send_header("X-Content-Type-Options", "nosniff")
+            self.send_header("Cache-Control", "no-store")
+            self.end_headers()
+            if send_body:
+                self.wfile.write(self.server.body)
+
+    def _is_local(self) -> bool:
+        port = self.server.server_address[1]
+        hosts = {f"{ADDRESS}:{port}", f"localhost:{port}"}
+        origin = self.headers.get("Origin")
+        return self.headers.get("Host") in hosts and (origin is None or origin in {f"http://{h}" for h in hosts})
+
+    def log_message(self, *_: Any) -> None:
+        """Stay silent: the library prints nothing."""

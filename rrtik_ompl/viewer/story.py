@@ -1,0 +1,154 @@
+"""What the page's panel tells and its player needs: joints with units, the chain, the waypoints and their times."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.goal import Goal, GoalRegion, JointGoal, PoseGoal
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import Scene
+from rrtik_ompl.shapes import HalfSpace
+from rrtik_ompl.transitions import moved
+from rrtik_ompl.viewer import palette
+from rrtik_ompl.viewer.framing import Frame
+from rrtik_ompl.viewer.robot_picture import joint_nodes, node_name
+from rrtik_ompl.viewer.subject import Subject
+from rrtik_ompl.viewer.trail import pieces
+from rrtik_ompl.viewer.viewpoint import overview
+
+PLAY_SPEED = np.deg2rad(30.0)  # [rad/s] of the joint that travels farthest in a move
+PLAY_SECONDS = (3.0, 60.0)  # shortest and longest playing time of a whole path
+DIGITS = 9
+
+
+def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
+    """Everything that the page's own script reads, as numbers, texts, lists and dicts (to be written as JSON).
+
+    Lengths are in metres and angles in radians; the script turns them into degrees where a person reads them.
+    """
+    robot = subject.robot
+    return {
+        "title": title,
+        "robot": None if robot is None else _robot(robot),
+        "obstacles": _obstacles(subject.scene),
+        "moving": any(o.motion is not None for o in subject.scene.obstacles),
+        "attached": [item.name for item in subject.scene.attached],
+        "goal": _goal_text(subject.goal),
+        "start_ghost": _numbers(subject.start),
+        "goal_ghost": _numbers(subject.end),
+        "waypoints": _numbers(subject.waypoints),
+        "moves": [] if robot is None else _moves(subject.waypoints),
+        "times": [] if robot is None else _numbers(play_times(robot, subject.waypoints, frame.arm)),
+        "frame": {"low": _numbers(frame.low), "high": _numbers(frame.high)},
+        "overview": _numbers(overview(_places(subject), subject.scene)),
+        "planar": robot is not None and robot.planar,
+        "grid": grid_cell(frame.size),
+        "colors": _colors(),
+    }
+
+
+def play_times(robot: Robot, waypoints: Matrix, arm: float) -> Vector:
+    """Time [s] at which the page shows each waypoint: a move lasts as long as its farthest travelling joint needs.
+
+    Times are for looking at, not for execution: all joints turn at 30 deg/s, sliding joints run through the arm's box
+    in 6 s, and a whole path that would be shorter than 3 s or longer than 60 s is slowed down or sped up.
+
+    Args:
+        robot: The arm.
+        waypoints: Shape (k, dof).
+        arm: Diagonal of the box around the arm's postures [m].
+    """
+    speed = np.where(robot.prismatic, arm / 6.0, PLAY_SPEED)
+    seconds = (np.abs(np.diff(waypoints, axis=0)) / speed).max(axis=1, initial=0.0)
+    total = float(seconds.sum())
+    if total > 0.0:
+        seconds *= np.clip(total, *PLAY_SECONDS) / total
+    return np.concatenate([[0.0], np.cumsum(seconds)])
+
+
+def grid_cell(size: float) -> float:
+    """Width of a grid cell [m] for a picture of this size [m]: 1, 2 or 5 times a power of ten, about a fifteenth."""
+    power = 10.0 ** np.floor(np.log10(size / 15.0))
+    return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= size / 15.0))
+
+
+def _robot(robot: Robot) -> dict[str, Any]:
+    tip = robot.model.frames[robot.model.getFrameId(robot.tip)]
+    chain = robot.chain
+    return {
+        "name": robot.name,
+        "nodes": joint_nodes(robot),
+        "parent": chain.parent.tolist(),
+        "placement": _numbers(chain.placement.reshape(-1, 16)),
+        "axis": _numbers(chain.axis),
+        "prismatic": chain.prismatic.tolist(),
+        "gain": _numbers(chain.gain),
+        "offset": _numbers(chain.offset),
+        "tip": {
+            "name": robot.tip,
+            "joint": int(tip.parentJoint),
+            "placement": _numbers(tip.placement.homogeneous.ravel()),
+        },
+        "joints": [
+            {"name": name, "unit": "m" if slides else "deg", "lower": _limit(low), "upper": _limit(high)}
+            for name, slides, low, high in zip(
+                robot.joint_names, robot.prismatic, robot.lower, robot.upper, strict=True
+            )
+        ],
+    }
+
+
+def _places(subject: Subject) -> Matrix:
+    """Where the joints and the tip are at each waypoint, shape (m, 3)."""
+    if subject.robot is None:
+        return np.empty((0, 3))
+    frames = subject.robot.joint_frames(subject.waypoints)[:, 1:, :3, 3].reshape(-1, 3)
+    return np.concatenate([frames, subject.robot.fk_batch(subject.waypoints)[:, :3, 3]])
+
+
+def _moves(waypoints: Matrix) -> list[dict[str, Any]]:
+    """For each move: the numbers of the joints that move, and the piece of the trail to which it belongs."""
+    movers = moved(waypoints[:-1], waypoints[1:])
+    return [
+        {"joints": np.flatnonzero(row).tolist(), "piece": int(piece)}
+        for row, piece in zip(movers, pieces(waypoints), strict=True)
+    ]
+
+
+def _obstacles(scene: Scene) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": o.name,
+            "node": node_name(o.name),
+            "plate": isinstance(o.shape, HalfSpace),
+            "moving": o.motion is not None,
+        }
+        for o in scene.obstacles
+    ]
+
+
+def _goal_text(goal: Goal | None) -> str:
+    if goal is None:
+        return ""
+    if isinstance(goal, GoalRegion):
+        return "any of several poses" if len(goal.members) > 1 else "a region of poses"
+    if isinstance(goal, JointGoal):
+        return "joint values"
+    return "pose of the tip" if isinstance(goal, PoseGoal) else "position of the tip"
+
+
+def _colors() -> dict[str, str]:
+    names = ("ROBOT", "START", "GOAL", "OBSTACLE", "ATTACHED", "TRAIL", "BACKGROUND_TOP", "BACKGROUND_BOTTOM")
+    return {name.lower(): getattr(palette, name) for name in names}
+
+
+def _limit(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _numbers(values: NDArray[np.float64] | None) -> Any:
+    return None if values is None else (np.round(values, DIGITS) + 0.0).tolist()

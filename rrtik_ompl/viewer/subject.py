@@ -1,0 +1,90 @@
+"""What a page can show: a problem with or without a path, a world, a robot alone, or a scene alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.goal import Goal, JointGoal
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import Scene
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Subject:
+    """The parts of what is shown.
+
+    Attributes:
+        name: What to call it.
+        robot: The arm, or None if a scene is shown alone.
+        scene: What surrounds it.
+        goal: The goal of the problem, or None.
+        waypoints: Configurations to play, shape (k, dof); a single row if there is no path, (0, 0) without a robot.
+        is_path: Whether the waypoints are a path, as opposed to the one posture in which the arm stands.
+    """
+
+    name: str
+    robot: Robot | None
+    scene: Scene
+    goal: Goal | None
+    waypoints: Matrix
+    is_path: bool
+
+    @property
+    def start(self) -> Vector | None:
+        """Configuration of the start ghost, shape (dof,), or None."""
+        start: Vector | None = self.waypoints[0] if self.is_path or self.goal is not None else None
+        return start
+
+    @property
+    def end(self) -> Vector | None:
+        """Configuration of the goal ghost, shape (dof,): end of the path or the goal's joint values, or None."""
+        if not self.is_path:
+            return self.goal.q if isinstance(self.goal, JointGoal) else None
+        end: Vector = self.waypoints[-1]
+        return end
+
+
+def subject_of(shown: Any, path: Any | None = None) -> Subject:
+    """Take apart what a caller wants to see.
+
+    Args:
+        shown: A ``Problem``, a ``World``, a ``Robot`` or a ``Scene``.
+        path: A ``JointPath``, or waypoints of shape (k, dof) with k at least 1 [rad or m].
+
+    Raises:
+        InputError: If ``shown`` is none of these, or the path does not fit the robot.
+    """
+    if isinstance(shown, Scene):
+        if path is not None:
+            raise InputError("view: a path needs a robot; show a problem, a world or a robot instead of a scene alone")
+        return Subject("Scene", None, shown, None, frozen(np.empty((0, 0))), False)
+    if isinstance(shown, Robot):
+        robot, scene = shown, Scene()
+    else:
+        world = getattr(shown, "world", shown)
+        if not isinstance(getattr(world, "robot", None), Robot) or not isinstance(getattr(world, "scene", None), Scene):
+            raise InputError(f"view: cannot show a {type(shown).__name__}; give a problem, world, robot or scene")
+        robot, scene = world.robot, world.scene
+    goal = getattr(shown, "goal", None)
+    named = getattr(shown, "name", "problem")
+    name = robot.name if named == "problem" else str(named)
+    if path is not None:
+        return Subject(name, robot, scene, goal, _waypoints(robot, path), True)
+    start = getattr(shown, "start", None)
+    posture = robot.clamp(np.zeros(robot.dof)) if start is None else robot.configuration(start, "start")
+    return Subject(name, robot, scene, goal, frozen(posture[None]), False)
+
+
+def _waypoints(robot: Robot, path: Any) -> Matrix:
+    rows = finite_array(getattr(path, "waypoints", path), (None, None), "path")
+    if len(rows) == 0 or rows.shape[1] != robot.dof:
+        raise InputError(
+            f"path: robot '{robot.name}' has {robot.dof} joints ({', '.join(robot.joint_names)}), "
+            f"but the path has shape {rows.shape}"
+        )
+    return frozen(rows)

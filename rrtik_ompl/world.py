@@ -1,0 +1,242 @@
+"""A robot in a scene: which configurations and motions are free, how far from contact, and what touches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
+from rrtik_ompl.bodies import Body, colliding_pairs, link_bodies, scene_bodies
+from rrtik_ompl.certificate import Certificate
+from rrtik_ompl.containment import Containment
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.motion_bound import displacement_weights
+from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
+from rrtik_ompl.scene import Scene
+
+MOTION_RESOLUTION = 0.01  # [m]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contact:
+    """Two bodies that touch, or the two that are nearest to touching.
+
+    Attributes:
+        first, second: Names of link, obstacle or attached object.
+        distance: Signed distance [m]: positive is a gap, negative a penetration depth.
+        point_first, point_second: Witness points in the world [m], shape (3,).
+    """
+
+    first: str
+    second: str
+    distance: float
+    point_first: Vector
+    point_second: Vector
+
+
+class World:
+    """Exact collision checks of a robot in a scene.
+
+    Configurations are checked with coal on the robot's and the scene's own geometry. Motions are straight lines in
+    configuration space, checked at both ends and at equal steps in between, so many that no point of the arm moves
+    more than ``motion_resolution`` between two checks. The same configurations are checked in both directions.
+
+    A world is meant for one thread at a time.
+
+    Args:
+        robot: The arm.
+        scene: Its surroundings; empty if None. Moving obstacles stand where they are at time 0.
+        motion_resolution: Largest step of any point of the arm between two checked configurations [m].
+
+    Raises:
+        InputError: If the scene names links that do not exist, or the resolution is not positive.
+    """
+
+    def __init__(
+        self, robot: Robot, scene: Scene | None = None, *, motion_resolution: float = MOTION_RESOLUTION
+    ) -> None:
+        self.robot = robot
+        self.scene = Scene() if scene is None else scene
+        self.motion_resolution = float(finite_array(motion_resolution, (), "motion_resolution"))
+        if self.motion_resolution <= 0.0:
+            raise InputError(f"motion_resolution must be greater than 0 metres, got {self.motion_resolution:g}")
+        self._bodies = link_bodies(robot) + scene_bodies(robot, self.scene.at(0.0))
+        self.weights = displacement_weights(robot, [b for b in self._bodies if b.kind != "obstacle"])
+        pairs = colliding_pairs(robot, self.scene, self._bodies)
+        moving = tuple(p for p in pairs if any(self._bodies[i].joint > 0 for i in p))
+        self._pairs = pairs
+        self._certificate = Certificate(robot, self._bodies, pairs)
+        self._oracle = _Oracle(robot, self._bodies, moving)
+        standing = tuple(p for p in pairs if p not in set(moving))
+        self._always_colliding = bool(standing) and not _standing_free(robot, self._bodies, standing)
+
+    def valid(self, q: ArrayLike) -> bool:
+        """Whether q, shape (dof,), is inside the limits and free of collision.
+
+        Raises:
+            InputError: If q has the wrong length or a value that is not finite.
+        """
+        row = self._rows(q, 1)
+        if self._always_colliding or not self.robot.within_limits(row)[0]:
+            return False
+        return self._oracle.free(self.robot.lift(row)[0])
+
+    def valid_batch(self, Q: ArrayLike) -> Mask:
+        """Which rows of Q, shape (m, dof), are inside the limits and free of collision. Shape (m,).
+
+        Raises:
+            InputError: If Q has the wrong shape or a value that is not finite.
+        """
+        rows = self._rows(Q, 2)
+        mask = self.robot.within_limits(rows) & (not self._always_colliding)
+        for k, full in zip(np.flatnonzero(mask), self.robot.lift(rows[mask]), strict=True):
+            mask[k] = self._oracle.free(full)
+        return mask
+
+    def motion_valid(self, a: ArrayLike, b: ArrayLike) -> bool:
+        """Whether the straight motion from a to b, shape (dof,) each, is valid; the same answer from b to a."""
+        return self._motion_free(self._rows(a, 1)[0], self._rows(b, 1)[0])
+
+    def motion_valid_batch(self, A: ArrayLike, B: ArrayLike) -> Mask:
+        """Which straight motions A[k] -> B[k], shape (m, dof) each, are valid. Shape (m,)."""
+        starts, ends = self._rows(A, 2), self._rows(B, 2)
+        if len(starts) != len(ends):
+            raise InputError(f"motions need as many starts as ends, got {len(starts)} and {len(ends)}")
+        return np.array([self._motion_free(a, b) for a, b in zip(starts, ends, strict=True)], dtype=bool)
+
+    def steps(self, a: ArrayLike, b: ArrayLike, resolution: float | None = None) -> int:
+        """Number of steps in which a motion is checked: the bound on the arm's displacement over the resolution."""
+        travel = float(self.weights @ np.abs(np.asarray(b, dtype=np.float64) - np.asarray(a, dtype=np.float64)))
+        return max(1, int(np.ceil(travel / (self.motion_resolution if resolution is None else resolution) - 1e-9)))
+
+    def contacts(self, q: ArrayLike) -> tuple[Contact, ...]:
+        """Every pair of bodies that touches at q, deepest first; empty if there is no collision."""
+        rows = self._rows(q, 1)
+        found = [c for c in self._distances(rows, near_only=True) if c.distance <= 0.0]
+        if not found:
+            found = [_inside(*names) for names in self._certificate.first_pairs(rows) if names is not None]
+        return tuple(sorted(found, key=lambda c: c.distance))
+
+    def closest(self, q: ArrayLike) -> Contact | None:
+        """The pair of bodies that is nearest to contact at q (or deepest in it); None if nothing can collide."""
+        return min(self._distances(self._rows(q, 1), near_only=False), key=lambda c: c.distance, default=None)
+
+    def clearance(self, q: ArrayLike) -> float:
+        """Smallest signed distance at q [m]: negative in collision, +inf if nothing can collide."""
+        touching = self.contacts(q)
+        if touching:
+            return min(0.0, touching[0].distance)
+        nearest = self.closest(q)
+        return float("inf") if nearest is None else nearest.distance
+
+    def explain(self, q: ArrayLike) -> str:
+        """A line that says why q is not valid: the joint outside its limit, or the pair in collision; "" if it is."""
+        row = self._rows(q, 1)[0]
+        outside = np.flatnonzero(
+            (row < self.robot.lower - LIMIT_TOLERANCE) | (row > self.robot.upper + LIMIT_TOLERANCE)
+        )
+        if len(outside):
+            return self.robot.limit_message(row, int(outside[0]))
+        touching = self.contacts(row)
+        if not touching:
+            return ""
+        deepest = touching[0]
+        more = f" (and {len(touching) - 1} more pairs)" if len(touching) > 1 else ""
+        depth = f" by {-1e3 * deepest.distance:.3g} mm" if np.isfinite(deepest.point_first).all() else ""
+        return f"'{deepest.first}' and '{deepest.second}' overlap{depth}{more}"
+
+    def certify(self, Q: ArrayLike) -> Mask:
+        """A second opinion on the rows of Q, independent of the checks that planners use. Shape (m,)."""
+        rows = self._rows(Q, 2)
+        mask = self.robot.within_limits(rows)
+        mask[mask] = self._certificate.free(rows[mask])
+        return mask
+
+    def _rows(self, Q: ArrayLike, dimensions: int) -> Matrix:
+        """Checked configurations as rows, shape (m, dof)."""
+        rows = np.asarray(Q, dtype=np.float64) if isinstance(Q, np.ndarray) and Q.dtype != object else None
+        if rows is None or rows.ndim != dimensions or rows.shape[-1] != self.robot.dof or not np.isfinite(rows).all():
+            if dimensions == 1:
+                return self.robot.configuration(Q)[None]
+            rows = finite_array(Q, (None, self.robot.dof), f"configurations of robot '{self.robot.name}'")
+        return np.atleast_2d(rows)
+
+    def _motion_free(self, a: Vector, b: Vector) -> bool:
+        if self._always_colliding or not self.robot.within_limits(np.stack([a, b])).all():
+            return False
+        if tuple(a) > tuple(b):  # one direction for both, so that the checked configurations are the same to the bit
+            a, b = b, a
+        count = self.steps(a, b)
+        shares = (_spread_order(count) / count)[:, None]
+        return all(self._oracle.free(full) for full in self.robot.lift((1.0 - shares) * a + shares * b))
+
+    def _distances(self, rows: Matrix, *, near_only: bool) -> list[Contact]:
+        frames = self.robot.joint_frames(rows)[0]
+        poses = [pin.SE3(frames[b.joint]) * b.placement for b in self._bodies]
+        transforms = [coal.Transform3s(p.rotation, p.translation) for p in poses]
+        request = coal.DistanceRequest()
+        found = []
+        for i, j in self._pairs:
+            first, second = self._bodies[i], self._bodies[j]
+            ends = (first.geometry, transforms[i], second.geometry, transforms[j])
+            if near_only and not coal.collide(*ends, coal.CollisionRequest(), coal.CollisionResult()):
+                continue
+            result = coal.DistanceResult()
+            distance = float(coal.distance(*ends, request, result))
+            points = (np.array(result.getNearestPoint1()), np.array(result.getNearestPoint2()))
+            found.append(Contact(first.name, second.name, min(distance, 0.0) if near_only else distance, *points))
+        return found
+
+
+class _Oracle:
+    """Pinocchio and coal behind a broadphase: judges one configuration at a time."""
+
+    def __init__(self, robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> None:
+        self._model, self._data = robot.model, robot.model.createData()
+        self._geometry = pin.GeometryModel()
+        for k, body in enumerate(bodies):
+            item = pin.GeometryObject(f"{k}", body.joint, body.placement, body.geometry)
+            self._geometry.addGeometryObject(item)
+        for i, j in pairs:
+            self._geometry.addCollisionPair(pin.CollisionPair(i, j))
+        self._geometry_data = pin.GeometryData(self._geometry)
+        self._manager = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(
+            self._model, self._geometry, self._geometry_data
+        )
+        self._containment = Containment(bodies, pairs)
+        self._empty = not pairs
+
+    def free(self, full: Vector) -> bool:
+        """Whether Pinocchio's configuration vector ``full``, shape (nq,), is free of collision."""
+        if self._empty:
+            return True
+        if pin.computeCollisions(self._model, self._data, self._manager, full, True):
+            return False
+        if not self._containment.pairs:
+            return True
+        return not self._containment.first(np.array([placement.homogeneous for placement in self._data.oMi]))
+
+
+def _standing_free(robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> bool:
+    """Whether bodies that never move (the base and the obstacles) are clear of each other."""
+    return bool(Certificate(robot, bodies, pairs).free(np.zeros((1, robot.dof)))[0])
+
+
+def _spread_order(count: int) -> NDArray[np.float64]:
+    """0..count with both ends first, then middles of ever finer halves, so that a collision shows early."""
+    levels = [np.array([0, count])]
+    step = 1 << max(count - 1, 1).bit_length()
+    while step > 1:
+        levels.append(np.arange(step // 2, count, step))
+        step //= 2
+    return np.concatenate(levels).astype(np.float64)
+
+
+def _inside(first: str, second: str) -> Contact:
+    """A body wholly inside another: there are no witness points and no meaningful depth."""
+    nowhere = np.full(3, np.nan)
+    return Contact(first, second, 0.0, nowhere, nowhere)

@@ -1,0 +1,170 @@
+"""The command line as a person uses it: what is printed, what is written, the exit codes, Ctrl-C."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from rrtik_ompl.cli import run
+from rrtik_ompl.path import load_path
+
+
+def rrtik(capsys, *arguments):
+    code = run(list(arguments))
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def test_plan_prints_the_moves_and_saves_a_path_that_check_accepts(capsys, tmp_path):
+    file = tmp_path / "path.json"
+    code, out, err = rrtik(capsys, "plan", "titan4_sdu", "--seed", "1", "--out", str(file))
+    assert (code, err) == (0, "")
+    path = load_path(file)
+    assert f"{path.transitions} moves (no path can have fewer than 5)" in out
+    rows = [line for line in out.splitlines() if line.rstrip().endswith(" deg")]
+    assert len(rows) == path.transitions
+    code, out, _ = rrtik(capsys, "check", "titan4_sdu", str(file))
+    assert code == 0
+    assert "valid" in out
+
+
+def test_the_same_seed_prints_the_same_moves(capsys):
+    one, two, other = (
+        json.loads(rrtik(capsys, "plan", "titan4_sdu", "--seed", s, "--json")[1])["waypoints"] for s in "778"
+    )
+    assert one == two
+    assert one != other
+
+
+def test_json_is_one_object_with_everything(capsys):
+    code, out, _ = rrtik(capsys, "plan", "planar3_a", "--seed", "1", "--json")
+    found = json.loads(out)
+    assert code == 0
+    assert found["found"] is True
+    assert found["lower_bound"] == 1
+    assert found["transitions"] == len(found["moves"]) == len(found["waypoints"]) - 1
+    assert found["seconds"]["plan"] > 0
+
+
+def test_a_planner_that_moves_all_joints_prints_waypoints(capsys):
+    code, out, _ = rrtik(capsys, "plan", "titan4_sdu", "--planner", "RRTConnect", "--seed", "1")
+    assert code == 0
+    assert "several joints move at once" in out
+    assert "[deg]" in out
+
+
+def test_options_of_the_planner_are_passed_on(capsys):
+    code, _, err = rrtik(capsys, "plan", "titan4_sdu", "--planner", "RRTConnect", "--set", "rang=0.5")
+    assert code == 2
+    assert "did you mean 'range'" in err
+    assert rrtik(capsys, "plan", "titan4_sdu", "--planner", "RRTConnect", "--set", "range=0.5", "--seed", "1")[0] == 0
+
+
+def test_not_found_is_exit_1_with_the_reason_and_no_file(capsys, tmp_path):
+    file = tmp_path / "path.json"
+    code, out, _ = rrtik(capsys, "plan", "titan4_sdu", "--seconds", "0.000001", "--out", str(file))
+    assert code == 1
+    assert "not found: no path within 1e-06 s" in out
+    assert not file.exists()
+
+
+def test_check_rejects_a_path_through_the_panel(capsys, tmp_path):
+    from rrtik_ompl import JointPath, load_problem
+
+    problem = load_problem("titan4_sdu")
+    file = tmp_path / "straight.json"
+    JointPath.of(problem.world.robot, [problem.start, problem.goal.q]).save(file)
+    code, out, _ = rrtik(capsys, "check", "titan4_sdu", str(file))
+    assert code == 1
+    assert "overlap" in out
+
+
+def test_check_rejects_a_path_of_another_problem(capsys, tmp_path):
+    file = tmp_path / "path.json"
+    assert rrtik(capsys, "plan", "titan4_prisms", "--seed", "1", "--out", str(file))[0] == 0
+    code, out, _ = rrtik(capsys, "check", "titan4_sdu", str(file))
+    assert code == 1
+    assert "does not begin at the start" in out
+
+
+@pytest.mark.parametrize("kind", ["robots", "planners", "problems"])
+def test_list_names_what_there_is(capsys, kind):
+    expected = {"robots": "titan4", "planners": "bicrdt", "problems": "titan4_sdu"}[kind]
+    code, out, _ = rrtik(capsys, "list", kind)
+    assert code == 0
+    assert expected in out.split()
+    assert expected in rrtik(capsys, "list")[1].split()
+
+
+@pytest.mark.parametrize("ending", [".csv", ".txt"])
+def test_convert_between_path_formats(capsys, tmp_path, ending):
+    source, target, back = tmp_path / "a.json", tmp_path / f"b{ending}", tmp_path / "c.json"
+    assert rrtik(capsys, "plan", "planar3_a", "--seed", "1", "--out", str(source))[0] == 0
+    assert rrtik(capsys, "convert", str(source), str(target))[0] == 0
+    assert rrtik(capsys, "convert", str(target), str(back), "--robot", "planar3")[0] == 0
+    assert (load_path(source).waypoints == load_path(back).waypoints).all()
+
+
+def test_convert_writes_a_problem_that_loads_again(capsys, tmp_path):
+    from rrtik_ompl.catalog import find_problem
+
+    target = tmp_path / "copy.yaml"
+    assert rrtik(capsys, "convert", str(find_problem("titan4_sdu")), str(target))[0] == 0
+    assert rrtik(capsys, "check", str(target))[0] == 0
+
+
+def test_a_file_that_cannot_be_written_is_refused_before_any_work(capsys):
+    code, out, err = rrtik(capsys, "plan", "titan4_sdu", "--out", "no/such/folder/path.json")
+    assert (code, out) == (2, "")
+    assert "no/such/folder" in err
+
+
+def test_help_and_version_are_there(capsys):
+    assert rrtik(capsys, "--help")[0] == 0
+    assert rrtik(capsys, "plan", "--help")[0] == 0
+    code, out, _ = rrtik(capsys, "--version")
+    assert code == 0
+    assert out.startswith("rrtik ")
+
+
+def command(*arguments):
+    return [sys.executable, "-m", "rrtik_ompl.cli", *arguments]
+
+
+def test_ctrl_c_exits_130_says_so_and_leaves_no_file(tmp_path):
+    # a goal walled in: planning goes on until the interruption
+    problem = tmp_path / "closed.yaml"
+    problem.write_text(
+        "version: 1\nrobot: {point2d: {radius: 0.1, bounds: [[0, 10], [0, 10]]}}\n"
+        "scene: {obstacles: [{name: wall, box: [1, 30, 1], pose: {xyz: [5, 5, 0]}}]}\n"
+        "start: {joints: [1, 1]}\ngoal: {joints: [9, 9]}\n"
+    )
+    out = tmp_path / "path.json"
+    process = subprocess.Popen(
+        command("plan", str(problem), "--seconds", "60", "--out", str(out)), stderr=subprocess.PIPE, text=True
+    )
+    time.sleep(4.0)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert err.strip() == "rrtik: interrupted; nothing was written"
+    assert sorted(f.name for f in tmp_path.iterdir()) == ["closed.yaml"]
+
+
+def test_a_reader_that_goes_away_is_no_error():
+    process = subprocess.Popen(command("list"), stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process.stdout.close()
+    _, err = process.communicate(timeout=60)
+    assert b"Traceback" not in err
+
+
+def test_nothing_is_printed_on_standard_error_when_it_is_no_terminal():
+    environment = dict(os.environ, PYTHONWARNINGS="error")
+    done = subprocess.run(
+        command("plan", "titan4_sdu", "--seed", "1"), capture_output=True, text=True, env=environment, check=False
+    )
+    assert done.returncode == 0
+    assert done.stderr == ""

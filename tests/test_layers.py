@@ -1,0 +1,62 @@
+"""The house is a ladder: a module imports only from those that stand before it."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+LADDER = """
+errors arrays text_file yaml_file file_format shapes poses transitions robot solids mesh_file
+tree robot_build joint_limits package_path urdf_read srdf robot_source urdf dh dh_file catalog
+scene goal scene_file
+bodies containment certificate motion_bound world path problem problem_file motion_bench_maker
+ompl_bridge plan shorten viewer report cli
+""".split()
+
+
+def _modules():
+    for file in sorted((ROOT / "rrtik_ompl").rglob("*.py")):
+        parts = file.relative_to(ROOT / "rrtik_ompl").with_suffix("").parts
+        if parts != ("__init__",):
+            yield parts[0], file
+
+
+def _imports(file):
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def test_every_module_has_its_place_on_the_ladder():
+    assert {room for room, _ in _modules()} == set(LADDER)
+
+
+@pytest.mark.parametrize(("room", "file"), _modules(), ids=lambda value: getattr(value, "stem", value))
+def test_a_module_imports_only_from_the_rungs_below(room, file):
+    allowed = set(LADDER[: LADDER.index(room)]) | {room}
+    inside = {name.split(".")[1] for name in _imports(file) if name.startswith("rrtik_ompl.")}
+    assert inside <= allowed | {n for n in inside if n not in LADDER}, f"{file.name} reaches up: {inside - allowed}"
+
+
+def test_the_core_knows_no_robot_and_no_planner():
+    reached = {name.split(".")[0] for _, file in _modules() for name in _imports(file)}
+    assert not reached & {"rrtik_planners", "rrtik_robots"}
+
+
+def test_robots_and_planners_do_not_know_each_other():
+    for folder, other in (("planners", "rrtik_robots"), ("robots", "rrtik_planners")):
+        for file in (ROOT / folder).rglob("*.py"):
+            assert other not in {name.split(".")[0] for name in _imports(file)}, file
+
+
+def test_importing_the_package_imports_nothing_heavy():
+    heavy = ["cv2", "meshcat", "numba", "matplotlib", "scipy"]
+    code = f"import sys, rrtik_ompl; print([m for m in {heavy} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

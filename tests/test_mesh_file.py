@@ -1,0 +1,181 @@
+"""Mesh files: every format and its scale, closed or open, and that a broken one is one line and never a crash."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from rrtik_ompl.errors import InputError, MeshWarning
+from rrtik_ompl.mesh_file import load_mesh
+
+CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]], dtype=np.float64)
+FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+COLLADA = """<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit name="u" meter="UNIT"/><up_axis>Y_UP</up_axis></asset>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="pa" count="12">0 0 0 1 0 0 0 2 0 0 0 3</float_array><technique_common>
+<accessor source="#pa" count="4" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+<param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/><p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#g"/></node></visual_scene>
+</library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
+
+
+def stl_text(faces=FACES):
+    facets = (
+        "facet normal 0 0 0\nouter loop\n"
+        + "".join(f"vertex {x} {y} {z}\n" for x, y, z in CORNERS[face])
+        + "endloop\nendfacet\n"
+        for face in faces
+    )
+    return ("solid part\n" + "".join(facets) + "endsolid part\n").encode()
+
+
+def stl_binary(faces=FACES, header=b"made by a test"):
+    body = b"".join(np.r_[np.zeros(3), CORNERS[f].ravel()].astype("<f4").tobytes() + b"\0\0" for f in faces)
+    return header.ljust(80, b" ") + len(faces).to_bytes(4, "little") + body
+
+
+def obj(faces=FACES):
+    rows = [f"v {x} {y} {z}" for x, y, z in CORNERS] + ["f " + " ".join(str(k + 1) for k in face) for face in faces]
+    return ("\n".join(rows) + "\n").encode()
+
+
+def dae(unit="1"):
+    return COLLADA.replace("UNIT", unit).encode()
+
+
+def volume(mesh):
+    return float(np.linalg.det(mesh.vertices[mesh.triangles]).sum() / 6.0)
+
+
+GOOD = {
+    "text.stl": stl_text(),
+    "binary.stl": stl_binary(),
+    "binary_that_begins_with_solid.stl": stl_binary(header=b"solid part"),
+    "part.obj": obj(),
+    "part.OBJ": obj(),
+    "part.dae": dae(),
+}
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_every_format_gives_the_same_solid(tmp_path, name):
+    (tmp_path / name).write_bytes(GOOD[name])
+    mesh = load_mesh(tmp_path / name)
+    assert mesh.closed
+    assert mesh.vertices.shape == (4, 3)
+    assert mesh.triangles.shape == (4, 3)
+    assert volume(mesh) == pytest.approx(1.0)
+    np.testing.assert_allclose(mesh.vertices.max(axis=0), [1, 2, 3])
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_scale_applies_to_every_format(tmp_path, name):
+    (tmp_path / name).write_bytes(GOOD[name])
+    mesh = load_mesh(tmp_path / name, scale=0.001)
+    np.testing.assert_allclose(mesh.vertices.max(axis=0), [0.001, 0.002, 0.003])
+    assert mesh.scale == 0.001
+    assert mesh.source == str(tmp_path / name)
+
+
+def test_the_unit_of_a_collada_file_is_honoured(tmp_path):
+    (tmp_path / "part.dae").write_bytes(dae("0.01"))
+    np.testing.assert_allclose(load_mesh(tmp_path / "part.dae", 2.0).vertices.max(axis=0), [0.02, 0.04, 0.06])
+
+
+@pytest.mark.parametrize(("name", "data"), [("part.stl", stl_text(FACES[:, ::-1])), ("part.obj", obj(FACES[:, ::-1]))])
+def test_an_inside_out_solid_is_turned(tmp_path, name, data):
+    (tmp_path / name).write_bytes(data)
+    assert volume(load_mesh(tmp_path / name)) == pytest.approx(1.0)
+
+
+def test_an_open_surface_is_loaded_with_a_warning_that_counts_its_edges(tmp_path):
+    (tmp_path / "open.stl").write_bytes(stl_binary(FACES[:3]))
+    with pytest.warns(MeshWarning, match=r"open\.stl: 6 open edges.*surface, not as a solid"):
+        mesh = load_mesh(tmp_path / "open.stl")
+    assert not mesh.closed
+
+
+def test_a_mesh_with_a_triangle_of_the_wrong_sense_is_not_a_solid(tmp_path):
+    (tmp_path / "bent.obj").write_bytes(obj([FACES[0][::-1], *FACES[1:]]))
+    with pytest.warns(MeshWarning):
+        assert not load_mesh(tmp_path / "bent.obj").closed
+
+
+def test_polygons_are_cut_into_triangles(tmp_path):
+    text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.5 0.5 1\nf 4 3 2 1\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n"
+    (tmp_path / "pyramid.obj").write_text(text)
+    mesh = load_mesh(tmp_path / "pyramid.obj")
+    assert len(mesh.triangles) == 6
+    assert volume(mesh) == pytest.approx(1.0 / 3.0)
+
+
+NAN = stl_text().replace(b"vertex 1.0", b"vertex nan", 1)
+BROKEN = {
+    "empty.stl": (b"", "empty"),
+    "words.stl": (b"this is not a mesh, only text\n" * 10, "not a usable mesh"),
+    "short.stl": (stl_binary()[:-30], "not a usable mesh"),
+    "count.stl": (b"x" * 80 + (2**32 - 1).to_bytes(4, "little") + b"\0" * 50, "not a usable mesh"),
+    "cut.stl": (stl_text()[:70], "not a usable mesh"),
+    "flat.stl": (b"x" * 80 + (2).to_bytes(4, "little") + bytes(100), "no triangles"),
+    "nan.stl": (NAN, "finite"),
+    "picture.stl": (b"\x89PNG\r\n\x1a\n" + bytes(range(256)), "not a usable mesh"),
+    "index.obj": (obj() + b"f 1 2 99\n", "not a usable mesh"),
+    "points.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no triangles"),
+    "lines.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\n", "no triangles"),
+    "huge.obj": (obj().replace(b"v 1.0", b"v 1e999"), "finite"),
+    "words.obj": (b"this is not a mesh\n" * 10, "not a usable mesh"),
+    "cut.dae": (dae()[:600], "not a usable mesh"),
+    "unit.dae": (dae("0"), "unit must be greater than 0"),
+    "units.dae": (dae("centimetre"), "not a usable mesh"),
+    "page.dae": (b"<html><body>404</body></html>", "not a usable mesh"),
+    "part.ply": (b"ply\n", "unknown kind of mesh"),
+    "part": (obj(), "unknown kind of mesh"),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_broken_mesh_is_one_line_and_silent(tmp_path, capfd, name):
+    data, message = BROKEN[name]
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(InputError, match=message) as caught:
+        load_mesh(tmp_path / name)
+    assert name in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_missing_file_and_a_folder_are_named(tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        load_mesh(tmp_path / "missing.stl")
+    (tmp_path / "folder.stl").mkdir()
+    with pytest.raises(InputError, match="this is a folder"):
+        load_mesh(tmp_path / "folder.stl")
+
+
+@pytest.mark.parametrize("scale", [0.0, -1.0, float("nan"), float("inf"), "x", [1, 1, 1]])
+def test_a_scale_that_makes_no_sense_is_refused(tmp_path, scale):
+    (tmp_path / "part.obj").write_bytes(obj())
+    with pytest.raises(InputError, match="scale"):
+        load_mesh(tmp_path / "part.obj", scale)
+
+
+@pytest.mark.filterwarnings("ignore::rrtik_ompl.errors.MeshWarning")
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(
+    st.sampled_from(sorted(GOOD)),
+    st.lists(st.tuples(st.floats(0, 1), st.binary(max_size=4), st.integers(0, 20)), min_size=1, max_size=5),
+)
+def test_a_damaged_file_gives_a_mesh_or_one_line(tmp_path, name, wounds):
+    data = bytearray(GOOD[name])
+    for share, filling, cut in wounds:
+        place = int(share * len(data))
+        data[place : place + cut] = filling
+    (tmp_path / name).write_bytes(data)
+    try:
+        assert np.isfinite(load_mesh(tmp_path / name).vertices).all()
+    except InputError as error:
+        assert name in str(error)

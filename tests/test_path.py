@@ -1,0 +1,165 @@
+"""Paths measure themselves, check themselves, and survive a round trip through every file format."""
+
+import json
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.path import JointPath, Move, load_path, subdivided
+from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.shapes import Box
+from rrtik_ompl.world import World
+
+# The published route to the button of the subsea distribution unit (degrees, joint 5 as printed).
+PUBLISHED = np.deg2rad(
+    [
+        [25, 19, -82, 60, 90, 0],
+        [48.19, 19, -82, 60, 90, 0],
+        [48.19, 19, -82, 60, 80, 0],
+        [48.19, 19, -82, 80, 80, 0],
+        [48.19, 19, -122, 80, 80, 0],
+        [48.19, 54.90, -122, 80, 80, 0],
+        [10, 54.90, -122, 80, 80, 0],
+        [10, 41, -122, 80, 80, 0],
+    ]
+)
+
+
+def test_the_published_route_has_seven_moves_and_its_published_length():
+    path = JointPath(PUBLISHED)
+    assert path.transitions == 7
+    assert path.length == pytest.approx(3.162, abs=1e-3)
+    assert path.one_joint_at_a_time
+    assert path.moves()[1] == Move("joint5", np.deg2rad(90), np.deg2rad(80))
+
+
+def test_moves_rebuild_the_path():
+    path = JointPath(PUBLISHED)
+    q, rows = np.array(path.start), [np.array(path.start)]
+    for move in path.moves():
+        joint = path.joint_names.index(move.joint)
+        assert q[joint] == move.start
+        q[joint] = move.end
+        rows.append(q.copy())
+    assert (np.array(rows) == path.waypoints).all()
+
+
+def test_a_path_of_joint_moves_is_told_from_one_that_moves_several():
+    path = JointPath([[0, 0], [1, 1]])
+    assert not path.one_joint_at_a_time
+    with pytest.raises(InputError, match="several joints"):
+        path.moves()
+
+
+def test_waypoints_are_a_private_read_only_copy():
+    rows = np.zeros((2, 3))
+    path = JointPath(rows)
+    rows[0, 0] = 5.0
+    assert path.waypoints[0, 0] == 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        path.waypoints[0, 0] = 1.0
+
+
+matrices = st.integers(1, 6).flatmap(
+    lambda n: st.lists(
+        st.lists(st.floats(-7, 7, allow_subnormal=True), min_size=n, max_size=n), min_size=1, max_size=8
+    )
+)
+
+
+@pytest.mark.parametrize("ending", [".json", ".csv", ".txt"])
+@given(rows=matrices)
+def test_every_format_gives_back_the_same_numbers(tmp_path_factory, ending, rows):
+    file = tmp_path_factory.mktemp("paths") / f"path{ending}"
+    path = JointPath(rows, [f"axis {k}" for k in range(len(rows[0]))], robot_name="some arm")
+    path.save(file)
+    again = load_path(file)
+    assert (again.waypoints == path.waypoints).all()
+    if ending != ".txt":
+        assert again.joint_names == path.joint_names
+
+
+def test_a_path_takes_the_names_of_the_robot_it_is_read_for(tmp_path):
+    robot = load_robot("titan4")
+    file = tmp_path / "path.txt"
+    JointPath(PUBLISHED).save(file)
+    assert load_path(file, robot).joint_names == robot.joint_names
+    with pytest.raises(InputError, match="planar3"):
+        load_path(file, load_robot("planar3"))
+
+
+def test_ompl_reads_and_writes_the_matrix_text(tmp_path):
+    from ompl import base as ob
+    from ompl import geometric as og
+
+    def matrix():
+        si = ob.SpaceInformation(ob.RealVectorStateSpace(6))
+        path, state = og.PathGeometric(si), si.allocState()
+        for row in PUBLISHED:
+            state[0:6] = row.tolist()
+            path.append(state)
+        return path.printAsMatrix()
+
+    (tmp_path / "ompl.txt").write_text(matrix())
+    assert np.allclose(load_path(tmp_path / "ompl.txt").waypoints, PUBLISHED, atol=1e-5)
+
+
+@given(matrices, st.floats(0.05, 3.0))
+def test_resampling_keeps_waypoints_ends_and_length(rows, step):
+    path = JointPath(rows)
+    fine = path.resample(step)
+    assert np.linalg.norm(np.diff(fine.waypoints, axis=0), axis=1).max(initial=0.0) <= step * (1 + 1e-6)
+    assert fine.length == pytest.approx(path.length, abs=1e-9)
+    assert (fine.start == path.start).all()
+    assert (fine.end == path.end).all()
+    assert {tuple(w) for w in path.waypoints} <= {tuple(w) for w in fine.waypoints}
+
+
+def test_subdivision_numbers_the_edges():
+    points, edges = subdivided(np.array([[0.0], [1.0], [3.0]]), np.array([2.0, 1.0]))
+    assert points[:, 0].tolist() == [0.0, 0.5, 1.0, 3.0]
+    assert edges.tolist() == [0, 0, 0, 1]
+
+
+def test_violations_name_edge_and_pair():
+    box = Obstacle("box", Box([1, 1, 2]), pin.SE3(np.eye(3), np.array([5.0, 5.0, 0.0])))
+    world = World(load_robot("point2d", radius=0.1, bounds=[[0, 10], [0, 10]]), Scene([box]))
+    clear = JointPath([[1, 1], [1, 9], [9, 9]])
+    blocked = JointPath([[1, 1], [1, 5], [9, 5], [11, 5]])
+    assert clear.violations(world) == ()
+    through, outside = blocked.violations(world)
+    assert (through.edge, outside.edge) == (1, 2)
+    assert "box" in through.reason
+    assert "outside its limits" in outside.reason
+    with pytest.raises(InputError):
+        JointPath([[0.0, 0.0, 0.0]]).violations(world)
+
+
+def test_an_interrupted_save_leaves_the_old_file(tmp_path, monkeypatch):
+    import os
+
+    file = tmp_path / "path.json"
+    JointPath([[1.0]]).save(file)
+    before = file.read_text()
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "replace", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        JointPath([[2.0], [3.0]]).save(file)
+    assert file.read_text() == before
+    assert [f.name for f in tmp_path.iterdir()] == ["path.json"]
+
+
+def test_the_json_says_units_and_measures(tmp_path):
+    robot = load_robot("titan4")
+    JointPath.of(robot, PUBLISHED).save(tmp_path / "path.json")
+    document = json.loads((tmp_path / "path.json").read_text())
+    assert document["robot"] == "titan4"
+    assert document["units"] == ["rad"] * 6
+    assert document["transitions"] == 7

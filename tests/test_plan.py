@@ -1,0 +1,175 @@
+"""Planning: every planner, the reasons of failure, seeds, restarts, interruption."""
+
+import os
+import signal
+import threading
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
+from rrtik_ompl.goal import PositionGoal
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.plan import find_planner, list_planners, plan
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.shapes import Box
+from rrtik_ompl.shorten import shorten
+from rrtik_ompl.world import World
+
+
+def at(x, y):
+    return pin.SE3(np.eye(3), np.array([x, y, 0.0]))
+
+
+@pytest.fixture(scope="module")
+def wall():
+    """A disc that has to go round a wall."""
+    robot = load_robot("point2d", radius=0.3, bounds=[[0, 10], [0, 10]])
+    world = World(robot, Scene([Obstacle("wall", Box([1, 7, 2]), at(5, 3.5))]), motion_resolution=0.05)
+    return Problem(world, [2, 2], [8, 2], name="wall")
+
+
+@pytest.fixture(scope="module")
+def closed():
+    """A goal that cannot be reached."""
+    robot = load_robot("point2d", radius=0.3, bounds=[[0, 10], [0, 10]])
+    world = World(robot, Scene([Obstacle("wall", Box([1, 20, 2]), at(5, 5))]), motion_resolution=0.05)
+    return Problem(world, [2, 2], [8, 2], name="closed")
+
+
+@pytest.mark.parametrize("name", [n for n in list_planners() if n != "crdt"])
+def test_every_planner_finds_a_valid_path_with_exact_ends(wall, name):
+    found = plan(wall, name, seconds=2.0, seed=1)
+    assert found.found, found.reason
+    assert found.path.violations(wall.world) == ()
+    assert (found.path.start == wall.start).all()
+    assert (found.path.end == wall.goal.q).all()
+    assert found.reason == ""
+    assert found.statistics["attempts"] >= 1
+
+
+@pytest.mark.parametrize("name", ["bicrdt", "RRTConnect", "RRT", "KPIECE1", "PRM"])
+def test_the_same_seed_gives_the_same_path(wall, name):
+    one, two, other = (plan(wall, name, seconds=8.0, seed=s).path.waypoints for s in (4, 4, 5))
+    assert np.array_equal(one, two)
+    assert not np.array_equal(one, other)
+
+
+def test_bicrdt_moves_one_joint_at_a_time_and_shortening_keeps_that(wall):
+    raw = plan(wall, "bicrdt", seconds=5.0, seed=2).path
+    short = shorten(raw, wall)
+    assert raw.one_joint_at_a_time
+    assert short.one_joint_at_a_time
+    assert short.transitions <= raw.transitions
+    assert short.transitions == 3
+    assert short.violations(wall.world) == ()
+
+
+@pytest.mark.parametrize("name", ["bicrdt", "RRTConnect"])
+def test_no_path_is_data_with_a_reason(closed, name):
+    found = plan(closed, name, seconds=0.3, seed=1)
+    assert not found.found
+    assert found.path is None
+    assert "no path within 0.3 s" in found.reason
+    assert found.seconds < 3.0
+
+
+def test_a_planner_that_gives_up_early_is_started_again(closed):
+    found = plan(closed, "bicrdt", seconds=20.0, seed=1, restarts=3, parameters={"max_iterations": 5})
+    assert found.statistics["attempts"] == 4
+    assert "bicrdt" in found.reason
+
+
+def test_a_path_that_the_second_check_rejects_is_never_returned(wall, monkeypatch):
+    monkeypatch.setattr(JointPath, "violations", lambda self, world, **_: (type("V", (), {"edge": 0, "reason": "no"})(),))
+    found = plan(wall, "bicrdt", seconds=5.0, seed=1, restarts=2)
+    assert not found.found
+    assert found.statistics["rejected"] == 3
+    assert "rejected by the second check: no" in found.reason
+
+
+def test_a_position_goal_works_with_the_planners_that_need_no_goal_configuration():
+    robot = load_robot("planar3")
+    problem = Problem(World(robot), np.zeros(3), PositionGoal([0.0, 2.0, 0.0], 0.1), name="reach")
+    found = plan(problem, "RRT", seconds=10.0, seed=1)
+    assert found.found, found.reason
+    assert problem.reached(found.path.end)
+    with pytest.raises(InputError, match="needs a goal in joint values"):
+        plan(problem, "bicrdt")
+
+
+def test_a_continuous_joint_goes_the_short_way_round():
+    robot = load_robot("kinova")
+    turning = int(np.flatnonzero(robot.continuous)[0])
+    middle = np.where(np.isfinite(robot.lower), 0.5 * (np.maximum(robot.lower, -7) + np.minimum(robot.upper, 7)), 0.0)
+    start, goal = middle.copy(), middle.copy()
+    start[turning], goal[turning] = 3.0, -3.0
+    found = plan(Problem(World(robot), start, goal), "RRTConnect", seconds=5.0, seed=1)
+    assert found.found, found.reason
+    assert found.path.length == pytest.approx(2 * np.pi - 6.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"planner": "rrt_conect"}, "no planner 'rrt_conect'; have"),
+        ({"seconds": 0}, "seconds must be greater than 0"),
+        ({"seconds": float("nan")}, "seconds"),
+        ({"seconds": "long"}, "seconds"),
+        ({"seed": -1}, "seed"),
+        ({"seed": 1.5}, "seed"),
+        ({"restarts": -1}, "restarts"),
+        ({"planner": "RRT", "parameters": {"rang": 1.0}}, "range"),
+        ({"planner": "RRT", "parameters": {"range": "wide"}}, "range cannot be 'wide'"),
+        ({"planner": "AORRTC", "parameters": {"nothing": 1}}, "nothing"),
+        ({"planner": "bicrdt", "parameters": {"nothing": 1}}, "nothing"),
+        ({"planner": "bicrdt", "parameters": {"max_iterations": 0}}, "max_iterations"),
+    ],
+)
+def test_wrong_arguments_get_one_line(wall, arguments, message):
+    with pytest.raises(InputError, match=message) as caught:
+        plan(wall, **arguments)
+    assert "\n" not in str(caught.value)
+
+
+def test_names_are_found_and_offered():
+    assert find_planner("geometric::RRTConnect") is find_planner("RRTConnect")
+    assert {"bicrdt", "crdt", "RRTConnect", "PRM"} <= set(list_planners())
+    with pytest.raises(UnknownNameError, match="did you mean 'RRTConnect'"):
+        find_planner("RRTConect")
+
+
+def test_a_planner_class_of_ones_own_can_be_given(wall):
+    from ompl import geometric as og
+
+    assert plan(wall, og.RRTConnect, seconds=5.0, seed=1).found
+
+
+@pytest.mark.parametrize("name", ["bicrdt", "RRTConnect", "PRM", "RRTstar"])
+def test_an_interruption_ends_the_planner_and_is_raised(closed, name):
+    timer = threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        plan(closed, name, seconds=20.0, seed=1)
+    timer.join()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.parametrize("name", ["bicrdt", "RRTConnect", "PRM"])
+def test_an_error_inside_the_checks_becomes_a_planner_error(wall, name, monkeypatch):
+    def broken(*_):
+        raise RuntimeError("the collision library gave up")
+
+    monkeypatch.setattr(World, "motion_valid", broken)
+    with pytest.raises(PlannerError, match="gave up"):
+        plan(wall, name, seconds=5.0, seed=1)
+
+
+def test_planning_works_in_another_thread(wall):
+    results = []
+    worker = threading.Thread(target=lambda: results.append(plan(wall, "bicrdt", seconds=5.0, seed=1).found))
+    worker.start()
+    worker.join()
+    assert results == [True]

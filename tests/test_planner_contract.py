@@ -1,0 +1,161 @@
+"""Every planner of ours in plain OMPL, clause by clause, and the same once more with a memory that shows misuse."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from ompl import base as ob
+from ompl import util as ou
+from rrtik_planners import CRDT, BiCRDT
+
+from rrtik_ompl.errors import PlannerError
+from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult, check_planner
+from rrtik_ompl.ompl_bridge.contract import CONTRACT, Clause, moves_one_joint_at_a_time, small_problem, solution_rows
+
+PLANNERS = (BiCRDT, CRDT)
+SINGLE_JOINT = (BiCRDT, CRDT)
+
+SOAK = 10_000
+SOAK_GROWTH_MB = 2.0
+
+
+@pytest.fixture(autouse=True)
+def quiet() -> Iterator[None]:
+    level = ou.getLogLevel()
+    ou.setLogLevel(ou.LogLevel.LOG_NONE)
+    yield
+    ou.setLogLevel(level)
+
+
+@pytest.mark.parametrize("clause", CONTRACT, ids=lambda c: c.__name__)
+@pytest.mark.parametrize("planner", PLANNERS, ids=lambda p: p.__name__)
+def test_planner_keeps_the_contract(planner: Any, clause: Clause) -> None:
+    clause(planner)
+
+
+@pytest.mark.parametrize("planner", SINGLE_JOINT, ids=lambda p: p.__name__)
+def test_every_edge_moves_exactly_one_joint(planner: Any) -> None:
+    moves_one_joint_at_a_time(planner)
+
+
+class Straight(SafePlanner):
+    """Breaks the contract: does not look where it goes."""
+
+    def __init__(self, si: Any, seed: int | None = None) -> None:
+        super().__init__(si, "Straight", seed=seed)
+
+    def search(self, starts: Any, goals: Any, checker: Any, ptc: Any) -> SearchResult:
+        return SearchResult(np.array([starts[0], goals[0]]))
+
+
+def test_check_planner_names_the_broken_clause() -> None:
+    with pytest.raises(PlannerError, match="an edge of the path is not free"):
+        check_planner(Straight)
+
+
+def run_strictly(code: str) -> subprocess.CompletedProcess[str]:
+    """Run Python with a C library that overwrites freed memory and reuses it at once, so that misuse crashes."""
+    strict = {"GLIBC_TUNABLES": "glibc.malloc.tcache_count=0", "MALLOC_PERTURB_": "165"}
+    paths = os.pathsep.join(p for p in sys.path if p)
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, **strict, "PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
+    )
+
+
+CHECK_ALL = """
+from ompl import util as ou
+from rrtik_ompl.ompl_bridge import check_planner
+from rrtik_planners import CRDT, BiCRDT
+ou.setLogLevel(ou.LogLevel.LOG_NONE)
+def main():
+    for _ in range(5):
+        for planner in (BiCRDT, CRDT):
+            check_planner(planner, single_joint_moves=True)
+    print("kept")
+main()
+"""
+
+
+def test_contract_holds_with_a_memory_that_shows_misuse() -> None:
+    run = run_strictly(CHECK_ALL)
+    assert (run.returncode, run.stdout.strip()) == (0, "kept"), run.stderr[-2000:]
+
+
+SOAK_ALL = f"""
+import os
+from ompl import util as ou
+from rrtik_ompl.ompl_bridge.contract import small_problem, solution_rows
+from rrtik_planners import BiCRDT
+ou.setLogLevel(ou.LogLevel.LOG_NONE)
+def resident_mb():
+    with open("/proc/self/statm") as statm:
+        return int(statm.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20
+def fresh(seed):
+    setup = small_problem()
+    setup.setPlanner(BiCRDT(setup.getSpaceInformation(), seed=seed))
+    return setup
+def main():
+    kept = fresh(0)
+    for k in range({SOAK}):
+        setup = fresh(k) if k % 2 else kept
+        if k % 4 == 0:
+            setup.clear()
+        else:
+            setup.getProblemDefinition().clearSolutionPaths()
+        if not setup.solve(5.0) or solution_rows(setup) is None:
+            raise SystemExit(f"solve {{k}} failed")
+        if k == {SOAK} // 10:
+            before = resident_mb()
+    print(resident_mb() - before)
+main()
+"""
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="reads the memory in use from /proc")
+def test_ten_thousand_solves_leave_the_memory_flat() -> None:
+    run = run_strictly(SOAK_ALL)
+    assert run.returncode == 0, run.stderr[-2000:]
+    assert float(run.stdout) < SOAK_GROWTH_MB
+
+
+def test_the_seed_of_ompl_fixes_a_planner_without_a_seed() -> None:
+    code = (
+        "from ompl import util as ou; ou.setLogLevel(ou.LogLevel.LOG_NONE); ou.RNG.setSeed({seed})\n"
+        "from rrtik_ompl.ompl_bridge.contract import small_problem, solution_rows\n"
+        "from rrtik_planners import BiCRDT\n"
+        "def main():\n"
+        "    s = small_problem(); s.setPlanner(BiCRDT(s.getSpaceInformation())); s.solve(5.0)\n"
+        "    print(solution_rows(s).tolist())\n"
+        "main()"
+    )
+    one, same, other = (run_strictly(code.format(seed=seed)).stdout for seed in (5, 5, 6))
+    assert one.startswith("[[")
+    assert one == same
+    assert one != other
+
+
+@pytest.mark.parametrize("planner", PLANNERS, ids=lambda p: p.__name__)
+def test_start_that_is_the_goal_is_a_path_of_one_configuration(planner: Any) -> None:
+    setup = small_problem(goals=[(-1.0, -1.0, -1.0)])
+    setup.setPlanner(planner(setup.getSpaceInformation(), seed=1))
+    assert str(setup.solve(5.0)) == "Exact solution"
+    rows = solution_rows(setup)
+    assert rows is not None
+    assert rows.tolist() == [[-1.0, -1.0, -1.0]]
+
+
+@pytest.mark.parametrize("planner", PLANNERS, ids=lambda p: p.__name__)
+def test_other_spaces_are_refused_at_construction(planner: Any) -> None:
+    with pytest.raises(Exception, match="needs a RealVectorStateSpace"):
+        planner(ob.SpaceInformation(ob.SE2StateSpace()))

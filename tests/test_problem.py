@@ -1,0 +1,89 @@
+"""A problem exists only if it is well posed."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.errors import InputError, ProblemError
+from rrtik_ompl.goal import JointGoal, PoseGoal, PositionGoal
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.shapes import Box
+from rrtik_ompl.world import World
+
+
+@pytest.fixture(scope="module")
+def world():
+    box = Obstacle("panel", Box([0.2, 0.2, 0.2]), pin.SE3(np.eye(3), np.array([1.9, 0.0, 0.0])))
+    return World(load_robot("titan4"), Scene([box]))
+
+
+FREE = np.deg2rad([30, 20, 0, 0, 0, 0])
+
+
+def test_a_start_in_collision_is_refused_with_the_pair(world):
+    with pytest.raises(ProblemError, match=r"start is in collision.*panel.*mm") as caught:
+        Problem(world, np.zeros(6), FREE)
+    assert any("panel" in pair for pair in caught.value.contacts)
+
+
+def test_a_goal_in_collision_is_refused_with_the_pair(world):
+    with pytest.raises(ProblemError, match=r"goal is in collision.*panel"):
+        Problem(world, FREE, np.zeros(6))
+
+
+def test_a_value_outside_its_limit_is_named_in_degrees(world):
+    bad = FREE.copy()
+    bad[1] = np.deg2rad(90)
+    with pytest.raises(ProblemError, match=r"goal: joint '.*' is at 90 deg, outside its limits -34.19 .. 85.81 deg"):
+        Problem(world, FREE, bad)
+
+
+def test_a_hair_outside_the_limit_is_moved_onto_it(world):
+    start = FREE.copy()
+    start[1] = world.robot.upper[1] + 5e-7
+    assert Problem(world, start, FREE).start[1] == world.robot.upper[1]
+
+
+@pytest.mark.parametrize("bad", [[0.0] * 5, [np.nan] * 6, "stowed", [[0.0] * 6]])
+def test_what_is_no_configuration_is_refused(world, bad):
+    with pytest.raises(InputError, match="start"):
+        Problem(world, bad, FREE)
+    with pytest.raises(InputError, match="goal"):
+        Problem(world, FREE, bad)
+
+
+def test_inputs_are_copied(world):
+    start = FREE.copy()
+    problem = Problem(world, start, FREE)
+    start[0] = 9.0
+    assert problem.start[0] == FREE[0]
+
+
+def test_goals_of_every_kind_know_when_they_are_reached(world):
+    robot = world.robot
+    tip = robot.fk(FREE)
+    other = FREE + 0.05
+    for goal in (JointGoal(FREE), PoseGoal(tip), PositionGoal(tip.translation)):
+        problem = Problem(world, other, goal)
+        assert problem.reached(FREE)
+        assert not problem.reached(other)
+
+
+def test_the_goal_of_a_continuous_joint_is_turned_to_the_short_way():
+    robot = load_robot("kinova")
+    turning = int(np.flatnonzero(robot.continuous)[0])
+    middle = np.where(np.isfinite(robot.lower), 0.5 * (np.maximum(robot.lower, -7) + np.minimum(robot.upper, 7)), 0.0)
+    world = World(robot)
+    start, goal = middle.copy(), middle.copy()
+    start[turning], goal[turning] = 3.0, -3.0
+    if not (world.valid(start) and world.valid(goal)):
+        pytest.fail("the middle posture of the kinova arm should be free")
+    problem = Problem(world, start, goal)
+    assert problem.goal.q[turning] == pytest.approx(2 * np.pi - 3.0)
+    assert problem.reached(goal)
+
+
+def test_only_a_world_makes_a_problem():
+    with pytest.raises(InputError, match="World"):
+        Problem(load_robot("titan4"), FREE, FREE)

@@ -1,0 +1,136 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.transitions import (
+    lower_bound,
+    merge_moves,
+    moved,
+    route_length,
+    routes,
+    routes_published,
+    single_joint,
+    transitions,
+)
+
+# The final list of moves of the SDU test in the C-RDT paper, degrees, joint 5 as printed.
+SDU = np.deg2rad(
+    [
+        [25, 19, -82, 60, 90, 0],
+        [48.19, 19, -82, 60, 90, 0],
+        [48.19, 19, -82, 60, 80, 0],
+        [48.19, 19, -82, 80, 80, 0],
+        [48.19, 19, -122, 80, 80, 0],
+        [48.19, 54.90, -122, 80, 80, 0],
+        [10, 54.90, -122, 80, 80, 0],
+        [10, 41, -122, 80, 80, 0],
+    ]
+)
+PRISMS = np.deg2rad([[0, 0, 0, 0, 90, 0], [0, 0, 95.13, 0, 90, 0], [-30, 0, 95.13, 0, 90, 0], [-30, 0, 0, 0, 90, 0]])
+RRT_CONNECT = np.deg2rad(
+    [
+        [0, 0, 0, 0, 90, 0],
+        [-7.73, 24.42, 18.64, 0.64, 81.13, -69.05],
+        [-37.94, 15.77, 3.761, -0.70, 70.10, -43.18],
+        [-30, 0, 0, 0, 90, 0],
+    ]
+)
+
+
+def axis_routes(dof: int = 3) -> st.SearchStrategy[np.ndarray]:
+    """Routes of single-joint moves on a small grid, with repeated joints and null moves."""
+    move = st.tuples(st.integers(0, dof - 1), st.integers(-2, 2))
+
+    def build(moves: list[tuple[int, int]]) -> np.ndarray:
+        rows = [np.zeros(dof)]
+        for joint, step in moves:
+            rows.append(rows[-1].copy())
+            rows[-1][joint] += step
+        return np.array(rows)
+
+    return st.lists(move, max_size=15).map(build)
+
+
+def test_the_published_sdu_list_has_seven_transitions_and_its_length() -> None:
+    assert transitions(SDU) == 7
+    assert route_length(SDU) == pytest.approx(3.162, abs=5e-4)
+    assert single_joint(SDU)
+    assert lower_bound(SDU[0], SDU[-1]) == 5
+
+
+def test_the_published_prism_list_has_three_transitions_against_a_lower_bound_of_one() -> None:
+    assert transitions(PRISMS) == 3
+    assert lower_bound(PRISMS[0], PRISMS[-1]) == 1
+
+
+def test_a_path_of_all_joints_has_as_many_transitions_as_edges_and_is_no_single_joint_route() -> None:
+    assert transitions(RRT_CONNECT) == 3
+    assert not single_joint(RRT_CONNECT)
+
+
+def test_the_counts_of_routes_are_those_of_the_paper() -> None:
+    assert (routes(3, 1), routes(3, 2)) == (6, 90)
+    assert (routes_published(3, 1), routes_published(3, 2)) == (6, 90)
+
+
+def test_routes_of_several_edges_multiply_and_the_published_count_permutes_the_edges() -> None:
+    assert routes(3, 1, 2) == 36
+    assert routes_published(3, 1, 2) == 12
+
+
+@pytest.mark.parametrize(("n", "l", "m"), [(0, 1, 1), (3, 0, 1), (3, 1, 0)])
+def test_routes_of_nothing_are_refused(n: int, l: int, m: int) -> None:  # noqa: E741
+    with pytest.raises(InputError, match="at least 1"):
+        routes(n, l, m)
+
+
+def test_sigma_is_one_only_for_changes_above_the_tolerance() -> None:
+    degree = np.deg2rad(1.0)
+    assert moved([0.0, 0.0], [0.5 * degree, 2.0 * degree], degree).tolist() == [False, True]
+    assert lower_bound([0.0, 0.0], [1e-9, 1e-7]) == 1
+
+
+def test_lower_bound_refuses_configurations_of_different_length() -> None:
+    with pytest.raises(InputError, match="goal"):
+        lower_bound([0.0, 0.0], [1.0])
+
+
+def test_consecutive_moves_of_one_joint_count_once() -> None:
+    assert merge_moves([[0.0, 0], [1, 0], [2, 0], [2, 1]]).tolist() == [[0, 0], [2, 0], [2, 1]]
+
+
+def test_there_and_back_again_vanishes_and_joins_its_neighbours() -> None:
+    assert merge_moves([[0.0, 0], [1, 0], [1, 1], [1, 0], [2, 0]]).tolist() == [[0, 0], [2, 0]]
+
+
+def test_a_route_that_stands_still_has_no_transitions() -> None:
+    assert transitions([[1.0, 2.0], [1.0, 2.0]]) == 0
+    assert transitions([[1.0, 2.0]]) == 0
+
+
+def test_a_route_needs_a_configuration() -> None:
+    with pytest.raises(InputError, match="at least one"):
+        transitions(np.empty((0, 3)))
+
+
+@given(axis_routes())
+def test_merging_keeps_the_ends_and_leaves_single_joint_moves_of_alternating_joints(route: np.ndarray) -> None:
+    merged = merge_moves(route, tolerance=0.0)
+    np.testing.assert_array_equal(merged[[0, -1]], route[[0, -1]])
+    assert single_joint(merged)
+    joints = (np.diff(merged, axis=0) != 0.0).argmax(axis=1)
+    assert (joints[1:] != joints[:-1]).all()
+
+
+@given(axis_routes())
+def test_transitions_lie_between_the_lower_bound_and_the_number_of_edges(route: np.ndarray) -> None:
+    assert lower_bound(route[0], route[-1]) <= transitions(route) <= len(route) - 1
+
+
+@given(axis_routes())
+def test_transitions_do_not_depend_on_the_direction(route: np.ndarray) -> None:
+    assert transitions(route) == transitions(route[::-1])

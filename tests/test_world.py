@@ -1,0 +1,212 @@
+"""Collision checks of a world."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from rrtik_ompl.certificate import Certificate
+from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
+from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Sphere
+from rrtik_ompl.world import World
+
+CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+FACES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)]
+
+
+def at(x, y, z):
+    return pin.SE3(np.eye(3), np.array([x, y, z], dtype=float))
+
+
+def shell(size):
+    """A closed mesh that is not convex: a cube whose top is pushed in to near the bottom."""
+    points = size * np.vstack([CUBE, [[0.0, 0.0, -0.9]]])
+    faces = [f for f in FACES if f not in ((1, 5, 7), (1, 7, 3))] + [(1, 5, 8), (5, 7, 8), (7, 3, 8), (3, 1, 8)]
+    return Mesh(points, faces)
+
+
+def clutter(rng, count, reach):
+    kinds = [
+        lambda: Box(rng.uniform(0.05, 0.3, 3)),
+        lambda: Sphere(rng.uniform(0.05, 0.2)),
+        lambda: Cylinder(rng.uniform(0.03, 0.1), rng.uniform(0.1, 0.5)),
+        lambda: Capsule(rng.uniform(0.03, 0.1), rng.uniform(0.1, 0.5)),
+        lambda: Prism([(0, 0), (0.3, 0), (0.3, 0.1), (0.1, 0.1), (0.1, 0.3), (0, 0.3)], 0.2),
+        lambda: shell(0.1),
+    ]
+    poses = (pin.SE3(pin.SE3.Random().rotation, rng.uniform(-reach, reach, 3)) for _ in range(count))
+    return [Obstacle(f"o{k}", kinds[k % len(kinds)](), pose) for k, pose in enumerate(poses)]
+
+
+@pytest.mark.parametrize(("name", "reach"), [("titan4", 1.8), ("panda", 0.8), ("kinova", 0.8), ("planar6", 3.0)])
+def test_both_opinions_agree_on_random_configurations(name, reach):
+    robot = load_robot(name)
+    rng = np.random.default_rng(3)
+    pin.seed(3)
+    world = World(robot, Scene(clutter(rng, 12, reach)))
+    Q = rng.uniform(np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi), (1500, robot.dof))
+    first, second = world.valid_batch(Q), world.certify(Q)
+    assert 0.02 < first.mean() < 0.98
+    # reused collision data miss about 3 overlaps in 100,000 near contacts: at most one here, and never the other way
+    assert (first & ~second).sum() <= 1
+    assert not (~first & second).any()
+    assert [world.valid(q) for q in Q[:200]] == list(first[:200])
+
+
+def test_a_collision_is_named_with_its_pair_depth_and_points():
+    world = World(load_robot("point2d", radius=0.5, bounds=[[0, 10], [0, 10]]), Scene([Obstacle("wall", Box([2, 10, 2]), at(5, 5, 0))]))
+    (contact,) = world.contacts([4.2, 5.0])
+    assert "wall" in (contact.first, contact.second)
+    assert contact.distance == pytest.approx(-0.3, abs=1e-6)
+    assert {round(abs(float(p[0])), 3) for p in (contact.point_first, contact.point_second)} == {4.0, 4.7}
+    assert world.contacts([2.0, 5.0]) == ()
+    assert world.clearance([2.0, 5.0]) == pytest.approx(1.5, abs=1e-6)
+    assert world.clearance([4.2, 5.0]) == pytest.approx(-0.3, abs=1e-6)
+    assert "wall" in world.explain([4.2, 5.0])
+    assert "overlap" in world.explain([4.2, 5.0])
+    assert "outside its limits" in world.explain([11.0, 5.0])
+    assert world.explain([2.0, 5.0]) == ""
+
+
+def test_an_empty_world_is_free_everywhere_inside_the_limits():
+    world = World(load_robot("planar3"))
+    assert world.valid([0.0, 0.0, 0.0])
+    assert not world.valid([4.8, 0.0, 0.0])
+    assert world.clearance([0.0, 0.0, 0.0]) == np.inf
+
+
+def test_motions_are_the_same_in_both_directions_and_see_thin_walls():
+    scene = Scene([Obstacle("wall", Box([0.01, 4, 2]), at(5, 5, 0)), Obstacle("block", Prism([(1, 1), (3, 1), (2, 4)]))])
+    world = World(load_robot("point2d", radius=0.01, bounds=[[0, 10], [0, 10]]), scene, motion_resolution=0.02)
+    rng = np.random.default_rng(0)
+    A, B = rng.uniform(0, 10, (2, 300, 2))
+    forward, backward = world.motion_valid_batch(A, B), world.motion_valid_batch(B, A)
+    assert (forward == backward).all()
+    assert 0.2 < forward.mean() < 0.9
+    assert not world.motion_valid([4.0, 5.0], [6.0, 5.0])
+    assert world.motion_valid([4.0, 9.0], [6.0, 9.0])
+
+
+@pytest.mark.parametrize("name", ["titan4", "panda", "ur5", "kinova"])
+def test_no_point_of_the_arm_moves_farther_than_the_bound_says(name):
+    robot = load_robot(name)
+    world = World(robot)
+    rng = np.random.default_rng(1)
+    low, high = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
+    for _ in range(200):
+        a = rng.uniform(low, high)
+        b = np.clip(a + rng.normal(0, 0.3, robot.dof), low, high)
+        moved = np.zeros(1)
+        frames = robot.joint_frames(np.stack([a, b]))
+        for item in robot.collision.geometryObjects:
+            centre = np.append(item.placement.act(item.geometry.aabb_center), 1.0)
+            points = (frames[:, item.parentJoint] @ centre)[:, :3]
+            moved = np.maximum(moved, np.linalg.norm(points[1] - points[0]))
+        assert moved <= world.weights @ np.abs(b - a) + 1e-9
+        tips = robot.fk_batch(np.stack([a, b]))[:, :3, 3]
+        assert np.linalg.norm(tips[1] - tips[0]) <= world.weights @ np.abs(b - a) + 1e-9
+
+
+def test_the_number_of_steps_follows_the_resolution():
+    coarse, fine = (World(load_robot("planar3"), motion_resolution=r) for r in (0.1, 0.01))
+    a, b = np.zeros(3), np.array([1.0, 0.0, 0.0])
+    assert coarse.steps(a, b) == int(np.ceil(coarse.weights[0] / 0.1))
+    assert fine.steps(a, b) == pytest.approx(10 * coarse.steps(a, b), rel=0.05)
+
+
+def test_a_body_wholly_inside_a_hollow_mesh_is_in_collision():
+    robot = load_robot("point2d", radius=0.05, bounds=[[-5, 5], [-5, 5]])
+    points = np.vstack([3.0 * CUBE, [[0.0, 0.0, 2.0]]])
+    dented = [f for f in FACES if f not in ((1, 5, 7), (1, 7, 3))] + [(1, 5, 8), (5, 7, 8), (7, 3, 8), (3, 1, 8)]
+    world = World(robot, Scene([Obstacle("tank", Mesh(points, dented))]))
+    assert not world.valid([0.0, 0.0])
+    assert not world.certify(np.zeros((1, 2)))[0]
+    assert "tank" in world.explain([0.0, 0.0])
+    assert world.valid([4.0, 0.0])
+
+
+def test_allowed_pairs_attached_objects_and_the_base():
+    robot = load_robot("titan4")
+    q = np.zeros(6)
+    tool = AttachedObject("tool", "gripper" if "gripper" in robot.link_names else robot.link_names[-1], Cylinder(0.02, 0.4), at(0.3, 0, 0))
+    box = Obstacle("box", Box([0.2, 0.2, 0.2]), robot.fk(q) * at(0, 0, 0.25))
+    assert World(robot, Scene([box])).valid(q)
+    held = AttachedObject(tool.name, tool.link, Box([0.05, 0.05, 0.8]), at(0, 0, 0))
+    world = World(robot, Scene([box], [held]))
+    reaching = [c for c in world.contacts(q) if {c.first, c.second} == {"tool", "box"}]
+    allowed = World(robot, Scene([box], [held], [("tool", "box")]))
+    assert not any({c.first, c.second} == {"tool", "box"} for c in allowed.contacts(q))
+    assert reaching or world.valid(q)
+    floor = Scene([Obstacle("floor", HalfSpace([0, 0, 1], 0.0))])
+    assert not World(robot, floor).valid(q)
+    base = robot.link_names[0]
+    names = {n for c in World(robot, floor).contacts(q) for n in (c.first, c.second)}
+    assert "floor" in names
+    assert base in names or len(names) > 1
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        (Scene([], [], [("nothing", "base")]), "nothing"),
+        (Scene([], [AttachedObject("tool", "no_such_link", Sphere(0.1))]), "no_such_link"),
+        (Scene([], [AttachedObject("tool", "gripper", Sphere(0.1), allow=("thumb",))]), "thumb"),
+    ],
+)
+def test_unknown_names_are_refused(scene, words):
+    with pytest.raises(UnknownNameError, match=words):
+        World(load_robot("titan4"), scene)
+
+
+def test_an_obstacle_must_not_have_the_name_of_a_link():
+    robot = load_robot("titan4")
+    with pytest.raises(InputError, match="rename"):
+        World(robot, Scene([Obstacle(robot.link_names[-1], Sphere(0.1), at(5, 5, 5))]))
+
+
+@pytest.mark.parametrize("bad", [[0.0] * 5, [0.0] * 7, [0.0] * 5 + [np.nan], [[0.0] * 6], "abcdef", None])
+def test_a_bad_configuration_is_refused(bad):
+    world = World(load_robot("titan4"))
+    with pytest.raises(InputError):
+        world.valid(bad)
+
+
+def test_batches_may_be_empty_of_any_layout_and_any_real_type():
+    world = World(load_robot("titan4"))
+    Q = np.random.default_rng(0).uniform(-0.5, 0.5, (6, 6))
+    expected = world.valid_batch(Q)
+    assert world.valid_batch(np.zeros((0, 6))).shape == (0,)
+    assert (world.valid_batch(np.asfortranarray(Q)) == expected).all()
+    assert (world.valid_batch(Q[::-1])[::-1] == expected).all()
+    locked = Q.copy()
+    locked.setflags(write=False)
+    assert (world.valid_batch(locked) == expected).all()
+    assert (world.valid_batch(Q.tolist()) == expected).all()
+    with pytest.raises(InputError):
+        world.valid_batch(np.full((2, 6), np.inf))
+    with pytest.raises(InputError):
+        world.motion_valid_batch(Q, Q[:2])
+
+
+def test_moving_obstacles_stand_where_they_are_at_time_zero():
+    from rrtik_ompl.scene import ConstantVelocity, Waypoints
+
+    robot = load_robot("point2d", radius=0.1, bounds=[[0, 10], [0, 10]])
+    buoy = Obstacle("buoy", Sphere(0.5), at(2, 2, 0), ConstantVelocity([1, 0, 0]))
+    door = Obstacle("door", Sphere(0.5), motion=Waypoints([0, 4], [at(8, 2, 0), at(8, 6, 0)]))
+    scene = Scene([buoy, door])
+    assert not World(robot, scene).valid([2.0, 2.0])
+    assert not World(robot, scene).valid([8.0, 2.0])
+    later = World(robot, scene.at(3.0))
+    assert later.valid([2.0, 2.0])
+    assert not later.valid([5.0, 2.0])
+    assert not later.valid([8.0, 5.0])
+
+
+def test_the_certificate_agrees_with_itself_in_chunks():
+    robot = load_robot("titan4")
+    world = World(robot, Scene(clutter(np.random.default_rng(5), 6, 1.5)))
+    Q = np.random.default_rng(6).uniform(robot.lower, robot.upper, (600, 6))
+    whole = world.certify(Q)
+    assert (whole == np.concatenate([world.certify(Q[:100]), world.certify(Q[100:])])).all()
+    assert isinstance(world._certificate, Certificate)
