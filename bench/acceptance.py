@@ -20,6 +20,10 @@ class Report:
         self.lines += [f"## {title}", "", "| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
         self.lines += ["| " + " | ".join(row) + " |" for row in rows] + [""]
 
+    def note(self, title: str, text: str) -> None:
+        """Add a section of text."""
+        self.lines += [f"## {title}", "", text, ""]
+
     def bar(self, what: str, wanted: str, measured: str, held: bool) -> None:
         """Add an acceptance row."""
         self.bars.append((what, wanted, measured, held))

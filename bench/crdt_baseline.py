@@ -7,10 +7,10 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from rrtik_planners import CRDT
 
 from rrtik_ompl.ompl_bridge.setup import Judge, problem_definition, space_information
 from rrtik_ompl.problem import Problem
+from rrtik_planners import CRDT
 
 STEP = 1.0  # of the RRT, and the tolerance at the goal for both
 SPACING = 0.2  # between two point tests

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 from acceptance import Report
 from crdt_baseline import TreeRun, crdt_run, rrt_run
 from crdt_published import CRDT_TABLE, PRISM_LIST, RRT_TABLE, SDU_LIST
@@ -22,7 +23,16 @@ from rrtik_ompl.problem import Problem
 from rrtik_ompl.transitions import lower_bound, route_length, routes, transitions
 
 OPTIMA = {"env_e": 4, "planar3_a": 3, "planar3_b": 4, "planar3_c": 3, "titan4_sdu": 6, "titan4_prisms": 3}
-PLANAR = ("planar3_a", "planar3_b", "planar3_c")
+WITH_ROOM = "planar3_a, 10 mm out"
+OPTIMA[WITH_ROOM] = 3
+PLANAR = ("planar3_a", WITH_ROOM, "planar3_b", "planar3_c")
+CASE_A = (
+    "With the squares of case A where they were proposed, their nearest corners are 1.991 m from axis 1. The only "
+    "routes of three moves, 3-1-3, fold joint 3 and carry it round on a circle of 2 m, which cuts each corner 6 mm "
+    "deep over 0.6 deg of joint 1. A check every few degrees steps over that; the exact one here does not, and the "
+    "best route found has {best} moves. Beside the case as proposed, the same one with both squares 10 mm outwards in "
+    "x and y is measured, in which the optimum of 3 is real."
+)
 RAW, ONCE, TWICE, ROUNDS = range(4)
 
 
@@ -114,6 +124,9 @@ def route_bars(report: Report, measured: dict[str, Measured]) -> None:
     sound = share(runs, lambda run: run.sound)
     text = f"{100 * sound:.1f} % of {4 * len(runs)} routes"
     report.bar("one coordinate per edge, valid at half resolution, ends exact", "100 %", text, sound == 1.0)
+    withdrawn = {name: sum(run.withdrawn for run in m.runs) for name, m in measured.items()}
+    text = ", ".join(f"{name}: {count}" for name, count in withdrawn.items() if count) or "none"
+    report.note("Routes withdrawn by the second, denser check (the raw route is counted in their place)", text)
     _share_bar(report, "E: BiCRDT + double pass at the optimum 4", measured["env_e"].at_optimum(TWICE), 0.99)
     planar_bars(report, [measured[name] for name in PLANAR])
     sdu_bars(report, measured["titan4_sdu"])
@@ -123,10 +136,23 @@ def route_bars(report: Report, measured: dict[str, Measured]) -> None:
         report.bar(f"{name}: median time of a plan with the double pass", "<= 1 s", f"{seconds:.3f} s", seconds <= 1.0)
 
 
+def case_a_with_room(problem: Problem, outwards: float = 0.01) -> Problem:
+    """Case A with its squares moved away from axis 1 (see CASE_A)."""
+    world, moved = problem.world, []
+    for square in world.scene.obstacles:
+        shift = outwards * np.sign(square.pose.translation)
+        moved.append(replace(square, pose=pin.SE3(square.pose.rotation, square.pose.translation + shift)))
+    scene = replace(world.scene, obstacles=tuple(moved))
+    roomy = rrtik.World(world.robot, scene, motion_resolution=world.motion_resolution)
+    return rrtik.Problem(roomy, problem.start, problem.goal, name=WITH_ROOM)
+
+
 def planar_bars(report: Report, cases: list[Measured]) -> None:
     """Planar 3R: the optimum of case A, and what the passes save in every case."""
-    _share_bar(report, "3R A: optimum 3 after the double pass", cases[0].at_optimum(TWICE), 0.50)
-    _share_bar(report, "3R A: optimum 3, extra rounds, best of 10", cases[0].best_at_optimum(ROUNDS, 10), 0.99)
+    for m in cases[:2]:
+        _share_bar(report, f"{m.name}: optimum 3 after the double pass", m.at_optimum(TWICE), 0.50)
+        _share_bar(report, f"{m.name}: optimum 3, extra rounds, best of 10", m.best_at_optimum(ROUNDS, 10), 0.99)
+    report.note("Case A", CASE_A.format(best=cases[0].moves.min()))
     for m in cases:
         falling = float((np.diff(m.moves[:, :3], axis=1) <= 0).all(axis=1).mean())
         _share_bar(report, f"{m.name}: pass 2 <= pass 1 <= raw in every run", falling, 1.0)
@@ -184,7 +210,7 @@ def main() -> None:
     measured: dict[str, Measured] = {}
     environment_e(report, rrtik.load_problem("env_e"), count)
     for name in OPTIMA:
-        problem = rrtik.load_problem(name)
+        problem = case_a_with_room(rrtik.load_problem("planar3_a")) if name == WITH_ROOM else rrtik.load_problem(name)
         runs = [route_run(problem, seed) for seed in range(count if name == "env_e" else arm_count)]
         measured[name] = Measured(name, problem, runs)
     route_bars(report, measured)

@@ -31,6 +31,7 @@ class RouteRun:
     search_motions: int
     post_motions: int
     sound: bool  # every stage: one joint at a time, valid at half resolution, ends exact
+    withdrawn: int  # stages that the second check rejected; as in shorten(), the raw route stands for them
 
     @property
     def moves(self) -> list[int]:
@@ -58,14 +59,16 @@ class CountedMotions:
 
 def route_run(problem: Problem, seed: int) -> RouteRun:
     """Plan with BiCRDT and cut."""
-    plan = rrtik.plan(problem, planner="bicrdt", seconds=60.0, seed=seed, restarts=0)
+    plan = rrtik.plan(problem, planner="bicrdt", seconds=60.0, seed=seed)
     if plan.path is None:
         raise SystemExit(f"{problem.name}, seed {seed}: {plan.reason}")
     motions, raw, begin = CountedMotions(problem.world), plan.path.waypoints, perf_counter()
     twice = double_axis_cut(raw, motions)
     post_seconds = perf_counter() - begin
     test = problem.world.motion_valid
-    routes = [raw, axis_cut(raw, test), twice, axis_cut_rounds(raw, test, seed=seed)]
+    stages = [raw, axis_cut(raw, test), twice, axis_cut_rounds(raw, test, seed=seed)]
+    passed = [sound(problem, route) for route in stages]
+    routes = [route if ok else raw for route, ok in zip(stages, passed, strict=True)]
     return RouteRun(
         int(plan.statistics["iterations"]),
         routes,
@@ -74,6 +77,7 @@ def route_run(problem: Problem, seed: int) -> RouteRun:
         int(plan.statistics["checked_motions"]),
         motions.count,
         all(sound(problem, route) for route in routes),
+        passed.count(False),
     )
 
 

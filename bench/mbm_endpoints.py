@@ -1,6 +1,6 @@
 """Load all MotionBenchMaker problems of the Panda set and check that start and goal are free, with the exact meshes.
 
-Run: ``python bench/mbm_endpoints.py FOLDER``; FOLDER is the unpacked set (``panda.urdf``, ``panda.srdf``, ``problems/``).
+Run: ``python bench/mbm_endpoints.py FOLDER``, the unpacked set (``panda.urdf``, ``panda.srdf``, ``problems/``).
 Prints a table; exit code 0 if every problem loads and start and goal of each are collision-free, else 1.
 """
 

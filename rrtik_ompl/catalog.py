@@ -10,11 +10,9 @@ from __future__ import annotations
 import inspect
 import json
 import os
-import threading
-from collections import OrderedDict
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
@@ -22,13 +20,14 @@ from typing import Any
 from rrtik_ompl.dh_file import DH_OPTIONS, robot_from_dh_file
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.robot_cache import RobotCache
 from rrtik_ompl.robot_source import base_pose, plain, source_entry
 from rrtik_ompl.urdf import URDF_OPTIONS, robot_from_urdf
 
 FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh")
 FILE_KINDS = (".urdf", ".xml", ".yaml", ".yml")
 PARAMETRIC = ("planar", "point2d")  # robots that a problem file describes by a group of keys of their own
-CACHE_SIZE = 64
+MOUNTING = ("base_pose", "tip")  # keys that stand beside that group
 
 
 def list_robots() -> tuple[str, ...]:
@@ -141,7 +140,7 @@ class _Recipe:
         options = source_entry(given)
         if self.target not in PARAMETRIC:
             return {self.kind: self.target} | options
-        beside = {key: options.pop(key) for key in ("base_pose",) if key in options}
+        beside = {key: options.pop(key) for key in MOUNTING if key in options}
         return {self.target: options} | beside
 
 
@@ -163,7 +162,7 @@ def _recipe(name: str | os.PathLike[str]) -> _Recipe:
     raise UnknownNameError("robot", text, list_robots())
 
 
-@lru_cache(maxsize=None)
+@cache
 def _offers(group: str) -> dict[str, EntryPoint]:
     return {entry.name: entry for entry in entry_points(group=f"rrtik_ompl.{group}")}
 
@@ -208,43 +207,4 @@ def _paths(options: Mapping[str, Any]) -> list[str]:
     return [os.fspath(options[key]) for key in FILE_OPTIONS if isinstance(options.get(key), (str, os.PathLike))]
 
 
-Stamp = tuple[str, int, int]
-
-
-class _Cache:
-    """The robots loaded last, each with the size and time of the files it came from."""
-
-    def __init__(self) -> None:
-        self._robots: OrderedDict[str, tuple[Robot, tuple[Stamp, ...]]] = OrderedDict()
-        self._lock = threading.Lock()
-
-    def get(self, key: str) -> Robot | None:
-        with self._lock:
-            found = self._robots.get(key)
-            if found is None or _stamps(path for path, _, _ in found[1]) != found[1]:
-                return None
-            self._robots.move_to_end(key)
-            return found[0]
-
-    def put(self, key: str, robot: Robot, files: Iterable[str]) -> Robot:
-        solids = (*robot.collision.geometryObjects, *robot.visual.geometryObjects)
-        stamps = _stamps({*files, *(solid.meshPath for solid in solids)})
-        with self._lock:
-            self._robots[key] = (robot, stamps)
-            if len(self._robots) > CACHE_SIZE:
-                self._robots.popitem(last=False)
-        return robot
-
-
-def _stamps(paths: Iterable[str]) -> tuple[Stamp, ...]:
-    found = []
-    for path in sorted(paths):
-        try:
-            state = os.stat(path)
-        except (OSError, ValueError):  # a name, or a file that is gone: then the next load says so
-            continue
-        found.append((path, state.st_mtime_ns, state.st_size))
-    return tuple(found)
-
-
-_cache = _Cache()
+_cache = RobotCache()

@@ -49,15 +49,21 @@ class Shorten(str, Enum):
     none = "none"
 
 
-@app.callback(invoke_without_command=False)
-def _options(
-    version: Annotated[bool, typer.Option("--version", help="Print the version.", is_eager=True)] = False,
-) -> None:
-    if version:
+def _print_version(asked: bool) -> None:
+    if asked:
         from rrtik_ompl import __version__
 
         print(f"rrtik {__version__}")
         raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", is_eager=True, callback=_print_version)
+    ] = False,
+) -> None:
+    del version
 
 
 @app.command()
@@ -111,6 +117,7 @@ def plan(
 def check(problem: ProblemName, path: PathFile = None) -> int:
     """Check a problem file, and a path for it, densely and independently of any planner."""
     from rrtik_ompl import load_path, load_problem
+    from rrtik_ompl.path import SECOND_CHECK
 
     question = load_problem(problem)
     world = question.world
@@ -127,7 +134,7 @@ def check(problem: ProblemName, path: PathFile = None) -> int:
         _print(f"{path}: {fault}")
     if faults:
         return NOT_FOUND
-    step = 0.5 * world.motion_resolution
+    step = world.motion_resolution / SECOND_CHECK
     size = f"{len(route.waypoints)} waypoints, {route.transitions} moves, length {route.length:.2f} rad"
     _print(f"{path}: valid, checked every {step:g} m; {size}")
     return FOUND
@@ -197,6 +204,8 @@ def run(arguments: list[str] | None = None) -> int:
     try:
         code = app(args=arguments, prog_name="rrtik", standalone_mode=False)
         sys.stdout.flush()
+        if code == INTERRUPTED:  # what typer makes of KeyboardInterrupt
+            raise KeyboardInterrupt
         return int(code or 0)
     except RrtikError as error:
         return _fail(str(error))

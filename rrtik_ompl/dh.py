@@ -1,4 +1,4 @@
-"""Robots from Denavit-Hartenberg tables, standard (Paul 1981) or modified (Craig 1986); the convention is always said."""
+"""Robots from Denavit-Hartenberg tables, standard (Paul 1981) or modified (Craig 1986): the caller says which."""
 
 from __future__ import annotations
 
@@ -60,7 +60,9 @@ def robot_from_dh(
     *,
     convention: str,
     radius: float | Sequence[float] = 0.05,
+    floor_gap: float = 0.0,
     tool: Any | None = None,
+    tip: str = "tip",
     base_pose: Any | None = None,
     postures: Mapping[str, ArrayLike] | None = None,
     self_collision: bool = True,
@@ -78,7 +80,10 @@ def robot_from_dh(
         rows: The table.
         convention: ``"standard"`` or ``"modified"``; there is no default because the two give different arms.
         radius: Of the capsules [m], one number or one per row; 0 stands for 1e-4.
+        floor_gap: How far along its d the first link's capsule begins [m]; its radius keeps the cap above a floor at
+            the height of the base.
         tool: Pose of the tip in the frame of the last row, ``pinocchio.SE3``; identity if None.
+        tip: Link that goals refer to.
         base_pose: ``pinocchio.SE3`` T_world_base.
         postures: Named configurations, each of as many numbers [rad or m] as there are rows.
         self_collision: Whether links are checked against each other.
@@ -102,13 +107,14 @@ def robot_from_dh(
     ]
     joints.append(Joint("tip_joint", "fixed", names[-1], "tip", after))
     corners = _corners(table, convention, T_last_tip)
+    corners[1][0] = np.array([0.0, 0.0, np.clip(floor_gap, 0.0, abs(table[0].d)) * np.sign(table[0].d)])
     solids = [_capsules(points, r, colour) for points, r in zip(corners, [radii[0], *radii], strict=True)]
     links = [Link(link, solid, solid) for link, solid in zip(names, solids, strict=True)]
     allowed = {frozenset(pair) for pair in options.pop("allowed_collisions", ())} | _touching(links)
     return build_robot(
         name,
         Tree(f"robot '{name}'", [*links, Link("tip")], joints),
-        tip="tip",
+        tip=tip,
         base_pose=base_pose,
         limits={row.joint: JointLimits(acceleration=row.acceleration, jerk=row.jerk) for row in table},
         postures={key: _posture(name, key, value, table) for key, value in (postures or {}).items()},

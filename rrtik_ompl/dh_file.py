@@ -9,12 +9,23 @@ import numpy as np
 from pydantic import Field
 
 from rrtik_ompl.dh import DhRow, robot_from_dh
-from rrtik_ompl.file_format import Name, NotNegative, Number, Numbers, Positive, Section, Vector2, Vector3, Vector4, parse
+from rrtik_ompl.file_format import (
+    Name,
+    NotNegative,
+    Number,
+    Numbers,
+    Positive,
+    Section,
+    Vector2,
+    Vector3,
+    Vector4,
+    parse,
+)
 from rrtik_ompl.poses import IDENTITY_QUATERNION, pose
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.yaml_file import YamlDocument, read_yaml
 
-DH_OPTIONS = ("base_pose",)
+DH_OPTIONS = ("base_pose", "tip")
 
 
 class RowEntry(Section):
@@ -37,7 +48,7 @@ class ToolEntry(Section):
     """Pose of the tip in the frame of the last row."""
 
     xyz: Vector3
-    quat_xyzw: Vector4 = list(IDENTITY_QUATERNION)
+    quat_xyzw: Vector4 = Field(default_factory=lambda: list(IDENTITY_QUATERNION))
 
 
 class TableEntry(Section):
@@ -58,11 +69,12 @@ class DhFile(Section):
     postures_deg: dict[str, Numbers] = Field({}, description="named configurations [deg, m if prismatic]")
 
 
-def robot_from_dh_file(path: str | os.PathLike[str], *, base_pose: Any | None = None) -> Robot:
+def robot_from_dh_file(path: str | os.PathLike[str], *, tip: str = "tip", base_pose: Any | None = None) -> Robot:
     """Load a robot from a DH table file.
 
     Args:
         path: YAML file.
+        tip: Link that goals refer to.
         base_pose: ``pinocchio.SE3`` T_world_base.
 
     Raises:
@@ -85,6 +97,7 @@ def robot_from_dh_file(path: str | os.PathLike[str], *, base_pose: Any | None = 
             convention=entry.dh.convention,
             radius=entry.dh.radius,
             tool=None if tool is None else pose(tool.xyz, tool.quat_xyzw),
+            tip=tip,
             base_pose=base_pose,
             postures=postures,
             source={"dh": os.path.abspath(path)},

@@ -4,21 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from difflib import get_close_matches
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from rrtik_ompl.yaml_file import Location, YamlDocument, describe
 
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
-NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
+LARGEST, SMALLEST = 1e6, 1e-6  # [m]; geometry beyond is a slip of the pen and breaks collision checking
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=LARGEST)]
+NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=LARGEST)]
+Length = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=SMALLEST, le=LARGEST)]
 Name = Annotated[str, Field(min_length=1)]
+Sizes3 = Annotated[list[Length], Field(min_length=3, max_length=3)]
 Vector2 = Annotated[list[Number], Field(min_length=2, max_length=2)]
 Vector3 = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Vector4 = Annotated[list[Number], Field(min_length=4, max_length=4)]
 Numbers = Annotated[list[Number], Field(min_length=1)]
+
+
+
+def _one(value: Any) -> Any:
+    if value is True:  # equal to 1 in Python, but not what a file should say
+        raise PydanticCustomError("version", "must be 1, found true")
+    return value
+
+
+Version = Annotated[Literal[1], BeforeValidator(_one)]
 
 _TAG = "<"  # tags of unions begin with it, so that they can be told from the keys in an error's location
 
@@ -118,10 +132,10 @@ def without_null(schema: Any) -> Any:
         return schema
     cleaned = {k: without_null(v) for k, v in schema.items() if not (k == "default" and v is None)}
     choices = [choice for choice in cleaned.get("anyOf", ()) if choice != {"type": "null"}]
-    if len(choices) == 1 and len(cleaned["anyOf"]) == 2:
+    if len(choices) == 1:
         del cleaned["anyOf"]
         return {**choices[0], **cleaned}
-    return cleaned
+    return cleaned | ({"anyOf": choices} if choices else {})
 
 
 def _location(error: Any) -> Location:
@@ -166,6 +180,7 @@ _MESSAGES: dict[str, Callable[[dict[str, Any], str], str]] = {
     "dict_type": _must_be("a group of keys"),
     "finite_number": _must_be("a finite number"),
     "greater_than": lambda context, found: f"must be greater than {context['gt']:g}, found {found}",
+    "less_than_equal": lambda context, found: f"must be {context['le']:g} or less, found {found}",
     "greater_than_equal": lambda context, found: f"must be {context['ge']:g} or more, found {found}",
     "too_short": lambda context, found: f"needs at least {context['min_length']} entries, found {found}",
     "too_long": lambda context, found: f"takes at most {context['max_length']} entries, found {found}",

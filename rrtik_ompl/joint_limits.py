@@ -17,8 +17,8 @@ RATES = ("velocity", "acceleration", "jerk")
 _FLAGS = ("position", "velocity", "acceleration", "deceleration", "jerk", "effort", "soft")
 _NUMBERS = ("min_position", "max_position", "max_velocity", "max_acceleration", "max_jerk")
 _UNUSED = ("max_deceleration", "min_jerk", "max_effort", "angle_wraparound", "k_position", "k_velocity")
-_UNUSED += ("soft_lower_limit", "soft_upper_limit")
-_KEYS = (*(f"has_{flag}_limits" for flag in _FLAGS), *_NUMBERS, *_UNUSED)
+_SOFT = ("soft_lower_limit", "soft_upper_limit")
+_KEYS = (*(f"has_{flag}_limits" for flag in _FLAGS), *_NUMBERS, *_UNUSED, *_SOFT)
 
 
 def read_joint_limits(path: str | os.PathLike[str], joints: Iterable[str]) -> dict[str, JointLimits]:

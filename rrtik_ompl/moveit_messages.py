@@ -9,7 +9,7 @@ import pinocchio as pin
 from pydantic import BaseModel, Field
 
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.file_format import Name, Number, Positive, Vector3, Vector4
+from rrtik_ompl.file_format import Length, Name, Number, Positive, Vector3, Vector4
 from rrtik_ompl.poses import IDENTITY_QUATERNION, pose
 from rrtik_ompl.scene import Obstacle
 from rrtik_ompl.shapes import Box, Cylinder, Shape, Sphere
@@ -38,7 +38,7 @@ class Primitive(BaseModel):
     """A shape: box [x, y, z], cylinder [height, radius], sphere [radius], full sizes in metres."""
 
     type: Literal["box", "cylinder", "sphere"]
-    dimensions: Annotated[list[Positive], Field(min_length=1, max_length=3)]
+    dimensions: Annotated[list[Length], Field(min_length=1, max_length=3)]
 
     def build(self) -> Shape:
         """The shape."""

@@ -32,6 +32,7 @@ def resolve_mesh(uri: str, folder: Path | None, packages: Iterable[Path], where:
     roots = [Path(p) for p in packages]
     roots += [] if folder is None else [folder, *folder.parents]
     name = unquote(rest) if scheme else rest
+    name = name.lstrip("/") if scheme in ("package", "model") else name  # package:///NAME is a common slip
     candidates = _in_packages(name, roots) if scheme in ("package", "model") else _beside(name, folder)
     found = next((path for path in candidates if path.is_file()), None)
     if found is None:
@@ -39,7 +40,7 @@ def resolve_mesh(uri: str, folder: Path | None, packages: Iterable[Path], where:
         remedy = f"give packages=[the folder that holds '{package}']" if scheme in ("package", "model") else "check it"
         raise InputError(f"{where}: mesh file '{uri}' does not exist; {remedy}")
     if found.suffix.lower() not in MESH_SUFFIXES:
-        raise InputError(f"{where}: mesh format '{found.suffix}' of '{uri}' cannot be read; export it as STL, OBJ or DAE")
+        raise InputError(f"{where}: mesh '{uri}' is of no kind that can be read; export it as STL, OBJ or DAE")
     return found.resolve()
 
 

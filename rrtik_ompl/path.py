@@ -22,6 +22,7 @@ from rrtik_ompl.text_file import read_text, write_text
 from rrtik_ompl.transitions import merge_moves, moved, route_length, single_joint, transitions
 from rrtik_ompl.world import World
 
+SECOND_CHECK = 2.0  # how many times finer than the motion resolution a path is checked again
 FORMATS = (".json", ".csv", ".txt")
 
 
@@ -163,7 +164,7 @@ class JointPath:
             InputError: If the path has another number of joints than the world's robot.
         """
         rows = finite_array(self.waypoints, (None, world.robot.dof), f"path for robot '{world.robot.name}'")
-        fine = 0.5 * world.motion_resolution if resolution is None else resolution
+        fine = world.motion_resolution / SECOND_CHECK if resolution is None else resolution
         counts = [world.steps(a, b, fine) for a, b in pairwise(rows)]
         dense, edges = subdivided(rows, np.array(counts, dtype=np.float64))
         bad = np.flatnonzero(~world.certify(dense))

@@ -13,8 +13,8 @@ import numpy as np
 from rrtik_ompl import catalog
 from rrtik_ompl.arrays import finite_array
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.ompl_bridge.attempt import Attempt, PlannerFactory, attempt, ompl_planners
-from rrtik_ompl.path import JointPath, Violation
+from rrtik_ompl.ompl_bridge.attempt import ANYTIME_PLANNERS, Attempt, PlannerFactory, attempt, ompl_planners
+from rrtik_ompl.path import SECOND_CHECK, JointPath, Violation
 from rrtik_ompl.problem import Problem
 
 DEFAULT_PLANNER = "bicrdt"
@@ -57,8 +57,8 @@ def plan(
     """Find a collision-free path from the start to the goal of a problem.
 
     A path is returned only if a second check agrees, which is twice as dense as the planner's and shares nothing with
-    it (:meth:`JointPath.violations`). If that check rejects a path, or a planner gives up before its time, it is
-    started anew with another random stream.
+    it (:meth:`JointPath.violations`). If a planner gives up before its time it is started anew with another random
+    stream; if the second check rejects its path, it is started anew and checks as densely as that.
 
     Args:
         problem: What to solve.
@@ -84,16 +84,28 @@ def plan(
     begin = time.perf_counter()
     totals: dict[str, int | float] = {"attempts": 0, "rejected": 0}
     reason, path = "", None
-    for child in np.random.SeedSequence(used).generate_state(restarts + 1, np.uint32):
+    # An optimal path touches what it goes round, and an anytime planner has no time left for a second attempt.
+    asked = problem.refined(SECOND_CHECK) if getattr(factory, "__name__", "") in ANYTIME_PLANNERS else problem
+    for number, child in enumerate(np.random.SeedSequence(used).generate_state(restarts + 1, np.uint32)):
         left = limit - (time.perf_counter() - begin)
         if left <= 0.0:
             break
-        outcome = attempt(problem, factory, seconds=left, seed=int(child), parameters=parameters or {})
+        short_way = number == 0 and restarts > 0 and bool(problem.world.robot.continuous.any())
+        outcome = attempt(
+            asked,
+            factory,
+            seconds=0.5 * left if short_way else left,
+            seed=int(child),
+            parameters=parameters or {},
+            all_turns=not short_way,
+        )
         _count(totals, outcome)
         path, reason = _judged(problem, outcome, name)
         if path is not None:
             break
-        totals["rejected"] += outcome.rows is not None
+        if outcome.rows is not None:
+            totals["rejected"] += 1
+            asked = problem.refined(SECOND_CHECK)
     elapsed = time.perf_counter() - begin
     if path is None and elapsed >= limit:
         reason = f"no path within {limit:g} s ({totals['attempts']} attempts; the last one: {reason or 'out of time'})"

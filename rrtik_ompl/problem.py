@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,12 @@ class Problem:
     def robot(self) -> Any:
         """The robot of the world."""
         return self.world.robot
+
+    def refined(self, factor: float) -> Problem:
+        """The same problem, its motions checked in steps ``factor`` times as fine."""
+        finer = copy.copy(self)
+        finer.world = self.world.refined(factor)
+        return finer
 
     def reached(self, q: ArrayLike) -> bool:
         """Whether a configuration, shape (dof,), satisfies the goal."""

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import Field
 
 from rrtik_ompl.catalog import find_problem, load_robot, robot_from_entry
 from rrtik_ompl.errors import ProblemError, UnknownNameError
-from rrtik_ompl.file_format import Positive, Section, parse, without_null
+from rrtik_ompl.file_format import Positive, Section, Version, parse, without_null
 from rrtik_ompl.goal_file import GoalSection, StartSection, build_goal, goal_data
 from rrtik_ompl.motion_bench_maker import is_motion_bench_maker, load_motion_bench_maker
 from rrtik_ompl.problem import Problem
@@ -27,7 +27,7 @@ from rrtik_ompl.yaml_file import YamlDocument, read_yaml, write_yaml
 class ProblemFile(Section):
     """A motion planning problem. Lengths in metres; angles in radians, in degrees where a key ends in _deg."""
 
-    version: Literal[1]
+    version: Version
     robot: RobotEntry
     scene: SceneEntry = Field(default=SceneEntry())
     start: StartSection

@@ -9,7 +9,7 @@ from rich import box
 from rich.table import Table
 
 from rrtik_ompl.goal import JointGoal
-from rrtik_ompl.path import JointPath
+from rrtik_ompl.path import SECOND_CHECK, JointPath
 from rrtik_ompl.plan import Plan
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.transitions import lower_bound
@@ -64,7 +64,7 @@ def summary(problem: Problem, plan: Plan, path: JointPath | None, shorten_second
         lines.append(f"{path.transitions} moves{least}, length {path.length:.2f} rad{before}")
     else:
         lines.append(f"{len(path.waypoints)} waypoints, length {path.length:.2f} rad, several joints move at once")
-    step = 0.5 * problem.world.motion_resolution
+    step = problem.world.motion_resolution / SECOND_CHECK
     lines.append(
         f"planning {plan.seconds:.3f} s, shortening {shorten_seconds:.3f} s; checked again every {step:g} m: valid"
     )

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import finite_array, frozen
+from rrtik_ompl.arrays import Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.robot import Chain, Robot
-from rrtik_ompl.tree import Joint, Tree, build_models
+from rrtik_ompl.tree import Joint, Tree
+from rrtik_ompl.tree_model import build_models
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,8 +85,9 @@ def build_robot(
     tip_name = _last_link(tree, actuated) if tip is None else tip
     if not model.existFrame(tip_name):
         raise UnknownNameError(f"frame of robot '{name}' for the tip", tip_name, (f.name for f in model.frames))
+    bounds = _limits(name, [movable[joint] for joint in actuated], limits or {})
     named = {
-        key: frozen([values[j] for j in actuated])
+        key: frozen(_turned_inside(np.array([values[j] for j in actuated]), bounds))
         for key, values in (postures or {}).items()
         if all(j in values for j in actuated)
     }
@@ -103,7 +105,7 @@ def build_robot(
         closed_form=closed_form,
         planar=planar,
         source=MappingProxyType(dict(source or {"name": name})),
-        **_limits(name, [movable[joint] for joint in actuated], limits or {}),
+        **bounds,
     )
 
 
@@ -181,7 +183,8 @@ def _limits(name: str, joints: Iterable[Joint], given: Mapping[str, JointLimits]
         high = high if wanted.upper is None else wanted.upper
         if not low < high:
             raise InputError(
-                f"robot '{name}': joint '{joint.name}' has limits {low:g} .. {high:g}; lower must be below upper"
+                f"robot '{name}': joint '{joint.name}' has limits {low:g} .. {high:g}; "
+                "lower must be below upper: correct the limits, or leave the joint out of joints=[...]"
             )
         rates = [joint.velocity if wanted.velocity is None else wanted.velocity]
         rates += [np.inf if rate is None else rate for rate in (wanted.acceleration, wanted.jerk)]
@@ -195,6 +198,16 @@ def _limits(name: str, joints: Iterable[Joint], given: Mapping[str, JointLimits]
     keys = ("lower", "upper", "velocity", "acceleration", "jerk")
     found: dict[str, Any] = {key: frozen(column) for key, column in zip(keys, columns, strict=False)}
     return found | {"continuous": frozen(columns[5], bool), "prismatic": frozen(columns[6], bool)}
+
+
+def _turned_inside(q: Vector, bounds: Mapping[str, Any]) -> Vector:
+    """The same posture with joints that lie outside their limits turned by a full turn, if that brings them inside."""
+    for turn in (2.0 * np.pi, -2.0 * np.pi):
+        other = q + turn
+        outside = (q < bounds["lower"]) | (q > bounds["upper"])
+        fits = (other >= bounds["lower"]) & (other <= bounds["upper"]) & ~bounds["prismatic"]
+        q = np.where(outside & fits, other, q)
+    return q
 
 
 def _last_link(tree: Tree, actuated: tuple[str, ...]) -> str:

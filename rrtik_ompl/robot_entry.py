@@ -11,10 +11,10 @@ import pinocchio as pin
 from pydantic import ConfigDict, Field, Tag
 
 from rrtik_ompl.file_format import (
+    Length,
     Name,
     NotNegative,
     Number,
-    Positive,
     Section,
     Vector2,
     tag,
@@ -45,7 +45,7 @@ class NamedRobot(_Mounted):
 class PlanarMeasures(Section):
     """Measures of an arm in the xy-plane."""
 
-    lengths: Annotated[list[Positive], Field(min_length=1)] = Field(description="of the links, base first [m]")
+    lengths: Annotated[list[Length], Field(min_length=1)] = Field(description="of the links, base first [m]")
     limits_deg: list[Vector2] | None = Field(None, description="lower and upper limit per joint [deg]")
     radius: NotNegative = Field(0.0, description="of the links [m]; 0 means as thin as possible")
 
@@ -101,7 +101,7 @@ RobotEntry: TypeAlias = Annotated[
 
 
 def robot_data(source: Mapping[str, Any], folder: Path) -> dict[str, Any] | str:
-    """What the ``robot:`` entry of a file in ``folder`` says about a robot with this source; its paths made relative."""
+    """What the ``robot:`` entry of a file in ``folder`` says about a robot with this source; paths made relative."""
     data: dict[str, Any] = {}
     for key, value in source.items():
         if isinstance(value, pin.SE3):

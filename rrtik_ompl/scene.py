@@ -28,6 +28,11 @@ class ConstantVelocity:
         """Pose at ``time`` [s] of an obstacle that is at ``start`` at time 0."""
         return pin.SE3(start.rotation, start.translation + time * self.velocity)
 
+    def seen_from(self, time: float) -> ConstantVelocity:
+        """The same motion with ``time`` [s] as its time 0."""
+        del time
+        return self
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Waypoints:
@@ -57,6 +62,10 @@ class Waypoints:
         a, b = self.poses[k - 1], self.poses[k]
         rotation = a.rotation @ pin.exp3(share * pin.log3(a.rotation.T @ b.rotation))
         return pin.SE3(rotation, (1.0 - share) * a.translation + share * b.translation)
+
+    def seen_from(self, time: float) -> Waypoints:
+        """The same motion with ``time`` [s] as its time 0."""
+        return Waypoints(self.times - time, self.poses)
 
 
 Motion: TypeAlias = ConstantVelocity | Waypoints
@@ -117,8 +126,9 @@ class Scene:
         raise UnknownNameError("obstacle", name, (o.name for o in self.obstacles))
 
     def at(self, time: float) -> Scene:
-        """The scene as it stands at ``time`` [s]: moving obstacles are where their motion puts them."""
-        moved = tuple(
-            o if o.motion is None else replace(o, pose=o.motion.pose_at(o.pose, time)) for o in self.obstacles
+        """The scene with ``time`` [s] as its time 0: moving obstacles are where their motion puts them, and go on."""
+        moved = (
+            o if o.motion is None else replace(o, pose=o.motion.pose_at(o.pose, time), motion=o.motion.seen_from(time))
+            for o in self.obstacles
         )
-        return replace(self, obstacles=moved)
+        return replace(self, obstacles=tuple(moved))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 import pinocchio as pin
@@ -13,13 +13,16 @@ from pydantic_core import PydanticCustomError
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.file_format import (
+    Length,
     Name,
     Number,
     Positive,
     Section,
+    Sizes3,
     Vector2,
     Vector3,
     Vector4,
+    Version,
     exactly_one,
     parse,
 )
@@ -56,8 +59,8 @@ class PoseEntry(Section):
 class RoundEntry(Section):
     """Measures of a cylinder or a capsule along z. A capsule's length is the distance between its cap centres."""
 
-    radius: Positive = Field(description="[m]")
-    length: Positive = Field(description="[m]")
+    radius: Length = Field(description="[m]")
+    length: Length = Field(description="[m]")
 
 
 class HalfSpaceEntry(Section):
@@ -97,15 +100,15 @@ class SolidEntry(Section):
     """A named solid: exactly one shape and a pose."""
 
     name: Name
-    box: Vector3 | None = Field(None, description="full side lengths [m]")
-    sphere: Positive | None = Field(None, description="radius [m]")
+    box: Sizes3 | None = Field(None, description="full side lengths [m]")
+    sphere: Length | None = Field(None, description="radius [m]")
     cylinder: RoundEntry | None = None
     capsule: RoundEntry | None = None
     half_space: HalfSpaceEntry | None = None
     polygon: Annotated[list[Vector2], Field(min_length=3)] | None = Field(
         None, description="vertices in the xy-plane [m], in order; extruded along z, centred about z = 0"
     )
-    height: Positive | None = Field(None, description="of a polygon, along z [m]; 1 if absent")
+    height: Length | None = Field(None, description="of a polygon, along z [m]; 1 if absent")
     mesh: Name | None = Field(None, description="STL, OBJ or DAE file, relative to the folder of this file")
     scale: Positive | None = Field(None, description="of a mesh: metres per unit of its file; 1 if absent")
     pose: PoseEntry | None = None
@@ -197,7 +200,7 @@ class SceneEntry(Section):
 class SceneFile(Section):
     """A file with a scene alone; a whole problem file will do as well, what else it says is not looked at."""
 
-    version: Literal[1]
+    version: Version
     scene: SceneEntry
     robot: Any = None
     start: Any = None

@@ -70,7 +70,7 @@ class Srdf:
     def postures(self, group: str | None) -> dict[str, dict[str, float]]:
         """Named states merged over all groups; those of ``group`` win where two share a name."""
         merged: dict[str, dict[str, float]] = {}
-        for (owner, state), values in sorted(self.states.items(), key=lambda item: item[0][0] == group):
+        for (_, state), values in sorted(self.states.items(), key=lambda item: item[0][0] == group):
             merged.setdefault(state, {}).update(values)
         return merged
 

@@ -1,4 +1,4 @@
-"""Links and joints as plain values, the checks that make them a tree, and the Pinocchio models of that tree.
+"""Links and joints as plain values, and the checks that make them a tree.
 
 Every description of a robot (URDF, DH table, a planar arm) becomes links and joints first, so that all of them pass the
 same checks in Python and no C++ parser meets a file that nobody has checked.
@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
@@ -20,10 +19,8 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, Sphere
-from rrtik_ompl.solids import pieces
 
 KINDS = ("revolute", "continuous", "prismatic", "fixed")
-GREY = (0.7, 0.7, 0.7, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +162,8 @@ class Tree:
 
 def _held(joint: Joint, value: float) -> Joint:
     axis = np.array(joint.axis)
-    motion = pin.SE3(np.eye(3), value * axis) if joint.kind == "prismatic" else pin.SE3(pin.exp3(value * axis), 0 * axis)
+    slides = joint.kind == "prismatic"
+    motion = pin.SE3(np.eye(3), value * axis) if slides else pin.SE3(pin.exp3(value * axis), np.zeros(3))
     return Joint(joint.name, "fixed", joint.parent, joint.child, joint.T_parent_joint * motion, axis)
 
 
@@ -202,115 +200,3 @@ def _check_connected(tree: Tree) -> None:
     lost = [joint.name for joint in tree.joints if joint.child not in reached]
     if lost:
         raise InputError(f"{tree.where}: joints {', '.join(lost[:6])} form a loop that hangs on nothing; cut the loop")
-
-
-def build_models(tree: Tree, T_world_base: Any | None = None) -> tuple[Any, Any, Any]:
-    """Pinocchio model, collision geometry and visual geometry of a tree.
-
-    Args:
-        tree: Links and joints.
-        T_world_base: Pose of the root link, ``pinocchio.SE3``; identity if None.
-
-    Raises:
-        InputError: If a mesh file cannot be read.
-    """
-    model = pin.Model()
-    model.name = tree.where
-    links = {link.name: link for link in tree.links}
-    places = {tree.root.name: _Place(0, pin.SE3.Identity() if T_world_base is None else T_world_base, 0)}
-    _add_link(model, tree.root, places)
-    for joint in tree.walk():
-        places[joint.child] = _add_joint(model, joint, places[joint.parent])
-        _add_link(model, links[joint.child], places)
-    meshes: dict[MeshFile, Any] = {}
-    hard = _geometry(tree, places, meshes, "collision")
-    return model, hard, _geometry(tree, places, meshes, "visual")
-
-
-@dataclass(slots=True, eq=False)
-class _Place:
-    """Where a link hangs: on which Pinocchio joint, with which offset, and its frame number."""
-
-    joint: int
-    T_joint_link: Any
-    frame: int
-
-
-def _add_joint(model: Any, joint: Joint, parent: _Place) -> _Place:
-    placement = parent.T_joint_link * joint.T_parent_joint
-    if joint.kind == "fixed":
-        frame = pin.Frame(joint.name, parent.joint, parent.frame, placement, pin.FrameType.FIXED_JOINT)
-        return _Place(parent.joint, placement, model.addFrame(frame, False))
-    kind, rotation = _joint_model(joint)
-    turn = pin.SE3(rotation, np.zeros(3))
-    size = kind.nq
-    lower, upper = (joint.lower, joint.upper) if joint.kind != "continuous" else (-1.01, 1.01)
-    number = model.addJoint(
-        parent.joint,
-        kind,
-        placement * turn,
-        joint.name,
-        np.full(1, np.inf),
-        np.full(1, joint.velocity),
-        np.full(size, lower),
-        np.full(size, upper),
-    )
-    return _Place(number, turn.inverse(), model.addJointFrame(number, parent.frame))
-
-
-def _joint_model(joint: Joint) -> tuple[Any, Any]:
-    """Pinocchio's joint, and the rotation of its frame (identity but for continuous joints about a slanted axis)."""
-    identity = np.eye(3)
-    letter = next((name for name, unit in zip("XYZ", identity, strict=True) if np.array_equal(unit, joint.axis)), "")
-    if joint.kind == "continuous":
-        # Pinocchio offers no way to give its unaligned unbounded joint an axis from Python.
-        if letter:
-            return getattr(pin, f"JointModelRUB{letter}")(), identity
-        return pin.JointModelRUBX(), pin.Quaternion.FromTwoVectors(identity[0], np.array(joint.axis)).matrix()
-    short, long = ("R", "Revolute") if joint.kind == "revolute" else ("P", "Prismatic")
-    if letter:
-        return getattr(pin, f"JointModel{short}{letter}")(), identity
-    return getattr(pin, f"JointModel{long}Unaligned")(np.array(joint.axis)), identity
-
-
-def _add_link(model: Any, link: Link, places: dict[str, _Place]) -> None:
-    place = places[link.name]
-    place.frame = model.addBodyFrame(link.name, place.joint, place.T_joint_link, place.frame)
-    if link.inertia is not None:
-        model.appendBodyToJoint(place.joint, link.inertia, place.T_joint_link)
-
-
-def _geometry(tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any], which: str) -> Any:
-    geometry = pin.GeometryModel()
-    for link in tree.links:
-        place = places[link.name]
-        for number, solid in enumerate(getattr(link, which)):
-            shape = solid.shape
-            is_file = isinstance(shape, MeshFile)
-            item = pin.GeometryObject(
-                f"{link.name}_{number}",
-                place.joint,
-                place.frame,
-                place.T_joint_link * solid.T_link_solid,
-                _load(shape, meshes, f"{tree.where}: link '{link.name}'") if is_file else pieces(shape)[0].geometry,
-                str(shape.path) if is_file else "",
-                np.array(shape.scale if is_file else (1.0, 1.0, 1.0)),
-                solid.colour is not None,
-                np.array(solid.colour or GREY),
-            )
-            geometry.addGeometryObject(item)
-    return geometry
-
-
-def _load(mesh: MeshFile, meshes: dict[MeshFile, Any], where: str) -> Any:
-    if mesh not in meshes:
-        try:
-            geometry = coal.MeshLoader().load(str(mesh.path), np.array(mesh.scale))
-        except (ValueError, RuntimeError) as error:
-            raise InputError(
-                f"{where}: mesh {mesh.path} cannot be read as triangles; export it again as STL, OBJ or DAE"
-            ) from error
-        if not np.isfinite(np.asarray(geometry.vertices())).all():
-            raise InputError(f"{where}: mesh {mesh.path} holds numbers that are not finite; export it again")
-        meshes[mesh] = geometry
-    return meshes[mesh]

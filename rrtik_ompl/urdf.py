@@ -14,7 +14,7 @@ from rrtik_ompl.robot_build import JointLimits, build_robot
 from rrtik_ompl.robot_source import source_entry
 from rrtik_ompl.srdf import Srdf, read_srdf
 from rrtik_ompl.text_file import read_text
-from rrtik_ompl.urdf_read import UrdfDescription, read_urdf
+from rrtik_ompl.urdf_read import UrdfDescription, located, read_urdf
 
 FilePath = str | os.PathLike[str]
 URDF_OPTIONS = ("base_pose", "group", "joint_limits", "joints", "locked", "packages", "srdf", "tip")
@@ -53,6 +53,7 @@ def robot_from_urdf_text(
     base_pose: Any | None = None,
     limits: Mapping[str, JointLimits] | None = None,
     postures: Mapping[str, Mapping[str, float]] | None = None,
+    allowed_collisions: Iterable[Iterable[str]] = (),
     self_collision: bool = True,
     closed_form: Callable[..., Any] | None = None,
     source: Mapping[str, Any] | None = None,
@@ -78,6 +79,7 @@ def robot_from_urdf_text(
         base_pose: ``pinocchio.SE3`` T_world_base.
         limits: Limits that replace those of the URDF and of ``joint_limits``, by joint name.
         postures: Further named postures.
+        allowed_collisions: Pairs of links never checked, besides those of the SRDF.
         self_collision: Whether links are checked against each other.
         closed_form: The robot's own inverse kinematics.
         source: What a problem file says under ``robot``.
@@ -95,21 +97,22 @@ def robot_from_urdf_text(
     end = semantics.group_tip(group, tree) if group in semantics.groups and tip is None and group is not None else tip
     actuated = _actuated(description, semantics, group, joints, tip)
     from_file = {} if joint_limits is None else read_joint_limits(joint_limits, [j.name for j in tree.joints])
-    return build_robot(
-        name or description.name or Path(where).stem,
-        tree,
-        joints=actuated,
-        mimics=description.mimics,
-        locked=locked,
-        tip=end,
-        base_pose=base_pose,
-        limits=merge_limits(from_file, limits or {}),
-        postures=semantics.postures(group) | {key: dict(value) for key, value in (postures or {}).items()},
-        allowed_collisions=semantics.allowed,
-        self_collision=self_collision,
-        closed_form=closed_form,
-        source=source,
-    )
+    with located(where):
+        return build_robot(
+            name or description.name or Path(where).stem,
+            tree,
+            joints=actuated,
+            mimics=description.mimics,
+            locked=locked,
+            tip=end,
+            base_pose=base_pose,
+            limits=merge_limits(from_file, limits or {}),
+            postures=semantics.postures(group) | {key: dict(value) for key, value in (postures or {}).items()},
+            allowed_collisions=[*semantics.allowed, *allowed_collisions],
+            self_collision=self_collision,
+            closed_form=closed_form,
+            source=source,
+        )
 
 
 def _actuated(

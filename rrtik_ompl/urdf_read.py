@@ -1,4 +1,4 @@
-"""URDF text to links and joints: every element is checked here, and every error names the file, the element, the remedy."""
+"""URDF text to links and joints: every element is checked here, every error names file, element and remedy."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from rrtik_ompl.shapes import Box, Capsule, Cylinder, Sphere
 from rrtik_ompl.tree import KINDS, Joint, Link, MeshFile, Solid, Tree
 
 Colour = tuple[float, float, float, float]
+_TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +49,7 @@ def read_urdf(
     """
     robot = parse_xml(text, "robot", where)
     if robot.find(".//{http://www.ros.org/wiki/xacro}*") is not None:
-        raise InputError(f"{where}: holds xacro macros; expand them first (xacro FILE > robot.urdf) and load the result")
+        raise InputError(f"{where}: holds xacro macros; expand them first: xacro FILE > robot.urdf")
     reader = _Reader(where, folder, tuple(packages), {})
     for material in robot.iter("material"):
         reader.learn_material(material)
@@ -68,7 +69,7 @@ def parse_xml(text: str, root: str, where: str) -> Element:
         element = ElementTree.fromstring(text.strip())
     except (ElementTree.ParseError, ValueError) as error:
         line = getattr(error, "position", (1, 0))[0]
-        raise InputError(f"{where}:{line}: not valid XML: {error}; correct the line or export the file again") from error
+        raise InputError(f"{where}:{line}: not valid XML: {error}; correct it or export it again") from error
     if element.tag != root:
         raise InputError(f"{where}: the top element is <{element.tag}>, expected <{root}>; is it the right file?")
     return element
@@ -107,6 +108,17 @@ def attribute(element: Element | None, tag: str, key: str, where: str) -> str:
     return value
 
 
+@contextmanager
+def located(where: str) -> Iterator[None]:
+    """Put the file and the element in front of an error that does not begin with them yet; its class and data stay."""
+    try:
+        yield
+    except RrtikError as error:
+        if not str(error).startswith(where):
+            error.args = (f"{where}: {error}",)
+        raise
+
+
 @dataclass(slots=True, eq=False)
 class _Reader:
     where: str
@@ -125,7 +137,7 @@ class _Reader:
         name = attribute(element, "link", "name", self.where)
         where = f"{self.where}: link '{name}'"
         capsules = {c.get("name", "") for c in element.findall("collision_checking/capsule")}
-        with _place(where):
+        with located(where):
             collision = tuple(self.solid(item, where, capsules) for item in element.findall("collision"))
             visual = tuple(self.solid(item, where, set()) for item in element.findall("visual"))
             return Link(name, collision, visual, _inertia(element.find("inertial"), where))
@@ -176,7 +188,7 @@ class _Reader:
         axis_element = element.find("axis")
         axis = [1.0, 0.0, 0.0] if axis_element is None else numbers(axis_element, "xyz", 3, (1.0, 0.0, 0.0), where)
         lower, upper, velocity = _limit(element.find("limit"), kind, where)
-        with _place(self.where):
+        with located(self.where):
             axis = [1.0, 0.0, 0.0] if kind == "fixed" else axis
             return Joint(name, kind, parent, child, _origin(element, where), axis, lower, upper, velocity)
 
@@ -223,11 +235,14 @@ def _inertia(inertial: Element | None, where: str) -> Any | None:
     tensor = None if inertial is None else inertial.find("inertia")
     if inertial is None or mass is None or tensor is None:
         return None
-    xx, xy, xz, yy, yz, zz = (numbers(tensor, key, 1, (0.0,), where)[0] for key in "ixx ixy ixz iyy iyz izz".split())
+    xx, xy, xz, yy, yz, zz = (numbers(tensor, key, 1, (0.0,), where)[0] for key in _TENSOR)
     placement = _origin(inertial, where)
     matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     turned = placement.rotation @ matrix @ placement.rotation.T
-    return pin.Inertia(numbers(mass, "value", 1, None, where)[0], placement.translation, turned)
+    weight = numbers(mass, "value", 1, None, where)[0]
+    if weight < 0.0 or np.linalg.eigvalsh(turned)[0] < 0.0:
+        return None  # impossible, but common in the files of real robots, and without effect on planning
+    return pin.Inertia(weight, placement.translation, turned)
 
 
 def _flatten(where: str, joints: Sequence[Joint], mimics: Sequence[Mimic]) -> tuple[Mimic, ...]:
@@ -249,14 +264,3 @@ def _flatten(where: str, joints: Sequence[Joint], mimics: Sequence[Mimic]) -> tu
             source, offset, multiplier = above.source, multiplier * above.offset + offset, multiplier * above.multiplier
         flat.append(Mimic(tie.joint, source, multiplier, offset))
     return tuple(flat)
-
-
-@contextmanager
-def _place(where: str) -> Iterator[None]:
-    """Put the file and the element in front of an error that does not name them yet."""
-    try:
-        yield
-    except RrtikError as error:
-        if not str(error).startswith(where):
-            raise InputError(f"{where}: {error}") from error
-        raise

@@ -66,7 +66,8 @@ class YamlDocument:
             yield
         except RrtikError as error:
             if not str(error).startswith(f"{self.path}:"):
-                error.args = (f"{self.place(location)}: {error}",)  # keeps the class and its data
+                said = str(error).removeprefix(f"{location[-1]}: " if location else "")
+                error.args = (f"{self.place(location)}: {said}",)  # keeps the class and its data
             raise
 
 

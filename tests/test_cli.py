@@ -8,6 +8,7 @@ import sys
 import time
 
 import pytest
+
 from rrtik_ompl.cli import run
 from rrtik_ompl.path import load_path
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rrtik_planners import CRDT, BiCRDT
-from rrtik_planners.axis_tree import AxisTree, Outcome
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.ompl_bridge.contract import small_problem, solution_rows
 from rrtik_ompl.transitions import single_joint
+from rrtik_planners import CRDT, BiCRDT
+from rrtik_planners.axis_tree import AxisTree, Outcome
 
 
 class Interval:

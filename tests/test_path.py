@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.path import JointPath, Move, load_path, subdivided
@@ -65,9 +66,7 @@ def test_waypoints_are_a_private_read_only_copy():
 
 
 matrices = st.integers(1, 6).flatmap(
-    lambda n: st.lists(
-        st.lists(st.floats(-7, 7, allow_subnormal=True), min_size=n, max_size=n), min_size=1, max_size=8
-    )
+    lambda n: st.lists(st.lists(st.floats(-7, 7, allow_subnormal=True), min_size=n, max_size=n), min_size=1, max_size=8)
 )
 
 
@@ -92,20 +91,18 @@ def test_a_path_takes_the_names_of_the_robot_it_is_read_for(tmp_path):
         load_path(file, load_robot("planar3"))
 
 
-def test_ompl_reads_and_writes_the_matrix_text(tmp_path):
+def test_ompl_and_we_agree_on_the_matrix_text(tmp_path):
     from ompl import base as ob
     from ompl import geometric as og
 
-    def matrix():
-        si = ob.SpaceInformation(ob.RealVectorStateSpace(6))
-        path, state = og.PathGeometric(si), si.allocState()
-        for row in PUBLISHED:
-            state[0:6] = row.tolist()
-            path.append(state)
-        return path.printAsMatrix()
-
-    (tmp_path / "ompl.txt").write_text(matrix())
-    assert np.allclose(load_path(tmp_path / "ompl.txt").waypoints, PUBLISHED, atol=1e-5)
+    si = ob.SpaceInformation(ob.RealVectorStateSpace(6))
+    path, state = og.PathGeometric(si), si.allocState()
+    for row in PUBLISHED:
+        state[0:6] = row.tolist()
+        path.append(state)
+    rows = (" ".join(f"{x:.9g}" for x in path.getState(k)[0:6]) + " " for k in range(path.getStateCount()))
+    (tmp_path / "ompl.txt").write_text("\n".join(rows) + "\n\n")  # blanks at the end of lines, one empty line
+    assert np.allclose(load_path(tmp_path / "ompl.txt").waypoints, PUBLISHED, atol=1e-8)
 
 
 @given(matrices, st.floats(0.05, 3.0))

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from ompl import base as ob
 from ompl import util as ou
-from rrtik_planners import CRDT, BiCRDT
 
 from rrtik_ompl.errors import PlannerError
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult, check_planner
 from rrtik_ompl.ompl_bridge.contract import CONTRACT, Clause, moves_one_joint_at_a_time, small_problem, solution_rows
+from rrtik_planners import CRDT, BiCRDT
 
 PLANNERS = (BiCRDT, CRDT)
 SINGLE_JOINT = (BiCRDT, CRDT)

@@ -3,6 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError, ProblemError
 from rrtik_ompl.goal import JointGoal, PoseGoal, PositionGoal

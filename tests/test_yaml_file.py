@@ -5,6 +5,7 @@ import os
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from rrtik_ompl.errors import InputError, ProblemError
 from rrtik_ompl.text_file import read_text, write_text
 from rrtik_ompl.yaml_file import key_path, plain_value, read_yaml, write_yaml
@@ -125,15 +126,16 @@ def test_an_endless_file_is_refused():
         read_text("/dev/zero")
 
 
+PRINTABLE = st.characters(codec="utf-8", exclude_categories=["Cc", "Cs", "Zl", "Zp"], exclude_characters="\ufeff")
 values = st.recursive(
     st.none()
     | st.booleans()
     | st.integers(-(10**18), 10**18)
     | st.floats(allow_nan=False)
-    | st.text(st.characters(codec="utf-8", exclude_categories=["Cc", "Cs", "Zl", "Zp"], exclude_characters="\ufeff"), max_size=12),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text("abc_", min_size=1, max_size=5), inner, max_size=4),
+    | st.text(PRINTABLE, max_size=12),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text("abc_", min_size=1), inner, max_size=4),
     max_leaves=12,
-)  # fmt: skip
+)
 
 
 @given(st.dictionaries(st.text("abcxyz", min_size=1), values, min_size=1, max_size=4))

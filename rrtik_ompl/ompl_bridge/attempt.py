@@ -16,12 +16,16 @@ from ompl import util as ou
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
+from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
-from rrtik_ompl.ompl_bridge.setup import Judge, exact_path, is_joint_goal, problem_definition, space_information
+from rrtik_ompl.ompl_bridge.setup import Judge, exact_path, problem_definition, space_information
 from rrtik_ompl.problem import Problem
 
 # The planners of the wheel that grow a tree towards a goal of which no configuration is known.
 WORKSPACE_GOAL_PLANNERS = ("KPIECE1", "RRT")
+
+# Those that go on improving their path until the time is up.
+ANYTIME_PLANNERS = ("AORRTC", "BITstar", "InformedRRTstar", "PRMstar", "RRTstar", "SORRTstar")
 
 PlannerFactory = Callable[..., Any]
 
@@ -42,9 +46,17 @@ def ompl_planners() -> dict[str, Any]:
 
 
 def attempt(
-    problem: Problem, factory: PlannerFactory, *, seconds: float, seed: int, parameters: Mapping[str, Any]
+    problem: Problem,
+    factory: PlannerFactory,
+    *,
+    seconds: float,
+    seed: int,
+    parameters: Mapping[str, Any],
+    all_turns: bool = True,
 ) -> Attempt:
     """Let a planner work on a problem for at most ``seconds``.
+
+    With ``all_turns`` the goal of a continuous joint may also be reached the long way round.
 
     Raises:
         InputError: If the planner does not take a parameter, or cannot work towards this kind of goal.
@@ -53,7 +65,7 @@ def attempt(
     """
     own = issubclass(factory, SafePlanner) if isinstance(factory, type) else False
     name = getattr(factory, "__name__", str(factory))
-    if not is_joint_goal(problem.goal) and name not in WORKSPACE_GOAL_PLANNERS:
+    if not isinstance(problem.goal, JointGoal) and name not in WORKSPACE_GOAL_PLANNERS:
         raise InputError(
             f"planner {name} needs a goal in joint values, but {problem.name} gives a pose or position; "
             f"use one of {', '.join(WORKSPACE_GOAL_PLANNERS)}, or give goal joints"
@@ -62,7 +74,7 @@ def attempt(
         ou.RNG.setSeed(1 + seed % (2**31 - 2))  # before any object that draws from it; OMPL does not take 0
         judge = Judge(problem.world)
         si = space_information(problem, judge)
-        definition = problem_definition(problem, si)
+        definition = problem_definition(problem, si, all_turns=all_turns)
         if own:
             planner = _own_planner(factory, name, si, problem, seed, parameters)
         else:
@@ -70,6 +82,7 @@ def attempt(
         planner.setProblemDefinition(definition)
         planner.setup()
         condition = ob.timedPlannerTerminationCondition(seconds)
+        judge.stop = condition.terminate
         with _interrupt_ends(condition):
             status = planner.solve(condition)
         problem_in_planner = judge.error or (getattr(planner, "error", None) if str(status) == "Crash" else None)

@@ -25,6 +25,15 @@ from rrtik_ompl.ompl_bridge.states import StateIO, real_vector_space, space_boun
 
 GOAL_SAMPLES = 32  # how often a goal that can give any number of configurations is asked for one
 WAIT_FOR_GOAL = 0.002  # [s] between two questions to a goal that is still computing its first sample
+NONE_USABLE = "none is given, or all are in collision or outside the bounds"
+
+
+class _Refused(Exception):
+    """The problem definition gives nothing to search between."""
+
+    def __init__(self, status: Any, reason: str) -> None:
+        super().__init__(reason)
+        self.status, self.reason = status, reason
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,6 +109,8 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self.statistics, self.error = {}, None
         try:
             status = self._solve(_condition(ptc))
+        except _Refused as refused:
+            status, self.error = refused.status, refused.reason
         except Exception as error:
             self.error = _explain(error)
             status = ob.PlannerStatus.CRASH
@@ -120,20 +131,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
             raise PlannerError(f"{self.getName()}: no problem definition; use SimpleSetup or setProblemDefinition()")
         space_bounds(si)  # refuses missing bounds in clearer words than OMPL
         checker: MotionChecker = SpaceChecker(si) if self._world is None else WorldChecker(self._world)
-        inputs = self.getPlannerInputStates()
-        inputs.restart()
-        starts = self._starts(inputs, StateIO(si), checker)
-        if len(starts) == 0:
-            self.error = "no valid start: none is given, or all are in collision or outside the bounds"
-            return ob.PlannerStatus.INVALID_START
-        goal = pdef.getGoal()
-        if goal is not None and not isinstance(goal, ob.GoalSampleableRegion):
-            self.error = "the goal cannot be sampled; use a GoalState, GoalStates or a GoalSampleableRegion"
-            return ob.PlannerStatus.UNRECOGNIZED_GOAL_TYPE
-        goals = self._goals(inputs, StateIO(si), checker, ptc)
-        if len(goals) == 0:
-            self.error = "no valid goal: none is given, or all are in collision or outside the bounds"
-            return ob.PlannerStatus.INVALID_GOAL
+        starts, goals = self._inputs(checker, ptc)
         result = self.search(starts, goals, checker, ptc)
         self.statistics = {
             **result.statistics,
@@ -141,6 +139,22 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
             "checked_motions": checker.checked_motions,
         }
         return self._report(result)
+
+    def _inputs(self, checker: MotionChecker, ptc: Any) -> tuple[Matrix, Matrix]:
+        """Starts and goals of the problem definition, shapes (s, n) and (g, n), at least one each."""
+        inputs, io = self.getPlannerInputStates(), StateIO(self.getSpaceInformation())
+        inputs.restart()
+        starts = self._starts(inputs, io, checker)
+        if len(starts) == 0:
+            raise _Refused(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
+        goal = self.getProblemDefinition().getGoal()
+        if goal is not None and not isinstance(goal, ob.GoalSampleableRegion):
+            text = "the goal cannot be sampled; use a GoalState, GoalStates or a GoalSampleableRegion"
+            raise _Refused(ob.PlannerStatus.UNRECOGNIZED_GOAL_TYPE, text)
+        goals = self._goals(inputs, io, checker, ptc)
+        if len(goals) == 0:
+            raise _Refused(ob.PlannerStatus.INVALID_GOAL, f"no valid goal: {NONE_USABLE}")
+        return starts, goals
 
     def _starts(self, inputs: Any, io: StateIO, checker: MotionChecker) -> Matrix:
         rows = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,12 +11,13 @@ from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import Goal, JointGoal
+from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.world import World
 
 TURN = 2.0 * np.pi
+AT_GOAL = 1e-9  # OMPL asks for a distance below the threshold, not equal to it
 UNLIMITED_STROKE = 10.0  # [m] each way from the start for a prismatic joint without limits
 
 
@@ -27,6 +29,7 @@ class Judge:
     states: int = 0
     motions: int = 0
     error: Exception | None = None
+    stop: Callable[[], object] | None = None  # ends the planner
 
     def valid(self, q: Vector) -> bool:
         """Whether q, shape (n,), is free; False from the first error on."""
@@ -45,6 +48,8 @@ class Judge:
             return bool(question(*arguments))
         except Exception as error:  # an exception that leaves a callback ends the process under some planners
             self.error = error.with_traceback(None)
+            if self.stop is not None:
+                self.stop()
             return False
 
 
@@ -66,14 +71,14 @@ class _Region(ob.GoalRegion):  # type: ignore[misc]
     def __init__(self, si: Any, problem: Problem, states: StateIO) -> None:
         super().__init__(si)
         self._goal, self._robot, self._states = problem.goal, problem.world.robot, states
-        self.setThreshold(0.0)
+        self.setThreshold(AT_GOAL)
 
     def distanceGoal(self, state: Any) -> float:
         """Zero at the goal, the goal's own distance elsewhere."""
         row = self._states.read(state)[None]
         if self._goal.satisfied(self._robot, row)[0]:
             return 0.0
-        return max(float(self._goal.distance(self._robot, row)[0]), 1e-9)
+        return max(float(self._goal.distance(self._robot, row)[0]), 2.0 * AT_GOAL)
 
 
 def planning_bounds(problem: Problem) -> tuple[Vector, Vector]:
@@ -86,12 +91,12 @@ def planning_bounds(problem: Problem) -> tuple[Vector, Vector]:
     return lower, upper
 
 
-def goal_configurations(problem: Problem) -> Matrix:
-    """The goal configuration and, for each continuous joint, the same posture reached the other way round."""
+def goal_configurations(problem: Problem, *, all_turns: bool) -> Matrix:
+    """The goal configuration; with ``all_turns`` also, for each continuous joint, the goal the other way round."""
     if not isinstance(problem.goal, JointGoal):
         raise InputError(f"goal of {problem.name}: a goal in joint values is needed here")
     rows = [np.asarray(problem.goal.q)]
-    for joint in np.flatnonzero(problem.world.robot.continuous):
+    for joint in np.flatnonzero(problem.world.robot.continuous) if all_turns else ():
         other = np.array(problem.goal.q)
         other[joint] += -TURN if other[joint] > problem.start[joint] else TURN
         rows.append(other)
@@ -115,14 +120,14 @@ def space_information(problem: Problem, judge: Judge) -> Any:
     return si
 
 
-def problem_definition(problem: Problem, si: Any) -> Any:
+def problem_definition(problem: Problem, si: Any, *, all_turns: bool) -> Any:
     """``ompl.base.ProblemDefinition`` with the start and the goal of the problem."""
     states, state, definition = StateIO(si), si.allocState(), ob.ProblemDefinition(si)
     states.write(state, problem.start)
     definition.addStartState(state)
     if isinstance(problem.goal, JointGoal):
         goal = ob.GoalStates(si)
-        for row in goal_configurations(problem):
+        for row in goal_configurations(problem, all_turns=all_turns):
             states.write(state, row)
             goal.addState(state)
     else:
@@ -138,8 +143,3 @@ def exact_path(definition: Any, si: Any) -> Matrix | None:
     found = definition.getSolutionPath()  # shared ownership: safe to keep while it is copied
     states = StateIO(si)
     return np.array([states.read(found.getState(k)) for k in range(found.getStateCount())])
-
-
-def is_joint_goal(goal: Goal) -> bool:
-    """Whether the goal is a configuration."""
-    return isinstance(goal, JointGoal)

@@ -1,6 +1,6 @@
 """Pictures that a person can turn, play and step through: one HTML page, written to a file or served to this machine.
 
-Nothing below this package imports it, and it is imported only when something is to be shown.
+Nothing below this package imports it, and meshcat is imported only when something is to be shown.
 """
 
 from __future__ import annotations
@@ -12,10 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from rrtik_ompl.text_file import write_text
-from rrtik_ompl.viewer.page import page
-from rrtik_ompl.viewer.serve import PageServer
 
-__all__ = ["PageServer", "page", "view"]
+__all__ = ["view"]
 
 
 def view(
@@ -43,6 +41,9 @@ def view(
     Raises:
         InputError: If that cannot be shown, the file cannot be written or the port cannot be used.
     """
+    from rrtik_ompl.viewer.page import page
+    from rrtik_ompl.viewer.serve import PageServer
+
     text = page(shown, path, title=title)
     if html is not None:
         write_text(html, text)

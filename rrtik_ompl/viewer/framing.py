@@ -22,7 +22,8 @@ class Frame:
 
     Attributes:
         low, high: Corners, shape (3,) [m].
-        arm: Diagonal of the box around the arm alone, or of everything if there is no arm [m].
+        arm: Diagonal of the box around the arm alone, not below a tenth of the whole box's, or of everything if there
+            is no arm [m].
     """
 
     low: Vector
@@ -40,8 +41,17 @@ class Frame:
         return float(np.linalg.norm(self.high - self.low))
 
 
-def frame_around(arm_points: Matrix | None, scene: Scene, extra: Iterable[Matrix] = ()) -> Frame:
-    """Box around the arm, the bounded obstacles and further points, each of shape (m, 3) [m]."""
+def frame_around(
+    arm_points: Matrix | None, scene: Scene, extra: Iterable[Matrix] = (), *, whole: bool = False
+) -> Frame:
+    """Box around the arm, the bounded obstacles and further points.
+
+    Args:
+        arm_points: Points around the arm, shape (m, 3) [m], or None.
+        scene: Its obstacles are taken in, of huge ones only the part near the arm.
+        extra: Further points, each array of shape (m, 3) [m].
+        whole: Take in huge obstacles completely.
+    """
     boxes = [obstacle_corners(o) for o in scene.obstacles if not isinstance(o.shape, HalfSpace)]
     if arm_points is None or len(arm_points) == 0:
         everything = np.concatenate([*boxes, *extra]) if boxes else np.array([[-0.5] * 3, [0.5] * 3])
@@ -52,10 +62,10 @@ def frame_around(arm_points: Matrix | None, scene: Scene, extra: Iterable[Matrix
     arm = max(float(np.linalg.norm(high - low)), 1e-3)
     near_low, near_high = low - MARGIN * arm, high + MARGIN * arm
     for corners in boxes:
-        if float(np.ptp(corners, axis=0).max()) > HUGE * arm:
+        if not whole and float(np.ptp(corners, axis=0).max()) > HUGE * arm:
             corners = np.clip(corners, near_low, near_high)
         low, high = np.minimum(low, corners.min(axis=0)), np.maximum(high, corners.max(axis=0))
-    return Frame(low, high, arm)
+    return Frame(low, high, max(arm, 0.1 * float(np.linalg.norm(high - low))))
 
 
 def obstacle_corners(obstacle: Obstacle) -> Matrix:

@@ -14,9 +14,10 @@ from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
 from rrtik_ompl.solids import is_mesh, mesh_arrays
-from rrtik_ompl.viewer.triangles import Faces, box_corners, capsule, extruded, split_creases, thin_out
+from rrtik_ompl.viewer.triangles import Faces, box_corners, capsule, extruded, split_creases, thin_out, tube
 
 MAX_OBSTACLE_TRIANGLES = 30_000  # a drawn mesh above this is thinned out; the one that is checked stays as it is
+BEAD = 0.9  # radius of the bead that stands for a robot that is a mere point, in thicknesses of a line
 _Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # three.js has its cylinders along y
 
 
@@ -77,6 +78,20 @@ def half_space_plate(shape: HalfSpace, centre: ArrayLike, size: float) -> tuple[
     pose[:3, :3] = _frame_along(shape.normal)
     pose[:3, 3] = foot
     return look_of_shape(Box([size, size, thickness])), pose
+
+
+def thickened(look: Look, least: float) -> Look:
+    """The same, or for what is too thin to be seen a rod of thickness ``least`` [m], or for a point a larger bead."""
+    sides = np.ptp(look.corners, axis=0)
+    if np.median(sides) >= least:
+        return look
+    middle = look.corners.mean(axis=0)
+    half = 0.5 * np.where(sides == sides.max(), sides, 0.0)
+    if sides.max() >= 2.0 * least:
+        return look_of_triangles(*tube(np.stack([middle - half, middle + half]), 0.5 * least))
+    place = np.eye(4)
+    place[:3, 3] = middle
+    return Look(mg.Sphere(BEAD * least), place, look.corners)
 
 
 def triangle_count(geometry: Any) -> int:

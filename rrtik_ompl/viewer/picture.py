@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import meshcat
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.viewer.framing import Frame, frame_around
+from rrtik_ompl.viewer.meshes import thickened
 from rrtik_ompl.viewer.robot_picture import (
     GHOST_TRIANGLES,
+    Part,
     attached_parts,
     draw_parts,
     joint_nodes,
@@ -26,42 +30,52 @@ from rrtik_ompl.viewer.trail import draw_trail
 from rrtik_ompl.viewer.window import RecordingWindow
 
 FRAMED_POSTURES = 100
+LEAST_THICKNESS = 0.01  # of the picture: what is drawn of a link that is a mere line
 
 
 def draw(subject: Subject) -> tuple[RecordingWindow, Frame]:
     """Draw a subject: arm in its first posture, obstacles, goal and trail (ghosts are the page's copies of the arm)."""
     window = RecordingWindow()
     vis = meshcat.Visualizer(window=window)
-    points = None
-    if subject.robot is not None:
-        points = _draw_robot(vis, subject.robot, subject)
-    frame = frame_around(points, subject.scene, _goal_points(subject.goal))
-    draw_scene(vis, subject.scene, frame)
-    draw_triad(vis["frames"]["world"], pin.SE3.Identity(), 0.1 * frame.arm)
-    if subject.robot is not None:
-        tip = subject.robot.model.frames[subject.robot.model.getFrameId(subject.robot.tip)]
-        node = vis["robot"][joint_nodes(subject.robot)[tip.parentJoint]]["tip frame"]
-        draw_triad(node, tip.placement, 0.07 * frame.arm)
+    robot, scene = subject.robot, subject.scene
+    if robot is None:
+        frame = frame_around(None, scene)
+    else:
+        frame = _draw_robot(vis, robot, subject)
         draw_goal(vis, subject.goal, frame)
         if len(subject.waypoints) > 1:
-            draw_trail(vis, subject.robot, subject.waypoints, 0.0035 * frame.arm)
-        if subject.robot.planar:
-            _flatten(vis, frame)
+            draw_trail(vis, robot, subject.waypoints, 0.0035 * frame.arm)
+    draw_scene(vis, scene, frame)
+    draw_triad(vis["frames"]["world"], pin.SE3.Identity(), 0.1 * frame.arm)
+    if robot is not None and robot.planar:
+        _flatten(vis, frame)
     return window, frame
 
 
-def _draw_robot(vis: Any, robot: Robot, subject: Subject) -> Matrix:
-    """Draw the arm in its first posture and return points around all its postures, shape (p, 3) [m]."""
-    held = attached_parts(robot, subject.scene.attached)
-    parts = link_parts(robot) + held
+def _draw_robot(vis: Any, robot: Robot, subject: Subject) -> Frame:
+    """Draw the arm in its first posture, and one for the page to copy as ghosts; return the box around everything."""
     shown = _spread(subject.waypoints)
     if subject.end is not None:
         shown = np.vstack([shown, subject.end])
     frames = robot.joint_frames(shown)
-    draw_parts(vis["robot"], robot, parts, frames[0])
-    if subject.start is not None:  # the page copies this one for each ghost
-        draw_parts(vis["ghost"], robot, link_parts(robot, GHOST_TRIANGLES) + held, frames[0])
-    return swept_points(parts, frames)
+    held = attached_parts(robot, subject.scene.attached)
+    parts = link_parts(robot) + held
+    points = swept_points(parts, frames)
+    frame = frame_around(points, subject.scene, _goal_points(subject.goal), whole=robot.planar)
+    _draw_parts(vis["robot"], robot, parts, frames[0], frame)
+    if subject.start is not None:
+        _draw_parts(vis["ghost"], robot, link_parts(robot, GHOST_TRIANGLES) + held, frames[0], frame)
+    tip = robot.model.frames[robot.model.getFrameId(robot.tip)]
+    draw_triad(vis["robot"][joint_nodes(robot)[tip.parentJoint]]["tip frame"], tip.placement, 0.07 * frame.arm)
+    return frame
+
+
+def _draw_parts(node: Any, robot: Robot, parts: list[Part], frames: NDArray[np.float64], frame: Frame) -> None:
+    """Draw the arm; one that consists of mere lines and points everywhere is made thick enough to be seen."""
+    least = LEAST_THICKNESS * frame.size
+    seen = [replace(part, look=thickened(part.look, least)) for part in parts]
+    too_thin = all(new.look is not old.look for new, old in zip(seen, parts, strict=True))
+    draw_parts(node, robot, seen if too_thin else parts, frames)
 
 
 def _spread(waypoints: Matrix) -> Matrix:

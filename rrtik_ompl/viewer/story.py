@@ -135,10 +135,10 @@ def _goal_text(goal: Goal | None) -> str:
     if goal is None:
         return ""
     if isinstance(goal, GoalRegion):
-        return "any of several poses" if len(goal.members) > 1 else "a region of poses"
+        return "one of several" if len(goal.members) > 1 else "tip region"
     if isinstance(goal, JointGoal):
         return "joint values"
-    return "pose of the tip" if isinstance(goal, PoseGoal) else "position of the tip"
+    return "tip pose" if isinstance(goal, PoseGoal) else "tip position"
 
 
 def _colors() -> dict[str, str]:

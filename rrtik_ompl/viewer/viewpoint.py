@@ -40,9 +40,7 @@ def overview(points: Matrix, scene: Scene) -> Vector:
 def direction(turn: float, elevation: float) -> Vector:
     """Unit vector at an azimuth ``turn`` [rad] from the usual one and an elevation [rad], shape (3,)."""
     azimuth = USUAL_AZIMUTH + turn
-    return np.array(
-        [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
-    )
+    return np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
 
 
 def behind(points: Matrix, away: Vector, obstacle: Obstacle) -> Mask:

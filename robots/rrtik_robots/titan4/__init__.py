@@ -9,8 +9,14 @@ from typing import Any
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.robot_build import JointLimits
 from rrtik_ompl.urdf import robot_from_urdf_text
-from rrtik_robots.titan4.geometry import JOINTS, LIMITS_ENVELOPE_DEG, LIMITS_PLANNING_DEG, TitanGeometry
-from rrtik_robots.titan4.geometry import geometry_from, limits_rad
+from rrtik_robots.titan4.geometry import (
+    JOINTS,
+    LIMITS_ENVELOPE_DEG,
+    LIMITS_PLANNING_DEG,
+    TitanGeometry,
+    geometry_from,
+    limits_rad,
+)
 from rrtik_robots.titan4.urdf import titan4_urdf
 
 __all__ = ["JOINTS", "LIMITS_ENVELOPE_DEG", "LIMITS_PLANNING_DEG", "TitanGeometry", "titan4", "titan4_urdf"]

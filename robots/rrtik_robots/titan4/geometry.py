@@ -1,4 +1,4 @@
-"""Measures and joint limits of the TITAN 4 manipulator; the source of every number is in the README beside this file."""
+"""Measures and joint limits of the TITAN 4 manipulator; the README beside this file has all sources."""
 
 from __future__ import annotations
 

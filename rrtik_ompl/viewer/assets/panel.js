@@ -1,5 +1,6 @@
 // The panel beside the picture: joints with units, list of moves, legend with switches.
-const HALF_MINUS = "\u2212";
+const MINUS = "\u2212";
+const FEW_MOVES = 12;  // up to here waypoints carry their numbers from the beginning
 
 function make(tag, properties = {}, ...children) {
   const element = Object.assign(document.createElement(tag), properties);
@@ -11,7 +12,7 @@ function make(tag, properties = {}, ...children) {
 function reading(j, value) {
   const inDegrees = robot.joints[j].unit === "deg";
   const text = inDegrees ? ((value * 180) / Math.PI).toFixed(1) : value.toFixed(3);
-  return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", HALF_MINUS);
+  return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", MINUS);
 }
 
 function withUnit(j, value) {
@@ -24,7 +25,7 @@ document.getElementById("title").textContent = story.title;
 document.getElementById("subtitle").textContent = [
   robot ? `robot ${robot.name}, ${count(robot.joints.length, "joint")}` : "",
   count(story.obstacles.length, "obstacle"),
-  story.goal ? story.goal : "",
+  story.goal ? `goal: ${story.goal}` : "",
 ].filter((text) => text).join("  \u00b7  ");
 
 // Joints -----------------------------------------------------------------------------------------------------------
@@ -76,7 +77,7 @@ function showJoints(q, move, moving) {
     row.element.className = active ? "moving" : "";
     row.set(value);
   });
-  const tip = tipPosition(q).toArray().map((x) => x.toFixed(3).replace("-", HALF_MINUS));
+  const tip = tipPosition(q).toArray().map((x) => x.toFixed(3).replace("-", MINUS));
   document.getElementById("tip").textContent = `tip (${robot.tip.name}): x ${tip[0]}, y ${tip[1]}, z ${tip[2]} m`;
 }
 
@@ -113,8 +114,8 @@ function showMove(k) {
   if (k === null) return;
   moveRows[k].className = "moving";
   const scroll = document.getElementById("moves-scroll");
-  const top = moveRows[k].offsetTop - scroll.offsetTop;
-  if (top < scroll.scrollTop || top > scroll.scrollTop + scroll.clientHeight - 40) scroll.scrollTop = top - 40;
+  const [row, box] = [moveRows[k], scroll].map((element) => element.getBoundingClientRect());
+  if (row.top < box.top || row.bottom > box.bottom) scroll.scrollTop += row.top - box.top - 40;
 }
 
 // Legend -----------------------------------------------------------------------------------------------------------
@@ -152,7 +153,7 @@ function buildLegend() {
   if (robot) addSwitch("robot", colors.robot, 1, toggles("robot"));
   if (story.start_ghost) addSwitch("start (ghost)", colors.start, 0.6, toggles("start ghost"));
   if (story.goal_ghost) addSwitch("goal (ghost)", colors.goal, 0.6, toggles("goal ghost"));
-  if (story.goal && story.goal !== "joint values") addSwitch(story.goal, colors.goal, 1, toggles("goal"));
+  if (story.goal && story.goal !== "joint values") addSwitch(`goal: ${story.goal}`, colors.goal, 1, toggles("goal"));
   if (story.moves.length) addSwitch("way of the tip", colors.trail, 1, toggles("trail", "beads"));
   if (story.attached.length) addSwitch(`held: ${story.attached.join(", ")}`, colors.attached, 1, () => {});
   if (story.obstacles.length) {
@@ -161,7 +162,7 @@ function buildLegend() {
     addSwitch("names of obstacles", null, 1, (on) => setLabels("obstacle", on), false);
   }
   if (labels.some((label) => label.kind === "waypoint")) {
-    addSwitch("numbers of moves", null, 1, (on) => setLabels("waypoint", on), story.moves.length <= 12);
+    addSwitch("numbers of moves", null, 1, (on) => setLabels("waypoint", on), story.moves.length <= FEW_MOVES);
   }
   addSwitch(["axes ", ...axes], null, 1, (on) => {
     toggles("frames")(on);
@@ -175,15 +176,17 @@ function addLabels() {
     const box = new THREE.Box3().setFromObject(node("obstacles", obstacle.node)).getCenter(new THREE.Vector3());
     addLabel(obstacle.name, "obstacle", { x: box.x, y: -box.z, z: box.y });
   }
-  if (story.moves.length === 0 || story.moves.length > 200) return;
+  const last = story.moves.length;
+  if (last === 0) return;
+  const between = [...Array(last - 1).keys()].map((k) => k + 1);
   const places = [];
-  story.waypoints.forEach((q, k) => {
-    const tip = tipPosition(q);
-    const text = k === 0 ? "start" : k === story.moves.length ? "goal" : `${k}`;
+  for (const k of last <= 200 ? [0, last, ...between] : [0, last]) {
+    const text = k === 0 ? "start" : k === last ? "goal" : `${k}`;
+    const tip = tipPosition(story.waypoints[k]);
     const same = places.find((place) => place.tip.distanceTo(tip) < 0.01 * size);
-    if (same) same.text += `, ${text}`;
-    else places.push({ tip, text, kind: k === 0 || k === story.moves.length ? "station" : "waypoint" });
-  });
+    if (!same) places.push({ tip, text, kind: k === 0 || k === last ? text : "waypoint" });
+    else if (k === last || same.kind === "waypoint" || last <= FEW_MOVES) same.text += `, ${text}`;
+  }
   places.forEach(({ tip, text, kind }) => addLabel(text, kind, tip));
 }
 

@@ -68,9 +68,13 @@ function addPlayer() {
   }
   addEventListener("keydown", (event) => {
     const action = ACTIONS[event.key];
-    if (!action || event.ctrlKey || event.altKey || event.metaKey || event.target.tagName === "SELECT") return;
+    const own = event.key === " " ? "select, button, [type=checkbox]" : "select";  // what answers this key by itself
+    if (!action || event.target.matches?.(own) || event.ctrlKey || event.altKey || event.metaKey) return;
     event.preventDefault();
     action();
+  });
+  addEventListener("click", (event) => {  // after a click with the mouse the space bar plays again
+    if (event.detail > 0 && event.target.matches("button, [type=checkbox]")) event.target.blur();
   });
   if (story.times.length <= 200) {
     for (const time of story.times) {

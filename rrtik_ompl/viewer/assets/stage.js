@@ -162,7 +162,7 @@ function lookFrom(name) {
 function fit(away, tangent) {
   const right = new THREE.Vector3(0, 0, 1).cross(away).normalize();
   const up = away.clone().cross(right);
-  const tall = tangent * 0.88;
+  const tall = tangent * 0.85;
   const wide = tall * (pane.clientWidth / Math.max(pane.clientHeight, 1));
   const target = centre.clone();
   let distance = 2 * size;

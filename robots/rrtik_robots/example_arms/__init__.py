@@ -1,0 +1,176 @@
+"""The fixed-base arms of the package example-robot-data, by name; hands and fingers are held still."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+from typing import Any
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.urdf import robot_from_urdf
+
+PACKAGE = "example-robot-data"
+INSIDE = "cmeel.prefix/share/example-robot-data/robots"
+
+
+def data_folder() -> Path:
+    """Folder of the package's robots.
+
+    Raises:
+        InputError: If the package is not installed.
+    """
+    try:
+        folder = Path(str(distribution(PACKAGE).locate_file(INSIDE)))
+    except PackageNotFoundError:
+        folder = Path()
+    if not folder.name or not folder.is_dir():
+        raise InputError(f"the robot files of {PACKAGE} are not installed; pip install {PACKAGE}")
+    return folder
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExampleArm:
+    """One arm of the package; calling it loads it.
+
+    Attributes:
+        name: Name of the robot.
+        urdf: File, relative to the package's folder of robots.
+        tip: Link that goals refer to.
+        joints: Actuated joints.
+        srdf: File with postures and allowed collisions, if there is one.
+        postures: Further named postures, one number [rad] per joint.
+    """
+
+    name: str
+    urdf: str
+    tip: str
+    joints: tuple[str, ...]
+    srdf: str = ""
+    postures: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+    def __call__(
+        self, *, tip: str | None = None, locked: Mapping[str, float] | None = None, base_pose: Any | None = None
+    ) -> Robot:
+        """Load the arm.
+
+        Args:
+            tip: Link that goals refer to.
+            locked: Values [rad or m] of joints that are held still, such as fingers.
+            base_pose: ``pinocchio.SE3`` T_world_base.
+
+        Raises:
+            InputError: If the package is not installed, or an option makes no sense.
+        """
+        folder = data_folder()
+        return robot_from_urdf(
+            folder / self.urdf,
+            name=self.name,
+            srdf=folder / self.srdf if self.srdf else None,
+            joints=self.joints,
+            tip=self.tip if tip is None else tip,
+            locked=locked,
+            base_pose=base_pose,
+            postures={key: dict(zip(self.joints, q, strict=True)) for key, q in self.postures.items()},
+        )
+
+
+def _numbered(prefix: str, count: int, first: int = 1) -> tuple[str, ...]:
+    return tuple(f"{prefix}{k}" for k in range(first, first + count))
+
+
+_UR = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint")
+_SO = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
+_BAXTER = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
+_PANDA = _numbered("panda_joint", 7)
+_UR_SRDF = "ur_description/srdf/ur5_joint_limited_robot.srdf"  # link names are the same for all three sizes
+_UR_UP = {"up": (0.0, -1.5707963267948966, 0.0, -1.5707963267948966, 0.0, 0.0)}
+
+panda = ExampleArm(
+    "panda",
+    "panda_description/urdf/panda.urdf",
+    "panda_hand_tcp",
+    _PANDA,
+    "panda_description/srdf/panda.srdf",
+)
+panda_primitives = ExampleArm(
+    "panda_primitives",
+    "panda_description/urdf/panda_collision.urdf",
+    "panda_hand_tcp",
+    _PANDA,
+    "panda_description/srdf/panda.srdf",
+)
+ur3 = ExampleArm("ur3", "ur_description/urdf/ur3_robot.urdf", "tool0", _UR, _UR_SRDF, postures=_UR_UP)
+ur5 = ExampleArm("ur5", "ur_description/urdf/ur5_robot.urdf", "tool0", _UR, _UR_SRDF, postures=_UR_UP)
+ur10 = ExampleArm("ur10", "ur_description/urdf/ur10_robot.urdf", "tool0", _UR, _UR_SRDF, postures=_UR_UP)
+ur3_limited = ExampleArm(
+    "ur3_limited", "ur_description/urdf/ur3_joint_limited_robot.urdf", "tool0", _UR, _UR_SRDF, postures=_UR_UP
+)
+ur5_limited = ExampleArm(
+    "ur5_limited", "ur_description/urdf/ur5_joint_limited_robot.urdf", "tool0", _UR, _UR_SRDF, postures=_UR_UP
+)
+ur10_limited = ExampleArm(
+    "ur10_limited", "ur_description/urdf/ur10_joint_limited_robot.urdf", "tool0", _UR, _UR_SRDF, postures=_UR_UP
+)
+ur3_gripper = ExampleArm(
+    "ur3_gripper",
+    "ur_description/urdf/ur3_gripper.urdf",
+    "tool0",
+    _UR,
+    "ur_description/srdf/ur3_gripper.srdf",
+    postures=_UR_UP,
+)
+ur5_gripper = ExampleArm(
+    "ur5_gripper",
+    "ur_description/urdf/ur5_gripper.urdf",
+    "tool0",
+    _UR,
+    "ur_description/srdf/ur5_gripper.srdf",
+    postures=_UR_UP,
+)
+kinova = ExampleArm(
+    "kinova",
+    "kinova_description/robots/kinova.urdf",
+    "j2s6s200_end_effector",
+    _numbered("j2s6s200_joint_", 6),
+    "kinova_description/srdf/kinova.srdf",
+)
+xarm7 = ExampleArm(
+    "xarm7",
+    "xarm_description/urdf/xarm7.urdf",
+    "link_eef",
+    _numbered("joint", 7),
+    "xarm_description/srdf/xarm7.srdf",
+)
+z1 = ExampleArm(
+    "z1",
+    "z1_description/urdf/z1.urdf",
+    "gripperStator",
+    _numbered("joint", 6),
+    "z1_description/srdf/z1.srdf",
+)
+so100 = ExampleArm("so100", "so_arm_description/urdf/so100.urdf", "gripper", _SO)
+so101 = ExampleArm("so101", "so_arm_description/urdf/so101.urdf", "gripper_frame_link", _SO)
+talos_left_arm = ExampleArm(
+    "talos_left_arm",
+    "talos_data/robots/talos_left_arm.urdf",
+    "gripper_left_base_link",
+    tuple(f"arm_left_{k}_joint" for k in range(2, 8)),
+    "talos_data/srdf/talos.srdf",
+)
+baxter_left = ExampleArm(
+    "baxter_left",
+    "baxter_description/urdf/baxter.urdf",
+    "left_gripper",
+    tuple(f"left_{joint}" for joint in _BAXTER),
+    "baxter_description/srdf/baxter_manipulation.srdf",
+)
+baxter_right = ExampleArm(
+    "baxter_right",
+    "baxter_description/urdf/baxter.urdf",
+    "right_gripper",
+    tuple(f"right_{joint}" for joint in _BAXTER),
+    "baxter_description/srdf/baxter_manipulation.srdf",
+)

@@ -1,0 +1,81 @@
+"""Arms of revolute joints in the xy-plane, with any number of links."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import finite_array
+from rrtik_ompl.dh import DhRow, robot_from_dh
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.robot import Robot
+
+LIMITS_PLANAR3_DEG = ((-45.0, 270.0), (-180.0, 180.0), (-180.0, 180.0))
+BLUE = (0.20, 0.42, 0.66, 1.0)
+
+
+def planar(
+    *,
+    lengths: Sequence[float] = (1.0, 1.0, 1.0),
+    limits_deg: ArrayLike | None = None,
+    radius: float = 0.0,
+    tip: str = "tip",
+    base_pose: Any | None = None,
+) -> Robot:
+    """A planar arm, stretched along x at zero; its links do not collide with each other.
+
+    Args:
+        lengths: Of the links, base first [m], all above 0.
+        limits_deg: Lower and upper limit per joint, shape (dof, 2) [deg]; -180 .. 180 if None.
+        radius: Of the links, which are capsules [m]; 0 stands for 1e-4.
+        tip: Link that goals refer to.
+        base_pose: ``pinocchio.SE3`` T_world_base.
+
+    Raises:
+        InputError: If a length is not above 0, a limit is missing, or a number is not finite.
+    """
+    return _arm("planar", lengths, limits_deg, radius, tip, base_pose)
+
+
+def planar3(*, radius: float = 0.0, tip: str = "tip", base_pose: Any | None = None) -> Robot:
+    """Three links of 1 m with the limits of the published planar tests."""
+    return _arm("planar3", (1.0,) * 3, LIMITS_PLANAR3_DEG, radius, tip, base_pose)
+
+
+def planar6(*, radius: float = 0.0, tip: str = "tip", base_pose: Any | None = None) -> Robot:
+    """Six links of 0.7 m, joints turn by 150 degrees to either side."""
+    return _arm("planar6", (0.7,) * 6, [(-150.0, 150.0)] * 6, radius, tip, base_pose)
+
+
+def planar10(*, radius: float = 0.0, tip: str = "tip", base_pose: Any | None = None) -> Robot:
+    """Ten links of 0.1 m, joints turn by 180 degrees to either side."""
+    return _arm("planar10", (0.1,) * 10, None, radius, tip, base_pose)
+
+
+def _arm(
+    name: str, lengths: ArrayLike, limits_deg: ArrayLike | None, radius: float, tip: str, base_pose: Any | None
+) -> Robot:
+    sizes = finite_array(lengths, (None,), f"{name}: lengths")
+    if len(sizes) == 0 or (sizes <= 0.0).any():
+        raise InputError(f"{name}: lengths must be one or more numbers greater than 0, got {sizes.tolist()}")
+    given = [(-180.0, 180.0)] * len(sizes) if limits_deg is None else limits_deg
+    limits = np.radians(finite_array(given, (len(sizes), 2), f"{name}: limits_deg"))
+    rows = [
+        DhRow(a=float(length), limits=(float(low), float(high)))
+        for length, (low, high) in zip(sizes, limits, strict=True)
+    ]
+    return robot_from_dh(
+        name,
+        rows,
+        convention="standard",
+        radius=radius,
+        tip=tip,
+        base_pose=base_pose,
+        postures={"zero": np.zeros(len(rows))},
+        self_collision=False,
+        planar=True,
+        colour=BLUE,
+    )

@@ -1,0 +1,65 @@
+"""A disc that slides in the xy-plane: the smallest robot, for planning in two dimensions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import finite_array
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.robot_build import build_robot
+from rrtik_ompl.shapes import Cylinder, Sphere
+from rrtik_ompl.tree import Joint, Link, Solid, Tree
+
+SMALLEST_RADIUS = 1e-4  # [m], stands for a radius of 0
+ORANGE = (0.90, 0.45, 0.10, 1.0)
+
+
+def point2d(
+    *,
+    radius: float = 0.0,
+    bounds: ArrayLike = ((0.0, 10.0), (0.0, 10.0)),
+    tip: str = "disc",
+    base_pose: Any | None = None,
+) -> Robot:
+    """A disc with the two sliding joints x and y.
+
+    It is checked as a ball about z = 0, which touches an extruded polygon of at least its height exactly when the
+    disc touches the polygon.
+
+    Args:
+        radius: Of the disc [m]; 0 stands for 1e-4.
+        bounds: Lower and upper limit of x and of y, shape (2, 2) [m].
+        tip: Link that goals refer to.
+        base_pose: ``pinocchio.SE3`` T_world_base.
+
+    Raises:
+        InputError: If the radius is negative or a bound makes no sense.
+    """
+    size = float(finite_array(radius, (), "point2d: radius"))
+    if size < 0.0:
+        raise InputError(f"point2d: radius must not be negative, got {size:g}")
+    size = max(size, SMALLEST_RADIUS)
+    (left, right), (bottom, top) = finite_array(bounds, (2, 2), "point2d: bounds").tolist()
+    ball, disc = Solid(Sphere(size), pin.SE3.Identity(), ORANGE), Solid(Cylinder(size, 0.1 * size), colour=ORANGE)
+    tree = Tree(
+        "point2d",
+        [Link("base"), Link("carriage"), Link("disc", (ball,), (disc,))],
+        [
+            Joint("x", "prismatic", "base", "carriage", axis=(1, 0, 0), lower=left, upper=right),
+            Joint("y", "prismatic", "carriage", "disc", axis=(0, 1, 0), lower=bottom, upper=top),
+        ],
+    )
+    return build_robot(
+        "point2d",
+        tree,
+        tip=tip,
+        base_pose=base_pose,
+        postures={"centre": {"x": float(np.mean([left, right])), "y": float(np.mean([bottom, top]))}},
+        self_collision=False,
+        planar=True,
+    )

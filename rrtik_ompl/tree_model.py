@@ -1,0 +1,146 @@
+"""Pinocchio's model, collision geometry and visual geometry of a tree of links and joints."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.solids import pieces
+from rrtik_ompl.text_file import read_bytes
+from rrtik_ompl.tree import Joint, Link, MeshFile, Tree
+
+GREY = (0.7, 0.7, 0.7, 1.0)
+MAX_MESH_BYTES = 256 * 1024 * 1024
+_NOT_FINITE = re.compile(rb"[\s>][-+]?(nan|inf)(inity)?[\s<]", re.IGNORECASE)
+
+
+def build_models(tree: Tree, T_world_base: Any | None = None) -> tuple[Any, Any, Any]:
+    """Pinocchio model, collision geometry and visual geometry of a tree.
+
+    Args:
+        tree: Links and joints.
+        T_world_base: Pose of the root link, ``pinocchio.SE3``; identity if None.
+
+    Raises:
+        InputError: If a mesh file cannot be read.
+    """
+    model = pin.Model()
+    model.name = tree.where
+    links = {link.name: link for link in tree.links}
+    # Pinocchio looks frames up by name alone in places, so a joint that is called like a link gets no frame.
+    framed = {joint.name for joint in tree.joints} - set(links)
+    places = {tree.root.name: _Place(0, pin.SE3.Identity() if T_world_base is None else T_world_base, 0)}
+    _add_link(model, tree.root, places)
+    for joint in tree.walk():
+        place = places[joint.child] = _add_joint(model, joint, places[joint.parent])
+        if joint.name in framed:
+            kind = pin.FrameType.FIXED_JOINT if joint.kind == "fixed" else pin.FrameType.JOINT
+            offset = place.T_joint_link if joint.kind == "fixed" else pin.SE3.Identity()
+            frame = pin.Frame(joint.name, place.joint, place.frame, offset, kind)
+            place.frame = model.addFrame(frame, False)
+        _add_link(model, links[joint.child], places)
+    meshes: dict[MeshFile, Any] = {}
+    hard = _geometry(tree, places, meshes, "collision")
+    return model, hard, _geometry(tree, places, meshes, "visual")
+
+
+@dataclass(slots=True, eq=False)
+class _Place:
+    """Where a link hangs: on which Pinocchio joint, with which offset, and its frame number."""
+
+    joint: int
+    T_joint_link: Any
+    frame: int
+
+
+def _add_joint(model: Any, joint: Joint, parent: _Place) -> _Place:
+    placement = parent.T_joint_link * joint.T_parent_joint
+    if joint.kind == "fixed":
+        return _Place(parent.joint, placement, parent.frame)
+    kind, rotation = _joint_model(joint)
+    turn = pin.SE3(rotation, np.zeros(3))
+    size = kind.nq
+    lower, upper = (joint.lower, joint.upper) if joint.kind != "continuous" else (-1.01, 1.01)
+    number = model.addJoint(
+        parent.joint,
+        kind,
+        placement * turn,
+        joint.name,
+        np.full(1, np.inf),
+        np.full(1, joint.velocity),
+        np.full(size, lower),
+        np.full(size, upper),
+    )
+    return _Place(number, turn.inverse(), parent.frame)
+
+
+def _joint_model(joint: Joint) -> tuple[Any, Any]:
+    """Pinocchio's joint, and the rotation of its frame (identity but for continuous joints about a slanted axis)."""
+    identity = np.eye(3)
+    letter = next((name for name, unit in zip("XYZ", identity, strict=True) if np.array_equal(unit, joint.axis)), "")
+    if joint.kind == "continuous":
+        # Pinocchio offers no way to give its unaligned unbounded joint an axis from Python.
+        if letter:
+            return getattr(pin, f"JointModelRUB{letter}")(), identity
+        return pin.JointModelRUBX(), pin.Quaternion.FromTwoVectors(identity[0], np.array(joint.axis)).matrix()
+    short, long = ("R", "Revolute") if joint.kind == "revolute" else ("P", "Prismatic")
+    if letter:
+        return getattr(pin, f"JointModel{short}{letter}")(), identity
+    return getattr(pin, f"JointModel{long}Unaligned")(np.array(joint.axis)), identity
+
+
+def _add_link(model: Any, link: Link, places: dict[str, _Place]) -> None:
+    place = places[link.name]
+    place.frame = model.addBodyFrame(link.name, place.joint, place.T_joint_link, place.frame)
+    if link.inertia is not None:
+        model.appendBodyToJoint(place.joint, link.inertia, place.T_joint_link)
+
+
+def _geometry(tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any], which: str) -> Any:
+    geometry = pin.GeometryModel()
+    for link in tree.links:
+        place = places[link.name]
+        for number, solid in enumerate(getattr(link, which)):
+            shape = solid.shape
+            is_file = isinstance(shape, MeshFile)
+            item = pin.GeometryObject(
+                f"{link.name}_{number}",
+                place.joint,
+                place.frame,
+                place.T_joint_link * solid.T_link_solid,
+                _load(shape, meshes, f"{tree.where}: link '{link.name}'") if is_file else pieces(shape)[0].geometry,
+                str(shape.path) if is_file else "",
+                np.array(shape.scale if is_file else (1.0, 1.0, 1.0)),
+                solid.colour is not None,
+                np.array(solid.colour or GREY),
+            )
+            geometry.addGeometryObject(item)
+    return geometry
+
+
+def _load(mesh: MeshFile, meshes: dict[MeshFile, Any], where: str) -> Any:
+    if mesh not in meshes:
+        if not _finite(read_bytes(mesh.path, MAX_MESH_BYTES)):
+            raise InputError(f"{where}: mesh {mesh.path} holds numbers that are not finite; export it again")
+        try:
+            meshes[mesh] = coal.MeshLoader().load(str(mesh.path), np.array(mesh.scale))
+        except (ValueError, RuntimeError) as error:
+            raise InputError(
+                f"{where}: mesh {mesh.path} cannot be read as triangles; export it again as STL, OBJ or DAE"
+            ) from error
+    return meshes[mesh]
+
+
+def _finite(data: bytes) -> bool:
+    """Whether a mesh file is free of NaN and infinity, about which the C++ library would write to the terminal."""
+    count = int.from_bytes(data[80:84], "little")
+    if len(data) == 84 + 50 * count:  # binary STL: per triangle twelve floats and two bytes
+        rows = np.frombuffer(data, dtype=[("corners", "<f4", 12), ("rest", "<u2")], offset=84)
+        return bool(np.isfinite(rows["corners"]).all())
+    return _NOT_FINITE.search(data) is None

@@ -1,0 +1,154 @@
+"""Names to robots and problems: the cache, the options, the entries of problem files."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from rrtik_ompl.catalog import (
+    find_planner,
+    find_problem,
+    list_planners,
+    list_problems,
+    list_robots,
+    load_robot,
+    robot_from_entry,
+)
+from rrtik_ompl.errors import InputError, UnknownNameError
+
+URDF = """<robot name="arm"><link name="base"/><link name="arm"/><joint name="j" type="revolute">
+<parent link="base"/><child link="arm"/><origin xyz="{height} 0 0"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
+
+
+@pytest.fixture
+def urdf(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(URDF.format(height=1))
+    return path
+
+
+def test_the_same_call_gives_the_same_object():
+    options = {"lengths": [1.0, 2.0], "base_pose": {"xyz": [0, 0, 1]}}
+    assert load_robot("planar", **options) is load_robot("planar", **options)
+    assert load_robot("planar", lengths=np.array([1.0, 2.0])) is load_robot("planar", lengths=[1.0, 2.0])
+
+
+def test_another_option_gives_another_robot():
+    assert load_robot("planar", lengths=[1.0, 2.0]) is not load_robot("planar", lengths=[1.0, 2.5])
+    poses = (pin.SE3(np.eye(3), np.array([0, 0, height])) for height in (1.0, 2.0))
+    first, second = (load_robot("titan4", base_pose=pose) for pose in poses)
+    assert second.fk(np.zeros(6)).translation[2] - first.fk(np.zeros(6)).translation[2] == pytest.approx(1.0)
+
+
+def test_a_file_that_changed_is_loaded_again(urdf):
+    before = load_robot(urdf)
+    assert load_robot(str(urdf)) is before
+    urdf.write_text(URDF.format(height=2))
+    os.utime(urdf, ns=(1, 1))
+    assert load_robot(urdf).fk([0.0]).translation[0] == 2.0
+
+
+def test_a_file_that_vanished_is_missed(urdf):
+    load_robot(urdf)
+    urdf.unlink()
+    with pytest.raises(InputError, match="no such file"):
+        load_robot(urdf)
+
+
+def test_a_relative_path_follows_the_current_folder(tmp_path, monkeypatch):
+    for number in (1, 2):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        (folder / "arm.urdf").write_text(URDF.format(height=number))
+        monkeypatch.chdir(folder)
+        assert load_robot("arm.urdf").fk([0.0]).translation[0] == number
+
+
+def test_an_unknown_name_lists_the_alternatives():
+    with pytest.raises(UnknownNameError, match=r"no robot 'titan5'; have .*did you mean 'titan4'") as caught:
+        load_robot("titan5")
+    assert caught.value.alternatives == list_robots()
+
+
+def test_an_option_that_does_not_apply_names_those_that_do():
+    with pytest.raises(InputError, match=r"'titan4' takes no option 'group'; it takes base_pose, lengths, limits, tip"):
+        load_robot("titan4", group="arm")
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "expected"),
+    [
+        ("titan4", {"limits": "wide"}, "no limit set 'wide'"),
+        ("titan4", {"lengths": {"a9": 1.0}}, "no length 'a9'"),
+        ("titan4", {"lengths": {"a2": -1.0}}, "a2 must be greater than 0"),
+        ("titan4", {"tip": "finger"}, "'finger'"),
+        ("titan4", {"base_pose": [0, 0, 1]}, "base_pose: expected"),
+        ("titan4", {"base_pose": {"position": [0, 0, 1]}}, "no key 'position'"),
+        ("titan4", {"base_pose": {"xyz": [0, 0]}}, "shape"),
+        ("titan4", {"base_pose": {"xyz": [0, 0, 0], "quat_xyzw": [1, 1, 1, 1]}}, "length 1"),
+        ("planar", {"lengths": []}, "lengths"),
+        ("planar", {"lengths": [1, -1]}, "greater than 0"),
+        ("planar", {"lengths": [1, 1], "limits_deg": [[-1, 1]]}, "limits_deg"),
+        ("planar", {"lengths": [1], "limits_deg": [[1, -1]]}, "lower must be below upper"),
+        ("planar", {"lengths": [1], "radius": -1}, "radius"),
+        ("point2d", {"radius": -1}, "radius"),
+        ("point2d", {"bounds": [[0, 1]]}, "bounds"),
+        ("puma560_3dof", {"lengths": {"d7": 0.1}}, "no length 'd7'"),
+        ("arm.xacro", {}, "xacro must be expanded"),
+        ("some/arm.step", {}, "not a robot file"),
+    ],
+)
+def test_a_bad_value_gets_one_line(name, options, expected):
+    with pytest.raises(InputError, match=expected):
+        load_robot(name, **options)
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        "titan4",
+        {"name": "titan4", "limits": "envelope", "base_pose": {"xyz": [0.0, 0.0, 1.0], "quat_xyzw": [0, 0, 0, 1]}},
+        {"planar": {"lengths": [1, 1, 1], "limits_deg": [[-45, 270], [-180, 180], [-180, 180]], "radius": 0.0}},
+        {"planar": {"lengths": [1, 2]}, "base_pose": {"xyz": [1, 0, 0], "rpy_deg": [0, 0, 90]}},
+        {"point2d": {"radius": 0.7, "bounds": [[0, 26], [0, 20]]}},
+        {"name": "panda", "locked": {"panda_finger_joint1": 0.02}, "tip": "panda_link8"},
+    ],
+)
+def test_the_source_of_a_robot_loads_it_again(entry):
+    robot = robot_from_entry(entry)
+    again = robot_from_entry(dict(robot.source))
+    q = np.clip(np.full(robot.dof, 0.3), robot.lower, robot.upper)
+    np.testing.assert_array_equal(again.fk(q).homogeneous, robot.fk(q).homogeneous)
+    np.testing.assert_array_equal(again.lower, robot.lower)
+    assert dict(again.source) == dict(robot.source)
+
+
+def test_an_entry_names_files_relative_to_its_folder(urdf):
+    robot = robot_from_entry({"urdf": urdf.name, "tip": "arm"}, urdf.parent)
+    assert dict(robot.source) == {"urdf": str(urdf), "tip": "arm"}
+    assert robot_from_entry(urdf.name, urdf.parent).tip == "arm"
+
+
+@pytest.mark.parametrize("entry", [3, {}, {"name": "titan4", "urdf": "a.urdf"}, {"planar": 3}, {"name": 4}])
+def test_an_entry_of_another_form_is_refused(entry):
+    with pytest.raises(InputError, match="robot: "):
+        robot_from_entry(entry)
+
+
+def test_every_listed_problem_is_a_file():
+    assert "titan4_sdu" in list_problems()
+    assert all(find_problem(name).is_file() and isinstance(find_problem(name), Path) for name in list_problems())
+
+
+def test_unknown_problems_and_planners_list_the_alternatives():
+    with pytest.raises(UnknownNameError, match="did you mean 'titan4_sdu'"):
+        find_problem("titan4_sud")
+    with pytest.raises(UnknownNameError, match="no planner 'bicrtd'"):
+        find_planner("bicrtd")
+
+
+def test_every_listed_planner_is_a_class():
+    assert all(isinstance(find_planner(name), type) for name in list_planners())
