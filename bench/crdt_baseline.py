@@ -74,7 +74,7 @@ def crdt_run(problem: Problem, seed: int) -> TreeRun:
     tests, begin = PointTests(problem.world), perf_counter()
     si = space_information(problem, Judge(problem.world))
     planner = CRDT(si, world=tests, seed=seed, goal_tolerance=STEP, max_iterations=CAP)
-    planner.setProblemDefinition(problem_definition(problem, si))
+    planner.setProblemDefinition(problem_definition(problem, si, all_turns=True))
     planner.setup()
     found = str(planner.solve(600.0)) == "Exact solution"
     counts = planner.statistics

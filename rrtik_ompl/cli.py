@@ -268,7 +268,8 @@ def _millimetres(distance: float) -> str:
 def _print(*items: Any) -> None:
     from rich.console import Console
 
-    console = Console(highlight=False, soft_wrap=True, markup=False)
+    width = None if sys.stdout.isatty() else 200  # a file or a pipe has room for every column
+    console = Console(highlight=False, soft_wrap=True, markup=False, width=width)
     for item in items:
         console.print(item)
 

@@ -25,7 +25,6 @@ Vector4 = Annotated[list[Number], Field(min_length=4, max_length=4)]
 Numbers = Annotated[list[Number], Field(min_length=1)]
 
 
-
 def _one(value: Any) -> Any:
     if value is True:  # equal to 1 in Python, but not what a file should say
         raise PydanticCustomError("version", "must be 1, found true")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix, finite_array
 from rrtik_ompl.errors import InputError, MeshWarning
 from rrtik_ompl.shapes import Mesh
-from rrtik_ompl.text_file import read_bytes
+from rrtik_ompl.text_file import file_name, read_bytes
 
 SUFFIXES = (".stl", ".obj", ".dae")
 MAX_BYTES = 256 * 1024 * 1024
@@ -39,6 +39,7 @@ def load_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
     Warns:
         MeshWarning: If the surface is not closed (or not manifold): it is then treated as a surface, not as a solid.
     """
+    file_name(path)
     factor = float(finite_array(scale, (), f"{path}: scale"))
     if factor <= 0.0:
         raise InputError(f"{path}: scale must be greater than 0, got {factor:g}")

@@ -20,8 +20,11 @@ from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.robot_entry import RobotEntry, robot_data
 from rrtik_ompl.scene_file import SceneEntry, scene_data
+from rrtik_ompl.text_file import file_name
 from rrtik_ompl.world import MOTION_RESOLUTION, World
 from rrtik_ompl.yaml_file import YamlDocument, read_yaml, write_yaml
+
+FilePath = str | os.PathLike[str]
 
 
 class ProblemFile(Section):
@@ -38,7 +41,7 @@ class ProblemFile(Section):
     )
 
 
-def load_problem(name_or_file: str | os.PathLike[str], *, robot: Robot | str | None = None) -> Problem:
+def load_problem(name_or_file: FilePath, *, robot: Robot | FilePath | None = None) -> Problem:
     """Load a shipped problem by name, a problem file, or a MotionBenchMaker pair by one of its two files.
 
     Args:
@@ -67,7 +70,7 @@ def load_problem(name_or_file: str | os.PathLike[str], *, robot: Robot | str | N
         raise
 
 
-def save_problem(problem: Problem, path: str | os.PathLike[str]) -> None:
+def save_problem(problem: Problem, path: FilePath) -> None:
     """Write a problem as YAML, whole or not at all; numbers read back bit for bit, rotations to the last digit or two.
 
     Angles are written in radians. Files (meshes, URDF) are named relative to the new file's folder.
@@ -75,7 +78,7 @@ def save_problem(problem: Problem, path: str | os.PathLike[str]) -> None:
     Raises:
         InputError: If the file cannot be written, or the format has no words for something in the problem.
     """
-    folder = Path(path).parent
+    folder = file_name(path).parent
     world = problem.world
     data: dict[str, Any] = {"version": 1, "robot": robot_data(world.robot.source, folder)}
     scene = scene_data(world.scene, folder)
@@ -90,9 +93,9 @@ def problem_schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
-def _problem_path(name_or_file: str | os.PathLike[str]) -> Path:
+def _problem_path(name_or_file: FilePath) -> Path:
     """A bare word is the name of a shipped problem; a file without ending is taken if there is no such name."""
-    path = Path(name_or_file)
+    path = file_name(name_or_file)
     if not isinstance(name_or_file, str) or path.suffix or len(path.parts) > 1:
         return path
     try:
@@ -103,7 +106,7 @@ def _problem_path(name_or_file: str | os.PathLike[str]) -> Path:
         raise
 
 
-def _world(document: YamlDocument, entry: ProblemFile, robot: Robot | str | None) -> World:
+def _world(document: YamlDocument, entry: ProblemFile, robot: Robot | FilePath | None) -> World:
     if robot is None:
         with document.at(("robot",)):
             robot = robot_from_entry(document.data["robot"], document.path.parent)

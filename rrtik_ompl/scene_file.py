@@ -30,6 +30,7 @@ from rrtik_ompl.mesh_file import load_mesh
 from rrtik_ompl.poses import pose, pose_from_rpy, quaternion_xyzw
 from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, Waypoints
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
+from rrtik_ompl.text_file import file_name
 from rrtik_ompl.yaml_file import Location, YamlDocument, read_yaml, write_yaml
 
 SHAPE_KEYS = ("box", "sphere", "cylinder", "capsule", "half_space", "polygon", "mesh")
@@ -224,7 +225,7 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     Raises:
         InputError: If the file cannot be written, or a mesh does not come from a file.
     """
-    write_yaml(path, {"version": 1, "scene": scene_data(scene, Path(path).parent)})
+    write_yaml(path, {"version": 1, "scene": scene_data(scene, file_name(path).parent)})
 
 
 def scene_data(scene: Scene, folder: Path) -> dict[str, Any]:

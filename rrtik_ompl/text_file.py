@@ -32,6 +32,7 @@ def read_bytes(path: str | os.PathLike[str], limit: int = MAX_BYTES) -> bytes:
     Raises:
         InputError: If the file is missing, a folder, unreadable or too large.
     """
+    file_name(path)
     try:
         with open(path, "rb") as file:
             data = file.read(limit + 1)
@@ -55,7 +56,7 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
     Raises:
         InputError: If the folder does not exist or the file cannot be written.
     """
-    target = Path(os.path.realpath(path))  # a link stays a link: the file it points to is replaced
+    target = Path(os.path.realpath(file_name(path)))  # a link stays a link: the file it points to is replaced
     temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
     try:
         if target.exists() and not target.is_file() and not target.is_dir():
@@ -72,6 +73,17 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
         raise InputError(f"{path}: cannot be written: folder '{target.parent}' does not exist; create it") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be written: {getattr(error, 'strerror', None) or error}") from error
+
+
+def file_name(path: object) -> Path:
+    """The path, if it is text or a path object (a number would be taken for an open file by the system).
+
+    Raises:
+        InputError: If it is something else.
+    """
+    if not isinstance(path, (str, os.PathLike)):
+        raise InputError(f"expected the name of a file, got {type(path).__name__} {path!r}")
+    return Path(path)
 
 
 def _similar(path: Path) -> str:

@@ -153,7 +153,6 @@ class Tree:
             raise InputError(f"{self.where}: link '{tip}' does not hang on link '{base}'; swap them or choose others")
         return tuple(reversed(joints))
 
-
     def hold(self, values: Mapping[str, float]) -> Tree:
         """The same tree with the named joints fixed at the given values [rad or m]."""
         joints = [_held(joint, values[joint.name]) if joint.name in values else joint for joint in self.joints]

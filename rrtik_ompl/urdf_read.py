@@ -92,7 +92,7 @@ def numbers(element: Element, key: str, count: int, default: Sequence[float] | N
         values = []
     if len(values) != count or not np.isfinite(values).all():
         plural = "number" if count == 1 else "numbers"
-        raise InputError(f"{where}: <{element.tag} {key}=\"{text}\"> must hold {count} finite {plural}")
+        raise InputError(f'{where}: <{element.tag} {key}="{text}"> must hold {count} finite {plural}')
     return values
 
 

@@ -16,7 +16,7 @@ from typing import Any, TypeAlias
 import yaml
 
 from rrtik_ompl.errors import InputError, RrtikError
-from rrtik_ompl.text_file import read_text, write_text
+from rrtik_ompl.text_file import file_name, read_text, write_text
 
 Location: TypeAlias = tuple[str | int, ...]  # keys and list numbers from the top: ("start", "joints", 2)
 
@@ -84,7 +84,7 @@ def read_yaml(path: str | os.PathLike[str]) -> YamlDocument:
         InputError: If the file cannot be read, is not valid YAML, is empty, is not a mapping, holds a key twice, uses
             tags, is nested deeper than 40 levels, or unfolds to more than a million values.
     """
-    file = Path(path)
+    file = file_name(path)
     text = read_text(path)
     builder = _Builder(file)
     try:

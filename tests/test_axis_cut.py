@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rrtik_ompl.errors import InputError
@@ -51,6 +51,7 @@ def all_free(route: np.ndarray, world: GridWorld) -> bool:
     return all(world.motion_valid(a, b) for a, b in pairwise(route))
 
 
+@settings(deadline=None)
 @given(walks())
 def test_a_pass_keeps_ends_validity_and_single_joint_moves_and_adds_no_move(case: tuple[GridWorld, np.ndarray]) -> None:
     world, route = case
@@ -62,12 +63,14 @@ def test_a_pass_keeps_ends_validity_and_single_joint_moves_and_adds_no_move(case
     assert transitions(twice) <= transitions(once) <= transitions(route)
 
 
+@settings(deadline=None)
 @given(walks())
 def test_without_obstacles_one_pass_reaches_the_lower_bound(case: tuple[GridWorld, np.ndarray]) -> None:
     _, route = case
     assert transitions(axis_cut(route, free)) == lower_bound(route[0], route[-1])
 
 
+@settings(deadline=None)
 @given(walks(), st.integers(0, 2**20))
 def test_a_test_that_is_never_sure_ends_all_the_same(case: tuple[GridWorld, np.ndarray], seed: int) -> None:
     _, route = case
@@ -137,6 +140,7 @@ def test_waypoints_that_are_no_route_are_refused(waypoints: object) -> None:
         axis_cut(waypoints, free)  # type: ignore[arg-type]
 
 
+@settings(deadline=None)
 @given(walks(), st.integers(0, 1000))
 def test_further_rounds_are_never_worse_and_repeat_with_their_seed(
     case: tuple[GridWorld, np.ndarray], seed: int

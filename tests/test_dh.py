@@ -66,8 +66,8 @@ def test_the_capsules_join_the_joint_axes_without_gaps(convention):
 
 
 def test_a_floor_gap_keeps_the_first_link_above_the_base_and_moves_nothing_else():
-    plain, raised = (robot_from_dh("arm", [DhRow(d=0.6), DhRow(a=0.4)], convention="standard", radius=0.1, floor_gap=gap)
-                     for gap in (0.0, 0.1))  # fmt: skip
+    rows = [DhRow(d=0.6), DhRow(a=0.4)]
+    plain, raised = (robot_from_dh("arm", rows, convention="standard", radius=0.1, floor_gap=g) for g in (0.0, 0.1))
     low, high = (robot.collision.geometryObjects[0] for robot in (plain, raised))
     assert low.placement.translation[2] - low.geometry.halfLength - 0.1 == pytest.approx(-0.1)
     assert high.placement.translation[2] - high.geometry.halfLength - 0.1 == pytest.approx(0.0)

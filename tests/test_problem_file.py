@@ -257,7 +257,7 @@ def test_the_schema_refuses_what_is_refused(tmp_path, content):
 
 FULL = text(
     rest="scene:\n  obstacles:\n"
-    "    - {name: a, box: [0.1, 0.1, 0.1], pose: {xyz: [-2, 0, 0], rpy_deg: [0, 0, 9]}, motion: {velocity: [1, 0, 0]}}\n"
+    "    - {name: a, box: [0.1, 0.1, 0.1], pose: {xyz: [-2, 0, 0], rpy_deg: [0,0,9]}, motion: {velocity: [1, 0, 0]}}\n"
     "    - {name: b, polygon: [[3.5, 3], [4, 3], [4, 4]], height: 1}\n"
     "    - {name: c, half_space: {normal: [0, 0, 1], offset: -1}}\n"
     "  attached: [{name: t, link: link1, capsule: {radius: 0.01, length: 0.1}}]\n"

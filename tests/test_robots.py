@@ -81,7 +81,7 @@ def test_the_package_that_is_absent_is_named(monkeypatch):
 def test_hands_are_held_still_where_told():
     closed, open_ = load_robot("panda"), load_robot("panda", locked={"panda_finger_joint1": 0.04})
     assert closed.joint_names == tuple(f"panda_joint{k}" for k in range(1, 8))
-    for side, sign in (("left", 1), ("right", -1)):
+    for side in ("left", "right"):
         link = f"panda_{side}finger"
         moved = closed.fk(np.zeros(7), link).actInv(open_.fk(np.zeros(7), link)).translation
         np.testing.assert_allclose(np.abs(moved), [0, 0.04, 0], atol=1e-12)

@@ -56,7 +56,7 @@ class World:
 def solve(setup: Any, *arguments: Any, **options: Any) -> tuple[str, Recorder]:
     planner = Recorder(setup.getSpaceInformation(), *arguments, **options)
     setup.setPlanner(planner)
-    return str(setup.solve(0.3)), planner
+    return str(setup.solve(5.0)), planner
 
 
 def test_the_rows_of_a_result_become_the_solution_of_ompl() -> None:

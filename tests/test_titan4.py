@@ -1,4 +1,4 @@
-"""TITAN 4: three independent forms of its forward kinematics agree; limits, postures and the shipped files are right."""
+"""TITAN 4: three independent forms of its forward kinematics agree; limits, postures and shipped files are right."""
 
 from importlib.resources import files
 

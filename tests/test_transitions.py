@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rrtik_ompl.errors import InputError
@@ -117,6 +117,7 @@ def test_a_route_needs_a_configuration() -> None:
         transitions(np.empty((0, 3)))
 
 
+@settings(deadline=None)
 @given(axis_routes())
 def test_merging_keeps_the_ends_and_leaves_single_joint_moves_of_alternating_joints(route: np.ndarray) -> None:
     merged = merge_moves(route, tolerance=0.0)
@@ -126,11 +127,13 @@ def test_merging_keeps_the_ends_and_leaves_single_joint_moves_of_alternating_joi
     assert (joints[1:] != joints[:-1]).all()
 
 
+@settings(deadline=None)
 @given(axis_routes())
 def test_transitions_lie_between_the_lower_bound_and_the_number_of_edges(route: np.ndarray) -> None:
     assert lower_bound(route[0], route[-1]) <= transitions(route) <= len(route) - 1
 
 
+@settings(deadline=None)
 @given(axis_routes())
 def test_transitions_do_not_depend_on_the_direction(route: np.ndarray) -> None:
     assert transitions(route) == transitions(route[::-1])

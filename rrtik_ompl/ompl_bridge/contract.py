@@ -25,7 +25,7 @@ Clause = Callable[[Factory], None]
 
 DOF = 3
 SECONDS = 10.0  # [s] for problems that take milliseconds
-SHORT = 0.05  # [s] for problems without a solution
+SHORT = 0.2  # [s] for problems without a solution
 START, GOAL = (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0)
 INSIDE_OBSTACLE, OUTSIDE_BOUNDS = (0.0, 0.0, 0.0), (9.0, 0.0, 0.0)
 
@@ -127,7 +127,7 @@ def repeats_with_the_same_seed(factory: Factory) -> None:
 
 
 def takes_seconds(factory: Factory) -> None:
-    """``planner.solve(0.05)`` called from Python takes a number, and time that runs out is not an error."""
+    """``planner.solve(0.2)`` called from Python takes a number, and time that runs out is not an error."""
     setup = small_problem(_behind_wall)
     planner = factory(setup.getSpaceInformation())
     setup.setPlanner(planner)
