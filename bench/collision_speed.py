@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+
 from rrtik_ompl import Obstacle, Scene, World, load_robot
 from rrtik_ompl.shapes import Box
 
@@ -66,8 +67,9 @@ def main() -> None:
     lines = [
         "# Exact collision checks",
         "",
-        f"Microseconds of CPU time per configuration, median of {repeats} interleaved repeats of {count} uniform random",
-        f"configurations inside the limits, seed 0. {platform.machine()}, Python {platform.python_version()}, {packages}.",
+        f"Microseconds of CPU time per configuration, median of {repeats} interleaved repeats of {count} uniform",
+        f"random configurations inside the limits, seed 0. {platform.machine()}, Python {platform.python_version()},",
+        f"{packages}.",
         "Made by `python bench/collision_speed.py`.",
         "",
         "| robot | boxes | pairs | free | " + " | ".join(CANDIDATES) + " | plain loop / valid_batch |",

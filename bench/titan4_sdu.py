@@ -1,6 +1,6 @@
 """The main job many times over: TITAN-4 from the bay of the subsea unit to its button, one joint at a time.
 
-    python bench/titan4_sdu.py [--seeds 50] [--out bench/reports/titan4_sdu.md]
+python bench/titan4_sdu.py [--seeds 50] [--out bench/reports/titan4_sdu.md]
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+
 from rrtik_ompl import load_problem, plan, shorten
 
 
@@ -31,12 +32,19 @@ def main() -> None:
         seconds = time.perf_counter() - begin
         rows.append((found.path.transitions, path.transitions, found.path.length, path.length, found.seconds, seconds))
     table = np.array(rows)
-    names = ("transitions, raw", "transitions, double cut", "length raw [rad]", "length cut [rad]", "search [s]", "all [s]")
+    names = (
+        "transitions, raw",
+        "transitions, double cut",
+        "length raw [rad]",
+        "length cut [rad]",
+        "search [s]",
+        "all [s]",
+    )
     lines = [
         "# TITAN-4 at the subsea distribution unit",
         "",
-        f"BiCRDT and the double axis cut, seeds 1 to {options.seeds}: {len(rows)} of {options.seeds} solved, all checked",
-        f"again. {platform.machine()}, Python {platform.python_version()}. Made by `python bench/titan4_sdu.py`.",
+        f"BiCRDT and the double axis cut, seeds 1 to {options.seeds}: {len(rows)} of {options.seeds} solved, all",
+        f"checked again. {platform.machine()}, Python {platform.python_version()}. Made by `python bench/titan4_sdu.py`.",
         "",
         "| | mean | median | 95 % | min | max |",
         "|---|---|---|---|---|---|",

@@ -1,4 +1,4 @@
-"""Motion planning for robot arms in one process: a robot and a scene, a problem, a plan, a path that has been checked."""
+"""Motion planning for robot arms: a robot and a scene, a problem, a plan, a path that has been checked."""
 
 from rrtik_ompl.catalog import list_problems, list_robots, load_robot
 from rrtik_ompl.errors import InputError, PlannerError, ProblemError, RrtikError, UnknownNameError

@@ -33,6 +33,8 @@ def finite_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) ->
         InputError: If the values are not numbers, have another shape, or are not all finite.
     """
     try:
+        if np.iscomplexobj(values):
+            raise TypeError("complex numbers")
         array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(f"{what}: expected numbers, got {_short(values)}") from error

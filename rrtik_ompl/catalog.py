@@ -17,12 +17,12 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
-from rrtik_ompl.dh_file import DH_OPTIONS, robot_from_dh_file
+from rrtik_ompl.description.dh_file import DH_OPTIONS, robot_from_dh_file
+from rrtik_ompl.description.robot_cache import RobotCache
+from rrtik_ompl.description.robot_source import base_pose, plain, source_entry
+from rrtik_ompl.description.urdf import URDF_OPTIONS, robot_from_urdf
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.robot_cache import RobotCache
-from rrtik_ompl.robot_source import base_pose, plain, source_entry
-from rrtik_ompl.urdf import URDF_OPTIONS, robot_from_urdf
 
 FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh")
 FILE_KINDS = (".urdf", ".xml", ".yaml", ".yml")

@@ -6,6 +6,7 @@ import json
 import os
 import sys
 import time
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import Enum
@@ -201,6 +202,7 @@ def main() -> None:
 
 def run(arguments: list[str] | None = None) -> int:
     """Run the command line with ``arguments`` (the process's own if None) and return the exit code."""
+    warnings.showwarning = _warn
     try:
         code = app(args=arguments, prog_name="rrtik", standalone_mode=False)
         sys.stdout.flush()
@@ -218,6 +220,10 @@ def run(arguments: list[str] | None = None) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the reader has gone; nobody is left to tell
         return FOUND
+
+
+def _warn(message: Warning | str, *_: Any, **__: Any) -> None:
+    print(f"rrtik: warning: {message}", file=sys.stderr)
 
 
 def _fail(message: str) -> int:

@@ -20,6 +20,10 @@ class InputError(RrtikError):
     """A file, an argument or a value given by the user cannot be used."""
 
 
+class MissingFileError(InputError):
+    """A file that another file names does not exist."""
+
+
 class UnknownNameError(InputError):
     """A name was asked for that does not exist; carries the names that do.
 
@@ -55,4 +59,4 @@ class PlannerError(RrtikError):
 
 
 class MeshWarning(UserWarning):
-    """A mesh can be used, but not as the solid that its author probably meant."""
+    """A mesh is missing or cannot be the solid that its author probably meant, but work can go on."""

@@ -68,7 +68,7 @@ class Box:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HalfSpace:
-    """Everything on the filled side of a plane: points with ``normal . x <= offset``; free side ``normal . x > offset``.
+    """The filled side of a plane: points with ``normal . x <= offset``; the free side is ``normal . x > offset``.
 
     ``normal`` is stored with unit length, and ``offset`` [m] is scaled with it.
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import warnings
 from dataclasses import dataclass
 
 import coal
@@ -11,11 +12,11 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
-from rrtik_ompl.bodies import Body, colliding_pairs, link_bodies, scene_bodies
-from rrtik_ompl.certificate import Certificate
-from rrtik_ompl.containment import Containment
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.motion_bound import displacement_weights
+from rrtik_ompl.collision.bodies import Body, colliding_pairs, link_bodies, scene_bodies
+from rrtik_ompl.collision.certificate import Certificate
+from rrtik_ompl.collision.containment import Containment
+from rrtik_ompl.collision.motion_bound import displacement_weights
+from rrtik_ompl.errors import InputError, MeshWarning
 from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
 from rrtik_ompl.scene import Scene
 
@@ -65,6 +66,9 @@ class World:
         self.motion_resolution = float(finite_array(motion_resolution, (), "motion_resolution"))
         if self.motion_resolution <= 0.0:
             raise InputError(f"motion_resolution must be greater than 0 metres, got {self.motion_resolution:g}")
+        if not robot.collision.geometryObjects:
+            message = f"robot '{robot.name}' has no collision geometry: every configuration counts as free"
+            warnings.warn(MeshWarning(message), stacklevel=2)
         self._bodies = link_bodies(robot) + scene_bodies(robot, self.scene.at(0.0))
         self.weights = displacement_weights(robot, [b for b in self._bodies if b.kind != "obstacle"])
         pairs = colliding_pairs(robot, self.scene, self._bodies)

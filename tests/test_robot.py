@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.urdf import robot_from_urdf_text
 
 MIXED = """<robot name="mixed"><link name="base"><collision><geometry><box size="1 1 1"/></geometry></collision></link>
 <link name="a"/><link name="b"/><link name="c"/><link name="d"><collision><geometry><sphere radius="1"/></geometry>

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rrtik_ompl.certificate import overlap
+from rrtik_ompl.collision.certificate import overlap
+from rrtik_ompl.collision.solids import convex_parts, hull, inside_mesh, pieces
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Sphere
-from rrtik_ompl.solids import convex_parts, hull, inside_mesh, pieces
 
 LETTER_E = [
     (8, 4),

@@ -20,13 +20,13 @@ import numpy as np
 import pytest
 import umsgpack
 
+from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import GoalRegion, JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.poses import pose
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, Waypoints
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Sphere
-from rrtik_ompl.urdf import robot_from_urdf_text
 from rrtik_ompl.viewer import palette, view
 from rrtik_ompl.viewer.framing import frame_around
 from rrtik_ompl.viewer.page import page

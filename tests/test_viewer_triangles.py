@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rrtik_ompl.collision.solids import pieces
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
-from rrtik_ompl.solids import pieces
 from rrtik_ompl.viewer.meshes import half_space_plate, look_of_coal, look_of_shape, thickened
 from rrtik_ompl.viewer.triangles import capsule, extruded, split_creases, thin_out, tube
 

@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.certificate import Certificate
+from rrtik_ompl.collision.certificate import Certificate
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Sphere

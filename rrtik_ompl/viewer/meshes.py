@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.collision.solids import is_mesh, mesh_arrays
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
-from rrtik_ompl.solids import is_mesh, mesh_arrays
 from rrtik_ompl.viewer.triangles import Faces, box_corners, capsule, extruded, split_creases, thin_out, tube
 
 MAX_OBSTACLE_TRIANGLES = 30_000  # a drawn mesh above this is thinned out; the one that is checked stays as it is

@@ -10,7 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.solids import convex_parts
+from rrtik_ompl.collision.solids import convex_parts
 
 Faces: TypeAlias = NDArray[np.int64]  # vertex numbers, shape (m, 3)
 CREASE = np.deg2rad(35.0)  # faces that meet at a larger angle are drawn with an edge between them

@@ -8,9 +8,9 @@ from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any
 
+from rrtik_ompl.description.urdf import robot_from_urdf
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.urdf import robot_from_urdf
 
 PACKAGE = "example-robot-data"
 INSIDE = "cmeel.prefix/share/example-robot-data/robots"

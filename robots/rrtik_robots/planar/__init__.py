@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import finite_array
-from rrtik_ompl.dh import DhRow, robot_from_dh
+from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
 

@@ -9,11 +9,11 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import finite_array
+from rrtik_ompl.description.robot_build import build_robot
+from rrtik_ompl.description.tree import Joint, Link, Solid, Tree
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.robot_build import build_robot
 from rrtik_ompl.shapes import Cylinder, Sphere
-from rrtik_ompl.tree import Joint, Link, Solid, Tree
 
 SMALLEST_RADIUS = 1e-4  # [m], stands for a radius of 0
 ORANGE = (0.90, 0.45, 0.10, 1.0)

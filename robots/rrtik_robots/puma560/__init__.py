@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.arrays import finite_array
-from rrtik_ompl.dh import DhRow, robot_from_dh
+from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.errors import UnknownNameError
 from rrtik_ompl.robot import Robot
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from rrtik_ompl.description.robot_build import JointLimits
+from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.robot_build import JointLimits
-from rrtik_ompl.urdf import robot_from_urdf_text
 from rrtik_robots.titan4.geometry import (
     JOINTS,
     LIMITS_ENVELOPE_DEG,

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from rrtik_ompl.description.robot_build import JointLimits
 from rrtik_ompl.errors import UnknownNameError
-from rrtik_ompl.robot_build import JointLimits
 from rrtik_ompl.yaml_file import Location, YamlDocument, describe, read_yaml
 
 RATES = ("velocity", "acceleration", "jerk")

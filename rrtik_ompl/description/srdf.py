@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
 
+from rrtik_ompl.description.tree import Tree
+from rrtik_ompl.description.urdf_read import attribute, numbers, parse_xml
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.tree import Tree
-from rrtik_ompl.urdf_read import attribute, numbers, parse_xml
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from rrtik_ompl.dh import DhRow, robot_from_dh
+from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.file_format import (
     Name,
     NotNegative,

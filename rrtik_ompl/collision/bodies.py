@@ -11,10 +11,10 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from rrtik_ompl.collision.solids import Piece, pieces, robot_solids
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Scene
-from rrtik_ompl.solids import pieces, robot_solids
+from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
 
 ALWAYS_COLLIDING_SAMPLES = 64
 
@@ -57,11 +57,10 @@ def scene_bodies(robot: Robot, scene: Scene) -> tuple[Body, ...]:
     for name in scene.names:
         if name in links:
             raise InputError(f"scene: '{name}' is also the name of a link of robot '{robot.name}'; rename the obstacle")
-    found = [
-        Body(o.name, 0, o.pose * piece.placement, piece.geometry, "obstacle")
-        for o in scene.obstacles
-        for piece in pieces(o.shape)
-    ]
+    found = []
+    for obstacle in scene.obstacles:
+        poses = ((obstacle.pose * piece.placement, piece.geometry) for piece in _pieces(obstacle))
+        found += [Body(obstacle.name, 0, placement, geometry, "obstacle") for placement, geometry in poses]
     for item in scene.attached:
         for link in (item.link, *item.allow):
             if link not in links:
@@ -70,9 +69,16 @@ def scene_bodies(robot: Robot, scene: Scene) -> tuple[Body, ...]:
         mount = frame.placement * item.pose
         found += [
             Body(item.name, frame.parentJoint, mount * piece.placement, piece.geometry, "attached")
-            for piece in pieces(item.shape)
+            for piece in _pieces(item)
         ]
     return tuple(found)
+
+
+def _pieces(item: Obstacle | AttachedObject) -> tuple[Piece, ...]:
+    try:
+        return pieces(item.shape)
+    except InputError as error:
+        raise InputError(f"scene: '{item.name}': {error}") from None
 
 
 def colliding_pairs(robot: Robot, scene: Scene, bodies: tuple[Body, ...]) -> tuple[tuple[int, int], ...]:

@@ -11,10 +11,10 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.arrays import Vector, finite_array, frozen
+from rrtik_ompl.description.tree import Joint, Tree
+from rrtik_ompl.description.tree_model import build_models
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.robot import Chain, Robot
-from rrtik_ompl.tree import Joint, Tree
-from rrtik_ompl.tree_model import build_models
 
 
 @dataclass(frozen=True, slots=True)

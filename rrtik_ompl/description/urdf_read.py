@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import warnings
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
@@ -13,12 +14,12 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.errors import InputError, RrtikError, UnknownNameError
-from rrtik_ompl.package_path import resolve_mesh
+from rrtik_ompl.description.package_path import resolve_mesh
+from rrtik_ompl.description.robot_build import Mimic
+from rrtik_ompl.description.tree import KINDS, Joint, Link, MeshFile, Solid, Tree
+from rrtik_ompl.errors import InputError, MeshWarning, MissingFileError, RrtikError, UnknownNameError
 from rrtik_ompl.poses import pose_from_rpy
-from rrtik_ompl.robot_build import Mimic
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, Sphere
-from rrtik_ompl.tree import KINDS, Joint, Link, MeshFile, Solid, Tree
 
 Colour = tuple[float, float, float, float]
 _TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -54,6 +55,9 @@ def read_urdf(
     for material in robot.iter("material"):
         reader.learn_material(material)
     links = [reader.link(element) for element in robot.findall("link")]
+    if reader.undrawn:
+        message = f"{where}: {len(reader.undrawn)} visual meshes are missing ({reader.undrawn[0]} and so on)"
+        warnings.warn(MeshWarning(f"{message}; collision shapes are drawn instead"), stacklevel=2)
     joints = [reader.joint(element) for element in robot.findall("joint")]
     mimics = [tie for element in robot.findall("joint") for tie in reader.mimics(element)]
     return UrdfDescription(robot.get("name", ""), Tree(where, links, joints), _flatten(where, joints, mimics))
@@ -125,6 +129,7 @@ class _Reader:
     folder: Path | None
     packages: tuple[Path, ...]
     materials: dict[str, Colour]
+    undrawn: list[str] = field(default_factory=list)  # links with a visual mesh that does not exist
 
     def learn_material(self, material: Element) -> None:
         colour = material.find("color")
@@ -139,8 +144,16 @@ class _Reader:
         capsules = {c.get("name", "") for c in element.findall("collision_checking/capsule")}
         with located(where):
             collision = tuple(self.solid(item, where, capsules) for item in element.findall("collision"))
-            visual = tuple(self.solid(item, where, set()) for item in element.findall("visual"))
-            return Link(name, collision, visual, _inertia(element.find("inertial"), where))
+            visual = tuple(self.visuals(element, name, where))
+            return Link(name, collision, visual or collision, _inertia(element.find("inertial"), where))
+
+    def visuals(self, element: Element, link: str, where: str) -> Iterator[Solid]:
+        """What is drawn. A missing visual mesh is no reason to refuse a robot: planning does not need it."""
+        for item in element.findall("visual"):
+            try:
+                yield self.solid(item, where, set())
+            except MissingFileError:
+                self.undrawn.append(f"link '{link}'")
 
     def solid(self, element: Element, where: str, capsules: set[str]) -> Solid:
         geometry = element.find("geometry")

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from urllib.parse import unquote
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, MissingFileError
 
 MESH_SUFFIXES = (".stl", ".obj", ".dae")
 
@@ -24,7 +24,8 @@ def resolve_mesh(uri: str, folder: Path | None, packages: Iterable[Path], where:
         where: File and element, put in front of the error message.
 
     Raises:
-        InputError: If there is no such file or its format is unknown.
+        MissingFileError: If there is no such file.
+        InputError: If its format is unknown.
     """
     scheme, _, rest = uri.rpartition("://")
     if scheme not in ("", "file", "package", "model"):
@@ -38,7 +39,7 @@ def resolve_mesh(uri: str, folder: Path | None, packages: Iterable[Path], where:
     if found is None:
         package = name.partition("/")[0]
         remedy = f"give packages=[the folder that holds '{package}']" if scheme in ("package", "model") else "check it"
-        raise InputError(f"{where}: mesh file '{uri}' does not exist; {remedy}")
+        raise MissingFileError(f"{where}: mesh file '{uri}' does not exist; {remedy}")
     if found.suffix.lower() not in MESH_SUFFIXES:
         raise InputError(f"{where}: mesh '{uri}' is of no kind that can be read; export it as STL, OBJ or DAE")
     return found.resolve()

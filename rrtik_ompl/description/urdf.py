@@ -7,14 +7,14 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from rrtik_ompl.description.joint_limits import merge_limits, read_joint_limits
+from rrtik_ompl.description.robot_build import JointLimits, build_robot
+from rrtik_ompl.description.robot_source import source_entry
+from rrtik_ompl.description.srdf import Srdf, read_srdf
+from rrtik_ompl.description.urdf_read import UrdfDescription, located, read_urdf
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.joint_limits import merge_limits, read_joint_limits
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.robot_build import JointLimits, build_robot
-from rrtik_ompl.robot_source import source_entry
-from rrtik_ompl.srdf import Srdf, read_srdf
 from rrtik_ompl.text_file import read_text
-from rrtik_ompl.urdf_read import UrdfDescription, located, read_urdf
 
 FilePath = str | os.PathLike[str]
 URDF_OPTIONS = ("base_pose", "group", "joint_limits", "joints", "locked", "packages", "srdf", "tip")

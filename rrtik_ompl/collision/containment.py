@@ -8,8 +8,8 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.bodies import Body
-from rrtik_ompl.solids import inside_mesh, is_mesh, mesh_arrays
+from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.solids import inside_mesh, is_mesh, mesh_arrays
 
 
 class Containment:

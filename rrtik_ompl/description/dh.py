@@ -12,11 +12,11 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import finite_array
+from rrtik_ompl.description.robot_build import JointLimits, build_robot
+from rrtik_ompl.description.tree import Joint, Link, Solid, Tree
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.robot_build import JointLimits, build_robot
 from rrtik_ompl.shapes import Capsule
-from rrtik_ompl.tree import Joint, Link, Solid, Tree
 
 CONVENTIONS = ("standard", "modified")
 ROW_KINDS = ("revolute", "continuous", "prismatic")

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from rrtik_ompl.arrays import Vector, frozen
-from rrtik_ompl.bodies import Body
+from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.robot import Robot
 
 UNBOUNDED_STROKE = 1.0  # [m] assumed stroke of a prismatic joint without limits

@@ -12,12 +12,16 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, frozen
+from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
 
 # A mesh whose volume is at least this share of its convex hull's is taken as convex: its hull stands for it. The hull
 # contains the mesh, so nothing that touches the mesh is missed.
 CONVEX_VOLUME_RATIO = 0.999
+
+# Hulls outside these are refused: thickness over extent, and extent [m].
+FLATTEST, SMALLEST, LARGEST = 1e-7, 1e-6, 1e6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,11 +69,29 @@ def bvh(vertices: Matrix, triangles: NDArray[np.int64]) -> Any:
 
 
 def hull(points: Matrix) -> Any:
-    """Convex hull of points, shape (n, 3), as a coal solid."""
+    """Convex hull of points, shape (n, 3), as a coal solid.
+
+    Raises:
+        InputError: If the points lie (nearly) in a plane or are too far apart; qhull would end the process.
+    """
+    extent, thickness = _extent(points), _thickness(points)
+    if not thickness >= FLATTEST * extent or not SMALLEST <= extent <= LARGEST:
+        raise InputError(
+            f"a solid of {extent:.3g} m across and {thickness:.3g} m thick is too flat, too small or too large to check"
+        )
     cloud = coal.StdVec_Vec3s()
     for point in points:
         cloud.append(np.array(point))
     return coal.Convex.convexHull(cloud, True, "Qt")
+
+
+def _extent(points: Matrix) -> float:
+    return float(np.ptp(points, axis=0).max())
+
+
+def _thickness(points: Matrix) -> float:
+    """Spread of points, shape (n, 3), along the direction in which they spread least [m]."""
+    return float(np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[-1])
 
 
 def convexified(geometry: Any) -> Any:
@@ -79,7 +101,7 @@ def convexified(geometry: Any) -> Any:
     vertices, triangles = mesh_arrays(geometry)
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     volume = abs(float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum())) / 6.0
-    if np.linalg.matrix_rank(vertices - vertices[0], tol=1e-9) < 3:
+    if not _thickness(vertices) >= FLATTEST * _extent(vertices):
         return geometry
     solid = hull(vertices)
     return solid if volume >= CONVEX_VOLUME_RATIO * solid.computeVolume() else geometry

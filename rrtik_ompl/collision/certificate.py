@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix
-from rrtik_ompl.bodies import Body
-from rrtik_ompl.containment import Containment
+from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.containment import Containment
 from rrtik_ompl.robot import Robot
 
 CHUNK = 256  # configurations at a time, to bound memory
