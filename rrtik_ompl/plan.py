@@ -19,7 +19,7 @@ from rrtik_ompl.problem import Problem
 
 DEFAULT_PLANNER = "bicrdt"
 RESTARTS = 20
-_OMPL_PREFIX = "geometric::"
+_OMPL_PREFIX, _MOVEIT_SUFFIX = "geometric::", "kConfigDefault"  # as in ompl_planning.yaml
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,18 +118,18 @@ def list_planners() -> tuple[str, ...]:
 
 
 def find_planner(name: str) -> PlannerFactory:
-    """The planner class of a name.
+    """The planner class of a name, in upper or lower case; MoveIt's way of writing OMPL's names is understood too.
 
     Raises:
         UnknownNameError: If there is none; carries all names.
     """
-    wheel = ompl_planners()
-    bare = name.removeprefix(_OMPL_PREFIX)
+    bare = name.removeprefix(_OMPL_PREFIX).removesuffix(_MOVEIT_SUFFIX).lower()
+    wheel = {key.lower(): value for key, value in ompl_planners().items()}
     if bare in wheel:
         found: PlannerFactory = wheel[bare]
         return found
-    if name in catalog.list_planners():
-        return catalog.find_planner(name)  # type: ignore[no-any-return]
+    if bare in catalog.list_planners():
+        return catalog.find_planner(bare)  # type: ignore[no-any-return]
     raise UnknownNameError("planner", name, list_planners())
 
 

@@ -140,7 +140,9 @@ def test_wrong_arguments_get_one_line(wall, arguments, message):
 
 
 def test_names_are_found_and_offered():
-    assert find_planner("geometric::RRTConnect") is find_planner("RRTConnect")
+    for name in ("geometric::RRTConnect", "rrtconnect", "RRTConnectkConfigDefault"):
+        assert find_planner(name) is find_planner("RRTConnect")
+    assert find_planner("BiCRDT") is find_planner("bicrdt")
     assert {"bicrdt", "crdt", "RRTConnect", "PRM"} <= set(list_planners())
     with pytest.raises(UnknownNameError, match="did you mean 'RRTConnect'"):
         find_planner("RRTConect")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 ROBOT = "#5b6b7c"
 ROBOT_ALTERNATE = "#8494a5"  # every second link, so that the joints can be seen
 START = "#0072b2"
@@ -17,6 +19,11 @@ BACKGROUND_BOTTOM = "#e3e9ef"
 def number(color: str) -> int:
     """The colour '#rrggbb' as the number that three.js takes."""
     return int(color.removeprefix("#"), 16)
+
+
+def hexadecimal(fractions: Iterable[float]) -> str:
+    """Red, green and blue between 0 and 1 as the colour '#rrggbb'."""
+    return "#" + "".join(f"{round(255 * min(max(float(part), 0.0), 1.0)):02x}" for part in fractions)
 
 
 def fractions(color: str) -> list[float]:

@@ -63,9 +63,17 @@ def _link_parts(bodies: Any, triangles: int) -> list[Part]:
         share = triangles * triangle_count(body.geometry) // total
         look = look_of_coal(body.geometry, max(share, 200))
         if look is not None:
-            color = palette.ROBOT_ALTERNATE if body.parentJoint % 2 else palette.ROBOT
-            parts.append(Part(node_name(body.name), body.parentJoint, body.placement.homogeneous, look, color))
+            parts.append(
+                Part(node_name(body.name), body.parentJoint, body.placement.homogeneous, look, _link_color(body))
+            )
     return parts
+
+
+def _link_color(body: Any) -> str:
+    """The colour that the robot's description gives, or one of two greys in turn, so that the joints can be seen."""
+    if body.overrideMaterial:
+        return palette.hexadecimal(body.meshColor[:3])
+    return palette.ROBOT_ALTERNATE if body.parentJoint % 2 else palette.ROBOT
 
 
 def attached_parts(robot: Robot, attached: tuple[AttachedObject, ...]) -> list[Part]:

@@ -14,7 +14,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
 
 LIMITS_PLANAR3_DEG = ((-45.0, 270.0), (-180.0, 180.0), (-180.0, 180.0))
-BLUE = (0.20, 0.42, 0.66, 1.0)
+SLATE = (0.36, 0.42, 0.49, 1.0)  # unlike the colours of start, goal and obstacles
 
 
 def planar(
@@ -77,5 +77,5 @@ def _arm(
         postures={"zero": np.zeros(len(rows))},
         self_collision=False,
         planar=True,
-        colour=BLUE,
+        colour=SLATE,
     )

@@ -16,7 +16,7 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.shapes import Cylinder, Sphere
 
 SMALLEST_RADIUS = 1e-4  # [m], stands for a radius of 0
-ORANGE = (0.90, 0.45, 0.10, 1.0)
+SLATE = (0.36, 0.42, 0.49, 1.0)  # unlike the colours of start, goal and obstacles
 
 
 def point2d(
@@ -45,7 +45,7 @@ def point2d(
         raise InputError(f"point2d: radius must not be negative, got {size:g}")
     size = max(size, SMALLEST_RADIUS)
     (left, right), (bottom, top) = finite_array(bounds, (2, 2), "point2d: bounds").tolist()
-    ball, disc = Solid(Sphere(size), pin.SE3.Identity(), ORANGE), Solid(Cylinder(size, 0.1 * size), colour=ORANGE)
+    ball, disc = Solid(Sphere(size), pin.SE3.Identity(), SLATE), Solid(Cylinder(size, 0.1 * size), colour=SLATE)
     tree = Tree(
         "point2d",
         [Link("base"), Link("carriage"), Link("disc", (ball,), (disc,))],
