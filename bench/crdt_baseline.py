@@ -72,9 +72,10 @@ def rrt_run(problem: Problem, seed: int) -> TreeRun:
 def crdt_run(problem: Problem, seed: int) -> TreeRun:
     """Basic C-RDT as an OMPL planner, with the same goal tolerance and the same counting."""
     tests, begin = PointTests(problem.world), perf_counter()
-    si = space_information(problem, Judge(problem.world))
+    goals = problem.goal.q[None]
+    si = space_information(problem, goals, Judge(problem.world))
     planner = CRDT(si, world=tests, seed=seed, goal_tolerance=STEP, max_iterations=CAP)
-    planner.setProblemDefinition(problem_definition(problem, si, all_turns=True))
+    planner.setProblemDefinition(problem_definition(problem, goals, si))
     planner.setup()
     found = str(planner.solve(600.0)) == "Exact solution"
     counts = planner.statistics

@@ -136,7 +136,7 @@ def check(problem: ProblemName, path: PathFile = None) -> int:
     if faults:
         return NOT_FOUND
     step = world.motion_resolution / SECOND_CHECK
-    size = f"{len(route.waypoints)} waypoints, {route.transitions} moves, length {route.length:.2f} rad"
+    size = f"{len(route.waypoints)} waypoints, {route.transitions} moves, length {route.length:.2f} {route.unit}"
     _print(f"{path}: valid, checked every {step:g} m; {size}")
     return FOUND
 

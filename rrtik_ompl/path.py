@@ -117,6 +117,11 @@ class JointPath:
         return route_length(self.waypoints)
 
     @property
+    def unit(self) -> str:
+        """Unit of the length: rad, m, or "rad, m" for a path of both kinds of joints."""
+        return ", ".join(name for name, some in (("rad", ~self.prismatic), ("m", self.prismatic)) if some.any())
+
+    @property
     def transitions(self) -> int:
         """Number of moves after joining consecutive moves of the same joint (C-RDT's measure)."""
         return transitions(self.waypoints)

@@ -13,6 +13,8 @@ import numpy as np
 from rrtik_ompl import catalog
 from rrtik_ompl.arrays import finite_array
 from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.goal_configurations import goal_configurations
 from rrtik_ompl.ompl_bridge.attempt import ANYTIME_PLANNERS, Attempt, PlannerFactory, attempt, ompl_planners
 from rrtik_ompl.path import SECOND_CHECK, JointPath, Violation
 from rrtik_ompl.problem import Problem
@@ -56,6 +58,8 @@ def plan(
 ) -> Plan:
     """Find a collision-free path from the start to the goal of a problem.
 
+    A pose or position is first turned into free goal configurations by inverse kinematics.
+
     A path is returned only if a second check agrees, which is twice as dense as the planner's and shares nothing with
     it (:meth:`JointPath.violations`). If a planner gives up before its time it is started anew with another random
     stream; if the second check rejects its path, it is started anew and checks as densely as that.
@@ -71,7 +75,7 @@ def plan(
 
     Raises:
         UnknownNameError: If there is no planner of that name.
-        InputError: If a number or a parameter makes no sense, or the planner cannot work towards this kind of goal.
+        InputError: If a number or a parameter makes no sense.
         PlannerError: If the planner broke.
     """
     limit = float(finite_array(seconds, (), "seconds"))
@@ -81,35 +85,50 @@ def plan(
         raise InputError(f"restarts must be a whole number of at least 0, got {restarts!r}")
     name, factory = (planner, find_planner(planner)) if isinstance(planner, str) else (planner.__name__, planner)
     used = _seed(seed)
+    seeds = [int(child) for child in np.random.SeedSequence(used).generate_state(restarts + 1, np.uint32)]
     begin = time.perf_counter()
-    totals: dict[str, int | float] = {"attempts": 0, "rejected": 0}
-    reason, path = "", None
-    # An optimal path touches what it goes round, and an anytime planner has no time left for a second attempt.
-    asked = problem.refined(SECOND_CHECK) if getattr(factory, "__name__", "") in ANYTIME_PLANNERS else problem
-    for number, child in enumerate(np.random.SeedSequence(used).generate_state(restarts + 1, np.uint32)):
-        left = limit - (time.perf_counter() - begin)
-        if left <= 0.0:
-            break
-        short_way = number == 0 and restarts > 0 and bool(problem.world.robot.continuous.any())
-        outcome = attempt(
-            asked,
-            factory,
-            seconds=0.5 * left if short_way else left,
-            seed=int(child),
-            parameters=parameters or {},
-            all_turns=not short_way,
-        )
-        _count(totals, outcome)
-        path, reason = _judged(problem, outcome, name)
-        if path is not None:
-            break
-        if outcome.rows is not None:
-            totals["rejected"] += 1
-            asked = problem.refined(SECOND_CHECK)
+    path, reason, totals = _search(problem, factory, name, begin + limit, seeds, parameters or {})
     elapsed = time.perf_counter() - begin
     if path is None and elapsed >= limit:
         reason = f"no path within {limit:g} s ({totals['attempts']} attempts; the last one: {reason or 'out of time'})"
     return Plan(path is not None, path, reason, elapsed, name, used, MappingProxyType(totals))
+
+
+def _search(
+    problem: Problem,
+    factory: PlannerFactory,
+    name: str,
+    deadline: float,
+    seeds: list[int],
+    parameters: Mapping[str, Any],
+) -> tuple[JointPath | None, str, dict[str, int | float]]:
+    """Attempt after attempt, one per seed: the path or None, the reason, and the counts of all of them."""
+    totals: dict[str, int | float] = {"attempts": 0, "rejected": 0}
+    reason = ""
+    turns_matter = isinstance(problem.goal, JointGoal) and bool(problem.world.robot.continuous.any())
+    # An optimal path touches what it goes round, and an anytime planner has no time left for a second attempt.
+    asked = problem.refined(SECOND_CHECK) if getattr(factory, "__name__", "") in ANYTIME_PLANNERS else problem
+    for number, seed in enumerate(seeds):
+        if time.perf_counter() >= deadline:
+            break
+        totals["attempts"] += 1
+        short_way = turns_matter and number == 0 and len(seeds) > 1
+        aims = goal_configurations(problem, np.random.default_rng(seed), all_turns=not short_way)
+        left = deadline - time.perf_counter()
+        if len(aims.rows) == 0 or left <= 0.0:
+            reason = aims.reason
+            continue
+        half = 0.5 if short_way else 1.0  # of the time for the short way round, before the long one is tried too
+        outcome = attempt(asked, factory, aims.rows, seconds=half * left, seed=seed, parameters=parameters)
+        for key, value in outcome.statistics.items():
+            totals[key] = totals.get(key, 0) + value
+        path, reason = _judged(problem, outcome, name)
+        if path is not None:
+            return path, "", totals
+        if outcome.rows is not None:
+            totals["rejected"] += 1
+            asked = problem.refined(SECOND_CHECK)
+    return None, reason, totals
 
 
 def list_planners() -> tuple[str, ...]:
@@ -144,12 +163,6 @@ def _judged(problem: Problem, outcome: Attempt, name: str) -> tuple[JointPath | 
     if not (path.start == problem.start).all() or not problem.reached(path.end):
         return None, f"the path of {name} does not lead from the start to the goal"
     return path, ""
-
-
-def _count(totals: dict[str, int | float], outcome: Attempt) -> None:
-    totals["attempts"] += 1
-    for key, value in outcome.statistics.items():
-        totals[key] = totals.get(key, 0) + value
 
 
 def _seed(seed: int | None) -> int:

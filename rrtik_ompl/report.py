@@ -58,12 +58,12 @@ def summary(problem: Problem, plan: Plan, path: JointPath | None, shorten_second
     bound = fewest_moves(problem)
     if path.one_joint_at_a_time:
         least = "" if bound is None else f" (no path can have fewer than {bound})"
-        before = (
-            "" if path is plan.path else f"; {plan.path.transitions} and {plan.path.length:.2f} rad before shortening"
-        )
-        lines.append(f"{path.transitions} moves{least}, length {path.length:.2f} rad{before}")
+        raw = plan.path
+        before = "" if path is raw else f"; {raw.transitions} and {raw.length:.2f} {raw.unit} before shortening"
+        lines.append(f"{path.transitions} moves{least}, length {path.length:.2f} {path.unit}{before}")
     else:
-        lines.append(f"{len(path.waypoints)} waypoints, length {path.length:.2f} rad, several joints move at once")
+        size = f"{len(path.waypoints)} waypoints, length {path.length:.2f} {path.unit}"
+        lines.append(f"{size}, several joints move at once")
     step = problem.world.motion_resolution / SECOND_CHECK
     lines.append(
         f"planning {plan.seconds:.3f} s, shortening {shorten_seconds:.3f} s; checked again every {step:g} m: valid"

@@ -193,7 +193,25 @@ class Robot:
         jacobian = pin.computeFrameJacobian(
             self.model, self.model.createData(), full, self._frame_id(frame), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         )
-        product: Matrix = jacobian @ self.chain.gain
+        product: Matrix = np.reshape(jacobian, (6, -1)) @ self.chain.gain  # for one joint it comes as a vector
+        return product
+
+    def jacobian_batch(self, Q: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
+        """Geometric Jacobians of a batch, as :meth:`jacobian`, for Q of shape (m, dof). Shape (m, 6, dof)."""
+        target = self.model.frames[self._frame_id(frame)]
+        frames = self.joint_frames(Q)
+        point = (frames[:, target.parentJoint] @ target.placement.homogeneous)[:, :3, 3]
+        columns = np.zeros((len(frames), 6, len(self.chain.parent)))
+        joint = target.parentJoint - 1
+        while joint >= 0:  # only the joints between the base and the frame move it
+            axis = frames[:, joint + 1, :3, :3] @ self.chain.axis[joint]
+            if self.chain.prismatic[joint]:
+                columns[:, :3, joint] = axis
+            else:
+                columns[:, :3, joint] = np.cross(axis, point - frames[:, joint + 1, :3, 3])
+                columns[:, 3:, joint] = axis
+            joint = int(self.chain.parent[joint])
+        product: NDArray[np.float64] = columns @ self.chain.gain
         return product
 
     def _frame_id(self, frame: str | None) -> int:

@@ -14,6 +14,7 @@ from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.plan import find_planner, list_planners, plan
 from rrtik_ompl.problem import Problem
+from rrtik_ompl.problem_file import load_problem
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box
 from rrtik_ompl.shorten import shorten
@@ -93,14 +94,33 @@ def test_a_path_that_the_second_check_rejects_is_never_returned(wall, monkeypatc
     assert "rejected by the second check: no" in found.reason
 
 
-def test_a_position_goal_works_with_the_planners_that_need_no_goal_configuration():
-    robot = load_robot("planar3")
-    problem = Problem(World(robot), np.zeros(3), PositionGoal([0.0, 2.0, 0.0], 0.1), name="reach")
-    found = plan(problem, "RRT", seconds=10.0, seed=1)
+@pytest.mark.parametrize("name", ["planar3_boxes", "planar6_c", "planar6_c_pose", "puma_position", "puma_pose"])
+@pytest.mark.parametrize("planner", ["bicrdt", "RRTConnect"])
+def test_goals_that_are_poses_or_positions_are_reached(name, planner):
+    problem = load_problem(name)
+    found = plan(problem, planner, seconds=20.0, seed=1)
     assert found.found, found.reason
     assert problem.reached(found.path.end)
-    with pytest.raises(InputError, match="needs a goal in joint values"):
-        plan(problem, "bicrdt")
+    assert found.path.violations(problem.world) == ()
+
+
+@pytest.mark.parametrize("name", ["titan4_axis1", "titan4_wrist"])
+def test_singular_pose_goals_are_reached(name):
+    problem = load_problem(name)
+    found = plan(problem, "bicrdt", seconds=20.0, seed=1)
+    assert found.found, found.reason
+    assert problem.reached(found.path.end)
+
+
+def test_a_goal_out_of_reach_and_a_goal_inside_an_obstacle_say_so():
+    robot = load_robot("planar3")
+    far = Problem(World(robot), np.zeros(3), PositionGoal([0.0, 5.0, 0.0]))
+    assert "is it in reach" in plan(far, "bicrdt", seconds=10.0, seed=1, restarts=0).reason
+    world = World(robot, Scene([Obstacle("crate", Box([0.5, 0.5, 1]), at(0, 2))]))
+    inside = Problem(world, np.zeros(3), PositionGoal([0.0, 2.0, 0.0]))
+    reason = plan(inside, "bicrdt", seconds=10.0, seed=1, restarts=0).reason
+    assert "all in collision" in reason
+    assert "crate" in reason
 
 
 def test_a_continuous_joint_goes_the_short_way_round():

@@ -41,8 +41,7 @@ def build_models(tree: Tree, T_world_base: Any | None = None) -> tuple[Any, Any,
         place = places[joint.child] = _add_joint(model, joint, places[joint.parent])
         if joint.name in framed:
             kind = pin.FrameType.FIXED_JOINT if joint.kind == "fixed" else pin.FrameType.JOINT
-            offset = place.T_joint_link if joint.kind == "fixed" else pin.SE3.Identity()
-            frame = pin.Frame(joint.name, place.joint, place.frame, offset, kind)
+            frame = pin.Frame(joint.name, place.joint, place.frame, place.T_joint_link, kind)
             place.frame = model.addFrame(frame, False)
         _add_link(model, links[joint.child], places)
     meshes: dict[MeshFile, Any] = {}

@@ -16,13 +16,9 @@ from ompl import util as ou
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
-from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
 from rrtik_ompl.ompl_bridge.setup import Judge, exact_path, problem_definition, space_information
 from rrtik_ompl.problem import Problem
-
-# The planners of the wheel that grow a tree towards a goal of which no configuration is known.
-WORKSPACE_GOAL_PLANNERS = ("KPIECE1", "RRT")
 
 # Those that go on improving their path until the time is up.
 ANYTIME_PLANNERS = ("AORRTC", "BITstar", "InformedRRTstar", "PRMstar", "RRTstar", "SORRTstar")
@@ -48,15 +44,13 @@ def ompl_planners() -> dict[str, Any]:
 def attempt(
     problem: Problem,
     factory: PlannerFactory,
+    goals: Matrix,
     *,
     seconds: float,
     seed: int,
     parameters: Mapping[str, Any],
-    all_turns: bool = True,
 ) -> Attempt:
-    """Let a planner work on a problem for at most ``seconds``.
-
-    With ``all_turns`` the goal of a continuous joint may also be reached the long way round.
+    """Let a planner work for at most ``seconds`` from the start of a problem to any of ``goals``, shape (k, n).
 
     Raises:
         InputError: If the planner does not take a parameter, or cannot work towards this kind of goal.
@@ -65,16 +59,11 @@ def attempt(
     """
     own = issubclass(factory, SafePlanner) if isinstance(factory, type) else False
     name = getattr(factory, "__name__", str(factory))
-    if not isinstance(problem.goal, JointGoal) and name not in WORKSPACE_GOAL_PLANNERS:
-        raise InputError(
-            f"planner {name} needs a goal in joint values, but {problem.name} gives a pose or position; "
-            f"use one of {', '.join(WORKSPACE_GOAL_PLANNERS)}, or give goal joints"
-        )
     with _quiet():
         ou.RNG.setSeed(1 + seed % (2**31 - 2))  # before any object that draws from it; OMPL does not take 0
         judge = Judge(problem.world)
-        si = space_information(problem, judge)
-        definition = problem_definition(problem, si, all_turns=all_turns)
+        si = space_information(problem, goals, judge)
+        definition = problem_definition(problem, goals, si)
         if own:
             planner = _own_planner(factory, name, si, problem, seed, parameters)
         else:

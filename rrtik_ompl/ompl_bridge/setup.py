@@ -10,14 +10,11 @@ import numpy as np
 from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.world import World
 
 TURN = 2.0 * np.pi
-AT_GOAL = 1e-9  # OMPL asks for a distance below the threshold, not equal to it
 UNLIMITED_STROKE = 10.0  # [m] each way from the start for a prismatic joint without limits
 
 
@@ -65,47 +62,19 @@ class _Motions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no types
         return self._judge.motion_valid(self._states.read(first), self._states.read(second))
 
 
-class _Region(ob.GoalRegion):  # type: ignore[misc]
-    """A goal in the workspace, for planners that need no goal configuration."""
-
-    def __init__(self, si: Any, problem: Problem, states: StateIO) -> None:
-        super().__init__(si)
-        self._goal, self._robot, self._states = problem.goal, problem.world.robot, states
-        self.setThreshold(AT_GOAL)
-
-    def distanceGoal(self, state: Any) -> float:
-        """Zero at the goal, the goal's own distance elsewhere."""
-        row = self._states.read(state)[None]
-        if self._goal.satisfied(self._robot, row)[0]:
-            return 0.0
-        return max(float(self._goal.distance(self._robot, row)[0]), 2.0 * AT_GOAL)
-
-
-def planning_bounds(problem: Problem) -> tuple[Vector, Vector]:
-    """Finite bounds to sample in, shapes (n,): the limits; for a continuous joint one turn each way from the start."""
+def planning_bounds(problem: Problem, goals: Matrix) -> tuple[Vector, Vector]:
+    """Finite bounds to sample in, shapes (n,): the limits; where there are none, some way beyond start and goals."""
     robot = problem.world.robot
     spread = np.where(robot.prismatic, UNLIMITED_STROKE, TURN)
-    goal = problem.goal.q if isinstance(problem.goal, JointGoal) else problem.start
-    lower = np.where(np.isfinite(robot.lower), robot.lower, np.minimum(problem.start, goal) - spread)
-    upper = np.where(np.isfinite(robot.upper), robot.upper, np.maximum(problem.start, goal) + spread)
+    ends = np.vstack([problem.start, goals])
+    lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - spread)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, ends.max(axis=0) + spread)
     return lower, upper
 
 
-def goal_configurations(problem: Problem, *, all_turns: bool) -> Matrix:
-    """The goal configuration; with ``all_turns`` also, for each continuous joint, the goal the other way round."""
-    if not isinstance(problem.goal, JointGoal):
-        raise InputError(f"goal of {problem.name}: a goal in joint values is needed here")
-    rows = [np.asarray(problem.goal.q)]
-    for joint in np.flatnonzero(problem.world.robot.continuous) if all_turns else ():
-        other = np.array(problem.goal.q)
-        other[joint] += -TURN if other[joint] > problem.start[joint] else TURN
-        rows.append(other)
-    return np.array(rows)
-
-
-def space_information(problem: Problem, judge: Judge) -> Any:
+def space_information(problem: Problem, goals: Matrix, judge: Judge) -> Any:
     """A set-up ``ompl.base.SpaceInformation`` of a RealVectorStateSpace whose checks are the world's."""
-    lower, upper = planning_bounds(problem)
+    lower, upper = planning_bounds(problem, goals)
     space = ob.RealVectorStateSpace(len(lower))
     bounds = ob.RealVectorBounds(len(lower))
     for k in range(len(lower)):
@@ -120,18 +89,15 @@ def space_information(problem: Problem, judge: Judge) -> Any:
     return si
 
 
-def problem_definition(problem: Problem, si: Any, *, all_turns: bool) -> Any:
-    """``ompl.base.ProblemDefinition`` with the start and the goal of the problem."""
+def problem_definition(problem: Problem, goals: Matrix, si: Any) -> Any:
+    """``ompl.base.ProblemDefinition`` with the start of the problem and goal configurations, shape (k, n)."""
     states, state, definition = StateIO(si), si.allocState(), ob.ProblemDefinition(si)
     states.write(state, problem.start)
     definition.addStartState(state)
-    if isinstance(problem.goal, JointGoal):
-        goal = ob.GoalStates(si)
-        for row in goal_configurations(problem, all_turns=all_turns):
-            states.write(state, row)
-            goal.addState(state)
-    else:
-        goal = _Region(si, problem, states)
+    goal = ob.GoalStates(si)
+    for row in goals:
+        states.write(state, row)
+        goal.addState(state)
     definition.setGoal(goal)
     return definition
 

@@ -1,0 +1,101 @@
+"""Numeric inverse kinematics of any arm, many starts at once: Levenberg-Marquardt with a damping that needs no tuning.
+
+Source: T. Sugihara, "Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method", IEEE Transactions
+on Robotics 27 (2011), 984-991: the damping is the residual itself plus a small constant, so that steps are short far
+from the target and in singular postures, and Newton's near the solution.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal
+from rrtik_ompl.robot import Robot
+
+ITERATIONS = 60
+DAMPING = 1e-6  # the constant part, in units of the squared residual (1 is the reach)
+LARGEST_STEP = 0.5  # [rad] or [m] of any joint in one iteration
+
+
+def numeric_ik(robot: Robot, goal: PoseGoal | PositionGoal, starts: Matrix, *, iterations: int = ITERATIONS) -> Matrix:
+    """Move configurations towards a goal, each from its own start, inside the joint limits.
+
+    Args:
+        robot: The arm.
+        goal: A pose, or a position with any orientation.
+        starts: Shape (m, dof).
+        iterations: Steps at most.
+
+    Returns:
+        The rows that satisfy the goal, in the order of their starts, shape (k, dof), k <= m.
+    """
+    Q = np.clip(starts, robot.lower, robot.upper)
+    reach = float(np.linalg.norm(robot.chain.placement[:, :3, 3], axis=1).sum()) or 1.0
+    scale = np.array([1.0 / reach] * 3 + [0.5] * 3)  # a full turn of orientation counts as much as the whole reach
+    for _ in range(iterations):
+        open_rows = np.flatnonzero(~_well_inside(robot, goal, Q))
+        if len(open_rows) == 0:
+            break
+        q = Q[open_rows]
+        residual, jacobian = _residual(goal, robot.fk_batch(q)), robot.jacobian_batch(q)
+        rows = slice(0, 3) if isinstance(goal, PositionGoal) else slice(0, 6)
+        e, J = (residual * scale)[:, rows], (jacobian * scale[:, None])[:, rows]
+        Q[open_rows] = np.clip(q + _step(J, e), robot.lower, robot.upper)
+    return Q[goal.satisfied(robot, Q)]
+
+
+def targets(
+    goal: PoseGoal | PositionGoal | GoalRegion, most: int, rng: np.random.Generator
+) -> list[PoseGoal | PositionGoal]:
+    """Goals without freedom: the goal itself, or up to ``most`` draws from a region."""
+    if not isinstance(goal, GoalRegion):
+        return [goal]
+    free = goal.free_rotation_axis is not None or bool(goal.box.any())
+    count = most if free else min(most, len(goal.members))
+    return [_drawn(goal, goal.members[k % len(goal.members)], rng) for k in range(count)]
+
+
+def _drawn(region: GoalRegion, member: PoseGoal | PositionGoal, rng: np.random.Generator) -> PoseGoal | PositionGoal:
+    if isinstance(member, PositionGoal):
+        return member
+    turn = np.eye(3)
+    if region.free_rotation_axis is not None:
+        axis = np.eye(3)["xyz".index(region.free_rotation_axis)]
+        turn = pin.exp3(rng.uniform(-np.pi, np.pi) * axis)
+    shift = pin.SE3(turn, rng.uniform(-0.5, 0.5, 3) * region.box)
+    return PoseGoal(member.T_world_tip * shift, member.position_tolerance, member.orientation_tolerance)
+
+
+def _well_inside(robot: Robot, goal: PoseGoal | PositionGoal, Q: Matrix) -> NDArray[np.bool_]:
+    """At most a hundredth of the tolerance away: a solution on the rim would not survive rounding."""
+    if isinstance(goal, PositionGoal):
+        return goal.distance(robot, Q) <= 0.01 * goal.tolerance
+    position, angle = goal.errors(robot, Q)
+    return (position <= 0.01 * goal.position_tolerance) & (angle <= 0.01 * goal.orientation_tolerance)
+
+
+def _residual(goal: PoseGoal | PositionGoal, tips: NDArray[np.float64]) -> Matrix:
+    """Twist from the tips, shape (m, 4, 4), to the goal in world axes: (linear [m]; rotation vector [rad]), (m, 6)."""
+    residual = np.zeros((len(tips), 6))
+    if isinstance(goal, PositionGoal):
+        residual[:, :3] = goal.position - tips[:, :3, 3]
+        return residual
+    target: Any = goal.T_world_tip
+    residual[:, :3] = target.translation - tips[:, :3, 3]
+    residual[:, 3:] = [pin.log3(target.rotation @ tip[:3, :3].T) for tip in tips]
+    return residual
+
+
+def _step(J: NDArray[np.float64], e: Matrix) -> Matrix:
+    """Solve (J^T J + (e^T e / 2 + DAMPING) I) dq = J^T e for every row; shapes (m, k, n), (m, k) -> (m, n)."""
+    damping: Vector = 0.5 * np.einsum("mi,mi->m", e, e) + DAMPING
+    normal = np.einsum("mki,mkj->mij", J, J) + damping[:, None, None] * np.eye(J.shape[2])
+    step: Matrix = np.linalg.solve(normal, np.einsum("mki,mk->mi", J, e)[..., None])[..., 0]
+    largest = np.abs(step).max(axis=1, keepdims=True)
+    bounded: Matrix = step * np.minimum(1.0, LARGEST_STEP / np.maximum(largest, 1e-12))
+    return bounded
