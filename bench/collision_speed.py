@@ -26,9 +26,10 @@ CANDIDATES = ("valid", "valid_batch", "certify", "plain loop")
 
 
 def clutter(count: int, reach: float, rng: np.random.Generator) -> Scene:
-    """Boxes on a spherical shell around the base, none nearer than a quarter of the reach."""
-    directions = rng.normal(size=(count, 3))
-    centres = directions / np.linalg.norm(directions, axis=1)[:, None] * rng.uniform(0.45, 1.0, (count, 1)) * reach
+    """Boxes around the arm; none stands so near to the first axis that the arm could not but touch it."""
+    azimuth = rng.uniform(-np.pi, np.pi, count)
+    radius, height = reach * rng.uniform(0.45, 1.0, count), reach * rng.uniform(-0.2, 0.7, count)
+    centres = np.column_stack([radius * np.cos(azimuth), radius * np.sin(azimuth), height])
     boxes = (Box(rng.uniform(0.05, 0.15, 3) * reach) for _ in range(count))
     poses = (pin.SE3(np.eye(3), centre) for centre in centres)
     return Scene([Obstacle(f"box{k}", box, pose) for k, (box, pose) in enumerate(zip(boxes, poses, strict=True))])

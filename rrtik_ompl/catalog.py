@@ -23,6 +23,7 @@ from rrtik_ompl.description.robot_source import base_pose, plain, source_entry
 from rrtik_ompl.description.urdf import URDF_OPTIONS, robot_from_urdf
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.text_file import file_name
 
 FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh")
 FILE_KINDS = (".urdf", ".xml", ".yaml", ".yml")
@@ -79,7 +80,7 @@ def load_robot(name: str | os.PathLike[str], **options: Any) -> Robot:
         UnknownNameError: If there is no robot of that name.
         InputError: If the robot does not take an option, or a file or value cannot be used.
     """
-    recipe = _recipe(name)
+    recipe = _recipe(file_name(name) if not isinstance(name, str) else name)
     for option in options:
         if option not in recipe.options:
             raise InputError(

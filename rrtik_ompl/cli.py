@@ -47,6 +47,7 @@ class Shorten(str, Enum):
 
     auto = "auto"
     axis = "axis"
+    axis_rounds = "axis-rounds"
     none = "none"
 
 
@@ -117,15 +118,17 @@ def plan(
 @app.command()
 def check(problem: ProblemName, path: PathFile = None) -> int:
     """Check a problem file, and a path for it, densely and independently of any planner."""
-    from rrtik_ompl import load_path, load_problem
+    from rrtik_ompl import JointGoal, load_path, load_problem
     from rrtik_ompl.path import SECOND_CHECK
 
     question = load_problem(problem)
     world = question.world
+    route = None if path is None else load_path(path, world.robot)
     _print(f"{question.name}: start is free, clearance {_millimetres(world.clearance(question.start))}")
-    if path is None:
+    if isinstance(question.goal, JointGoal):
+        _print(f"{question.name}: goal is free, clearance {_millimetres(world.clearance(question.goal.q))}")
+    if route is None:
         return FOUND
-    route = load_path(path, world.robot)
     faults = [f"edge {v.edge + 1}: {v.reason}" for v in route.violations(world)]
     if abs(route.start - question.start).max() > 1e-6:
         faults.append("the path does not begin at the start of the problem")
@@ -178,14 +181,14 @@ def list_names(kind: Annotated[Kind | None, typer.Argument(help="All three kinds
 
 @app.command()
 def convert(
-    source: Annotated[Path, typer.Argument(metavar="IN", help="A path file, or a problem (MotionBenchMaker too).")],
+    source: Annotated[str, typer.Argument(metavar="IN", help="A path file, or a problem (MotionBenchMaker too).")],
     target: Annotated[Path, typer.Argument(metavar="OUT", help="The ending says which format.")],
     robot: Annotated[str | None, typer.Option(help="Robot that the file is for, where the file does not say.")] = None,
 ) -> int:
     """Convert between path formats (.json, .csv, .txt), or write any problem as a problem file (.yaml)."""
     from rrtik_ompl import load_path, load_problem, load_robot, save_problem
 
-    if source.suffix.lower() in PATH_ENDINGS:
+    if Path(source).suffix.lower() in PATH_ENDINGS:
         _check_target(target, PATH_ENDINGS)
         load_path(source, None if robot is None else load_robot(robot)).save(target)
     else:
@@ -203,6 +206,7 @@ def main() -> None:
 def run(arguments: list[str] | None = None) -> int:
     """Run the command line with ``arguments`` (the process's own if None) and return the exit code."""
     warnings.showwarning = _warn
+    _prepare_streams()
     try:
         code = app(args=arguments, prog_name="rrtik", standalone_mode=False)
         sys.stdout.flush()
@@ -212,14 +216,16 @@ def run(arguments: list[str] | None = None) -> int:
     except RrtikError as error:
         return _fail(str(error))
     except UsageError as error:
-        text = " ".join(error.format_message().split())
-        return _fail(f"{text} (see: rrtik --help)") if text and "--help" not in text else BAD_INPUT
+        return _usage(error)
     except (KeyboardInterrupt, typer.Abort):
-        print("rrtik: interrupted; nothing was written", file=sys.stderr)
+        print("rrtik: interrupted; no file is half-written", file=sys.stderr)
         return INTERRUPTED
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the reader has gone; nobody is left to tell
+    except (BrokenPipeError, SystemExit):  # the reader has gone, nobody is left to tell; typer makes an exit of it
+        _drop_output()
         return FOUND
+    except OSError as error:
+        _drop_output()
+        return _fail(f"standard output cannot be written: {error.strerror or error}")
 
 
 def _warn(message: Warning | str, *_: Any, **__: Any) -> None:
@@ -229,6 +235,32 @@ def _warn(message: Warning | str, *_: Any, **__: Any) -> None:
 def _fail(message: str) -> int:
     print(f"rrtik: {message}", file=sys.stderr)
     return BAD_INPUT
+
+
+def _usage(error: Any) -> int:
+    """Say what is wrong with a command; `rrtik` alone gets the help itself."""
+    text = error.format_message()
+    if "--help" in text:
+        print(text, file=sys.stderr)
+        return BAD_INPUT
+    context = getattr(error, "ctx", None)
+    command = "rrtik" if context is None else context.command_path
+    return _fail(f"{' '.join(text.replace('Value error, ', '').split())} (see: {command} --help)")
+
+
+def _prepare_streams() -> None:
+    """Make printing safe: a stream that was closed leads nowhere, a letter that a terminal lacks is spelt out."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115 - open until the process ends
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _drop_output() -> None:
+    """Let what could not be printed go, so that the end of the process does not try again."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _shortened(path: Any, problem: Any, method: Shorten) -> tuple[Any, float]:
@@ -263,8 +295,12 @@ def _check_target(path: Path | None, endings: tuple[str, ...]) -> None:
         return
     if path.suffix.lower() not in endings:
         raise InputError(f"{path}: unknown ending '{path.suffix}'; use {', '.join(endings)}")
+    if path.is_dir():
+        raise InputError(f"{path}: this is a folder; give a file name")
     if not path.parent.is_dir():
         raise InputError(f"{path}: folder '{path.parent}' does not exist; create it")
+    if not os.access(path.parent, os.W_OK):
+        raise InputError(f"{path}: folder '{path.parent}' cannot be written to; choose another one")
 
 
 def _millimetres(distance: float) -> str:
@@ -274,10 +310,12 @@ def _millimetres(distance: float) -> str:
 def _print(*items: Any) -> None:
     from rich.console import Console
 
-    width = None if sys.stdout.isatty() else 200  # a file or a pipe has room for every column
-    console = Console(highlight=False, soft_wrap=True, markup=False, width=width)
-    for item in items:
-        console.print(item)
+    # Wider than any table: where there is less room lines are broken, but no number is cut.
+    console = Console(highlight=False, soft_wrap=True, markup=False, width=1000)
+    with console.capture() as captured:
+        for item in items:
+            console.print(item)
+    print(captured.get(), end="")
 
 
 @contextmanager

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from types import UnionType
+from typing import get_args
 
 
 class RrtikError(Exception):
@@ -56,6 +58,18 @@ class ProblemError(RrtikError):
 
 class PlannerError(RrtikError):
     """A planner broke (as opposed to not finding a path, which is data: see ``Plan.reason``)."""
+
+
+def require(value: object, kind: type | UnionType, what: str, remedy: str = "") -> None:
+    """Refuse an argument that is not of the type, or of one of the types, that is needed.
+
+    Raises:
+        InputError: It names the argument, what was expected, what was found, and the remedy.
+    """
+    if not isinstance(value, kind):
+        wanted = " or ".join(each.__name__ for each in get_args(kind) or (kind,))
+        hint = f"; {remedy}" if remedy else ""
+        raise InputError(f"{what} must be of type {wanted}, got {type(value).__name__}{hint}")
 
 
 class MeshWarning(UserWarning):

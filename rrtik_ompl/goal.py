@@ -80,8 +80,10 @@ class PoseGoal:
     def __post_init__(self) -> None:
         if not isinstance(self.T_world_tip, pin.SE3):
             matrix = finite_array(self.T_world_tip, (4, 4), "goal pose")
+            if not np.allclose(matrix[3], [0.0, 0.0, 0.0, 1.0]):
+                raise InputError(f"goal pose: the last row must be 0 0 0 1, got {matrix[3].tolist()}")
             object.__setattr__(self, "T_world_tip", pin.SE3(matrix))
-        finite_array(self.T_world_tip.homogeneous, (4, 4), "goal pose")
+        _check_rigid(finite_array(self.T_world_tip.homogeneous, (4, 4), "goal pose")[:3, :3])
         _tolerance(self.position_tolerance, "goal position_tolerance")
         _tolerance(self.orientation_tolerance, "goal orientation_tolerance")
 
@@ -123,8 +125,8 @@ class GoalRegion:
         box: ArrayLike = NO_BOX,
     ) -> None:
         goals = tuple(members)
-        if not goals:
-            raise InputError("goal: a region needs at least one pose or position")
+        if not goals or not all(isinstance(goal, PoseGoal | PositionGoal) for goal in goals):
+            raise InputError("goal: a region needs at least one pose or position, and nothing else")
         if free_rotation_axis not in (None, "x", "y", "z"):
             raise InputError(f"goal free_rotation_axis must be x, y or z, got {free_rotation_axis!r}")
         sides = finite_array(box, (3,), "goal box")
@@ -183,6 +185,14 @@ def _rotation_angle(rotations: NDArray[np.float64]) -> Vector:
     sine = np.linalg.norm(rotations - np.swapaxes(rotations, 1, 2), axis=(1, 2)) / (2.0 * np.sqrt(2.0))
     angle: Vector = np.arctan2(sine, 0.5 * (np.trace(rotations, axis1=1, axis2=2) - 1.0))
     return angle
+
+
+def _check_rigid(rotation: NDArray[np.float64]) -> None:
+    off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
+    if off > 1e-3 or np.linalg.det(rotation) < 0.0:
+        raise InputError(
+            "goal pose: its upper left 3 x 3 part is no rotation (it scales, skews or mirrors); make it orthonormal"
+        )
 
 
 def _tolerance(value: float, what: str) -> float:

@@ -9,9 +9,8 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.goal import GoalRegion, JointGoal, PoseGoal, PositionGoal, joint_difference
 from rrtik_ompl.ik.numeric import numeric_ik, targets
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.problem import TURN, Problem
 
-TURN = 2.0 * np.pi
 STARTS = 48  # of inverse kinematics in one round
 ROUNDS = 4  # at most, until one free configuration is found
 MOST = 16  # configurations handed to a planner
@@ -64,8 +63,7 @@ def _turns(problem: Problem, q: Vector) -> Matrix:
 def _solved(problem: Problem, goal: PoseGoal | PositionGoal | GoalRegion, rng: np.random.Generator) -> Matrix:
     """Configurations at the goal, from the start and from random ones."""
     robot = problem.world.robot
-    low, high = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
-    starts = rng.uniform(low, high, (STARTS, robot.dof))
+    starts = rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
     starts[0] = problem.start
     goals = targets(goal, STARTS, rng)
     share = -(-STARTS // len(goals))

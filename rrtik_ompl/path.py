@@ -9,21 +9,22 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.text_file import read_text, write_text
+from rrtik_ompl.text_file import file_name, read_text, write_text
 from rrtik_ompl.transitions import merge_moves, moved, route_length, single_joint, transitions
 from rrtik_ompl.world import World
 
 SECOND_CHECK = 2.0  # how many times finer than the motion resolution a path is checked again
 FORMATS = (".json", ".csv", ".txt")
+MAX_VALUE = 1e6  # of a joint [rad or m], as everywhere in our files
+MAX_CHECKS = 10_000_000  # of a path; with more of them the memory would run out long before the patience
 
 
 class Move(NamedTuple):
@@ -75,6 +76,10 @@ class JointPath:
         rows = finite_array(waypoints, (None, None), "path waypoints")
         if rows.size == 0:
             raise InputError("path waypoints: a path needs at least one configuration of at least one joint")
+        if np.abs(rows).max() > MAX_VALUE:
+            raise InputError(
+                f"path waypoints: found {np.abs(rows).max():g}, more than {MAX_VALUE:g} rad or m; check units"
+            )
         count = rows.shape[1]
         names = tuple(f"joint{k + 1}" for k in range(count)) if joint_names is None else tuple(joint_names)
         sliding = np.zeros(count, dtype=bool) if prismatic is None else np.asarray(prismatic, dtype=bool)
@@ -85,6 +90,11 @@ class JointPath:
         object.__setattr__(self, "prismatic", frozen(sliding, bool))
         object.__setattr__(self, "robot_name", robot_name)
 
+    def __repr__(self) -> str:
+        k, n = self.waypoints.shape
+        size = f"{k} waypoints of {n} joints, {self.transitions} transitions"
+        return f"JointPath({size}, length {self.length:.3g} {self.unit})"
+
     @classmethod
     def of(cls, robot: Robot, waypoints: ArrayLike) -> JointPath:
         """A path of this robot through ``waypoints``, shape (k, dof).
@@ -92,6 +102,7 @@ class JointPath:
         Raises:
             InputError: If the rows do not have one value per joint of the robot.
         """
+        require(robot, Robot, "robot of a path")
         rows = finite_array(waypoints, (None, robot.dof), f"path waypoints of robot '{robot.name}'")
         return cls(rows, robot.joint_names, robot.prismatic, robot.name)
 
@@ -166,11 +177,21 @@ class JointPath:
             The first violation of every edge that has one; empty for a valid path.
 
         Raises:
-            InputError: If the path has another number of joints than the world's robot.
+            InputError: If the path has another number of joints than the world's robot, is too long for its checks,
+                or ``resolution`` is not positive.
         """
+        require(world, World, "world of a path's check")
         rows = finite_array(self.waypoints, (None, world.robot.dof), f"path for robot '{world.robot.name}'")
-        fine = world.motion_resolution / SECOND_CHECK if resolution is None else resolution
+        half = world.motion_resolution / SECOND_CHECK
+        fine = half if resolution is None else float(finite_array(resolution, (), "resolution"))
+        if fine <= 0.0:
+            raise InputError(f"resolution must be greater than 0 metres, got {fine:g}")
         counts = [world.steps(a, b, fine) for a, b in pairwise(rows)]
+        if sum(counts) > MAX_CHECKS:
+            raise InputError(
+                f"path: {sum(counts):.1e} checks are too many (at most {MAX_CHECKS:.0e}); "
+                f"raise motion_resolution, or look whether the joint values are rad and m"
+            )
         dense, edges = subdivided(rows, np.array(counts, dtype=np.float64))
         bad = np.flatnonzero(~world.certify(dense))
         _, first = np.unique(edges[bad], return_index=True)
@@ -227,6 +248,7 @@ def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> Joint
     Raises:
         InputError: If the file is missing, malformed, or does not fit the robot; the message names file and line.
     """
+    require(robot, Robot | None, "robot of a path", "use load_robot(name)")
     ending = _ending(path)
     try:
         if ending == ".json":
@@ -249,7 +271,7 @@ def _fitted(path: JointPath, robot: Robot) -> JointPath:
 
 
 def _ending(path: str | os.PathLike[str]) -> str:
-    ending = Path(path).suffix.lower()
+    ending = file_name(path).suffix.lower()
     if ending not in FORMATS:
         raise InputError(f"{path}: unknown ending '{ending}' for a path; use {', '.join(FORMATS)}")
     return ending
@@ -260,14 +282,22 @@ def _from_json(text: str) -> JointPath:
         document = json.loads(text)
     except json.JSONDecodeError as error:
         raise InputError(f"line {error.lineno}: not JSON: {error.msg}") from None
+    except RecursionError:
+        raise InputError("lists are nested too deeply; is this a path file?") from None
+    except ValueError:
+        raise InputError("holds a number of thousands of digits; is this a path file?") from None
     if not isinstance(document, dict) or "waypoints" not in document:
         raise InputError("expected an object with the key 'waypoints'; is this a path file?")
-    if document.get("version", 1) != 1:
-        raise InputError(f"version: expected 1, got {document['version']!r}")
+    for key, expected in (("version", 1), ("kind", "joint_path")):
+        if document.get(key, expected) != expected:
+            raise InputError(f"{key}: expected {expected!r}, got {document[key]!r}")
     units, names = document.get("units"), document.get("joint_names")
     for key, value in (("units", units), ("joint_names", names)):
         if value is not None and not (isinstance(value, list) and all(isinstance(v, str) for v in value)):
             raise InputError(f"{key}: expected a list of text, one per joint")
+    for unit in units or ():
+        if unit not in ("rad", "m"):
+            raise InputError(f"units: expected 'rad' or 'm' for each joint, got {unit!r}; convert the waypoints")
     prismatic = None if units is None else [unit == "m" for unit in units]
     return JointPath(document["waypoints"], names, prismatic, str(document.get("robot", "")))
 
@@ -279,6 +309,8 @@ def _from_table(text: str, separator: str | None) -> JointPath:
     names = None
     if separator is not None:
         names = [name.strip() for name in next(csv.reader(io.StringIO(lines[0][1])))]
+        if all(_is_number(name) for name in names):
+            raise InputError("line 1: expected the names of the joints, found numbers; add a line of names")
         lines = lines[1:]
     rows = []
     for number, line in lines:
@@ -289,4 +321,14 @@ def _from_table(text: str, separator: str | None) -> JointPath:
             raise InputError(f"line {number}: expected numbers, got {line.strip()[:60]!r}") from None
         if len(rows[-1]) != len(names or rows[0]):
             raise InputError(f"line {number}: expected {len(names or rows[0])} numbers, got {len(cells)}")
-    return JointPath(np.array(rows).reshape(len(rows), -1), names)
+    if not rows:
+        raise InputError("the file holds joint names only; expected one configuration a line below them")
+    return JointPath(np.array(rows), names)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 
 from rrtik_ompl import catalog
 from rrtik_ompl.arrays import finite_array
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.goal_configurations import goal_configurations
 from rrtik_ompl.ompl_bridge.attempt import ANYTIME_PLANNERS, Attempt, PlannerFactory, attempt, ompl_planners
@@ -21,6 +21,8 @@ from rrtik_ompl.problem import Problem
 
 DEFAULT_PLANNER = "bicrdt"
 RESTARTS = 20
+MAX_RESTARTS = 1_000_000
+MAX_SECONDS = 1e9  # thirty years; OMPL's clock overflows at about nine times as much
 _OMPL_PREFIX, _MOVEIT_SUFFIX = "geometric::", "kConfigDefault"  # as in ompl_planning.yaml
 
 
@@ -78,11 +80,15 @@ def plan(
         InputError: If a number or a parameter makes no sense.
         PlannerError: If the planner broke.
     """
+    require(problem, Problem, "problem to plan", "use Problem(world, start, goal) or load_problem(name)")
+    require(planner, str | Callable, "planner", "use a name of list_planners() or a planner class")
     limit = float(finite_array(seconds, (), "seconds"))
     if limit <= 0.0:
         raise InputError(f"seconds must be greater than 0, got {limit:g}")
-    if isinstance(restarts, bool) or not isinstance(restarts, int) or restarts < 0:
-        raise InputError(f"restarts must be a whole number of at least 0, got {restarts!r}")
+    if limit > MAX_SECONDS:
+        raise InputError(f"seconds must be {MAX_SECONDS:g} or less, got {limit:g}")
+    if isinstance(restarts, bool) or not isinstance(restarts, int) or not 0 <= restarts <= MAX_RESTARTS:
+        raise InputError(f"restarts must be a whole number from 0 to {MAX_RESTARTS}, got {restarts!r}")
     name, factory = (planner, find_planner(planner)) if isinstance(planner, str) else (planner.__name__, planner)
     used = _seed(seed)
     seeds = [int(child) for child in np.random.SeedSequence(used).generate_state(restarts + 1, np.uint32)]
@@ -105,6 +111,8 @@ def _search(
     """Attempt after attempt, one per seed: the path or None, the reason, and the counts of all of them."""
     totals: dict[str, int | float] = {"attempts": 0, "rejected": 0}
     reason = ""
+    if _nothing_to_do(problem):  # some planners wander off and come back, others break
+        return JointPath.of(problem.world.robot, problem.start[None]), "", totals
     turns_matter = isinstance(problem.goal, JointGoal) and bool(problem.world.robot.continuous.any())
     # An optimal path touches what it goes round, and an anytime planner has no time left for a second attempt.
     asked = problem.refined(SECOND_CHECK) if getattr(factory, "__name__", "") in ANYTIME_PLANNERS else problem
@@ -129,6 +137,13 @@ def _search(
             totals["rejected"] += 1
             asked = problem.refined(SECOND_CHECK)
     return None, reason, totals
+
+
+def _nothing_to_do(problem: Problem) -> bool:
+    """Whether the start is the goal, to the bit if that is a configuration; a `Problem` has checked its start."""
+    if isinstance(problem.goal, JointGoal):
+        return bool((problem.start == problem.goal.q).all())
+    return problem.reached(problem.start)
 
 
 def list_planners() -> tuple[str, ...]:

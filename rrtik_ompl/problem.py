@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Vector, frozen
-from rrtik_ompl.errors import InputError, ProblemError
-from rrtik_ompl.goal import Goal, GoalRegion, JointGoal, PoseGoal, PositionGoal, joint_difference
+from rrtik_ompl.errors import ProblemError, require
+from rrtik_ompl.goal import Goal, GoalRegion, JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.robot import LIMIT_TOLERANCE
 from rrtik_ompl.world import World
+
+TURN = 2.0 * np.pi
 
 
 class Problem:
@@ -39,8 +41,7 @@ class Problem:
     """
 
     def __init__(self, world: World, start: ArrayLike, goal: Goal | ArrayLike, *, name: str = "problem") -> None:
-        if not isinstance(world, World):
-            raise InputError(f"problem: world must be a World, got {type(world).__name__}; use World(robot, scene)")
+        require(world, World, "world of a problem", "use World(robot, scene)")
         self.world = world
         self.name = name
         self.start: Vector = frozen(_usable(world, start, "start"))
@@ -51,6 +52,9 @@ class Problem:
             q = _usable(world, wanted.q, "goal")
             wanted = JointGoal(_nearest_turn(world, self.start, q), wanted.tolerance)
         self.goal: Goal = wanted
+
+    def __repr__(self) -> str:
+        return f"Problem('{self.name}', {self.world}, to a {type(self.goal).__name__})"
 
     @property
     def robot(self) -> Any:
@@ -65,7 +69,7 @@ class Problem:
 
     def reached(self, q: ArrayLike) -> bool:
         """Whether a configuration, shape (dof,), satisfies the goal."""
-        return bool(self.goal.satisfied(self.world.robot, np.atleast_2d(np.asarray(q, dtype=np.float64)))[0])
+        return bool(self.goal.satisfied(self.world.robot, self.world.robot.configuration(q)[None])[0])
 
 
 def _usable(world: World, values: ArrayLike, what: str) -> Vector:
@@ -85,6 +89,7 @@ def _usable(world: World, values: ArrayLike, what: str) -> Vector:
 
 
 def _nearest_turn(world: World, start: Vector, q: Vector) -> Vector:
-    """The goal with its continuous joints turned by whole turns to lie nearest to the start."""
-    nearest: Vector = np.where(world.robot.continuous, start + joint_difference(world.robot, q, start), q)
+    """The goal with its continuous joints turned by whole turns to lie nearest to the start; no turn, no rounding."""
+    turns = np.where(world.robot.continuous, np.round((start - q) / TURN), 0.0)
+    nearest: Vector = q + turns * TURN
     return nearest

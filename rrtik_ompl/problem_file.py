@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import Field
 
 from rrtik_ompl.catalog import find_problem, load_robot, robot_from_entry
-from rrtik_ompl.errors import ProblemError, UnknownNameError
+from rrtik_ompl.errors import ProblemError, UnknownNameError, require
 from rrtik_ompl.file_format import Positive, Section, Version, parse, without_null
 from rrtik_ompl.goal_file import GoalSection, StartSection, build_goal, goal_data
 from rrtik_ompl.motion_bench_maker import is_motion_bench_maker, load_motion_bench_maker
@@ -21,7 +21,7 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.robot_entry import RobotEntry, robot_data
 from rrtik_ompl.scene_file import SceneEntry, scene_data
 from rrtik_ompl.text_file import file_name
-from rrtik_ompl.world import MOTION_RESOLUTION, World
+from rrtik_ompl.world import FINEST_RESOLUTION, MOTION_RESOLUTION, World
 from rrtik_ompl.yaml_file import YamlDocument, read_yaml, write_yaml
 
 FilePath = str | os.PathLike[str]
@@ -37,6 +37,7 @@ class ProblemFile(Section):
     goal: GoalSection
     motion_resolution: Positive = Field(
         MOTION_RESOLUTION,
+        ge=FINEST_RESOLUTION,
         description="largest step of any point of the arm between two checked configurations [m]",
     )
 
@@ -78,6 +79,7 @@ def save_problem(problem: Problem, path: FilePath) -> None:
     Raises:
         InputError: If the file cannot be written, or the format has no words for something in the problem.
     """
+    require(problem, Problem, "problem to save")
     folder = file_name(path).parent
     world = problem.world
     data: dict[str, Any] = {"version": 1, "robot": robot_data(world.robot.source, folder)}

@@ -59,7 +59,8 @@ def summary(problem: Problem, plan: Plan, path: JointPath | None, shorten_second
     if path.one_joint_at_a_time:
         least = "" if bound is None else f" (no path can have fewer than {bound})"
         raw = plan.path
-        before = "" if path is raw else f"; {raw.transitions} and {raw.length:.2f} {raw.unit} before shortening"
+        same = (raw.transitions, raw.length) == (path.transitions, path.length)
+        before = "" if same else f"; {raw.transitions} and {raw.length:.2f} {raw.unit} before shortening"
         lines.append(f"{path.transitions} moves{least}, length {path.length:.2f} {path.unit}{before}")
     else:
         size = f"{len(path.waypoints)} waypoints, length {path.length:.2f} {path.unit}"

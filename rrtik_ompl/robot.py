@@ -79,6 +79,9 @@ class Robot:
     planar: bool = False
     source: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
+    def __repr__(self) -> str:
+        return f"Robot('{self.name}', {self.dof} joints: {', '.join(self.joint_names)}; tip '{self.tip}')"
+
     @property
     def dof(self) -> int:
         """Number of actuated joints."""
@@ -120,9 +123,15 @@ class Robot:
 
     def within_limits(self, Q: ArrayLike, tolerance: float = LIMIT_TOLERANCE) -> Mask:
         """Which of the configurations Q, shape (m, dof), lie inside the limits. Shape (m,)."""
-        rows = np.atleast_2d(np.asarray(Q, dtype=np.float64))
+        rows = self._rows(Q)
         inside: Mask = np.all((rows >= self.lower - tolerance) & (rows <= self.upper + tolerance), axis=1)
         return inside
+
+    def finite_range(self) -> tuple[Vector, Vector]:
+        """Bounds to draw configurations in, shapes (dof,): the limits, half a turn (or 3.14 m) where there is none."""
+        lower = np.where(np.isfinite(self.lower), self.lower, np.minimum(self.upper, 0.0) - np.pi)
+        upper = np.where(np.isfinite(self.upper), self.upper, np.maximum(self.lower, 0.0) + np.pi)
+        return lower, upper
 
     def limit_message(self, q: Vector, joint: int) -> str:
         """A line that names a joint, its value and its limits, in degrees (metres for a prismatic joint)."""
@@ -145,7 +154,7 @@ class Robot:
         Returns:
             Shape (m, nq).
         """
-        rows = np.atleast_2d(np.asarray(Q, dtype=np.float64))
+        rows = self._rows(Q)
         values: Matrix = rows @ self.chain.gain.T + self.chain.offset
         if self.model.nq == len(self.chain.parent):
             return values
@@ -160,7 +169,7 @@ class Robot:
 
     def joint_frames(self, Q: ArrayLike) -> NDArray[np.float64]:
         """Pose in the world of every Pinocchio joint frame, world first. Shape (m, joints + 1, 4, 4)."""
-        rows = np.atleast_2d(np.asarray(Q, dtype=np.float64))
+        rows = self._rows(Q)
         values = rows @ self.chain.gain.T + self.chain.offset
         frames = np.empty((len(rows), len(self.chain.parent) + 1, 4, 4))
         frames[:, 0] = np.eye(4)
@@ -213,6 +222,13 @@ class Robot:
             joint = int(self.chain.parent[joint])
         product: NDArray[np.float64] = columns @ self.chain.gain
         return product
+
+    def _rows(self, Q: ArrayLike) -> Matrix:
+        """One configuration or several as rows, shape (m, dof)."""
+        rows = np.atleast_2d(np.asarray(Q, dtype=np.float64))
+        if rows.ndim != 2 or rows.shape[1] != self.dof:
+            raise InputError(f"configurations of robot '{self.name}': expected shape (m, {self.dof}), got {rows.shape}")
+        return rows
 
     def _frame_id(self, frame: str | None) -> int:
         name = self.tip if frame is None else frame

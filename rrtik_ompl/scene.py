@@ -11,8 +11,8 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Vector, finite_array, frozen
-from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.shapes import Shape
+from rrtik_ompl.errors import InputError, UnknownNameError, require
+from rrtik_ompl.shapes import HalfSpace, Shape
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,6 +71,12 @@ class Waypoints:
 Motion: TypeAlias = ConstantVelocity | Waypoints
 
 
+def _check_solid(name: object, shape: object, pose: object) -> None:
+    require(name, str, "name of an obstacle or attached object")
+    require(shape, Shape, f"shape of '{name}'", "use rrtik_ompl.shapes")
+    require(pose, pin.SE3, f"pose of '{name}'", "use rrtik_ompl.poses.pose(xyz, quat_xyzw)")
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Obstacle:
     """A named solid in the world. ``pose`` is T_world_obstacle; ``motion`` moves it over time, if given."""
@@ -79,6 +85,10 @@ class Obstacle:
     shape: Shape
     pose: Any = field(default_factory=pin.SE3.Identity)
     motion: Motion | None = None
+
+    def __post_init__(self) -> None:
+        _check_solid(self.name, self.shape, self.pose)
+        require(self.motion, Motion | None, f"motion of '{self.name}'")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,6 +100,11 @@ class AttachedObject:
     shape: Shape
     pose: Any = field(default_factory=pin.SE3.Identity)
     allow: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        _check_solid(self.name, self.shape, self.pose)
+        if isinstance(self.shape, HalfSpace):
+            raise InputError("a half-space cannot be attached to a link")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,11 +118,21 @@ class Scene:
     def __post_init__(self) -> None:
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
         object.__setattr__(self, "attached", tuple(self.attached))
-        object.__setattr__(self, "allowed_collisions", tuple((str(a), str(b)) for a, b in self.allowed_collisions))
+        for obstacle in self.obstacles:
+            require(obstacle, Obstacle, "each obstacle of a scene")
+        for held in self.attached:
+            require(held, AttachedObject, "each attached object of a scene")
+        pairs = tuple(tuple(map(str, pair)) for pair in self.allowed_collisions)
+        if any(len(pair) != 2 for pair in pairs):
+            raise InputError(f"allowed_collisions of a scene must be pairs of names, got {list(pairs)}")
+        object.__setattr__(self, "allowed_collisions", pairs)
         names = self.names
         for name in names:
             if names.count(name) > 1:
                 raise InputError(f"scene: the name '{name}' is used {names.count(name)} times; names must differ")
+
+    def __repr__(self) -> str:
+        return f"Scene({', '.join(self.names) or 'empty'})"
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ import pinocchio as pin
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.file_format import (
     Length,
     Name,
@@ -165,10 +165,7 @@ class AttachedEntry(SolidEntry, json_schema_extra=_ONE_SHAPE):
 
     def build(self, folder: Path) -> AttachedObject:
         """The attached object."""
-        shape = self.build_shape(folder)
-        if isinstance(shape, HalfSpace):
-            raise InputError("a half-space cannot be attached to a link")
-        return AttachedObject(self.name, self.link, shape, self.build_pose(), tuple(self.allow))
+        return AttachedObject(self.name, self.link, self.build_shape(folder), self.build_pose(), tuple(self.allow))
 
 
 class SceneEntry(Section):
@@ -225,6 +222,7 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     Raises:
         InputError: If the file cannot be written, or a mesh does not come from a file.
     """
+    require(scene, Scene, "scene to save")
     write_yaml(path, {"version": 1, "scene": scene_data(scene, file_name(path).parent)})
 
 

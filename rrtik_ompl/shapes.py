@@ -90,7 +90,8 @@ class Prism:
     """A simple polygon in the xy-plane, extruded along z and centred about z = 0.
 
     Attributes:
-        polygon: Vertices in order (either sense), shape (k, 2), metres; convex or not, without self-crossings.
+        polygon: Vertices in order (either sense), shape (k, 2), metres; convex or not, without self-crossings and
+            without places where two sides touch.
         height: Full extent along z [m].
     """
 
@@ -98,9 +99,9 @@ class Prism:
     height: float
 
     def __init__(self, polygon: ArrayLike, height: float = 1.0) -> None:
-        vertices = finite_array(polygon, (None, 2), "polygon")
+        vertices = _without_repeats(finite_array(polygon, (None, 2), "polygon"))
         if len(vertices) < 3:
-            raise InputError(f"polygon needs at least 3 vertices, got {len(vertices)}")
+            raise InputError(f"polygon needs at least 3 different vertices, got {len(vertices)}")
         _check_simple(vertices)
         object.__setattr__(self, "polygon", frozen(vertices))
         object.__setattr__(self, "height", _positive(height, "polygon height"))
@@ -129,7 +130,7 @@ class Mesh:
         faces = np.asarray(triangles)
         if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
             raise InputError(f"{what}: needs at least one triangle (three vertex numbers each); export it triangulated")
-        faces = faces.astype(np.int64)
+        faces = finite_array(faces, (None, 3), f"{what}: triangles").astype(np.int64)
         if faces.min() < 0 or faces.max() >= len(points):
             raise InputError(f"{what}: a triangle names vertex {int(faces.max())}, but there are only {len(points)}")
         points, faces = _welded(points, faces)
@@ -167,21 +168,34 @@ def _open_edges(faces: NDArray[np.int64]) -> int:
     return int((count > 1).sum() + np.setxor1d(forward, backward).size)
 
 
+def _without_repeats(polygon: Matrix) -> Matrix:
+    """The polygon without vertices that the next one repeats, as the first one of a closed ring repeats the last."""
+    kept: Matrix = polygon[(polygon != np.roll(polygon, -1, axis=0)).any(axis=1)]
+    return kept
+
+
 def _check_simple(polygon: Matrix) -> None:
-    """Raise if two sides of the polygon cross or if it has no area."""
+    """Raise if two sides of the polygon cross or touch, or if it has no area."""
     a, b = polygon, np.roll(polygon, -1, axis=0)
     area = 0.5 * float(np.sum(a[:, 0] * b[:, 1] - b[:, 0] * a[:, 1]))
     extent = float(np.ptp(polygon, axis=0).max())
     if abs(area) <= 1e-12 * max(extent * extent, 1e-12):
         raise InputError("polygon has no area: its vertices lie on one line")
     for i in range(len(a)):
+        if _side(a[i - 1], a[i], b[i]) == 0.0 and (a[i] - a[i - 1]) @ (b[i] - a[i]) < 0.0:
+            raise InputError(f"polygon folds back on itself at vertex {i}; delete it")
         for j in range(i + 2, len(a)):
-            if (i, j) != (0, len(a) - 1) and _cross(a[i], b[i], a[j], b[j]):
+            if (i, j) != (0, len(a) - 1) and _meet(a[i], b[i], a[j], b[j]):
                 raise InputError(f"polygon crosses itself: side {i} meets side {j}; list its vertices in order")
 
 
-def _cross(p: Vector, q: Vector, r: Vector, s: Vector) -> bool:
-    def side(u: Vector, v: Vector, w: Vector) -> float:
-        return float((v[0] - u[0]) * (w[1] - u[1]) - (v[1] - u[1]) * (w[0] - u[0]))
+def _meet(p: Vector, q: Vector, r: Vector, s: Vector) -> bool:
+    """Whether the segments p q and r s have a point in common."""
+    if (np.maximum(p, q) < np.minimum(r, s)).any() or (np.maximum(r, s) < np.minimum(p, q)).any():
+        return False
+    return _side(p, q, r) * _side(p, q, s) <= 0.0 and _side(r, s, p) * _side(r, s, q) <= 0.0
 
-    return side(p, q, r) * side(p, q, s) < 0.0 and side(r, s, p) * side(r, s, q) < 0.0
+
+def _side(u: Vector, v: Vector, w: Vector) -> float:
+    """On which side of the line u v the point w lies: positive on the left."""
+    return float((v[0] - u[0]) * (w[1] - u[1]) - (v[1] - u[1]) * (w[0] - u[0]))

@@ -56,9 +56,10 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
     Raises:
         InputError: If the folder does not exist or the file cannot be written.
     """
-    target = Path(os.path.realpath(file_name(path)))  # a link stays a link: the file it points to is replaced
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+    name = file_name(path)
     try:
+        target = Path(os.path.realpath(name))  # a link stays a link: the file it points to is replaced
+        temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
         if target.exists() and not target.is_file() and not target.is_dir():
             target.write_text(text, encoding="utf-8")
             return
@@ -70,7 +71,9 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
         finally:
             temporary.unlink(missing_ok=True)
     except FileNotFoundError:
-        raise InputError(f"{path}: cannot be written: folder '{target.parent}' does not exist; create it") from None
+        folder = name.parent
+        remedy = "no file can be made in it; choose another one" if folder.is_dir() else "does not exist; create it"
+        raise InputError(f"{path}: cannot be written: folder '{folder}': {remedy}") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be written: {getattr(error, 'strerror', None) or error}") from error
 

@@ -16,11 +16,13 @@ from rrtik_ompl.collision.bodies import Body, colliding_pairs, link_bodies, scen
 from rrtik_ompl.collision.certificate import Certificate
 from rrtik_ompl.collision.containment import Containment
 from rrtik_ompl.collision.motion_bound import displacement_weights
-from rrtik_ompl.errors import InputError, MeshWarning
+from rrtik_ompl.collision.solids import is_mesh
+from rrtik_ompl.errors import InputError, MeshWarning, require
 from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
 from rrtik_ompl.scene import Scene
 
 MOTION_RESOLUTION = 0.01  # [m]
+FINEST_RESOLUTION = 1e-5  # [m]; a motion across an arm's reach is then some hundred thousand checks
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,9 +65,13 @@ class World:
     ) -> None:
         self.robot = robot
         self.scene = Scene() if scene is None else scene
+        require(robot, Robot, "robot of a world", "use load_robot(name or file)")
+        require(self.scene, Scene, "scene of a world", "use Scene(obstacles) or load_scene(file)")
         self.motion_resolution = float(finite_array(motion_resolution, (), "motion_resolution"))
-        if self.motion_resolution <= 0.0:
-            raise InputError(f"motion_resolution must be greater than 0 metres, got {self.motion_resolution:g}")
+        if self.motion_resolution < FINEST_RESOLUTION:
+            raise InputError(
+                f"motion_resolution must be {FINEST_RESOLUTION:g} metres or more, got {self.motion_resolution:g}"
+            )
         if not robot.collision.geometryObjects:
             message = f"robot '{robot.name}' has no collision geometry: every configuration counts as free"
             warnings.warn(MeshWarning(message), stacklevel=2)
@@ -78,6 +84,9 @@ class World:
         self._oracle = _Oracle(robot, self._bodies, moving)
         standing = tuple(p for p in pairs if p not in set(moving))
         self._always_colliding = bool(standing) and not _standing_free(robot, self._bodies, standing)
+
+    def __repr__(self) -> str:
+        return f"World({self.robot.name}, {self.scene}, motion_resolution={self.motion_resolution:g} m)"
 
     def refined(self, factor: float) -> World:
         """The same world, its motions checked in steps ``factor`` times as fine; shares everything else."""
@@ -134,13 +143,13 @@ class World:
 
     def closest(self, q: ArrayLike) -> Contact | None:
         """The pair of bodies that is nearest to contact at q (or deepest in it); None if nothing can collide."""
+        touching = self.contacts(q)
+        if touching:
+            return touching[0]
         return min(self._distances(self._rows(q, 1), near_only=False), key=lambda c: c.distance, default=None)
 
     def clearance(self, q: ArrayLike) -> float:
         """Smallest signed distance at q [m]: negative in collision, +inf if nothing can collide."""
-        touching = self.contacts(q)
-        if touching:
-            return min(0.0, touching[0].distance)
         nearest = self.closest(q)
         return float("inf") if nearest is None else nearest.distance
 
@@ -194,10 +203,14 @@ class World:
         for i, j in self._pairs:
             first, second = self._bodies[i], self._bodies[j]
             ends = (first.geometry, transforms[i], second.geometry, transforms[j])
-            if near_only and not coal.collide(*ends, coal.CollisionRequest(), coal.CollisionResult()):
+            touching, result = coal.CollisionResult(), coal.DistanceResult()
+            if near_only and not coal.collide(*ends, coal.CollisionRequest(), touching):
                 continue
-            result = coal.DistanceResult()
-            distance = float(coal.distance(*ends, request, result))
+            if near_only and is_mesh(first.geometry) and is_mesh(second.geometry):
+                result = touching.getContact(0)  # between two meshes that touch coal knows no distance
+                distance = float(result.penetration_depth)
+            else:
+                distance = float(coal.distance(*ends, request, result))
             points = (np.array(result.getNearestPoint1()), np.array(result.getNearestPoint2()))
             found.append(Contact(first.name, second.name, min(distance, 0.0) if near_only else distance, *points))
         return found

@@ -151,8 +151,56 @@ def test_ctrl_c_exits_130_says_so_and_leaves_no_file(tmp_path):
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=30)
     assert process.returncode == 130
-    assert err.strip() == "rrtik: interrupted; nothing was written"
+    assert err.strip() == "rrtik: interrupted; no file is half-written"
     assert sorted(f.name for f in tmp_path.iterdir()) == ["closed.yaml"]
+
+
+def test_ctrl_c_while_the_program_loads_is_one_line():
+    code = (
+        "import os, signal, sys\n"
+        "class Finder:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name == 'numpy': os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Finder())\n"
+        "import rrtik_command; rrtik_command.main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code, "list"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "rrtik: interrupted; no file is half-written\n")
+
+
+def test_rrtik_alone_prints_the_help(capsys):
+    code, _, err = rrtik(capsys)
+    assert code == 2
+    assert "Usage: rrtik" in err
+
+
+@pytest.mark.parametrize(("streams", "code"), [(">&-", 0), ("2>&-", 0), ("<&- >&- 2>&-", 0), (">/dev/full", 2)])
+def test_streams_that_are_closed_or_full_give_no_traceback(streams, code):
+    line = f'exec "$0" -m rrtik_ompl.cli plan planar3_a --seed 1 {streams}'
+    done = subprocess.run(["sh", "-c", line, sys.executable], capture_output=True, text=True, check=False)
+    assert done.returncode == code
+    assert done.stderr in ("", "rrtik: standard output cannot be written: No space left on device\n")
+
+
+def test_an_error_stays_out_of_standard_output_if_standard_error_is_closed():
+    line = 'exec "$0" -m rrtik_ompl.cli check nothing.yaml 2>&-'
+    done = subprocess.run(["sh", "-c", line, sys.executable], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+
+
+def test_letters_that_the_terminal_lacks_are_spelt_out(tmp_path):
+    source = tmp_path / "übung.yaml"
+    assert run(["convert", "planar3_a", str(source)]) == 0
+    environment = dict(os.environ, PYTHONIOENCODING="ascii")
+    done = subprocess.run(command("check", str(source)), capture_output=True, text=True, env=environment, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith(r"\xfcbung: start is free")
+
+
+def test_a_narrow_terminal_cuts_no_number(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "20")
+    _, out, _ = rrtik(capsys, "plan", "titan4_sdu", "--planner", "RRTConnect", "--seed", "1")
+    assert "…" not in out
 
 
 def test_a_reader_that_goes_away_is_no_error():

@@ -136,7 +136,7 @@ def test_a_bad_dh_file_gets_one_line_with_its_place(tmp_path, old, new, expected
     ("rows", "options", "expected"),
     [
         ([], {}, "no rows"),
-        ([DhRow(a=np.nan)], {}, "a: every number must be finite"),
+        ([DhRow(a=np.nan)], {}, "a: must be a finite number"),
         ([DhRow(a=1, kind="ball")], {}, "no joint type 'ball'"),
         ([DhRow(a=1)], {"convention": "denavit"}, "no DH convention 'denavit'"),
         ([DhRow(a=1)], {"radius": -1.0}, "must not be negative"),

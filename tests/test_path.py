@@ -15,31 +15,17 @@ from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box
 from rrtik_ompl.world import World
 
-# The published route to the button of the subsea distribution unit (degrees, joint 5 as printed).
-PUBLISHED = np.deg2rad(
-    [
-        [25, 19, -82, 60, 90, 0],
-        [48.19, 19, -82, 60, 90, 0],
-        [48.19, 19, -82, 60, 80, 0],
-        [48.19, 19, -82, 80, 80, 0],
-        [48.19, 19, -122, 80, 80, 0],
-        [48.19, 54.90, -122, 80, 80, 0],
-        [10, 54.90, -122, 80, 80, 0],
-        [10, 41, -122, 80, 80, 0],
-    ]
-)
 
-
-def test_the_published_route_has_seven_moves_and_its_published_length():
-    path = JointPath(PUBLISHED)
+def test_the_published_route_has_seven_moves_and_its_published_length(sdu_route):
+    path = JointPath(sdu_route)
     assert path.transitions == 7
     assert path.length == pytest.approx(3.162, abs=1e-3)
     assert path.one_joint_at_a_time
     assert path.moves()[1] == Move("joint5", np.deg2rad(90), np.deg2rad(80))
 
 
-def test_moves_rebuild_the_path():
-    path = JointPath(PUBLISHED)
+def test_moves_rebuild_the_path(sdu_route):
+    path = JointPath(sdu_route)
     q, rows = np.array(path.start), [np.array(path.start)]
     for move in path.moves():
         joint = path.joint_names.index(move.joint)
@@ -82,27 +68,27 @@ def test_every_format_gives_back_the_same_numbers(tmp_path_factory, ending, rows
         assert again.joint_names == path.joint_names
 
 
-def test_a_path_takes_the_names_of_the_robot_it_is_read_for(tmp_path):
+def test_a_path_takes_the_names_of_the_robot_it_is_read_for(tmp_path, sdu_route):
     robot = load_robot("titan4")
     file = tmp_path / "path.txt"
-    JointPath(PUBLISHED).save(file)
+    JointPath(sdu_route).save(file)
     assert load_path(file, robot).joint_names == robot.joint_names
     with pytest.raises(InputError, match="planar3"):
         load_path(file, load_robot("planar3"))
 
 
-def test_ompl_and_we_agree_on_the_matrix_text(tmp_path):
+def test_ompl_and_we_agree_on_the_matrix_text(tmp_path, sdu_route):
     from ompl import base as ob
     from ompl import geometric as og
 
     si = ob.SpaceInformation(ob.RealVectorStateSpace(6))
     path, state = og.PathGeometric(si), si.allocState()
-    for row in PUBLISHED:
+    for row in sdu_route:
         state[0:6] = row.tolist()
         path.append(state)
     rows = (" ".join(f"{x:.9g}" for x in path.getState(k)[0:6]) + " " for k in range(path.getStateCount()))
     (tmp_path / "ompl.txt").write_text("\n".join(rows) + "\n\n")  # blanks at the end of lines, one empty line
-    assert np.allclose(load_path(tmp_path / "ompl.txt").waypoints, PUBLISHED, atol=1e-8)
+    assert np.allclose(load_path(tmp_path / "ompl.txt").waypoints, sdu_route, atol=1e-8)
 
 
 @given(matrices, st.floats(0.05, 3.0))
@@ -153,10 +139,31 @@ def test_an_interrupted_save_leaves_the_old_file(tmp_path, monkeypatch):
     assert [f.name for f in tmp_path.iterdir()] == ["path.json"]
 
 
-def test_the_json_says_units_and_measures(tmp_path):
+def test_the_json_says_units_and_measures(tmp_path, sdu_route):
     robot = load_robot("titan4")
-    JointPath.of(robot, PUBLISHED).save(tmp_path / "path.json")
+    JointPath.of(robot, sdu_route).save(tmp_path / "path.json")
     document = json.loads((tmp_path / "path.json").read_text())
     assert document["robot"] == "titan4"
     assert document["units"] == ["rad"] * 6
     assert document["transitions"] == 7
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("names.csv", "a,b,c\n", "joint names only"),
+        ("degrees.json", '{"units": ["deg", "deg"], "waypoints": [[0, 90]]}', "units"),
+        ("deep.json", "[" * 100_000, "nested"),
+    ],
+)
+def test_a_file_that_holds_no_path_is_refused(tmp_path, name, text, words):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(InputError, match=words):
+        load_path(tmp_path / name)
+
+
+@pytest.mark.parametrize("resolution", [0.0, -1.0, np.nan])
+def test_a_check_in_steps_of_nothing_is_refused(resolution):
+    world = World(load_robot("planar3"))
+    with pytest.raises(InputError, match="resolution"):
+        JointPath.of(world.robot, [[0.0] * 3, [1.0] * 3]).violations(world, resolution=resolution)

@@ -11,6 +11,7 @@ import pytest
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.goal import PositionGoal
+from rrtik_ompl.ompl_bridge.setup import Judge
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.plan import find_planner, list_planners, plan
 from rrtik_ompl.problem import Problem
@@ -41,7 +42,7 @@ def closed():
     return Problem(world, [2, 2], [8, 2], name="closed")
 
 
-@pytest.mark.parametrize("name", [n for n in list_planners() if n != "crdt"])
+@pytest.mark.parametrize("name", list_planners())
 def test_every_planner_finds_a_valid_path_with_exact_ends(wall, name):
     found = plan(wall, name, seconds=2.0, seed=1)
     assert found.found, found.reason
@@ -67,6 +68,15 @@ def test_bicrdt_moves_one_joint_at_a_time_and_shortening_keeps_that(wall):
     assert short.transitions <= raw.transitions
     assert short.transitions == 3
     assert short.violations(wall.world) == ()
+
+
+def test_further_rounds_are_never_worse_than_the_double_cut():
+    problem = load_problem("titan4_sdu")
+    for seed in range(3):
+        raw = plan(problem, "bicrdt", seconds=5.0, seed=seed).path
+        double, rounds = (shorten(raw, problem, method=method) for method in ("axis", "axis-rounds"))
+        assert (rounds.transitions, rounds.length) <= (double.transitions, double.length)
+        assert rounds.one_joint_at_a_time
 
 
 @pytest.mark.parametrize("name", ["bicrdt", "RRTConnect"])
@@ -200,3 +210,29 @@ def test_planning_works_in_another_thread(wall):
     worker.start()
     worker.join()
     assert results == [True]
+
+
+@pytest.mark.parametrize("name", ["bicrdt", "RRTConnect", "InformedRRTstar", "BKPIECE1", "AORRTC"])
+def test_where_the_start_is_the_goal_the_path_is_a_single_configuration(wall, name):
+    found = plan(Problem(wall.world, wall.start, wall.start), name, seconds=2.0, seed=1)
+    assert found.found
+    assert found.path.waypoints.tolist() == [wall.start.tolist()]
+
+
+def test_aorrtc_finds_the_straight_motion_where_it_is_free(wall):
+    found = plan(Problem(wall.world, [2, 2], [2, 8]), "AORRTC", seconds=2.0, seed=1)
+    assert found.found, found.reason
+    assert found.path.waypoints.tolist() == [[2, 2], [2, 8]]
+
+
+@pytest.mark.parametrize("name", ["PRM", "PRMstar"])
+def test_a_road_map_comes_to_an_end_also_where_there_are_several_goals(name):
+    problem = load_problem("planar6_c")
+    for seed in range(4):
+        assert plan(problem, name, seconds=0.5, seed=seed).seconds > 0.0
+
+
+def test_after_its_deadline_a_judge_says_no(wall):
+    assert Judge(wall.world).valid(wall.start)
+    assert not Judge(wall.world, deadline=0.0).valid(wall.start)
+    assert not Judge(wall.world, deadline=0.0).motion_valid(wall.start, wall.start)

@@ -5,13 +5,11 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
 from ompl import base as ob
-from ompl import util as ou
 
 from rrtik_ompl.errors import PlannerError
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult, check_planner
@@ -25,12 +23,7 @@ SOAK = 10_000
 SOAK_GROWTH_MB = 2.0
 
 
-@pytest.fixture(autouse=True)
-def quiet() -> Iterator[None]:
-    level = ou.getLogLevel()
-    ou.setLogLevel(ou.LogLevel.LOG_NONE)
-    yield
-    ou.setLogLevel(level)
+pytestmark = pytest.mark.usefixtures("quiet_ompl")
 
 
 @pytest.mark.parametrize("clause", CONTRACT, ids=lambda c: c.__name__)

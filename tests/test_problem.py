@@ -6,7 +6,8 @@ import pytest
 
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError, ProblemError
-from rrtik_ompl.goal import JointGoal, PoseGoal, PositionGoal
+from rrtik_ompl.goal import GoalRegion, JointGoal, PoseGoal, PositionGoal
+from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box
@@ -88,3 +89,33 @@ def test_the_goal_of_a_continuous_joint_is_turned_to_the_short_way():
 def test_only_a_world_makes_a_problem():
     with pytest.raises(InputError, match="World"):
         Problem(load_robot("titan4"), FREE, FREE)
+
+
+def test_things_say_what_they_are_in_one_line(world):
+    path = JointPath.of(world.robot, [FREE, FREE + 0.1])
+    texts = [repr(thing) for thing in (world.robot, world.scene, world, Problem(world, FREE, FREE + 0.1), path)]
+    assert all("\n" not in text and len(text) < 200 for text in texts)
+    assert ["titan4" in texts[0], "panel" in texts[1], "panel" in texts[2], "JointGoal" in texts[3]] == [True] * 4
+    assert texts[4] == "JointPath(2 waypoints of 6 joints, 1 transitions, length 0.245 rad)"
+
+
+def test_a_goal_less_than_half_a_turn_away_is_kept_to_the_bit():
+    world = World(load_robot("kinova"))
+    turning = np.flatnonzero(world.robot.continuous)
+    start = np.mean(world.robot.finite_range(), axis=0) + 0.1
+    goals = np.tile(start, (50, 1))
+    goals[:, turning] = np.random.default_rng(0).uniform(-3.0, 3.0, (50, len(turning)))
+    free = goals[world.valid_batch(goals)]
+    assert len(free) > 10
+    assert all((Problem(world, start, goal).goal.q == goal).all() for goal in free)
+
+
+@pytest.mark.parametrize("matrix", [np.zeros((4, 4)), np.diag([2.0, 2.0, 2.0, 1.0]), np.diag([1.0, 1.0, -1.0, 1.0])])
+def test_a_goal_pose_that_is_no_rigid_pose_is_refused(matrix):
+    with pytest.raises(InputError, match="goal pose"):
+        PoseGoal(matrix)
+
+
+def test_a_region_takes_no_goal_in_joint_values():
+    with pytest.raises(InputError, match="pose or position"):
+        GoalRegion([JointGoal([0.0, 0.0])])

@@ -108,3 +108,34 @@ def test_limits_are_closed_and_tolerate_rounding(mixed):
         False,
     ]
     assert mixed.clamp(np.array([50.0, 1.5, -3.0])).tolist() == [50.0, 1.0, -2.0]
+
+
+def test_the_frame_of_a_joint_is_where_the_description_puts_it_also_for_a_slanted_endless_axis():
+    robot = robot_from_urdf_text(MIXED)
+    reference = pin.buildModelFromXML(MIXED)
+    data, q = reference.createData(), np.array([0.7, 0.4, -0.3])
+    full = np.array([np.cos(0.7), np.sin(0.7), 0.4, -0.3, 0.65])
+    pin.framesForwardKinematics(reference, data, full)
+    for joint in ("turn", "slide", "bend", "follow"):
+        pose = data.oMf[reference.getFrameId(joint)]
+        np.testing.assert_allclose(robot.fk(q, joint).homogeneous, pose.homogeneous, atol=1e-12)
+
+
+def test_a_robot_of_one_joint_has_a_jacobian_of_one_column():
+    robot = load_robot("planar", lengths=[2.0])
+    np.testing.assert_allclose(robot.jacobian([0.0])[:, 0], [0, 2, 0, 0, 0, 1], atol=1e-12)
+
+
+def test_the_finite_range_lies_inside_the_limits_wherever_they_are():
+    rail = """<robot name="rail"><link name="a"/><link name="b"/><link name="c"/>
+    <joint name="far" type="prismatic"><parent link="a"/><child link="b"/><axis xyz="1 0 0"/>
+    <limit lower="5" upper="9" velocity="1" effort="1"/></joint>
+    <joint name="turn" type="continuous"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/></joint></robot>"""
+    lower, upper = robot_from_urdf_text(rail).finite_range()
+    np.testing.assert_allclose(lower, [5.0, -np.pi])
+    np.testing.assert_allclose(upper, [9.0, np.pi])
+
+
+def test_a_joint_that_follows_a_moving_one_cannot_be_locked():
+    with pytest.raises(InputError, match="follow"):
+        robot_from_urdf_text(MIXED, locked={"follow": 0.1})

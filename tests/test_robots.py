@@ -59,8 +59,9 @@ def test_named_postures_are_free_and_within_limits(robot):
         assert world.valid(q) != ((robot.name, name) in POSTURES_IN_COLLISION), name
 
 
-def test_a_robot_is_named_as_it_is_listed(robot):
-    assert robot.source == ({robot.name: {}} if robot.name in ("planar", "point2d") else {"name": robot.name})
+@pytest.mark.parametrize("name", list_robots())
+def test_a_robot_remembers_the_name_it_was_loaded_by(name):
+    assert load_robot(name).source == ({name: {}} if name in ("planar", "point2d") else {"name": name})
 
 
 def test_every_robot_has_a_readme_with_sources_and_licence():

@@ -3,25 +3,17 @@ from __future__ import annotations
 import gc
 import time
 import weakref
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
 from ompl import base as ob
-from ompl import util as ou
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult, SpaceChecker, WorldChecker
 from rrtik_ompl.ompl_bridge.contract import GOAL, START, outside_bar, small_problem, solution_rows
 
-
-@pytest.fixture(autouse=True)
-def quiet() -> Iterator[None]:
-    level = ou.getLogLevel()
-    ou.setLogLevel(ou.LogLevel.LOG_NONE)
-    yield
-    ou.setLogLevel(level)
+pytestmark = pytest.mark.usefixtures("quiet_ompl")
 
 
 class Recorder(SafePlanner):

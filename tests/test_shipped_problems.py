@@ -79,19 +79,8 @@ def test_puma_goals_are_the_forward_kinematics_of_their_joint_values():
     np.testing.assert_array_equal(place.start, np.radians([0, 90, -90, 0, 0, 0]))
 
 
-def test_the_published_panel_route_is_free_in_the_reconstructed_panel():
-    vertices = np.radians(
-        [
-            [25, 19, -82, 60, 90, 0],
-            [48.19, 19, -82, 60, 90, 0],
-            [48.19, 19, -82, 60, 80, 0],
-            [48.19, 19, -82, 80, 80, 0],
-            [48.19, 19, -122, 80, 80, 0],
-            [48.19, 54.90, -122, 80, 80, 0],
-            [10, 54.90, -122, 80, 80, 0],
-            [10, 41, -122, 80, 80, 0],
-        ]
-    ) - np.radians([0, 0, 0, 0, 90, 0])
+def test_the_published_panel_route_is_free_in_the_reconstructed_panel(sdu_route):
+    vertices = sdu_route - np.radians([0, 0, 0, 0, 90, 0])  # the print counts joint 5 from 90
     problem = load_problem("titan4_sdu")
     np.testing.assert_allclose(problem.start, vertices[0], atol=1e-12)
     np.testing.assert_allclose(problem.goal.q, vertices[-1], atol=1e-12)

@@ -3,42 +3,16 @@
 import coal
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rrtik_ompl.collision.certificate import overlap
 from rrtik_ompl.collision.solids import convex_parts, hull, inside_mesh, pieces
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Sphere
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
 
-LETTER_E = [
-    (8, 4),
-    (18, 4),
-    (18, 7),
-    (11, 7),
-    (11, 11),
-    (18, 11),
-    (18, 14),
-    (11, 14),
-    (11, 18),
-    (18, 18),
-    (18, 21),
-    (8, 21),
-]
-CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
-FACES = [
-    (0, 1, 3),
-    (0, 3, 2),
-    (4, 6, 7),
-    (4, 7, 5),
-    (0, 4, 5),
-    (0, 5, 1),
-    (2, 3, 7),
-    (2, 7, 6),
-    (0, 2, 6),
-    (0, 6, 4),
-    (1, 5, 7),
-    (1, 7, 3),
-]
+LETTER_E = [(8, 4), (18, 4), (18, 7), (11, 7), (11, 11), (18, 11)]
+LETTER_E += [(18, 14), (11, 14), (11, 18), (18, 18), (18, 21), (8, 21)]
 
 
 def area(polygon):
@@ -61,13 +35,17 @@ def touches(shape, point):
         (Capsule(0.5, 2.0), (0.0, 0.0, 1.49), (0.0, 0.0, 1.51)),
         (HalfSpace([0, 0, 2], -2.0), (5.0, 5.0, -1.01), (5.0, 5.0, -0.99)),
         (Prism(LETTER_E, 1.0), (9.5, 12.5, 0.49), (15.0, 9.0, 0.0)),
-        (Mesh(CUBE, FACES), (0.5, 0.5, 0.5), (0.5, 0.5, 1.01)),
     ],
     ids=lambda value: type(value).__name__,
 )
 def test_a_shape_is_where_its_definition_says(shape, inside, outside):
     assert touches(shape, inside)
     assert not touches(shape, outside)
+
+
+def test_a_mesh_is_where_its_triangles_are(cube):
+    assert touches(cube, (0.0, 0.0, 0.99))
+    assert not touches(cube, (0.0, 0.0, 1.01))
 
 
 @given(st.lists(st.floats(0.3, 2.0), min_size=3, max_size=12))
@@ -88,18 +66,34 @@ def test_the_sense_of_a_polygon_does_not_matter():
     )
 
 
-def test_a_convex_mesh_becomes_a_solid_and_a_hollow_one_stays_a_mesh():
-    bent = np.vstack([CUBE, [[0.5, 0.5, 0.2]]])  # a dent in the top: not convex
-    dented = [f for f in FACES if f not in ((1, 5, 7), (1, 7, 3))] + [(1, 5, 8), (5, 7, 8), (7, 3, 8), (3, 1, 8)]
-    assert isinstance(pieces(Mesh(CUBE, FACES))[0].geometry, coal.ConvexBase)
-    assert isinstance(pieces(Mesh(bent, dented))[0].geometry, coal.BVHModelBase)
+def test_a_convex_mesh_becomes_a_solid_and_a_hollow_one_stays_a_mesh(cube, dented_cube):
+    assert isinstance(pieces(cube)[0].geometry, coal.ConvexBase)
+    assert isinstance(pieces(dented_cube(1.0, -0.6))[0].geometry, coal.BVHModelBase)
 
 
-@given(st.tuples(*[st.floats(-0.5, 1.5)] * 3))
-def test_inside_mesh_agrees_with_the_cube(point):
-    if min(abs(c - e) for c in point for e in (0.0, 1.0)) > 1e-6:
-        assert inside_mesh(CUBE, np.array(FACES), np.array(point)) == all(0.0 < c < 1.0 for c in point)
+@given(point=st.tuples(*[st.floats(-2.0, 2.0)] * 3))
+def test_inside_mesh_agrees_with_the_cube(cube, point):
+    assume(min(abs(abs(c) - 1.0) for c in point) > 1e-6)
+    assert inside_mesh(cube.vertices, cube.triangles, np.array(point)) == all(abs(c) < 1.0 for c in point)
 
 
-def test_hull_of_a_cube_has_its_volume():
-    assert hull(CUBE).computeVolume() == pytest.approx(1.0)
+def test_hull_of_a_cube_has_its_volume(cube):
+    assert hull(cube.vertices).computeVolume() == pytest.approx(8.0)
+
+
+@pytest.mark.parametrize(
+    "polygon",
+    [
+        [(0, 0), (2, 0), (2, 2), (1, 0), (0, 2)],  # a vertex on a side
+        [(0, 0), (1, 1), (2, 0), (2, 2), (1, 1), (0, 2)],  # two vertices in one place
+        [(0, 0), (4, 0), (2, 0), (2, 2)],  # there and back
+    ],
+)
+def test_a_polygon_that_touches_itself_is_refused(polygon):
+    with pytest.raises(InputError, match="itself"):
+        Prism(polygon)
+
+
+def test_a_polygon_may_repeat_its_first_vertex_at_the_end():
+    corner = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]
+    assert Prism([*corner, corner[0]]).polygon.tolist() == Prism(corner).polygon.tolist()

@@ -17,20 +17,7 @@ from rrtik_ompl.transitions import (
     transitions,
 )
 
-# The final list of moves of the SDU test in the C-RDT paper, degrees, joint 5 as printed.
-SDU = np.deg2rad(
-    [
-        [25, 19, -82, 60, 90, 0],
-        [48.19, 19, -82, 60, 90, 0],
-        [48.19, 19, -82, 60, 80, 0],
-        [48.19, 19, -82, 80, 80, 0],
-        [48.19, 19, -122, 80, 80, 0],
-        [48.19, 54.90, -122, 80, 80, 0],
-        [10, 54.90, -122, 80, 80, 0],
-        [10, 41, -122, 80, 80, 0],
-    ]
-)
-PRISMS = np.deg2rad([[0, 0, 0, 0, 90, 0], [0, 0, 95.13, 0, 90, 0], [-30, 0, 95.13, 0, 90, 0], [-30, 0, 0, 0, 90, 0]])
+# What RRT-Connect gives for the prism test in the C-RDT paper, degrees, joint 5 as printed.
 RRT_CONNECT = np.deg2rad(
     [
         [0, 0, 0, 0, 90, 0],
@@ -55,16 +42,16 @@ def axis_routes(dof: int = 3) -> st.SearchStrategy[np.ndarray]:
     return st.lists(move, max_size=15).map(build)
 
 
-def test_the_published_sdu_list_has_seven_transitions_and_its_length() -> None:
-    assert transitions(SDU) == 7
-    assert route_length(SDU) == pytest.approx(3.162, abs=5e-4)
-    assert single_joint(SDU)
-    assert lower_bound(SDU[0], SDU[-1]) == 5
+def test_the_published_sdu_list_has_seven_transitions_and_its_length(sdu_route: np.ndarray) -> None:
+    assert transitions(sdu_route) == 7
+    assert route_length(sdu_route) == pytest.approx(3.162, abs=5e-4)
+    assert single_joint(sdu_route)
+    assert lower_bound(sdu_route[0], sdu_route[-1]) == 5
 
 
-def test_the_published_prism_list_has_three_transitions_against_a_lower_bound_of_one() -> None:
-    assert transitions(PRISMS) == 3
-    assert lower_bound(PRISMS[0], PRISMS[-1]) == 1
+def test_the_published_prism_list_has_three_transitions_against_a_lower_bound_of_one(prism_route: np.ndarray) -> None:
+    assert transitions(prism_route) == 3
+    assert lower_bound(prism_route[0], prism_route[-1]) == 1
 
 
 def test_a_path_of_all_joints_has_as_many_transitions_as_edges_and_is_no_single_joint_route() -> None:

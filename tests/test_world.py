@@ -11,53 +11,30 @@ from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Sphere
 from rrtik_ompl.world import World
 
-CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
-FACES = [
-    (0, 1, 3),
-    (0, 3, 2),
-    (4, 6, 7),
-    (4, 7, 5),
-    (0, 4, 5),
-    (0, 5, 1),
-    (2, 3, 7),
-    (2, 7, 6),
-    (0, 2, 6),
-    (0, 6, 4),
-    (1, 5, 7),
-    (1, 7, 3),
-]
-
 
 def at(x, y, z):
     return pin.SE3(np.eye(3), np.array([x, y, z], dtype=float))
 
 
-def shell(size):
-    """A closed mesh that is not convex: a cube whose top is pushed in to near the bottom."""
-    points = size * np.vstack([CUBE, [[0.0, 0.0, -0.9]]])
-    faces = [f for f in FACES if f not in ((1, 5, 7), (1, 7, 3))] + [(1, 5, 8), (5, 7, 8), (7, 3, 8), (3, 1, 8)]
-    return Mesh(points, faces)
-
-
-def clutter(rng, count, reach):
+def clutter(rng, count, reach, shell):
     kinds = [
         lambda: Box(rng.uniform(0.05, 0.3, 3)),
         lambda: Sphere(rng.uniform(0.05, 0.2)),
         lambda: Cylinder(rng.uniform(0.03, 0.1), rng.uniform(0.1, 0.5)),
         lambda: Capsule(rng.uniform(0.03, 0.1), rng.uniform(0.1, 0.5)),
         lambda: Prism([(0, 0), (0.3, 0), (0.3, 0.1), (0.1, 0.1), (0.1, 0.3), (0, 0.3)], 0.2),
-        lambda: shell(0.1),
+        lambda: shell,
     ]
     poses = (pin.SE3(pin.SE3.Random().rotation, rng.uniform(-reach, reach, 3)) for _ in range(count))
     return [Obstacle(f"o{k}", kinds[k % len(kinds)](), pose) for k, pose in enumerate(poses)]
 
 
 @pytest.mark.parametrize(("name", "reach"), [("titan4", 1.8), ("panda", 0.8), ("kinova", 0.8), ("ur5", 0.9)])
-def test_both_opinions_agree_on_random_configurations(name, reach):
+def test_both_opinions_agree_on_random_configurations(name, reach, dented_cube):
     robot = load_robot(name)
     rng = np.random.default_rng(3)
     pin.seed(3)
-    world = World(robot, Scene(clutter(rng, 12, reach)))
+    world = World(robot, Scene(clutter(rng, 12, reach, dented_cube(0.1, -0.09))))
     Q = rng.uniform(np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi), (1500, robot.dof))
     first, second = world.valid_batch(Q), world.certify(Q)
     assert 0.02 < first.mean() < 0.98
@@ -134,37 +111,60 @@ def test_the_number_of_steps_follows_the_resolution():
     assert fine.steps(a, b) == pytest.approx(10 * coarse.steps(a, b), rel=0.05)
 
 
-def test_a_body_wholly_inside_a_hollow_mesh_is_in_collision():
+def test_a_body_wholly_inside_a_hollow_mesh_is_in_collision(dented_cube):
     robot = load_robot("point2d", radius=0.05, bounds=[[-5, 5], [-5, 5]])
-    points = np.vstack([3.0 * CUBE, [[0.0, 0.0, 2.0]]])
-    dented = [f for f in FACES if f not in ((1, 5, 7), (1, 7, 3))] + [(1, 5, 8), (5, 7, 8), (7, 3, 8), (3, 1, 8)]
-    world = World(robot, Scene([Obstacle("tank", Mesh(points, dented))]))
+    world = World(robot, Scene([Obstacle("tank", dented_cube(3.0, 2.0))]))
     assert not world.valid([0.0, 0.0])
     assert not world.certify(np.zeros((1, 2)))[0]
     assert "tank" in world.explain([0.0, 0.0])
     assert world.valid([4.0, 0.0])
 
 
-def test_allowed_pairs_attached_objects_and_the_base():
-    robot = load_robot("titan4")
-    q = np.zeros(6)
-    tool = AttachedObject(
-        "tool", "gripper" if "gripper" in robot.link_names else robot.link_names[-1], Cylinder(0.02, 0.4), at(0.3, 0, 0)
-    )
+def test_what_the_gripper_holds_collides_unless_the_pair_is_allowed():
+    robot, q = load_robot("titan4"), np.zeros(6)
     box = Obstacle("box", Box([0.2, 0.2, 0.2]), robot.fk(q) * at(0, 0, 0.25))
     assert World(robot, Scene([box])).valid(q)
-    held = AttachedObject(tool.name, tool.link, Box([0.05, 0.05, 0.8]), at(0, 0, 0))
-    world = World(robot, Scene([box], [held]))
-    reaching = [c for c in world.contacts(q) if {c.first, c.second} == {"tool", "box"}]
-    allowed = World(robot, Scene([box], [held], [("tool", "box")]))
-    assert not any({c.first, c.second} == {"tool", "box"} for c in allowed.contacts(q))
-    assert reaching or world.valid(q)
-    floor = Scene([Obstacle("floor", HalfSpace([0, 0, 1], 0.0))])
-    assert not World(robot, floor).valid(q)
-    base = robot.link_names[0]
-    names = {n for c in World(robot, floor).contacts(q) for n in (c.first, c.second)}
-    assert "floor" in names
-    assert base in names or len(names) > 1
+    held = AttachedObject("tool", "gripper", Box([0.6, 0.05, 0.05]), at(0.4, 0, 0))
+    (contact,) = World(robot, Scene([box], [held])).contacts(q)
+    assert {contact.first, contact.second} == {"tool", "box"}
+    assert World(robot, Scene([box], [held], [("tool", "box")])).valid(q)
+
+
+def test_what_the_gripper_holds_must_not_touch_the_link_before_the_gripper_either():
+    robot, q = load_robot("titan4"), np.zeros(6)
+
+    def holding(*allow):
+        bar = AttachedObject("bar", "gripper", Box([0.4, 0.05, 0.05]), at(0.2, 0, 0), allow)
+        return World(robot, Scene([], [bar]))
+
+    assert not holding().valid(q)
+    assert not holding().certify([q])[0]
+    assert {name for c in holding().contacts(q) for name in (c.first, c.second)} == {"bar", "wrist"}
+    assert holding("wrist").valid(q)
+
+
+def test_the_base_must_not_touch_the_floor():
+    world = World(load_robot("titan4"), Scene([Obstacle("floor", HalfSpace([0, 0, 1], 0.0))]))
+    assert not world.valid(np.zeros(6))
+    assert {"base", "floor"} in [{c.first, c.second} for c in world.contacts(np.zeros(6))]
+
+
+@pytest.mark.parametrize("lift", [0.0, -2.9])  # with the second one the open side lies near the origin of the mesh
+def test_a_body_inside_an_open_mesh_is_free(cube, lift):
+    basket = Mesh(3.0 * cube.vertices + [0.0, 0.0, lift], cube.triangles[:-2])
+    robot = load_robot("point2d", radius=0.05, bounds=[[-5, 5], [-5, 5]])
+    world = World(robot, Scene([Obstacle("basket", basket, at(0, 0, -lift))]))
+    assert world.valid([0.0, 0.0])
+    assert world.certify([[0.0, 0.0]])[0]
+    assert not world.valid([3.0, 0.0])
+
+
+def test_inside_a_hollow_mesh_the_closest_pair_is_the_one_in_collision(dented_cube):
+    robot = load_robot("point2d", radius=0.05, bounds=[[-5, 5], [-5, 5]])
+    world = World(robot, Scene([Obstacle("tank", dented_cube(3.0, 2.0)), Obstacle("ball", Sphere(0.1), at(1, 0, 0))]))
+    assert world.clearance([0.0, 0.0]) <= 0.0
+    assert "tank" in (world.closest([0.0, 0.0]).first, world.closest([0.0, 0.0]).second)
+    assert world.closest([4.0, 0.0]).distance == pytest.approx(0.95, abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -225,10 +225,27 @@ def test_moving_obstacles_stand_where_they_are_at_time_zero():
     assert not later.valid([8.0, 5.0])
 
 
-def test_the_certificate_agrees_with_itself_in_chunks():
+def test_the_certificate_agrees_with_itself_in_chunks(dented_cube):
     robot = load_robot("titan4")
-    world = World(robot, Scene(clutter(np.random.default_rng(5), 6, 1.5)))
+    world = World(robot, Scene(clutter(np.random.default_rng(5), 6, 1.5, dented_cube(0.1, -0.09))))
     Q = np.random.default_rng(6).uniform(robot.lower, robot.upper, (600, 6))
     whole = world.certify(Q)
     assert (whole == np.concatenate([world.certify(Q[:100]), world.certify(Q[100:])])).all()
     assert isinstance(world._certificate, Certificate)
+
+
+def test_a_half_space_cannot_be_held():
+    with pytest.raises(InputError, match="half-space"):
+        AttachedObject("floor", "gripper", HalfSpace([0, 0, 1]))
+
+
+def test_where_two_meshes_touch_the_depth_and_a_point_of_the_overlap_are_given(dented_cube):
+    robot = load_robot("point2d", radius=0.05, bounds=[[-5, 5], [-5, 5]])
+    held = AttachedObject("cup", robot.link_names[-1], dented_cube(0.5, -0.4), at(0, 0, 1))
+    bowl = Obstacle("bowl", dented_cube(1.0, -0.8), at(0, 0, 1))
+    world = World(robot, Scene([bowl], [held], [("disc", "bowl")]))
+    (contact,) = world.contacts([1.4, 0.1])
+    assert {contact.first, contact.second} == {"cup", "bowl"}
+    assert contact.distance == pytest.approx(-0.1, abs=1e-6)
+    for point in (contact.point_first, contact.point_second):
+        assert (np.abs(point - [0.95, 0.1, 1.0]) <= [0.051, 0.501, 0.501]).all()

@@ -95,9 +95,9 @@ def iteration_limit(limit: int | None) -> float:
     """The largest number of iterations, infinity if None.
 
     Raises:
-        InputError: If the limit is below 1.
+        InputError: If the limit is no number of at least 1.
     """
-    if limit is not None and not limit >= 1:
+    if limit is not None and (isinstance(limit, bool) or not isinstance(limit, int | float) or not limit >= 1):
         raise InputError(f"max_iterations: expected at least 1, got {limit!r}")
     return np.inf if limit is None else limit
 

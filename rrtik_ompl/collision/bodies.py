@@ -82,7 +82,10 @@ def _pieces(item: Obstacle | AttachedObject) -> tuple[Piece, ...]:
 
 
 def colliding_pairs(robot: Robot, scene: Scene, bodies: tuple[Body, ...]) -> tuple[tuple[int, int], ...]:
-    """Numbers of the bodies that must not touch: all but what is rigidly joined, adjacent, or allowed.
+    """Numbers of the bodies that must not touch: all but what is rigidly joined or allowed, and adjacent links.
+
+    Adjacent links overlap at their joint by construction; what a link holds does not, so it is checked against all
+    links but its own and those that it is allowed to touch.
 
     Raises:
         UnknownNameError: If an allowed collision names something that does not exist.
@@ -100,9 +103,10 @@ def colliding_pairs(robot: Robot, scene: Scene, bodies: tuple[Body, ...]) -> tup
             if names in allowed or len(names) == 1:
                 continue
             if "obstacle" not in (first.kind, second.kind):
-                if not robot.self_collision or _adjacent(first.joint, second.joint, parent):
+                if not robot.self_collision or first.joint == second.joint:
                     continue
-                if first.kind == second.kind == "link" and names not in checked_links:
+                between_links = first.kind == second.kind == "link"
+                if between_links and (_adjacent(first.joint, second.joint, parent) or names not in checked_links):
                     continue
             found.append((i, j))
     return tuple(found)
@@ -163,8 +167,7 @@ def _always_colliding(
     robot: Robot, bodies: tuple[Body, ...], pairs: list[tuple[int, int]]
 ) -> frozenset[frozenset[str]]:
     rng = np.random.default_rng(0)
-    low, high = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
-    samples = robot.joint_frames(rng.uniform(low, high, (ALWAYS_COLLIDING_SAMPLES, robot.dof)))
+    samples = robot.joint_frames(rng.uniform(*robot.finite_range(), (ALWAYS_COLLIDING_SAMPLES, robot.dof)))
     suspects = set(pairs)
     for frames in samples:
         suspects = {p for p in suspects if _touch(bodies[p[0]], bodies[p[1]], frames)}

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.solids import inside_mesh, is_mesh, mesh_arrays
+from rrtik_ompl.shapes import Mesh
 
 
 class Containment:
@@ -20,7 +21,8 @@ class Containment:
 
     def __init__(self, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> None:
         both_ways = [*pairs, *((j, i) for i, j in pairs)]
-        self.pairs = [(o, i) for o, i in both_ways if _may_hold(bodies[o].geometry, bodies[i].geometry)]
+        solid = {o for o in {o for o, _ in both_ways} if _has_inside(bodies[o])}
+        self.pairs = [(o, i) for o, i in both_ways if o in solid and _may_hold(bodies[o].geometry, bodies[i].geometry)]
         outer, inner = ([bodies[p[k]] for p in self.pairs] for k in (0, 1))
         self._outer_joint = np.array([b.joint for b in outer], dtype=np.int64)
         self._inner_joint = np.array([b.joint for b in inner], dtype=np.int64)
@@ -51,8 +53,13 @@ class Containment:
         return ()
 
 
+def _has_inside(body: Body) -> bool:
+    """Whether a body is a hollow mesh that stands for a solid: a link's always does, another one if it is closed."""
+    return is_mesh(body.geometry) and (body.kind == "link" or Mesh(*mesh_arrays(body.geometry)).closed)
+
+
 def _may_hold(outer: Any, inner: Any) -> bool:
-    if not is_mesh(outer) or isinstance(inner, coal.Halfspace):
+    if isinstance(inner, coal.Halfspace):
         return False
     return bool(_half_extents(inner).max() <= outer.aabb_radius)
 

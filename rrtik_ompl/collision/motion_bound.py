@@ -10,8 +10,6 @@ from rrtik_ompl.arrays import Vector, frozen
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.robot import Robot
 
-UNBOUNDED_STROKE = 1.0  # [m] assumed stroke of a prismatic joint without limits
-
 
 def displacement_weights(robot: Robot, bodies: Iterable[Body]) -> Vector:
     """Weights w, shape (dof,), such that no point of the arm moves farther than ``w @ |b - a|`` [m] from a to b.
@@ -46,7 +44,6 @@ def _from_axis(point: Vector, axis: Vector) -> float:
 
 def _stroke(robot: Robot, row: int) -> float:
     """Largest distance of a sliding joint from its zero [m]."""
-    gain, offset = robot.chain.gain[row], robot.chain.offset[row]
-    finite = np.isfinite(robot.lower) & np.isfinite(robot.upper)
-    ends = np.where(finite, np.maximum(np.abs(robot.lower), np.abs(robot.upper)), UNBOUNDED_STROKE)
-    return float(np.abs(gain) @ ends + abs(offset))
+    moving = robot.chain.gain[row] != 0.0  # joints with limits all of them, or the robot would have been refused
+    ends = np.maximum(np.abs(robot.lower[moving]), np.abs(robot.upper[moving]))
+    return float(np.abs(robot.chain.gain[row, moving]) @ ends + abs(robot.chain.offset[row]))

@@ -54,7 +54,8 @@ def _single(shape: Shape) -> Any:
     if isinstance(shape, HalfSpace):
         return coal.Halfspace(np.array(shape.normal), shape.offset)
     if isinstance(shape, Mesh):
-        return convexified(bvh(shape.vertices, shape.triangles))
+        surface = bvh(shape.vertices, shape.triangles)
+        return convexified(surface) if shape.closed else surface
     raise TypeError(f"no coal geometry for {type(shape).__name__}")
 
 

@@ -80,6 +80,12 @@ def build_robot(
     movable = {joint.name: joint for joint in tree.walk() if joint.kind != "fixed"}
     actuated = tuple(joints) if joints is not None else tuple(n for n in movable if n not in ties)
     _check_joints(name, tuple(movable), actuated, ties, locked or {})
+    for tie in ties.values():
+        if movable[tie.joint].kind == "prismatic" and movable[tie.source].kind == "continuous":
+            raise InputError(
+                f"robot '{name}': prismatic joint '{tie.joint}' mimics '{tie.source}', which turns without end; "
+                "give that one limits"
+            )
     held = _held_values(name, movable, actuated, ties, locked or {})
     model, collision, visual = build_models(tree.hold(held), base_pose)
     tip_name = _last_link(tree, actuated) if tip is None else tip
@@ -117,6 +123,9 @@ def _check_joints(
     for joint in (*actuated, *ties, *(m.source for m in ties.values()), *locked):
         if joint not in known:
             raise UnknownNameError(f"movable joint of robot '{name}'", joint, known)
+    for joint in locked:
+        if joint in ties and ties[joint].source in actuated:
+            raise InputError(f"robot '{name}': joint '{joint}' follows '{ties[joint].source}' and cannot be locked")
     for joint in actuated:
         if actuated.count(joint) > 1:
             raise InputError(f"robot '{name}': joint '{joint}' is listed twice")
@@ -186,6 +195,8 @@ def _limits(name: str, joints: Iterable[Joint], given: Mapping[str, JointLimits]
                 f"robot '{name}': joint '{joint.name}' has limits {low:g} .. {high:g}; "
                 "lower must be below upper: correct the limits, or leave the joint out of joints=[...]"
             )
+        if joint.kind == "prismatic" and not np.isfinite([low, high]).all():
+            raise InputError(f"robot '{name}': prismatic joint '{joint.name}' needs finite limits, in metres")
         rates = [joint.velocity if wanted.velocity is None else wanted.velocity]
         rates += [np.inf if rate is None else rate for rate in (wanted.acceleration, wanted.jerk)]
         for what, rate in zip(("velocity", "acceleration", "jerk"), rates, strict=True):

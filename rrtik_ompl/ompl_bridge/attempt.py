@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.arrays import Matrix, finite_array
 from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
 from rrtik_ompl.ompl_bridge.setup import Judge, exact_path, problem_definition, space_information
@@ -22,6 +25,16 @@ from rrtik_ompl.problem import Problem
 
 # Those that go on improving their path until the time is up.
 ANYTIME_PLANNERS = ("AORRTC", "BITstar", "InformedRRTstar", "PRMstar", "RRTstar", "SORRTstar")
+
+# Those that take up further goals in a second thread. It asks Python about motions under a lock of the roadmap, for
+# which the first thread waits while it holds Python's lock: with more than one goal they hang.
+ONE_GOAL_PLANNERS = ("PRM", "PRMstar")
+
+# Those that answer with a path from the goal to the goal if a straight motion from the start to it is free.
+STRAIGHT_FIRST_PLANNERS = ("AORRTC",)
+
+# Options of our planners that `attempt` itself sets.
+GIVEN_OPTIONS = ("world", "seed")
 
 PlannerFactory = Callable[..., Any]
 
@@ -52,6 +65,8 @@ def attempt(
 ) -> Attempt:
     """Let a planner work for at most ``seconds`` from the start of a problem to any of ``goals``, shape (k, n).
 
+    PRM and PRMstar aim at the first goal alone.
+
     Raises:
         InputError: If the planner does not take a parameter, or cannot work towards this kind of goal.
         PlannerError: If the planner broke.
@@ -59,6 +74,7 @@ def attempt(
     """
     own = issubclass(factory, SafePlanner) if isinstance(factory, type) else False
     name = getattr(factory, "__name__", str(factory))
+    goals = goals[:1] if name in ONE_GOAL_PLANNERS else goals
     with _quiet():
         ou.RNG.setSeed(1 + seed % (2**31 - 2))  # before any object that draws from it; OMPL does not take 0
         judge = Judge(problem.world)
@@ -68,12 +84,19 @@ def attempt(
             planner = _own_planner(factory, name, si, problem, seed, parameters)
         else:
             planner = _wheel_planner(factory, name, si, definition, parameters)
-        planner.setProblemDefinition(definition)
-        planner.setup()
+        judge.deadline = time.monotonic() + seconds
         condition = ob.timedPlannerTerminationCondition(seconds)
         judge.stop = condition.terminate
-        with _interrupt_ends(condition):
-            status = planner.solve(condition)
+        try:
+            planner.setProblemDefinition(definition)
+            planner.setup()
+            straight = _straight_motion(problem, goals) if name in STRAIGHT_FIRST_PLANNERS else None
+            if straight is not None:
+                return Attempt(straight, "Exact solution", {})
+            with _interrupt_ends(condition):
+                status = planner.solve(condition)
+        except RuntimeError as error:  # what C++ throws
+            raise PlannerError(f"planner {name} broke: {error}") from None
         problem_in_planner = judge.error or (getattr(planner, "error", None) if str(status) == "Crash" else None)
         if problem_in_planner is not None:
             raise PlannerError(f"planner {name} broke: {str(problem_in_planner).splitlines()[-1]}")
@@ -81,9 +104,19 @@ def attempt(
         return Attempt(exact_path(definition, si), str(status), counts)
 
 
+def _straight_motion(problem: Problem, goals: Matrix) -> Matrix | None:
+    """The first free straight motion from the start to a goal, shape (2, n), or None."""
+    ends = (np.stack([problem.start, goal]) for goal in goals)
+    return next((rows for rows in ends if problem.world.motion_valid(*rows)), None)
+
+
 def _own_planner(
     factory: PlannerFactory, name: str, si: Any, problem: Problem, seed: int, parameters: Mapping[str, Any]
 ) -> Any:
+    options = tuple(inspect.signature(factory).parameters)[1:]  # the first one is the space information
+    for key in parameters:
+        if key not in options or key in GIVEN_OPTIONS:
+            raise UnknownNameError(f"parameter of planner {name}", key, set(options).difference(GIVEN_OPTIONS))
     try:
         return factory(si, world=problem.world, seed=seed, **parameters)
     except TypeError as error:
@@ -108,6 +141,8 @@ def _set(planner: Any, name: str, key: str, value: Any) -> None:
     setter = "set" + "".join(part[:1].upper() + part[1:] for part in key.split("_"))
     if setter not in setters:
         raise UnknownNameError(f"parameter of planner {name}", key, (_snake(s) for s in setters))
+    if isinstance(value, float):
+        finite_array(value, (), f"planner {name}: parameter {key}")
     try:
         getattr(planner, setter)(value)
     except TypeError:

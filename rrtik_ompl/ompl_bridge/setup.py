@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -11,22 +12,24 @@ from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.ompl_bridge.states import StateIO
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.problem import TURN, Problem
 from rrtik_ompl.world import World
-
-TURN = 2.0 * np.pi
-UNLIMITED_STROKE = 10.0  # [m] each way from the start for a prismatic joint without limits
 
 
 @dataclass(slots=True, eq=False)
 class Judge:
-    """Counts the questions of a C++ planner and remembers the first error, which must not be raised inside OMPL."""
+    """Counts the questions of a C++ planner and remembers the first error, which must not be raised inside OMPL.
+
+    After the ``deadline`` [s, of ``time.monotonic``] every answer is no, for some planners ask hundreds of questions
+    between two looks at their time.
+    """
 
     world: World
     states: int = 0
     motions: int = 0
     error: Exception | None = None
     stop: Callable[[], object] | None = None  # ends the planner
+    deadline: float = np.inf
 
     def valid(self, q: Vector) -> bool:
         """Whether q, shape (n,), is free; False from the first error on."""
@@ -39,7 +42,7 @@ class Judge:
         return self._ask(self.world.motion_valid, a, b)
 
     def _ask(self, question: Any, *arguments: Vector) -> bool:
-        if self.error is not None:
+        if self.error is not None or time.monotonic() > self.deadline:
             return False
         try:
             return bool(question(*arguments))
@@ -63,12 +66,11 @@ class _Motions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no types
 
 
 def planning_bounds(problem: Problem, goals: Matrix) -> tuple[Vector, Vector]:
-    """Finite bounds to sample in, shapes (n,): the limits; where there are none, some way beyond start and goals."""
+    """Finite bounds to sample in, shapes (n,): the limits; for continuous joints one turn beyond start and goals."""
     robot = problem.world.robot
-    spread = np.where(robot.prismatic, UNLIMITED_STROKE, TURN)
     ends = np.vstack([problem.start, goals])
-    lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - spread)
-    upper = np.where(np.isfinite(robot.upper), robot.upper, ends.max(axis=0) + spread)
+    lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - TURN)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, ends.max(axis=0) + TURN)
     return lower, upper
 
 

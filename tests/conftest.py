@@ -1,0 +1,59 @@
+"""What several tests share: the published lists of moves, small meshes, OMPL without its log."""
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ompl import util as ou
+
+from rrtik_ompl.shapes import Mesh
+
+CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+BOTTOM_AND_SIDES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6)]
+BOTTOM_AND_SIDES += [(0, 2, 6), (0, 6, 4)]
+TOP = [(1, 5, 7), (1, 7, 3)]
+PUSHED_IN_TOP = [(1, 5, 8), (5, 7, 8), (7, 3, 8), (3, 1, 8)]
+
+
+@pytest.fixture(scope="session")
+def published():
+    """The tables of the C-RDT paper by name; its lists of moves in degrees as printed (TITAN-4's joint 5 plus 90)."""
+    return runpy.run_path(str(Path(__file__).parent.parent / "bench" / "crdt_published.py"))
+
+
+@pytest.fixture(scope="session")
+def sdu_route(published):
+    """The published moves to the button of the subsea distribution unit, as printed but in radians, shape (8, 6)."""
+    return np.deg2rad(published["SDU_LIST"])
+
+
+@pytest.fixture(scope="session")
+def prism_route(published):
+    """The published moves past the two prisms, as printed but in radians, shape (4, 6)."""
+    return np.deg2rad(published["PRISM_LIST"])
+
+
+@pytest.fixture(scope="session")
+def cube():
+    """The cube between -1 and 1 as a closed mesh."""
+    return Mesh(CORNERS, BOTTOM_AND_SIDES + TOP)
+
+
+@pytest.fixture(scope="session")
+def dented_cube():
+    """Makes closed meshes that are not convex: a cube of ``half`` a side whose top dips to ``height`` in the middle."""
+
+    def make(half, height):
+        return Mesh(np.vstack([half * CORNERS, [[0.0, 0.0, height]]]), BOTTOM_AND_SIDES + PUSHED_IN_TOP)
+
+    return make
+
+
+@pytest.fixture
+def quiet_ompl():
+    """No log of OMPL while the test runs."""
+    level = ou.getLogLevel()
+    ou.setLogLevel(ou.LogLevel.LOG_NONE)
+    yield
+    ou.setLogLevel(level)

@@ -1,0 +1,55 @@
+"""What the README shows, works."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from rrtik_ompl.cli import run
+from rrtik_ompl.path import load_path
+from rrtik_ompl.problem_file import load_problem
+
+README = (Path(__file__).parent.parent / "README.md").read_text()
+
+
+def blocks(language):
+    return re.findall(rf"^```{language}\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+
+
+def test_there_are_two_commands_to_set_up_and_the_second_runs_the_tests():
+    commands = [line for block in blocks("") for line in block.splitlines() if "pip install" in line]
+    assert [command.rpartition("&& ")[2].split()[0] for command in commands] == [".venv/bin/rrtik", ".venv/bin/python"]
+    assert commands[1].endswith("-m pytest")
+
+
+def test_the_main_job_writes_what_it_says(tmp_path, monkeypatch):
+    (job,) = re.findall(r"\.venv/bin/rrtik (.*)", README)
+    monkeypatch.chdir(tmp_path)
+    assert run(job.split()) == 0
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["titan4_sdu.html", "titan4_sdu.json"]
+
+
+def test_the_python_example_runs_from_top_to_bottom(tmp_path, monkeypatch):
+    (example,) = blocks("python")
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec(compile(example, "README.md", "exec"), names)
+    assert names["plan"].found, names["plan"].reason
+    assert load_path("path.json").transitions == names["path"].transitions
+    assert load_problem("reach.yaml").world.scene.names == ("post",)
+    assert Path("view.html").stat().st_size > 100_000
+
+
+def test_the_problem_file_loads(tmp_path):
+    (text,) = blocks("yaml")
+    file = tmp_path / "task.yaml"
+    file.write_text(text)
+    assert load_problem(file).world.scene.names == ("panel", "seabed")
+
+
+@pytest.mark.parametrize("verb", ["plan", "check", "show", "list", "convert"])
+def test_every_option_that_the_readme_names_is_there(verb, capsys):
+    (usage,) = re.findall(rf"^rrtik {verb} [^\n]*(?:\n  [^\n]*)*", README, re.MULTILINE)
+    assert run([verb, "--help"]) == 0
+    text = capsys.readouterr().out
+    assert [option for option in re.findall(r"--[a-z]+", usage) if option not in text] == []
