@@ -19,12 +19,19 @@ def main() -> int:
     """Check every family and print one row for each."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path, help="the unpacked set, for instance mbm_panda")
-    folder = parser.parse_args().folder
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "reports" / "mbm_endpoints.md")
+    options = parser.parse_args()
+    folder = options.folder
     families = sorted(path for path in (folder / "problems").glob("*") if path.is_dir())
     rows = [check_family(family, folder / "panda.urdf") for family in families]
-    print(f"{'family':30} {'problems':>8} {'loaded':>8} {'start free':>10} {'goal free':>10} {'seconds':>8}")
-    for name, *counts, seconds in [*rows, ("all", *(sum(column) for column in list(zip(*rows, strict=True))[1:]))]:
-        print(f"{name:30} {counts[0]:8d} {counts[1]:8d} {counts[2]:10d} {counts[3]:10d} {seconds:8.1f}")
+    total = ("all", *(sum(column) for column in list(zip(*rows, strict=True))[1:]))
+    lines = ["# Ends of the MotionBenchMaker problems for the Panda, exact meshes", ""]
+    lines += ["| family | problems | loaded | start free | goal free | seconds |", "|---|---|---|---|---|---|"]
+    lines += ["| " + " | ".join(str(cell) for cell in (*row[:-1], f"{row[-1]:.1f}")) + " |" for row in [*rows, total]]
+    lines += ["", "Made by `python bench/mbm_endpoints.py FOLDER`."]
+    print("\n".join(lines))
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    options.out.write_text("\n".join(lines) + "\n")
     good = bool(rows) and all(row[1] == row[2] == row[3] == row[4] for row in rows)
     print("all start and goal configurations are free" if good else "NOT all problems are loaded and free")
     return 0 if good else 1

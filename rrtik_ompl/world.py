@@ -22,6 +22,7 @@ from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
 from rrtik_ompl.scene import Scene
 
 MOTION_RESOLUTION = 0.01  # [m]
+BROADPHASE_FROM = 40  # pairs; below that, asking about each of them is faster than a tree of bounding boxes
 FINEST_RESOLUTION = 1e-5  # [m]; a motion across an arm's reach is then some hundred thousand checks
 
 
@@ -51,6 +52,12 @@ class World:
 
     A world is meant for one thread at a time.
 
+    Attributes:
+        robot, scene, motion_resolution: As given.
+        bodies: The solids of the robot and the scene.
+        pairs: Numbers of the bodies that must not touch.
+        weights: No point of the arm moves farther than ``weights @ |b - a|`` [m] from a to b, shape (dof,).
+
     Args:
         robot: The arm.
         scene: Its surroundings; empty if None. Moving obstacles stand where they are at time 0.
@@ -75,15 +82,15 @@ class World:
         if not robot.collision.geometryObjects:
             message = f"robot '{robot.name}' has no collision geometry: every configuration counts as free"
             warnings.warn(MeshWarning(message), stacklevel=2)
-        self._bodies = link_bodies(robot) + scene_bodies(robot, self.scene.at(0.0))
-        self.weights = displacement_weights(robot, [b for b in self._bodies if b.kind != "obstacle"])
-        pairs = colliding_pairs(robot, self.scene, self._bodies)
-        moving = tuple(p for p in pairs if any(self._bodies[i].joint > 0 for i in p))
-        self._pairs = pairs
-        self._certificate = Certificate(robot, self._bodies, pairs)
-        self._oracle = _Oracle(robot, self._bodies, moving)
+        self.bodies = link_bodies(robot) + scene_bodies(robot, self.scene.at(0.0))
+        self.weights = displacement_weights(robot, [b for b in self.bodies if b.kind != "obstacle"])
+        pairs = colliding_pairs(robot, self.scene, self.bodies)
+        moving = tuple(p for p in pairs if any(self.bodies[i].joint > 0 for i in p))
+        self.pairs = pairs
+        self._certificate = Certificate(robot, self.bodies, pairs)
+        self._oracle = _Oracle(robot, self.bodies, moving)
         standing = tuple(p for p in pairs if p not in set(moving))
-        self._always_colliding = bool(standing) and not _standing_free(robot, self._bodies, standing)
+        self._always_colliding = bool(standing) and not _standing_free(robot, self.bodies, standing)
 
     def __repr__(self) -> str:
         return f"World({self.robot.name}, {self.scene}, motion_resolution={self.motion_resolution:g} m)"
@@ -196,12 +203,12 @@ class World:
 
     def _distances(self, rows: Matrix, *, near_only: bool) -> list[Contact]:
         frames = self.robot.joint_frames(rows)[0]
-        poses = [pin.SE3(frames[b.joint]) * b.placement for b in self._bodies]
+        poses = [pin.SE3(frames[b.joint]) * b.placement for b in self.bodies]
         transforms = [coal.Transform3s(p.rotation, p.translation) for p in poses]
         request = coal.DistanceRequest()
         found = []
-        for i, j in self._pairs:
-            first, second = self._bodies[i], self._bodies[j]
+        for i, j in self.pairs:
+            first, second = self.bodies[i], self.bodies[j]
             ends = (first.geometry, transforms[i], second.geometry, transforms[j])
             touching, result = coal.CollisionResult(), coal.DistanceResult()
             if near_only and not coal.collide(*ends, coal.CollisionRequest(), touching):
@@ -228,17 +235,14 @@ class _Oracle:
         for i, j in pairs:
             self._geometry.addCollisionPair(pin.CollisionPair(i, j))
         self._geometry_data = pin.GeometryData(self._geometry)
-        self._manager = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(
-            self._model, self._geometry, self._geometry_data
-        )
+        plain = (self._geometry, self._geometry_data)
+        tree = (pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(self._model, *plain),)
+        self._checked = plain if len(pairs) < BROADPHASE_FROM else tree
         self._containment = Containment(bodies, pairs)
-        self._empty = not pairs
 
     def free(self, full: Vector) -> bool:
         """Whether Pinocchio's configuration vector ``full``, shape (nq,), is free of collision."""
-        if self._empty:
-            return True
-        if pin.computeCollisions(self._model, self._data, self._manager, full, True):
+        if pin.computeCollisions(self._model, self._data, *self._checked, full, True):
             return False
         if not self._containment.pairs:
             return True
