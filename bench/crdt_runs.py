@@ -13,8 +13,8 @@ import numpy as np
 import rrtik_ompl as rrtik
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.shorten.axis import axis_cut, double_axis_cut
-from rrtik_ompl.shorten.axis_rounds import axis_cut_rounds, route_rank
+from rrtik_ompl.shortening.axis import axis_cut, double_axis_cut
+from rrtik_ompl.shortening.axis_rounds import axis_cut_rounds, route_rank
 from rrtik_ompl.transitions import route_length, single_joint, transitions
 
 STAGES = ("raw", "pass 1", "pass 2", "extra rounds")

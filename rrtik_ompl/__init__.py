@@ -1,49 +1,68 @@
-"""Motion planning for robot arms: a robot and a scene, a problem, a plan, a path that has been checked."""
+"""Motion planning for robot arms: a robot and a scene, a problem, a plan, a path that has been checked.
 
-from rrtik_ompl.catalog import list_problems, list_robots, load_robot
-from rrtik_ompl.errors import InputError, PlannerError, ProblemError, RrtikError, UnknownNameError
-from rrtik_ompl.goal import GoalRegion, JointGoal, PoseGoal, PositionGoal
-from rrtik_ompl.path import JointPath, load_path
-from rrtik_ompl.plan import Plan, list_planners, plan
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.problem_file import load_problem, save_problem
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
-from rrtik_ompl.scene_file import load_scene, save_scene
-from rrtik_ompl.shorten import shorten
-from rrtik_ompl.viewer import view
-from rrtik_ompl.world import World
+What stands here is loaded when it is first used, so that ``import rrtik_ompl`` costs next to nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
 
-__all__ = [
-    "AttachedObject",
-    "GoalRegion",
-    "InputError",
-    "JointGoal",
-    "JointPath",
-    "Obstacle",
-    "Plan",
-    "PlannerError",
-    "PoseGoal",
-    "PositionGoal",
-    "Problem",
-    "ProblemError",
-    "Robot",
-    "RrtikError",
-    "Scene",
-    "UnknownNameError",
-    "World",
-    "list_planners",
-    "list_problems",
-    "list_robots",
-    "load_path",
-    "load_problem",
-    "load_robot",
-    "load_scene",
-    "plan",
-    "save_problem",
-    "save_scene",
-    "shorten",
-    "view",
-]
+if TYPE_CHECKING:
+    from rrtik_ompl.catalog import list_problems as list_problems
+    from rrtik_ompl.catalog import list_robots as list_robots
+    from rrtik_ompl.catalog import load_robot as load_robot
+    from rrtik_ompl.errors import InputError as InputError
+    from rrtik_ompl.errors import PlannerError as PlannerError
+    from rrtik_ompl.errors import ProblemError as ProblemError
+    from rrtik_ompl.errors import RrtikError as RrtikError
+    from rrtik_ompl.errors import UnknownNameError as UnknownNameError
+    from rrtik_ompl.goal import GoalRegion as GoalRegion
+    from rrtik_ompl.goal import JointGoal as JointGoal
+    from rrtik_ompl.goal import PoseGoal as PoseGoal
+    from rrtik_ompl.goal import PositionGoal as PositionGoal
+    from rrtik_ompl.path import JointPath as JointPath
+    from rrtik_ompl.path import load_path as load_path
+    from rrtik_ompl.planning import Plan as Plan
+    from rrtik_ompl.planning import list_planners as list_planners
+    from rrtik_ompl.planning import plan as plan
+    from rrtik_ompl.problem import Problem as Problem
+    from rrtik_ompl.problem_file import load_problem as load_problem
+    from rrtik_ompl.problem_file import save_problem as save_problem
+    from rrtik_ompl.robot import Robot as Robot
+    from rrtik_ompl.scene import AttachedObject as AttachedObject
+    from rrtik_ompl.scene import Obstacle as Obstacle
+    from rrtik_ompl.scene import Scene as Scene
+    from rrtik_ompl.scene_file import load_scene as load_scene
+    from rrtik_ompl.scene_file import save_scene as save_scene
+    from rrtik_ompl.shortening import shorten as shorten
+    from rrtik_ompl.viewer import view as view
+    from rrtik_ompl.world import World as World
+else:
+    _HOMES = {
+        "catalog": ("list_problems", "list_robots", "load_robot"),
+        "errors": ("InputError", "PlannerError", "ProblemError", "RrtikError", "UnknownNameError"),
+        "goal": ("GoalRegion", "JointGoal", "PoseGoal", "PositionGoal"),
+        "path": ("JointPath", "load_path"),
+        "planning": ("Plan", "list_planners", "plan"),
+        "problem": ("Problem",),
+        "problem_file": ("load_problem", "save_problem"),
+        "robot": ("Robot",),
+        "scene": ("AttachedObject", "Obstacle", "Scene"),
+        "scene_file": ("load_scene", "save_scene"),
+        "shortening": ("shorten",),
+        "viewer": ("view",),
+        "world": ("World",),
+    }
+    _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+    __all__ = sorted(_HOME_OF)
+
+    def __getattr__(name: str) -> Any:
+        if name not in _HOME_OF:
+            raise AttributeError(f"module 'rrtik_ompl' has no attribute '{name}'")
+        value = getattr(import_module(f"rrtik_ompl.{_HOME_OF[name]}"), name)
+        globals()[name] = value
+        return value
+
+    def __dir__() -> list[str]:
+        return [*globals(), *__all__]

@@ -87,8 +87,8 @@ def plan(
     _check_target(out, PATH_ENDINGS)
     _check_target(html, (".html", ".htm"))
     from rrtik_ompl import load_problem, report
-    from rrtik_ompl.plan import find_planner
-    from rrtik_ompl.plan import plan as find_path
+    from rrtik_ompl.planning import find_planner
+    from rrtik_ompl.planning import plan as find_path
 
     find_planner(planner)
     question = load_problem(problem)
@@ -264,7 +264,7 @@ def _drop_output() -> None:
 
 
 def _shortened(path: Any, problem: Any, method: Shorten) -> tuple[Any, float]:
-    from rrtik_ompl.shorten import shorten
+    from rrtik_ompl.shortening import shorten
 
     wanted = method
     if path is not None and method is Shorten.auto:

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.path import SECOND_CHECK, JointPath
-from rrtik_ompl.plan import Plan
+from rrtik_ompl.planning import Plan
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.transitions import lower_bound
 
@@ -60,7 +60,7 @@ def summary(problem: Problem, plan: Plan, path: JointPath | None, shorten_second
         least = "" if bound is None else f" (no path can have fewer than {bound})"
         raw = plan.path
         same = (raw.transitions, raw.length) == (path.transitions, path.length)
-        before = "" if same else f"; {raw.transitions} and {raw.length:.2f} {raw.unit} before shortening"
+        before = "" if same else f"; {raw.transitions} moves and {raw.length:.2f} {raw.unit} before shortening"
         lines.append(f"{path.transitions} moves{least}, length {path.length:.2f} {path.unit}{before}")
     else:
         size = f"{len(path.waypoints)} waypoints, length {path.length:.2f} {path.unit}"

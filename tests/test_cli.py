@@ -162,7 +162,7 @@ def test_ctrl_c_while_the_program_loads_is_one_line():
         "    def find_spec(self, name, *_):\n"
         "        if name == 'numpy': os.kill(os.getpid(), signal.SIGINT)\n"
         "sys.meta_path.insert(0, Finder())\n"
-        "import rrtik_command; rrtik_command.main()"
+        "from rrtik_ompl.command import main; main()"
     )
     done = subprocess.run([sys.executable, "-c", code, "list"], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "rrtik: interrupted; no file is half-written\n")

@@ -12,7 +12,7 @@ LADDER = [
     *("errors", "arrays", "text_file", "yaml_file", "file_format", "shapes", "poses", "transitions", "robot"),
     *("scene", "goal", "collision", "mesh_file", "description", "catalog", "scene_file", "goal_file", "robot_entry"),
     *("world", "path", "problem", "ik", "goal_configurations", "moveit_messages", "motion_bench_maker", "problem_file"),
-    *("ompl_bridge", "plan", "shorten", "viewer", "report", "cli"),
+    *("ompl_bridge", "planning", "shortening", "viewer", "report", "cli", "command"),
 ]
 
 

@@ -13,12 +13,12 @@ from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.ompl_bridge.setup import Judge
 from rrtik_ompl.path import JointPath
-from rrtik_ompl.plan import find_planner, list_planners, plan
+from rrtik_ompl.planning import find_planner, list_planners, plan
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_file import load_problem
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box
-from rrtik_ompl.shorten import shorten
+from rrtik_ompl.shortening import shorten
 from rrtik_ompl.world import World
 
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.shorten.axis import MotionValid, ask_once, axis_cut, double_axis_cut
+from rrtik_ompl.shortening.axis import MotionValid, ask_once, axis_cut, double_axis_cut
 from rrtik_ompl.transitions import lower_bound, route_length, transitions
 
 ROUNDS = 20

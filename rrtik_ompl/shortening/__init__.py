@@ -10,8 +10,8 @@ from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.path import SECOND_CHECK, JointPath
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.shorten.axis import MotionValid, double_axis_cut
-from rrtik_ompl.shorten.axis_rounds import axis_cut_rounds
+from rrtik_ompl.shortening.axis import MotionValid, double_axis_cut
+from rrtik_ompl.shortening.axis_rounds import axis_cut_rounds
 
 Method: TypeAlias = Callable[[Matrix, MotionValid], Matrix]
 
