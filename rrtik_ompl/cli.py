@@ -8,7 +8,7 @@ import sys
 import time
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any
@@ -24,7 +24,6 @@ UsageError: Any = typer.BadParameter.__bases__[0]  # click's, which typer carrie
 app = typer.Typer(
     help="Plan collision-free paths for robot arms.",
     add_completion=False,
-    no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
@@ -207,8 +206,13 @@ def run(arguments: list[str] | None = None) -> int:
     """Run the command line with ``arguments`` (the process's own if None) and return the exit code."""
     warnings.showwarning = _warn
     _prepare_streams()
+    given = sys.argv[1:] if arguments is None else arguments
     try:
-        code = app(args=arguments, prog_name="rrtik", standalone_mode=False)
+        if not given:  # the help, but no success: nothing was asked
+            with redirect_stdout(sys.stderr):
+                app(args=["--help"], prog_name="rrtik", standalone_mode=False)
+            return BAD_INPUT
+        code = app(args=given, prog_name="rrtik", standalone_mode=False)
         sys.stdout.flush()
         if code == INTERRUPTED:  # what typer makes of KeyboardInterrupt
             raise KeyboardInterrupt
@@ -238,11 +242,8 @@ def _fail(message: str) -> int:
 
 
 def _usage(error: Any) -> int:
-    """Say what is wrong with a command; `rrtik` alone gets the help itself."""
+    """Say in one line what is wrong with a command."""
     text = error.format_message()
-    if "--help" in text:
-        print(text, file=sys.stderr)
-        return BAD_INPUT
     context = getattr(error, "ctx", None)
     command = "rrtik" if context is None else context.command_path
     return _fail(f"{' '.join(text.replace('Value error, ', '').split())} (see: {command} --help)")
