@@ -1,13 +1,19 @@
 """What several tests share: the published lists of moves, small meshes, OMPL without its log."""
 
+import os
 import runpy
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import settings
 from ompl import util as ou
 
 from rrtik_ompl.shapes import Mesh
+
+# Machines differ and are shared: no example may fail for being slow, and an unattended run repeats the same examples.
+settings.register_profile("rrtik", deadline=None, derandomize=bool(os.environ.get("CI")))
+settings.load_profile("rrtik")
 
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 BOTTOM_AND_SIDES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6)]

@@ -10,7 +10,18 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 LADDER = [
     *("errors", "arrays", "text_file", "yaml_file", "file_format", "shapes", "poses", "transitions", "robot"),
-    *("scene", "goal", "collision", "mesh_file", "description", "catalog", "scene_file", "goal_file", "robot_entry"),
+    *(
+        "scene",
+        "goal",
+        "collision",
+        "fast",
+        "mesh_file",
+        "description",
+        "catalog",
+        "scene_file",
+        "goal_file",
+        "robot_entry",
+    ),
     *("world", "path", "problem", "ik", "goal_configurations", "moveit_messages", "motion_bench_maker", "problem_file"),
     *("ompl_bridge", "planning", "shortening", "viewer", "report", "cli", "command"),
 ]

@@ -1,0 +1,115 @@
+"""Covers kept on disk, so that a geometry is covered once per machine. Nothing here ever fails: no cache, no gain.
+
+One file per geometry, parameters and algorithm, named by a hash of all three. Files appear whole (written aside, then
+renamed), so processes may share the folder.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import sys
+import tempfile
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import coal
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.collision.solids import is_mesh, mesh_arrays
+from rrtik_ompl.fast.covers import ALGORITHM, inner_spheres, outer_cover
+
+FOLDER_VARIABLE = "RRTIK_CACHE"  # another folder; empty: no cache
+LAYOUT = 1
+
+
+def cached_outer_cover(geometry: Any, *, protrusion: float | None = None) -> Matrix:
+    """``outer_cover``, from the cache if it is there."""
+    return _cached(geometry, f"outer {protrusion!r}", lambda: outer_cover(geometry, protrusion=protrusion))
+
+
+def cached_inner_spheres(geometry: Any, *, count: int | None = None) -> Matrix:
+    """``inner_spheres``, from the cache if they are there."""
+    return _cached(geometry, f"inner {count!r}", lambda: inner_spheres(geometry, count=count))
+
+
+def cache_folder() -> Path | None:
+    """The folder of the cached covers, or None if the cache is switched off or nobody's home is known."""
+    named = os.environ.get(FOLDER_VARIABLE)
+    if named is not None:
+        return Path(named) / "covers" if named else None
+    try:
+        home = Path.home()
+    except RuntimeError:
+        return None
+    default = home / "Library" / "Caches" if sys.platform == "darwin" else home / ".cache"
+    return Path(os.environ.get("XDG_CACHE_HOME") or default) / "rrtik-ompl" / "covers"
+
+
+def geometry_bytes(geometry: Any) -> bytes | None:
+    """All that a cover depends on, or None for a kind that is not cached (its cover is quick to make)."""
+    numbers: list[Any]
+    if isinstance(geometry, coal.Box):
+        numbers = [np.array(geometry.halfSide, dtype=np.float64)]
+    elif isinstance(geometry, coal.Cylinder):
+        numbers = [np.array([geometry.radius, geometry.halfLength])]
+    elif isinstance(geometry, coal.ConvexBase):
+        numbers = [np.array(geometry.points(), dtype=np.float64)]
+    elif is_mesh(geometry):
+        numbers = [*mesh_arrays(geometry)]
+    else:
+        return None
+    swept = geometry.getSweptSphereRadius() if hasattr(geometry, "getSweptSphereRadius") else 0.0
+    parts = [f"{type(geometry).__name__} {swept!r}".encode()]
+    for array in numbers:
+        parts += [f"{array.dtype} {array.shape}".encode(), np.ascontiguousarray(array).tobytes()]
+    return b"\0".join(parts)
+
+
+def _cached(geometry: Any, parameters: str, make: Callable[[], Matrix]) -> Matrix:
+    folder, data = cache_folder(), geometry_bytes(geometry)
+    if folder is None or data is None:
+        return make()
+    head = f"layout {LAYOUT} algorithm {ALGORITHM} {parameters}\0".encode()
+    key = hashlib.sha256(head + data).hexdigest()
+    file = folder / f"{key}.npz"
+    found = _read(file, key)
+    if found is None:
+        found = make()
+        _write(file, key, found)
+    return found
+
+
+def _read(file: Path, key: str) -> Matrix | None:
+    """The spheres in a file, or None if it is absent, damaged or another's."""
+    try:
+        with np.load(file, allow_pickle=False) as stored:
+            spheres, name, check = stored["spheres"], str(stored["key"]), str(stored["check"])
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, NotImplementedError, MemoryError):
+        return None
+    whole = spheres.dtype == np.float64 and spheres.ndim == 2 and spheres.shape[1] == 4
+    if not whole or name != key or check != _check(spheres):
+        return None
+    sound = np.isfinite(spheres[:, :3]).all() and (spheres[:, 3] >= 0.0).all()
+    return np.asarray(spheres) if sound else None
+
+
+def _check(spheres: Matrix) -> str:
+    return hashlib.sha256(np.ascontiguousarray(spheres).tobytes()).hexdigest()
+
+
+def _write(file: Path, key: str, spheres: Matrix) -> None:
+    with contextlib.suppress(OSError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        handle, aside = tempfile.mkstemp(dir=file.parent, prefix=".writing-")
+        try:
+            with os.fdopen(handle, "wb") as stream:
+                np.savez(stream, spheres=spheres, key=np.array(key), check=np.array(_check(spheres)))
+            os.replace(aside, file)
+        except OSError:
+            with contextlib.suppress(OSError):
+                os.unlink(aside)

@@ -1,0 +1,273 @@
+"""Kernels that judge configurations and motions: free, undecided or colliding, ``WIDTH`` configurations at a time.
+
+Joint values stay in float64 until they are reduced to an eighth of a turn, so that neither large angles nor long
+motions cost precision: the configurations checked along a motion are those of :class:`rrtik_ompl.world.World`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.fast import robot_tables as robot
+from rrtik_ompl.fast import scene_tables as scene
+from rrtik_ompl.fast.compiled import WIDTH, inlined, kernel
+from rrtik_ompl.fast.lanes import (
+    absolute,
+    choose,
+    double_at,
+    field,
+    float_at,
+    floor,
+    int_at,
+    lane_numbers,
+    lanes_at,
+    nearest,
+    set_double,
+    set_int,
+    set_lanes,
+    set_wide_lanes,
+    single,
+    smaller,
+    wide_lanes_at,
+)
+from rrtik_ompl.fast.overlap import (
+    CENTRES,
+    FOUND,
+    FRAME_BYTES,
+    FRAMES,
+    GROUP_CENTRES,
+    MARKS,
+    MET,
+    NEAR,
+    PLACED,
+    VALUES,
+    WAITING,
+    meets_itself,
+    meets_surroundings,
+    prepare,
+)
+from rrtik_ompl.fast.row_kernels import along
+
+FREE, UNDECIDED, COLLIDING = 0, 1, 2
+ALL_LANES = (1 << WIDTH) - 1
+
+# World: addresses of the tables that a check needs.
+ARM, OUTER, INNER, OUTER_ROWS, INNER_ROWS, WORK = range(6)
+
+QUARTERS_PER_RADIAN = 2.0 / np.pi
+QUARTER_HIGH = 1.5707963267948966  # pi / 2 in two parts: the second is what float64 cannot hold of it
+QUARTER_LOW = 6.123233995736766e-17
+
+# Polynomials in z = x^2 for |x| <= pi / 4, fitted to the smallest greatest error (Lawson 1961):
+# sin x = x + x z S(z), error 1.8e-9; cos x = 1 - z / 2 + z^2 C(z), error 1e-10.
+SINE = (np.float32(-0.16666651), np.float32(0.00833198), np.float32(-0.00019496))
+COSINE = (np.float32(4.16666469e-02), np.float32(-1.38873672e-03), np.float32(2.44384155e-05))
+HALF, ONE, TWO, ONE_AND_HALF = (np.float32(x) for x in (0.5, 1.0, 2.0, 1.5))
+
+
+@inlined
+def sine_and_cosine(angle: Any) -> Any:
+    """Sine and cosine of wide lanes as lanes, within 1.5e-7 for angles up to 1e8 [rad]."""
+    quarters = nearest(angle * QUARTERS_PER_RADIAN)
+    x = single((angle - quarters * QUARTER_HIGH) - quarters * QUARTER_LOW)
+    quarter = single(quarters - floor(quarters * 0.25) * 4.0)  # 0, 1, 2 or 3
+    z = x * x
+    sine = x + x * z * (SINE[0] + z * (SINE[1] + z * SINE[2]))
+    cosine = (ONE - HALF * z) + z * z * (COSINE[0] + z * (COSINE[1] + z * COSINE[2]))
+    odd = absolute(absolute(quarter - TWO) - ONE) < HALF
+    turned_sine, turned_cosine = choose(odd, cosine, sine), choose(odd, sine, cosine)
+    return (
+        choose(quarter > ONE_AND_HALF, -turned_sine, turned_sine),
+        choose(absolute(quarter - ONE_AND_HALF) < ONE, -turned_cosine, turned_cosine),
+    )
+
+
+@kernel
+def move(arm: int, work: int) -> None:
+    """Frames of all joints from the joint values in the workspace (the world's own frame is there already)."""
+    parents, sliding = field(arm, robot.PARENTS), field(arm, robot.SLIDING)
+    values, frames = field(work, VALUES), field(work, FRAMES)
+    for joint in range(field(arm, robot.JOINT_COUNT)):
+        parent = frames + FRAME_BYTES * int_at(parents, joint)
+        frame = frames + FRAME_BYTES * (joint + 1)
+        fixed = field(arm, robot.PLACEMENTS) + 48 * joint
+        value = wide_lanes_at(values, joint)
+        if int_at(sliding, joint) != 0:
+            slide(parent, frame, fixed, single(value))
+        else:
+            turn(parent, frame, fixed, value)
+
+
+@inlined
+def slide(parent: int, frame: int, fixed: int, value: Any) -> None:
+    """Frame of a sliding joint: along its own z."""
+    for row in range(3):
+        a, b, c = lanes_at(parent, 3 * row), lanes_at(parent, 3 * row + 1), lanes_at(parent, 3 * row + 2)
+        x, y, z = rotated(fixed, a, b, c)
+        set_lanes(frame, 3 * row, x)
+        set_lanes(frame, 3 * row + 1, y)
+        set_lanes(frame, 3 * row + 2, z)
+        origin = lanes_at(parent, 9 + row) + along(fixed, 9, a, b, c)
+        set_lanes(frame, 9 + row, origin + z * value)
+
+
+@inlined
+def turn(parent: int, frame: int, fixed: int, value: Any) -> None:
+    """Frame of a turning joint: about its own z."""
+    sine, cosine = sine_and_cosine(value)
+    for row in range(3):
+        a, b, c = lanes_at(parent, 3 * row), lanes_at(parent, 3 * row + 1), lanes_at(parent, 3 * row + 2)
+        x, y, z = rotated(fixed, a, b, c)
+        set_lanes(frame, 3 * row, x * cosine + y * sine)
+        set_lanes(frame, 3 * row + 1, y * cosine - x * sine)
+        set_lanes(frame, 3 * row + 2, z)
+        origin = lanes_at(parent, 9 + row) + along(fixed, 9, a, b, c)
+        set_lanes(frame, 9 + row, origin)
+
+
+@inlined
+def rotated(fixed: int, a: Any, b: Any, c: Any) -> Any:
+    """A row (a, b, c) times the rotation of a placement."""
+    return (
+        a * float_at(fixed, 0) + b * float_at(fixed, 3) + c * float_at(fixed, 6),
+        a * float_at(fixed, 1) + b * float_at(fixed, 4) + c * float_at(fixed, 7),
+        a * float_at(fixed, 2) + b * float_at(fixed, 5) + c * float_at(fixed, 8),
+    )
+
+
+@kernel
+def meeting(world: int, balls: int, rows: int, wanted: int) -> Any:
+    """Lanes among ``wanted`` in which these balls meet these rows or each other."""
+    prepare(balls, field(world, WORK))
+    found = meets_surroundings(balls, rows, field(world, WORK), wanted, False)
+    if found != wanted:
+        found |= meets_itself(balls, field(world, WORK), wanted & ~found, 0)
+    return found
+
+
+@kernel
+def doubtful_lanes(world: int, wanted: int) -> Any:
+    """Lanes that the outer balls cannot prove free, for the joint values in the workspace."""
+    move(field(world, ARM), field(world, WORK))
+    return meeting(world, field(world, OUTER), field(world, OUTER_ROWS), wanted)
+
+
+@inlined
+def load_row(world: int, rows: int, row: int, lane: int) -> None:
+    """Set the joint values of a lane to a row of an array of float64."""
+    joints = field(field(world, ARM), robot.JOINT_COUNT)
+    values = field(field(world, WORK), VALUES)
+    for joint in range(joints):
+        set_double(values, joint * WIDTH + lane, double_at(rows, row * joints + joint))
+
+
+@kernel
+def prove(world: int, rows: int, waiting: int, answers: int) -> None:
+    """Answer COLLIDING for those of the waiting rows whose inner balls meet something."""
+    queue = field(field(world, WORK), WAITING)
+    for lane in range(WIDTH):
+        load_row(world, rows, int_at(queue, min(lane, waiting - 1)), lane)
+    move(field(world, ARM), field(world, WORK))
+    colliding = meeting(world, field(world, INNER), field(world, INNER_ROWS), ALL_LANES >> (WIDTH - waiting))
+    for lane in range(waiting):
+        if (colliding >> lane) & 1:
+            set_int(answers, int_at(queue, lane), COLLIDING)
+
+
+@kernel
+def classify(world: int, rows: int, count: int, answers: int, proving: bool) -> None:
+    """Judge ``count`` rows of joint values (float64) at an address; int32 answers go to another.
+
+    Rows that are not proven free wait until there are enough of them to fill all lanes of a second look.
+    """
+    queue, waiting = field(field(world, WORK), WAITING), 0
+    for start in range(0, count, WIDTH):
+        filled = min(WIDTH, count - start)
+        for lane in range(WIDTH):
+            load_row(world, rows, start + min(lane, filled - 1), lane)
+        doubtful = doubtful_lanes(world, ALL_LANES >> (WIDTH - filled))
+        for lane in range(filled):
+            open_ = (doubtful >> lane) & 1
+            set_int(answers, start + lane, open_)
+            if open_ and proving:
+                set_int(queue, waiting, start + lane)
+                waiting += 1
+                if waiting == WIDTH:
+                    prove(world, rows, waiting, answers)
+                    waiting = 0
+    if waiting:
+        prove(world, rows, waiting, answers)
+
+
+@kernel
+def classify_edges(world: int, starts: int, ends: int, steps: int, count: int, answers: int, proving: bool) -> None:
+    """Judge motions by their configurations at k / steps, k = 0..steps, the lanes spread over the whole motion."""
+    joints = field(field(world, ARM), robot.JOINT_COUNT)
+    values = field(field(world, WORK), VALUES)
+    for edge in range(count):
+        last = int_at(steps, edge)
+        blocks = (last + WIDTH) // WIDTH
+        answer = FREE
+        for block in range(blocks):
+            share = smaller(lane_numbers() * float(blocks) + float(block), float(last)) / float(last)
+            for joint in range(joints):
+                start, end = double_at(starts, edge * joints + joint), double_at(ends, edge * joints + joint)
+                set_wide_lanes(values, joint, (1.0 - share) * start + share * end)
+            doubtful = doubtful_lanes(world, ALL_LANES)
+            if doubtful != 0:
+                answer = UNDECIDED
+                if not proving:
+                    break
+                if meeting(world, field(world, INNER), field(world, INNER_ROWS), doubtful) != 0:
+                    answer = COLLIDING
+                    break
+        set_int(answers, edge, answer)
+
+
+@kernel
+def mark_pairs(world: int, row: int) -> Any:
+    """Set the flags of all pairs that the outer balls cannot prove free for one row of joint values.
+
+    Flags are those of moving and standing bodies first, then those of the pairs of moving bodies.
+    """
+    work, balls, rows = field(world, WORK), field(world, OUTER), field(world, OUTER_ROWS)
+    for lane in range(WIDTH):
+        load_row(world, row, 0, lane)
+    move(field(world, ARM), work)
+    prepare(balls, work)
+    crossing = field(balls, robot.BODY_COUNT) * field(rows, scene.STANDING_COUNT)
+    total = crossing + field(balls, robot.PAIR_COUNT)
+    for k in range(total):
+        set_int(field(work, MARKS), k, 0)
+    meets_surroundings(balls, rows, work, 1, True)
+    meets_itself(balls, work, 1, field(work, MARKS) + 4 * crossing)
+    return total
+
+
+def workspace(arm: robot.Table, balls: tuple[robot.Table, ...], rows: tuple[robot.Table, ...]) -> robot.Table:
+    """Memory for one thread that checks with these tables; the frame of the world is in place."""
+
+    def most(tables: tuple[robot.Table, ...], place: int) -> int:
+        return max(int(t.header[place]) for t in tables)
+
+    frames = np.zeros((int(arm.header[robot.JOINT_COUNT]) + 1, 12, WIDTH), dtype=np.float32)
+    frames[0, [0, 4, 8]] = 1.0
+    ball_count = max(len(t[robot.BALLS]) // 4 for t in balls)
+    row_list = np.zeros(most(rows, scene.PADDED_COUNT), dtype=np.int32)
+    crossing = most(balls, robot.BODY_COUNT) * most(rows, scene.STANDING_COUNT)
+    return robot.table(
+        {
+            VALUES: np.zeros((len(frames), WIDTH)),
+            FRAMES: frames,
+            GROUP_CENTRES: np.zeros((most(balls, robot.GROUP_COUNT), 3, WIDTH), dtype=np.float32),
+            CENTRES: np.zeros((ball_count, 3, WIDTH), dtype=np.float32),
+            PLACED: np.zeros(most(balls, robot.CLUSTER_COUNT), dtype=np.int32),
+            FOUND: row_list,
+            NEAR: row_list,
+            MET: row_list,
+            WAITING: np.zeros(WIDTH, dtype=np.int32),
+            MARKS: np.zeros(crossing + most(balls, robot.PAIR_COUNT), dtype=np.int32),
+        }
+    )
