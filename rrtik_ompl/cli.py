@@ -7,8 +7,7 @@ import os
 import sys
 import time
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import redirect_stdout
 from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,9 +15,10 @@ from typing import Annotated, Any
 import typer
 
 from rrtik_ompl.errors import InputError, RrtikError
+from rrtik_ompl.path_text import FORMATS as PATH_FORMATS
+from rrtik_ompl.terminal import drop_output, prepare_streams, progress, say, warn
 
 FOUND, NOT_FOUND, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-PATH_ENDINGS = (".json", ".csv", ".txt")
 UsageError: Any = typer.BadParameter.__bases__[0]  # click's, which typer carries under a private name
 
 app = typer.Typer(
@@ -83,7 +83,7 @@ def plan(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> int:
     """Find a path and print its moves."""
-    _check_target(out, PATH_ENDINGS)
+    _check_target(out, PATH_FORMATS)
     _check_target(html, (".html", ".htm"))
     from rrtik_ompl import load_problem, report
     from rrtik_ompl.planning import find_planner
@@ -91,26 +91,26 @@ def plan(
 
     find_planner(planner)
     question = load_problem(problem)
-    with _progress(f"planning {question.name} with {planner}"):
+    with progress(f"planning {question.name} with {planner}"):
         found = find_path(
             question, planner, seconds=seconds, seed=seed, restarts=restarts, parameters=_parameters(parameter or [])
         )
-    with _progress("shortening"):
+    with progress("shortening"):
         path, shorten_seconds = _shortened(found.path, question, shorten)
     if path is not None and out is not None:
         path.save(out)
     if path is not None and html is not None:
         from rrtik_ompl.viewer import view
 
-        with _progress("drawing"):
+        with progress("drawing"):
             view(question, path, html=html)
     if as_json:
         print(json.dumps(report.document(question, found, path, shorten_seconds)))
     else:
-        _print(*report.summary(question, found, path, shorten_seconds))
+        say(*report.summary(question, found, path, shorten_seconds))
         if path is not None:
-            _print(report.moves_table(path) if path.one_joint_at_a_time else report.waypoints_table(path))
-        _print(*(f"wrote {file}" for file in (out, html) if path is not None and file is not None))
+            say(report.moves_table(path) if path.one_joint_at_a_time else report.waypoints_table(path))
+        say(*(f"wrote {file}" for file in (out, html) if path is not None and file is not None))
     return FOUND if found.found else NOT_FOUND
 
 
@@ -123,9 +123,9 @@ def check(problem: ProblemName, path: PathFile = None) -> int:
     question = load_problem(problem)
     world = question.world
     route = None if path is None else load_path(path, world.robot)
-    _print(f"{question.name}: start is free, clearance {_millimetres(world.clearance(question.start))}")
+    say(f"{question.name}: start is free, clearance {_millimetres(world.clearance(question.start))}")
     if isinstance(question.goal, JointGoal):
-        _print(f"{question.name}: goal is free, clearance {_millimetres(world.clearance(question.goal.q))}")
+        say(f"{question.name}: goal is free, clearance {_millimetres(world.clearance(question.goal.q))}")
     if route is None:
         return FOUND
     faults = [f"edge {v.edge + 1}: {v.reason}" for v in route.violations(world)]
@@ -134,12 +134,12 @@ def check(problem: ProblemName, path: PathFile = None) -> int:
     if not question.reached(route.end):
         faults.append("the path does not end at the goal of the problem")
     for fault in faults:
-        _print(f"{path}: {fault}")
+        say(f"{path}: {fault}")
     if faults:
         return NOT_FOUND
     step = world.motion_resolution / SECOND_CHECK
     size = f"{len(route.waypoints)} waypoints, {route.transitions} moves, length {route.length:.2f} {route.unit}"
-    _print(f"{path}: valid, checked every {step:g} m; {size}")
+    say(f"{path}: valid, checked every {step:g} m; {size}")
     return FOUND
 
 
@@ -159,9 +159,9 @@ def show(
     route = None if path is None else load_path(path, question.world.robot)
     if html is not None:
         view(question, route, html=html)
-        _print(f"wrote {html}")
+        say(f"wrote {html}")
         return FOUND
-    view(question, route, port=port, on_ready=lambda url: _print(f"open {url} in a browser; Ctrl-C ends"))
+    view(question, route, port=port, on_ready=lambda url: say(f"open {url} in a browser; Ctrl-C ends"))
     return FOUND
 
 
@@ -173,8 +173,8 @@ def list_names(kind: Annotated[Kind | None, typer.Argument(help="All three kinds
     sources = {Kind.robots: list_robots, Kind.planners: list_planners, Kind.problems: list_problems}
     for each in Kind if kind is None else (kind,):
         if kind is None:
-            _print(f"{each.value}:")
-        _print(*(name if kind else f"  {name}" for name in sources[each]()))
+            say(f"{each.value}:")
+        say(*(name if kind else f"  {name}" for name in sources[each]()))
     return FOUND
 
 
@@ -187,13 +187,13 @@ def convert(
     """Convert between path formats (.json, .csv, .txt), or write any problem as a problem file (.yaml)."""
     from rrtik_ompl import load_path, load_problem, load_robot, save_problem
 
-    if Path(source).suffix.lower() in PATH_ENDINGS:
-        _check_target(target, PATH_ENDINGS)
+    if Path(source).suffix.lower() in PATH_FORMATS:
+        _check_target(target, PATH_FORMATS)
         load_path(source, None if robot is None else load_robot(robot)).save(target)
     else:
         _check_target(target, (".yaml", ".yml"))
         save_problem(load_problem(source, robot=robot), target)
-    _print(f"wrote {target}")
+    say(f"wrote {target}")
     return FOUND
 
 
@@ -204,8 +204,8 @@ def main() -> None:
 
 def run(arguments: list[str] | None = None) -> int:
     """Run the command line with ``arguments`` (the process's own if None) and return the exit code."""
-    warnings.showwarning = _warn
-    _prepare_streams()
+    warnings.showwarning = warn
+    prepare_streams()
     given = sys.argv[1:] if arguments is None else arguments
     try:
         if not given:  # the help, but no success: nothing was asked
@@ -225,15 +225,11 @@ def run(arguments: list[str] | None = None) -> int:
         print("rrtik: interrupted; no file is half-written", file=sys.stderr)
         return INTERRUPTED
     except (BrokenPipeError, SystemExit):  # the reader has gone, nobody is left to tell; typer makes an exit of it
-        _drop_output()
+        drop_output()
         return FOUND
     except OSError as error:
-        _drop_output()
+        drop_output()
         return _fail(f"standard output cannot be written: {error.strerror or error}")
-
-
-def _warn(message: Warning | str, *_: Any, **__: Any) -> None:
-    print(f"rrtik: warning: {message}", file=sys.stderr)
 
 
 def _fail(message: str) -> int:
@@ -247,21 +243,6 @@ def _usage(error: Any) -> int:
     context = getattr(error, "ctx", None)
     command = "rrtik" if context is None else context.command_path
     return _fail(f"{' '.join(text.replace('Value error, ', '').split())} (see: {command} --help)")
-
-
-def _prepare_streams() -> None:
-    """Make printing safe: a stream that was closed leads nowhere, a letter that a terminal lacks is spelt out."""
-    for name in ("stdout", "stderr"):
-        stream = getattr(sys, name)
-        if stream is None:
-            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115 - open until the process ends
-        elif hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="backslashreplace")
-
-
-def _drop_output() -> None:
-    """Let what could not be printed go, so that the end of the process does not try again."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _shortened(path: Any, problem: Any, method: Shorten) -> tuple[Any, float]:
@@ -306,29 +287,6 @@ def _check_target(path: Path | None, endings: tuple[str, ...]) -> None:
 
 def _millimetres(distance: float) -> str:
     return "unlimited" if distance == float("inf") else f"{1e3 * distance:.1f} mm"
-
-
-def _print(*items: Any) -> None:
-    from rich.console import Console
-
-    # Wider than any table: where there is less room lines are broken, but no number is cut.
-    console = Console(highlight=False, soft_wrap=True, markup=False, width=1000)
-    with console.capture() as captured:
-        for item in items:
-            console.print(item)
-    print(captured.get(), end="")
-
-
-@contextmanager
-def _progress(message: str) -> Iterator[None]:
-    """A spinner on standard error while something takes time; nothing unless that is a terminal."""
-    if not sys.stderr.isatty():
-        yield
-        return
-    from rich.console import Console
-
-    with Console(stderr=True).status(message):
-        yield
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
+from rrtik_ompl.text_file import is_number
 from rrtik_ompl.yaml_file import Location, YamlDocument, describe
 
 LARGEST, SMALLEST = 1e6, 1e-6  # [m]; geometry beyond is a slip of the pen and breaks collision checking
@@ -153,18 +154,10 @@ def _message(error: Any) -> str:
 
 def _must_be(what: str) -> Callable[[dict[str, Any], str], str]:
     def write(_context: dict[str, Any], found: str) -> str:
-        quoted = "number" in what and _is_number(found.removeprefix("text '").removesuffix("'"))
+        quoted = "number" in what and is_number(found.removeprefix("text '").removesuffix("'"))
         return f"must be {what}, found {found}" + ("; write it without quotes" if quoted else "")
 
     return write
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 _MESSAGES: dict[str, Callable[[dict[str, Any], str], str]] = {

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import json
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -16,13 +13,13 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.path_text import decoded, encoded, path_format
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.text_file import file_name, read_text, write_text
+from rrtik_ompl.text_file import read_text, write_text
 from rrtik_ompl.transitions import merge_moves, moved, route_length, single_joint, transitions
 from rrtik_ompl.world import World
 
 SECOND_CHECK = 2.0  # how many times finer than the motion resolution a path is checked again
-FORMATS = (".json", ".csv", ".txt")
 MAX_VALUE = 1e6  # of a joint [rad or m], as everywhere in our files
 MAX_CHECKS = 10_000_000  # of a path; with more of them the memory would run out long before the patience
 
@@ -205,15 +202,7 @@ class JointPath:
         Raises:
             InputError: If the ending is another one or the file cannot be written.
         """
-        ending = _ending(path)
-        if ending == ".json":
-            text = json.dumps(self._document(), indent=1) + "\n"
-        else:
-            comma = ending == ".csv"
-            lines = [",".join(self.joint_names)] if comma else []
-            lines += [("," if comma else " ").join(map(repr, row)) for row in self.waypoints.tolist()]
-            text = "\n".join(lines) + "\n"
-        write_text(path, text)
+        write_text(path, encoded(self._document(), path_format(path)))
 
     def _document(self) -> dict[str, Any]:
         return {
@@ -249,12 +238,12 @@ def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> Joint
         InputError: If the file is missing, malformed, or does not fit the robot; the message names file and line.
     """
     require(robot, Robot | None, "robot of a path", "use load_robot(name)")
-    ending = _ending(path)
+    ending = path_format(path)
     try:
-        if ending == ".json":
-            found = _from_json(read_text(path))
-        else:
-            found = _from_table(read_text(path), "," if ending == ".csv" else None)
+        document = decoded(read_text(path), ending)
+        units, name = document.get("units"), str(document.get("robot", ""))
+        sliding = None if units is None else [unit == "m" for unit in units]
+        found = JointPath(document["waypoints"], document.get("joint_names"), sliding, name)
         return found if robot is None else _fitted(found, robot)
     except InputError as error:
         raise error if str(error).startswith(str(path)) else InputError(f"{path}: {error}") from None
@@ -268,67 +257,3 @@ def _fitted(path: JointPath, robot: Robot) -> JointPath:
             f"{', '.join(robot.joint_names)}"
         )
     return JointPath.of(robot, path.waypoints)
-
-
-def _ending(path: str | os.PathLike[str]) -> str:
-    ending = file_name(path).suffix.lower()
-    if ending not in FORMATS:
-        raise InputError(f"{path}: unknown ending '{ending}' for a path; use {', '.join(FORMATS)}")
-    return ending
-
-
-def _from_json(text: str) -> JointPath:
-    try:
-        document = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise InputError(f"line {error.lineno}: not JSON: {error.msg}") from None
-    except RecursionError:
-        raise InputError("lists are nested too deeply; is this a path file?") from None
-    except ValueError:
-        raise InputError("holds a number of thousands of digits; is this a path file?") from None
-    if not isinstance(document, dict) or "waypoints" not in document:
-        raise InputError("expected an object with the key 'waypoints'; is this a path file?")
-    for key, expected in (("version", 1), ("kind", "joint_path")):
-        if document.get(key, expected) != expected:
-            raise InputError(f"{key}: expected {expected!r}, got {document[key]!r}")
-    units, names = document.get("units"), document.get("joint_names")
-    for key, value in (("units", units), ("joint_names", names)):
-        if value is not None and not (isinstance(value, list) and all(isinstance(v, str) for v in value)):
-            raise InputError(f"{key}: expected a list of text, one per joint")
-    for unit in units or ():
-        if unit not in ("rad", "m"):
-            raise InputError(f"units: expected 'rad' or 'm' for each joint, got {unit!r}; convert the waypoints")
-    prismatic = None if units is None else [unit == "m" for unit in units]
-    return JointPath(document["waypoints"], names, prismatic, str(document.get("robot", "")))
-
-
-def _from_table(text: str, separator: str | None) -> JointPath:
-    lines = [(k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip()]
-    if not lines:
-        raise InputError("the file is empty; expected one configuration a line")
-    names = None
-    if separator is not None:
-        names = [name.strip() for name in next(csv.reader(io.StringIO(lines[0][1])))]
-        if all(_is_number(name) for name in names):
-            raise InputError("line 1: expected the names of the joints, found numbers; add a line of names")
-        lines = lines[1:]
-    rows = []
-    for number, line in lines:
-        cells = line.split(separator)
-        try:
-            rows.append([float(cell) for cell in cells])
-        except ValueError:
-            raise InputError(f"line {number}: expected numbers, got {line.strip()[:60]!r}") from None
-        if len(rows[-1]) != len(names or rows[0]):
-            raise InputError(f"line {number}: expected {len(names or rows[0])} numbers, got {len(cells)}")
-    if not rows:
-        raise InputError("the file holds joint names only; expected one configuration a line below them")
-    return JointPath(np.array(rows), names)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

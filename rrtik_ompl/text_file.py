@@ -89,6 +89,15 @@ def file_name(path: object) -> Path:
     return Path(path)
 
 
+def is_number(text: str) -> bool:
+    """Whether a text reads as a number."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
 def _similar(path: Path) -> str:
     """A hint at a file of nearly the same name in the same folder."""
     try:

@@ -9,7 +9,18 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 LADDER = [
-    *("errors", "arrays", "text_file", "yaml_file", "file_format", "shapes", "poses", "transitions", "robot"),
+    *(
+        "errors",
+        "arrays",
+        "text_file",
+        "path_text",
+        "yaml_file",
+        "file_format",
+        "shapes",
+        "poses",
+        "transitions",
+        "robot",
+    ),
     *(
         "scene",
         "goal",
@@ -23,7 +34,7 @@ LADDER = [
         "robot_entry",
     ),
     *("world", "path", "problem", "ik", "goal_configurations", "moveit_messages", "motion_bench_maker", "problem_file"),
-    *("ompl_bridge", "planning", "shortening", "viewer", "report", "cli", "command"),
+    *("ompl_bridge", "planning", "shortening", "viewer", "report", "terminal", "cli", "command"),
 ]
 
 

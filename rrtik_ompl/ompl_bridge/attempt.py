@@ -68,7 +68,7 @@ def attempt(
     PRM and PRMstar aim at the first goal alone.
 
     Raises:
-        InputError: If the planner does not take a parameter, or cannot work towards this kind of goal.
+        InputError: If the planner does not take a parameter.
         PlannerError: If the planner broke.
         KeyboardInterrupt: After the planner has stopped in good order.
     """

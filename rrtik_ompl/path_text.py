@@ -1,0 +1,95 @@
+"""The text of a path file: JSON (complete), CSV with a header of joint names, OMPL's matrix text; written and read."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from typing import Any
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.text_file import file_name, is_number
+
+FORMATS = (".json", ".csv", ".txt")
+
+
+def path_format(path: str | os.PathLike[str]) -> str:
+    """Ending of a path file, one of ``FORMATS``.
+
+    Raises:
+        InputError: If it is another one.
+    """
+    ending = file_name(path).suffix.lower()
+    if ending not in FORMATS:
+        raise InputError(f"{path}: unknown ending '{ending}' for a path; use {', '.join(FORMATS)}")
+    return ending
+
+
+def encoded(document: dict[str, Any], ending: str) -> str:
+    """Text of a path: ``document`` holds ``waypoints``, ``joint_names`` and whatever else JSON shall keep."""
+    if ending == ".json":
+        return json.dumps(document, indent=1) + "\n"
+    text = io.StringIO()
+    table = csv.writer(text, delimiter="," if ending == ".csv" else " ", lineterminator="\n")
+    if ending == ".csv":
+        table.writerow(document["joint_names"])
+    table.writerows([repr(value) for value in row] for row in document["waypoints"])
+    return text.getvalue()
+
+
+def decoded(text: str, ending: str) -> dict[str, Any]:
+    """What :func:`encoded` wrote: ``waypoints``, and ``joint_names``, ``units`` and ``robot`` if the text says them.
+
+    Raises:
+        InputError: If the text is malformed; the message names the line or the key.
+    """
+    return _from_json(text) if ending == ".json" else _from_table(text, "," if ending == ".csv" else None)
+
+
+def _from_json(text: str) -> dict[str, Any]:
+    try:
+        document = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise InputError(f"line {error.lineno}: not JSON: {error.msg}") from None
+    except RecursionError:
+        raise InputError("lists are nested too deeply; is this a path file?") from None
+    except ValueError:
+        raise InputError("holds a number of thousands of digits; is this a path file?") from None
+    if not isinstance(document, dict) or "waypoints" not in document:
+        raise InputError("expected an object with the key 'waypoints'; is this a path file?")
+    for key, expected in (("version", 1), ("kind", "joint_path")):
+        if document.get(key, expected) != expected:
+            raise InputError(f"{key}: expected {expected!r}, got {document[key]!r}")
+    for key in ("units", "joint_names"):
+        words = document.get(key)
+        if words is not None and not (isinstance(words, list) and all(isinstance(word, str) for word in words)):
+            raise InputError(f"{key}: expected a list of text, one per joint")
+    for unit in document.get("units") or ():
+        if unit not in ("rad", "m"):
+            raise InputError(f"units: expected 'rad' or 'm' for each joint, got {unit!r}; convert the waypoints")
+    return document
+
+
+def _from_table(text: str, separator: str | None) -> dict[str, Any]:
+    lines = [(k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip()]
+    if not lines:
+        raise InputError("the file is empty; expected one configuration a line")
+    names = None
+    if separator is not None:
+        names = [name.strip() for name in next(csv.reader(io.StringIO(lines[0][1])))]
+        if all(is_number(name) for name in names):
+            raise InputError("line 1: expected the names of the joints, found numbers; add a line of names")
+        lines = lines[1:]
+    rows: list[list[float]] = []
+    for number, line in lines:
+        cells = line.split(separator)
+        try:
+            rows.append([float(cell) for cell in cells])
+        except ValueError:
+            raise InputError(f"line {number}: expected numbers, got {line.strip()[:60]!r}") from None
+        if len(rows[-1]) != len(names or rows[0]):
+            raise InputError(f"line {number}: expected {len(names or rows[0])} numbers, got {len(cells)}")
+    if not rows:
+        raise InputError("the file holds joint names only; expected one configuration a line below them")
+    return {"waypoints": rows} if names is None else {"waypoints": rows, "joint_names": names}

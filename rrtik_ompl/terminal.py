@@ -1,0 +1,53 @@
+"""What a person sees of the command line: text and tables on standard output, progress and warnings on the other."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+
+def warn(message: Warning | str, *_: Any, **__: Any) -> None:
+    """Say a warning in one line, in place of ``warnings.showwarning``."""
+    print(f"rrtik: warning: {message}", file=sys.stderr)
+
+
+def prepare_streams() -> None:
+    """Make printing safe: a stream that was closed leads nowhere, a letter that a terminal lacks is spelt out."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115 - open until the process ends
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def drop_output() -> None:
+    """Let what could not be printed go, so that the end of the process does not try again."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def say(*items: Any) -> None:
+    """Print texts and tables on standard output."""
+    from rich.console import Console
+
+    # Wider than any table: where there is less room lines are broken, but no number is cut.
+    console = Console(highlight=False, soft_wrap=True, markup=False, width=1000)
+    with console.capture() as captured:
+        for item in items:
+            console.print(item)
+    print(captured.get(), end="")
+
+
+@contextmanager
+def progress(message: str) -> Iterator[None]:
+    """A spinner on standard error while something takes time; nothing unless that is a terminal."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status(message):
+        yield
