@@ -1,6 +1,7 @@
 """Problem files: every kind of robot, start and goal; writing and reading; errors with file and line; the schema."""
 
 import json
+from copy import deepcopy
 
 import jsonschema
 import numpy as np
@@ -293,7 +294,7 @@ def test_a_mutated_file_gives_a_problem_or_one_line(tmp_path, data):
             target = target[key]
         action = data.draw(st.sampled_from(["drop", "retype", "rename"]))
         if action == "retype" or isinstance(target, list):
-            target[last] = data.draw(JUNK)
+            target[last] = deepcopy(data.draw(JUNK))  # later steps change it
         else:
             value = target.pop(last)
             if action == "rename":
