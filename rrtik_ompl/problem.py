@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Vector, frozen
 from rrtik_ompl.errors import ProblemError, require
 from rrtik_ompl.goal import Goal, GoalRegion, JointGoal, PoseGoal, PositionGoal
-from rrtik_ompl.robot import LIMIT_TOLERANCE
 from rrtik_ompl.world import World
 
 TURN = 2.0 * np.pi
@@ -76,9 +75,9 @@ def _usable(world: World, values: ArrayLike, what: str) -> Vector:
     """A configuration that can be a start or a goal: finite, inside the limits, free."""
     robot = world.robot
     q = robot.configuration(values, what)
-    outside = np.flatnonzero((q < robot.lower - LIMIT_TOLERANCE) | (q > robot.upper + LIMIT_TOLERANCE))
-    if len(outside):
-        raise ProblemError(f"{what}: {robot.limit_message(q, int(outside[0]))}")
+    fault = robot.limit_fault(q)
+    if fault:
+        raise ProblemError(f"{what}: {fault}")
     q = robot.clamp(q)
     # both opinions must agree, for the path through q will be certified by the second one
     if not world.valid(q) or not world.certify(q[None])[0]:

@@ -133,8 +133,12 @@ class Robot:
         upper = np.where(np.isfinite(self.upper), self.upper, np.maximum(self.lower, 0.0) + np.pi)
         return lower, upper
 
-    def limit_message(self, q: Vector, joint: int) -> str:
-        """A line that names a joint, its value and its limits, in degrees (metres for a prismatic joint)."""
+    def limit_fault(self, q: Vector) -> str:
+        """A line that names the first joint of q outside its limits, in degrees (m if it slides); "" if none is."""
+        outside = np.flatnonzero((q < self.lower - LIMIT_TOLERANCE) | (q > self.upper + LIMIT_TOLERANCE))
+        if len(outside) == 0:
+            return ""
+        joint = int(outside[0])
         factor, unit = (1.0, "m") if self.prismatic[joint] else (180.0 / np.pi, "deg")
         value, low, high = (factor * float(x) for x in (q[joint], self.lower[joint], self.upper[joint]))
         name = self.joint_names[joint]

@@ -18,7 +18,7 @@ from rrtik_ompl.collision.containment import Containment
 from rrtik_ompl.collision.motion_bound import displacement_weights
 from rrtik_ompl.collision.solids import is_mesh
 from rrtik_ompl.errors import InputError, MeshWarning, require
-from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
+from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 
 MOTION_RESOLUTION = 0.01  # [m]
@@ -163,11 +163,9 @@ class World:
     def explain(self, q: ArrayLike) -> str:
         """A line that says why q is not valid: the joint outside its limit, or the pair in collision; "" if it is."""
         row = self._rows(q, 1)[0]
-        outside = np.flatnonzero(
-            (row < self.robot.lower - LIMIT_TOLERANCE) | (row > self.robot.upper + LIMIT_TOLERANCE)
-        )
-        if len(outside):
-            return self.robot.limit_message(row, int(outside[0]))
+        fault = self.robot.limit_fault(row)
+        if fault:
+            return fault
         touching = self.contacts(row)
         if not touching:
             return ""
