@@ -75,6 +75,9 @@ class FastWorld:
 
     A world is meant for one thread at a time.
 
+    Attributes:
+        address: Of the tables in memory, for other kernels; 0 without kernels. Valid as long as this object lives.
+
     Args:
         chain: The tree of joints.
         bodies: Things with ``joint`` (0 stands still), ``placement`` in the joint's frame and coal ``geometry``.
@@ -115,11 +118,12 @@ class FastWorld:
         self._flagged = self._flag_places(moving, standing)
         self._plain = PlainChecks(self._arm.arm, self._arm.balls, self._rows)
         self._kernels = _kernels() if compiled else None
+        self.address = 0
         if self._kernels is not None:
             self._work = self._kernels.workspace(self._arm.arm, self._arm.balls, self._rows)
             tables = (self._arm.arm, *self._arm.balls, *self._rows, self._work)
             self._world = table({k: t.address for k, t in enumerate(tables)})
-            self._address = self._world.address
+            self.address = self._world.address
             self._marks = self._work[self._kernels.MARKS]
 
     @property
@@ -142,7 +146,7 @@ class FastWorld:
             answers = self._plain.classify(rows, prove=prove)
         else:
             judged = np.empty(len(rows), dtype=np.int32)
-            self._kernels.classify(self._address, rows.ctypes.data, len(rows), judged.ctypes.data, prove)
+            self._kernels.classify(self.address, rows.ctypes.data, len(rows), judged.ctypes.data, prove)
             answers = judged.astype(np.int8)
         return answers if beyond is None else np.where(beyond, np.int8(UNDECIDED), answers)
 
@@ -169,7 +173,7 @@ class FastWorld:
         else:
             judged = np.empty(len(starts), dtype=np.int32)
             places = (starts.ctypes.data, ends.ctypes.data, steps.ctypes.data)
-            self._kernels.classify_edges(self._address, *places, len(starts), judged.ctypes.data, prove)
+            self._kernels.classify_edges(self.address, *places, len(starts), judged.ctypes.data, prove)
             answers = judged.astype(np.int8)
         for beyond in (first, second):
             answers = answers if beyond is None else np.where(beyond, np.int8(UNDECIDED), answers)
@@ -187,7 +191,7 @@ class FastWorld:
         if self._kernels is None:
             marks = self._plain.marks(rows)
         else:
-            count = self._kernels.mark_pairs(self._address, rows.ctypes.data)
+            count = self._kernels.mark_pairs(self.address, rows.ctypes.data)
             marks = self._marks[:count]
         return [self._pairs[k] for k in sorted(self._flagged[flag] for flag in np.flatnonzero(marks).tolist())]
 

@@ -60,6 +60,11 @@ def kernel(function: Function) -> Function:
     return kept
 
 
+def entry(function: Function) -> Function:
+    """Compile a function that Python calls: whole numbers (64 bits) in, one whole number out."""
+    return kernel(function)
+
+
 def inlined(function: Function) -> Function:
     """Compile a function into each of its callers."""
     compiled: Function = njit(forceinline=True, error_model="numpy", boundscheck=False)(function)

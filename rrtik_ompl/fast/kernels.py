@@ -12,7 +12,7 @@ import numpy as np
 
 from rrtik_ompl.fast import robot_tables as robot
 from rrtik_ompl.fast import scene_tables as scene
-from rrtik_ompl.fast.compiled import WIDTH, inlined, kernel
+from rrtik_ompl.fast.compiled import WIDTH, entry, inlined, kernel
 from rrtik_ompl.fast.lanes import (
     absolute,
     choose,
@@ -176,8 +176,8 @@ def prove(world: int, rows: int, waiting: int, answers: int) -> None:
             set_int(answers, int_at(queue, lane), COLLIDING)
 
 
-@kernel
-def classify(world: int, rows: int, count: int, answers: int, proving: bool) -> None:
+@entry
+def classify(world: int, rows: int, count: int, answers: int, proving: int) -> int:
     """Judge ``count`` rows of joint values (float64) at an address; int32 answers go to another.
 
     Rows that are not proven free wait until there are enough of them to fill all lanes of a second look.
@@ -191,7 +191,7 @@ def classify(world: int, rows: int, count: int, answers: int, proving: bool) -> 
         for lane in range(filled):
             open_ = (doubtful >> lane) & 1
             set_int(answers, start + lane, open_)
-            if open_ and proving:
+            if open_ and proving != 0:
                 set_int(queue, waiting, start + lane)
                 waiting += 1
                 if waiting == WIDTH:
@@ -199,35 +199,46 @@ def classify(world: int, rows: int, count: int, answers: int, proving: bool) -> 
                     waiting = 0
     if waiting:
         prove(world, rows, waiting, answers)
+    return count
 
 
 @kernel
-def classify_edges(world: int, starts: int, ends: int, steps: int, count: int, answers: int, proving: bool) -> None:
-    """Judge motions by their configurations at k / steps, k = 0..steps, the lanes spread over the whole motion."""
+def judge_edge(world: int, start: int, end: int, last: int, proving: bool) -> int:
+    """Judge the motion between two rows of joint values by its configurations at k / last, k = 0..last.
+
+    The lanes are spread over the whole motion, so that a collision anywhere shows early.
+    """
     joints = field(field(world, ARM), robot.JOINT_COUNT)
     values = field(field(world, WORK), VALUES)
-    for edge in range(count):
-        last = int_at(steps, edge)
-        blocks = (last + WIDTH) // WIDTH
-        answer = FREE
-        for block in range(blocks):
-            share = smaller(lane_numbers() * float(blocks) + float(block), float(last)) / float(last)
-            for joint in range(joints):
-                start, end = double_at(starts, edge * joints + joint), double_at(ends, edge * joints + joint)
-                set_wide_lanes(values, joint, (1.0 - share) * start + share * end)
-            doubtful = doubtful_lanes(world, ALL_LANES)
-            if doubtful != 0:
-                answer = UNDECIDED
-                if not proving:
-                    break
-                if meeting(world, field(world, INNER), field(world, INNER_ROWS), doubtful) != 0:
-                    answer = COLLIDING
-                    break
-        set_int(answers, edge, answer)
+    blocks = (last + WIDTH) // WIDTH
+    answer = FREE
+    for block in range(blocks):
+        share = smaller(lane_numbers() * float(blocks) + float(block), float(last)) / float(last)
+        for joint in range(joints):
+            set_wide_lanes(values, joint, (1.0 - share) * double_at(start, joint) + share * double_at(end, joint))
+        doubtful = doubtful_lanes(world, ALL_LANES)
+        if doubtful != 0:
+            answer = UNDECIDED
+            if not proving:
+                break
+            if meeting(world, field(world, INNER), field(world, INNER_ROWS), doubtful) != 0:
+                answer = COLLIDING
+                break
+    return answer
 
 
-@kernel
-def mark_pairs(world: int, row: int) -> Any:
+@entry
+def classify_edges(world: int, starts: int, ends: int, steps: int, count: int, answers: int, proving: int) -> int:
+    """Judge ``count`` motions between rows of two arrays in the given numbers of steps; int32 answers."""
+    stride = 8 * field(field(world, ARM), robot.JOINT_COUNT)
+    for k in range(count):
+        answer = judge_edge(world, starts + k * stride, ends + k * stride, int_at(steps, k), proving != 0)
+        set_int(answers, k, answer)
+    return count
+
+
+@entry
+def mark_pairs(world: int, row: int) -> int:
     """Set the flags of all pairs that the outer balls cannot prove free for one row of joint values.
 
     Flags are those of moving and standing bodies first, then those of the pairs of moving bodies.
