@@ -12,17 +12,18 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
+from rrtik_ompl.checks import CollisionChecks
 from rrtik_ompl.collision.bodies import Body, colliding_pairs, link_bodies, scene_bodies
 from rrtik_ompl.collision.certificate import Certificate
-from rrtik_ompl.collision.containment import Containment
 from rrtik_ompl.collision.motion_bound import displacement_weights
 from rrtik_ompl.collision.solids import is_mesh
-from rrtik_ompl.errors import InputError, MeshWarning, require
+from rrtik_ompl.errors import InputError, MeshWarning, UnknownNameError, require
+from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 
 MOTION_RESOLUTION = 0.01  # [m]
-BROADPHASE_FROM = 40  # pairs; below that, asking about each of them is faster than a tree of bounding boxes
+ACCURACIES = ("exact", "conservative")
 FINEST_RESOLUTION = 1e-5  # [m]; a motion across an arm's reach is then some hundred thousand checks
 
 
@@ -46,14 +47,17 @@ class Contact:
 class World:
     """Exact collision checks of a robot in a scene.
 
-    Configurations are checked with coal on the robot's and the scene's own geometry. Motions are straight lines in
-    configuration space, checked at both ends and at equal steps in between, so many that no point of the arm moves
-    more than ``motion_resolution`` between two checks. The same configurations are checked in both directions.
+    Answers are coal's, on the robot's and the scene's own geometry; kernels give most of them without asking coal
+    (:mod:`rrtik_ompl.checks`). A conservative world never asks coal: what the kernels cannot prove free is refused.
+
+    Motions are straight lines in configuration space, checked at both ends and at equal steps in between, so many that
+    no point of the arm moves more than ``motion_resolution`` between two checks. The same configurations are checked
+    in both directions.
 
     A world is meant for one thread at a time.
 
     Attributes:
-        robot, scene, motion_resolution: As given.
+        robot, scene, motion_resolution, accuracy: As given.
         bodies: The solids of the robot and the scene.
         pairs: Numbers of the bodies that must not touch.
         weights: No point of the arm moves farther than ``weights @ |b - a|`` [m] from a to b, shape (dof,).
@@ -62,13 +66,20 @@ class World:
         robot: The arm.
         scene: Its surroundings; empty if None. Moving obstacles stand where they are at time 0.
         motion_resolution: Largest step of any point of the arm between two checked configurations [m].
+        accuracy: "exact" or "conservative".
 
     Raises:
         InputError: If the scene names links that do not exist, or the resolution is not positive.
+        UnknownNameError: If there is no such accuracy.
     """
 
     def __init__(
-        self, robot: Robot, scene: Scene | None = None, *, motion_resolution: float = MOTION_RESOLUTION
+        self,
+        robot: Robot,
+        scene: Scene | None = None,
+        *,
+        motion_resolution: float = MOTION_RESOLUTION,
+        accuracy: str = "exact",
     ) -> None:
         self.robot = robot
         self.scene = Scene() if scene is None else scene
@@ -87,13 +98,31 @@ class World:
         pairs = colliding_pairs(robot, self.scene, self.bodies)
         moving = tuple(p for p in pairs if any(self.bodies[i].joint > 0 for i in p))
         self.pairs = pairs
+        self.accuracy = _accuracy(accuracy)
         self._certificate = Certificate(robot, self.bodies, pairs)
-        self._oracle = _Oracle(robot, self.bodies, moving)
+        self._checks = CollisionChecks(robot, self.bodies, moving, conservative=accuracy == "conservative")
         standing = tuple(p for p in pairs if p not in set(moving))
         self._always_colliding = bool(standing) and not _standing_free(robot, self.bodies, standing)
 
     def __repr__(self) -> str:
         return f"World({self.robot.name}, {self.scene}, motion_resolution={self.motion_resolution:g} m)"
+
+    @property
+    def fast(self) -> FastWorld | None:
+        """The world's tables, for planners that run in kernels; None without kernels or where nothing is ever free."""
+        tables = self._checks.fast
+        return tables if tables.address and not self._always_colliding else None
+
+    def with_accuracy(self, accuracy: str) -> World:
+        """The same world, "exact" or "conservative"; shares everything else.
+
+        Raises:
+            UnknownNameError: If there is no such accuracy.
+        """
+        other = copy.copy(self)
+        other.accuracy = _accuracy(accuracy)
+        other._checks = self._checks.as_conservative(accuracy == "conservative")
+        return other
 
     def refined(self, factor: float) -> World:
         """The same world, its motions checked in steps ``factor`` times as fine; shares everything else."""
@@ -107,10 +136,7 @@ class World:
         Raises:
             InputError: If q has the wrong length or a value that is not finite.
         """
-        row = self._rows(q, 1)
-        if self._always_colliding or not self.robot.within_limits(row)[0]:
-            return False
-        return self._oracle.free(self.robot.lift(row)[0])
+        return bool(self._free(self._rows(q, 1))[0])
 
     def valid_batch(self, Q: ArrayLike) -> Mask:
         """Which rows of Q, shape (m, dof), are inside the limits and free of collision. Shape (m,).
@@ -118,22 +144,18 @@ class World:
         Raises:
             InputError: If Q has the wrong shape or a value that is not finite.
         """
-        rows = self._rows(Q, 2)
-        mask = self.robot.within_limits(rows) & (not self._always_colliding)
-        for k, full in zip(np.flatnonzero(mask), self.robot.lift(rows[mask]), strict=True):
-            mask[k] = self._oracle.free(full)
-        return mask
+        return self._free(self._rows(Q, 2))
 
     def motion_valid(self, a: ArrayLike, b: ArrayLike) -> bool:
         """Whether the straight motion from a to b, shape (dof,) each, is valid; the same answer from b to a."""
-        return self._motion_free(self._rows(a, 1)[0], self._rows(b, 1)[0])
+        return bool(self._motions_free(self._rows(a, 1), self._rows(b, 1))[0])
 
     def motion_valid_batch(self, A: ArrayLike, B: ArrayLike) -> Mask:
         """Which straight motions A[k] -> B[k], shape (m, dof) each, are valid. Shape (m,)."""
         starts, ends = self._rows(A, 2), self._rows(B, 2)
         if len(starts) != len(ends):
             raise InputError(f"motions need as many starts as ends, got {len(starts)} and {len(ends)}")
-        return np.array([self._motion_free(a, b) for a, b in zip(starts, ends, strict=True)], dtype=bool)
+        return self._motions_free(starts, ends)
 
     def steps(self, a: ArrayLike, b: ArrayLike, resolution: float | None = None) -> int:
         """Number of steps in which a motion is checked: the bound on the arm's displacement over the resolution."""
@@ -190,14 +212,24 @@ class World:
             rows = finite_array(Q, (None, self.robot.dof), f"configurations of robot '{self.robot.name}'")
         return np.atleast_2d(rows)
 
-    def _motion_free(self, a: Vector, b: Vector) -> bool:
-        if self._always_colliding or not self.robot.within_limits(np.stack([a, b])).all():
-            return False
-        if tuple(a) > tuple(b):  # one direction for both, so that the checked configurations are the same to the bit
-            a, b = b, a
-        count = self.steps(a, b)
-        shares = (_spread_order(count) / count)[:, None]
-        return all(self._oracle.free(full) for full in self.robot.lift((1.0 - shares) * a + shares * b))
+    def _free(self, rows: Matrix) -> Mask:
+        mask = self.robot.within_limits(rows) & (not self._always_colliding)
+        if mask.all():
+            return self._checks.free(rows)
+        mask[mask] = self._checks.free(rows[mask])
+        return mask
+
+    def _motions_free(self, starts: Matrix, ends: Matrix) -> Mask:
+        mask = self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self._always_colliding)
+        starts, ends = _one_way(starts[mask], ends[mask])
+        mask[mask] = self._checks.motions_free(starts, ends, self._step_counts(starts, ends))
+        return mask
+
+    def _step_counts(self, starts: Matrix, ends: Matrix) -> NDArray[np.int64]:
+        """See :meth:`steps`; shapes (m, dof), (m,)."""
+        travel = np.abs(ends - starts) @ self.weights
+        counts: NDArray[np.int64] = np.maximum(1, np.ceil(travel / self.motion_resolution - 1e-9)).astype(np.int64)
+        return counts
 
     def _distances(self, rows: Matrix, *, near_only: bool) -> list[Contact]:
         frames = self.robot.joint_frames(rows)[0]
@@ -221,45 +253,22 @@ class World:
         return found
 
 
-class _Oracle:
-    """Pinocchio and coal behind a broadphase: judges one configuration at a time."""
-
-    def __init__(self, robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> None:
-        self._model, self._data = robot.model, robot.model.createData()
-        self._geometry = pin.GeometryModel()
-        for k, body in enumerate(bodies):
-            item = pin.GeometryObject(f"{k}", body.joint, body.placement, body.geometry)
-            self._geometry.addGeometryObject(item)
-        for i, j in pairs:
-            self._geometry.addCollisionPair(pin.CollisionPair(i, j))
-        self._geometry_data = pin.GeometryData(self._geometry)
-        plain = (self._geometry, self._geometry_data)
-        tree = (pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(self._model, *plain),)
-        self._checked = plain if len(pairs) < BROADPHASE_FROM else tree
-        self._containment = Containment(bodies, pairs)
-
-    def free(self, full: Vector) -> bool:
-        """Whether Pinocchio's configuration vector ``full``, shape (nq,), is free of collision."""
-        if pin.computeCollisions(self._model, self._data, *self._checked, full, True):
-            return False
-        if not self._containment.pairs:
-            return True
-        return not self._containment.first(np.array([placement.homogeneous for placement in self._data.oMi]))
-
-
 def _standing_free(robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> bool:
     """Whether bodies that never move (the base and the obstacles) are clear of each other."""
     return bool(Certificate(robot, bodies, pairs).free(np.zeros((1, robot.dof)))[0])
 
 
-def _spread_order(count: int) -> NDArray[np.float64]:
-    """0..count with both ends first, then middles of ever finer halves, so that a collision shows early."""
-    levels = [np.array([0, count])]
-    step = 1 << max(count - 1, 1).bit_length()
-    while step > 1:
-        levels.append(np.arange(step // 2, count, step))
-        step //= 2
-    return np.concatenate(levels).astype(np.float64)
+def _one_way(starts: Matrix, ends: Matrix) -> tuple[Matrix, Matrix]:
+    """Motions turned so that both directions of one are the same to the bit: the lexically smaller end first."""
+    first_difference = (starts != ends).argmax(axis=1)[:, None]
+    turned = np.take_along_axis(starts, first_difference, axis=1) > np.take_along_axis(ends, first_difference, axis=1)
+    return np.where(turned, ends, starts), np.where(turned, starts, ends)
+
+
+def _accuracy(name: str) -> str:
+    if name not in ACCURACIES:
+        raise UnknownNameError("accuracy", str(name), ACCURACIES)
+    return name
 
 
 def _inside(first: str, second: str) -> Contact:

@@ -33,7 +33,8 @@ LADDER = [
         "goal_file",
         "robot_entry",
     ),
-    *("world", "path", "problem", "ik", "goal_configurations", "moveit_messages", "motion_bench_maker", "problem_file"),
+    *("checks", "world", "path", "problem", "ik", "goal_configurations"),
+    *("moveit_messages", "motion_bench_maker", "problem_file"),
     *("ompl_bridge", "planning", "shortening", "viewer", "report", "terminal", "cli", "command"),
 ]
 

@@ -38,6 +38,7 @@ class Body:
     kind: str
 
 
+@lru_cache(maxsize=64)
 def link_bodies(robot: Robot) -> tuple[Body, ...]:
     """The robot's own bodies."""
     return tuple(

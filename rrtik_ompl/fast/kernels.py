@@ -249,7 +249,7 @@ def mark_pairs(world: int, row: int) -> int:
     move(field(world, ARM), work)
     prepare(balls, work)
     crossing = field(balls, robot.BODY_COUNT) * field(rows, scene.STANDING_COUNT)
-    total = crossing + field(balls, robot.PAIR_COUNT)
+    total: int = crossing + field(balls, robot.PAIR_COUNT)
     for k in range(total):
         set_int(field(work, MARKS), k, 0)
     meets_surroundings(balls, rows, work, 1, True)
