@@ -8,7 +8,7 @@ start from the last support points and have been seen to miss overlaps.
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
@@ -26,6 +26,7 @@ from rrtik_ompl.fast.cover_cache import cached_inner_spheres, cached_outer_cover
 from rrtik_ompl.robot import Robot
 
 STROKE_ROOM = 1e-3  # [m] beyond the limits of sliding joints
+SETTLED_ROWS = 8  # looked at together, of which the first may already be colliding
 NO_SPHERES = np.empty((0, 4))
 
 Pairs = tuple[tuple[int, int], ...]
@@ -42,10 +43,12 @@ class CollisionChecks:
 
     def __init__(self, robot: Robot, bodies: tuple[Body, ...], pairs: Pairs, *, conservative: bool = False) -> None:
         self.conservative = conservative
-        self.fast = _packed(robot, bodies, pairs)
+        spheres = _all_spheres(robot, bodies)
+        self.fast = _packed(robot, bodies, pairs, spheres)
         self._robot, self._bodies = robot, bodies
         self._data = robot.model.createData()
-        self._containment = Containment(bodies, pairs)
+        self._standing = {k: self._transform(k) for k, body in enumerate(bodies) if body.joint == 0}
+        self._containment = Containment(bodies, pairs, [around for around, _ in spheres])
 
     def as_conservative(self, conservative: bool) -> CollisionChecks:
         """The same checks, conservative or not; shares the tables."""
@@ -58,8 +61,7 @@ class CollisionChecks:
         answers = self.fast.classify(self.values(rows), prove=not self.conservative)
         free: Mask = answers == FREE
         if not self.conservative:
-            for k in np.flatnonzero(answers == UNDECIDED):
-                free[k] = self._settled(rows[k])
+            free[answers == UNDECIDED] = list(self._settled(rows[answers == UNDECIDED]))
         return free
 
     def motions_free(self, starts: Matrix, ends: Matrix, steps: NDArray[np.int64]) -> Mask:
@@ -69,7 +71,10 @@ class CollisionChecks:
         free: Mask = answers == FREE
         if not self.conservative:
             for k in np.flatnonzero(answers == UNDECIDED):
-                free[k] = self._motion_settled(starts[k], ends[k], int(steps[k]))
+                shares = (spread_order(int(steps[k])) / steps[k])[:, None]
+                rows = (1.0 - shares) * starts[k] + shares * ends[k]
+                open_ = self.fast.classify(self.values(rows), prove=False) != FREE
+                free[k] = all(self._settled(rows[open_]))
         return free
 
     def values(self, rows: Matrix) -> Matrix:
@@ -77,30 +82,32 @@ class CollisionChecks:
         chain = self._robot.chain
         return rows @ chain.gain.T + chain.offset
 
-    def _motion_settled(self, start: Vector, end: Vector, steps: int) -> bool:
-        shares = (spread_order(steps) / steps)[:, None]
-        rows = (1.0 - shares) * start + shares * end
-        open_rows = rows[self.fast.classify(self.values(rows), prove=False) != FREE]
-        return all(self._settled(row) for row in open_rows)
+    def _settled(self, rows: Matrix) -> Iterator[bool]:
+        """Whether rows are free, by coal, one after the other: a caller may stop at the first that is not."""
+        for start in range(0, len(rows), SETTLED_ROWS):
+            part = rows[start : start + SETTLED_ROWS]
+            marked = self.fast.undecided_pairs(self.values(part))
+            for full, pairs in zip(self._robot.lift(part), marked, strict=True):
+                yield self._free_between(full, pairs)
 
-    def _settled(self, row: Vector) -> bool:
-        """Whether a configuration is free, by coal."""
-        pairs = self.fast.undecided_pairs(self.values(row[None])[0])
-        pin.forwardKinematics(self._robot.model, self._data, self._robot.lift(row[None])[0])
-        transforms: dict[int, Any] = {}
-        for pair in pairs:
-            for k in pair:
+    def _free_between(self, full: Vector, pairs: list[tuple[int, int]]) -> bool:
+        """Whether Pinocchio's configuration vector ``full`` is free of collision between some pairs of bodies."""
+        pin.forwardKinematics(self._robot.model, self._data, full)
+        transforms = dict(self._standing)
+        for i, j in pairs:
+            for k in (i, j):
                 if k not in transforms:
-                    body = self._bodies[k]
-                    pose = self._data.oMi[body.joint] * body.placement
-                    transforms[k] = coal.Transform3s(pose.rotation, pose.translation)
-            first, second = (self._bodies[k].geometry for k in pair)
-            ends = (first, transforms[pair[0]], second, transforms[pair[1]])
+                    transforms[k] = self._transform(k)
+            ends = (self._bodies[i].geometry, transforms[i], self._bodies[j].geometry, transforms[j])
             if coal.collide(*ends, coal.CollisionRequest(), coal.CollisionResult()):
                 return False
-        if not self._containment.pairs:
-            return True
-        return not self._containment.first(np.array([placement.homogeneous for placement in self._data.oMi]))
+        return not self._containment.between(pairs, self._data.oMi)
+
+    def _transform(self, number: int) -> Any:
+        """Coal's pose of a body in the world."""
+        body = self._bodies[number]
+        pose = self._data.oMi[body.joint] * body.placement
+        return coal.Transform3s(pose.rotation, pose.translation)
 
 
 def spread_order(count: int) -> NDArray[np.float64]:
@@ -126,14 +133,19 @@ def _arm(robot: Robot) -> _Arm:
     return _Arm(tuple(_spheres(body) for body in link_bodies(robot)))
 
 
-def _packed(robot: Robot, bodies: Sequence[Body], pairs: Pairs) -> FastWorld:
+def _packed(robot: Robot, bodies: Sequence[Body], pairs: Pairs, spheres: Sequence[Spheres]) -> FastWorld:
     """The tables of a world; those of the arm are taken over from the robot's last world where they fit."""
     arm = _arm(robot)
-    spheres = (*arm.spheres, *(_spheres(body) for body in bodies[len(arm.spheres) :]))
     outer, inner = ([both[k] for both in spheres] for k in (0, 1))
     packed = FastWorld(robot.chain, bodies, pairs, outer=outer, inner=inner, strokes=_strokes(robot), like=arm.latest)
     arm.latest = packed
     return packed
+
+
+def _all_spheres(robot: Robot, bodies: Sequence[Body]) -> tuple[Spheres, ...]:
+    """Spheres of all bodies, those of the robot's links first."""
+    links = _arm(robot).spheres
+    return (*links, *(_spheres(body) for body in bodies[len(links) :]))
 
 
 def _spheres(body: Body) -> Spheres:

@@ -378,7 +378,7 @@ def test_undecided_pairs_are_all_those_whose_outer_spheres_touch(name):
         touching = case.meetings(Q, case.outer, inner=False)
         nearly = case.meetings(Q, case.outer, inner=False, grow=3.0 * case.world.margin + 1e-4)
         for q, sure, perhaps in zip(joint_values(case.robot, Q), touching, nearly, strict=True):
-            found = case.world.undecided_pairs(q)
+            found = case.world.undecided_pairs(q[None])[0]
             assert {case.pairs[k] for k in np.flatnonzero(sure)} <= set(found)
             assert set(found) <= {case.pairs[k] for k in np.flatnonzero(perhaps)}
             assert found == [pair for pair in case.pairs if pair in set(found)]
@@ -397,7 +397,7 @@ def test_plain_numpy_gives_the_same_answers(name):
     others = plain.classify_edges(V[:20], V[20:40], [9] * 20)
     assert ((edges == others) | (edges == UNDECIDED) | (others == UNDECIDED)).all()
     for v in V[:50]:
-        assert set(case.world.undecided_pairs(v)) == set(plain.undecided_pairs(v))
+        assert set(case.world.undecided_pairs(v[None])[0]) == set(plain.undecided_pairs(v[None])[0])
 
 
 @pytest.mark.parametrize("count", [0, 1, 7, 8, 9, 15, 16, 17, 1000])
@@ -432,7 +432,7 @@ def test_values_that_are_not_finite_are_refused(bad):
     for ask in (
         lambda: case.world.classify(V),
         lambda: case.world.classify_edges(np.zeros((20, 6)), V, np.ones(20)),
-        lambda: case.world.undecided_pairs(V[13]),
+        lambda: case.world.undecided_pairs(V[13:15]),
     ):
         with pytest.raises(InputError, match="finite"):
             ask()
@@ -458,7 +458,7 @@ def test_values_beyond_what_the_margin_covers_are_undecided():
     assert answers[4] == answers[7] == UNDECIDED
     np.testing.assert_array_equal(np.delete(answers, [4, 7]), case.world.classify(np.delete(V, [4, 7], axis=0)))
     assert case.world.classify_edges(V[3:5], V[4:6], [3, 3]).tolist() == [UNDECIDED, UNDECIDED]
-    assert set(case.world.undecided_pairs(V[4])) == set(case.pairs) - set(standing_pairs(case))
+    assert set(case.world.undecided_pairs(V[4:5])[0]) == set(case.pairs) - set(standing_pairs(case))
 
 
 @pytest.mark.parametrize("strokes", [np.nan, -1.0, [1.0, 2.0]])
@@ -529,7 +529,7 @@ def test_a_world_without_pairs_is_free():
     world = FastWorld(arm("titan4").chain, [], [], outer=[], inner=[])
     assert world.classify(np.ones((20, 6))).tolist() == [FREE] * 20
     assert world.classify_edges(np.ones((2, 6)), np.zeros((2, 6)), [3, 40]).tolist() == [FREE] * 2
-    assert world.undecided_pairs(np.zeros(6)) == []
+    assert world.undecided_pairs(np.zeros((1, 6))) == [[]]
 
 
 def test_solids_with_a_formula_need_no_covers():

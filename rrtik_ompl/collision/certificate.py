@@ -43,16 +43,16 @@ class Certificate:
             for found in self._first(Q)
         )
 
-    def _first(self, Q: Matrix) -> list[tuple[int, int] | tuple[()]]:
+    def _first(self, Q: Matrix) -> list[tuple[int, ...]]:
         """For each row of Q the numbers of one colliding pair of bodies, or ()."""
-        found: list[tuple[int, int] | tuple[()]] = []
+        found: list[tuple[int, ...]] = []
         for start in range(0, len(Q), CHUNK):
             found += self._first_of_chunk(self._robot.joint_frames(Q[start : start + CHUNK]))
         return found
 
-    def _first_of_chunk(self, frames: NDArray[np.float64]) -> list[tuple[int, int] | tuple[()]]:
+    def _first_of_chunk(self, frames: NDArray[np.float64]) -> list[tuple[int, ...]]:
         poses = frames[:, self._joints] @ self._placements
-        found: list[tuple[int, int] | tuple[()]] = [()] * len(frames)
+        found: list[tuple[int, ...]] = [()] * len(frames)
         for row, pair in zip(*np.nonzero(self._near(poses)), strict=True):
             if not found[row]:
                 i, j = (int(body) for body in self._pairs[pair])

@@ -2,38 +2,58 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import coal
 import numpy as np
 from numpy.typing import NDArray
 
+from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.solids import inside_mesh, is_mesh, mesh_arrays
 from rrtik_ompl.shapes import Mesh
+
+ROUNDING = 1e-9  # [m]
 
 
 class Containment:
     """The pairs of a world in which one body is a mesh large enough to hold the other.
 
-    If two surfaces do not cross, one body is either wholly inside the other or wholly outside, so one point decides.
+    If two surfaces do not cross, one body is either wholly inside the other or wholly outside, so one point decides;
+    a few more, at the body's ends, show quickly that most bodies are too large for the other's bounding box.
+
+    Attributes:
+        pairs: Numbers of the bodies, the one that may hold first.
     """
 
-    def __init__(self, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> None:
+    def __init__(
+        self, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...], covers: Sequence[Matrix] | None = None
+    ) -> None:
+        """Prepare the pairs.
+
+        Args:
+            bodies: The solids of a world.
+            pairs: Numbers of those that must not touch.
+            covers: For each body balls that contain it, shape (n, 4), as a first look for :meth:`between`.
+        """
         both_ways = [*pairs, *((j, i) for i, j in pairs)]
         solid = {o for o in {o for o, _ in both_ways} if _has_inside(bodies[o])}
         self.pairs = [(o, i) for o, i in both_ways if o in solid and _may_hold(bodies[o].geometry, bodies[i].geometry)]
+        self._places = {pair: k for k, pair in enumerate(self.pairs)}
         outer, inner = ([bodies[p[k]] for p in self.pairs] for k in (0, 1))
         self._outer_joint = np.array([b.joint for b in outer], dtype=np.int64)
         self._inner_joint = np.array([b.joint for b in inner], dtype=np.int64)
+        points = [np.array([b.placement.act(p) for p in _end_points(b.geometry)]) for b in inner]
+        self._points = np.array(points).reshape(-1, 6, 3)
         self._to_outer = np.array([b.placement.inverse().homogeneous for b in outer]).reshape(-1, 4, 4)
-        points = [b.placement.act(_reference_point(b.geometry)) for b in inner]
-        self._points = np.array([[*p, 1.0] for p in points]).reshape(-1, 4)
         self._centres = np.array([b.geometry.aabb_local.center() for b in outer]).reshape(-1, 3)
-        self._halves = np.array([_half_extents(b.geometry) for b in outer]).reshape(-1, 3)
+        self._halves = np.array([_half_extents(b.geometry) for b in outer]).reshape(-1, 3) + ROUNDING
+        everywhere = np.array([[0.0, 0.0, 0.0, np.inf]])
+        self._covers = {o: everywhere if covers is None else covers[o] for o, _ in self.pairs}
         self._meshes = {o: mesh_arrays(bodies[o].geometry) for o, _ in self.pairs}
 
-    def first(self, frames: NDArray[np.float64]) -> tuple[int, int] | tuple[()]:
+    def first(self, frames: NDArray[np.float64]) -> tuple[int, ...]:
         """Numbers of two bodies of which one holds the other, or ().
 
         Args:
@@ -41,16 +61,36 @@ class Containment:
         """
         if not self.pairs:
             return ()
-        world = np.einsum("pij,pj->pi", frames[self._inner_joint], self._points)
-        rotation, origin = frames[self._outer_joint, :3, :3], frames[self._outer_joint, :3, 3]
-        in_joint = np.einsum(
-            "pji,pj->pi", rotation, world[:, :3] - origin
-        )  # the inverse of a rotation is its transpose
-        local = np.einsum("pij,pj->pi", self._to_outer[:, :3, :3], in_joint) + self._to_outer[:, :3, 3]
-        for k in np.flatnonzero((np.abs(local - self._centres) <= self._halves).all(axis=1)):
-            if inside_mesh(*self._meshes[self.pairs[k][0]], local[k]):
-                return self.pairs[k]
+        inner, outer = frames[self._inner_joint], frames[self._outer_joint]
+        world = self._points @ inner[:, :3, :3].transpose(0, 2, 1) + inner[:, None, :3, 3]
+        in_joint = (world - outer[:, None, :3, 3]) @ outer[:, :3, :3]  # the inverse of a rotation is its transpose
+        to_outer = self._to_outer
+        local = in_joint @ to_outer[:, :3, :3].transpose(0, 2, 1) + to_outer[:, None, :3, 3]
+        beyond = np.abs(local - self._centres[:, None]) > self._halves[:, None]
+        for row in np.flatnonzero(~beyond.any(axis=(1, 2))):
+            pair: tuple[int, ...] = self.pairs[row]
+            if inside_mesh(*self._meshes[pair[0]], local[row, 0]):
+                return pair
         return ()
+
+    def between(self, pairs: Iterable[tuple[int, int]], joints: Any) -> bool:
+        """Whether in one of some pairs, in either order, a body holds the other.
+
+        Args:
+            pairs: Numbers of the bodies.
+            joints: ``pinocchio.SE3`` of every joint frame in the world, world first.
+        """
+        both_ways = (pair for i, j in pairs for pair in ((i, j), (j, i)) if pair in self._places)
+        for pair in both_ways:
+            k = self._places[pair]
+            world = joints[int(self._inner_joint[k])].act(self._points[k, 0])
+            in_joint = joints[int(self._outer_joint[k])].actInv(world)
+            local = self._to_outer[k, :3, :3] @ in_joint + self._to_outer[k, :3, 3]
+            balls = self._covers[pair[0]]
+            near = ((balls[:, :3] - local) ** 2).sum(axis=1) <= (balls[:, 3] + ROUNDING) ** 2
+            if near.any() and inside_mesh(*self._meshes[pair[0]], local):
+                return True
+        return False
 
 
 def _has_inside(body: Body) -> bool:
@@ -69,8 +109,15 @@ def _half_extents(geometry: Any) -> NDArray[np.float64]:
     return 0.5 * np.array([box.width(), box.height(), box.depth()])
 
 
-def _reference_point(geometry: Any) -> Any:
-    """A point of the body in its own frame."""
+def _end_points(geometry: Any) -> Matrix:
+    """Six points of the body in its own frame, its extremes along the axes, shape (6, 3)."""
     if is_mesh(geometry):
-        return np.array(geometry.vertex(0))
-    return np.mean(geometry.points(), axis=0) if isinstance(geometry, coal.ConvexBase) else np.zeros(3)
+        vertices, triangles = mesh_arrays(geometry)
+        points = vertices[np.unique(triangles)]
+    elif isinstance(geometry, coal.ConvexBase):
+        points = np.array(geometry.points()).reshape(-1, 3)
+    elif isinstance(geometry, (coal.Box, coal.Sphere, coal.Capsule, coal.Cylinder)):
+        return np.concatenate([np.eye(3), -np.eye(3)]) * _half_extents(geometry)
+    else:
+        return np.zeros((6, 3))
+    return np.asarray(points[np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])])

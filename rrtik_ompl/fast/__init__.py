@@ -38,6 +38,7 @@ FREE, UNDECIDED, COLLIDING = 0, 1, 2
 LARGEST_ANGLE = 1e8  # [rad]; float64 cannot hold larger ones to the precision of the margin
 STROKE = 4.0  # [m] a sliding joint may go this far from its zero unless told otherwise
 MOST_STEPS = 2**30
+MARKED_ROWS = 8  # at a time; every width has that many lanes
 
 __all__ = ["COLLIDING", "FREE", "UNDECIDED", "FastWorld", "needs_covers"]
 
@@ -179,21 +180,31 @@ class FastWorld:
             answers = answers if beyond is None else np.where(beyond, np.int8(UNDECIDED), answers)
         return answers
 
-    def undecided_pairs(self, v: ArrayLike) -> list[tuple[int, int]]:
-        """Pairs of body numbers that the outer spheres cannot prove free at joint values v, shape (joints,).
+    def undecided_pairs(self, V: ArrayLike) -> list[list[tuple[int, int]]]:
+        """For each row of joint values V, shape (m, joints), the pairs that the outer spheres cannot prove free.
 
         Raises:
-            InputError: If v has the wrong length or a value that is not finite.
+            InputError: If V has the wrong shape or a value that is not finite.
         """
-        rows, beyond = self._values(np.asarray(v)[None], "joint values")
-        if beyond is not None:
-            return list(self._pairs)
+        rows, beyond = self._values(V, "joint values")
+        found: list[list[tuple[int, int]]] = []
+        for start in range(0, len(rows), MARKED_ROWS):
+            marks = self._marked(rows[start : start + MARKED_ROWS])
+            pairs: list[list[tuple[int, int]]] = [[] for _ in marks]
+            for row, flag in np.argwhere(marks).tolist():
+                pairs[row].append(self._flagged[flag])
+            found += pairs
+        for far in np.flatnonzero(beyond) if beyond is not None else ():
+            found[far] = list(self._pairs)
+        return found
+
+    def _marked(self, rows: Matrix) -> Mask:
+        """Flags of the pairs that are not proven free, shape (m, flags), for a few rows."""
         if self._kernels is None:
-            marks = self._plain.marks(rows)
-        else:
-            count = self._kernels.mark_pairs(self.address, rows.ctypes.data)
-            marks = self._marks[:count]
-        return [self._pairs[k] for k in sorted(self._flagged[flag] for flag in np.flatnonzero(marks).tolist())]
+            return self._plain.marks(rows)
+        count = self._kernels.mark_pairs(self.address, rows.ctypes.data, len(rows))
+        lanes = np.arange(len(rows), dtype=np.int32)[:, None]
+        return np.asarray((self._marks[:count] >> lanes) & 1, dtype=bool)
 
     def _values(self, V: ArrayLike, what: str) -> tuple[Matrix, Mask | None]:
         """Rows of values as the kernels want them, and which of them lie beyond the limits, if any."""
@@ -231,9 +242,9 @@ class FastWorld:
         balls = (ball_table(packed, own, inner=False), ball_table(packed, own, inner=True))
         return _ArmTables(carried, covers, own, self._limits, margin, arm_table(chain), balls)
 
-    def _flag_places(self, moving: Sequence[int], standing: Sequence[int]) -> dict[int, int]:
-        """For each flag that the kernels can set the place of its pair in the list of pairs."""
-        number = {frozenset(pair): k for k, pair in enumerate(self._pairs)}
+    def _flag_places(self, moving: Sequence[int], standing: Sequence[int]) -> dict[int, tuple[int, int]]:
+        """For each flag that the kernels can set its pair."""
+        number = {frozenset(pair): pair for pair in self._pairs}
         crossing = {
             m * len(standing) + s: number[frozenset((i, j))]
             for m, i in enumerate(moving)

@@ -141,7 +141,7 @@ def rotated(fixed: int, a: Any, b: Any, c: Any) -> Any:
 def meeting(world: int, balls: int, rows: int, wanted: int) -> Any:
     """Lanes among ``wanted`` in which these balls meet these rows or each other."""
     prepare(balls, field(world, WORK))
-    found = meets_surroundings(balls, rows, field(world, WORK), wanted, False)
+    found = meets_surroundings(balls, rows, field(world, WORK), wanted, 0)
     if found != wanted:
         found |= meets_itself(balls, field(world, WORK), wanted & ~found, 0)
     return found
@@ -238,22 +238,23 @@ def classify_edges(world: int, starts: int, ends: int, steps: int, count: int, a
 
 
 @entry
-def mark_pairs(world: int, row: int) -> int:
-    """Set the flags of all pairs that the outer balls cannot prove free for one row of joint values.
+def mark_pairs(world: int, row: int, count: int) -> int:
+    """For up to ``WIDTH`` rows of joint values: in which of them the outer balls cannot prove a pair free, as bits.
 
-    Flags are those of moving and standing bodies first, then those of the pairs of moving bodies.
+    The numbers of moving and standing bodies come first, then those of the pairs of moving bodies.
     """
     work, balls, rows = field(world, WORK), field(world, OUTER), field(world, OUTER_ROWS)
     for lane in range(WIDTH):
-        load_row(world, row, 0, lane)
+        load_row(world, row, min(lane, count - 1), lane)
     move(field(world, ARM), work)
     prepare(balls, work)
+    marks, wanted = field(work, MARKS), ALL_LANES >> (WIDTH - count)
     crossing = field(balls, robot.BODY_COUNT) * field(rows, scene.STANDING_COUNT)
     total: int = crossing + field(balls, robot.PAIR_COUNT)
     for k in range(total):
-        set_int(field(work, MARKS), k, 0)
-    meets_surroundings(balls, rows, work, 1, True)
-    meets_itself(balls, work, 1, field(work, MARKS) + 4 * crossing)
+        set_int(marks, k, 0)
+    meets_surroundings(balls, rows, work, wanted, marks)
+    meets_itself(balls, work, wanted, marks + 4 * crossing)
     return total
 
 

@@ -89,8 +89,8 @@ def place_cluster(balls: int, work: int, cluster: int) -> None:
 
 
 @kernel
-def cluster_meets(balls: int, rows: int, work: int, cluster: int, count: int, wanted: int, mark: bool) -> int:
-    """Lanes in which a ball of a cluster meets one of the first ``count`` rows found; marks the bodies if asked."""
+def cluster_meets(balls: int, rows: int, work: int, cluster: int, count: int, wanted: int, marks: int) -> int:
+    """Lanes in which a ball of a cluster meets one of the first ``count`` rows found; see ``meets_surroundings``."""
     numbers = field(balls, robot.CLUSTERS) + 16 * cluster
     body, frame = int_at(numbers, 0), field(work, FRAMES) + FRAME_BYTES * int_at(numbers, 1)
     near, met = field(work, NEAR), field(work, MET)
@@ -99,29 +99,31 @@ def cluster_meets(balls: int, rows: int, work: int, cluster: int, count: int, wa
         return 0
     around = field(balls, robot.CLUSTER_BALLS)
     x, y, z = placed(frame, around, cluster)
-    close, count = meets_rows(rows, x, y, z, float_at(around, 4 * cluster + 3), True, wanted, near, count, near)
+    close, count = meets_rows(rows, x, y, z, float_at(around, 4 * cluster + 3), True, wanted, near, count, near, 0)
     if close == 0:
         return 0
     place_cluster(balls, work, cluster)
     centres, all_balls = field(work, CENTRES), field(balls, robot.BALLS)
+    flags = 0 if marks == 0 else marks + 4 * body * field(rows, scene.STANDING_COUNT)
     meeting = 0
     for ball in range(int_at(numbers, 2), int_at(numbers, 3)):
         x, y, z = stored(centres, ball)
-        still = close if mark else close & ~meeting
-        found, kept = meets_rows(rows, x, y, z, float_at(all_balls, 4 * ball + 3), False, still, near, count, met)
+        still = close if marks != 0 else close & ~meeting
+        radius = float_at(all_balls, 4 * ball + 3)
+        found, _ = meets_rows(rows, x, y, z, radius, False, still, near, count, met, flags)
         meeting |= found
-        if mark:
-            marks = field(work, MARKS) + 4 * body * field(rows, scene.STANDING_COUNT)
-            for k in range(kept):
-                set_int(marks, int_at(field(rows, scene.NUMBERS), 4 * int_at(met, k) + 1), 1)
-        elif meeting == close:
+        if meeting == close and marks == 0:
             break
     return meeting
 
 
 @kernel
-def meets_surroundings(balls: int, rows: int, work: int, wanted: int, mark: bool) -> int:
-    """Lanes among ``wanted`` in which the arm meets a row."""
+def meets_surroundings(balls: int, rows: int, work: int, wanted: int, marks: int) -> int:
+    """Lanes among ``wanted`` in which the arm meets a row.
+
+    Unless 0, ``marks`` is the address of one number for each moving and standing body, which collects the lanes in
+    which the two meet.
+    """
     if field(rows, scene.ROW_COUNT) == 0:
         return 0
     groups, around = field(balls, robot.GROUPS), field(balls, robot.GROUP_BALLS)
@@ -130,16 +132,17 @@ def meets_surroundings(balls: int, rows: int, work: int, wanted: int, mark: bool
     for group in range(field(balls, robot.GROUP_COUNT)):
         x, y, z = stored(field(work, GROUP_CENTRES), group)
         radius = float_at(around, 4 * group + 3)
-        still = wanted if mark else wanted & ~meeting
+        still = wanted if marks != 0 else wanted & ~meeting
         count = rows_in_reach(rows, x, y, z, radius, found)
         if count == 0:
             continue
-        close, count = meets_rows(rows, x, y, z, radius, True, still, found, count, found)
+        close, count = meets_rows(rows, x, y, z, radius, True, still, found, count, found, 0)
         if close == 0:
             continue
         for cluster in range(int_at(groups, 3 * group + 1), int_at(groups, 3 * group + 2)):
-            meeting |= cluster_meets(balls, rows, work, cluster, count, close if mark else close & ~meeting, mark)
-        if meeting == wanted and not mark:
+            left = close if marks != 0 else close & ~meeting
+            meeting |= cluster_meets(balls, rows, work, cluster, count, left, marks)
+        if meeting == wanted and marks == 0:
             break
     return meeting
 
@@ -203,7 +206,7 @@ def bodies_meet(balls: int, work: int, first: int, second: int, wanted: int) -> 
 
 @kernel
 def meets_itself(balls: int, work: int, wanted: int, marks: int) -> int:
-    """Lanes among ``wanted`` in which two bodies of the arm meet; sets flag number ``pair`` of ``marks`` unless 0."""
+    """Lanes among ``wanted`` in which two bodies of the arm meet; ``marks``, unless 0, collects them for each pair."""
     groups, pairs = field(balls, robot.PAIR_GROUPS), field(balls, robot.PAIRS)
     around, centres = field(balls, robot.GROUP_BALLS), field(work, GROUP_CENTRES)
     meeting = 0
@@ -220,7 +223,7 @@ def meets_itself(balls: int, work: int, wanted: int, marks: int) -> int:
             found = bodies_meet(balls, work, int_at(pairs, 2 * pair), int_at(pairs, 2 * pair + 1), close)
             meeting |= found
             if marks != 0 and found != 0:
-                set_int(marks, pair, 1)
+                set_int(marks, pair, int_at(marks, pair) | found)
         if meeting == wanted and marks == 0:
             break
     return meeting

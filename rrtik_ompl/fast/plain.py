@@ -83,8 +83,8 @@ class PlainChecks:
         return answers
 
     def marks(self, values: Matrix) -> Mask:
-        """Flags of the pairs that the outer balls cannot prove free, for one row of values of shape (1, joints)."""
-        return np.asarray(self._meeting(frames(self._arm, values), 0)[0])
+        """Flags of the pairs that the outer balls cannot prove free, shape (m, flags)."""
+        return np.asarray(self._meeting(frames(self._arm, values), 0))
 
     def _meeting(self, poses: NDArray[np.float64], level: int) -> NDArray[np.bool_]:
         """Which bodies meet, shape (m, moving * standing + pairs of moving bodies)."""

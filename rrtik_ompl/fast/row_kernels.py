@@ -108,9 +108,22 @@ def meets_row(rows: int, number: int, x: Any, y: Any, z: Any, radius: float, bou
 
 @kernel
 def meets_rows(
-    rows: int, x: Any, y: Any, z: Any, radius: float, bound: bool, wanted: int, source: int, count: int, sink: int
+    rows: int,
+    x: Any,
+    y: Any,
+    z: Any,
+    radius: float,
+    bound: bool,
+    wanted: int,
+    source: int,
+    count: int,
+    sink: int,
+    marks: int,
 ) -> Any:
-    """Lanes among ``wanted`` in which a ball meets one of the rows of a list; the rows that it meets go to ``sink``."""
+    """Lanes among ``wanted`` in which a ball meets one of the rows of a list; the rows that it meets go to ``sink``.
+
+    Unless 0, ``marks`` is the address of one number for each standing body, which collects the lanes that meet it.
+    """
     meeting, kept = 0, 0
     for k in range(count):
         number = int_at(source, k)
@@ -119,6 +132,9 @@ def meets_rows(
             meeting |= found
             set_int(sink, kept, number)
             kept += 1
+            if marks != 0:
+                body = int_at(field(rows, scene.NUMBERS), 4 * number + 1)
+                set_int(marks, body, int_at(marks, body) | found)
     return meeting, kept
 
 
