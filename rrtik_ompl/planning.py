@@ -11,17 +11,25 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl import catalog
-from rrtik_ompl.arrays import finite_array
+from rrtik_ompl.arrays import Matrix, finite_array
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.goal_configurations import goal_configurations
-from rrtik_ompl.ompl_bridge.attempt import ANYTIME_PLANNERS, Attempt, PlannerFactory, attempt, ompl_planners
+from rrtik_ompl.ompl_bridge.attempt import (
+    ANYTIME_PLANNERS,
+    Attempt,
+    PlannerFactory,
+    attempt,
+    can_be_brief,
+    ompl_planners,
+)
 from rrtik_ompl.path import SECOND_CHECK, JointPath, Violation
 from rrtik_ompl.problem import Problem
 
 DEFAULT_PLANNER = "bicrdt"
 RESTARTS = 20
 MAX_RESTARTS = 1_000_000
+SHORTEST = 1e-3  # [s] that an attempt gets at least
 MAX_SECONDS = 1e9  # thirty years; OMPL's clock overflows at about nine times as much
 _OMPL_PREFIX, _MOVEIT_SUFFIX = "geometric::", "kConfigDefault"  # as in ompl_planning.yaml
 
@@ -57,14 +65,16 @@ def plan(
     seed: int | None = None,
     restarts: int = RESTARTS,
     parameters: Mapping[str, Any] | None = None,
+    accuracy: str = "exact",
 ) -> Plan:
     """Find a collision-free path from the start to the goal of a problem.
 
     A pose or position is first turned into free goal configurations by inverse kinematics.
 
-    A path is returned only if a second check agrees, which is twice as dense as the planner's and shares nothing with
-    it (:meth:`JointPath.violations`). If a planner gives up before its time it is started anew with another random
-    stream; if the second check rejects its path, it is started anew and checks as densely as that.
+    The planner first asks what the kernels can prove without coal, for a short while; where that finds no path it asks
+    exactly. Either way a path is returned only if a second check agrees, which is twice as dense as the planner's and
+    shares nothing with it (:meth:`JointPath.violations`). If a planner gives up before its time it is started anew with
+    another random stream; if the second check rejects its path, it is started anew and checks as densely as that.
 
     Args:
         problem: What to solve.
@@ -74,9 +84,10 @@ def plan(
         seed: The same seed gives the same path, as long as the time limit does not cut in; drawn if None.
         restarts: Further attempts at most.
         parameters: Options of the planner; of OMPL's planners in snake case, such as ``range`` or ``goal_bias``.
+        accuracy: "conservative" to leave it at what can be proven without coal: faster, and blind to narrow passages.
 
     Raises:
-        UnknownNameError: If there is no planner of that name.
+        UnknownNameError: If there is no planner or no accuracy of that name.
         InputError: If a number or a parameter makes no sense.
         PlannerError: If the planner broke.
     """
@@ -91,6 +102,7 @@ def plan(
         raise InputError(f"restarts must be a whole number from 0 to {MAX_RESTARTS}, got {restarts!r}")
     name, factory = (planner, find_planner(planner)) if isinstance(planner, str) else (planner.__name__, planner)
     used = _seed(seed)
+    problem = problem if accuracy == problem.world.accuracy else problem.with_accuracy(accuracy)
     seeds = [int(child) for child in np.random.SeedSequence(used).generate_state(restarts + 1, np.uint32)]
     begin = time.perf_counter()
     path, reason, totals = _search(problem, factory, name, begin + limit, seeds, parameters or {})
@@ -126,10 +138,14 @@ def _search(
         if len(aims.rows) == 0 or left <= 0.0:
             reason = aims.reason
             continue
+        if number == 0 and problem.world.accuracy == "exact" and can_be_brief(factory):
+            path = _without_coal(problem, factory, name, aims.rows, left, seed, parameters, totals)
+            if path is not None:
+                return path, "", totals
+            left = max(deadline - time.perf_counter(), SHORTEST)
         half = 0.5 if short_way else 1.0  # of the time for the short way round, before the long one is tried too
         outcome = attempt(asked, factory, aims.rows, seconds=half * left, seed=seed, parameters=parameters)
-        for key, value in outcome.statistics.items():
-            totals[key] = totals.get(key, 0) + value
+        _add(totals, outcome.statistics)
         path, reason = _judged(problem, outcome, name)
         if path is not None:
             return path, "", totals
@@ -137,6 +153,31 @@ def _search(
             totals["rejected"] += 1
             asked = problem.refined(SECOND_CHECK)
     return None, reason, totals
+
+
+def _without_coal(
+    problem: Problem,
+    factory: PlannerFactory,
+    name: str,
+    aims: Matrix,
+    seconds: float,
+    seed: int,
+    parameters: Mapping[str, Any],
+    totals: dict[str, int | float],
+) -> JointPath | None:
+    """A brief attempt on what the kernels can prove; None where it finds nothing or where an end cannot be proven."""
+    proven = problem.with_accuracy("conservative")
+    aims = aims[proven.world.valid_batch(aims)]
+    if len(aims) == 0 or not proven.world.valid(problem.start):
+        return None
+    outcome = attempt(proven, factory, aims, seconds=seconds, seed=seed, parameters=parameters, brief=True)
+    _add(totals, outcome.statistics)
+    return _judged(problem, outcome, name)[0]
+
+
+def _add(totals: dict[str, int | float], counts: Mapping[str, int | float]) -> None:
+    for key, value in counts.items():
+        totals[key] = totals.get(key, 0) + value
 
 
 def _nothing_to_do(problem: Problem) -> bool:

@@ -66,6 +66,12 @@ class Problem:
         finer.world = self.world.refined(factor)
         return finer
 
+    def with_accuracy(self, accuracy: str) -> Problem:
+        """The same problem, its world "exact" or "conservative" (see :meth:`rrtik_ompl.World.with_accuracy`)."""
+        other = copy.copy(self)
+        other.world = self.world.with_accuracy(accuracy)
+        return other
+
     def reached(self, q: ArrayLike) -> bool:
         """Whether a configuration, shape (dof,), satisfies the goal."""
         return bool(self.goal.satisfied(self.world.robot, self.world.robot.configuration(q)[None])[0])

@@ -381,7 +381,7 @@ def test_undecided_pairs_are_all_those_whose_outer_spheres_touch(name):
             found = case.world.undecided_pairs(q[None])[0]
             assert {case.pairs[k] for k in np.flatnonzero(sure)} <= set(found)
             assert set(found) <= {case.pairs[k] for k in np.flatnonzero(perhaps)}
-            assert found == [pair for pair in case.pairs if pair in set(found)]
+            assert len(found) == len(set(found))
 
 
 @pytest.mark.parametrize("name", ["titan4", "slider"])

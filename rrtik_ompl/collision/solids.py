@@ -113,11 +113,34 @@ def is_mesh(geometry: Any) -> bool:
     return isinstance(geometry, coal.BVHModelBase)
 
 
+class _SameObject:
+    """Makes a coal geometry a key: equal only to itself."""
+
+    __slots__ = ("geometry",)
+
+    def __init__(self, geometry: Any) -> None:
+        self.geometry = geometry
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _SameObject) and other.geometry is self.geometry
+
+    def __hash__(self) -> int:
+        return id(self.geometry)
+
+
 def mesh_arrays(geometry: Any) -> tuple[Matrix, NDArray[np.int64]]:
-    """Vertices, shape (n, 3), and triangles, shape (m, 3), of a coal mesh."""
+    """Vertices, shape (n, 3), and triangles, shape (m, 3), of a coal mesh, read-only."""
+    return _mesh_arrays(_SameObject(geometry))
+
+
+@lru_cache(maxsize=128)  # coal hands out one triangle at a time
+def _mesh_arrays(key: _SameObject) -> tuple[Matrix, NDArray[np.int64]]:
+    geometry = key.geometry
     vertices = np.array(geometry.vertices(), dtype=np.float64).reshape(-1, 3)
     corners = (geometry.tri_indices(k) for k in range(geometry.num_tris))
-    return vertices, np.array([(t[0], t[1], t[2]) for t in corners], dtype=np.int64).reshape(-1, 3)
+    triangles = np.array([(t[0], t[1], t[2]) for t in corners], dtype=np.int64).reshape(-1, 3)
+    vertices.flags.writeable = triangles.flags.writeable = False
+    return vertices, triangles
 
 
 @lru_cache(maxsize=64)

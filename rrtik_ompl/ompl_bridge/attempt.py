@@ -36,6 +36,11 @@ STRAIGHT_FIRST_PLANNERS = ("AORRTC",)
 # Options of our planners that `attempt` itself sets.
 GIVEN_OPTIONS = ("world", "seed")
 
+# What a brief attempt may take: iterations of our planners, questions about motions of OMPL's.
+ITERATION_LIMIT = "max_iterations"
+BRIEF_ITERATIONS = 1000
+BRIEF_MOTIONS = 5000
+
 PlannerFactory = Callable[..., Any]
 
 
@@ -62,10 +67,12 @@ def attempt(
     seconds: float,
     seed: int,
     parameters: Mapping[str, Any],
+    brief: bool = False,
 ) -> Attempt:
     """Let a planner work for at most ``seconds`` from the start of a problem to any of ``goals``, shape (k, n).
 
-    PRM and PRMstar aim at the first goal alone.
+    PRM and PRMstar aim at the first goal alone. A brief attempt (see :func:`can_be_brief`) ends after a number of
+    iterations or questions, so that what it finds does not depend on the computer's speed.
 
     Raises:
         InputError: If the planner does not take a parameter.
@@ -77,11 +84,12 @@ def attempt(
     goals = goals[:1] if name in ONE_GOAL_PLANNERS else goals
     with _quiet():
         ou.RNG.setSeed(1 + seed % (2**31 - 2))  # before any object that draws from it; OMPL does not take 0
-        judge = Judge(problem.world)
+        judge = Judge(problem.world, most_motions=BRIEF_MOTIONS if brief else np.inf)
         si = space_information(problem, goals, judge)
         definition = problem_definition(problem, goals, si)
         if own:
-            planner = _own_planner(factory, name, si, problem, seed, parameters)
+            limited = {ITERATION_LIMIT: BRIEF_ITERATIONS, **parameters} if brief else parameters
+            planner = _own_planner(factory, name, si, problem, seed, limited)
         else:
             planner = _wheel_planner(factory, name, si, definition, parameters)
         judge.deadline = time.monotonic() + seconds
@@ -102,6 +110,13 @@ def attempt(
             raise PlannerError(f"planner {name} broke: {str(problem_in_planner).splitlines()[-1]}")
         counts = dict(planner.statistics) if own else {"checked_states": judge.states, "checked_motions": judge.motions}
         return Attempt(exact_path(definition, si), str(status), counts)
+
+
+def can_be_brief(factory: PlannerFactory) -> bool:
+    """Whether a planner can be given a limit that does not depend on time, and makes something of a short search."""
+    if isinstance(factory, type) and issubclass(factory, SafePlanner):
+        return ITERATION_LIMIT in inspect.signature(factory).parameters
+    return getattr(factory, "__name__", "") not in ANYTIME_PLANNERS
 
 
 def _straight_motion(problem: Problem, goals: Matrix) -> Matrix | None:

@@ -21,7 +21,7 @@ class Judge:
     """Counts the questions of a C++ planner and remembers the first error, which must not be raised inside OMPL.
 
     After the ``deadline`` [s, of ``time.monotonic``] every answer is no, for some planners ask hundreds of questions
-    between two looks at their time.
+    between two looks at their time. After ``most_motions`` too, and the planner is stopped.
     """
 
     world: World
@@ -30,6 +30,7 @@ class Judge:
     error: Exception | None = None
     stop: Callable[[], object] | None = None  # ends the planner
     deadline: float = np.inf
+    most_motions: float = np.inf
 
     def valid(self, q: Vector) -> bool:
         """Whether q, shape (n,), is free; False from the first error on."""
@@ -39,6 +40,10 @@ class Judge:
     def motion_valid(self, a: Vector, b: Vector) -> bool:
         """Whether the motion a -> b is free; False from the first error on."""
         self.motions += 1
+        if self.motions > self.most_motions:
+            if self.stop is not None:
+                self.stop()
+            return False
         return self._ask(self.world.motion_valid, a, b)
 
     def _ask(self, question: Any, *arguments: Vector) -> bool:
