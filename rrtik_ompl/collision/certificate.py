@@ -77,7 +77,8 @@ class Certificate:
             frames = self._robot.joint_frames(Q[middles[part]])
             gaps = self._gaps(*self._boxes(self._poses(frames)))
             close[part] = gaps <= self._movers * reach[part, None] + ROOM
-        open_rows = rows[close.any(axis=1)[block]]
+        concerned: NDArray[np.bool_] = close.any(axis=1)
+        open_rows = rows[concerned[block]]
         return open_rows, close[block[open_rows]]
 
     def _first_of_chunk(self, Q: Matrix, close: NDArray[np.bool_]) -> list[tuple[int, ...]]:
