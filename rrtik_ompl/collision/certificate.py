@@ -77,7 +77,7 @@ class Certificate:
             frames = self._robot.joint_frames(Q[middles[part]])
             gaps = self._gaps(*self._boxes(self._poses(frames)))
             close[part] = gaps <= self._movers * reach[part, None] + ROOM
-        concerned: NDArray[np.bool_] = close.any(axis=1)
+        concerned = np.asarray(close.any(axis=1))
         open_rows = rows[concerned[block]]
         return open_rows, close[block[open_rows]]
 
