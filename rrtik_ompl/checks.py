@@ -58,7 +58,7 @@ class CollisionChecks:
 
     def free(self, rows: Matrix) -> Mask:
         """Which rows, shape (m, dof), are free of collision. Shape (m,)."""
-        answers = self.fast.classify(self.values(rows), prove=not self.conservative)
+        answers = self.fast.classify(self._robot.joint_values(rows), prove=not self.conservative)
         free: Mask = answers == FREE
         if not self.conservative:
             free[answers == UNDECIDED] = list(self._settled(rows[answers == UNDECIDED]))
@@ -66,27 +66,22 @@ class CollisionChecks:
 
     def motions_free(self, starts: Matrix, ends: Matrix, steps: NDArray[np.int64]) -> Mask:
         """Which straight motions, shape (m, dof), are free at all k / steps, k = 0..steps. Shape (m,)."""
-        sides = self.values(starts), self.values(ends)
+        sides = self._robot.joint_values(starts), self._robot.joint_values(ends)
         answers = self.fast.classify_edges(*sides, steps, prove=not self.conservative)
         free: Mask = answers == FREE
         if not self.conservative:
             for k in np.flatnonzero(answers == UNDECIDED):
                 shares = (spread_order(int(steps[k])) / steps[k])[:, None]
                 rows = (1.0 - shares) * starts[k] + shares * ends[k]
-                open_ = self.fast.classify(self.values(rows), prove=False) != FREE
+                open_ = self.fast.classify(self._robot.joint_values(rows), prove=False) != FREE
                 free[k] = all(self._settled(rows[open_]))
         return free
-
-    def values(self, rows: Matrix) -> Matrix:
-        """Joint values of configurations, mimic joints resolved, shape (m, joints)."""
-        chain = self._robot.chain
-        return rows @ chain.gain.T + chain.offset
 
     def _settled(self, rows: Matrix) -> Iterator[bool]:
         """Whether rows are free, by coal, one after the other: a caller may stop at the first that is not."""
         for start in range(0, len(rows), SETTLED_ROWS):
             part = rows[start : start + SETTLED_ROWS]
-            marked = self.fast.undecided_pairs(self.values(part))
+            marked = self.fast.undecided_pairs(self._robot.joint_values(part))
             for full, pairs in zip(self._robot.lift(part), marked, strict=True):
                 yield self._free_between(full, pairs)
 

@@ -149,6 +149,11 @@ class Robot:
         clamped: Vector = np.clip(q, self.lower, self.upper)
         return clamped
 
+    def joint_values(self, Q: ArrayLike) -> Matrix:
+        """Values of every joint of the chain, mimic joints resolved. Q: shape (m, dof) or (dof,); (m, joints)."""
+        values: Matrix = self._rows(Q) @ self.chain.gain.T + self.chain.offset
+        return values
+
     def lift(self, Q: ArrayLike) -> Matrix:
         """Pinocchio's configuration vectors for Q: adds mimic joints and (cos, sin) of continuous ones.
 
@@ -159,7 +164,7 @@ class Robot:
             Shape (m, nq).
         """
         rows = self._rows(Q)
-        values: Matrix = rows @ self.chain.gain.T + self.chain.offset
+        values = self.joint_values(rows)
         if self.model.nq == len(self.chain.parent):
             return values
         full = np.empty((len(rows), self.model.nq))
@@ -174,7 +179,7 @@ class Robot:
     def joint_frames(self, Q: ArrayLike) -> NDArray[np.float64]:
         """Pose in the world of every Pinocchio joint frame, world first. Shape (m, joints + 1, 4, 4)."""
         rows = self._rows(Q)
-        values = rows @ self.chain.gain.T + self.chain.offset
+        values = self.joint_values(rows)
         frames = np.empty((len(rows), len(self.chain.parent) + 1, 4, 4))
         frames[:, 0] = np.eye(4)
         for k, parent in enumerate(self.chain.parent):

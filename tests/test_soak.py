@@ -18,6 +18,7 @@ robot = load_robot("point2d", radius=0.3, bounds=[[0, 10], [0, 10]])
 wall = Obstacle("wall", Box([1, 7, 2]), pin.SE3(np.eye(3), np.array([5.0, 3.5, 0.0])))
 world = World(robot, Scene([wall]), motion_resolution=0.5)
 problem = Problem(world, [2, 2], [8, 2])
+world.valid_batch(np.random.default_rng(0).uniform(0, 10, (2000, 2)))  # whatever is loaded at its first use
 names = ("bicrdt", "RRTConnect", "bicrdt", "KPIECE1")
 for k in range(10_001):
     found = plan(problem, names[k % 4], seconds=5.0, seed=k)

@@ -38,7 +38,7 @@ class Body:
     kind: str
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=16)
 def link_bodies(robot: Robot) -> tuple[Body, ...]:
     """The robot's own bodies."""
     return tuple(
@@ -141,7 +141,7 @@ def _adjacent(first: int, second: int, parent: dict[int, int]) -> bool:
     return first == second or parent.get(first) == second or parent.get(second) == first
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=16)
 def _self_collision_names(robot: Robot) -> frozenset[frozenset[str]]:
     """Pairs of links to check. Without a list of allowed pairs, those that always collide are left out.
 

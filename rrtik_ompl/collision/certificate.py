@@ -7,6 +7,7 @@ support points as a first guess and have been seen to miss about 3 overlaps in 1
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import coal
@@ -35,6 +36,7 @@ class Certificate:
         self._centres, self._halves = _local_boxes(bodies)
         self._weights = displacement_weights(robot, [b for b in bodies if b.kind != "obstacle"])
         self._movers: Vector = np.sum(self._joints[self._pairs] > 0, axis=1).astype(np.float64)  # 0, 1 or 2 of a pair
+        self._half_spaces = list(_half_space_pairs(bodies, pairs))
         self._containment = Containment(bodies, pairs)
         hollow = {frozenset(pair) for pair in self._containment.pairs}
         self._hollow = np.array([frozenset(pair) in hollow for pair in pairs], dtype=bool)
@@ -110,6 +112,8 @@ class Certificate:
         """Lower bounds of the distances [m] between the pairs' boxes, shape (m, pairs)."""
         a, b = self._pairs[:, 0], self._pairs[:, 1]
         gaps: NDArray[np.float64] = (np.abs(centres[:, a] - centres[:, b]) - halves[:, a] - halves[:, b]).max(axis=2)
+        for pair, other, normal, offset in self._half_spaces:
+            gaps[:, pair] = centres[:, other] @ normal - offset - halves[:, other] @ np.abs(normal)
         return gaps
 
 
@@ -118,6 +122,18 @@ def overlap(first: Any, first_pose: NDArray[np.float64], second: Any, second_pos
     transforms = [coal.Transform3s(pose[:3, :3], pose[:3, 3]) for pose in (first_pose, second_pose)]
     result = coal.CollisionResult()
     return bool(coal.collide(first, transforms[0], second, transforms[1], coal.CollisionRequest(), result))
+
+
+def _half_space_pairs(
+    bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]
+) -> Iterator[tuple[int, int, Vector, float]]:
+    """Pairs with a half-space that stands still: number of the pair, of the other body, outward normal and offset."""
+    for k, pair in enumerate(pairs):
+        for first, other in (pair, pair[::-1]):
+            body = bodies[first]
+            if isinstance(body.geometry, coal.Halfspace) and body.joint == 0:
+                normal = np.array(body.placement.rotation @ body.geometry.n)
+                yield k, other, normal, float(body.geometry.d + normal @ body.placement.translation)
 
 
 def _local_boxes(bodies: tuple[Body, ...]) -> tuple[Matrix, Matrix]:

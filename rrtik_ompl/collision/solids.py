@@ -143,7 +143,7 @@ def _mesh_arrays(key: _SameObject) -> tuple[Matrix, NDArray[np.int64]]:
     return vertices, triangles
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=16)
 def robot_solids(robot: Robot) -> tuple[Any, ...]:
     """Coal geometry of every collision object of a robot, convex meshes as solids, in the order of the model."""
     return tuple(_measured(convexified(body.geometry)) for body in robot.collision.geometryObjects)
