@@ -38,7 +38,7 @@ class Interval:
 
 
 def rules(dof: int, scale: Any = 1.0, smallest_move: float = 0.0) -> AxisRules:
-    return AxisRules(-np.ones(dof), np.ones(dof), np.full(dof, scale), np.full(dof, smallest_move))
+    return AxisRules(-np.ones(dof), np.ones(dof), np.full(dof, scale), np.full(dof, smallest_move), np.ones(dof))
 
 
 def grown(*targets: Any, checker: Any = None, dof: int = 2, seed: int = 0) -> tuple[AxisTree, list[Any]]:

@@ -22,8 +22,9 @@ class AxisOptions:
 
     Args:
         scale_by_range: Divide each coordinate by its range in the metric of the nearest neighbour.
-        joint_costs: Cost of a joint's motion, greater than 0, shape (n,), or one number. The metric multiplies each
-            coordinate by it, so that trees grow from where costly joints have less far to go; 1 if None.
+        joint_costs: Cost of a joint's motion, greater than 0, shape (n,): a slow or risky joint costs more. The metric
+            multiplies its coordinate by it, and of the samples it takes part only in the share lowest cost / its cost,
+            so that it moves less often; where it has to, it still does. All equal if None.
         frozen_joints: Joints that must not move, by number (from 0) or, with a world, by name. Starts and goals have to
             agree in them exactly; those that do not are left out.
         smallest_move: No move of a path is shorter [unit of the joint: rad or m], one number or one for each joint.
@@ -80,7 +81,7 @@ class AxisOptions:
         scale = self.joint_costs / (upper - lower) if self.scale_by_range else self.joint_costs
         lower, upper = lower.copy(), upper.copy()
         lower[self.frozen_joints] = upper[self.frozen_joints] = start[self.frozen_joints]
-        return AxisRules(lower, upper, scale, self.smallest_move)
+        return AxisRules(lower, upper, scale, self.smallest_move, self.joint_costs.min() / self.joint_costs)
 
     def accepts(self, path: Matrix) -> bool:
         """Whether no move of a path, shape (k, n), is too short, once those of the same joint in a row are joined."""

@@ -14,8 +14,11 @@ WORD = 2**64 - 1
 GOLDEN, FIRST_FACTOR, SECOND_FACTOR = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
 
 
-class AxisOrder(Protocol):
+class Random(Protocol):
     """What a tree needs of a random generator; numpy's will do too."""
+
+    def random(self) -> float:
+        """A number from 0 to 1, less than 1."""
 
     def permutation(self, axes: Sequence[int]) -> Sequence[int]:
         """The axes in random order."""
@@ -37,9 +40,13 @@ class AxisStream:
         z = ((z ^ (z >> 27)) * SECOND_FACTOR) & WORD
         return z ^ (z >> 31)
 
+    def random(self) -> float:
+        """A number from 0 to 1, less than 1."""
+        return (self._draw() >> 11) * 2.0**-53
+
     def uniform(self, lower: Vector, upper: Vector) -> Vector:
         """A configuration between the bounds, shapes (n,)."""
-        shares = np.array([(self._draw() >> 11) * 2.0**-53 for _ in range(len(lower))])
+        shares = np.array([self.random() for _ in range(len(lower))])
         q: Vector = np.minimum(lower + shares * (upper - lower), upper)
         return q
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.fast.axis_rules import AxisRules
 from rrtik_ompl.ompl_bridge import MotionChecker
-from rrtik_planners.axis_stream import AxisOrder
+from rrtik_planners.axis_stream import Random
 
 ROOT = -1
 FIRST_CAPACITY = 256
@@ -81,14 +81,14 @@ class AxisTree:
             way.append(int(self._parents[way[-1]]))
         return np.ascontiguousarray(self._coordinates[:, way[::-1]].T)
 
-    def extend(
-        self, target: Vector, checker: MotionChecker, rng: AxisOrder, *, exactly: bool = True
-    ) -> Extension:
+    def extend(self, target: Vector, checker: MotionChecker, rng: Random, *, exactly: bool = True) -> Extension:
         """Grow from the vertex nearest to ``target`` towards it, one axis after the other (algorithm 10)."""
-        return self.extend_from(self.nearest(target), target, checker, rng, exactly=exactly)
+        near = self.nearest(target)
+        target = target if exactly else self._held(near, target, rng)
+        return self.extend_from(near, target, checker, rng, exactly=exactly)
 
     def extend_from(
-        self, near: int, target: Vector, checker: MotionChecker, rng: AxisOrder, *, exactly: bool = True
+        self, near: int, target: Vector, checker: MotionChecker, rng: Random, *, exactly: bool = True
     ) -> Extension:
         """Grow from vertex ``near`` towards ``target``, shape (n,).
 
@@ -120,7 +120,14 @@ class AxisTree:
             current = self._attach(step, turn, current)
         return Extension(Outcome.REACHED, current)
 
-    def _axis_order(self, near: int, rng: AxisOrder) -> list[int]:
+    def _held(self, near: int, target: Vector, rng: Random) -> Vector:
+        """The target, but as at a vertex in the coordinates that do not take part this time."""
+        chance = self._rules.chance
+        stays = np.array([c < 1.0 and rng.random() >= c for c in chance.tolist()])
+        held: Vector = np.where(stays, self._coordinates[:, near], target)
+        return held
+
+    def _axis_order(self, near: int, rng: Random) -> list[int]:
         order = [int(axis) for axis in rng.permutation(self._axes)]
         parent = self._parents[near]
         if parent != ROOT:  # a root has no direction to remember

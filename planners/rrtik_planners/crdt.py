@@ -96,7 +96,7 @@ class CRDT(SafePlanner):
         statistics = {"iterations": tree.iterations, "vertices": tree.vertices}
         if path is not None:
             return SearchResult(path, statistics)
-        nearest, distance = _nearest_to_goal(tree.coordinates(0), goals)
+        nearest, distance = _nearest_to_goal(tree.tree(0), goals)
         return SearchResult(tree.branch(0, nearest), statistics, distance)
 
 
@@ -158,8 +158,8 @@ class SingleTree:
         """The way from the root to a vertex, shape (k, n); there is only one tree, number 0."""
         return self._tree.branch(vertex)
 
-    def coordinates(self, number: int) -> Matrix:
-        """The vertices of the tree, shape (size, n)."""
+    def tree(self, number: int) -> Matrix:
+        """The vertices of the only tree, shape (size, n)."""
         return np.array([self._tree.vertex(i) for i in range(self._tree.size)])
 
     def _near_goals(self, known: int) -> list[tuple[int, int]]:

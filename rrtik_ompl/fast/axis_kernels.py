@@ -41,16 +41,18 @@ BEGIN, GROW, MEET, CHOOSE_GOAL, REACH_GOAL = range(5)
 # Tree: coordinates are runs of CAPACITY float64, one run for each coordinate; parents int32.
 SIZE, CAPACITY, COORDINATES, PARENTS = range(4)
 
-# Search, the motions: joint values = GAIN q + OFFSET; NUMBERS are float64: resolution, goal tolerance squared. LEAST and MOST are the limits of a valid configuration, LOWER and UPPER those of samples.
+# Search, the motions: joint values = GAIN q + OFFSET, limits of a valid configuration, WEIGHTS of its travel. NUMBERS
+# are float64: see below. ASKS: whether the world is asked about what is undecided; otherwise it counts as colliding.
 WORLD, DOF, GAIN, OFFSET, WEIGHTS, LEAST, MOST, NUMBERS, VALUES, ASKS = range(10)
-LOWER, UPPER, SCALE, AXES, AXIS_COUNT, RANDOM, ITERATIONS, ITERATION_LIMIT, NEXT, MOTIONS = range(10, 20)
+# Its rules, see AxisRules, and its progress.
+LOWER, UPPER, SCALE, SMALLEST_MOVE, CHANCE, AXES, AXIS_COUNT = range(10, 17)
+RANDOM, ITERATIONS, ITERATION_LIMIT, NEXT, MOTIONS = range(17, 22)
 # Its trees: the addresses of two, which of them grows; where they met.
-TREES, GROWING, MET, MET_OTHER = range(20, 24)
+TREES, GROWING, MET = range(22, 25)
 # Its extension: the edges are rows of STARTS and ENDS; the first FIRST_EDGES of them belong to the first leg.
-TARGET, NEAR, ORDER, CURRENT, TURN, FIRST_EDGES, EDGE_COUNT, COMPLETE, STARTS, ENDS, VERDICTS, LAST = range(24, 36)
+TARGET, NEAR, ORDER, CURRENT, TURN, FIRST_EDGES, EDGE_COUNT, COMPLETE, STARTS, ENDS, VERDICTS, LAST = range(25, 37)
 # Work of the search for the nearest vertex. Goals of a single tree, and which vertex is to try which of them next.
-DISTANCES, GOALS, GOAL_COUNT, VERTEX, VERTEX_END, GOAL = range(36, 42)
-SMALLEST_MOVE = 42  # of each coordinate
+DISTANCES, GOALS, GOAL_COUNT, VERTEX, VERTEX_END, GOAL = range(37, 43)
 FIELDS = 43
 
 RESOLUTION, TOLERANCE_SQUARED = range(2)
@@ -80,11 +82,17 @@ def draw(search: int) -> Any:
 
 
 @inlined
+def draw_unit(search: int) -> Any:
+    """A number from 0 to 1, less than 1."""
+    return float(np.int64(draw(search) >> SHIFT_11)) * UNIT
+
+
+@inlined
 def sample(search: int) -> None:
     """Draw a target within the bounds."""
     for axis in range(field(search, DOF)):
         low, high = double_at(field(search, LOWER), axis), double_at(field(search, UPPER), axis)
-        share = float(np.int64(draw(search) >> SHIFT_11)) * UNIT
+        share = draw_unit(search)
         set_double(field(search, TARGET), axis, min(low + share * (high - low), high))
 
 
@@ -133,7 +141,7 @@ def read_vertex(search: int, tree: int, vertex: int, sink: int) -> None:
 
 
 @inlined
-def add_vertex(search: int, tree: int, row: int, parent: int) -> int:
+def add_vertex(search: int, tree: int, row: int, parent: int) -> Any:
     """Add the coordinates at an address to a tree that has room; returns the number of the vertex."""
     vertex = field(tree, SIZE)
     for axis in range(field(search, DOF)):
@@ -167,6 +175,15 @@ def nearest_vertex(search: int, tree: int) -> int:
         if a < b or (a == b and double_at(distances, WIDTH + lane) < double_at(distances, WIDTH + best)):
             best = lane
     return int(double_at(distances, WIDTH + best))
+
+
+@inlined
+def hold(search: int, tree: int, near: int) -> None:
+    """Let each coordinate of the target stay as it is at a vertex if it does not take part this time."""
+    for axis in range(field(search, DOF)):
+        chance = double_at(field(search, CHANCE), axis)
+        if chance < 1.0 and draw_unit(search) >= chance:
+            set_double(field(search, TARGET), axis, coordinate(tree, near, axis))
 
 
 @inlined
@@ -205,7 +222,7 @@ def turning(came_from: Any, here: Any, there: Any) -> int:
 def shortest_piece(turn: int, came_from: Any, here: Any, there: Any) -> Any:
     """Length of the shortest edge that a leg would leave in the tree."""
     length = abs(there - here)
-    return min(length, abs(there - came_from)) if turn == BETWEEN or turn == BEYOND else length
+    return min(length, abs(there - came_from)) if turn in (BETWEEN, BEYOND) else length
 
 
 @kernel
@@ -215,6 +232,8 @@ def aim(search: int, tree: int, near: int, exactly: bool) -> None:
     A leg shorter than the smallest move ends the way; towards a target that need not be met exactly it is left out.
     """
     parent, current = int_at(field(tree, PARENTS), near), field(search, CURRENT)
+    if not exactly:
+        hold(search, tree, near)
     shuffle(search)
     if parent != ROOT:  # a root has no direction to remember
         to_front(search, remembered_axis(search, tree, near, parent))
@@ -237,9 +256,9 @@ def aim(search: int, tree: int, near: int, exactly: bool) -> None:
                 set_field(search, COMPLETE, 0)
                 break
             continue
-        if turn == ONWARD or turn == BETWEEN:
+        if turn in (ONWARD, BETWEEN):
             add_edge(search, axis, here, there)
-        if turn == BETWEEN or turn == BEYOND:  # the edge to the vertex is split, or left out: the way has no turn
+        if turn in (BETWEEN, BEYOND):  # the edge to the vertex is split, or left out: the way has no turn
             add_edge(search, axis, came_from, there)
         if legs == 0:
             set_field(search, TURN, turn)
@@ -271,12 +290,12 @@ def judge(search: int, start: int, end: int) -> int:
         if order == 0 and a != b:
             order = 1 if a < b else -1
         travel += double_at(field(search, WEIGHTS), axis) * abs(b - a)
-    steps = np.int64(np.ceil(travel / double_at(field(search, NUMBERS), RESOLUTION) - WHOLE_STEP))
+    steps = max(1, int(np.ceil(travel / double_at(field(search, NUMBERS), RESOLUTION) - WHOLE_STEP)))
     first = field(search, VALUES)
     second = first + 8 * field(field(field(search, WORLD), kernels.ARM), robot.JOINT_COUNT)
     load_values(search, start if order >= 0 else end, first)
     load_values(search, end if order >= 0 else start, second)
-    return kernels.judge_edge(field(search, WORLD), first, second, max(steps, 1), field(search, ASKS) != 0)
+    return kernels.judge_edge(field(search, WORLD), first, second, steps, field(search, ASKS) != 0)
 
 
 @kernel
@@ -323,7 +342,7 @@ def keep(search: int, tree: int) -> int:
 
 
 @inlined
-def has_room(search: int, tree: int) -> bool:
+def has_room(search: int, tree: int) -> Any:
     """Whether a tree can take a whole extension."""
     return field(tree, SIZE) + field(search, DOF) <= field(tree, CAPACITY)
 
@@ -377,7 +396,7 @@ def resume_pair(search: int, budget: int) -> int:
 
 
 @inlined
-def goal_in_reach(search: int, tree: int, vertex: int, goal: int) -> bool:
+def goal_in_reach(search: int, tree: int, vertex: int, goal: int) -> Any:
     """Whether a goal lies within the tolerance around a vertex."""
     total = 0.0
     for axis in range(field(search, DOF)):

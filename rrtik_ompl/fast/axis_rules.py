@@ -19,12 +19,14 @@ class AxisRules:
         lower, upper: Samples are drawn between them, shapes (n,); a coordinate for which they are equal never moves.
         scale: Weight of each coordinate in the metric of the nearest neighbour, shape (n,).
         smallest_move: No edge is shorter, shape (n,) [rad or m].
+        chance: How probably a coordinate takes part in the way to a sample, shape (n,); otherwise it stays.
     """
 
     lower: Vector
     upper: Vector
     scale: Vector
     smallest_move: Vector
+    chance: Vector
 
     @property
     def axes(self) -> NDArray[np.int32]:

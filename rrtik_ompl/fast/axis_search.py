@@ -5,7 +5,8 @@ The kernels decide what they can; the world is asked about the rest, all edges o
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from itertools import accumulate
 from time import perf_counter
 from typing import Any
 
@@ -17,7 +18,7 @@ from rrtik_ompl.fast import COLLIDING, FREE, UNDECIDED
 from rrtik_ompl.fast import axis_kernels as kernel
 from rrtik_ompl.fast.axis_rules import AxisRules
 from rrtik_ompl.fast.compiled import WIDTH
-from rrtik_ompl.fast.robot_tables import Table, table
+from rrtik_ompl.fast.robot_tables import ALIGNMENT
 from rrtik_ompl.robot import LIMIT_TOLERANCE
 
 FIRST_CAPACITY = 256
@@ -28,9 +29,6 @@ NO_LIMIT = 2**62
 
 class AxisSearch:
     """A search in progress. It stops at each solution and can be told to go on.
-
-    Attributes:
-        trees: The trees' tables.
 
     Args:
         world: A :class:`rrtik_ompl.World` with kernels.
@@ -53,26 +51,29 @@ class AxisSearch:
         tolerance: float = 0.0,
     ) -> None:
         self._world = world
-        self._resume = kernel.resume_pair if goals is None else kernel.resume_single
-        self.trees = [_tree(rows) for rows in roots]
-        dof = len(rules.lower)
-        single = {} if goals is None else {kernel.GOALS: goals, kernel.GOAL_COUNT: len(goals)}
-        fields = _zeros() | _motions(world, tolerance) | _extension(dof) | single
-        fields |= {
-            kernel.LOWER: rules.lower,
-            kernel.UPPER: rules.upper,
-            kernel.SCALE: rules.scale,
-            kernel.SMALLEST_MOVE: rules.smallest_move,
-            kernel.AXES: rules.axes,
+        single = goals is not None
+        self._resume = kernel.resume_single if single else kernel.resume_pair
+        self._trees = [_Tree(rows) for rows in roots]
+        self._addresses = np.array([tree.address for tree in self._trees])
+        dof, aims = len(rules.lower), np.empty((0, 0)) if goals is None else goals
+        self._floats, self._integers = _floats(world, rules, tolerance, aims), _integers(rules)
+        fields = {
+            **self._floats.addresses,
+            **self._integers.addresses,
+            kernel.WORLD: world.fast.address,
+            kernel.DOF: dof,
+            kernel.ASKS: int(getattr(world, "accuracy", "exact") == "exact"),
             kernel.AXIS_COUNT: len(rules.axes),
             kernel.RANDOM: seed,
             kernel.ITERATION_LIMIT: NO_LIMIT if limit is None else limit,
-            kernel.NEXT: kernel.BEGIN if goals is None else kernel.CHOOSE_GOAL,
-            kernel.VERTEX_END: 0 if goals is None else len(roots[0]),
-            kernel.TREES: np.array([t.address for t in self.trees]),
+            kernel.NEXT: kernel.CHOOSE_GOAL if single else kernel.BEGIN,
+            kernel.TREES: int(self._addresses.ctypes.data),
+            kernel.GOAL_COUNT: len(aims),
+            kernel.VERTEX_END: len(roots[0]) if single else 0,
         }
-        self._search = table(fields)
-        self._edges = [self._search[place].reshape(dof + 1, dof) for place in (kernel.STARTS, kernel.ENDS)]
+        self._header = np.array([fields.get(place, 0) for place in range(kernel.FIELDS)], dtype=np.int64)
+        self._address = int(self._header.ctypes.data)
+        self._edges = [self._floats.of[place].reshape(dof + 1, dof) for place in (kernel.STARTS, kernel.ENDS)]
         self._budget = FIRST_BUDGET
 
     @property
@@ -83,7 +84,7 @@ class AxisSearch:
     @property
     def vertices(self) -> int:
         """Vertices of all trees."""
-        return sum(int(t.header[kernel.SIZE]) for t in self.trees)
+        return sum(tree.size for tree in self._trees)
 
     @property
     def motions(self) -> int:
@@ -102,32 +103,28 @@ class AxisSearch:
 
     def meeting(self) -> tuple[Matrix, Matrix]:
         """The way from the root of each of two trees to the vertex at which they met, shapes (k, n)."""
-        other = self._field(kernel.GROWING)  # the turns have changed since
-        ends = {1 - other: kernel.MET, other: kernel.LAST}
-        return self.branch(0, self._field(ends[0])), self.branch(1, self._field(ends[1]))
+        met, other = self._field(kernel.MET), self._field(kernel.LAST)
+        if self._field(kernel.GROWING) == 0:  # the turns have changed since
+            met, other = other, met
+        return self._trees[0].branch(met), self._trees[1].branch(other)
 
     def ending(self) -> Matrix:
         """The way from the root of a single tree to the goal that it reached, shape (k, n)."""
-        return self.branch(0, self._field(kernel.LAST))
+        return self._trees[0].branch(self._field(kernel.LAST))
 
-    def coordinates(self, number: int) -> Matrix:
-        """The vertices of a tree, shape (size, n). A view."""
-        tree = self.trees[number]
-        runs: Matrix = tree[kernel.COORDINATES].reshape(-1, int(tree.header[kernel.CAPACITY]))
-        return runs[:, : int(tree.header[kernel.SIZE])].T
+    def tree(self, number: int) -> Matrix:
+        """The vertices of a tree, shape (size, n)."""
+        return np.ascontiguousarray(self._trees[number].vertices)
 
     def branch(self, number: int, vertex: int) -> Matrix:
         """The way from the root of a tree to a vertex, shape (k, n)."""
-        parents, way = self.trees[number][kernel.PARENTS], [vertex]
-        while parents[way[-1]] != kernel.ROOT:
-            way.append(int(parents[way[-1]]))
-        return np.ascontiguousarray(self.coordinates(number)[way[::-1]])
+        return self._trees[number].branch(vertex)
 
     def _run(self) -> int:
         """Let the kernel work until its budget is used up, with all the answers and the room that it asks for."""
         before = self.iterations
         while True:
-            status = int(self._resume(self._search.address, self._budget - (self.iterations - before)))
+            status = int(self._resume(self._address, self._budget - (self.iterations - before)))
             if status == kernel.ASKING:
                 self._answer()
             elif status == kernel.FULL:
@@ -137,18 +134,15 @@ class AxisSearch:
 
     def _answer(self) -> None:
         """Have the world settle the edges that the kernels left undecided."""
-        verdicts = self._search[kernel.VERDICTS][: self._field(kernel.EDGE_COUNT)]
+        verdicts = self._integers.of[kernel.VERDICTS][: self._field(kernel.EDGE_COUNT)]
         asked = np.flatnonzero(verdicts == UNDECIDED)
         free = self._world.motion_valid_batch(self._edges[0][asked], self._edges[1][asked])
         verdicts[asked] = np.where(free, FREE, COLLIDING)
 
     def _grow(self) -> None:
         """Twice the room for each tree."""
-        addresses = self._search[kernel.TREES]
-        for number, tree in enumerate(self.trees):
-            parents = tree[kernel.PARENTS][: int(tree.header[kernel.SIZE])]
-            grown = _tree(self.coordinates(number), parents, 2 * int(tree.header[kernel.CAPACITY]))
-            self.trees[number], addresses[number] = grown, grown.address
+        self._trees = [tree.grown() for tree in self._trees]
+        self._addresses[:] = [tree.address for tree in self._trees]
 
     def _pace(self, seconds: float) -> None:
         """More or fewer iterations next time, so that the clock is looked at about every millisecond."""
@@ -158,57 +152,98 @@ class AxisSearch:
             self._budget = max(1, self._budget // 2)
 
     def _field(self, place: int) -> int:
-        return int(self._search.header[place])
+        return int(self._header[place])
 
 
-def _tree(rows: Matrix, parents: NDArray[np.int32] | None = None, capacity: int = FIRST_CAPACITY) -> Table:
-    """A tree of given vertices, roots all of them unless ``parents`` are given, with room for as many again."""
-    while capacity < len(rows) + max(FIRST_CAPACITY, rows.shape[1]):
-        capacity *= 2
-    coordinates = np.zeros((rows.shape[1], -(-capacity // WIDTH) * WIDTH))
-    coordinates[:, : len(rows)] = rows.T
-    above = np.full(coordinates.shape[1], kernel.ROOT, dtype=np.int32)
-    if parents is not None:
-        above[: len(parents)] = parents
-    return table(
+class _Tree:
+    """Vertices of a tree, roots all of them unless ``parents`` are given, with room for more."""
+
+    def __init__(self, rows: Matrix, parents: NDArray[np.int32] | None = None, capacity: int = FIRST_CAPACITY) -> None:
+        count, dof = rows.shape
+        while capacity < count + dof:
+            capacity *= 2
+        self.runs: Matrix = _room(dof * capacity, np.float64).reshape(dof, capacity)
+        self.runs[:, :count] = rows.T
+        self.parents: NDArray[np.int32] = _room(capacity, np.int32)
+        self.parents[:count] = kernel.ROOT if parents is None else parents
+        addresses = self.runs.ctypes.data, self.parents.ctypes.data
+        self.header = np.array([count, capacity, *addresses], dtype=np.int64)
+        self.address = int(self.header.ctypes.data)
+
+    @property
+    def size(self) -> int:
+        """Number of vertices."""
+        return int(self.header[kernel.SIZE])
+
+    @property
+    def vertices(self) -> Matrix:
+        """Shape (size, n). A view."""
+        return self.runs[:, : self.size].T
+
+    def branch(self, vertex: int) -> Matrix:
+        """The way from the root to a vertex, shape (k, n)."""
+        way = [vertex]
+        while (parent := self.parents.item(way[-1])) != kernel.ROOT:
+            way.append(parent)
+        return np.ascontiguousarray(self.runs[:, way[::-1]].T)
+
+    def grown(self) -> _Tree:
+        """The same tree with twice the room."""
+        return _Tree(self.vertices, self.parents[: self.size], 2 * len(self.parents))
+
+
+class _Arrays:
+    """Arrays of one kind in a row in memory, each known by its field's number."""
+
+    def __init__(self, kind: type, fields: Mapping[int, NDArray[Any] | int]) -> None:
+        """Take numbers for the sizes of arrays of zeros."""
+        sizes = [value if isinstance(value, int) else value.size for value in fields.values()]
+        ends = list(accumulate(sizes))
+        memory = _room(ends[-1], kind)
+        self.of = {place: memory[end - size : end] for place, size, end in zip(fields, sizes, ends, strict=True)}
+        for place, value in fields.items():
+            if not isinstance(value, int):
+                self.of[place][:] = value.ravel()
+        start, width = memory.ctypes.data, memory.itemsize
+        self.addresses = {p: start + width * (end - size) for p, size, end in zip(fields, sizes, ends, strict=True)}
+
+
+def _room(count: int, kind: type) -> NDArray[Any]:
+    """Zeros, the first of them at a multiple of ``ALIGNMENT`` bytes."""
+    memory = np.zeros(count * np.dtype(kind).itemsize + ALIGNMENT, dtype=np.uint8)
+    start = -memory.ctypes.data % ALIGNMENT
+    return memory[start : start + count * np.dtype(kind).itemsize].view(kind)
+
+
+def _floats(world: Any, rules: AxisRules, tolerance: float, goals: Matrix) -> _Arrays:
+    """What decides about a motion and how trees grow, and room for one extension."""
+    robot, dof = world.robot, len(rules.lower)
+    return _Arrays(
+        np.float64,
         {
-            kernel.SIZE: len(rows),
-            kernel.CAPACITY: coordinates.shape[1],
-            kernel.COORDINATES: coordinates,
-            kernel.PARENTS: above,
-        }
+            kernel.DISTANCES: 2 * WIDTH,
+            kernel.GAIN: robot.chain.gain,
+            kernel.OFFSET: robot.chain.offset,
+            kernel.WEIGHTS: world.weights,
+            kernel.LEAST: robot.lower - LIMIT_TOLERANCE,
+            kernel.MOST: robot.upper + LIMIT_TOLERANCE,
+            kernel.NUMBERS: np.array([world.motion_resolution, tolerance * tolerance]),
+            kernel.VALUES: 2 * len(robot.chain.parent),
+            kernel.LOWER: rules.lower,
+            kernel.UPPER: rules.upper,
+            kernel.SCALE: rules.scale,
+            kernel.SMALLEST_MOVE: rules.smallest_move,
+            kernel.CHANCE: rules.chance,
+            kernel.TARGET: dof,
+            kernel.CURRENT: dof,
+            kernel.STARTS: (dof + 1) * dof,
+            kernel.ENDS: (dof + 1) * dof,
+            kernel.GOALS: goals,
+        },
     )
 
 
-def _zeros() -> dict[int, int | NDArray[Any]]:
-    return dict.fromkeys(range(kernel.FIELDS), 0)
-
-
-def _motions(world: Any, tolerance: float) -> dict[int, int | NDArray[Any]]:
-    """What decides about a motion."""
-    robot = world.robot
-    return {
-        kernel.WORLD: world.fast.address,
-        kernel.DOF: robot.dof,
-        kernel.GAIN: robot.chain.gain,
-        kernel.OFFSET: robot.chain.offset,
-        kernel.WEIGHTS: world.weights,
-        kernel.LEAST: robot.lower - LIMIT_TOLERANCE,
-        kernel.MOST: robot.upper + LIMIT_TOLERANCE,
-        kernel.NUMBERS: np.array([world.motion_resolution, tolerance * tolerance]),
-        kernel.VALUES: np.zeros((2, len(robot.chain.parent))),
-        kernel.ASKS: int(getattr(world, "accuracy", "exact") == "exact"),
-    }
-
-
-def _extension(dof: int) -> dict[int, int | NDArray[Any]]:
-    """Room for one extension."""
-    return {
-        kernel.TARGET: np.zeros(dof),
-        kernel.ORDER: np.zeros(dof, dtype=np.int32),
-        kernel.CURRENT: np.zeros(dof),
-        kernel.STARTS: np.zeros((dof + 1, dof)),
-        kernel.ENDS: np.zeros((dof + 1, dof)),
-        kernel.VERDICTS: np.zeros(dof + 1, dtype=np.int32),
-        kernel.DISTANCES: np.zeros((2, WIDTH)),
-    }
+def _integers(rules: AxisRules) -> _Arrays:
+    """The axes that may move, and room for their order and for verdicts."""
+    dof = len(rules.lower)
+    return _Arrays(np.int32, {kernel.AXES: rules.axes, kernel.ORDER: dof, kernel.VERDICTS: dof + 1})
