@@ -66,6 +66,8 @@ class AxisOptions:
             InputError: If there is none.
         """
         frozen = self.frozen_joints
+        if not frozen:
+            return starts, goals
         for start in starts:
             fitting = (goals[:, frozen] == start[frozen]).all(axis=1)
             if fitting.any():

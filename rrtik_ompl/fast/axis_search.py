@@ -22,7 +22,7 @@ from rrtik_ompl.fast.robot_tables import ALIGNMENT
 from rrtik_ompl.robot import LIMIT_TOLERANCE
 
 FIRST_CAPACITY = 256
-FIRST_BUDGET = 64  # iterations
+FIRST_BUDGET = 16  # iterations
 LEAST_PAUSE, MOST_PAUSE = 0.5e-3, 2e-3  # [s] between two looks at the clock, if iterations are not longer
 NO_LIMIT = 2**62
 
@@ -94,9 +94,11 @@ class AxisSearch:
     def advance(self, stop: Callable[[], Any]) -> bool:
         """Go on to the next solution; False if ``stop()`` or the limit of iterations came first."""
         while not stop():
-            begin = perf_counter()
-            status = self._run()
-            if status != kernel.RUNNING:
+            begin, until = perf_counter(), self.iterations + self._budget
+            status = self._go_on(until)
+            while status in (kernel.ASKING, kernel.FULL) and perf_counter() - begin < MOST_PAUSE:
+                status = self._go_on(until)
+            if status in (kernel.SOLVED, kernel.EXHAUSTED):
                 return status == kernel.SOLVED
             self._pace(perf_counter() - begin)
         return False
@@ -120,17 +122,14 @@ class AxisSearch:
         """The way from the root of a tree to a vertex, shape (k, n)."""
         return self._trees[number].branch(vertex)
 
-    def _run(self) -> int:
-        """Let the kernel work until its budget is used up, with all the answers and the room that it asks for."""
-        before = self.iterations
-        while True:
-            status = int(self._resume(self._address, self._budget - (self.iterations - before)))
-            if status == kernel.ASKING:
-                self._answer()
-            elif status == kernel.FULL:
-                self._grow()
-            else:
-                return status
+    def _go_on(self, until: int) -> int:
+        """Let the kernel work up to a number of iterations, or until it wants an answer or room, and give it that."""
+        status = int(self._resume(self._address, until - self.iterations))
+        if status == kernel.ASKING:
+            self._answer()
+        elif status == kernel.FULL:
+            self._grow()
+        return status
 
     def _answer(self) -> None:
         """Have the world settle the edges that the kernels left undecided."""
