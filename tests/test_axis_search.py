@@ -347,3 +347,42 @@ def test_a_costly_joint_moves_less() -> None:
 def test_options_that_make_no_sense_are_refused_by_name(planner: Any, options: Any, error: Any) -> None:
     with pytest.raises(error, match=next(iter(options))):
         planner(small_problem().getSpaceInformation(), **options)
+
+
+@pytest.mark.parametrize("kernels", [True, False])
+def test_joints_that_move_last_stay_until_the_others_have_arrived(kernels: bool) -> None:
+    problem, world = shipped("titan4_sdu"), None if kernels else Plain(shipped("titan4_sdu").world)
+    name = problem.robot.joint_names[4]
+    turned = problem.goal.q + np.array([0, 0, 0, 0, 0, 0.5])
+    other = Problem(problem.world, problem.start, turned)
+    for seed in range(5):
+        rows, _ = solved(other, BiCRDT, seed, world, last_joints=[5, name])
+        assert single_joint(rows)
+        assert other.world.motion_valid_batch(rows[:-1], rows[1:]).all()
+        np.testing.assert_array_equal(rows[0], other.start)
+        np.testing.assert_array_equal(rows[-1], turned)
+        assert (rows[:-2, 4:] == problem.start[4:]).all()
+        assert rows[-2].tolist() == [*turned[:4], problem.start[4], turned[5]]
+
+
+def test_goals_whose_last_moves_are_not_free_are_left_out() -> None:
+    problem = shipped("env_e")
+    goals = np.array([[15.0, 16.0], [22.0, 16.0]])  # on the way to the first along y stands the letter's middle arm
+    start = np.array([15.0, 9.0])
+    assert not problem.world.motion_valid(np.array([15.0, 9.0]), goals[0])
+    other = Problem(problem.world, start, goals[1])
+    found = attempt(other, BiCRDT, goals, seconds=20.0, seed=1, parameters={"last_joints": [1]})
+    assert found.rows.tolist()[-2:] == [[22.0, 9.0], [22.0, 16.0]]
+    blocked = attempt(other, BiCRDT, goals[:1], seconds=20.0, seed=1, parameters={"last_joints": [1]})
+    assert blocked.rows is None
+
+
+def test_a_last_move_shorter_than_the_smallest_is_not_made() -> None:
+    problem = shipped("titan4_sdu")
+    other = Problem(problem.world, problem.start, problem.goal.q + np.array([0, 0, 0, 0, 0, 0.05]))
+    options = {"last_joints": [5], "smallest_move": 0.06}
+    found = attempt(other, BiCRDT, other.goal.q[None], seconds=20.0, seed=1, parameters=options)
+    assert found.rows is None
+    options["smallest_move"] = 0.04
+    found = attempt(other, BiCRDT, other.goal.q[None], seconds=20.0, seed=1, parameters=options)
+    assert found.rows is not None

@@ -55,7 +55,7 @@ class AxisOptions:
         self.smallest_move = _per_joint(smallest_move, dof, "smallest_move")
         if not (self.smallest_move >= 0.0).all():
             raise InputError(f"smallest_move: expected 0 or more, got {smallest_move!r}")
-        self.frozen_joints = _joint_numbers(frozen_joints, names, dof)
+        self.frozen_joints = joint_numbers(frozen_joints, names, dof, "frozen_joints")
         self.max_iterations = iteration_limit(max_iterations)
         self._names = names or [str(k) for k in range(dof)]
 
@@ -78,11 +78,12 @@ class AxisOptions:
             f"start and at {goals[0, joint]:.9g} at the goal; let it move or change one of them"
         )
 
-    def rules(self, lower: Vector, upper: Vector, start: Vector) -> AxisRules:
-        """How trees grow within bounds, shapes (n,), if frozen joints stay where they are at a start."""
+    def rules(self, lower: Vector, upper: Vector, start: Vector, others: Sequence[int] = ()) -> AxisRules:
+        """How trees grow within bounds, shapes (n,), if frozen joints and ``others`` stay where they are at a start."""
         scale = self.joint_costs / (upper - lower) if self.scale_by_range else self.joint_costs
         lower, upper = lower.copy(), upper.copy()
-        lower[self.frozen_joints] = upper[self.frozen_joints] = start[self.frozen_joints]
+        staying = [*self.frozen_joints, *others]
+        lower[staying] = upper[staying] = start[staying]
         return AxisRules(lower, upper, scale, self.smallest_move, self.joint_costs.min() / self.joint_costs)
 
     def accepts(self, path: Matrix) -> bool:
@@ -117,17 +118,23 @@ def _per_joint(value: PerJoint, dof: int, what: str) -> Vector:
     return np.broadcast_to(finite_array(value, shape, what), dof).astype(np.float64)
 
 
-def _joint_numbers(joints: Joints, names: Sequence[str], dof: int) -> list[int]:
+def joint_numbers(joints: Joints, names: Sequence[str], dof: int, option: str) -> list[int]:
+    """Numbers of joints that are given by number or name, each once.
+
+    Raises:
+        InputError: If they are not a list of joint numbers.
+        UnknownNameError: If there is no joint of a name.
+    """
     if isinstance(joints, str) or not isinstance(joints, Sequence):
-        raise InputError(f"frozen_joints: expected a list of joints, got {joints!r}")
-    numbers = []
+        raise InputError(f"{option}: expected a list of joints, got {joints!r}")
+    numbers = {}
     for joint in joints:
         if isinstance(joint, str):
             if joint not in names:
-                raise UnknownNameError("frozen_joints: joint", joint, names)
-            numbers.append(list(names).index(joint))
+                raise UnknownNameError(f"{option}: joint", joint, names)
+            numbers[list(names).index(joint)] = True
         elif isinstance(joint, bool) or not isinstance(joint, int) or not 0 <= joint < dof:
-            raise InputError(f"frozen_joints: expected joint numbers from 0 to {dof - 1}, got {joint!r}")
+            raise InputError(f"{option}: expected joint numbers from 0 to {dof - 1}, got {joint!r}")
         else:
-            numbers.append(joint)
-    return numbers
+            numbers[joint] = True
+    return list(numbers)

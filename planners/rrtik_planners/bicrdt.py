@@ -10,7 +10,8 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.fast.axis_rules import AxisRules, runs_in_kernels
 from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
-from rrtik_planners.axis_options import AxisOptions, Joints, PerJoint, joint_names
+from rrtik_planners.axis_endings import Endings
+from rrtik_planners.axis_options import AxisOptions, Joints, PerJoint, joint_names, joint_numbers
 from rrtik_planners.axis_stream import AxisStream
 from rrtik_planners.axis_tree import AxisTree, Outcome
 
@@ -34,6 +35,7 @@ class BiCRDT(SafePlanner):
         joint_costs: PerJoint | None = None,
         frozen_joints: Joints = (),
         smallest_move: PerJoint = 0.0,
+        last_joints: Joints = (),
     ) -> None:
         """Make a planner.
 
@@ -46,6 +48,9 @@ class BiCRDT(SafePlanner):
             joint_costs: As there.
             frozen_joints: As there.
             smallest_move: As there.
+            last_joints: Joints that stay until all others have arrived, by number or name, such as the gripper's
+                rotation; then they go straight to the goal, one after the other in this order. Goals to which that is
+                not free are left out.
 
         Raises:
             InputError: If an option is out of range or the space is of another kind.
@@ -60,11 +65,23 @@ class BiCRDT(SafePlanner):
             names=joint_names(world),
             dof=si.getStateDimension(),
         )
+        self.last_joints = joint_numbers(last_joints, joint_names(world), si.getStateDimension(), "last_joints")
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         starts, goals = self.options.agreeing(starts, goals)
-        rules, seed = self.options.rules(*self.bounds(), starts[0]), int(self.rng.integers(2**63))
+        last, smallest = self.last_joints, self.options.smallest_move
+        starts = starts[(starts[:, last] == starts[0, last]).all(axis=1)]
+        endings = Endings(starts[0], goals, last, smallest, checker)
+        if len(endings.aims) == 0:
+            return SearchResult(None)
+        result = self._between(starts, endings.aims, checker, ptc)
+        path = None if result.path is None else endings.completed(result.path)
+        return SearchResult(path, result.statistics)
+
+    def _between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+        """The search between starts and goals that agree in the joints that stay where they are."""
+        rules, seed = self.options.rules(*self.bounds(), starts[0], self.last_joints), int(self.rng.integers(2**63))
         limit, path = self.options.max_iterations, _common_row(starts, goals)
         trees: Any
         if runs_in_kernels(self._world, starts, goals, rules.lower[None], rules.upper[None]):
