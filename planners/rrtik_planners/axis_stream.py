@@ -34,15 +34,12 @@ class AxisStream:
     def __init__(self, seed: int) -> None:
         self._state = seed
 
-    def _draw(self) -> int:
+    def random(self) -> float:
+        """A number from 0 to 1, less than 1."""
         self._state = (self._state + GOLDEN) & WORD
         z = ((self._state ^ (self._state >> 30)) * FIRST_FACTOR) & WORD
         z = ((z ^ (z >> 27)) * SECOND_FACTOR) & WORD
-        return z ^ (z >> 31)
-
-    def random(self) -> float:
-        """A number from 0 to 1, less than 1."""
-        return (self._draw() >> 11) * 2.0**-53
+        return ((z ^ (z >> 31)) >> 11) * 2.0**-53
 
     def uniform(self, lower: Vector, upper: Vector) -> Vector:
         """A configuration between the bounds, shapes (n,)."""
@@ -54,6 +51,6 @@ class AxisStream:
         """The axes in random order (Fisher and Yates)."""
         order = [int(axis) for axis in axes]
         for k in range(len(order) - 1, 0, -1):
-            other = self._draw() % (k + 1)
+            other = int(self.random() * (k + 1))
             order[k], order[other] = order[other], order[k]
         return order

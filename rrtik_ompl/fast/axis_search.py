@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.fast import COLLIDING, FREE, UNDECIDED
-from rrtik_ompl.fast import axis_kernels as kernel
+from rrtik_ompl.fast import COLLIDING, FREE, UNDECIDED, axis_kernels
+from rrtik_ompl.fast import axis_tables as table
 from rrtik_ompl.fast.axis_rules import AxisRules
 from rrtik_ompl.fast.compiled import WIDTH
 from rrtik_ompl.fast.robot_tables import ALIGNMENT
@@ -52,7 +52,7 @@ class AxisSearch:
     ) -> None:
         self._world = world
         single = goals is not None
-        self._resume = kernel.resume_single if single else kernel.resume_pair
+        self._resume = axis_kernels.resume_single if single else axis_kernels.resume_pair
         self._trees = [_Tree(rows) for rows in roots]
         self._addresses = np.array([tree.address for tree in self._trees])
         dof, aims = len(rules.lower), np.empty((0, 0)) if goals is None else goals
@@ -60,26 +60,26 @@ class AxisSearch:
         fields = {
             **self._floats.addresses,
             **self._integers.addresses,
-            kernel.WORLD: world.fast.address,
-            kernel.DOF: dof,
-            kernel.ASKS: int(getattr(world, "accuracy", "exact") == "exact"),
-            kernel.AXIS_COUNT: len(rules.axes),
-            kernel.RANDOM: seed,
-            kernel.ITERATION_LIMIT: NO_LIMIT if limit is None else limit,
-            kernel.NEXT: kernel.CHOOSE_GOAL if single else kernel.BEGIN,
-            kernel.TREES: int(self._addresses.ctypes.data),
-            kernel.GOAL_COUNT: len(aims),
-            kernel.VERTEX_END: len(roots[0]) if single else 0,
+            table.WORLD: world.fast.address,
+            table.DOF: dof,
+            table.ASKS: int(getattr(world, "accuracy", "exact") == "exact"),
+            table.AXIS_COUNT: len(rules.axes),
+            table.RANDOM: seed,
+            table.ITERATION_LIMIT: NO_LIMIT if limit is None else limit,
+            table.NEXT: table.CHOOSE_GOAL if single else table.BEGIN,
+            table.TREES: int(self._addresses.ctypes.data),
+            table.GOAL_COUNT: len(aims),
+            table.VERTEX_END: len(roots[0]) if single else 0,
         }
-        self._header = np.array([fields.get(place, 0) for place in range(kernel.FIELDS)], dtype=np.int64)
+        self._header = np.array([fields.get(place, 0) for place in range(table.FIELDS)], dtype=np.int64)
         self._address = int(self._header.ctypes.data)
-        self._edges = [self._floats.of[place].reshape(dof + 1, dof) for place in (kernel.STARTS, kernel.ENDS)]
+        self._edges = [self._floats.of[place].reshape(dof + 1, dof) for place in (table.STARTS, table.ENDS)]
         self._budget = FIRST_BUDGET
 
     @property
     def iterations(self) -> int:
         """Samples drawn so far."""
-        return self._field(kernel.ITERATIONS)
+        return self._field(table.ITERATIONS)
 
     @property
     def vertices(self) -> int:
@@ -89,30 +89,30 @@ class AxisSearch:
     @property
     def motions(self) -> int:
         """Edges that were asked about so far."""
-        return self._field(kernel.MOTIONS)
+        return self._field(table.MOTIONS)
 
     def advance(self, stop: Callable[[], Any]) -> bool:
         """Go on to the next solution; False if ``stop()`` or the limit of iterations came first."""
         while not stop():
             begin, until = perf_counter(), self.iterations + self._budget
             status = self._go_on(until)
-            while status in (kernel.ASKING, kernel.FULL) and perf_counter() - begin < MOST_PAUSE:
+            while status in (table.ASKING, table.FULL) and perf_counter() - begin < MOST_PAUSE:
                 status = self._go_on(until)
-            if status in (kernel.SOLVED, kernel.EXHAUSTED):
-                return status == kernel.SOLVED
+            if status in (table.SOLVED, table.EXHAUSTED):
+                return status == table.SOLVED
             self._pace(perf_counter() - begin)
         return False
 
     def meeting(self) -> tuple[Matrix, Matrix]:
         """The way from the root of each of two trees to the vertex at which they met, shapes (k, n)."""
-        met, other = self._field(kernel.MET), self._field(kernel.LAST)
-        if self._field(kernel.GROWING) == 0:  # the turns have changed since
+        met, other = self._field(table.MET), self._field(table.LAST)
+        if self._field(table.GROWING) == 0:  # the turns have changed since
             met, other = other, met
         return self._trees[0].branch(met), self._trees[1].branch(other)
 
     def ending(self) -> Matrix:
         """The way from the root of a single tree to the goal that it reached, shape (k, n)."""
-        return self._trees[0].branch(self._field(kernel.LAST))
+        return self._trees[0].branch(self._field(table.LAST))
 
     def tree(self, number: int) -> Matrix:
         """The vertices of a tree, shape (size, n)."""
@@ -125,15 +125,15 @@ class AxisSearch:
     def _go_on(self, until: int) -> int:
         """Let the kernel work up to a number of iterations, or until it wants an answer or room, and give it that."""
         status = int(self._resume(self._address, until - self.iterations))
-        if status == kernel.ASKING:
+        if status == table.ASKING:
             self._answer()
-        elif status == kernel.FULL:
+        elif status == table.FULL:
             self._grow()
         return status
 
     def _answer(self) -> None:
         """Have the world settle the edges that the kernels left undecided."""
-        verdicts = self._integers.of[kernel.VERDICTS][: self._field(kernel.EDGE_COUNT)]
+        verdicts = self._integers.of[table.VERDICTS][: self._field(table.EDGE_COUNT)]
         asked = np.flatnonzero(verdicts == UNDECIDED)
         free = self._world.motion_valid_batch(self._edges[0][asked], self._edges[1][asked])
         verdicts[asked] = np.where(free, FREE, COLLIDING)
@@ -164,7 +164,7 @@ class _Tree:
         self.runs: Matrix = _room(dof * capacity, np.float64).reshape(dof, capacity)
         self.runs[:, :count] = rows.T
         self.parents: NDArray[np.int32] = _room(capacity, np.int32)
-        self.parents[:count] = kernel.ROOT if parents is None else parents
+        self.parents[:count] = table.ROOT if parents is None else parents
         addresses = self.runs.ctypes.data, self.parents.ctypes.data
         self.header = np.array([count, capacity, *addresses], dtype=np.int64)
         self.address = int(self.header.ctypes.data)
@@ -172,7 +172,7 @@ class _Tree:
     @property
     def size(self) -> int:
         """Number of vertices."""
-        return int(self.header[kernel.SIZE])
+        return int(self.header[table.SIZE])
 
     @property
     def vertices(self) -> Matrix:
@@ -182,7 +182,7 @@ class _Tree:
     def branch(self, vertex: int) -> Matrix:
         """The way from the root to a vertex, shape (k, n)."""
         way = [vertex]
-        while (parent := self.parents.item(way[-1])) != kernel.ROOT:
+        while (parent := self.parents.item(way[-1])) != table.ROOT:
             way.append(parent)
         return np.ascontiguousarray(self.runs[:, way[::-1]].T)
 
@@ -220,24 +220,24 @@ def _floats(world: Any, rules: AxisRules, tolerance: float, goals: Matrix) -> _A
     return _Arrays(
         np.float64,
         {
-            kernel.DISTANCES: 2 * WIDTH,
-            kernel.GAIN: robot.chain.gain,
-            kernel.OFFSET: robot.chain.offset,
-            kernel.WEIGHTS: world.weights,
-            kernel.LEAST: robot.lower - LIMIT_TOLERANCE,
-            kernel.MOST: robot.upper + LIMIT_TOLERANCE,
-            kernel.NUMBERS: np.array([world.motion_resolution, tolerance * tolerance]),
-            kernel.VALUES: 2 * len(robot.chain.parent),
-            kernel.LOWER: rules.lower,
-            kernel.UPPER: rules.upper,
-            kernel.SCALE: rules.scale,
-            kernel.SMALLEST_MOVE: rules.smallest_move,
-            kernel.CHANCE: rules.chance,
-            kernel.TARGET: dof,
-            kernel.CURRENT: dof,
-            kernel.STARTS: (dof + 1) * dof,
-            kernel.ENDS: (dof + 1) * dof,
-            kernel.GOALS: goals,
+            table.DISTANCES: 2 * WIDTH,
+            table.GAIN: robot.chain.gain,
+            table.OFFSET: robot.chain.offset,
+            table.WEIGHTS: world.weights,
+            table.LEAST: robot.lower - LIMIT_TOLERANCE,
+            table.MOST: robot.upper + LIMIT_TOLERANCE,
+            table.NUMBERS: np.array([world.motion_resolution, tolerance * tolerance]),
+            table.VALUES: 2 * len(robot.chain.parent),
+            table.LOWER: rules.lower,
+            table.UPPER: rules.upper,
+            table.SCALE: rules.scale,
+            table.SMALLEST_MOVE: rules.smallest_move,
+            table.CHANCE: rules.chance,
+            table.TARGET: dof,
+            table.CURRENT: dof,
+            table.STARTS: (dof + 1) * dof,
+            table.ENDS: (dof + 1) * dof,
+            table.GOALS: goals,
         },
     )
 
@@ -245,4 +245,4 @@ def _floats(world: Any, rules: AxisRules, tolerance: float, goals: Matrix) -> _A
 def _integers(rules: AxisRules) -> _Arrays:
     """The axes that may move, and room for their order and for verdicts."""
     dof = len(rules.lower)
-    return _Arrays(np.int32, {kernel.AXES: rules.axes, kernel.ORDER: dof, kernel.VERDICTS: dof + 1})
+    return _Arrays(np.int32, {table.AXES: rules.axes, table.ORDER: dof, table.VERDICTS: dof + 1})
