@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.fast.axis_rules import AxisRules, runs_in_kernels
 from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
+from rrtik_planners.axis_endings import Endings
+from rrtik_planners.axis_options import AxisOptions, Joints, PerJoint, joint_names, joint_numbers
+from rrtik_planners.axis_stream import AxisStream
 from rrtik_planners.axis_tree import AxisTree, Outcome
-from rrtik_planners.crdt import iteration_limit, metric_scale
 
 
 class BiCRDT(SafePlanner):
     """One tree from the start and one from the goal, grown in turn; no step length, no bias, no goal tolerance.
 
     Axis moves end exactly on their target, so the trees meet exactly and every edge of the path moves one joint.
+
+    In a world with kernels the whole search runs there; it finds the same path as the search in Python.
     """
 
     def __init__(
@@ -26,6 +32,10 @@ class BiCRDT(SafePlanner):
         seed: int | None = None,
         scale_by_range: bool = False,
         max_iterations: int | None = None,
+        joint_costs: PerJoint | None = None,
+        frozen_joints: Joints = (),
+        smallest_move: PerJoint = 0.0,
+        last_joints: Joints = (),
     ) -> None:
         """Make a planner.
 
@@ -33,33 +43,109 @@ class BiCRDT(SafePlanner):
             si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
             world: Asked instead of ``si`` whether configurations and motions are free, if given.
             seed: At least 0; drawn from OMPL's if None.
-            scale_by_range: Divide each coordinate by its range in the metric of the nearest neighbour.
-            max_iterations: The K of the paper; without limit if None.
+            scale_by_range: See :class:`rrtik_planners.axis_options.AxisOptions`.
+            max_iterations: As there.
+            joint_costs: As there.
+            frozen_joints: As there.
+            smallest_move: As there.
+            last_joints: Joints that stay until all others have arrived, by number or name, such as the gripper's
+                rotation; then they go straight to the goal, one after the other in this order. Goals to which that is
+                not free are left out.
 
         Raises:
             InputError: If an option is out of range or the space is of another kind.
         """
         super().__init__(si, "BiCRDT", world=world, seed=seed)
-        self.scale_by_range = scale_by_range
-        self.max_iterations = iteration_limit(max_iterations)
+        self.options = AxisOptions(
+            scale_by_range=scale_by_range,
+            joint_costs=joint_costs,
+            frozen_joints=frozen_joints,
+            smallest_move=smallest_move,
+            max_iterations=max_iterations,
+            names=joint_names(world),
+            dof=si.getStateDimension(),
+        )
+        self.last_joints = joint_numbers(last_joints, joint_names(world), si.getStateDimension(), "last_joints")
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
-        lower, upper = self.bounds()
-        scale = metric_scale(lower, upper, self.scale_by_range)
-        from_start, from_goal = AxisTree(starts, scale), AxisTree(goals, scale)
-        growing, other = from_start, from_goal
-        path, iterations = _common_row(starts, goals), 0
-        while path is None and not ptc() and iterations < self.max_iterations:
-            iterations += 1
-            extension = growing.extend(self.rng.uniform(lower, upper), checker, self.rng)
-            if extension.outcome is not Outcome.TRAPPED:
-                meeting = other.extend(growing.vertex(extension.vertex), checker, self.rng)
-                if meeting.outcome is Outcome.REACHED:
-                    path = _join(growing.branch(extension.vertex), other.branch(meeting.vertex))
-                    path = path if growing is from_start else path[::-1]
-            growing, other = other, growing
-        return SearchResult(path, {"iterations": iterations, "vertices": from_start.size + from_goal.size})
+        starts, goals = self.options.agreeing(starts, goals)
+        last, smallest = self.last_joints, self.options.smallest_move
+        starts = starts[(starts[:, last] == starts[0, last]).all(axis=1)]
+        endings = Endings(starts[0], goals, last, smallest, checker)
+        if len(endings.aims) == 0:
+            return SearchResult(None)
+        result = self._between(starts, endings.aims, checker, ptc)
+        path = None if result.path is None else endings.completed(result.path)
+        return SearchResult(path, result.statistics)
+
+    def _between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+        """The search between starts and goals that agree in the joints that stay where they are."""
+        rules, seed = self.options.rules(*self.bounds(), starts[0], self.last_joints), int(self.rng.integers(2**63))
+        limit, path = self.options.max_iterations, _common_row(starts, goals)
+        trees: Any
+        if runs_in_kernels(self._world, starts, goals, rules.lower[None], rules.upper[None]):
+            from rrtik_ompl.fast.axis_search import AxisSearch  # compiles
+
+            trees = AxisSearch(self._world, rules, seed, limit, starts, goals)
+        else:
+            trees = TreePair(rules, seed, limit, starts, goals, checker)
+        while path is None and trees.advance(ptc):
+            met = _join(*trees.meeting())
+            path = met if self.options.accepts(met) else None
+        checker.checked_motions += trees.motions
+        return SearchResult(path, {"iterations": trees.iterations, "vertices": trees.vertices})
+
+
+class TreePair:
+    """The search in Python: for any checker, in the same steps as :class:`rrtik_ompl.fast.axis_search.AxisSearch`.
+
+    Attributes:
+        iterations: Samples drawn so far.
+        motions: Edges that were asked about without the checker's knowledge: none.
+    """
+
+    motions = 0
+
+    def __init__(
+        self, rules: AxisRules, seed: int, limit: int | None, starts: Matrix, goals: Matrix, checker: MotionChecker
+    ) -> None:
+        self._rules, self._limit, self._checker = rules, limit, checker
+        self._stream = AxisStream(seed)
+        self._trees = AxisTree(starts, rules), AxisTree(goals, rules)
+        self._growing = 0
+        self._met = (0, 0)
+        self.iterations = 0
+
+    @property
+    def vertices(self) -> int:
+        """Vertices of both trees."""
+        return sum(tree.size for tree in self._trees)
+
+    def advance(self, stop: Callable[[], Any]) -> bool:
+        """Go on to the next solution; False if ``stop()`` or the limit of iterations came first."""
+        while self.iterations != self._limit and not stop():
+            self.iterations += 1
+            if self._step():
+                return True
+        return False
+
+    def meeting(self) -> tuple[Matrix, Matrix]:
+        """The way from the root of each tree to the vertex at which they met, shapes (k, n)."""
+        return self._trees[0].branch(self._met[0]), self._trees[1].branch(self._met[1])
+
+    def _step(self) -> bool:
+        """One iteration; whether the trees have met."""
+        number, self._growing = self._growing, 1 - self._growing
+        growing, other = self._trees[number], self._trees[1 - number]
+        target = self._stream.uniform(self._rules.lower, self._rules.upper)
+        grown = growing.extend(target, self._checker, self._stream, exactly=False)
+        if grown.outcome is Outcome.TRAPPED:
+            return False
+        meeting = other.extend(growing.vertex(grown.vertex), self._checker, self._stream)
+        ends = grown.vertex, meeting.vertex
+        self._met = ends if number == 0 else ends[::-1]
+        return meeting.outcome is Outcome.REACHED
 
 
 def _join(one: Matrix, two: Matrix) -> Matrix:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.fast.axis_rules import AxisRules, runs_in_kernels
 from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
+from rrtik_planners.axis_options import AxisOptions, Joints, PerJoint, joint_names
+from rrtik_planners.axis_stream import AxisStream
 from rrtik_planners.axis_tree import AxisTree, Outcome
 
 GOAL_TOLERANCE_SHARE = 0.2  # default goal tolerance as a share of the diagonal of the space
@@ -23,6 +27,8 @@ class CRDT(SafePlanner):
 
     A small goal tolerance needs very many iterations for an arm of six joints, since nothing draws the tree towards the
     goal; the default is meant to be met soon. The paper's comparison with RRT used the step length of the RRT.
+
+    In a world with kernels the whole search runs there; it finds the same path as the search in Python.
     """
 
     def __init__(
@@ -34,6 +40,9 @@ class CRDT(SafePlanner):
         goal_tolerance: float | None = None,
         scale_by_range: bool = False,
         max_iterations: int | None = None,
+        joint_costs: PerJoint | None = None,
+        frozen_joints: Joints = (),
+        smallest_move: PerJoint = 0.0,
     ) -> None:
         """Make a planner.
 
@@ -43,8 +52,11 @@ class CRDT(SafePlanner):
             seed: At least 0; drawn from OMPL's if None.
             goal_tolerance: Euclidean distance to a goal below which a vertex tries to reach it [unit of the space];
                 a fifth of the diagonal of the space if None.
-            scale_by_range: Divide each coordinate by its range in the metric of the nearest neighbour.
-            max_iterations: The K of the paper; without limit if None.
+            scale_by_range: See :class:`rrtik_planners.axis_options.AxisOptions`.
+            max_iterations: As there.
+            joint_costs: As there.
+            frozen_joints: As there.
+            smallest_move: As there.
 
         Raises:
             InputError: If an option is out of range or the space is of another kind.
@@ -53,58 +65,114 @@ class CRDT(SafePlanner):
         if goal_tolerance is not None and not goal_tolerance > 0.0:
             raise InputError(f"goal_tolerance: expected a number greater than 0, got {goal_tolerance!r}")
         self.goal_tolerance = goal_tolerance
-        self.scale_by_range = scale_by_range
-        self.max_iterations = iteration_limit(max_iterations)
+        self.options = AxisOptions(
+            scale_by_range=scale_by_range,
+            joint_costs=joint_costs,
+            frozen_joints=frozen_joints,
+            smallest_move=smallest_move,
+            max_iterations=max_iterations,
+            names=joint_names(world),
+            dof=si.getStateDimension(),
+        )
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
+        starts, goals = self.options.agreeing(starts, goals)
         lower, upper = self.bounds()
         tolerance = self.goal_tolerance or GOAL_TOLERANCE_SHARE * float(np.linalg.norm(upper - lower))
-        tree = AxisTree(starts, metric_scale(lower, upper, self.scale_by_range))
-        ending, iterations = self._try_goals(tree, 0, goals, tolerance, checker), 0
-        while ending is None and not ptc() and iterations < self.max_iterations:
-            iterations += 1
-            known = tree.size
-            tree.extend(self.rng.uniform(lower, upper), checker, self.rng)
-            ending = self._try_goals(tree, known, goals, tolerance, checker)
-        statistics = {"iterations": iterations, "vertices": tree.size}
-        if ending is not None:
-            return SearchResult(tree.branch(ending), statistics)
-        nearest, distance = _nearest_to_goal(tree, goals)
-        return SearchResult(tree.branch(nearest), statistics, distance)
+        rules, seed = self.options.rules(lower, upper, starts[0]), int(self.rng.integers(2**63))
+        limit, path = self.options.max_iterations, None
+        tree: Any
+        if runs_in_kernels(self._world, starts, goals, rules.lower[None], rules.upper[None]):
+            from rrtik_ompl.fast.axis_search import AxisSearch  # compiles
 
-    def _try_goals(
-        self, tree: AxisTree, known: int, goals: Matrix, tolerance: float, checker: MotionChecker
-    ) -> int | None:
-        """Try to reach a goal from the vertices added since there were ``known``; returns the vertex at the goal."""
-        for vertex in range(known, tree.size):
-            distances = np.linalg.norm(goals - tree.vertex(vertex), axis=1)
-            for k in np.flatnonzero(distances <= tolerance):
-                extension = tree.extend_from(vertex, goals[k], checker, self.rng)
-                if extension.outcome is Outcome.REACHED:
-                    return extension.vertex
-        return None
+            tree = AxisSearch(self._world, rules, seed, limit, starts, goals=goals, tolerance=tolerance)
+        else:
+            tree = SingleTree(rules, seed, limit, starts, goals, tolerance, checker)
+        while path is None and tree.advance(ptc):
+            found = tree.ending()
+            path = found if self.options.accepts(found) else None
+        checker.checked_motions += tree.motions
+        statistics = {"iterations": tree.iterations, "vertices": tree.vertices}
+        if path is not None:
+            return SearchResult(path, statistics)
+        nearest, distance = _nearest_to_goal(tree.tree(0), goals)
+        return SearchResult(tree.branch(0, nearest), statistics, distance)
 
 
-def metric_scale(lower: Vector, upper: Vector, by_range: bool) -> Vector:
-    """Weights of the coordinates in the metric of the nearest neighbour, shape (n,)."""
-    return 1.0 / (upper - lower) if by_range else np.ones(len(lower))
+class SingleTree:
+    """The search in Python: for any checker, in the same steps as :class:`rrtik_ompl.fast.axis_search.AxisSearch`.
 
-
-def iteration_limit(limit: int | None) -> float:
-    """The largest number of iterations, infinity if None.
-
-    Raises:
-        InputError: If the limit is no number of at least 1.
+    Attributes:
+        iterations: Samples drawn so far.
+        motions: Edges that were asked about without the checker's knowledge: none.
     """
-    if limit is not None and (isinstance(limit, bool) or not isinstance(limit, int | float) or not limit >= 1):
-        raise InputError(f"max_iterations: expected at least 1, got {limit!r}")
-    return np.inf if limit is None else limit
+
+    motions = 0
+
+    def __init__(
+        self,
+        rules: AxisRules,
+        seed: int,
+        limit: int | None,
+        starts: Matrix,
+        goals: Matrix,
+        tolerance: float,
+        checker: MotionChecker,
+    ) -> None:
+        self._rules, self._limit, self._checker = rules, limit, checker
+        self._goals, self._tolerance = goals, tolerance
+        self._stream, self._tree = AxisStream(seed), AxisTree(starts, rules)
+        self._waiting = self._near_goals(0)
+        self._ending = 0
+        self.iterations = 0
+
+    @property
+    def vertices(self) -> int:
+        """Vertices of the tree."""
+        return self._tree.size
+
+    def advance(self, stop: Callable[[], Any]) -> bool:
+        """Go on to the next solution; False if ``stop()`` or the limit of iterations came first."""
+        while not stop():
+            while self._waiting:
+                vertex, goal = self._waiting.pop(0)
+                extension = self._tree.extend_from(vertex, self._goals[goal], self._checker, self._stream)
+                if extension.outcome is Outcome.REACHED:
+                    self._ending = extension.vertex
+                    return True
+            if self.iterations == self._limit:
+                return False
+            self.iterations += 1
+            known = self._tree.size
+            target = self._stream.uniform(self._rules.lower, self._rules.upper)
+            self._tree.extend(target, self._checker, self._stream, exactly=False)
+            self._waiting = self._near_goals(known)
+        return False
+
+    def ending(self) -> Matrix:
+        """The way from the root to the goal that was reached, shape (k, n)."""
+        return self._tree.branch(self._ending)
+
+    def branch(self, number: int, vertex: int) -> Matrix:
+        """The way from the root to a vertex, shape (k, n); there is only one tree, number 0."""
+        return self._tree.branch(vertex)
+
+    def tree(self, number: int) -> Matrix:
+        """The vertices of the only tree, shape (size, n)."""
+        return np.array([self._tree.vertex(i) for i in range(self._tree.size)])
+
+    def _near_goals(self, known: int) -> list[tuple[int, int]]:
+        """Vertices added since there were ``known`` and goals within the tolerance around them."""
+        found = []
+        for vertex in range(known, self._tree.size):
+            distances = np.linalg.norm(self._goals - self._tree.vertex(vertex), axis=1)
+            found += [(vertex, int(goal)) for goal in np.flatnonzero(distances <= self._tolerance)]
+        return found
 
 
-def _nearest_to_goal(tree: AxisTree, goals: Matrix) -> tuple[int, float]:
+def _nearest_to_goal(vertices: Matrix, goals: Matrix) -> tuple[int, float]:
     """The vertex nearest to any of the goals and its distance."""
-    vertices = [tree.nearest(goal) for goal in goals]
-    distances = [float(np.linalg.norm(tree.vertex(v) - goal)) for v, goal in zip(vertices, goals, strict=True)]
-    best = int(np.argmin(distances))
-    return vertices[best], distances[best]
+    distances = np.array([np.linalg.norm(vertices - goal, axis=1) for goal in goals])
+    best = int(distances.min(axis=0).argmin())
+    return best, float(distances[:, best].min())

@@ -222,6 +222,16 @@ def lane_numbers(typingctx: Any) -> Any:
     return signature(WIDE_LANES), emit
 
 
+@_lowered
+def rounded_sum(typingctx: Any, first: Any, second: Any) -> Any:
+    """Sum of wide lanes, never fused with a product that is one of them: the same to the bit as numpy's."""
+
+    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.fadd(*args)
+
+    return WIDE_LANES(first, second), emit
+
+
 def _spreader(lane_type: LaneType) -> Any:
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return _spread(builder, args[0])
@@ -268,3 +278,4 @@ set_lanes = _writer(_vector(LANES), LANES, ALIGNMENT // 2)
 set_wide_lanes = _writer(_vector(WIDE_LANES), WIDE_LANES, ALIGNMENT)
 set_double = _writer(_DOUBLE, types.float64, 8)
 set_int = _writer(_INDEX, types.int64, 4)
+set_field = _writer(ir.IntType(64), types.int64, 8)

@@ -1,0 +1,61 @@
+"""Random numbers of searches in kernels, the same as those of the search in Python."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.fast import axis_tables as table
+from rrtik_ompl.fast.compiled import inlined, kernel
+from rrtik_ompl.fast.lanes import double_at, field, int_at, set_double, set_field, set_int
+
+# splitmix64. Source: Steele, Lea, Flood, Fast splittable pseudorandom number generators, 2014.
+GOLDEN, FIRST_FACTOR, SECOND_FACTOR = (
+    np.uint64(x) for x in (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB)
+)
+SHIFT_30, SHIFT_27, SHIFT_31, SHIFT_11 = (np.uint64(x) for x in (30, 27, 31, 11))
+UNIT = 2.0**-53
+
+
+@inlined
+def draw(search: int) -> Any:
+    """The next number of the stream, from 0 to 1, less than 1."""
+    state = np.uint64(field(search, table.RANDOM)) + GOLDEN
+    set_field(search, table.RANDOM, np.int64(state))
+    z = (state ^ (state >> SHIFT_30)) * FIRST_FACTOR
+    z = (z ^ (z >> SHIFT_27)) * SECOND_FACTOR
+    return float(np.int64((z ^ (z >> SHIFT_31)) >> SHIFT_11)) * UNIT
+
+
+@inlined
+def sample(search: int) -> None:
+    """Draw a target within the bounds."""
+    for axis in range(field(search, table.DOF)):
+        low, high = double_at(field(search, table.LOWER), axis), double_at(field(search, table.UPPER), axis)
+        share = draw(search)
+        set_double(field(search, table.TARGET), axis, min(low + share * (high - low), high))
+
+
+@kernel
+def shuffle(search: int) -> None:
+    """The axes that may move, in random order."""
+    order, count = field(search, table.ORDER), field(search, table.AXIS_COUNT)
+    for k in range(count):
+        set_int(order, k, int_at(field(search, table.AXES), k))
+    for k in range(count - 1, 0, -1):
+        other = int(draw(search) * (k + 1))
+        axis = int_at(order, k)
+        set_int(order, k, int_at(order, other))
+        set_int(order, other, axis)
+
+
+@inlined
+def to_front(search: int, axis: int) -> None:
+    """Let an axis go first and the others keep their order."""
+    order, k = field(search, table.ORDER), 0
+    while int_at(order, k) != axis:
+        k += 1
+    for place in range(k, 0, -1):
+        set_int(order, place, int_at(order, place - 1))
+    set_int(order, 0, axis)
