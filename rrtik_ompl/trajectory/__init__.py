@@ -9,11 +9,11 @@ from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.trajectory.corners import Curve, rounding, runs, vertices
-from rrtik_ompl.trajectory.curved import curved
+from rrtik_ompl.trajectory.curve import along_curve
 from rrtik_ompl.trajectory.limits import RateLimits
+from rrtik_ompl.trajectory.line import along_line
 from rrtik_ompl.trajectory.motion import Peaks, State, Trajectory, load_trajectory
 from rrtik_ompl.trajectory.pieces import joined
-from rrtik_ompl.trajectory.straight import straight
 from rrtik_ompl.world import World
 
 __all__ = ["Peaks", "RateLimits", "State", "Trajectory", "load_trajectory", "timed"]
@@ -87,7 +87,7 @@ def _checked(path: JointPath, limits: RateLimits) -> Matrix:
 def _timed(path: JointPath, corners: Matrix, rounded: Vector, limits: RateLimits) -> Trajectory:
     """The motion along the runs, slowed where rounding errors or the grid let it exceed a limit."""
     parts = [
-        curved(run, limits) if isinstance(run, Curve) else straight(run[0], run[1], limits)
+        along_curve(run, limits) if isinstance(run, Curve) else along_line(run[0], run[1], limits)
         for run in runs(corners, rounded)
     ]
     found = joined(parts, path)

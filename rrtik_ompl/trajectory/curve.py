@@ -17,10 +17,10 @@ from rrtik_ompl.trajectory.corners import Curve
 from rrtik_ompl.trajectory.limits import RateLimits
 from rrtik_ompl.trajectory.pieces import Pieces
 
-STEPS = 40  # grid steps of each piece of a curve
+STEPS = 80  # grid steps of each piece of a curve
 
 
-def curved(curve: Curve, limits: RateLimits) -> Pieces:
+def along_curve(curve: Curve, limits: RateLimits) -> Pieces:
     """The fastest motion along a curve that keeps the limits at the points of a grid.
 
     Between two of them every joint follows the cubic through its positions and velocities there.
@@ -30,7 +30,8 @@ def curved(curve: Curve, limits: RateLimits) -> Pieces:
     """
     path = _path(curve)
     ends = np.concatenate([np.zeros(1), np.cumsum(curve.lengths)])
-    inside = [begin + (end - begin) * np.arange(STEPS) / STEPS for begin, end in pairwise(ends)]
+    shares = np.arange(STEPS) / STEPS
+    inside = [begin + (end - begin) * shares for begin, end in pairwise(ends)]
     grid = np.append(np.concatenate(inside), ends[-1])
     speeds = _speeds(path, grid, limits)
     durations = 2.0 * np.diff(grid) / (speeds[1:] + speeds[:-1])

@@ -17,7 +17,7 @@ from rrtik_ompl.trajectory.pieces import Pieces
 BRIEF = 1e-9  # [s]; a phase shorter than this is left out
 
 
-def straight(a: Vector, b: Vector, limits: RateLimits) -> Pieces:
+def along_line(a: Vector, b: Vector, limits: RateLimits) -> Pieces:
     """The fastest motion from rest at a to rest at b on the line between them, shape (n,) each.
 
     Raises:
