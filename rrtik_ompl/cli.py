@@ -104,7 +104,7 @@ def plan(
         from rrtik_ompl.viewer import view
 
         with progress("drawing"):
-            view(question, path, html=html)
+            view(question, path, html=html, before=None if path is found.path else found.path)
     if as_json:
         print(json.dumps(report.document(question, found, path, shorten_seconds)))
     else:
@@ -148,6 +148,7 @@ def check(problem: ProblemName, path: PathFile = None) -> int:
 def show(
     problem: ProblemName,
     path: PathFile = None,
+    before: Annotated[Path | None, typer.Option(help="Another path file, to compare with.")] = None,
     html: HtmlFile = None,
     port: Annotated[int, typer.Option(help="Port on 127.0.0.1; 0 takes a free one.", min=0, max=65535)] = 0,
 ) -> int:
@@ -158,11 +159,12 @@ def show(
 
     question = load_problem(problem)
     route = None if path is None else load_path(path, question.world.robot)
+    earlier = None if before is None else load_path(before, question.world.robot)
     if html is not None:
-        view(question, route, html=html)
+        view(question, route, html=html, before=earlier)
         say(f"wrote {html}")
         return FOUND
-    view(question, route, port=port, on_ready=lambda url: say(f"open {url} in a browser; Ctrl-C ends"))
+    view(question, route, before=earlier, port=port, on_ready=lambda url: say(f"open {url} in a browser; Ctrl-C ends"))
     return FOUND
 
 

@@ -119,7 +119,7 @@ def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> tupl
 
 
 def _rates(text: str | None) -> list[float] | None:
-    """"30,30,60" as numbers."""
+    """Numbers with commas between them, or one alone."""
     if text is None:
         return None
     try:

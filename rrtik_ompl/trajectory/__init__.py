@@ -22,9 +22,7 @@ ROUNDS = 4  # of making rounded corners smaller all together, before none is rou
 A_HAIR = 1.0 + 1e-12  # so that a motion slowed to a limit does not exceed it by rounding
 
 
-def timed(
-    path: JointPath, limits: RateLimits | Robot, *, blend: float = 0.0, world: World | None = None
-) -> Trajectory:
+def timed(path: JointPath, limits: RateLimits | Robot, *, blend: float = 0.0, world: World | None = None) -> Trajectory:
     """Give a path its times: as fast as the limits allow, beginning and ending at rest.
 
     Without ``blend`` the motion stays on the path to 1e-9 and stops at every corner; between two corners it has the

@@ -116,4 +116,3 @@ def _of_robot(robot: Robot, given: ArrayLike | None, name: str, own: Vector, def
     if len(row) not in (1, robot.dof):
         raise InputError(f"{name} limits: robot '{robot.name}' has {robot.dof} joints, but got {len(row)} numbers")
     return np.broadcast_to(row, (robot.dof,)).astype(np.float64)
-

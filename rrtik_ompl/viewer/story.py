@@ -12,7 +12,7 @@ from rrtik_ompl.goal import Goal, GoalRegion, JointGoal, PoseGoal
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.shapes import HalfSpace
-from rrtik_ompl.transitions import moved
+from rrtik_ompl.transitions import moved, route_length
 from rrtik_ompl.viewer import palette
 from rrtik_ompl.viewer.framing import Frame
 from rrtik_ompl.viewer.robot_picture import joint_nodes, node_name
@@ -41,6 +41,8 @@ def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
         "start_ghost": _numbers(subject.start),
         "goal_ghost": _numbers(subject.end),
         "waypoints": _numbers(subject.waypoints),
+        "before": _measures(subject.before),
+        "measures": _measures(subject.waypoints),
         "moves": [] if robot is None else _moves(subject.waypoints),
         "times": [] if robot is None else _numbers(play_times(robot, subject.waypoints, frame.arm)),
         "frame": {"low": _numbers(frame.low), "high": _numbers(frame.high)},
@@ -119,6 +121,14 @@ def _moves(waypoints: Matrix) -> list[dict[str, Any]]:
     ]
 
 
+def _measures(waypoints: Matrix | None) -> str:
+    """How many moves a path has, and how long it is: "7 moves, length 3.16"."""
+    if waypoints is None:
+        return ""
+    moves = len(waypoints) - 1
+    return f"{moves} move{'' if moves == 1 else 's'}, length {route_length(waypoints):.2f}"
+
+
 def _obstacles(scene: Scene) -> list[dict[str, Any]]:
     return [
         {
@@ -142,7 +152,7 @@ def _goal_text(goal: Goal | None) -> str:
 
 
 def _colors() -> dict[str, str]:
-    names = ("ROBOT", "START", "GOAL", "OBSTACLE", "ATTACHED", "TRAIL", "BACKGROUND_TOP", "BACKGROUND_BOTTOM")
+    names = ("ROBOT", "START", "GOAL", "OBSTACLE", "ATTACHED", "TRAIL", "BEFORE", "BACKGROUND_TOP", "BACKGROUND_BOTTOM")
     return {name.lower(): getattr(palette, name) for name in names}
 
 

@@ -26,6 +26,7 @@ document.getElementById("subtitle").textContent = [
   robot ? `robot ${robot.name}, ${count(robot.joints.length, "joint")}` : "",
   count(story.obstacles.length, "obstacle"),
   story.goal ? `goal: ${story.goal}` : "",
+  story.before ? `before: ${story.before}; now: ${story.measures}` : "",
 ].filter((text) => text).join("  \u00b7  ");
 
 // Joints -----------------------------------------------------------------------------------------------------------
@@ -155,6 +156,7 @@ function buildLegend() {
   if (story.goal_ghost) addSwitch("goal (ghost)", colors.goal, 0.6, toggles("goal ghost"));
   if (story.goal && story.goal !== "joint values") addSwitch(`goal: ${story.goal}`, colors.goal, 1, toggles("goal"));
   if (story.moves.length) addSwitch("way of the tip", colors.trail, 1, toggles("trail", "beads"));
+  if (story.before) addSwitch("way of the tip before", colors.before, 1, toggles("before"));
   if (story.attached.length) addSwitch(`held: ${story.attached.join(", ")}`, colors.attached, 1, () => {});
   if (story.obstacles.length) {
     addSwitch(count(story.obstacles.length, "obstacle"), colors.obstacle, 1, toggles("obstacles", "later"));
