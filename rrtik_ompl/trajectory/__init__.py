@@ -18,8 +18,8 @@ from rrtik_ompl.world import World
 
 __all__ = ["Peaks", "RateLimits", "State", "Trajectory", "load_trajectory", "timed"]
 
+SLOWINGS = 10  # one is enough but for rounding errors in motions of very short phases
 ROUNDS = 4  # of making rounded corners smaller all together, before none is rounded
-A_HAIR = 1.0 + 1e-12  # so that a motion slowed to a limit does not exceed it by rounding
 
 
 def timed(path: JointPath, limits: RateLimits | Robot, *, blend: float = 0.0, world: World | None = None) -> Trajectory:
@@ -50,7 +50,8 @@ def timed(path: JointPath, limits: RateLimits | Robot, *, blend: float = 0.0, wo
     require(path, JointPath, "path to time", "a plan has one if plan.found")
     bounds = RateLimits.of(limits) if isinstance(limits, Robot) else limits
     require(bounds, RateLimits, "limits of a path to time", "use RateLimits.of(robot)")
-    corners = _checked(path, bounds)
+    bounds = bounds.for_joints(path.waypoints.shape[1])
+    corners = _corners(path)
     reach = float(finite_array(blend, (), "blend"))
     if reach < 0.0:
         raise InputError(f"blend must be 0 or greater, got {reach:g}")
@@ -69,11 +70,8 @@ def timed(path: JointPath, limits: RateLimits | Robot, *, blend: float = 0.0, wo
     return _timed(path, corners, sharp, bounds)
 
 
-def _checked(path: JointPath, limits: RateLimits) -> Matrix:
+def _corners(path: JointPath) -> Matrix:
     """The vertices of a path that can be timed, shape (k, n), k at least 2."""
-    count = path.waypoints.shape[1]
-    if len(limits.velocity) not in (1, count):
-        raise InputError(f"path to time: it has {count} joints, but there are limits for {len(limits.velocity)}")
     if len(path.waypoints) < 2:
         raise InputError("path to time: it has one waypoint; a motion needs two or more")
     corners = vertices(path.waypoints)
@@ -89,6 +87,10 @@ def _timed(path: JointPath, corners: Matrix, rounded: Vector, limits: RateLimits
         for run in runs(corners, rounded)
     ]
     found = joined(parts, path)
-    peaks = found.peaks()
-    excess = limits.excess(peaks.velocity, peaks.acceleration, None if rounded.any() else peaks.jerk)
-    return found if excess == 1.0 else found.slowed(excess * A_HAIR)
+    for _ in range(SLOWINGS):
+        peaks = found.peaks()
+        factor = limits.slowing(peaks.velocity, peaks.acceleration, None if rounded.any() else peaks.jerk)
+        if factor == 1.0:
+            break
+        found = found.slowed(factor)
+    return found

@@ -15,6 +15,8 @@ TURNING, SLIDING = 0.5, 0.1  # [rad/s], [m/s]: velocity of a joint whose robot s
 RAMP = 0.5  # [s] in which a joint whose robot says no acceleration comes to its full velocity
 ONSET = 0.1  # [s] in which a joint whose robot says no jerk comes to its full acceleration
 
+A_HAIR = 1.0 + 1e-12  # so that a motion slowed to a limit does not exceed it by rounding
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RateLimits:
@@ -82,20 +84,28 @@ class RateLimits:
 
     def along(self, direction: Vector) -> tuple[float, float, float]:
         """Limits of the speed along a straight line, its acceleration and jerk, for a direction of shape (n,)."""
-        with np.errstate(divide="ignore"):
-            shares = 1.0 / np.abs(direction)
-        moves = np.isfinite(shares)
-        rows = (self.velocity, self.acceleration, self.jerk)
-        v, a, j = (float((row[moves] * shares[moves]).min()) for row in rows)
+        with np.errstate(divide="ignore", over="ignore"):
+            v, a, j = (float((row / np.abs(direction)).min()) for row in (self.velocity, self.acceleration, self.jerk))
         return v, a, j
 
-    def excess(self, velocity: Vector, acceleration: Vector, jerk: Vector | None = None) -> float:
+    def for_joints(self, count: int) -> RateLimits:
+        """The same limits for so many joints: limits of one number each are those of all joints.
+
+        Raises:
+            InputError: If they are for another number of joints.
+        """
+        if len(self.velocity) not in (1, count):
+            raise InputError(f"path to time: it has {count} joints, but there are limits for {len(self.velocity)}")
+        return RateLimits(*(np.broadcast_to(row, (count,)) for row in (self.velocity, self.acceleration, self.jerk)))
+
+    def slowing(self, velocity: Vector, acceleration: Vector, jerk: Vector | None = None) -> float:
         """Factor by which a motion with these peaks must be slowed to keep the limits; 1 if it keeps them already."""
-        found = [(velocity / self.velocity).max(), np.sqrt((acceleration / self.acceleration).max())]
+        shares = [(velocity / self.velocity).max(), (acceleration / self.acceleration).max()]
         if jerk is not None:
             limited = np.isfinite(self.jerk)
-            found.append(np.cbrt((jerk[limited] / self.jerk[limited]).max(initial=0.0)))
-        return max(1.0, float(max(found)))
+            shares.append((jerk[limited] / self.jerk[limited]).max(initial=0.0))
+        factors = [float(share) ** (1.0 / power) for power, share in enumerate(shares, start=1)]
+        return 1.0 if max(shares) <= 1.0 else max(factors) * A_HAIR
 
 
 def _row(values: ArrayLike, name: str) -> Vector:

@@ -142,18 +142,25 @@ class Trajectory:
     def peaks(self) -> Peaks:
         """The largest velocity, acceleration and jerk of each joint: exact, not sampled, for every piece is a cubic."""
         h = np.diff(self.times)[:, None]
-        a, j = self.accelerations[:-1], self.jerks
-        ends = a + h * j
+        v, a, j = self.velocities, self.accelerations, self.jerks
         with np.errstate(divide="ignore", invalid="ignore"):
-            turn = np.where((j != 0.0) & (-a / j > 0.0) & (-a / j < h), self.velocities[:-1] - a * a / (2.0 * j), 0.0)
-        velocity = np.maximum(np.abs(self.velocities).max(axis=0), np.abs(turn).max(axis=0))
-        acceleration = np.maximum(np.abs(a), np.abs(ends)).max(axis=0)
-        # at rest before and after; the end of a piece follows from velocities, which carry rounding errors
-        jumps = np.abs(np.vstack([a[:1], ends - self.accelerations[1:], self.accelerations[-1:]]))
-        noise = np.vstack([np.zeros(1), 8.0 * np.finfo(np.float64).eps * velocity.max() / h, np.zeros(1)])
-        smooth = (jumps <= JUMP * acceleration.max() + noise).all(axis=0)
-        slopes = np.abs(np.diff(self.accelerations, axis=0) / h).max(axis=0)
-        return Peaks(velocity, acceleration, np.where(smooth, slopes, np.inf))
+            turn = -a[:-1] / j
+            between = np.where((turn > 0.0) & (turn < h), v[:-1] + 0.5 * turn * a[:-1], 0.0)
+        velocity = np.abs(np.vstack([v, between])).max(axis=0)
+        ends = a[:-1] + h * j
+        smooth = np.abs(ends - a[1:]) <= self._noise(h)
+        acceleration = np.abs(np.vstack([a, np.where(smooth, 0.0, ends)])).max(axis=0)
+        jump = JUMP * acceleration.max()
+        rest = np.abs(a[[0, -1]]) <= jump  # before its beginning and after its end the arm stands still
+        smooth |= np.abs(ends - a[1:]) <= jump
+        jerk = np.where(smooth.all(axis=0) & rest.all(axis=0), np.abs(np.diff(a, axis=0) / h).max(axis=0), np.inf)
+        return Peaks(velocity, acceleration, jerk)
+
+    def _noise(self, h: Matrix) -> Matrix:
+        """What rounding of times and velocities does to the acceleration at the end of pieces of durations ``h``."""
+        speed, push = np.abs(self.velocities).max(), np.abs(self.accelerations).max()
+        noise: Matrix = 8.0 * np.finfo(np.float64).eps * (speed + self.duration * push) / h
+        return noise
 
     def slowed(self, factor: float) -> Trajectory:
         """The same motion, ``factor`` times as long.

@@ -41,8 +41,7 @@ def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
         "start_ghost": _numbers(subject.start),
         "goal_ghost": _numbers(subject.end),
         "waypoints": _numbers(subject.waypoints),
-        "before": _measures(subject.before),
-        "measures": _measures(subject.waypoints),
+        "before": "" if subject.before is None else _compared(subject.before, subject.waypoints),
         "moves": [] if robot is None else _moves(subject.waypoints),
         "times": [] if robot is None else _numbers(play_times(robot, subject.waypoints, frame.arm)),
         "frame": {"low": _numbers(frame.low), "high": _numbers(frame.high)},
@@ -121,12 +120,10 @@ def _moves(waypoints: Matrix) -> list[dict[str, Any]]:
     ]
 
 
-def _measures(waypoints: Matrix | None) -> str:
-    """How many moves a path has, and how long it is: "7 moves, length 3.16"."""
-    if waypoints is None:
-        return ""
-    moves = len(waypoints) - 1
-    return f"{moves} move{'' if moves == 1 else 's'}, length {route_length(waypoints):.2f}"
+def _compared(before: Matrix, after: Matrix) -> str:
+    """Number of moves and length of two paths: "12 moves, length 16.06; now 7, 3.16"."""
+    lengths = [f"{route_length(rows):.2f}" for rows in (before, after)]
+    return f"{len(before) - 1} moves, length {lengths[0]}; now {len(after) - 1}, {lengths[1]}"
 
 
 def _obstacles(scene: Scene) -> list[dict[str, Any]]:
