@@ -31,7 +31,8 @@ def timed(path: JointPath, limits: RateLimits | Robot, *, blend: float = 0.0, wo
 
     With ``blend`` corners are rounded and passed without a stop (by toppra). The motion then leaves the path by at most
     0.22 of ``blend``, obeys velocity and acceleration limits but no jerk limit where it passes rounded corners, and is
-    itself checked against the world; a corner that cannot be rounded is a stop.
+    itself checked against the world; a corner that cannot be rounded is a stop, and where rounding makes nothing faster
+    none is rounded.
 
     Args:
         path: A valid path. Waypoints that coincide or lie on a line are no corners.
@@ -41,7 +42,7 @@ def timed(path: JointPath, limits: RateLimits | Robot, *, blend: float = 0.0, wo
 
     Returns:
         A motion whose largest velocity, acceleration and (where it stops at the corners) jerk are within the limits
-        everywhere, not at samples: see :meth:`Trajectory.peaks`.
+        everywhere (to 1e-9 of them), not at samples: see :meth:`Trajectory.peaks`.
 
     Raises:
         InputError: If the path has one waypoint, does not move, or has another number of joints than the limits; if the
@@ -55,19 +56,21 @@ def timed(path: JointPath, limits: RateLimits | Robot, *, blend: float = 0.0, wo
     reach = float(finite_array(blend, (), "blend"))
     if reach < 0.0:
         raise InputError(f"blend must be 0 or greater, got {reach:g}")
-    sharp = np.zeros(len(corners) - 2)
-    if reach == 0.0 or len(sharp) == 0:
-        return _timed(path, corners, sharp, bounds)
+    stopping = _timed(path, corners, np.zeros(len(corners) - 2), bounds)
+    if reach == 0.0:
+        return stopping
     if world is None:
         raise InputError("a path with rounded corners leaves the checked one: pass world=problem.world, to check it")
     require(world, World, "world of a path with rounded corners")
     rounded = rounding(corners, reach, world)
     for _ in range(ROUNDS):
         found = _timed(path, corners, rounded, bounds)
+        if found.duration >= stopping.duration:
+            return stopping
         if not found.faults(world):
             return found
         rounded *= 0.5
-    return _timed(path, corners, sharp, bounds)
+    return stopping
 
 
 def _corners(path: JointPath) -> Matrix:

@@ -12,7 +12,7 @@ from rrtik_ompl.world import World
 
 NEAR = 1e-10  # [rad] or [m]; waypoints this close to the last one, or to a straight line, are left out
 ROUNDED = 2.5  # length of a rounded corner's parameter over its distance to the corner, see _corner
-SHARPEST = -0.8  # cosine between the directions before and after; nearer to a turn back, a corner is not rounded
+SHARPEST = -0.98  # cosine between the directions before and after; nearer to a turn back, a corner is not rounded
 TRIES = 7  # halvings of a rounded corner that touches something, before it is left sharp
 
 
