@@ -69,6 +69,15 @@ def test_the_list_of_moves_of_a_converted_path_leads_back_to_it(rows):
     assert len(moves.moves()) == moves.transitions
 
 
+def test_a_joint_that_trembles_makes_no_moves():
+    world = FREE[3]
+    path = JointPath.of(world.robot, [[0, 0, 0], [1, 1e-9, 0], [1, 0, 1], [0.5, 1e-9, 1]])
+    moves = one_joint_moves(path, world)
+    assert [move.joint for move in moves.moves()] == ["joint1", "joint3", "joint1"]
+    assert (moves.end == path.end).all()
+    assert moves.one_joint_at_a_time
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_path_of_rrt_connect_is_converted_among_obstacles(seed):
     problem = load_problem("titan4_sdu")
