@@ -21,11 +21,13 @@ if TYPE_CHECKING:
     from rrtik_ompl.goal import JointGoal as JointGoal
     from rrtik_ompl.goal import PoseGoal as PoseGoal
     from rrtik_ompl.goal import PositionGoal as PositionGoal
+    from rrtik_ompl.one_joint import one_joint_moves as one_joint_moves
     from rrtik_ompl.path import JointPath as JointPath
     from rrtik_ompl.path import load_path as load_path
     from rrtik_ompl.planning import Plan as Plan
     from rrtik_ompl.planning import list_planners as list_planners
     from rrtik_ompl.planning import plan as plan
+    from rrtik_ompl.plot import plot_joints as plot_joints
     from rrtik_ompl.problem import Problem as Problem
     from rrtik_ompl.problem_file import load_problem as load_problem
     from rrtik_ompl.problem_file import save_problem as save_problem
@@ -36,6 +38,10 @@ if TYPE_CHECKING:
     from rrtik_ompl.scene_file import load_scene as load_scene
     from rrtik_ompl.scene_file import save_scene as save_scene
     from rrtik_ompl.shortening import shorten as shorten
+    from rrtik_ompl.trajectory import RateLimits as RateLimits
+    from rrtik_ompl.trajectory import Trajectory as Trajectory
+    from rrtik_ompl.trajectory import load_trajectory as load_trajectory
+    from rrtik_ompl.trajectory import timed as timed
     from rrtik_ompl.viewer import view as view
     from rrtik_ompl.world import World as World
 else:
@@ -43,14 +49,17 @@ else:
         "catalog": ("list_problems", "list_robots", "load_robot"),
         "errors": ("InputError", "PlannerError", "ProblemError", "RrtikError", "UnknownNameError"),
         "goal": ("GoalRegion", "JointGoal", "PoseGoal", "PositionGoal"),
+        "one_joint": ("one_joint_moves",),
         "path": ("JointPath", "load_path"),
         "planning": ("Plan", "list_planners", "plan"),
+        "plot": ("plot_joints",),
         "problem": ("Problem",),
         "problem_file": ("load_problem", "save_problem"),
         "robot": ("Robot",),
         "scene": ("AttachedObject", "Obstacle", "Scene"),
         "scene_file": ("load_scene", "save_scene"),
         "shortening": ("shorten",),
+        "trajectory": ("RateLimits", "Trajectory", "load_trajectory", "timed"),
         "viewer": ("view",),
         "world": ("World",),
     }

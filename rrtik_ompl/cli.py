@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 import time
 import warnings
@@ -15,8 +14,10 @@ from typing import Annotated, Any
 import typer
 
 from rrtik_ompl.errors import InputError, RrtikError
+from rrtik_ompl.motion_commands import list_moves, time_path
 from rrtik_ompl.path_text import FORMATS as PATH_FORMATS
 from rrtik_ompl.terminal import drop_output, prepare_streams, progress, say, warn
+from rrtik_ompl.text_file import check_target
 
 FOUND, NOT_FOUND, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 UsageError: Any = typer.BadParameter.__bases__[0]  # click's, which typer carries under a private name
@@ -83,8 +84,8 @@ def plan(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> int:
     """Find a path and print its moves."""
-    _check_target(out, PATH_FORMATS)
-    _check_target(html, (".html", ".htm"))
+    check_target(out, PATH_FORMATS)
+    check_target(html, (".html", ".htm"))
     from rrtik_ompl import load_problem, report
     from rrtik_ompl.planning import find_planner
     from rrtik_ompl.planning import plan as find_path
@@ -103,7 +104,7 @@ def plan(
         from rrtik_ompl.viewer import view
 
         with progress("drawing"):
-            view(question, path, html=html)
+            view(question, path, html=html, before=None if path is found.path else found.path)
     if as_json:
         print(json.dumps(report.document(question, found, path, shorten_seconds)))
     else:
@@ -147,21 +148,23 @@ def check(problem: ProblemName, path: PathFile = None) -> int:
 def show(
     problem: ProblemName,
     path: PathFile = None,
+    before: Annotated[Path | None, typer.Option(help="Another path file, to compare with.")] = None,
     html: HtmlFile = None,
     port: Annotated[int, typer.Option(help="Port on 127.0.0.1; 0 takes a free one.", min=0, max=65535)] = 0,
 ) -> int:
     """Show a problem, and a path for it, in 3-D: a live page on 127.0.0.1, or a file."""
-    _check_target(html, (".html", ".htm"))
+    check_target(html, (".html", ".htm"))
     from rrtik_ompl import load_path, load_problem
     from rrtik_ompl.viewer import view
 
     question = load_problem(problem)
     route = None if path is None else load_path(path, question.world.robot)
+    earlier = None if before is None else load_path(before, question.world.robot)
     if html is not None:
-        view(question, route, html=html)
+        view(question, route, html=html, before=earlier)
         say(f"wrote {html}")
         return FOUND
-    view(question, route, port=port, on_ready=lambda url: say(f"open {url} in a browser; Ctrl-C ends"))
+    view(question, route, before=earlier, port=port, on_ready=lambda url: say(f"open {url} in a browser; Ctrl-C ends"))
     return FOUND
 
 
@@ -188,13 +191,17 @@ def convert(
     from rrtik_ompl import load_path, load_problem, load_robot, save_problem
 
     if Path(source).suffix.lower() in PATH_FORMATS:
-        _check_target(target, PATH_FORMATS)
+        check_target(target, PATH_FORMATS)
         load_path(source, None if robot is None else load_robot(robot)).save(target)
     else:
-        _check_target(target, (".yaml", ".yml"))
+        check_target(target, (".yaml", ".yml"))
         save_problem(load_problem(source, robot=robot), target)
     say(f"wrote {target}")
     return FOUND
+
+
+app.command("moves")(list_moves)
+app.command("time")(time_path)
 
 
 def main() -> None:
@@ -269,20 +276,6 @@ def _parameters(pairs: list[str]) -> dict[str, Any]:
         except json.JSONDecodeError:
             found[name] = value
     return found
-
-
-def _check_target(path: Path | None, endings: tuple[str, ...]) -> None:
-    """Refuse a file that cannot be written before the work is done, not after."""
-    if path is None:
-        return
-    if path.suffix.lower() not in endings:
-        raise InputError(f"{path}: unknown ending '{path.suffix}'; use {', '.join(endings)}")
-    if path.is_dir():
-        raise InputError(f"{path}: this is a folder; give a file name")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: folder '{path.parent}' does not exist; create it")
-    if not os.access(path.parent, os.W_OK):
-        raise InputError(f"{path}: folder '{path.parent}' cannot be written to; choose another one")
 
 
 def _millimetres(distance: float) -> str:

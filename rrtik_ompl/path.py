@@ -16,7 +16,7 @@ from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.path_text import decoded, encoded, path_format
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.text_file import read_text, write_text
-from rrtik_ompl.transitions import merge_moves, moved, route_length, single_joint, transitions
+from rrtik_ompl.transitions import SAME, merge_moves, moved, route_length, single_joint, transitions
 from rrtik_ompl.world import World
 
 SECOND_CHECK = 2.0  # how many times finer than the motion resolution a path is checked again
@@ -25,11 +25,23 @@ MAX_CHECKS = 10_000_000  # of a path; with more of them the memory would run out
 
 
 class Move(NamedTuple):
-    """One joint moves: ``joint`` is its name, ``start`` and ``end`` its values [rad or m]."""
+    """One joint moves, all others stand still.
+
+    Attributes:
+        joint: Its name.
+        start, end: Its values before and after.
+        unit: Of the values, "rad" or "m".
+    """
 
     joint: str
     start: float
     end: float
+    unit: str = "rad"
+
+    @property
+    def change(self) -> float:
+        """How far the joint moves, with its sign [rad or m]."""
+        return self.end - self.start
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,14 +148,15 @@ class JointPath:
 
     @property
     def one_joint_at_a_time(self) -> bool:
-        """Whether every edge moves exactly one joint."""
-        return single_joint(merge_moves(self.waypoints))
+        """Whether every edge moves exactly one joint, so that :meth:`moves` can list them."""
+        return single_joint(merge_moves(self.waypoints), SAME)
 
     def moves(self) -> tuple[Move, ...]:
-        """The list of single-joint moves that the path consists of.
+        """The list of single-joint moves that the path consists of; consecutive moves of the same joint are one.
 
         Raises:
-            InputError: If an edge moves several joints at once.
+            InputError: If an edge moves several joints at once; :func:`rrtik_ompl.one_joint.one_joint_moves` makes a
+                path of single-joint moves from any path.
         """
         rows = merge_moves(self.waypoints)
         changes = moved(rows[:-1], rows[1:])
@@ -151,10 +164,14 @@ class JointPath:
         if len(several) and len(rows) > 1:
             together = ", ".join(np.array(self.joint_names)[changes[several[0]]])
             raise InputError(
-                f"path: edge {int(several[0])} moves several joints at once ({together}); it is no list of moves"
+                f"path: edge {int(several[0])} moves several joints at once ({together}); it is no list of moves: "
+                "convert it with one_joint_moves(path, world)"
             )
+        units = ["m" if sliding else "rad" for sliding in self.prismatic]
         joints = changes.argmax(axis=1)
-        return tuple(Move(self.joint_names[j], float(rows[i, j]), float(rows[i + 1, j])) for i, j in enumerate(joints))
+        return tuple(
+            Move(self.joint_names[j], float(rows[i, j]), float(rows[i + 1, j]), units[j]) for i, j in enumerate(joints)
+        )
 
     def resample(self, step: float) -> JointPath:
         """The same path with further waypoints, none farther than ``step`` [rad] from the next; all old ones stay."""

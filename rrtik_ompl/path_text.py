@@ -44,21 +44,34 @@ def decoded(text: str, ending: str) -> dict[str, Any]:
     Raises:
         InputError: If the text is malformed; the message names the line or the key.
     """
-    return _from_json(text) if ending == ".json" else _from_table(text, "," if ending == ".csv" else None)
+    if ending == ".json":
+        return json_object(text, "joint_path", "waypoints")
+    return _from_table(text, "," if ending == ".csv" else None)
 
 
-def _from_json(text: str) -> dict[str, Any]:
+def json_object(text: str, kind: str, key: str) -> dict[str, Any]:
+    """The JSON object of a file of version 1 and of this kind, that has this key; names and units are checked.
+
+    Raises:
+        InputError: If the text is something else; the message names the line or the key.
+    """
+    file = f"is this a {kind.partition('_')[2]} file?"
     try:
         document = json.loads(text)
     except json.JSONDecodeError as error:
         raise InputError(f"line {error.lineno}: not JSON: {error.msg}") from None
     except RecursionError:
-        raise InputError("lists are nested too deeply; is this a path file?") from None
+        raise InputError(f"lists are nested too deeply; {file}") from None
     except ValueError:
-        raise InputError("holds a number of thousands of digits; is this a path file?") from None
-    if not isinstance(document, dict) or "waypoints" not in document:
-        raise InputError("expected an object with the key 'waypoints'; is this a path file?")
-    for key, expected in (("version", 1), ("kind", "joint_path")):
+        raise InputError(f"holds a number of thousands of digits; {file}") from None
+    if not isinstance(document, dict) or key not in document:
+        raise InputError(f"expected an object with the key '{key}'; {file}")
+    _check_heads(document, kind)
+    return document
+
+
+def _check_heads(document: dict[str, Any], kind: str) -> None:
+    for key, expected in (("version", 1), ("kind", kind)):
         if document.get(key, expected) != expected:
             raise InputError(f"{key}: expected {expected!r}, got {document[key]!r}")
     for key in ("units", "joint_names"):
@@ -68,10 +81,19 @@ def _from_json(text: str) -> dict[str, Any]:
     for unit in document.get("units") or ():
         if unit not in ("rad", "m"):
             raise InputError(f"units: expected 'rad' or 'm' for each joint, got {unit!r}; convert the waypoints")
-    return document
 
 
 def _from_table(text: str, separator: str | None) -> dict[str, Any]:
+    names, rows = table_rows(text, separator)
+    return {"waypoints": rows} if names is None else {"waypoints": rows, "joint_names": names}
+
+
+def table_rows(text: str, separator: str | None) -> tuple[list[str] | None, list[list[float]]]:
+    """Names (if there is a separator, then they stand in the first line) and numbers of a table.
+
+    Raises:
+        InputError: If a line is malformed; the message names it.
+    """
     lines = [(k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip()]
     if not lines:
         raise InputError("the file is empty; expected one configuration a line")
@@ -92,4 +114,4 @@ def _from_table(text: str, separator: str | None) -> dict[str, Any]:
             raise InputError(f"line {number}: expected {len(names or rows[0])} numbers, got {len(cells)}")
     if not rows:
         raise InputError("the file holds joint names only; expected one configuration a line below them")
-    return {"waypoints": rows} if names is None else {"waypoints": rows, "joint_names": names}
+    return names, rows

@@ -9,21 +9,22 @@ from rich import box
 from rich.table import Table
 
 from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.moves_text import COLUMNS, moves_document, reading
 from rrtik_ompl.path import SECOND_CHECK, JointPath
 from rrtik_ompl.planning import Plan
 from rrtik_ompl.problem import Problem
+from rrtik_ompl.trajectory import RateLimits, Trajectory
 from rrtik_ompl.transitions import lower_bound
 
 
 def moves_table(path: JointPath) -> Table:
     """One row per single-joint move: joint, from, to, change; degrees, or metres for a prismatic joint."""
-    sliding = dict(zip(path.joint_names, path.prismatic, strict=True))
-    table = Table("move", "joint", "from", "to", "change", "unit", box=box.SIMPLE_HEAD, pad_edge=False)
+    table = Table(*COLUMNS, box=box.SIMPLE_HEAD, pad_edge=False)
     for column in (0, 2, 3, 4):
         table.columns[column].justify = "right"
     for number, move in enumerate(path.moves(), start=1):
-        factor, unit, digits = (1.0, "m", 4) if sliding[move.joint] else (180.0 / np.pi, "deg", 2)
-        start, end = factor * move.start, factor * move.end
+        (start, unit), (end, _) = reading(move.start, move.unit), reading(move.end, move.unit)
+        digits = 4 if unit == "m" else 2
         values = (f"{start:.{digits}f}", f"{end:.{digits}f}", f"{end - start:+.{digits}f}")
         table.add_row(str(number), move.joint, *values, unit)
     return table
@@ -43,6 +44,25 @@ def waypoints_table(path: JointPath) -> Table:
             *(f"{value:.4f}" if m else f"{value:.2f}" for value, m in zip(row, path.prismatic, strict=False)),
         )
     return table
+
+
+def peaks_table(trajectory: Trajectory, limits: RateLimits) -> Table:
+    """One row per joint: its largest velocity, acceleration and jerk beside their limits; degrees, or metres."""
+    heads = (f"{what}{end}" for what in ("velocity", "acceleration", "jerk") for end in ("", " limit"))
+    table = Table("joint", *heads, "unit", box=box.SIMPLE_HEAD, pad_edge=False)
+    for column in table.columns[1:-1]:
+        column.justify = "right"
+    peaks, words = trajectory.peaks(), ("jumps", "none")  # said of a peak, of a limit, that is infinite
+    pairs = ((peaks.velocity, limits.velocity), (peaks.acceleration, limits.acceleration), (peaks.jerk, limits.jerk))
+    for k, name in enumerate(trajectory.joint_names):
+        factor, unit = (1.0, "m") if trajectory.prismatic[k] else (180.0 / np.pi, "deg")
+        cells = (_rate(factor * float(row[k]), word) for pair in pairs for row, word in zip(pair, words, strict=True))
+        table.add_row(name, *cells, unit)
+    return table
+
+
+def _rate(value: float, word: str) -> str:
+    return f"{value:.4g}" if np.isfinite(value) else word
 
 
 def fewest_moves(problem: Problem) -> int | None:
@@ -94,5 +114,21 @@ def document(problem: Problem, plan: Plan, path: JointPath | None, shorten_secon
         "waypoints": path.waypoints.tolist(),
     }
     if path.one_joint_at_a_time:
-        found["moves"] = [{"joint": m.joint, "from": m.start, "to": m.end} for m in path.moves()]
+        found["moves"] = moves_document(path)
     return found
+
+
+def timing_document(problem: Problem, trajectory: Trajectory) -> dict[str, Any]:
+    """A timed motion for machines: duration and each joint's peaks (a jerk of null is a jump of acceleration)."""
+    peaks = trajectory.peaks()
+    return {
+        "problem": problem.name,
+        "robot": trajectory.robot_name,
+        "duration": trajectory.duration,
+        "knots": len(trajectory.times),
+        "joint_names": list(trajectory.joint_names),
+        "peaks": {
+            name: [float(x) if np.isfinite(x) else None for x in row]
+            for name, row in zip(peaks._fields, peaks, strict=True)
+        },
+    }

@@ -48,9 +48,18 @@ def read_bytes(path: str | os.PathLike[str], limit: int = MAX_BYTES) -> bytes:
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """Write a UTF-8 text file so that an interruption leaves the old file or the new one, never a half.
+    """Write a UTF-8 text file whole or not at all, see :func:`write_bytes`.
 
-    The text goes to a temporary name in the same folder, which then takes the place of the old file. Devices and
+    Raises:
+        InputError: If the folder does not exist or the file cannot be written.
+    """
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
+    """Write a file so that an interruption leaves the old file or the new one, never a half.
+
+    The data goes to a temporary name in the same folder, which then takes the place of the old file. Devices and
     pipes (``/dev/stdout``) are written directly.
 
     Raises:
@@ -61,12 +70,12 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
         target = Path(os.path.realpath(name))  # a link stays a link: the file it points to is replaced
         temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
         if target.exists() and not target.is_file() and not target.is_dir():
-            target.write_text(text, encoding="utf-8")
+            target.write_bytes(data)
             return
         if target.is_dir():
             raise IsADirectoryError(None, "this is a folder; give a file name")
         try:
-            temporary.write_text(text, encoding="utf-8")
+            temporary.write_bytes(data)
             os.replace(temporary, target)
         finally:
             temporary.unlink(missing_ok=True)
@@ -76,6 +85,24 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
         raise InputError(f"{path}: cannot be written: folder '{folder}': {remedy}") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be written: {getattr(error, 'strerror', None) or error}") from error
+
+
+def check_target(path: Path | None, endings: tuple[str, ...]) -> None:
+    """Refuse a file that cannot be written before the work is done, not after; None is no file.
+
+    Raises:
+        InputError: If the ending is none of ``endings``, or the folder does not exist or cannot be written to.
+    """
+    if path is None:
+        return
+    if path.suffix.lower() not in endings:
+        raise InputError(f"{path}: unknown ending '{path.suffix}'; use {', '.join(endings)}")
+    if path.is_dir():
+        raise InputError(f"{path}: this is a folder; give a file name")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: folder '{path.parent}' does not exist; create it")
+    if not os.access(path.parent, os.W_OK):
+        raise InputError(f"{path}: folder '{path.parent}' cannot be written to; choose another one")
 
 
 def file_name(path: object) -> Path:

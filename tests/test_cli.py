@@ -91,6 +91,95 @@ def test_check_rejects_a_path_of_another_problem(capsys, tmp_path):
     assert "does not begin at the start" in out
 
 
+@pytest.fixture(scope="module")
+def several(tmp_path_factory):
+    """A path of the subsea unit that moves several joints at once."""
+    file = tmp_path_factory.mktemp("paths") / "several.json"
+    assert run(["plan", "titan4_sdu", "--planner", "RRTConnect", "--seed", "1", "--out", str(file)]) == 0
+    return str(file)
+
+
+def test_a_path_of_several_joints_is_no_list_of_moves_until_it_is_converted(capsys, tmp_path, several):
+    code, out, err = rrtik(capsys, "moves", several)
+    assert (code, out) == (2, "")
+    assert "several joints at once" in err
+    assert "--problem" in err
+    target = tmp_path / "moves.json"
+    converted = ("moves", several, "--problem", "titan4_sdu", "--shorten", "axis", "--out", str(target))
+    assert rrtik(capsys, *converted)[0] == 0
+    assert load_path(target).one_joint_at_a_time
+    assert rrtik(capsys, "check", "titan4_sdu", str(target))[0] == 0
+    assert rrtik(capsys, "moves", str(target))[0] == 0
+
+
+def test_moves_are_printed_as_csv_json_and_sentences(capsys, several):
+    asked = ("moves", several, "--problem", "titan4_sdu")
+    rows = rrtik(capsys, *asked, "--csv")[1].splitlines()
+    moves = json.loads(rrtik(capsys, *asked, "--json")[1])["moves"]
+    said = rrtik(capsys, *asked, "--spoken")[1].splitlines()
+    assert rows[0] == "move,joint,from,to,change,unit"
+    assert len(rows) - 1 == len(moves) == len(said)
+    assert all(" degrees to " in line for line in said)
+    assert rrtik(capsys, *asked, "--csv", "--json")[0] == 2
+
+
+def test_time_writes_a_trajectory_and_a_picture(capsys, tmp_path, several):
+    from rrtik_ompl import load_trajectory
+
+    target, picture = tmp_path / "motion.json", tmp_path / "joints.png"
+    code, out, err = rrtik(capsys, "time", "titan4_sdu", several, "--out", str(target), "--plot", str(picture))
+    assert (code, err) == (0, "")
+    motion = load_trajectory(target)
+    assert f"{motion.duration:.3f} s" in out
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    faster = json.loads(rrtik(capsys, "time", "titan4_sdu", several, "--velocity", "40", "--jerk", "inf", "--json")[1])
+    assert faster["duration"] < motion.duration
+    slower = json.loads(rrtik(capsys, "time", "titan4_sdu", several, "--share", "0.5", "--json")[1])
+    assert slower["duration"] > motion.duration
+    rounded = ("time", "titan4_sdu", several, "--blend", "20", "--jerk", "inf", "--json")
+    assert json.loads(rrtik(capsys, *rounded)[1])["duration"] < motion.duration
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--velocity", "0"), "velocity limits"),
+        (("--velocity", "nan"), "velocity limits"),
+        (("--acceleration", "1,2"), "6 joints"),
+        (("--jerk", "fast"), "expected a number"),
+        (("--share", "0"), "share"),
+        (("--blend", "-1"), "blend"),
+        (("--out", "motion.txt"), "unknown ending"),
+        (("--plot", "joints.pdf"), "unknown ending"),
+    ],
+)
+def test_limits_and_files_that_are_none_are_refused_in_one_line(capsys, several, options, words):
+    code, out, err = rrtik(capsys, "time", "titan4_sdu", several, *options)
+    assert (code, out) == (2, "")
+    assert words in err
+    assert err.count("\n") == 1
+
+
+def test_a_path_that_is_not_valid_is_neither_timed_nor_converted(capsys, tmp_path):
+    from rrtik_ompl import JointPath, load_problem
+
+    problem = load_problem("titan4_sdu")
+    file = tmp_path / "straight.json"
+    JointPath.of(problem.robot, [problem.start, problem.goal.q]).save(file)
+    for asked in (("time", "titan4_sdu", str(file)), ("moves", str(file), "--problem", "titan4_sdu")):
+        code, out, err = rrtik(capsys, *asked)
+        assert (code, out) == (2, "")
+        assert "not valid" in err
+        assert "overlap" in err
+
+
+def test_show_takes_a_path_before(capsys, tmp_path, several):
+    page = tmp_path / "page.html"
+    code, out, _ = rrtik(capsys, "show", "titan4_sdu", several, "--before", several, "--html", str(page))
+    assert (code, out) == (0, f"wrote {page}\n")
+    assert '"before":"6 moves' in page.read_text()
+
+
 @pytest.mark.parametrize("kind", ["robots", "planners", "problems"])
 def test_list_names_what_there_is(capsys, kind):
     expected = {"robots": "titan4", "planners": "bicrdt", "problems": "titan4_sdu"}[kind]

@@ -33,9 +33,9 @@ LADDER = [
         "goal_file",
         "robot_entry",
     ),
-    *("checks", "world", "path", "problem", "ik", "goal_configurations"),
-    *("moveit_messages", "motion_bench_maker", "problem_file"),
-    *("ompl_bridge", "planning", "shortening", "viewer", "report", "terminal", "cli", "command"),
+    *("checks", "world", "path", "moves_text", "problem", "one_joint", "ik", "goal_configurations"),
+    *("moveit_messages", "motion_bench_maker", "problem_file", "ompl_bridge", "planning", "shortening"),
+    *("trajectory", "plot", "viewer", "report", "terminal", "motion_commands", "cli", "command"),
 ]
 
 

@@ -216,6 +216,27 @@ def test_a_plane_world_is_flattened_so_that_obstacles_do_not_cover_the_arm(crane
     assert squeeze[10] * (frame.high[2] - frame.low[2]) < 0.02 * frame.size
 
 
+def test_the_way_before_is_drawn_and_measured_beside_the_way_after(crane: Robot, scene: Scene) -> None:
+    asked = problem(crane, scene)
+    after = WAYPOINTS[[0, -1]]
+    window, frame = draw(subject_of(asked, after, before=WAYPOINTS))
+    assert "/meshcat/before" in window.paths
+    tips = crane.fk_batch(WAYPOINTS)[:, :3, 3]
+    assert (tips >= frame.low - 1e-9).all()
+    assert (tips <= frame.high + 1e-9).all()
+    told = story(page(asked, after, before=WAYPOINTS))
+    assert told["before"].startswith(f"{len(WAYPOINTS) - 1} moves, length")
+    assert "; now 1, " in told["before"]
+    assert story(page(asked, after))["before"] == ""
+
+
+def test_a_way_before_without_one_after_is_refused(crane: Robot) -> None:
+    with pytest.raises(InputError, match="none after it"):
+        page(crane, before=WAYPOINTS)
+    with pytest.raises(InputError, match="3 joints"):
+        page(crane, WAYPOINTS, before=WAYPOINTS[:, :2])
+
+
 # The story ----------------------------------------------------------------------------------------------------------
 
 

@@ -20,6 +20,7 @@ def view(
     shown: Any,
     path: Any | None = None,
     *,
+    before: Any | None = None,
     html: str | os.PathLike[str] | None = None,
     title: str | None = None,
     port: int = 0,
@@ -30,6 +31,8 @@ def view(
     Args:
         shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
         path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m]; what is shown stands still if None.
+        before: Another path to compare with, such as the one that ``path`` was shortened from: the way of its tip is
+            drawn too.
         html: File to write. If None, the page is served on 127.0.0.1 until Ctrl-C is pressed.
         title: Heading of the page; made from the problem's or the robot's name if None.
         port: Port to serve on; a free one if 0.
@@ -44,7 +47,7 @@ def view(
     from rrtik_ompl.viewer.page import page
     from rrtik_ompl.viewer.serve import PageServer
 
-    text = page(shown, path, title=title)
+    text = page(shown, path, before=before, title=title)
     if html is not None:
         write_text(html, text)
         return Path(html)

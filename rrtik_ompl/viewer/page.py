@@ -19,7 +19,7 @@ POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inli
 SCRIPTS = ("kinematics.js", "stage.js", "panel.js", "player.js")
 
 
-def page(shown: Any, path: Any | None = None, *, title: str | None = None) -> str:
+def page(shown: Any, path: Any | None = None, *, before: Any | None = None, title: str | None = None) -> str:
     """The page that shows something, as the text of one HTML file that needs no other file and no network.
 
     The same input gives the same text.
@@ -27,12 +27,13 @@ def page(shown: Any, path: Any | None = None, *, title: str | None = None) -> st
     Args:
         shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
         path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m].
+        before: Another path, to compare with; the way of its tip is drawn too.
         title: Heading; made from the problem's or the robot's name if None.
 
     Raises:
         InputError: If that cannot be shown.
     """
-    subject = subject_of(shown, path)
+    subject = subject_of(shown, path, before)
     window, frame = draw(subject)
     heading = _title(subject) if title is None else title
     story = json.dumps(story_of(subject, frame, heading), allow_nan=False, separators=(",", ":"))

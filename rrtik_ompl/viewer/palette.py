@@ -11,6 +11,7 @@ GOAL = "#009e73"
 OBSTACLE = "#e6b35a"
 ATTACHED = "#cc79a7"
 TRAIL = "#d55e00"
+BEFORE = "#56b4e9"
 AXES = ("#d55e00", "#009e73", "#0072b2")  # x, y, z
 BACKGROUND_TOP = "#fbfcfd"
 BACKGROUND_BOTTOM = "#e3e9ef"

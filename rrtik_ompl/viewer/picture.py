@@ -26,7 +26,7 @@ from rrtik_ompl.viewer.robot_picture import (
 )
 from rrtik_ompl.viewer.scene_picture import draw_goal, draw_scene, draw_triad
 from rrtik_ompl.viewer.subject import Subject
-from rrtik_ompl.viewer.trail import draw_trail
+from rrtik_ompl.viewer.trail import draw_before, draw_trail
 from rrtik_ompl.viewer.window import RecordingWindow
 
 FRAMED_POSTURES = 100
@@ -45,6 +45,8 @@ def draw(subject: Subject) -> tuple[RecordingWindow, Frame]:
         draw_goal(vis, subject.goal, frame)
         if len(subject.waypoints) > 1:
             draw_trail(vis, robot, subject.waypoints, 0.0035 * frame.arm)
+        if subject.before is not None:
+            draw_before(vis, robot, subject.before, 0.0035 * frame.arm)
     draw_scene(vis, scene, frame)
     draw_triad(vis["frames"]["world"], pin.SE3.Identity(), 0.1 * frame.arm)
     if robot is not None and robot.planar:
@@ -61,7 +63,10 @@ def _draw_robot(vis: Any, robot: Robot, subject: Subject) -> Frame:
     held = attached_parts(robot, subject.scene.attached)
     parts = link_parts(robot) + held
     points = swept_points(parts, frames)
-    frame = frame_around(points, subject.scene, _goal_points(subject.goal), whole=robot.planar)
+    places = _goal_points(subject.goal)
+    if subject.before is not None:
+        places.append(robot.fk_batch(_spread(subject.before))[:, :3, 3])
+    frame = frame_around(points, subject.scene, places, whole=robot.planar)
     _draw_parts(vis["robot"], robot, parts, frames[0], frame)
     if subject.start is not None:
         _draw_parts(vis["ghost"], robot, link_parts(robot, GHOST_TRIANGLES) + held, frames[0], frame)

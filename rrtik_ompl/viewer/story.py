@@ -12,7 +12,7 @@ from rrtik_ompl.goal import Goal, GoalRegion, JointGoal, PoseGoal
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.shapes import HalfSpace
-from rrtik_ompl.transitions import moved
+from rrtik_ompl.transitions import moved, route_length
 from rrtik_ompl.viewer import palette
 from rrtik_ompl.viewer.framing import Frame
 from rrtik_ompl.viewer.robot_picture import joint_nodes, node_name
@@ -41,6 +41,7 @@ def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
         "start_ghost": _numbers(subject.start),
         "goal_ghost": _numbers(subject.end),
         "waypoints": _numbers(subject.waypoints),
+        "before": "" if subject.before is None else _compared(subject.before, subject.waypoints),
         "moves": [] if robot is None else _moves(subject.waypoints),
         "times": [] if robot is None else _numbers(play_times(robot, subject.waypoints, frame.arm)),
         "frame": {"low": _numbers(frame.low), "high": _numbers(frame.high)},
@@ -119,6 +120,12 @@ def _moves(waypoints: Matrix) -> list[dict[str, Any]]:
     ]
 
 
+def _compared(before: Matrix, after: Matrix) -> str:
+    """Number of moves and length of two paths: "12 moves, length 16.06; now 7, 3.16"."""
+    lengths = [f"{route_length(rows):.2f}" for rows in (before, after)]
+    return f"{len(before) - 1} moves, length {lengths[0]}; now {len(after) - 1}, {lengths[1]}"
+
+
 def _obstacles(scene: Scene) -> list[dict[str, Any]]:
     return [
         {
@@ -142,7 +149,7 @@ def _goal_text(goal: Goal | None) -> str:
 
 
 def _colors() -> dict[str, str]:
-    names = ("ROBOT", "START", "GOAL", "OBSTACLE", "ATTACHED", "TRAIL", "BACKGROUND_TOP", "BACKGROUND_BOTTOM")
+    names = ("ROBOT", "START", "GOAL", "OBSTACLE", "ATTACHED", "TRAIL", "BEFORE", "BACKGROUND_TOP", "BACKGROUND_BOTTOM")
     return {name.lower(): getattr(palette, name) for name in names}
 
 

@@ -25,6 +25,7 @@ class Subject:
         goal: The goal of the problem, or None.
         waypoints: Configurations to play, shape (k, dof); a single row if there is no path, (0, 0) without a robot.
         is_path: Whether the waypoints are a path, as opposed to the one posture in which the arm stands.
+        before: Waypoints of a path to compare with, shape (m, dof), or None.
     """
 
     name: str
@@ -33,6 +34,7 @@ class Subject:
     goal: Goal | None
     waypoints: Matrix
     is_path: bool
+    before: Matrix | None = None
 
     @property
     def start(self) -> Vector | None:
@@ -49,16 +51,20 @@ class Subject:
         return end
 
 
-def subject_of(shown: Any, path: Any | None = None) -> Subject:
+def subject_of(shown: Any, path: Any | None = None, before: Any | None = None) -> Subject:
     """Take apart what a caller wants to see.
 
     Args:
         shown: A ``Problem``, a ``World``, a ``Robot`` or a ``Scene``.
         path: A ``JointPath``, or waypoints of shape (k, dof) with k at least 1 [rad or m].
+        before: Another path to compare with.
 
     Raises:
-        InputError: If ``shown`` is none of these, or the path does not fit the robot.
+        InputError: If ``shown`` is none of these, or the path does not fit the robot, or there is one to compare with
+            but none to show.
     """
+    if before is not None and path is None:
+        raise InputError("view: there is a path before, but none after it; give the path to show too")
     if isinstance(shown, Scene):
         if path is not None:
             raise InputError("view: a path needs a robot; show a problem, a world or a robot instead of a scene alone")
@@ -74,7 +80,8 @@ def subject_of(shown: Any, path: Any | None = None) -> Subject:
     named = getattr(shown, "name", "problem")
     name = robot.name if named == "problem" else str(named)
     if path is not None:
-        return Subject(name, robot, scene, goal, _waypoints(robot, path), True)
+        earlier = None if before is None else _waypoints(robot, before)
+        return Subject(name, robot, scene, goal, _waypoints(robot, path), True, earlier)
     start = getattr(shown, "start", None)
     posture = robot.clamp(np.zeros(robot.dof)) if start is None else robot.configuration(start, "start")
     return Subject(name, robot, scene, goal, frozen(posture[None]), False)

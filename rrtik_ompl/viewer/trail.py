@@ -25,6 +25,14 @@ def pieces(waypoints: Matrix) -> NDArray[np.int64]:
     return np.arange(moves) * min(moves, MAX_PIECES) // max(moves, 1)
 
 
+def draw_before(vis: Any, robot: Robot, waypoints: Matrix, radius: float) -> None:
+    """Draw the tip's way on another path, thinner, under ``before``; arguments as of :func:`draw_trail`."""
+    tips = robot.fk_batch(_dense(robot, waypoints, len(waypoints)))[:, :3, 3]
+    tips = tips[np.insert(np.linalg.norm(np.diff(tips, axis=0), axis=1) > 0.05 * radius, 0, True)]
+    if len(tips) > 1:
+        draw_tube(vis["before"], tips, 0.6 * radius, palette.BEFORE)
+
+
 def draw_trail(vis: Any, robot: Robot, waypoints: Matrix, radius: float) -> None:
     """Draw the tip's way under ``trail/piece N`` and a bead at every waypoint under ``beads``.
 

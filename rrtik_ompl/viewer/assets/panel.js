@@ -119,13 +119,13 @@ function showMove(k) {
 }
 
 // Legend -----------------------------------------------------------------------------------------------------------
-function addSwitch(text, color, opacity, change, on = true) {
+function addSwitch(text, color, opacity, change, on = true, className = "") {
   const box = make("input", { type: "checkbox", checked: on });
   const swatch = make("span", { className: color ? "swatch" : "swatch none" });
   if (color) Object.assign(swatch.style, { background: color, opacity });
   box.addEventListener("change", () => change(box.checked));
   const label = make("label", {}, box, swatch, ...[].concat(text));
-  document.getElementById("legend").append(make("li", {}, label));
+  document.getElementById("legend").append(make("li", { className }, label));
   change(on);
 }
 
@@ -155,6 +155,7 @@ function buildLegend() {
   if (story.goal_ghost) addSwitch("goal (ghost)", colors.goal, 0.6, toggles("goal ghost"));
   if (story.goal && story.goal !== "joint values") addSwitch(`goal: ${story.goal}`, colors.goal, 1, toggles("goal"));
   if (story.moves.length) addSwitch("way of the tip", colors.trail, 1, toggles("trail", "beads"));
+  if (story.before) addSwitch(`before: ${story.before}`, colors.before, 1, toggles("before"), true, "wide");
   if (story.attached.length) addSwitch(`held: ${story.attached.join(", ")}`, colors.attached, 1, () => {});
   if (story.obstacles.length) {
     addSwitch(count(story.obstacles.length, "obstacle"), colors.obstacle, 1, toggles("obstacles", "later"));

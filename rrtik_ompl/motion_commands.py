@@ -1,0 +1,133 @@
+"""The commands of `rrtik` that follow a path: its list of single-joint moves, and its times."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.path_text import FORMATS as PATH_FORMATS
+from rrtik_ompl.terminal import progress, say
+from rrtik_ompl.text_file import check_target
+
+TRAJECTORY_FORMATS, PLOT_FORMATS = (".json", ".csv"), (".png", ".svg")
+
+Problem = Annotated[str, typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.")]
+GivenPath = Annotated[Path, typer.Argument(help="A path file: .json, .csv or .txt.")]
+Rate = Annotated[str | None, typer.Option(help="One number, or one per joint with commas; deg (m if it slides) and s.")]
+
+
+def list_moves(
+    path: GivenPath,
+    problem: Annotated[
+        str | None, typer.Option(help="Of the path; if the path moves several joints at once, it is converted.")
+    ] = None,
+    shorten: Annotated[str | None, typer.Option(metavar="METHOD", help="Then make fewer moves: axis, ...")] = None,
+    as_csv: Annotated[bool, typer.Option("--csv", help="Print CSV, in degrees.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, in radians.")] = False,
+    spoken: Annotated[bool, typer.Option("--spoken", help="Print sentences, to be read aloud.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Save the path of moves: .json, .csv or .txt.")] = None,
+) -> int:
+    """List the single-joint moves of a path: a table, CSV, JSON or sentences."""
+    if as_csv + as_json + spoken > 1:
+        raise InputError("give one of --csv, --json and --spoken, not several")
+    check_target(out, PATH_FORMATS)
+    route, robot = _path_of_moves(path, problem, shorten)
+    if out is not None:
+        route.save(out)
+    from rrtik_ompl import moves_text, report
+
+    if as_csv:
+        print(moves_text.moves_csv(route), end="")
+    elif as_json:
+        print(json.dumps({"robot": route.robot_name, "moves": moves_text.moves_document(route)}))
+    elif spoken:
+        endless = () if robot is None else [n for n, c in zip(robot.joint_names, robot.continuous, strict=True) if c]
+        say(*moves_text.spoken_moves(route, continuous=endless))
+    else:
+        say(report.moves_table(route), f"{route.transitions} moves, length {route.length:.2f} {route.unit}")
+    return 0
+
+
+def time_path(
+    problem: Problem,
+    path: GivenPath,
+    velocity: Rate = None,
+    acceleration: Rate = None,
+    jerk: Annotated[str | None, typer.Option(help="Likewise; inf for no limit.")] = None,
+    share: Annotated[float, typer.Option(help="Of all limits: 0.5 is half as fast.")] = 1.0,
+    blend: Annotated[float, typer.Option(help="Round corners from this far before them [deg]; 0 stops there.")] = 0.0,
+    out: Annotated[Path | None, typer.Option(help="Save the trajectory: .json (JointTrajectory) or .csv.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw the joints over time: .png or .svg.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
+) -> int:
+    """Give a path its times, under the robot's limits or those given."""
+    check_target(out, TRAJECTORY_FORMATS)
+    check_target(plot, PLOT_FORMATS)
+    given = {"velocity": _rates(velocity), "acceleration": _rates(acceleration), "jerk": _rates(jerk)}
+    import numpy as np
+
+    from rrtik_ompl import RateLimits, load_path, load_problem, plot_joints, report, timed
+
+    question = load_problem(problem)
+    robot = question.robot
+    route = load_path(path, robot)
+    faults = route.violations(question.world)
+    if faults:
+        raise InputError(f"{path}: not valid for {question.name}: edge {faults[0].edge + 1}: {faults[0].reason}")
+    factors = np.where(robot.prismatic, 1.0, np.pi / 180.0)
+    limits = RateLimits.of(
+        robot, share=share, **{name: None if row is None else _scaled(row, factors) for name, row in given.items()}
+    )
+    with progress("timing"):
+        found = timed(route, limits, blend=float(np.deg2rad(blend)), world=question.world)
+    if out is not None:
+        found.save(out)
+    if plot is not None:
+        plot_joints(found, plot)
+    if as_json:
+        print(json.dumps(report.timing_document(question, found)))
+    else:
+        say(f"{question.name}: {found.duration:.3f} s", report.peaks_table(found, limits))
+        say(*(f"wrote {file}" for file in (out, plot) if file is not None))
+    return 0
+
+
+def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> tuple[Any, Any]:
+    """The path as single-joint moves, and the robot if the problem says it."""
+    from rrtik_ompl import load_path, load_problem, one_joint_moves
+    from rrtik_ompl.shortening import shorten as shortened
+
+    if problem is None:
+        route = load_path(path)
+        if shorten is not None:
+            raise InputError("--shorten needs to know what stands in the way: give --problem too")
+        if not route.one_joint_at_a_time:
+            raise InputError(f"{path}: moves several joints at once; give --problem NAME, and it is converted")
+        return route, None
+    question = load_problem(problem)
+    route = load_path(path, question.robot)
+    with progress("converting"):
+        if not route.one_joint_at_a_time:
+            route = one_joint_moves(route, question)
+        if shorten is not None:
+            route = shortened(route, question, method=shorten)
+    return route, question.robot
+
+
+def _rates(text: str | None) -> list[float] | None:
+    """Numbers with commas between them, or one alone."""
+    if text is None:
+        return None
+    try:
+        return [float(word) for word in text.split(",")]
+    except ValueError:
+        raise InputError(f"expected a number, or numbers with commas between them, got '{text}'") from None
+
+
+def _scaled(row: list[float], factors: Any) -> Any:
+    """Degrees as radians; a row of the wrong length is left for the limits to refuse."""
+    return row if len(row) not in (1, len(factors)) else row * factors

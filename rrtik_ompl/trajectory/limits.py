@@ -1,0 +1,128 @@
+"""How fast joints may move: velocity, acceleration and jerk limits, from the robot or given."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import Vector, finite_array, frozen
+from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.robot import Robot
+
+TURNING, SLIDING = 0.5, 0.1  # [rad/s], [m/s]: velocity of a joint whose robot says none; slow enough to be watched
+RAMP = 0.5  # [s] in which a joint whose robot says no acceleration comes to its full velocity
+ONSET = 0.1  # [s] in which a joint whose robot says no jerk comes to its full acceleration
+
+A_HAIR = 1.0 + 1e-12  # so that a motion slowed to a limit does not exceed it by rounding
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RateLimits:
+    """Largest velocity, acceleration and jerk of each joint, shape (n,) each.
+
+    Attributes:
+        velocity: [rad/s or m/s], finite.
+        acceleration: [rad/s^2 or m/s^2], finite.
+        jerk: [rad/s^3 or m/s^3]; inf for none.
+    """
+
+    velocity: Vector
+    acceleration: Vector
+    jerk: Vector
+
+    def __init__(self, velocity: ArrayLike, acceleration: ArrayLike, jerk: ArrayLike = np.inf) -> None:
+        """Take limits, one number per joint; one number alone is for all joints.
+
+        Raises:
+            InputError: If a limit is no number greater than 0, or their counts differ.
+        """
+        rows = [_row(v, name) for v, name in ((velocity, "velocity"), (acceleration, "acceleration"), (jerk, "jerk"))]
+        count = max(len(row) for row in rows)
+        for row, name in zip(rows, ("velocity", "acceleration", "jerk"), strict=True):
+            if len(row) not in (1, count):
+                raise InputError(f"{name} limits: expected {count} numbers, one per joint, got {len(row)}")
+            if name != "jerk" and np.isinf(row).any():
+                raise InputError(f"{name} limits: must be finite")
+            object.__setattr__(self, name, frozen(np.broadcast_to(row, (count,))))
+
+    @classmethod
+    def of(
+        cls,
+        robot: Robot,
+        *,
+        velocity: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
+        jerk: ArrayLike | None = None,
+        share: float = 1.0,
+    ) -> RateLimits:
+        """The limits of a robot, or those given instead.
+
+        What neither the robot nor the caller says is a default: 0.5 rad/s or 0.1 m/s; the acceleration that reaches
+        the velocity in 0.5 s; the jerk that reaches the acceleration in 0.1 s.
+
+        Args:
+            robot: Whose limits hold.
+            velocity: Instead of the robot's, one number or one per joint [rad/s or m/s].
+            acceleration: Likewise [rad/s^2 or m/s^2].
+            jerk: Likewise [rad/s^3 or m/s^3]; inf for no limit.
+            share: Of all limits, greater than 0 and at most 1: 0.5 moves at half the speed.
+
+        Raises:
+            InputError: If a limit is no number greater than 0, or there is not one per joint.
+        """
+        require(robot, Robot, "robot of rate limits", "use load_robot(name)")
+        part = float(finite_array(share, (), "share of the limits"))
+        if not 0.0 < part <= 1.0:
+            raise InputError(f"share of the limits must be greater than 0 and at most 1, got {part:g}")
+        plain = np.where(robot.prismatic, SLIDING, TURNING)
+        v = _of_robot(robot, velocity, "velocity", robot.velocity, plain)
+        a = _of_robot(robot, acceleration, "acceleration", robot.acceleration, v / RAMP)
+        j = _of_robot(robot, jerk, "jerk", robot.jerk, a / ONSET)
+        return cls(part * v, part * a, part * j)
+
+    def along(self, direction: Vector) -> tuple[float, float, float]:
+        """Limits of the speed along a straight line, its acceleration and jerk, for a direction of shape (n,)."""
+        with np.errstate(divide="ignore", over="ignore"):
+            v, a, j = (float((row / np.abs(direction)).min()) for row in (self.velocity, self.acceleration, self.jerk))
+        return v, a, j
+
+    def for_joints(self, count: int) -> RateLimits:
+        """The same limits for so many joints: limits of one number each are those of all joints.
+
+        Raises:
+            InputError: If they are for another number of joints.
+        """
+        if len(self.velocity) not in (1, count):
+            raise InputError(f"path to time: it has {count} joints, but there are limits for {len(self.velocity)}")
+        return RateLimits(*(np.broadcast_to(row, (count,)) for row in (self.velocity, self.acceleration, self.jerk)))
+
+    def slowing(self, velocity: Vector, acceleration: Vector, jerk: Vector | None = None) -> float:
+        """Factor by which a motion with these peaks must be slowed to keep the limits; 1 if it keeps them already."""
+        shares = [(velocity / self.velocity).max(), (acceleration / self.acceleration).max()]
+        if jerk is not None:
+            limited = np.isfinite(self.jerk)
+            shares.append((jerk[limited] / self.jerk[limited]).max(initial=0.0))
+        factors = [float(share) ** (1.0 / power) for power, share in enumerate(shares, start=1)]
+        return 1.0 if max(shares) <= 1.0 else max(factors) * A_HAIR
+
+
+def _row(values: ArrayLike, name: str) -> Vector:
+    """Positive numbers, infinity allowed, shape (n,) or (1,)."""
+    try:
+        row = np.atleast_1d(np.asarray(values))
+    except ValueError:  # lists of unequal lengths
+        row = np.empty((1, 0))
+    if row.ndim != 1 or row.size == 0 or row.dtype.kind not in "iuf" or not (row > 0.0).all():
+        raise InputError(f"{name} limits: expected numbers greater than 0, one per joint, got {str(row.tolist())[:60]}")
+    return row.astype(np.float64)
+
+
+def _of_robot(robot: Robot, given: ArrayLike | None, name: str, own: Vector, default: Vector) -> Vector:
+    if given is None:
+        return np.where(np.isfinite(own), own, default)
+    row = _row(given, name)
+    if len(row) not in (1, robot.dof):
+        raise InputError(f"{name} limits: robot '{robot.name}' has {robot.dof} joints, but got {len(row)} numbers")
+    return np.broadcast_to(row, (robot.dof,)).astype(np.float64)

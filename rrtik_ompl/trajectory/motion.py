@@ -1,0 +1,286 @@
+"""A timed motion: knots in time, a cubic between each two, and what follows from that: values, peaks, faults."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
+from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.path import SECOND_CHECK, JointPath
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.text_file import read_text, write_text
+from rrtik_ompl.trajectory.text import decoded, encoded, trajectory_format
+from rrtik_ompl.world import World
+
+FIT = 1e-8  # [rad] or [m]; how well a knot and the cubic that leads to it must agree
+JUMP = 1e-6  # of the largest acceleration; a larger difference between two pieces is a jump, its jerk infinite
+
+
+class State(NamedTuple):
+    """Where a motion is, shape (n,) each for one time, (k, n) for k times.
+
+    Attributes:
+        positions: [rad or m].
+        velocities: [rad/s or m/s].
+        accelerations: [rad/s^2 or m/s^2]; just after a jump.
+    """
+
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    accelerations: NDArray[np.float64]
+
+
+class Peaks(NamedTuple):
+    """Largest absolute velocity, acceleration and jerk of each joint, shape (n,); inf is a jump of acceleration."""
+
+    velocity: Vector
+    acceleration: Vector
+    jerk: Vector
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """Joint positions over time: between two knots every joint follows a cubic.
+
+    Attributes:
+        times: Of the knots [s], shape (m,), increasing from 0.
+        positions: Shape (m, n), rad (m for sliding joints).
+        velocities: Shape (m, n).
+        accelerations: Shape (m, n): at the beginning of each piece, in the last row at the end of the last one.
+        joint_names: Names of the n joints.
+        prismatic: Which joints slide, shape (n,).
+        robot_name: Name of the robot it is for, or "".
+    """
+
+    times: Vector
+    positions: Matrix
+    velocities: Matrix
+    accelerations: Matrix
+    joint_names: tuple[str, ...]
+    prismatic: Mask
+    robot_name: str = ""
+
+    def __init__(
+        self,
+        times: ArrayLike,
+        positions: ArrayLike,
+        velocities: ArrayLike,
+        accelerations: ArrayLike | None = None,
+        *,
+        joint_names: Iterable[str] | None = None,
+        prismatic: ArrayLike | None = None,
+        robot_name: str = "",
+    ) -> None:
+        """Take knots; without accelerations the cubics are those through positions and velocities (Hermite's).
+
+        Raises:
+            InputError: If the shapes differ, a number is not finite, the times do not increase from 0, or the
+                accelerations lead elsewhere than to the next knot.
+        """
+        # the names and units of a path obey the same rules, so a path checks them
+        path = JointPath(positions, joint_names, prismatic, robot_name)
+        rows = path.waypoints
+        clock = finite_array(times, (len(rows),), "trajectory times")
+        if len(clock) < 2 or clock[0] != 0.0 or not (np.diff(clock) > 0.0).all():
+            raise InputError("trajectory times: expected two or more, beginning with 0, each greater than the last")
+        rates = finite_array(velocities, rows.shape, "trajectory velocities")
+        if accelerations is None:
+            bends = _hermite_accelerations(clock, rows, rates)
+        else:
+            bends = finite_array(accelerations, rows.shape, "trajectory accelerations")
+            apart = np.abs(_ends(clock, rows, rates, bends) - rows[1:]).max(axis=1)
+            if apart.max() > FIT * max(1.0, np.abs(rates).max()):
+                raise InputError(
+                    f"trajectory: point {int(apart.argmax()) + 2} is {apart.max():.2g} away from where the point "
+                    "before it leads; leave the accelerations out to have positions and velocities decide"
+                )
+        values = {"times": clock, "positions": rows, "velocities": rates, "accelerations": bends}
+        for name, value in values.items():
+            object.__setattr__(self, name, frozen(value))
+        for name in ("joint_names", "prismatic", "robot_name"):
+            object.__setattr__(self, name, getattr(path, name))
+
+    def __repr__(self) -> str:
+        return f"Trajectory({len(self.joint_names)} joints, {len(self.times)} knots, {self.duration:.3g} s)"
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last knot [s]."""
+        return float(self.times[-1])
+
+    def __call__(self, t: ArrayLike) -> State:
+        """Positions, velocities and accelerations at a time [s], or at many: shape (n,), or (k, n) for t of shape (k,).
+
+        Before its beginning and after its end the arm stands still.
+
+        Raises:
+            InputError: If a time is not finite.
+        """
+        many = np.ndim(t) > 0
+        wanted = finite_array(t, (None,) if many else (), "time of a trajectory")
+        clock = np.clip(np.atleast_1d(wanted), 0.0, self.duration)
+        piece = np.clip(np.searchsorted(self.times, clock, side="right") - 1, 0, len(self.times) - 2)
+        x = (clock - self.times[piece])[:, None]
+        q, v, a, j = (rows[piece] for rows in (self.positions, self.velocities, self.accelerations, self.jerks))
+        found = [q + x * (v + x * (a / 2.0 + x * j / 6.0)), v + x * (a + x * j / 2.0), a + x * j]
+        found[0][clock == self.duration] = self.positions[-1]  # to the bit
+        outside = np.atleast_1d(wanted) != clock
+        found[1][outside] = found[2][outside] = 0.0
+        return State(*found) if many else State(*(rows[0] for rows in found))
+
+    @property
+    def jerks(self) -> Matrix:
+        """Jerk of each piece [rad/s^3 or m/s^3], shape (m - 1, n)."""
+        return _jerks(self.times, self.velocities, self.accelerations)
+
+    def peaks(self) -> Peaks:
+        """The largest velocity, acceleration and jerk of each joint: exact, not sampled, for every piece is a cubic."""
+        h = np.diff(self.times)[:, None]
+        v, a, j = self.velocities, self.accelerations, self.jerks
+        with np.errstate(divide="ignore", invalid="ignore"):
+            turn = -a[:-1] / j
+            between = np.where((turn > 0.0) & (turn < h), v[:-1] + 0.5 * turn * a[:-1], 0.0)
+        velocity = np.abs(np.vstack([v, between])).max(axis=0)
+        ends = a[:-1] + h * j
+        smooth = np.abs(ends - a[1:]) <= self._noise(h)
+        acceleration = np.abs(np.vstack([a, np.where(smooth, 0.0, ends)])).max(axis=0)
+        jump = JUMP * acceleration.max()
+        rest = np.abs(a[[0, -1]]) <= jump  # before its beginning and after its end the arm stands still
+        smooth |= np.abs(ends - a[1:]) <= jump
+        jerk = np.where(smooth.all(axis=0) & rest.all(axis=0), np.abs(np.diff(a, axis=0) / h).max(axis=0), np.inf)
+        return Peaks(velocity, acceleration, jerk)
+
+    def _noise(self, h: Matrix) -> Matrix:
+        """What rounding of times and velocities does to the acceleration at the end of pieces of durations ``h``."""
+        speed, push = np.abs(self.velocities).max(), np.abs(self.accelerations).max()
+        noise: Matrix = 8.0 * np.finfo(np.float64).eps * (speed + self.duration * push) / h
+        return noise
+
+    def slowed(self, factor: float) -> Trajectory:
+        """The same motion, ``factor`` times as long.
+
+        Raises:
+            InputError: If the factor is not greater than 0.
+        """
+        k = float(finite_array(factor, (), "factor of a trajectory"))
+        if k <= 0.0:
+            raise InputError(f"factor of a trajectory must be greater than 0, got {k:g}")
+        rates = (self.velocities / k, self.accelerations / k**2)
+        return Trajectory(self.times * k, self.positions, *rates, **self._names())
+
+    def path(self) -> JointPath:
+        """The knots as waypoints of a path."""
+        return JointPath(self.positions, self.joint_names, self.prismatic, self.robot_name)
+
+    def faults(self, world: World) -> tuple[str, ...]:
+        """Check the motion itself, not the path it was made from, densely and independently of planners.
+
+        Each piece is looked at in steps in which no point of the arm moves more than half of the world's motion
+        resolution, by :meth:`World.certify`.
+
+        Returns:
+            A line for the first fault of every piece that has one: time, and the pair or limit; empty if it is valid.
+
+        Raises:
+            InputError: If it has another number of joints than the world's robot.
+        """
+        require(world, World, "world of a trajectory's check")
+        finite_array(self.positions, (None, world.robot.dof), f"trajectory for robot '{world.robot.name}'")
+        h, peak = np.diff(self.times), np.abs(self.velocities)
+        speed = np.maximum(peak[1:], peak[:-1]) + h[:, None] * np.abs(self.jerks * h[:, None]) / 8.0
+        counts = np.ceil(h * (speed @ world.weights) * SECOND_CHECK / world.motion_resolution).astype(np.int64) + 1
+        clock = np.concatenate([t + d * np.arange(n) / n for t, d, n in zip(self.times, h, counts, strict=False)])
+        pieces = np.repeat(np.arange(len(h)), counts)
+        clock, pieces = np.append(clock, self.duration), np.append(pieces, len(h) - 1)
+        rows = self(clock).positions
+        bad = np.flatnonzero(~world.certify(rows))
+        _, first = np.unique(pieces[bad], return_index=True)
+        return tuple(f"after {clock[k]:.3f} s: {world.explain(rows[k])}" for k in bad[first])
+
+    def save(self, file: str | os.PathLike[str]) -> None:
+        """Write the motion to a file: .json (the shape of a JointTrajectory message) or .csv (``time,<joint>...``).
+
+        One point per knot. Both give back the same motion by :func:`load_trajectory`. The file is written whole or not
+        at all.
+
+        Raises:
+            InputError: If the ending is another one or the file cannot be written.
+        """
+        units = ["m" if sliding else "rad" for sliding in self.prismatic]
+        columns = (self.times, self.positions, self.velocities, self.accelerations)
+        points = [column.tolist() for column in columns]
+        write_text(file, encoded(self.robot_name, self.joint_names, units, points, trajectory_format(file)))
+
+    def _names(self) -> dict[str, Any]:
+        return {"joint_names": self.joint_names, "prismatic": self.prismatic, "robot_name": self.robot_name}
+
+
+def load_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) -> Trajectory:
+    """Read a motion written by :meth:`Trajectory.save`, or a JointTrajectory message as JSON.
+
+    Accelerations that lead elsewhere than to the next point (other programs join their points by other curves) are
+    left out: then the motion is the cubic through positions and velocities.
+
+    Args:
+        file: A .json or .csv file.
+        robot: If given, the motion must have its joints.
+
+    Raises:
+        InputError: If the file is missing, malformed, or does not fit the robot; the message names file and line.
+    """
+    require(robot, Robot | None, "robot of a trajectory", "use load_robot(name)")
+    ending = trajectory_format(file)
+    try:
+        document = decoded(read_text(file), ending)
+        found = _from_document(document, robot)
+        if robot is not None and found.joint_names != robot.joint_names:
+            own, wanted = ", ".join(found.joint_names), ", ".join(robot.joint_names)
+            raise InputError(f"the trajectory moves {own}, but robot '{robot.name}' has the joints {wanted}")
+        return found
+    except InputError as error:
+        raise error if str(error).startswith(str(file)) else InputError(f"{file}: {error}") from None
+
+
+def _from_document(document: dict[str, Any], robot: Robot | None) -> Trajectory:
+    units = document["units"]
+    sliding = None if units is None else [unit == "m" for unit in units]
+    if sliding is None and robot is not None and document["joint_names"] == list(robot.joint_names):
+        sliding = robot.prismatic.tolist()
+    names = {"joint_names": document["joint_names"], "prismatic": sliding, "robot_name": document["robot"]}
+    plain = Trajectory(document["times"], document["positions"], document["velocities"], **names)
+    if document["accelerations"] is None:
+        return plain
+    bends = finite_array(document["accelerations"], plain.positions.shape, "trajectory accelerations")
+    try:
+        return Trajectory(plain.times, plain.positions, plain.velocities, bends, **names)
+    except InputError:
+        return plain
+
+
+def _jerks(times: Vector, velocities: Matrix, accelerations: Matrix) -> Matrix:
+    """The jerk with which each piece comes to the velocity of the next knot, shape (m - 1, n)."""
+    h = np.diff(times)[:, None]
+    jerks: Matrix = 2.0 * (np.diff(velocities, axis=0) - h * accelerations[:-1]) / h**2
+    return jerks
+
+
+def _ends(times: Vector, positions: Matrix, velocities: Matrix, accelerations: Matrix) -> Matrix:
+    """Where the cubic of each piece ends, shape (m - 1, n)."""
+    h = np.diff(times)[:, None]
+    v, a, j = velocities[:-1], accelerations[:-1], _jerks(times, velocities, accelerations)
+    ends: Matrix = positions[:-1] + h * (v + h * (a / 2.0 + h * j / 6.0))
+    return ends
+
+
+def _hermite_accelerations(times: Vector, positions: Matrix, velocities: Matrix) -> Matrix:
+    """Accelerations at the beginning of the cubics through positions and velocities, and at the end of the last one."""
+    h = np.diff(times)[:, None]
+    mean, first, last = np.diff(positions, axis=0) / h, velocities[:-1], velocities[1:]
+    begin, end = (6.0 * mean - 4.0 * first - 2.0 * last) / h, (2.0 * first + 4.0 * last - 6.0 * mean) / h
+    return np.vstack([begin, end[-1:]])

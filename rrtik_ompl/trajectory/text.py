@@ -1,0 +1,107 @@
+"""The text of a trajectory file: JSON in the shape of ROS's JointTrajectory, or CSV; written and read."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.path_text import json_object, table_rows
+from rrtik_ompl.text_file import file_name
+
+FORMATS = (".json", ".csv")
+KIND = "joint_trajectory"
+FIELDS = ("positions", "velocities", "accelerations")
+_DURATION = (("sec", "secs"), ("nanosec", "nsecs"))
+
+
+def trajectory_format(path: str | os.PathLike[str]) -> str:
+    """Ending of a trajectory file, one of ``FORMATS``.
+
+    Raises:
+        InputError: If it is another one.
+    """
+    ending = file_name(path).suffix.lower()
+    if ending not in FORMATS:
+        raise InputError(f"{path}: unknown ending '{ending}' for a trajectory; use {', '.join(FORMATS)}")
+    return ending
+
+
+def encoded(robot: str, names: Sequence[str], units: Sequence[str], columns: Sequence[list[Any]], ending: str) -> str:
+    """Text of a trajectory; ``columns`` are times (m) and positions, velocities and accelerations (m, n)."""
+    if ending == ".json":
+        points = [
+            dict(zip(FIELDS, values, strict=True)) | {"time_from_start": time}
+            for time, *values in zip(*columns, strict=True)
+        ]
+        head = {"version": 1, "kind": KIND, "robot": robot, "joint_names": list(names), "units": list(units)}
+        return json.dumps(head | {"points": points}, indent=1) + "\n"
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(_header(names))
+    for time, *values in zip(*columns, strict=True):
+        table.writerow([repr(number) for number in (time, *(x for value in values for x in value))])
+    return text.getvalue()
+
+
+def decoded(text: str, ending: str) -> dict[str, Any]:
+    """What :func:`encoded` wrote: ``times`` and ``FIELDS`` (accelerations may be None), ``joint_names``, ``units``.
+
+    Raises:
+        InputError: If the text is malformed; the message names the line, the point or the key.
+    """
+    return _from_json(text) if ending == ".json" else _from_csv(text)
+
+
+def _header(names: Iterable[str]) -> list[str]:
+    own = list(names)
+    return ["time", *own, *(f"{name} velocity" for name in own), *(f"{name} acceleration" for name in own)]
+
+
+def _from_json(text: str) -> dict[str, Any]:
+    document = json_object(text, KIND, "points")
+    points = document["points"]
+    if not isinstance(points, list) or not all(isinstance(point, dict) for point in points):
+        raise InputError("points: expected a list of objects with positions, velocities and time_from_start")
+    for number, point in enumerate(points, start=1):
+        for key in ("positions", "velocities", "time_from_start"):
+            if not point.get(key) and point.get(key) != 0:
+                raise InputError(f"point {number}: no {key}; a motion needs positions, velocities and time_from_start")
+    bends = [point.get("accelerations") for point in points]
+    return {
+        "times": [_seconds(point["time_from_start"]) for point in points],
+        "positions": [point["positions"] for point in points],
+        "velocities": [point["velocities"] for point in points],
+        "accelerations": bends if all(bends) else None,
+        "joint_names": document.get("joint_names"),
+        "units": document.get("units"),
+        "robot": str(document.get("robot", "")),
+    }
+
+
+def _seconds(time: Any) -> Any:
+    """A duration as a number of seconds, or as the messages of ROS 1 and 2 write it."""
+    if not isinstance(time, dict):
+        return time
+    whole, fraction = (next((time[key] for key in keys if key in time), 0) for keys in _DURATION)
+    try:
+        return whole + 1e-9 * fraction
+    except TypeError:
+        raise InputError(f"time_from_start: expected seconds, or sec and nanosec, got {time!r}") from None
+
+
+def _from_csv(text: str) -> dict[str, Any]:
+    names, rows = table_rows(text, ",")
+    count = (len(names or ()) - 1) // 3
+    joints = (names or [])[1 : 1 + count]
+    if count < 1 or names != _header(joints):
+        wanted = "time,<joint>...,<joint> velocity...,<joint> acceleration..."
+        raise InputError(f"line 1: expected the columns {wanted}; is this a trajectory file?")
+    found: dict[str, Any] = {"times": [row[0] for row in rows], "joint_names": joints, "units": None, "robot": ""}
+    for k, field in enumerate(FIELDS):
+        found[field] = [row[1 + k * count : 1 + (k + 1) * count] for row in rows]
+    return found
