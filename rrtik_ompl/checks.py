@@ -21,12 +21,13 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body, link_bodies
 from rrtik_ompl.collision.containment import Containment
+from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.fast import FREE, UNDECIDED, FastWorld, needs_covers
 from rrtik_ompl.fast.cover_cache import cached_inner_spheres, cached_outer_cover
 from rrtik_ompl.robot import Robot
 
 STROKE_ROOM = 1e-3  # [m] beyond the limits of sliding joints
-SETTLED_ROWS = 8  # looked at together, of which the first may already be colliding
+ROOM = 1e-5  # [m] taken off coal's distances
 NO_SPHERES = np.empty((0, 4))
 
 Pairs = tuple[tuple[int, int], ...]
@@ -48,6 +49,7 @@ class CollisionChecks:
         self._robot, self._bodies = robot, bodies
         self._data = robot.model.createData()
         self._standing = {k: self._transform(k) for k, body in enumerate(bodies) if body.joint == 0}
+        self._approaches: dict[tuple[int, int], Vector] = {}
         self._containment = Containment(bodies, pairs, [around for around, _ in spheres])
 
     def as_conservative(self, conservative: bool) -> CollisionChecks:
@@ -71,32 +73,66 @@ class CollisionChecks:
         free: Mask = answers == FREE
         if not self.conservative:
             for k in np.flatnonzero(answers == UNDECIDED):
-                shares = (spread_order(int(steps[k])) / steps[k])[:, None]
-                rows = (1.0 - shares) * starts[k] + shares * ends[k]
-                open_ = self.fast.classify(self._robot.joint_values(rows), prove=False) != FREE
-                free[k] = all(self._settled(rows[open_]))
+                free[k] = self._motion_settled(starts[k], ends[k], int(steps[k]))
         return free
 
     def _settled(self, rows: Matrix) -> Iterator[bool]:
-        """Whether rows are free, by coal, one after the other: a caller may stop at the first that is not."""
-        for start in range(0, len(rows), SETTLED_ROWS):
-            part = rows[start : start + SETTLED_ROWS]
-            marked = self.fast.undecided_pairs(self._robot.joint_values(part))
-            for full, pairs in zip(self._robot.lift(part), marked, strict=True):
-                yield self._free_between(full, pairs)
+        """Whether rows are free, by coal, one after the other."""
+        marked = self.fast.undecided_pairs(self._robot.joint_values(rows))
+        for full, pairs in zip(self._robot.lift(rows), marked, strict=True):
+            yield self._gaps(full, pairs) is not None
 
-    def _free_between(self, full: Vector, pairs: list[tuple[int, int]]) -> bool:
-        """Whether Pinocchio's configuration vector ``full`` is free of collision between some pairs of bodies."""
+    def _motion_settled(self, start: Vector, end: Vector, steps: int) -> bool:
+        """Whether a motion is free, by coal.
+
+        Two bodies that are some distance apart at one of the motion's configurations are so far from touching that
+        its neighbours need no question about this pair.
+        """
+        order = spread_order(steps)
+        rows = (1.0 - order / steps)[:, None] * start + (order / steps)[:, None] * end
+        open_ = self.fast.classify(self._robot.joint_values(rows), prove=False) != FREE
+        rows, order = rows[open_], order[open_]
+        marked = self.fast.undecided_pairs(self._robot.joint_values(rows))
+        travel = np.abs(end - start)
+        cleared: dict[tuple[int, int], list[tuple[float, float]]] = {}
+        for place, full, pairs in zip(order.tolist(), self._robot.lift(rows), marked, strict=True):
+            left = [p for p in pairs if not any(low < place < high for low, high in cleared.get(p, ()))]
+            gaps = self._gaps(full, left)
+            if gaps is None:
+                return False
+            for pair, gap in zip(left, gaps, strict=True):
+                approach = float(self._approach(pair) @ travel)  # [m] along the whole motion
+                reach = steps * max(gap - ROOM, 0.0) / approach if approach > 0.0 else np.inf
+                cleared.setdefault(pair, []).append((place - reach, place + reach))
+        return True
+
+    def _gaps(self, full: Vector, pairs: list[tuple[int, int]]) -> list[float] | None:
+        """Lower bounds of the distances [m] between pairs of bodies, or None if two of them touch, by coal.
+
+        Args:
+            full: Pinocchio's configuration vector.
+            pairs: Numbers of the bodies.
+        """
         pin.forwardKinematics(self._robot.model, self._data, full)
         transforms = dict(self._standing)
+        gaps = []
         for i, j in pairs:
             for k in (i, j):
                 if k not in transforms:
                     transforms[k] = self._transform(k)
             ends = (self._bodies[i].geometry, transforms[i], self._bodies[j].geometry, transforms[j])
-            if coal.collide(*ends, coal.CollisionRequest(), coal.CollisionResult()):
-                return False
-        return not self._containment.between(pairs, self._data.oMi)
+            result = coal.CollisionResult()
+            if coal.collide(*ends, coal.CollisionRequest(), result):
+                return None
+            gaps.append(result.distance_lower_bound)
+        return None if self._containment.between(pairs, self._data.oMi) else gaps
+
+    def _approach(self, pair: tuple[int, int]) -> Vector:
+        """See :func:`rrtik_ompl.collision.motion_bound.approach_weights`."""
+        if pair not in self._approaches:
+            first, second = (self._bodies[k] for k in pair)
+            self._approaches[pair] = approach_weights(self._robot, first, second)
+        return self._approaches[pair]
 
     def _transform(self, number: int) -> Any:
         """Coal's pose of a body in the world."""

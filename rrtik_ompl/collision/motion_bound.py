@@ -14,28 +14,50 @@ from rrtik_ompl.robot import Robot
 def displacement_weights(robot: Robot, bodies: Iterable[Body]) -> Vector:
     """Weights w, shape (dof,), such that no point of the arm moves farther than ``w @ |b - a|`` [m] from a to b.
 
-    For a revolute joint the weight is the largest distance that any point beyond it can have from its axis (over all
-    postures), for a prismatic joint 1. The bound adds what each joint contributes, hence holds for joint motion along
-    a straight line in configuration space.
+    The bound adds what each joint contributes, hence holds for joint motion along a straight line in configuration
+    space. The tip counts as a point of the arm.
+    """
+    tip = robot.model.frames[robot.model.getFrameId(robot.tip)]
+    points = [*_balls(bodies), (tip.parentJoint, tip.placement.translation, 0.0)]
+    return frozen(np.abs(robot.chain.gain).T @ _joint_weights(robot, points))
+
+
+def approach_weights(robot: Robot, first: Body, second: Body) -> Vector:
+    """Weights w, shape (dof,), such that two bodies come nearer by ``w @ |b - a|`` [m] from a to b at most.
+
+    A joint that carries both of them turns them as one.
+    """
+    weights = np.array([_joint_weights(robot, _balls([body])) for body in (first, second)])
+    return frozen(np.abs(robot.chain.gain).T @ np.where((weights > 0.0).all(axis=0), 0.0, weights.sum(axis=0)))
+
+
+def _balls(bodies: Iterable[Body]) -> list[tuple[int, Vector, float]]:
+    """Joint, centre in its frame and radius of a ball around each body."""
+    return [(b.joint, b.placement.act(b.geometry.aabb_center), b.geometry.aabb_radius) for b in bodies]
+
+
+def _joint_weights(robot: Robot, balls: list[tuple[int, Vector, float]]) -> Vector:
+    """For each joint how far a point of the balls moves at most per unit of it, shape (joints,).
+
+    For a revolute joint that is the largest distance that any point beyond it can have from its axis (over all
+    postures), for a prismatic joint 1; 0 for one that carries none of the balls.
     """
     chain, count = robot.chain, len(robot.chain.parent)
-    around_origin, around_axis = np.zeros(count), np.zeros(count)
-    tip = robot.model.frames[robot.model.getFrameId(robot.tip)]
-    points = [(b.joint, b.placement.act(b.geometry.aabb_center), b.geometry.aabb_radius) for b in bodies]
-    points.append((tip.parentJoint, tip.placement.translation, 0.0))
+    around_origin, around_axis, carries = np.zeros(count), np.zeros(count), np.zeros(count, dtype=bool)
     for k in range(count - 1, -1, -1):  # children come after their parents, so they are done first
         axis = chain.axis[k]
-        for joint, centre, radius in points:
+        for joint, centre, radius in balls:
             if joint == k + 1:
+                carries[k] = True
                 around_origin[k] = max(around_origin[k], float(np.linalg.norm(centre)) + radius)
                 around_axis[k] = max(around_axis[k], _from_axis(centre, axis) + radius)
-        for child in (int(c) for c in np.flatnonzero(chain.parent == k)):
+        for child in (int(c) for c in np.flatnonzero((chain.parent == k) & carries)):
+            carries[k] = True
             reach = around_origin[child] + (_stroke(robot, child) if chain.prismatic[child] else 0.0)
             origin = chain.placement[child][:3, 3]
             around_origin[k] = max(around_origin[k], float(np.linalg.norm(origin)) + reach)
             around_axis[k] = max(around_axis[k], _from_axis(origin, axis) + reach)
-    weights = np.where(chain.prismatic, 1.0, around_axis)
-    return frozen(np.abs(chain.gain).T @ weights)
+    return np.where(carries, np.where(chain.prismatic, 1.0, around_axis), 0.0)
 
 
 def _from_axis(point: Vector, axis: Vector) -> float:
