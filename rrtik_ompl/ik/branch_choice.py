@@ -119,7 +119,8 @@ def follow(robot: Robot, targets: ArrayLike, near: ArrayLike | None = None, *, j
         raise InputError("targets: a trajectory needs at least one point")
     found = solutions(robot, goals, near=near, check=False)
     before = np.zeros((1, robot.dof)) if near is None else robot.configuration(near)[None]
-    cost, layers = np.zeros(1), []
+    cost = np.zeros(1)
+    layers: list[_Layer] = []
     for k in range(len(goals)):
         q, tags = _candidates(robot, goals[k], found, k, before)
         parent = np.zeros(len(q), dtype=np.int64)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 
 SINGULAR = 1e-10  # [m] or sine; nearer than this a pose counts as singular, and its answer is still good to 1e-9
+DOUBLE_ROOT = 4e-14  # of a squared sine: less is rounding, whose square root would spoil a stretched arm by 1e-8
 REACH_TOLERANCE = 1e-10  # in the cosine of an elbow: what rounding may add at a stretched arm
 
 
@@ -88,7 +89,9 @@ def two_links(
     cosine = (x * x + y * y - (first * first + second * second)) / (2.0 * first * second)
     real = np.abs(cosine) <= 1.0 + REACH_TOLERANCE
     np.clip(cosine, -1.0, 1.0, out=cosine)
-    sine = np.sqrt((1.0 - cosine) * (1.0 + cosine))
+    square = (1.0 - cosine) * (1.0 + cosine)
+    square[square < DOUBLE_ROOT] = 0.0
+    sine = np.sqrt(square)
     along, across = first + second * cosine, second * sine
     ax, ay, cx, cy = along * x, along * y, across * x, across * y
     turn = np.arctan2(sine, cosine)

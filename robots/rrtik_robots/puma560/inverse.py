@@ -18,6 +18,7 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.ik.form import REACH_TOLERANCE, SINGULAR, Branches, ClosedFormSolver, two_links, wrapped
 
 Numbers = NDArray[np.float64]
+SHOULDER_ROOT = 1e-15  # [m^2] of a squared radius: less is rounding, which moves the wrist centre by less than 1e-14 m
 ARM_BRANCHES = tuple(" ".join(tag) for tag in product(("front", "back"), ("up", "down")))
 BRANCHES = tuple(" ".join(tag) for tag in product(("front", "back"), ("up", "down"), ("near", "flip")))
 
@@ -102,7 +103,7 @@ def arm_branches(g: PumaGeometry, poses: Numbers, near: Matrix | None = None) ->
 def _arm(g: PumaGeometry, x: Vector, y: Vector, z: Vector) -> tuple[Numbers, NDArray[np.bool_]]:
     """Joints 1 to 3 for a wrist centre seen from the shoulder: shapes (3, 2, 2, m) and (2, 2, m)."""
     square = x * x + y * y - g.d3 * g.d3
-    radius = np.sqrt(np.maximum(square, 0.0))
+    radius = np.sqrt(np.where(square < SHOULDER_ROOT, 0.0, square))
     side = np.arctan2(g.d3, radius)
     heading = np.arctan2(y, x)
     upper, turn, real = two_links(g.a2, g.forearm, np.stack([radius, -radius]), np.stack([z, z]))
