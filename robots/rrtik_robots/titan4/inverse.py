@@ -22,6 +22,8 @@ from rrtik_robots.titan4.singularities import nearness
 
 FAMILIES = ("wrist", "shoulder")
 BRANCHES = tuple(" ".join(tag) for tag in product(("front", "back"), ("near", "far"), ("up", "down")))
+ROUNDING = 3e-16  # [m] of the wrist point: divided by its distance from the azimuth axis, of theta1 and so of h
+NORMAL = 1e-9  # sine; largest deviation of the gripper axis from the arm plane's normal that counts as none
 SIGMA = np.array([1.0, -1.0])[:, None]  # the two ways of the wrist: theta5 and pi - theta5
 
 
@@ -63,7 +65,7 @@ def titan_branches(g: TitanGeometry, poses: NDArray[np.float64], near: Matrix | 
     on_axis = distance < SINGULAR
     c1, s1 = target.p[:2] / np.where(on_axis, 1.0, distance)
     x, h = _in_plane(target, c1, s1)
-    normal = h < SINGULAR
+    normal = h < np.minimum(SINGULAR + ROUNDING / np.maximum(distance, SINGULAR), NORMAL)
     direction = SIGMA * np.stack([x, w[2]])[:, None] / np.where(normal, 1.0, h)  # cosine and sine of psi, (2, 2, m)
     cosines, sines = np.stack([direction[0], -direction[0]]), np.stack([direction[1], direction[1]])
     front = np.arctan2(target.p[1], target.p[0])
@@ -75,7 +77,7 @@ def titan_branches(g: TitanGeometry, poses: NDArray[np.float64], near: Matrix | 
     singular = ((normal | (on_axis & horizontal)) * np.uint8(1) + on_axis * np.uint8(2)).astype(np.uint8)
     if len(odd):
         wanted = np.zeros((len(odd), 6)) if near is None else near[odd]
-        q[..., odd], real[..., odd] = _representatives(g, target.rows(odd), on_axis[odd], wanted)
+        q[..., odd], real[..., odd] = _representatives(g, target.rows(odd), on_axis[odd], normal[odd], wanted)
     count = len(poses)
     return Branches(q.reshape(6, 8, count).transpose(2, 1, 0), real.reshape(8, count).T, singular)
 
@@ -123,7 +125,7 @@ def _completed(
 
 
 def _representatives(
-    g: TitanGeometry, target: Target, on_axis: NDArray[np.bool_], near: Matrix
+    g: TitanGeometry, target: Target, on_axis: NDArray[np.bool_], normal: NDArray[np.bool_], near: Matrix
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Branches of singular poses: what is free takes the value nearest to that of ``near`` that the arm can reach."""
     front = np.where(on_axis, near[:, 0], np.arctan2(target.p[1], target.p[0]))
@@ -136,5 +138,5 @@ def _representatives(
     wanted = near[:, 1:4].sum(axis=1) + np.array([0.0, np.pi])[:, None]
     radius = target.p[0] * turn[0] + target.p[1] * turn[1]
     free, _ = nearest_psi(g, radius, target.p[2], np.broadcast_to(wanted, psi.shape))
-    psi = np.where(h < SINGULAR, free, psi)
+    psi = np.where(np.where(on_axis, h < SINGULAR, normal), free, psi)
     return _completed(g, target, theta1, turn, np.cos(psi), np.sin(psi))
