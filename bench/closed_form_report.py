@@ -151,12 +151,13 @@ def report(quick: bool) -> list[str]:
         "",
         "## Round trip",
         "",
-        "Solved: a branch reaches the pose. Exact: the configuration is among the branches within 1e-8 rad. Original or",
-        "flagged: it is among them within 1e-5 rad (at a stretched elbow, a double root, an angle is known to the square",
-        "root of the rounding), or the pose is flagged as singular and answered by its representatives. Asked near: with",
-        "`near=` the original that itself is found, within 1e-5 rad. Residuals are the worst of all real branches.",
+        "Solved: a branch reaches the pose. Exact: the configuration is among the branches within 1e-8 rad. Same or",
+        "flagged: it is among them within 1e-5 rad (at a stretched elbow, a double root, an angle is known to the",
+        "square root of the rounding), or the pose is flagged as singular and answered by its representatives. Asked",
+        "near: with `near=` the original that itself is found, within 1e-5 rad. The residuals are the worst of all",
+        "real branches.",
         "",
-        "| robot | case | configurations | solved | exact | original or flagged | flagged | asked near | worst [m] | [rad] |",
+        "| robot | case | configurations | solved | exact | same or flagged | flagged | asked near | [m] | [rad] |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for robot, case, Q in cases(5_000 if quick else COUNT, rng):

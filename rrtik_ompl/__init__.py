@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from rrtik_ompl.goal import JointGoal as JointGoal
     from rrtik_ompl.goal import PoseGoal as PoseGoal
     from rrtik_ompl.goal import PositionGoal as PositionGoal
+    from rrtik_ompl.ik.face import IkResult as IkResult
+    from rrtik_ompl.ik.face import list_ik_methods as list_ik_methods
+    from rrtik_ompl.ik.face import solve_ik as solve_ik
     from rrtik_ompl.path import JointPath as JointPath
     from rrtik_ompl.path import load_path as load_path
     from rrtik_ompl.planning import Plan as Plan
@@ -43,6 +46,7 @@ else:
         "catalog": ("list_problems", "list_robots", "load_robot"),
         "errors": ("InputError", "PlannerError", "ProblemError", "RrtikError", "UnknownNameError"),
         "goal": ("GoalRegion", "JointGoal", "PoseGoal", "PositionGoal"),
+        "ik.face": ("IkResult", "list_ik_methods", "solve_ik"),
         "path": ("JointPath", "load_path"),
         "planning": ("Plan", "list_planners", "plan"),
         "problem": ("Problem",),

@@ -64,6 +64,14 @@ def has_closed_form(robot: Robot) -> bool:
     return isinstance(robot.closed_form, ClosedFormSolver) or planar_form(robot) is not None
 
 
+def tip_fault(robot: Robot, form: ClosedFormSolver) -> str:
+    """A line if the robot's tip is carried by another joint than the frame that the form places; else ""."""
+    tip, own = (robot.model.frames[robot.model.getFrameId(name)] for name in (robot.tip, form.frame))
+    if tip.parentJoint == own.parentJoint:
+        return ""
+    return f"its closed form places '{form.frame}', and the tip '{robot.tip}' does not move with that frame"
+
+
 def solutions(robot: Robot, targets: ArrayLike, *, near: ArrayLike | None = None, check: bool = True) -> ClosedForm:
     """All branches for many targets.
 
@@ -80,24 +88,21 @@ def solutions(robot: Robot, targets: ArrayLike, *, near: ArrayLike | None = None
     form = form_of(robot)
     poses = _poses(robot, form, targets)
     count, branches = len(poses), len(form.branches)
-    placed, tip = _placed(robot, form, poses), tip_columns(robot)
-    hints = None if near is None else _hints(robot, near, count)
-    q, residuals = np.empty((robot.dof, branches, count)), np.zeros((2, branches, count)) if check else None
-    real, valid = np.empty((branches, count), dtype=bool), np.empty((branches, count), dtype=bool)
-    singular = np.empty(count, dtype=np.uint8)
+    placed, hints = _placed(robot, form, poses), None if near is None else _hints(robot, near, count)
+    q, real = np.empty((robot.dof, branches, count)), np.empty((branches, count), dtype=bool)
+    valid, singular = np.empty_like(real), np.empty(count, dtype=np.uint8)
+    residuals, tip = np.zeros((2, branches, count)), tip_columns(robot)
     for begin in range(0, count, BLOCK):
         rows = slice(begin, begin + BLOCK)
         hint = None if hints is None else hints[rows]
         found = form(placed[rows], hint)
         q[..., rows], real[:, rows], singular[rows] = found.q.T, found.real.T, found.singular
         valid[:, rows] = real[:, rows] & _turn_inside(robot, q[..., rows], hint)
-        if residuals is not None:
+        if check:
             residuals[..., rows] = _residuals(tip.poses(q[..., rows]), poses[rows], form.kind == "pose")
-    answers = (q.T, real.T, valid.T, singular, None if residuals is None else residuals.T)
-    for array in answers:
-        if array is not None:
-            array.setflags(write=False)
-    return ClosedForm(*answers)
+    for array in (q, real, valid, singular, residuals):
+        array.setflags(write=False)
+    return ClosedForm(q.T, real.T, valid.T, singular, residuals.T if check else None)
 
 
 def family(robot: Robot, target: ArrayLike, *, samples: int = SWEEP) -> Matrix:
@@ -163,13 +168,11 @@ def _hints(robot: Robot, near: ArrayLike, count: int) -> Matrix:
 
 def _placed(robot: Robot, form: ClosedFormSolver, poses: NDArray[np.float64]) -> NDArray[np.float64]:
     """T_base_frame for T_world_tip: the base may stand anywhere, and the tip may be another frame of the last link."""
+    fault = tip_fault(robot, form)
+    if fault:
+        raise InputError(f"robot '{robot.name}': {fault}; method 'numeric' fits every tip")
     frames = robot.model.frames
     base, tip, own = (frames[robot.model.getFrameId(name)] for name in (robot.link_names[0], robot.tip, form.frame))
-    if tip.parentJoint != own.parentJoint:
-        raise InputError(
-            f"robot '{robot.name}': its closed form places '{form.frame}', and the tip '{robot.tip}' does not move "
-            "with that frame; method 'numeric' fits every tip"
-        )
     T_base_world = base.placement.inverse().homogeneous
     T_tip_frame = (tip.placement.inverse() * own.placement).homogeneous
     if not np.array_equal(T_base_world, np.eye(4)):

@@ -17,6 +17,7 @@ from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
 from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
 
 NEAR = 0.05  # singular values below this are damped; metres count in units of the arm's reach
+LOST = 1e-12  # singular values below this are 0
 DAMPING = 0.05  # at a singular value of 0
 
 
@@ -68,20 +69,15 @@ def rate(
     jacobian = robot.jacobian_batch(values[None])[0]
     reach = float(np.linalg.norm(robot.chain.placement[1:, :3, 3], axis=1).sum()) or 1.0
     units = np.array([1.0 / reach] * 3 + [1.0] * 3)
+    low, high = values <= robot.lower + LIMIT_TOLERANCE, values >= robot.upper - LIMIT_TOLERANCE
     free = np.ones(robot.dof, dtype=bool)
-    for _ in range(robot.dof):  # each round stops at least one joint more
+    while True:  # each round holds at least one joint more; held joints do not move, so it ends
         qdot, smallest = _damped(jacobian * units[:, None] * free, wanted * units, extra * free, damping, near)
-        blocked = free & (
-            ((values <= robot.lower + LIMIT_TOLERANCE) & (qdot < 0.0))
-            | ((values >= robot.upper - LIMIT_TOLERANCE) & (qdot > 0.0))
-        )
+        blocked = free & ((low & (qdot < 0.0)) | (high & (qdot > 0.0)))
         if not blocked.any():
             break
         free &= ~blocked
-    else:
-        qdot = np.zeros(robot.dof)
-    with np.errstate(invalid="ignore"):
-        scale = 1.0 / max(1.0, float(np.max(np.abs(qdot) / robot.velocity)))
+    scale = 1.0 / max(1.0, float(np.max(np.abs(qdot) / robot.velocity)))
     names = tuple(name for name, is_free in zip(robot.joint_names, free, strict=True) if not is_free)
     return Rate(frozen(qdot * scale), frozen(jacobian @ (qdot * scale)), smallest, scale, names)
 
@@ -90,8 +86,7 @@ def _damped(J: Matrix, twist: Vector, bias: Vector, damping: float, near: float)
     """Singular directions are followed by s / (s^2 + l^2); what that leaves of the joint space follows the bias."""
     U, s, Vt = np.linalg.svd(J)
     square = np.where(s < near, (1.0 - (s / near) ** 2) * damping**2, 0.0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        inverse = np.where(s > 1e-12, s / (s * s + square), 0.0)
+    inverse = np.divide(s, s * s + square, out=np.zeros_like(s), where=s > LOST)
     kept = np.zeros(len(Vt))
     kept[: len(s)] = s * inverse  # share of each direction that the twist has taken
     V = Vt.T

@@ -6,6 +6,7 @@ A chain of joints is folded beforehand into fixed transforms between turns about
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -54,6 +55,7 @@ class TipColumns:
         return list(np.tensordot(self.gain, q, 1) + self.offset.reshape(-1, *(1,) * (q.ndim - 1)))
 
 
+@lru_cache(maxsize=64)
 def tip_columns(robot: Robot) -> TipColumns:
     """The chain from the base to the robot's tip."""
     chain, target = robot.chain, robot.model.frames[robot.model.getFrameId(robot.tip)]
