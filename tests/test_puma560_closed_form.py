@@ -93,28 +93,6 @@ def test_over_the_shoulder_the_arm_is_singular():
         assert "shoulder" in report.active
 
 
-def test_eaik_finds_the_same_solutions():
-    """An independent check: subproblem decomposition of the same arm (EAIK), where it is installed."""
-    eaik = pytest.importorskip("eaik.IK_HP")
-    robot = load_robot("puma560")
-    other, at_zero = eaik.HPRobot(*axes_and_offsets(robot)), robot.fk(np.zeros(6)).rotation
-    for q in np.random.default_rng(4).uniform(robot.lower, robot.upper, (50, 6)):
-        ours = solutions(robot, robot.fk_batch(q[None]))
-        pose = robot.fk(q).homogeneous
-        pose[:3, :3] = pose[:3, :3] @ at_zero.T  # EAIK's tip is parallel to the base at zero
-        theirs = np.array(other.IK(pose).Q)
-        gaps = np.abs(wrapped(theirs[:, None] - ours.branches[0][None])).max(axis=2)
-        assert len(theirs) == ours.real.sum() == 8
-        assert gaps.min(axis=1).max() < 1e-6
-
-
-def axes_and_offsets(robot):
-    """Joint axes, shape (6, 3), and the offsets from the base over the joints to the tip, shape (7, 3), at zero."""
-    frames = robot.joint_frames(np.zeros((1, 6)))[0, 1:]
-    points = np.vstack([np.zeros(3), frames[:, :3, 3], robot.fk(np.zeros(6)).translation])
-    return np.einsum("kij,kj->ki", frames[:, :3, :3], robot.chain.axis), np.diff(points, axis=0)
-
-
 def test_the_form_says_what_its_branches_are():
     form = form_of(load_robot("puma560"))
     assert (form.kind, len(form.branches), form.families) == ("pose", 8, ("wrist",))

@@ -130,6 +130,18 @@ def test_a_singular_pose_whose_representatives_break_the_limits_is_still_solved(
         assert result.found, np.degrees(q)
 
 
+@pytest.mark.parametrize(("name", "joint", "value"), [("titan4", 4, np.pi / 2), ("puma560", 4, 0.0)])
+def test_a_singular_pose_that_is_known_to_six_digits_is_solved_within_its_tolerance(name, joint, value):
+    robot, rng = rrtik.load_robot(name), np.random.default_rng(2)
+    for q in rng.uniform(robot.lower, robot.upper, (100, 6)):
+        q[joint] = value
+        tip = robot.fk(q) * pin.SE3(pin.exp3(rng.normal(0.0, 1e-6, 3)), rng.normal(0.0, 1e-6, 3))
+        goal = rrtik.PoseGoal(tip)
+        result = solve_ik(robot, goal, method="closed-form")
+        assert result.found, np.degrees(q)
+        assert goal.satisfied(robot, result.solutions).all()
+
+
 def test_no_time_is_a_reason_of_its_own():
     robot = rrtik.load_robot("panda")
     far = rrtik.PoseGoal(pose_from_rpy([5, 0, 0], [0, 0, 0]))

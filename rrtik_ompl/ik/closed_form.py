@@ -72,7 +72,9 @@ def tip_fault(robot: Robot, form: ClosedFormSolver) -> str:
     return f"its closed form places '{form.frame}', and the tip '{robot.tip}' does not move with that frame"
 
 
-def solutions(robot: Robot, targets: ArrayLike, *, near: ArrayLike | None = None, check: bool = True) -> ClosedForm:
+def solutions(
+    robot: Robot, targets: ArrayLike, *, near: ArrayLike | None = None, slack: float = 0.0, check: bool = True
+) -> ClosedForm:
     """All branches for many targets.
 
     Args:
@@ -80,6 +82,8 @@ def solutions(robot: Robot, targets: ArrayLike, *, near: ArrayLike | None = None
         targets: T_world_tip, shape (m, 4, 4); or points [m], shape (m, 3), if the robot's form is one of positions.
         near: Configuration or configurations, shape (dof,) or (m, dof): singular targets are answered by the members
             of their curve nearest to it, and full turns are chosen to lie near it. Zeros if None.
+        slack: A target that is this near to a singular one [m, sine of an angle] is answered as if it were singular,
+            with residuals up to about that; for targets that are only known so well.
         check: Whether forward kinematics judges every answer (``residuals``); that takes most of the time.
 
     Raises:
@@ -95,7 +99,7 @@ def solutions(robot: Robot, targets: ArrayLike, *, near: ArrayLike | None = None
     for begin in range(0, count, BLOCK):
         rows = slice(begin, begin + BLOCK)
         hint = None if hints is None else hints[rows]
-        found = form(placed[rows], hint)
+        found = form(placed[rows], hint, slack)
         q[..., rows], real[:, rows], singular[rows] = found.q.T, found.real.T, found.singular
         valid[:, rows] = real[:, rows] & _turn_inside(robot, q[..., rows], hint)
         if check:
@@ -105,13 +109,14 @@ def solutions(robot: Robot, targets: ArrayLike, *, near: ArrayLike | None = None
     return ClosedForm(q.T, real.T, valid.T, singular, residuals.T if check else None)
 
 
-def family(robot: Robot, target: ArrayLike, *, samples: int = SWEEP) -> Matrix:
+def family(robot: Robot, target: ArrayLike, *, samples: int = SWEEP, slack: float = 0.0) -> Matrix:
     """The solutions inside the joint limits of one target, singular or not: of a curve, samples along it.
 
     Args:
         robot: An arm with a closed form.
         target: T_world_tip, shape (4, 4), or a point, shape (3,).
         samples: Values of the free angle over a full turn.
+        slack: See `solutions`.
 
     Returns:
         Configurations, shape (k, dof), branch by branch in the order of the free angle.
@@ -120,9 +125,10 @@ def family(robot: Robot, target: ArrayLike, *, samples: int = SWEEP) -> Matrix:
     near = np.zeros((samples, robot.dof))
     near[:, list(form.free)] = np.linspace(-np.pi, np.pi, samples, endpoint=False)[:, None]
     goal = np.asarray(target, dtype=np.float64)
-    found = solutions(robot, goal[None], check=False)
+    found = solutions(robot, goal[None], slack=slack, check=False)
     if found.singular[0]:
-        found = solutions(robot, np.broadcast_to(goal, (samples, *goal.shape)), near=near, check=False)
+        many = np.broadcast_to(goal, (samples, *goal.shape))
+        found = solutions(robot, many, near=near, slack=slack, check=False)
     rows: Matrix = found.branches.transpose(1, 0, 2)[found.valid.T]
     new = np.abs(np.diff(rows, axis=0, prepend=np.full((1, robot.dof), np.inf))).max(axis=1) > LIMIT_TOLERANCE
     different: Matrix = rows[new]

@@ -46,9 +46,10 @@ class ClosedFormSolver:
         branches: A label for each branch.
         families: Names of the kinds of singular poses.
         free: The joints that tell where on a family's curve a configuration lies (see ``solve``).
-        solve: From T_base_frame, shape (m, 4, 4), and ``near``, shape (m, dof) or None, to `Branches`. The
+        solve: From T_base_frame, shape (m, 4, 4), ``near``, shape (m, dof) or None, and a slack, to `Branches`. The
             representatives of a singular pose are the members of its curve nearest to the values that the free joints
-            have in ``near`` (0 if None), and to these values turned by half a turn.
+            have in ``near`` (0 if None), and to these values turned by half a turn. The number is the slack [m, sine]:
+            a pose that near to a singular one is answered as if it were singular, off by at most about that.
         nearness: From Q, shape (m, dof), to the named singular cases: 0 at the singularity, in [0, 1] or metres.
     """
 
@@ -57,12 +58,12 @@ class ClosedFormSolver:
     branches: tuple[str, ...]
     families: tuple[str, ...]
     free: tuple[int, ...]
-    solve: Callable[[NDArray[np.float64], Matrix | None], Branches]
+    solve: Callable[[NDArray[np.float64], Matrix | None, float], Branches]
     nearness: Callable[[Matrix], Mapping[str, Vector]]
 
-    def __call__(self, poses: NDArray[np.float64], near: Matrix | None = None) -> Branches:
+    def __call__(self, poses: NDArray[np.float64], near: Matrix | None = None, slack: float = 0.0) -> Branches:
         """All branches for T_base_frame, shape (m, 4, 4); see ``solve``."""
-        return self.solve(poses, near)
+        return self.solve(poses, near, slack)
 
 
 def wrapped(angle: NDArray[np.float64]) -> NDArray[np.float64]:

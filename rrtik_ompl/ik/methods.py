@@ -87,18 +87,24 @@ def _closed_form_misfit(robot: Robot, target: Target) -> str:
 
 
 def _closed_form(question: Question) -> Answer:
-    """All branches of all targets; of a singular pose whose representatives do not do, the curve of its solutions."""
+    """All branches of all targets; if none will do, the curves of those that are singular within their tolerances."""
     robot, targets = question.robot, question.targets
     found = solutions(robot, np.array([_matrix(target) for target in targets]), near=question.near)
     rows, owner = found.branches.reshape(-1, robot.dof), np.repeat(np.arange(len(targets)), found.real.shape[1])
     fits = robot.within_limits(rows) & _at_targets(question, rows, owner)
     q = rows[fits]
-    if found.singular.any() and not question.accept(q).any():
-        curves = [family(robot, _matrix(targets[k])) for k in np.flatnonzero(found.singular)]
-        q = np.vstack([q, *curves])
+    if not question.accept(q).any():
+        q = np.vstack([q, *(family(robot, _matrix(target), slack=_slack(target)) for target in targets)])
     residuals = np.asarray(found.residuals).reshape(-1, 2)
     best = int(np.argmin(residuals.sum(axis=1)))
     return Answer(q, rows[best], targets[int(owner[best])])
+
+
+def _slack(target: Target) -> float:
+    """How far from singular a target may be to be treated as singular: a part of its tolerances [m, rad]."""
+    if isinstance(target, PositionGoal):
+        return 0.0
+    return 0.4 * min(target.position_tolerance, target.orientation_tolerance)
 
 
 def _at_targets(question: Question, rows: Matrix, owner: np.ndarray) -> Mask:

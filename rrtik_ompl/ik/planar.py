@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,9 +30,9 @@ class PlanarArm:
     links: Matrix
     tip: NDArray[np.float64]
 
-    def solve(self, poses: NDArray[np.float64], near: Matrix | None = None) -> Branches:
-        """Both branches for T_base_tip, shape (m, 4, 4); ``near`` is not used, as no pose is singular for good."""
-        del near
+    def solve(self, poses: NDArray[np.float64], near: Matrix | None = None, slack: float = 0.0) -> Branches:
+        """Both branches for T_base_tip, shape (m, 4, 4); ``near`` and ``slack`` are not used: no pose is singular."""
+        del near, slack
         targets = self.to_plane @ poses
         point, real = targets[:, :2, 3], np.abs(targets[:, 2, 3] - self.tip[2, 3]) <= IN_PLANE
         heading = np.zeros(len(poses))
@@ -54,6 +55,7 @@ class PlanarArm:
         return {"elbow": np.abs(np.sin(Q[:, 1] + angles[1] - angles[0]))}
 
 
+@lru_cache(maxsize=64)
 def planar_form(robot: Robot) -> ClosedFormSolver | None:
     """The closed form of a robot whose two or three joints turn about parallel axes, one after another; else None."""
     chain = robot.chain

@@ -59,13 +59,14 @@ def position_form(geometry: PumaGeometry) -> ClosedFormSolver:
     return ClosedFormSolver("tip", "position", ARM_BRANCHES, (), (), solve, partial(nearness, geometry))
 
 
-def puma_branches(g: PumaGeometry, poses: Numbers, near: Matrix | None = None) -> Branches:
+def puma_branches(g: PumaGeometry, poses: Numbers, near: Matrix | None = None, slack: float = 0.0) -> Branches:
     """All eight branches for T_base_tip, shape (m, 4, 4), labelled as in ``BRANCHES``.
 
     Args:
         g: Lengths of the arm.
         poses: Targets; their origin is the wrist centre.
         near: Configurations, shape (m, 6), whose theta4 a straight wrist takes; zeros if None.
+        slack: Sine of theta5 up to which the wrist counts as straight, if more than rounding.
     """
     numbers, count = np.ascontiguousarray(poses.transpose(1, 2, 0)), len(poses)
     u, v, w, p = numbers[:3].transpose(1, 0, 2)
@@ -77,7 +78,7 @@ def puma_branches(g: PumaGeometry, poses: Numbers, near: Matrix | None = None) -
     forward = w[0] * c1 + w[1] * s1
     x, y, z = forward * c23 + w[2] * s23, w[1] * c1 - w[0] * s1, w[2] * c23 - forward * s23
     sine = np.hypot(x, y)
-    straight = sine < SINGULAR
+    straight = sine < max(SINGULAR, slack)
     theta4 = np.where(straight, 0.0 if near is None else near[:, 3], np.arctan2(-y, -x))
     c4, s4 = np.cos(theta4), np.sin(theta4)
     ax, ay, az = -s4 * c23 * c1 - c4 * s1, -s4 * c23 * s1 + c4 * c1, -s4 * s23  # the axis of joint 5, backwards
@@ -90,9 +91,9 @@ def puma_branches(g: PumaGeometry, poses: Numbers, near: Matrix | None = None) -
     return Branches(q.reshape(6, 8, count).transpose(2, 1, 0), both.reshape(8, count).T, singular)
 
 
-def arm_branches(g: PumaGeometry, poses: Numbers, near: Matrix | None = None) -> Branches:
-    """All four branches that bring the wrist centre to the origins of poses, shape (m, 4, 4); ``near`` is not used."""
-    del near
+def arm_branches(g: PumaGeometry, poses: Numbers, near: Matrix | None = None, slack: float = 0.0) -> Branches:
+    """All four branches that bring the wrist centre to the origins of poses, shape (m, 4, 4); none is singular."""
+    del near, slack
     x, y, z = np.ascontiguousarray(poses[:, :3, 3].T)
     q, real = _arm(g, x, y, g.base - z)
     return Branches(

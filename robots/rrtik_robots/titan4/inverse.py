@@ -50,22 +50,25 @@ def closed_form(geometry: TitanGeometry) -> ClosedFormSolver:
     return ClosedFormSolver("grip_point", "pose", BRANCHES, FAMILIES, (0, 1), solve, partial(nearness, geometry))
 
 
-def titan_branches(g: TitanGeometry, poses: NDArray[np.float64], near: Matrix | None = None) -> Branches:
+def titan_branches(
+    g: TitanGeometry, poses: NDArray[np.float64], near: Matrix | None = None, slack: float = 0.0
+) -> Branches:
     """All eight branches for T_base_E, shape (m, 4, 4), labelled as in ``BRANCHES``; angles are physical ones.
 
     Args:
         g: Lengths of the arm.
         poses: Targets.
         near: Configurations, shape (m, 6), that say which member of a singular family is wanted; zeros if None.
+        slack: How near to singular counts as singular [m, sine], if more than rounding.
     """
     numbers = np.ascontiguousarray(poses.transpose(1, 2, 0))
     w = numbers[:3, 2]
     target = Target(numbers[:3, 0], w, numbers[:3, 3] - g.d6 * w)
     distance = np.hypot(target.p[0], target.p[1])
-    on_axis = distance < SINGULAR
+    on_axis = distance < max(SINGULAR, slack)
     c1, s1 = target.p[:2] / np.where(on_axis, 1.0, distance)
     x, h = _in_plane(target, c1, s1)
-    normal = h < np.minimum(SINGULAR + ROUNDING / np.maximum(distance, SINGULAR), NORMAL)
+    normal = h < np.maximum(np.minimum(SINGULAR + ROUNDING / np.maximum(distance, SINGULAR), NORMAL), slack)
     direction = SIGMA * np.stack([x, w[2]])[:, None] / np.where(normal, 1.0, h)  # cosine and sine of psi, (2, 2, m)
     cosines, sines = np.stack([direction[0], -direction[0]]), np.stack([direction[1], direction[1]])
     front = np.arctan2(target.p[1], target.p[0])
@@ -73,7 +76,7 @@ def titan_branches(g: TitanGeometry, poses: NDArray[np.float64], near: Matrix | 
     turn = np.stack([np.stack([c1, -c1]), np.stack([s1, -s1])])[:, :, None]
     q, real = _completed(g, target, theta1, turn, cosines, sines)
     odd = np.flatnonzero(on_axis | normal)
-    horizontal = np.abs(w[2]) < SINGULAR  # then the arm plane can be turned normal to the gripper axis
+    horizontal = np.abs(w[2]) < max(SINGULAR, slack)  # then the arm plane can be turned normal to the gripper axis
     singular = ((normal | (on_axis & horizontal)) * np.uint8(1) + on_axis * np.uint8(2)).astype(np.uint8)
     if len(odd):
         wanted = np.zeros((len(odd), 6)) if near is None else near[odd]
