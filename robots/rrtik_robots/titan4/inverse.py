@@ -23,7 +23,8 @@ from rrtik_robots.titan4.singularities import nearness
 FAMILIES = ("wrist", "shoulder")
 BRANCHES = tuple(" ".join(tag) for tag in product(("front", "back"), ("near", "far"), ("up", "down")))
 ROUNDING = 3e-16  # [m] of the wrist point: divided by its distance from the azimuth axis, of theta1 and so of h
-NORMAL = 1e-9  # sine; largest deviation of the gripper axis from the arm plane's normal that counts as none
+NORMAL = 4e-10  # sine; largest deviation of the gripper axis from the arm plane's normal that counts as none
+UNSURE = 1e-3  # sine; nearer to normal, rounding in psi can open a triangle that closes
 SIGMA = np.array([1.0, -1.0])[:, None]  # the two ways of the wrist: theta5 and pi - theta5
 
 
@@ -75,7 +76,7 @@ def titan_branches(
     theta1 = np.stack([front, np.where(front > 0.0, front - np.pi, front + np.pi)])[:, None]
     turn = np.stack([np.stack([c1, -c1]), np.stack([s1, -s1])])[:, :, None]
     q, real = _completed(g, target, theta1, turn, cosines, sines)
-    odd = np.flatnonzero(on_axis | normal)
+    odd = np.flatnonzero(on_axis | normal | ((h < UNSURE) & ~real.all(axis=(0, 1, 2))))
     horizontal = np.abs(w[2]) < max(SINGULAR, slack)  # then the arm plane can be turned normal to the gripper axis
     singular = ((normal | (on_axis & horizontal)) * np.uint8(1) + on_axis * np.uint8(2)).astype(np.uint8)
     if len(odd):
@@ -130,7 +131,10 @@ def _completed(
 def _representatives(
     g: TitanGeometry, target: Target, on_axis: NDArray[np.bool_], normal: NDArray[np.bool_], near: Matrix
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Branches of singular poses: what is free takes the value nearest to that of ``near`` that the arm can reach."""
+    """Branches of singular poses: what is free takes the value nearest to that of ``near`` that the arm can reach.
+
+    Where psi is not free but poorly known, it moves into reach if that turns the gripper by no more than rounding.
+    """
     front = np.where(on_axis, near[:, 0], np.arctan2(target.p[1], target.p[0]))
     theta1 = np.broadcast_to((front + np.array([0.0, np.pi])[:, None])[:, None], (2, 2, len(near))).copy()
     theta1[..., on_axis] = nearest_azimuth(g, target.w[:, on_axis], target.p[2, on_axis], theta1[..., on_axis])
@@ -138,8 +142,9 @@ def _representatives(
     turn = np.stack([np.cos(theta1), np.sin(theta1)])
     x, h = _in_plane(target, *turn)
     psi = np.arctan2(SIGMA * target.w[2], SIGMA * x)
-    wanted = near[:, 1:4].sum(axis=1) + np.array([0.0, np.pi])[:, None]
+    any_psi = np.where(on_axis, h < SINGULAR, normal)
+    wanted = np.where(any_psi, near[:, 1:4].sum(axis=1) + np.array([0.0, np.pi])[:, None], psi)
     radius = target.p[0] * turn[0] + target.p[1] * turn[1]
-    free, _ = nearest_psi(g, radius, target.p[2], np.broadcast_to(wanted, psi.shape))
-    psi = np.where(np.where(on_axis, h < SINGULAR, normal), free, psi)
+    free, _ = nearest_psi(g, radius, target.p[2], wanted)
+    psi = np.where(any_psi | (np.abs(wrapped(free - psi)) * h < SINGULAR), free, psi)
     return _completed(g, target, theta1, turn, np.cos(psi), np.sin(psi))
