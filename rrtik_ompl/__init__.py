@@ -21,6 +21,11 @@ if TYPE_CHECKING:
     from rrtik_ompl.goal import JointGoal as JointGoal
     from rrtik_ompl.goal import PoseGoal as PoseGoal
     from rrtik_ompl.goal import PositionGoal as PositionGoal
+    from rrtik_ompl.ik.batch import IkBatch as IkBatch
+    from rrtik_ompl.ik.batch import solve_ik_batch as solve_ik_batch
+    from rrtik_ompl.ik.face import IkResult as IkResult
+    from rrtik_ompl.ik.face import list_ik_methods as list_ik_methods
+    from rrtik_ompl.ik.face import solve_ik as solve_ik
     from rrtik_ompl.one_joint import one_joint_moves as one_joint_moves
     from rrtik_ompl.path import JointPath as JointPath
     from rrtik_ompl.path import load_path as load_path
@@ -49,6 +54,8 @@ else:
         "catalog": ("list_problems", "list_robots", "load_robot"),
         "errors": ("InputError", "PlannerError", "ProblemError", "RrtikError", "UnknownNameError"),
         "goal": ("GoalRegion", "JointGoal", "PoseGoal", "PositionGoal"),
+        "ik.batch": ("IkBatch", "solve_ik_batch"),
+        "ik.face": ("IkResult", "list_ik_methods", "solve_ik"),
         "one_joint": ("one_joint_moves",),
         "path": ("JointPath", "load_path"),
         "planning": ("Plan", "list_planners", "plan"),

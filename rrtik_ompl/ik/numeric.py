@@ -34,19 +34,27 @@ def numeric_ik(robot: Robot, goal: PoseGoal | PositionGoal, starts: Matrix, *, i
     Returns:
         The rows that satisfy the goal, in the order of their starts, shape (k, dof), k <= m.
     """
+    Q, _ = descend(robot, goal, starts, iterations=iterations)
+    return Q[goal.satisfied(robot, Q)]
+
+
+def descend(
+    robot: Robot, goal: PoseGoal | PositionGoal, starts: Matrix, *, iterations: int = ITERATIONS
+) -> tuple[Matrix, int]:
+    """As `numeric_ik`, but where every start has led to, at the goal or not: shape (m, dof), and the steps taken."""
     Q = np.clip(starts, robot.lower, robot.upper)
     reach = float(np.linalg.norm(robot.chain.placement[:, :3, 3], axis=1).sum()) or 1.0
     scale = np.array([1.0 / reach] * 3 + [0.5] * 3)  # a full turn of orientation counts as much as the whole reach
-    for _ in range(iterations):
+    for step in range(iterations):
         open_rows = np.flatnonzero(~_well_inside(robot, goal, Q))
         if len(open_rows) == 0:
-            break
+            return Q, step
         q = Q[open_rows]
         residual, jacobian = _residual(goal, robot.fk_batch(q)), robot.jacobian_batch(q)
         rows = slice(0, 3) if isinstance(goal, PositionGoal) else slice(0, 6)
         e, J = (residual * scale)[:, rows], (jacobian * scale[:, None])[:, rows]
         Q[open_rows] = np.clip(q + _step(J, e), robot.lower, robot.upper)
-    return Q[goal.satisfied(robot, Q)]
+    return Q, iterations
 
 
 def targets(

@@ -12,6 +12,7 @@ from rrtik_ompl.arrays import finite_array
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.errors import UnknownNameError
 from rrtik_ompl.robot import Robot
+from rrtik_robots.puma560.inverse import PumaGeometry, pose_form, position_form
 
 INCH = 0.0254  # [m]
 RIGHT = np.pi / 2
@@ -52,10 +53,12 @@ def puma560(*, base_height: float = 0.672, tip: str = "tip", base_pose: Any | No
         DhRow(a=a, alpha=alpha, d=height if k == 0 else d, limits=_radians(limits))
         for k, (a, alpha, d, limits, _) in enumerate(ROWS_560)
     ]
+    geometry = PumaGeometry(base=height, a2=rows[1].a, a3=rows[2].a, d3=rows[2].d, d4=rows[3].d)
     return robot_from_dh(
         "puma560",
         rows,
         convention="standard",
+        closed_form=pose_form(geometry),
         radius=[row[-1] for row in ROWS_560],
         floor_gap=ROWS_560[0][-1] + 0.01,
         tip=tip,
@@ -104,6 +107,7 @@ def _cut(name: str, joints: int, lengths: Mapping[str, float] | None, tip: str, 
         (size["a3"], -RIGHT, size["d4"], 0.05),
         (0.0, RIGHT, 0.0, 0.045),
     ][:joints]
+    geometry = PumaGeometry(base=0.0, a2=size["a2"], a3=size["a3"], d3=-size["d3"], d4=size["d4"])
     end = DhRow(a=size["a3"], alpha=-RIGHT, d=size["d4"]) if joints == 3 else DhRow(alpha=-RIGHT, d=size["d7"])
     tool = pin.SE3(pin.rpy.rpyToMatrix(end.alpha, 0.0, 0.0), np.array([end.a, 0.0, 0.0]))
     return robot_from_dh(
@@ -113,6 +117,7 @@ def _cut(name: str, joints: int, lengths: Mapping[str, float] | None, tip: str, 
             for (a, alpha, d, _), limits in zip(table, LIMITS_CUT_DEG, strict=False)
         ],
         convention="modified",
+        closed_form=position_form(geometry) if joints == 3 else None,
         radius=[row[-1] for row in table],
         tool=tool * pin.SE3(np.eye(3), np.array([0.0, 0.0, end.d])),
         tip=tip,

@@ -17,6 +17,7 @@ from rrtik_robots.titan4.geometry import (
     geometry_from,
     limits_rad,
 )
+from rrtik_robots.titan4.inverse import closed_form
 from rrtik_robots.titan4.urdf import titan4_urdf
 
 __all__ = ["JOINTS", "LIMITS_ENVELOPE_DEG", "LIMITS_PLANNING_DEG", "TitanGeometry", "titan4", "titan4_urdf"]
@@ -46,8 +47,9 @@ def titan4(
         InputError: If the limit set, a length or the tip makes no sense.
     """
     bounds = {joint: JointLimits(lower=low, upper=high) for joint, (low, high) in limits_rad(limits).items()}
+    geometry = geometry_from(lengths)
     return robot_from_urdf_text(
-        titan4_urdf(geometry_from(lengths)),
+        titan4_urdf(geometry),
         name="titan4",
         where="titan4",
         srdf=FOLDER / "titan4.srdf",
@@ -56,4 +58,5 @@ def titan4(
         tip=tip,
         base_pose=base_pose,
         limits=bounds,
+        closed_form=closed_form(geometry),
     )

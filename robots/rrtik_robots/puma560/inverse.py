@@ -1,0 +1,133 @@
+"""Inverse kinematics of the PUMA 560 in closed form: eight branches of the six-joint arm, four of the first three.
+
+The wrist centre gives the shoulder (front or back of it) and a triangle (elbow up or down); the orientation that is
+left gives the three wrist angles in two ways. Arrays are kept as (shoulder, elbow, wrist, m).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.ik.form import REACH_TOLERANCE, SINGULAR, Branches, ClosedFormSolver, two_links, wrapped
+
+Numbers = NDArray[np.float64]
+SHOULDER_ROOT = 1e-15  # [m^2] of a squared radius: less is rounding, which moves the wrist centre by less than 1e-14 m
+ARM_BRANCHES = tuple(" ".join(tag) for tag in product(("front", "back"), ("up", "down")))
+BRANCHES = tuple(" ".join(tag) for tag in product(("front", "back"), ("up", "down"), ("near", "flip")))
+
+
+@dataclass(frozen=True, slots=True)
+class PumaGeometry:
+    """Lengths [m] in the standard Denavit-Hartenberg sense, z of the shoulder's axis to the right of the arm.
+
+    Attributes:
+        base: Height of the shoulder.
+        a2: Upper arm.
+        a3, d4: Forearm, across and along.
+        d3: Sideways offset of the arm plane.
+    """
+
+    base: float
+    a2: float
+    a3: float
+    d3: float
+    d4: float
+
+    @property
+    def forearm(self) -> float:
+        """Elbow axis to wrist centre."""
+        return float(np.hypot(self.a3, self.d4))
+
+
+def pose_form(geometry: PumaGeometry) -> ClosedFormSolver:
+    """The six-joint arm. With the wrist straight (family ``wrist``) theta4 is free, and theta6 follows it."""
+    return ClosedFormSolver(
+        "tip", "pose", BRANCHES, ("wrist",), (3,), partial(puma_branches, geometry), partial(nearness, geometry)
+    )
+
+
+def position_form(geometry: PumaGeometry) -> ClosedFormSolver:
+    """The first three joints in the modified Denavit-Hartenberg sense (theta2, theta3 turn downwards)."""
+    solve = partial(arm_branches, geometry)
+    return ClosedFormSolver("tip", "position", ARM_BRANCHES, (), (), solve, partial(nearness, geometry))
+
+
+def puma_branches(g: PumaGeometry, poses: Numbers, near: Matrix | None = None, slack: float = 0.0) -> Branches:
+    """All eight branches for T_base_tip, shape (m, 4, 4), labelled as in ``BRANCHES``.
+
+    Args:
+        g: Lengths of the arm.
+        poses: Targets; their origin is the wrist centre.
+        near: Configurations, shape (m, 6), whose theta4 a straight wrist takes; zeros if None.
+        slack: Sine of theta5 up to which the wrist counts as straight, if more than rounding.
+    """
+    numbers, count = np.ascontiguousarray(poses.transpose(1, 2, 0)), len(poses)
+    u, v, w, p = numbers[:3].transpose(1, 0, 2)
+    arm, real = _arm(g, p[0], p[1], p[2] - g.base)
+    q = np.empty((6, 2, 2, 2, count))
+    q[:3] = arm[:, :, :, None]
+    c1, s1 = np.cos(arm[0]), np.sin(arm[0])
+    c23, s23 = np.cos(arm[1] + arm[2]), np.sin(arm[1] + arm[2])
+    forward = w[0] * c1 + w[1] * s1
+    x, y, z = forward * c23 + w[2] * s23, w[1] * c1 - w[0] * s1, w[2] * c23 - forward * s23
+    sine = np.hypot(x, y)
+    straight = sine < max(SINGULAR, slack)
+    theta4 = np.where(straight, 0.0 if near is None else near[:, 3], np.arctan2(-y, -x))
+    c4, s4 = np.cos(theta4), np.sin(theta4)
+    ax, ay, az = -s4 * c23 * c1 - c4 * s1, -s4 * c23 * s1 + c4 * c1, -s4 * s23  # the axis of joint 5, backwards
+    theta6 = np.arctan2(ax * u[0] + ay * u[1] + az * u[2], ax * v[0] + ay * v[1] + az * v[2])
+    theta5 = np.arctan2(sine, z)
+    q[3, :, :, 0], q[4, :, :, 0], q[5, :, :, 0] = theta4, theta5, theta6
+    q[3, :, :, 1], q[4, :, :, 1], q[5, :, :, 1] = _opposite(theta4), -theta5, _opposite(theta6)
+    singular = (straight & real).any(axis=(0, 1)).astype(np.uint8)
+    both = np.repeat(real[:, :, None], 2, axis=2)
+    return Branches(q.reshape(6, 8, count).transpose(2, 1, 0), both.reshape(8, count).T, singular)
+
+
+def arm_branches(g: PumaGeometry, poses: Numbers, near: Matrix | None = None, slack: float = 0.0) -> Branches:
+    """All four branches that bring the wrist centre to the origins of poses, shape (m, 4, 4); none is singular."""
+    del near, slack
+    x, y, z = np.ascontiguousarray(poses[:, :3, 3].T)
+    q, real = _arm(g, x, y, g.base - z)
+    return Branches(
+        q.reshape(3, 4, len(poses)).transpose(2, 1, 0), real.reshape(4, -1).T, np.zeros(len(poses), dtype=np.uint8)
+    )
+
+
+def _arm(g: PumaGeometry, x: Vector, y: Vector, z: Vector) -> tuple[Numbers, NDArray[np.bool_]]:
+    """Joints 1 to 3 for a wrist centre seen from the shoulder: shapes (3, 2, 2, m) and (2, 2, m)."""
+    square = x * x + y * y - g.d3 * g.d3
+    radius = np.sqrt(np.where(square < SHOULDER_ROOT, 0.0, square))
+    side = np.arctan2(g.d3, radius)
+    heading = np.arctan2(y, x)
+    upper, turn, real = two_links(g.a2, g.forearm, np.stack([radius, -radius]), np.stack([z, z]))
+    q = np.empty((3, 2, 2, len(x)))
+    q[0, 0], q[0, 1] = wrapped(heading + side), wrapped(heading + np.pi - side)
+    q[1] = upper.transpose(1, 0, 2)
+    q[2] = wrapped(turn.transpose(1, 0, 2) - np.arctan2(g.d4, g.a3))
+    clear = square >= -REACH_TOLERANCE
+    return q, np.repeat((real & clear)[:, None], 2, axis=1)
+
+
+def nearness(g: PumaGeometry, Q: Matrix) -> Mapping[str, Vector]:
+    """Zero at the singularity, for Q of shape (m, dof): sines, for ``shoulder`` metres.
+
+    ``elbow``: stretched or folded. ``shoulder``: wrist centre above or below the shoulder, in the plane through the
+    azimuth axis. ``wrist``: axes 4 and 6 in line (six joints). The signs of theta2 and theta3 do not matter here.
+    """
+    forearm = Q[:, 1] + Q[:, 2]
+    radius = g.a2 * np.cos(Q[:, 1]) + g.a3 * np.cos(forearm) - g.d4 * np.sin(forearm)
+    found = {"elbow": np.abs(np.sin(Q[:, 2] + np.arctan2(g.d4, g.a3))), "shoulder": np.abs(radius)}
+    return found | ({"wrist": np.abs(np.sin(Q[:, 4]))} if Q.shape[1] == 6 else {})
+
+
+def _opposite(angle: Numbers) -> Numbers:
+    """The angle half a turn away, in (-pi, pi], for angles that are there too."""
+    return np.where(angle > 0.0, angle - np.pi, angle + np.pi)

@@ -1,0 +1,41 @@
+"""Random postures of the PUMA 560 inside its joint limits, singular ones among them, for tests and benchmarks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.errors import UnknownNameError
+from rrtik_ompl.ik.form import wrapped
+from rrtik_ompl.robot import Robot
+from rrtik_robots.puma560 import ROWS_560
+
+CASES = ("generic", "elbow", "wrist", "shoulder", "elbow wrist", "shoulder wrist")
+
+
+def singular_configurations(robot: Robot, case: str, count: int, rng: np.random.Generator) -> Matrix:
+    """Random postures, shape (count, 6) [rad], of one of ``CASES`` (combinations of families).
+
+    The elbow is stretched: folded it would stand outside its limits.
+
+    Raises:
+        UnknownNameError: If there is no such case.
+    """
+    if case not in CASES:
+        raise UnknownNameError("singular case", case, CASES, where=robot.name)
+    (a2, a3, d4), found = (ROWS_560[1][0], ROWS_560[2][0], ROWS_560[3][2]), np.zeros((0, 6))
+    bend = np.arctan2(d4, a3)
+    while len(found) < count:
+        Q = rng.uniform(robot.lower, robot.upper, (4 * count, 6))
+        if "elbow" in case:
+            Q[:, 2] = -bend
+        if "wrist" in case:
+            Q[:, 4] = 0.0
+        if "shoulder" in case:
+            cosine = -a2 * np.cos(Q[:, 1]) / np.hypot(a3, d4)
+            Q = Q[np.abs(cosine) <= 1.0]
+            cosine = cosine[np.abs(cosine) <= 1.0]
+            Q[:, 2] = wrapped(np.arccos(cosine) * rng.choice([-1.0, 1.0], len(Q)) - bend - Q[:, 1])
+            Q = Q[np.abs(np.sin(Q[:, 2] + bend)) > 0.1]  # folded, the wrist centre would stand in the shoulder
+        found = np.vstack([found, Q[robot.within_limits(Q, 0.0)]])
+    return found[:count]

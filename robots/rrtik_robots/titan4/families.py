@@ -1,0 +1,86 @@
+"""The curves of solutions that singular poses of the TITAN 4 have: which values of the free angle the arm can reach.
+
+Sections 8.1 to 8.3 of the kinematics specification ask for a scan; the intervals have a closed form. With K the wrist
+point seen from the shoulder axis, the elbow triangle closes where |a2 - a3| <= |K - a4 (cos psi, sin psi)| <= a2 + a3,
+which bounds cos(psi - angle of K) from both sides.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.ik.form import REACH_TOLERANCE, SINGULAR, wrapped
+from rrtik_robots.titan4.geometry import TitanGeometry
+
+Numbers = NDArray[np.float64]
+
+
+def psi_interval(
+    g: TitanGeometry, radius: Numbers, height: Numbers
+) -> tuple[Numbers, Numbers, Numbers, NDArray[np.bool_]]:
+    """Values of psi for which the arm reaches a wrist point: centre - high .. centre - low and centre + low .. + high.
+
+    Args:
+        g: Lengths of the arm.
+        radius: Of the wrist point in the arm plane, from the azimuth axis [m].
+        height: Above the shoulder axis [m], same shape.
+
+    Returns:
+        ``centre, low, high`` [rad], 0 <= low <= high <= pi, and whether there is any such psi.
+    """
+    x = radius - g.a1
+    square = x * x + height * height
+    scale = np.maximum(2.0 * g.a4 * np.sqrt(square), 1e-300)
+    most = (square + g.a4**2 - (g.a2 - g.a3) ** 2) / scale
+    least = (square + g.a4**2 - (g.a2 + g.a3) ** 2) / scale
+    exists = (least <= 1.0 + REACH_TOLERANCE) & (most >= -1.0 - REACH_TOLERANCE)
+    low, high = np.arccos(np.clip(most, -1.0, 1.0)), np.arccos(np.clip(least, -1.0, 1.0))
+    return np.arctan2(height, x), low, high, exists
+
+
+def nearest_psi(
+    g: TitanGeometry, radius: Numbers, height: Numbers, wanted: Numbers
+) -> tuple[Numbers, NDArray[np.bool_]]:
+    """The reachable psi nearest to the wanted one, and whether any is reachable; shapes as given."""
+    centre, low, high, exists = psi_interval(g, radius, height)
+    away = wrapped(wanted - centre)
+    return centre + np.copysign(np.clip(np.abs(away), low, high), away), exists
+
+
+def nearest_azimuth(g: TitanGeometry, w: Matrix, height: Vector, wanted: Numbers) -> Numbers:
+    """With the wrist point on the azimuth axis: the theta1 nearest to the wanted one that the arm can reach.
+
+    It is the wanted one, or an end of an interval of reachable psi, or the one that turns the arm plane normal to the
+    gripper axis (where psi is free). If none is reachable, the wanted one.
+
+    Args:
+        g: Lengths of the arm.
+        w: Gripper axis, shape (3, m).
+        height: Of the wrist point above the shoulder axis [m], shape (m,).
+        wanted: Shape (2, 2, m); the second axis is the way of the wrist, sigma = 1, -1.
+    """
+    sigma = np.array([1.0, -1.0])[:, None]
+    choices = np.concatenate([wanted[None], _ends(g, w, height, wanted.shape)])
+    x = w[0] * np.cos(choices) + w[1] * np.sin(choices)
+    psi = np.arctan2(sigma * w[2], sigma * x)
+    reached, exists = nearest_psi(g, np.zeros_like(x), np.broadcast_to(height, x.shape), psi)
+    fits = exists & ((np.hypot(x, w[2]) < SINGULAR) | (np.abs(wrapped(reached - psi)) < 1e-9))
+    distance = np.where(fits, np.abs(wrapped(choices - wanted)), np.inf)
+    best = np.argmin(distance, axis=0)
+    nearest: Numbers = np.take_along_axis(choices, best[None], axis=0)[0]
+    return nearest
+
+
+def _ends(g: TitanGeometry, w: Matrix, height: Vector, shape: tuple[int, ...]) -> Numbers:
+    """Values of theta1 at which psi is at an end of its intervals, or is free; shape (10, 2, 2, m)."""
+    centre, low, high, _ = psi_interval(g, np.zeros_like(height), height)
+    psi = centre + np.stack([low, -low, high, -high])
+    flat, heading = np.hypot(w[0], w[1]), np.arctan2(w[1], w[0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        away = np.arccos(np.clip(w[2] / (np.tan(psi) * flat), -1.0, 1.0))
+    away = np.where(np.isfinite(away), away, 0.0)
+    right = np.full_like(away[:1], np.pi / 2)
+    ends = heading + np.concatenate([away, -away, right, -right])
+    return np.broadcast_to(ends[:, None, None], (len(ends), *shape))

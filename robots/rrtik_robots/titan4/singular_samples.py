@@ -1,0 +1,56 @@
+"""Random singular postures of the TITAN 4, for tests and benchmarks; joint limits aside."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.errors import UnknownNameError
+from rrtik_ompl.ik.form import wrapped
+from rrtik_robots.titan4.geometry import TitanGeometry
+
+RIGHT = np.pi / 2
+CASES = ("generic", "elbow", "wrist", "shoulder", "elbow wrist", "shoulder wrist", "case 1", "case 2", "all psi")
+
+
+def singular_configurations(case: str, count: int, rng: np.random.Generator, g: TitanGeometry | None = None) -> Matrix:
+    """Random postures, shape (count, 6) [rad], of one of ``CASES``.
+
+    The names are those of the families; ``case 1`` and ``case 2`` have axis 5 or axis 6 on axis 1; ``all psi`` has the
+    wrist point on axis 1 and the gripper axis normal to the arm plane while link 4 is upright.
+
+    Raises:
+        UnknownNameError: If there is no such case.
+    """
+    geometry = TitanGeometry() if g is None else g
+    if case not in CASES:
+        raise UnknownNameError("singular case", case, CASES, where="titan4")
+    Q = rng.uniform(-np.pi, np.pi, (count, 6))
+    if "shoulder" in case:
+        Q = _on_axis(geometry, Q, None, rng)
+    elif case in ("case 1", "case 2", "all psi"):
+        psi = rng.choice([0.0, np.pi], count) if case == "case 1" else np.full(count, RIGHT)
+        Q = _on_axis(geometry, Q, psi, rng)
+    if "elbow" in case:
+        Q[:, 2] = rng.choice([0.0, np.pi], count)
+    if "wrist" in case or case == "all psi":
+        Q[:, 4] = rng.choice([-RIGHT, RIGHT], count)
+    if case == "case 2":
+        Q[:, 4] = rng.choice([0.0, np.pi], count)
+    return Q
+
+
+def _on_axis(g: TitanGeometry, Q: Matrix, psi: np.ndarray | None, rng: np.random.Generator) -> Matrix:
+    """The wrist point on axis 1: theta2 and theta3 drawn until theta4 (or, for a wanted psi, the rest) can do that."""
+    placed = Q.copy()
+    todo = np.arange(len(Q))
+    while len(todo):
+        shoulder, elbow = rng.uniform(-np.pi, np.pi, (2, len(todo)))
+        angle = elbow if psi is None else psi[todo]
+        link, other = (g.a4, g.a3) if psi is None else (g.a3, g.a4)
+        cosine = -(g.a1 + g.a2 * np.cos(shoulder) + other * np.cos(angle)) / link
+        turn = np.arccos(np.clip(cosine, -1.0, 1.0)) * rng.choice([-1.0, 1.0], len(todo))
+        forearm, last = (angle, turn) if psi is None else (turn, angle)
+        placed[todo, 1:4] = np.column_stack([shoulder, wrapped(forearm - shoulder), wrapped(last - forearm)])
+        todo = todo[np.abs(cosine) > 1.0]
+    return placed

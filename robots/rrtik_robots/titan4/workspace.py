@@ -1,0 +1,167 @@
+"""Where the TITAN 4 can be used on its vehicle: in reach with a margin, seen by a camera, clear of the vehicle.
+
+Source: section 11 of the kinematics specification. The published figures with numbers are lost: the poses of cameras
+and vehicle are **chosen** here, their sizes are the specification's defaults; everything can be set.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.ik.closed_form import solutions
+from rrtik_ompl.robot import Robot
+
+PITCHES_DEG = tuple(range(-90, 91, 15))  # of the gripper in the arm plane, with a straight wrist
+JOINTS_OF_POINTS = ("forearm", "wrist", "yaw_housing")  # links whose origins are elbow, wrist pitch and wrist yaw axis
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Camera:
+    """A camera that can be turned. It sees what lies inside its picture for one of the ways it can look.
+
+    Attributes:
+        position: In the arm's base frame [m], shape (3,).
+        target: Point it looks at in its middle position [m], shape (3,).
+        diagonal_deg: Field of view over the diagonal [deg].
+        aspect: Width over height of the picture.
+        pan_deg: How far it can be turned to either side about the vertical [deg].
+        tilt_deg: How far it can be turned up and down [deg].
+        nearest: Distance from which on it is sharp [m].
+        farthest: Distance up to which the water is clear enough [m].
+    """
+
+    position: Vector
+    target: Vector
+    diagonal_deg: float = 78.0
+    aspect: float = 4.0 / 3.0
+    pan_deg: float = 15.0
+    tilt_deg: float = 15.0
+    nearest: float = 0.3
+    farthest: float = 5.0
+
+    def __post_init__(self) -> None:
+        for name in ("position", "target"):
+            object.__setattr__(self, name, frozen(finite_array(getattr(self, name), (3,), f"camera: {name}")))
+        if np.linalg.norm((self.target - self.position)[:2]) < 1e-9:
+            raise InputError("camera: it looks straight up or down, where pan has no meaning; move its target aside")
+
+    def sees(self, points: ArrayLike) -> Mask:
+        """Which points, shape (m, 3) in the base frame, it can bring into its picture. Shape (m,)."""
+        half = np.tan(np.radians(self.diagonal_deg) / 2.0) / np.hypot(self.aspect, 1.0)
+        middle, to_points = self.target - self.position, np.asarray(points, dtype=np.float64) - self.position
+        distance = np.linalg.norm(to_points, axis=1)
+        heading = np.arctan2(to_points[:, 1], to_points[:, 0]) - np.arctan2(middle[1], middle[0])
+        pan = np.abs((heading + np.pi) % (2.0 * np.pi) - np.pi)
+        tilt = np.abs(_elevation(to_points) - _elevation(middle[None]))
+        wide, high = np.arctan(half * self.aspect), np.arctan(half)
+        aimed = (pan <= wide + np.radians(self.pan_deg)) & (tilt <= high + np.radians(self.tilt_deg))
+        seen: Mask = aimed & (distance >= self.nearest) & (distance <= self.farthest)
+        return seen
+
+
+CAMERAS = (
+    Camera(np.array([0.1, 0.9, 0.6]), np.array([1.2, 0.0, 0.0])),
+    Camera(np.array([0.1, -0.4, 0.6]), np.array([1.2, 0.0, 0.0])),
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EffectiveWorkspace:
+    """The operating space of an arm on its vehicle.
+
+    Attributes:
+        robot: A TITAN 4; take ``limits="envelope"`` for statements about reach.
+        cameras: One of them must see the grip point.
+        vehicle: Corners of the vehicle's box in the base frame [m], shape (2, 3): it must not hold the elbow, the wrist
+            or the grip point. 3 m long, 2 m high, behind and above the base.
+        margin: Distance that every joint keeps from its limits [rad].
+    """
+
+    robot: Robot
+    cameras: Sequence[Camera] = CAMERAS
+    vehicle: Matrix = field(default_factory=lambda: frozen([[-2.9, -0.35, 0.35], [0.1, 1.35, 2.35]]))
+    margin: float = float(np.radians(5.0))
+
+    def contains(self, poses: ArrayLike) -> Mask:
+        """Which poses T_world_tip, shape (m, 4, 4), belong to it. Shape (m,).
+
+        Raises:
+            InputError: If a target is no pose.
+        """
+        targets = finite_array(poses, (None, 4, 4), "poses")
+        found = solutions(self.robot, targets, check=False)
+        q = found.branches
+        room = np.minimum(q - self.robot.lower, self.robot.upper - q).min(axis=2) >= self.margin
+        fits = np.array(found.valid & room)
+        fits[fits] = self._clear(q[fits])
+        seen = np.array([camera.sees(self._in_base(targets[:, :3, 3])) for camera in self.cameras]).any(axis=0)
+        return np.asarray(fits.any(axis=1) & seen, dtype=np.bool_)
+
+    def side_view(self, x: ArrayLike, z: ArrayLike) -> NDArray[np.bool_]:
+        """The slice through the azimuth axis and straight ahead, for a grid in the base frame [m]. Shape (z, x)."""
+        across, up = np.meshgrid(np.asarray(x, dtype=np.float64), np.asarray(z, dtype=np.float64))
+        return self._slice(np.stack([across, np.zeros_like(across), up], axis=-1))
+
+    def top_view(self, x: ArrayLike, y: ArrayLike, height: float = 0.0) -> NDArray[np.bool_]:
+        """The horizontal slice at a height above the shoulder axis, for a grid in the base frame [m]. Shape (y, x)."""
+        along, across = np.meshgrid(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+        return self._slice(np.stack([along, across, np.full_like(along, height)], axis=-1))
+
+    def _slice(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Points at which the gripper can be used straight ahead in the arm plane at one of ``PITCHES_DEG``."""
+        flat = points.reshape(-1, 3)
+        heading, pitch = np.arctan2(flat[:, 1], flat[:, 0])[:, None], np.radians(PITCHES_DEG)[None]
+        poses = gripper_poses(flat[:, None], heading, pitch).reshape(-1, 4, 4)
+        inside = self.contains(self._base() @ poses).reshape(*points.shape[:-1], len(PITCHES_DEG))
+        return np.asarray(inside.any(axis=-1), dtype=np.bool_)
+
+    def _clear(self, Q: Matrix) -> Mask:
+        """Which postures keep elbow, wrist and grip point out of the vehicle's box."""
+        if len(Q) == 0:
+            return np.zeros(0, dtype=bool)
+        points = [self._in_base(self.robot.fk_batch(Q, frame)[:, :3, 3]) for frame in (*JOINTS_OF_POINTS, "grip_point")]
+        stacked = np.array(points)
+        inside = ((stacked > self.vehicle[0]) & (stacked < self.vehicle[1])).all(axis=2)
+        return np.asarray(~inside.any(axis=0), dtype=np.bool_)
+
+    def _base(self) -> NDArray[np.float64]:
+        """T_world_base."""
+        base: NDArray[np.float64] = self.robot.fk_batch(np.zeros(self.robot.dof), self.robot.link_names[0])[0]
+        return base
+
+    def _in_base(self, points: Matrix) -> Matrix:
+        base = self._base()
+        moved: Matrix = (points - base[:3, 3]) @ base[:3, :3]
+        return moved
+
+
+def gripper_poses(points: ArrayLike, heading: ArrayLike, pitch: ArrayLike) -> NDArray[np.float64]:
+    """Poses of the grip point whose approach axis has a heading and a pitch [rad], without roll; shapes broadcast.
+
+    Args:
+        points: Shape (..., 3) [m].
+        heading: Of the approach axis about the vertical, 0 along x, shape (...).
+        pitch: Above the horizontal, shape (...).
+
+    Returns:
+        Shape (..., 4, 4).
+    """
+    c, s, cp, sp = (f(np.asarray(a, dtype=np.float64)) for a in (heading, pitch) for f in (np.cos, np.sin))
+    shape = np.broadcast_shapes(np.shape(points)[:-1], np.shape(c), np.shape(cp))
+    poses = np.zeros((*shape, 4, 4))
+    poses[..., 0, 0], poses[..., 1, 0], poses[..., 2, 0] = -c * sp, -s * sp, cp + 0.0 * c  # u
+    poses[..., 0, 1], poses[..., 1, 1] = s, -c  # v
+    poses[..., 0, 2], poses[..., 1, 2], poses[..., 2, 2] = c * cp, s * cp, sp + 0.0 * c  # w
+    poses[..., :3, 3], poses[..., 3, 3] = points, 1.0
+    return poses
+
+
+def _elevation(directions: NDArray[np.float64]) -> Vector:
+    angle: Vector = np.arctan2(directions[:, 2], np.hypot(directions[:, 0], directions[:, 1]))
+    return angle

@@ -1,0 +1,172 @@
+"""Inverse kinematics by one call: from a goal to configurations that were checked, or the reason why there is none."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
+from rrtik_ompl.errors import InputError, UnknownNameError, require
+from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal, joint_difference
+from rrtik_ompl.ik.methods import METHODS, Answer, Question, Target, errors
+from rrtik_ompl.ik.numeric import targets
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.world import World
+
+SECONDS = 1.0
+DRAWS = 32  # targets drawn from a goal that leaves freedom
+SAME_POSTURE = 1e-3  # [rad] or [m]; solutions of a numeric method this near are one
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IkResult:
+    """What inverse kinematics found.
+
+    Attributes:
+        solutions: Configurations at the goal, inside the limits, free if a world was given, nearest first; shape
+            (k, dof). At most one unless all were asked for.
+        residuals: Distance [m] and angle [rad] of each from its target by forward kinematics, shape (k, 2).
+        reason: "" or why there is none: ``unreachable``, ``limits``, ``collision``, ``time``.
+        detail: The same in a line: by how much, which joint, what touches.
+        iterations: Steps of a numeric method.
+        method: The method that answered.
+        seconds: Time taken.
+    """
+
+    solutions: Matrix
+    residuals: Matrix
+    reason: str
+    detail: str
+    iterations: int
+    method: str
+    seconds: float
+
+    @property
+    def found(self) -> bool:
+        """Whether there is a solution."""
+        return len(self.solutions) > 0
+
+
+def list_ik_methods() -> tuple[str, ...]:
+    """Names that `solve_ik` takes as a method, beside "auto"."""
+    return tuple(METHODS)
+
+
+def solve_ik(
+    robot: Robot,
+    goal: PoseGoal | PositionGoal | GoalRegion,
+    *,
+    method: str = "auto",
+    near: ArrayLike | None = None,
+    all: bool = False,
+    world: World | None = None,
+    seconds: float = SECONDS,
+    seed: int = 0,
+) -> IkResult:
+    """Find configurations at a goal.
+
+    Args:
+        robot: The arm.
+        goal: A pose, a position, or a region with some freedom (of which targets are drawn).
+        method: A name from `list_ik_methods`; "auto" is the closed form where it fits, else numeric.
+        near: Posture near which a solution is wanted, shape (dof,); the middle of the limits if None.
+        all: Every solution that the method finds, not just the nearest: a closed form gives all there are (of a
+            singular pose representatives), a numeric one those it comes across.
+        world: If given, solutions in collision are left out. Its robot must be this one.
+        seconds: Time that a numeric method may take.
+        seed: Of the random numbers.
+
+    Raises:
+        UnknownNameError: If there is no such method.
+        InputError: If the method does not fit the robot and the goal, or an argument makes no sense.
+    """
+    begin = time.monotonic()
+    require(goal, PoseGoal | PositionGoal | GoalRegion, "goal", "inverse kinematics needs a goal of the tip")
+    if world is not None and world.robot is not robot:
+        raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
+    limit = float(finite_array(seconds, (), "seconds"))
+    rng = np.random.default_rng(seed)
+    posture = 0.5 * np.sum(robot.finite_range(), axis=0) if near is None else robot.configuration(near, "near")
+    drawn = tuple(targets(goal, DRAWS, rng))
+    name = _chosen(robot, drawn, method)
+
+    def accept(Q: Matrix) -> Mask:
+        return _free(world, Q)
+
+    answer = METHODS[name].run(Question(robot, drawn, posture, accept, all, begin + limit, rng))
+    q = answer.q[robot.within_limits(answer.q) & goal.satisfied(robot, answer.q)] if len(answer.q) else answer.q
+    q = robot.clamp(q)
+    free = q[accept(q)]
+    kept = _different(robot, free, posture)[: None if all else 1]
+    reason, detail = ("", "") if len(kept) else _why(robot, answer, world, q)
+    return IkResult(
+        solutions=frozen(kept),
+        residuals=frozen(_residuals(robot, drawn, kept)),
+        reason=reason,
+        detail=detail,
+        iterations=answer.iterations,
+        method=name,
+        seconds=time.monotonic() - begin,
+    )
+
+
+def _chosen(robot: Robot, drawn: tuple[Target, ...], method: str) -> str:
+    misfits = {
+        name: next((m for m in (each.misfit(robot, t) for t in drawn) if m), "") for name, each in METHODS.items()
+    }
+    fitting = [name for name, misfit in misfits.items() if not misfit]
+    if method == "auto":
+        return fitting[0]
+    if method not in METHODS:
+        raise UnknownNameError("inverse kinematics method", method, ("auto", *METHODS))
+    if misfits[method]:
+        raise InputError(
+            f"method '{method}' does not fit robot '{robot.name}' and this goal: {misfits[method]}; "
+            f"what fits: {', '.join(fitting)}"
+        )
+    return method
+
+
+def _free(world: World | None, Q: Matrix) -> Mask:
+    """Which configurations are free of collision: by the fast check first, then by the independent one."""
+    if world is None or len(Q) == 0:
+        return np.ones(len(Q), dtype=bool)
+    free = np.array(world.valid_batch(Q))
+    free[free] = world.certify(Q[free])
+    return free
+
+
+def _different(robot: Robot, q: Matrix, near: Vector) -> Matrix:
+    """The rows without repetitions, nearest to a posture first; continuous joints turned towards it."""
+    difference = joint_difference(robot, q, near)
+    kept: list[int] = []
+    for k in np.argsort(np.linalg.norm(difference, axis=1), kind="stable"):
+        if not kept or np.abs(difference[k] - difference[kept]).max(axis=1).min() > SAME_POSTURE:
+            kept.append(int(k))
+    return np.where(robot.continuous, near + difference[kept], q[kept])
+
+
+def _residuals(robot: Robot, drawn: tuple[Target, ...], q: Matrix) -> Matrix:
+    """Of each configuration from the target it is nearest to, shape (k, 2)."""
+    if len(q) == 0:
+        return np.zeros((0, 2))
+    each = np.array([errors(robot, target, q) for target in drawn])
+    best = np.argmin(each.sum(axis=2), axis=0)
+    nearest: Matrix = each[best, np.arange(len(q))]
+    return nearest
+
+
+def _why(robot: Robot, answer: Answer, world: World | None, q: Matrix) -> tuple[str, str]:
+    """Reason and detail of a failure."""
+    if len(q) and world is not None:
+        return "collision", f"{len(q)} configurations reach the goal, all in collision: {world.explain(q[0])}"
+    distance, angle = errors(robot, answer.target, answer.nearest[None])[0]
+    if bool(answer.target.satisfied(robot, answer.nearest[None])[0]):
+        fault = robot.limit_fault(answer.nearest) or "the joints' limits leave no way to it"
+        return "limits", f"the arm could reach the goal, but {fault}"
+    if answer.timed_out:
+        return "time", f"no solution in time; the nearest posture is {distance:.4g} m and {angle:.4g} rad away"
+    return "unreachable", f"the nearest posture is {distance:.4g} m and {angle:.4g} rad away from the goal"

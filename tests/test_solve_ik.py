@@ -1,0 +1,184 @@
+"""One face of inverse kinematics."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.ik.face import list_ik_methods, solve_ik
+from rrtik_ompl.poses import pose_from_rpy
+from rrtik_ompl.shapes import Box, Sphere
+
+Q_TITAN = np.radians([20, 30, -70, 20, 30, 40])
+
+
+def pose_goal(robot, q, **options):
+    return rrtik.PoseGoal(robot.fk(q), **options)
+
+
+WHAT_FITS = {"titan4": "closed-form", "puma560": "closed-form", "planar3": "closed-form", "ur5": "numeric"}
+
+
+@pytest.mark.parametrize(("name", "method"), WHAT_FITS.items())
+def test_auto_takes_the_closed_form_where_there_is_one(name, method):
+    robot = rrtik.load_robot(name)
+    rng = np.random.default_rng(0)
+    for q in rng.uniform(*robot.finite_range(), (5, robot.dof)):
+        result = solve_ik(robot, pose_goal(robot, q))
+        assert (result.found, result.reason, result.method) == (True, "", method)
+        assert pose_goal(robot, q).satisfied(robot, result.solutions).all()
+        assert robot.within_limits(result.solutions, 0.0).all()
+        assert result.solutions.shape == (1, robot.dof)
+
+
+@pytest.mark.parametrize("method", ["closed-form", "numeric"])
+def test_near_a_posture_its_solution_comes_first(method):
+    robot = rrtik.load_robot("puma560")
+    q = np.radians([40, 60, -120, 30, 40, 20])
+    result = solve_ik(robot, pose_goal(robot, q, position_tolerance=1e-6), method=method, near=q + 0.05)
+    np.testing.assert_allclose(result.solutions[0], q, atol=1e-3)
+    assert (result.iterations > 0) == (method == "numeric")
+
+
+def test_all_gives_every_solution_nearest_first():
+    robot = rrtik.load_robot("puma560")
+    q = np.radians([40, 60, -120, 30, 40, 20])
+    result = solve_ik(robot, pose_goal(robot, q), all=True, near=q)
+    assert len(result.solutions) > 1
+    np.testing.assert_allclose(result.solutions[0], q, atol=1e-9)
+    assert (np.diff(np.linalg.norm(result.solutions - q, axis=1)) >= 0.0).all()
+    assert result.residuals.shape == (len(result.solutions), 2)
+    assert result.residuals.max() < 1e-9
+
+
+def test_a_position_leaves_the_orientation_free():
+    robot = rrtik.load_robot("titan4")
+    result = solve_ik(robot, rrtik.PositionGoal([1.2, 0.3, 0.1], tolerance=1e-4))
+    assert result.method == "numeric"
+    assert result.residuals[0, 0] <= 1e-4
+    three = rrtik.load_robot("puma560_3dof")
+    exact = solve_ik(three, rrtik.PositionGoal(three.fk(three.posture("start")).translation), all=True)
+    assert exact.method == "closed-form"
+    assert 1 <= len(exact.solutions) <= 4
+
+
+def test_a_region_is_reached_at_any_of_its_targets():
+    robot = rrtik.load_robot("titan4")
+    region = rrtik.GoalRegion([pose_goal(robot, Q_TITAN)], free_rotation_axis="z", box=[0.1, 0.0, 0.0])
+    result = solve_ik(robot, region, all=True)
+    assert result.method == "closed-form"
+    assert len(result.solutions) > 5
+    assert region.satisfied(robot, result.solutions).all()
+    assert result.residuals.max() < 1e-9
+
+
+def test_unreachable_says_by_how_much():
+    for name, method in (("titan4", "closed-form"), ("titan4", "numeric"), ("ur5", "numeric")):
+        robot = rrtik.load_robot(name)
+        goal = rrtik.PositionGoal([3.0, 0.0, 0.0]) if method == "numeric" else rrtik.PoseGoal(
+            robot.fk(np.zeros(6)) * pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.25])))  # fmt: skip
+        result = solve_ik(robot, goal, method=method, seconds=20.0)
+        assert result.reason == "unreachable"
+        assert not result.found
+        assert result.solutions.shape == (0, 6)
+        if name == "titan4":
+            assert f"{0.25 if method == 'closed-form' else 3.0 - 1.922:.4g}" in result.detail
+
+
+@pytest.mark.parametrize("method", ["closed-form", "numeric"])
+def test_a_pose_that_only_the_limits_forbid_says_which(method):
+    robot = rrtik.load_robot("titan4")
+    q = Q_TITAN.copy()
+    q[5] = np.radians(150.0)
+    result = solve_ik(robot, pose_goal(robot, q), method=method, seconds=20.0)
+    assert result.reason == "limits"
+    assert "outside its limits" in result.detail
+
+
+@pytest.mark.parametrize("method", ["closed-form", "numeric"])
+def test_a_pose_inside_an_obstacle_says_what_touches(method):
+    robot = rrtik.load_robot("titan4")
+    tip = robot.fk(Q_TITAN)
+    world = rrtik.World(robot, rrtik.Scene([rrtik.Obstacle("ball", Sphere(0.05), tip)]))
+    result = solve_ik(robot, pose_goal(robot, Q_TITAN), method=method, world=world, seconds=20.0)
+    assert result.reason == "collision"
+    assert "ball" in result.detail
+
+
+def test_with_a_world_a_free_solution_is_taken_instead_of_a_nearer_one_in_collision():
+    robot = rrtik.load_robot("puma560")
+    q = np.radians([40, 60, -120, 30, 40, 20])
+    everything = solve_ik(robot, pose_goal(robot, q), all=True, near=q).solutions
+    elbows = robot.fk_batch(everything, "link3")[:, :3, 3]
+    other = int(np.argmax(np.linalg.norm(elbows - elbows[0], axis=1)))
+    assert np.linalg.norm(elbows[other] - elbows[0]) > 0.2
+    block = rrtik.Obstacle("block", Box([0.05, 0.05, 0.05]), pin.SE3(np.eye(3), elbows[0]))
+    world = rrtik.World(robot, rrtik.Scene([block]))
+    result = solve_ik(robot, pose_goal(robot, q), world=world, near=q)
+    assert result.found
+    assert world.valid_batch(result.solutions).all()
+    assert np.abs(result.solutions[0] - q).max() > 0.1
+
+
+def test_a_singular_pose_whose_representatives_break_the_limits_is_still_solved():
+    robot = rrtik.load_robot("titan4")
+    rng = np.random.default_rng(1)
+    for q in rng.uniform(robot.lower, robot.upper, (100, 6)):
+        q[4] = np.pi / 2
+        result = solve_ik(robot, pose_goal(robot, q, position_tolerance=1e-9, orientation_tolerance=1e-8))
+        assert result.found, np.degrees(q)
+
+
+@pytest.mark.parametrize(("name", "joint", "value"), [("titan4", 4, np.pi / 2), ("puma560", 4, 0.0)])
+def test_a_singular_pose_that_is_known_to_six_digits_is_solved_within_its_tolerance(name, joint, value):
+    robot, rng = rrtik.load_robot(name), np.random.default_rng(2)
+    for q in rng.uniform(robot.lower, robot.upper, (100, 6)):
+        q[joint] = value
+        tip = robot.fk(q) * pin.SE3(pin.exp3(rng.normal(0.0, 1e-6, 3)), rng.normal(0.0, 1e-6, 3))
+        goal = rrtik.PoseGoal(tip)
+        result = solve_ik(robot, goal, method="closed-form")
+        assert result.found, np.degrees(q)
+        assert goal.satisfied(robot, result.solutions).all()
+
+
+def test_no_time_is_a_reason_of_its_own():
+    robot = rrtik.load_robot("panda")
+    far = rrtik.PoseGoal(pose_from_rpy([5, 0, 0], [0, 0, 0]))
+    assert solve_ik(robot, far, seconds=0.0).reason == "time"
+
+
+def test_the_same_seed_gives_the_same_answer():
+    robot = rrtik.load_robot("panda")
+    goal = pose_goal(robot, robot.posture("default"))
+    first, second = (solve_ik(robot, goal, seed=3).solutions for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+
+
+def test_bad_arguments_are_refused_in_one_line():
+    titan, ur5 = rrtik.load_robot("titan4"), rrtik.load_robot("ur5")
+    goal = pose_goal(titan, Q_TITAN)
+    with pytest.raises(UnknownNameError, match="no inverse kinematics method 'closed'; have auto, closed-form"):
+        solve_ik(titan, goal, method="closed")
+    with pytest.raises(InputError, match=r"does not fit robot 'ur5' .* what fits: numeric"):
+        solve_ik(ur5, goal, method="closed-form")
+    with pytest.raises(InputError, match="needs a pose, and a position leaves a whole family"):
+        solve_ik(titan, rrtik.PositionGoal([1, 0, 0]), method="closed-form")
+    with pytest.raises(InputError, match="holds another robot"):
+        solve_ik(titan, goal, world=rrtik.World(ur5))
+    with pytest.raises(InputError, match="near: robot 'titan4' has 6 joints"):
+        solve_ik(titan, goal, near=[0.0])
+    with pytest.raises(InputError, match="goal must be of type PoseGoal"):
+        solve_ik(titan, rrtik.JointGoal(np.zeros(6)))
+
+
+def test_with_a_tip_that_the_last_joint_does_not_carry_auto_is_numeric():
+    robot = rrtik.load_robot("titan4", tip="wrist")
+    goal = rrtik.PoseGoal(robot.fk(Q_TITAN))
+    assert solve_ik(robot, goal).method == "numeric"
+    with pytest.raises(InputError, match="the tip 'wrist' does not move with that frame"):
+        solve_ik(robot, goal, method="closed-form")
+
+
+def test_the_methods_have_names():
+    assert list_ik_methods() == ("closed-form", "numeric")
