@@ -15,8 +15,9 @@ from typing import Annotated, Any
 import typer
 
 from rrtik_ompl.errors import InputError, RrtikError
+from rrtik_ompl.fast import announce
 from rrtik_ompl.path_text import FORMATS as PATH_FORMATS
-from rrtik_ompl.terminal import drop_output, prepare_streams, progress, say, warn
+from rrtik_ompl.terminal import drop_output, note, prepare_streams, progress, say, warn
 
 FOUND, NOT_FOUND, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 UsageError: Any = typer.BadParameter.__bases__[0]  # click's, which typer carries under a private name
@@ -197,6 +198,14 @@ def convert(
     return FOUND
 
 
+@app.command()
+def warmup() -> int:
+    """Compile all kernels now, once per machine, so that no later command waits for them."""
+    from rrtik_ompl.fast import warm_up
+
+    return FOUND if warm_up(say) else NOT_FOUND
+
+
 def main() -> None:
     """Run the command line and exit with its code."""
     sys.exit(run())
@@ -205,6 +214,7 @@ def main() -> None:
 def run(arguments: list[str] | None = None) -> int:
     """Run the command line with ``arguments`` (the process's own if None) and return the exit code."""
     warnings.showwarning = warn
+    announce.on_compile = note
     prepare_streams()
     given = sys.argv[1:] if arguments is None else arguments
     try:
