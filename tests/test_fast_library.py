@@ -1,6 +1,7 @@
 """Kernels are made once for a processor, load without numba, and a bad cache costs time, never a wrong answer."""
 
 import os
+import runpy
 import shutil
 import subprocess
 import sys
@@ -164,7 +165,7 @@ def test_functions_take_whole_numbers_only(cached):
 
 
 def test_every_entry_of_every_module_is_in_its_library():
-    for name in library.kernel_modules():
+    for name in code_files.kernel_modules():
         entries = compiled.entries(bitcode.import_module(f"rrtik_ompl.fast.{name}").__name__)
         assert set(entries) == set(vars(library.library(name)))
         assert entries
@@ -218,7 +219,7 @@ def test_warming_up_makes_all_kernels(cached, capsys):
     before = cached.read_bytes()
     cached.unlink()
     assert run(["warmup"]) == 0
-    assert capsys.readouterr().out.splitlines() == [f"{name}: ready" for name in library.kernel_modules()]
+    assert capsys.readouterr().out.splitlines() == [f"{name}: ready" for name in code_files.kernel_modules()]
     assert cached.read_bytes() == before
 
 
@@ -232,7 +233,89 @@ def test_compiling_is_told_in_one_line(monkeypatch, capsys):
 
 def test_the_sources_of_kernels_need_no_collision_library():
     code = "import sys; sys.modules.update(dict.fromkeys(('coal', 'pinocchio', 'ompl', 'scipy')))\n"
-    code += f"import rrtik_ompl.fast.bitcode; [__import__('rrtik_ompl.fast.' + n) for n in {library.kernel_modules()}]"
+    code += (
+        f"import rrtik_ompl.fast.bitcode; [__import__('rrtik_ompl.fast.' + n) for n in {code_files.kernel_modules()}]"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert Path(library.__file__).parent == code_files.FOLDER
+
+
+@pytest.fixture
+def packaged(cached, tmp_path, monkeypatch):
+    """The file of bitcode that the package brings, an empty cache and no compiler."""
+
+    def fail(name):
+        raise ValueError(f"{name} is compiled")
+
+    folder = tmp_path / "package"
+    folder.mkdir()
+    bitcode.write_bitcode(folder)
+    cached.unlink()
+    monkeypatch.setattr(library, "FOLDER", folder)
+    monkeypatch.setattr(bitcode, "compiled_module", fail)
+    monkeypatch.setattr(library, "_warned", False)
+    return folder / code_files.bitcode_name(KERNELS)
+
+
+def test_bitcode_of_the_package_saves_compiling(packaged, cached):
+    assert library.library(KERNELS).classify(0, 0, 0, 0, 0) == 0
+    assert cached.is_file()
+
+
+@pytest.mark.parametrize("damage", ["short", "one bit of the code", "another's", "no machine code"])
+def test_damaged_bitcode_of_the_package_is_passed_over(packaged, damage):
+    packaged.write_bytes(DAMAGES[damage](packaged.read_bytes()))
+    with pytest.warns(RuntimeWarning, match="kernels is compiled"):
+        assert library.library(KERNELS) is None
+
+
+@pytest.fixture
+def hook(monkeypatch):
+    """The build hook's module, without hatch, and a hook whose messages are kept."""
+    name = "hatchling.builders.hooks.plugin.interface"
+    interface = types.ModuleType(name)
+    interface.BuildHookInterface = object
+    monkeypatch.setitem(sys.modules, name, interface)
+    module = types.SimpleNamespace(**runpy.run_path(str(code_files.FOLDER / "hatch_build.py")))
+    made, said = module.KernelBitcode(), []
+    made.root = str(code_files.FOLDER.parent.parent)
+    made.app = types.SimpleNamespace(display_info=said.append, display_warning=said.append)
+    return made, module.KernelBitcode.initialize.__globals__, said
+
+
+def test_a_wheel_takes_along_what_could_be_compiled(hook, monkeypatch):
+    made, names, said = hook
+    order = [sys.executable, "-c", "import sys, pathlib; pathlib.Path(sys.argv[1], 'k-8.bitcode').touch()"]
+    monkeypatch.setitem(names, "_compiler", lambda width, root, folder: subprocess.Popen([*order, str(folder)]))
+    build = {"force_include": {}}
+    made.initialize("standard", build)
+    assert [*build["force_include"].values()] == ["rrtik_ompl/fast/k-8.bitcode"]
+    assert all(Path(file).is_file() for file in build["force_include"])
+    assert said == ["kernels as bitcode: k-8.bitcode"]
+
+
+def test_a_wheel_is_built_without_a_compiler(hook, monkeypatch):
+    made, names, said = hook
+    build = {"force_include": {}}
+    made.initialize("editable", build)
+    monkeypatch.setitem(names, "_compiler", lambda *_: subprocess.Popen([sys.executable, "-c", "raise SystemExit(1)"]))
+    made.initialize("standard", build)
+    monkeypatch.setitem(names, "_compiler", lambda *_: subprocess.Popen(["no such program"]))
+    made.initialize("standard", build)
+    assert build == {"force_include": {}}
+    assert [message.partition(":")[0] for message in said] == ["kernels as bitcode"] * 2
+
+
+def test_a_damaged_cache_of_numba_is_not_trusted(tmp_path):
+    source, folder = tmp_path / "twice.py", tmp_path / "numba"
+    source.write_text(
+        "from rrtik_ompl.fast.compiled import kernel\n@kernel\ndef twice(x):\n    return 2 * x\nprint(twice(21))"
+    )
+    for _ in range(2):
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
+        done = subprocess.run([sys.executable, source], capture_output=True, text=True, env=environment, check=False)
+        assert (done.stdout, done.stderr) == ("42\n", "")
+        files = [file for file in folder.rglob("*") if file.is_file()]
+        assert files
+        for file in files:
+            file.write_bytes(b"nonsense")

@@ -5,7 +5,9 @@ Bitcode is the same for every processor of a kind; code for one processor is mad
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -14,7 +16,7 @@ from numba import types
 from numba.core.registry import cpu_target
 
 from rrtik_ompl.fast import compiled
-from rrtik_ompl.fast.code_files import PREFIX, Code
+from rrtik_ompl.fast.code_files import PREFIX, Code, bitcode_key, bitcode_name, kernel_modules, write_code
 
 WHOLE = ir.IntType(64)
 RUNTIMES = ("Py", "_Py", "NRT_", "numba_", "__svml")  # beginnings of names that only Python or numba can provide
@@ -81,3 +83,13 @@ def _hide_all_but(module: Any, shown: set[str]) -> None:
     passes.add_global_dead_code_eliminate_pass()
     passes.add_strip_dead_prototype_pass()
     passes.run(module, builder)
+
+
+def write_bitcode(folder: Path) -> None:
+    """Compile all kernels into files that :mod:`rrtik_ompl.fast.library` takes instead of compiling."""
+    for name in kernel_modules():
+        write_code(folder / bitcode_name(name), bitcode_key(name), compiled_module(name))
+
+
+if __name__ == "__main__":
+    write_bitcode(Path(sys.argv[1]))

@@ -28,6 +28,11 @@ class Code:
     code: bytes
 
 
+def kernel_modules() -> list[str]:
+    """Names of the modules that are libraries."""
+    return sorted(file.stem for file in FOLDER.glob("*.py") if "\n@entry\n" in file.read_text(encoding="utf-8"))
+
+
 @cache
 def sources_digest() -> str:
     """A hash of this package's sources: a change of any of them makes all kernels anew."""

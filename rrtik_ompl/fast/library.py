@@ -24,6 +24,7 @@ from rrtik_ompl.fast.code_files import (
     bitcode_key,
     bitcode_name,
     file_name,
+    kernel_modules,
     machine_key,
     read_code,
     write_code,
@@ -58,11 +59,6 @@ def library(name: str) -> Library | None:
         if name not in _libraries:
             _libraries[name] = _tried(name)
         return _libraries[name]
-
-
-def kernel_modules() -> list[str]:
-    """Names of the modules that are libraries."""
-    return sorted(file.stem for file in FOLDER.glob("*.py") if "\n@entry\n" in file.read_text(encoding="utf-8"))
 
 
 def warm_up(report: Callable[[str], None]) -> bool:
