@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.collision.solids import bvh, hull, inside_mesh, is_mesh, mesh_arrays, pieces, robot_solids
-from rrtik_ompl.fast import cover_cache
+from rrtik_ompl.fast import cover_cache, covers
 from rrtik_ompl.fast.cache_files import FOLDER_VARIABLE
 from rrtik_ompl.fast.cover_cache import cached_inner_spheres, cached_outer_cover
 from rrtik_ompl.fast.cover_solids import distance_to_triangles, rim_caps
@@ -349,8 +349,8 @@ def folder(tmp_path, monkeypatch):
 
 def test_the_cache_gives_back_what_was_made(folder, monkeypatch):
     first = cached_outer_cover(SOLIDS["box"]), cached_inner_spheres(SOLIDS["box"])
-    monkeypatch.setattr(cover_cache, "outer_cover", None)
-    monkeypatch.setattr(cover_cache, "inner_spheres", None)
+    monkeypatch.setattr(covers, "outer_cover", None)
+    monkeypatch.setattr(covers, "inner_spheres", None)
     again = cached_outer_cover(SOLIDS["box"]), cached_inner_spheres(SOLIDS["box"])
     assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
     assert len(list(folder.iterdir())) == 2

@@ -17,27 +17,41 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.collision.solids import is_mesh, mesh_arrays
 from rrtik_ompl.fast.cache_files import cache_folder, write_whole
-from rrtik_ompl.fast.covers import ALGORITHM, inner_spheres, outer_cover
 
 LAYOUT = 1
+ALGORITHM = 1  # counts up when rrtik_ompl.fast.covers makes other spheres of the same geometry
 
 
 def cached_outer_cover(geometry: Any, *, protrusion: float | None = None) -> Matrix:
     """``outer_cover``, from the cache if it is there."""
-    return _cached(geometry, f"outer {protrusion!r}", lambda: outer_cover(geometry, protrusion=protrusion))
+
+    def make() -> Matrix:
+        from rrtik_ompl.fast.covers import outer_cover  # with scipy, which takes longer to load than covers to read
+
+        return outer_cover(geometry, protrusion=protrusion)
+
+    return _cached(geometry, f"outer {protrusion!r}", make)
 
 
 def cached_inner_spheres(geometry: Any, *, count: int | None = None) -> Matrix:
     """``inner_spheres``, from the cache if they are there."""
-    return _cached(geometry, f"inner {count!r}", lambda: inner_spheres(geometry, count=count))
+
+    def make() -> Matrix:
+        from rrtik_ompl.fast.covers import inner_spheres
+
+        return inner_spheres(geometry, count=count)
+
+    return _cached(geometry, f"inner {count!r}", make)
 
 
 def geometry_bytes(geometry: Any) -> bytes | None:
-    """All that a cover depends on, or None for a kind that is not cached (its cover is quick to make)."""
+    """All that a cover depends on, or None for a kind that is not cached."""
     numbers: list[Any]
     if isinstance(geometry, coal.Box):
         numbers = [np.array(geometry.halfSide, dtype=np.float64)]
-    elif isinstance(geometry, coal.Cylinder):
+    elif isinstance(geometry, coal.Sphere):
+        numbers = [np.array([geometry.radius])]
+    elif isinstance(geometry, (coal.Capsule, coal.Cylinder)):
         numbers = [np.array([geometry.radius, geometry.halfLength])]
     elif isinstance(geometry, coal.ConvexBase):
         numbers = [np.array(geometry.points(), dtype=np.float64)]
