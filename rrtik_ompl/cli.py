@@ -14,9 +14,10 @@ from typing import Annotated, Any
 import typer
 
 from rrtik_ompl.errors import InputError, RrtikError
+from rrtik_ompl.fast import announce
 from rrtik_ompl.motion_commands import list_moves, time_path
 from rrtik_ompl.path_text import FORMATS as PATH_FORMATS
-from rrtik_ompl.terminal import drop_output, prepare_streams, progress, say, warn
+from rrtik_ompl.terminal import drop_output, note, prepare_streams, progress, say, warn
 from rrtik_ompl.text_file import check_target
 
 FOUND, NOT_FOUND, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -200,6 +201,14 @@ def convert(
     return FOUND
 
 
+@app.command()
+def warmup() -> int:
+    """Compile all kernels now, once per machine, so that no later command waits for them."""
+    from rrtik_ompl.fast import warm_up
+
+    return FOUND if warm_up(say) else NOT_FOUND
+
+
 app.command("moves")(list_moves)
 app.command("time")(time_path)
 
@@ -212,6 +221,7 @@ def main() -> None:
 def run(arguments: list[str] | None = None) -> int:
     """Run the command line with ``arguments`` (the process's own if None) and return the exit code."""
     warnings.showwarning = warn
+    announce.on_compile = note
     prepare_streams()
     given = sys.argv[1:] if arguments is None else arguments
     try:

@@ -14,6 +14,11 @@ def warn(message: Warning | str, *_: Any, **__: Any) -> None:
     print(f"rrtik: warning: {message}", file=sys.stderr)
 
 
+def note(message: str) -> None:
+    """Say in one line, on standard error, what takes a while."""
+    print(f"rrtik: {message}", file=sys.stderr)
+
+
 def prepare_streams() -> None:
     """Make printing safe: a stream that was closed leads nowhere, a letter that a terminal lacks is spelt out."""
     for name in ("stdout", "stderr"):

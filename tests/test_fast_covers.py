@@ -12,7 +12,8 @@ from scipy.spatial import ConvexHull
 
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.collision.solids import bvh, hull, inside_mesh, is_mesh, mesh_arrays, pieces, robot_solids
-from rrtik_ompl.fast import cover_cache
+from rrtik_ompl.fast import cover_cache, covers
+from rrtik_ompl.fast.cache_files import FOLDER_VARIABLE
 from rrtik_ompl.fast.cover_cache import cached_inner_spheres, cached_outer_cover
 from rrtik_ompl.fast.cover_solids import distance_to_triangles, rim_caps
 from rrtik_ompl.fast.covers import inner_spheres, outer_cover, protrusion_bound
@@ -342,14 +343,14 @@ def test_open_edges_are_found_and_closed():
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    monkeypatch.setenv(cover_cache.FOLDER_VARIABLE, str(tmp_path))
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
     return tmp_path / "covers"
 
 
 def test_the_cache_gives_back_what_was_made(folder, monkeypatch):
     first = cached_outer_cover(SOLIDS["box"]), cached_inner_spheres(SOLIDS["box"])
-    monkeypatch.setattr(cover_cache, "outer_cover", None)
-    monkeypatch.setattr(cover_cache, "inner_spheres", None)
+    monkeypatch.setattr(covers, "outer_cover", None)
+    monkeypatch.setattr(covers, "inner_spheres", None)
     again = cached_outer_cover(SOLIDS["box"]), cached_inner_spheres(SOLIDS["box"])
     assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
     assert len(list(folder.iterdir())) == 2
@@ -408,19 +409,19 @@ def test_every_cut_of_a_file_is_survived(folder):
 
 def test_a_folder_that_cannot_be_made_is_no_error(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
-    monkeypatch.setenv(cover_cache.FOLDER_VARIABLE, str(tmp_path / "file" / "below"))
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "file" / "below"))
     assert len(cached_outer_cover(SOLIDS["box"])) > 0
 
 
 def test_an_empty_folder_name_switches_the_cache_off(tmp_path, monkeypatch):
-    monkeypatch.setenv(cover_cache.FOLDER_VARIABLE, "")
+    monkeypatch.setenv(FOLDER_VARIABLE, "")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     cached_outer_cover(SOLIDS["box"])
     assert not list(tmp_path.iterdir())
 
 
 def test_the_users_cache_folder_is_the_default(tmp_path, monkeypatch):
-    monkeypatch.delenv(cover_cache.FOLDER_VARIABLE, raising=False)
+    monkeypatch.delenv(FOLDER_VARIABLE, raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     cached_outer_cover(SOLIDS["box"])
     assert len(list((tmp_path / "rrtik-ompl" / "covers").glob("*.npz"))) == 1

@@ -82,3 +82,10 @@ def test_importing_the_package_imports_nothing_heavy():
     code = f"import sys, rrtik_ompl; print([m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_world_is_loaded_without_a_compiler_and_without_what_covers_are_made_with():
+    code = "import sys, rrtik_ompl.world, rrtik_ompl.fast.cover_cache, rrtik_ompl.fast.fast_world"
+    code += "; print([m for m in ('numba', 'scipy') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -85,7 +85,7 @@ class BiCRDT(SafePlanner):
         limit, path = self.options.max_iterations, _common_row(starts, goals)
         trees: Any
         if runs_in_kernels(self._world, starts, goals, rules.lower[None], rules.upper[None]):
-            from rrtik_ompl.fast.axis_search import AxisSearch  # compiles
+            from rrtik_ompl.fast.axis_search import AxisSearch
 
             trees = AxisSearch(self._world, rules, seed, limit, starts, goals)
         else:

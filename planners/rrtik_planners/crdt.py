@@ -84,7 +84,7 @@ class CRDT(SafePlanner):
         limit, path = self.options.max_iterations, None
         tree: Any
         if runs_in_kernels(self._world, starts, goals, rules.lower[None], rules.upper[None]):
-            from rrtik_ompl.fast.axis_search import AxisSearch  # compiles
+            from rrtik_ompl.fast.axis_search import AxisSearch
 
             tree = AxisSearch(self._world, rules, seed, limit, starts, goals=goals, tolerance=tolerance)
         else:

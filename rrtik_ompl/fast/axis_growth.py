@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.fast import axis_tables as table
-from rrtik_ompl.fast import kernels
-from rrtik_ompl.fast import robot_tables as robot
 from rrtik_ompl.fast.axis_draws import draw, shuffle, to_front
 from rrtik_ompl.fast.compiled import WIDTH, inlined, kernel
+from rrtik_ompl.fast.kernels import judge_edge
 from rrtik_ompl.fast.lanes import (
     choose,
     double_at,
@@ -28,6 +27,7 @@ from rrtik_ompl.fast.lanes import (
     spread_wide,
     wide_lanes_at,
 )
+from rrtik_ompl.fast.layout import ARM, COLLIDING, FREE, JOINT_COUNT, UNDECIDED
 
 FARTHEST = 1e300
 WHOLE_STEP = 1e-9  # a motion this little longer than a number of steps is checked in that number of steps
@@ -184,7 +184,7 @@ def aim(search: int, tree: int, near: int, exactly: bool) -> None:
 def load_values(search: int, row: int, sink: int) -> None:
     """Joint values of a configuration."""
     dof = field(search, table.DOF)
-    for joint in range(field(field(field(search, table.WORLD), kernels.ARM), robot.JOINT_COUNT)):
+    for joint in range(field(field(field(search, table.WORLD), ARM), JOINT_COUNT)):
         value = 0.0
         for axis in range(dof):
             value += double_at(field(search, table.GAIN), joint * dof + axis) * double_at(row, axis)
@@ -199,16 +199,16 @@ def judge(search: int, start: int, end: int) -> int:
         a, b = double_at(start, axis), double_at(end, axis)
         least, most = double_at(field(search, table.LEAST), axis), double_at(field(search, table.MOST), axis)
         if min(a, b) < least or max(a, b) > most:
-            return kernels.COLLIDING
+            return COLLIDING
         if order == 0 and a != b:
             order = 1 if a < b else -1
         travel += double_at(field(search, table.WEIGHTS), axis) * abs(b - a)
     steps = max(1, int(np.ceil(travel / double_at(field(search, table.NUMBERS), table.RESOLUTION) - WHOLE_STEP)))
     first = field(search, table.VALUES)
-    second = first + 8 * field(field(field(search, table.WORLD), kernels.ARM), robot.JOINT_COUNT)
+    second = first + 8 * field(field(field(search, table.WORLD), ARM), JOINT_COUNT)
     load_values(search, start if order >= 0 else end, first)
     load_values(search, end if order >= 0 else start, second)
-    return kernels.judge_edge(field(search, table.WORLD), first, second, steps, field(search, table.ASKS) != 0)
+    return judge_edge(field(search, table.WORLD), first, second, steps, field(search, table.ASKS) != 0)
 
 
 @kernel
@@ -217,11 +217,11 @@ def open_edges(search: int) -> int:
     stride, count, open_ = 8 * field(search, table.DOF), field(search, table.EDGE_COUNT), 0
     for edge in range(count):
         verdict = judge(search, field(search, table.STARTS) + edge * stride, field(search, table.ENDS) + edge * stride)
-        if verdict == kernels.UNDECIDED:
-            verdict = kernels.UNDECIDED if field(search, table.ASKS) != 0 else kernels.COLLIDING
+        if verdict == UNDECIDED:
+            verdict = UNDECIDED if field(search, table.ASKS) != 0 else COLLIDING
             open_ += 1 if field(search, table.ASKS) != 0 else 0
         set_int(field(search, table.VERDICTS), edge, verdict)
-        if verdict == kernels.COLLIDING:
+        if verdict == COLLIDING:
             set_field(search, table.EDGE_COUNT, edge + 1)
             break
     return open_
@@ -233,7 +233,7 @@ def keep(search: int, tree: int) -> int:
     count, first, near = field(search, table.EDGE_COUNT), field(search, table.FIRST_EDGES), field(search, table.NEAR)
     stride, turn, known = 8 * field(search, table.DOF), field(search, table.TURN), field(tree, table.SIZE)
     free = 0
-    while free < count and int_at(field(search, table.VERDICTS), free) == kernels.FREE:
+    while free < count and int_at(field(search, table.VERDICTS), free) == FREE:
         free += 1
     set_field(search, table.MOTIONS, field(search, table.MOTIONS) + min(free + 1, count))
     vertex = near

@@ -9,6 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.fast.library import library
+
+KERNELS = "axis_kernels"  # the library of these searches
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,4 +44,5 @@ def runs_in_kernels(world: Any, *rows: Matrix) -> bool:
         return False
     chain = world.robot.chain
     largest = np.abs(np.vstack(rows)).max(axis=0)
-    return bool((np.abs(chain.gain) @ largest + np.abs(chain.offset) <= fast.limits).all())
+    within = bool((np.abs(chain.gain) @ largest + np.abs(chain.offset) <= fast.limits).all())
+    return within and library(KERNELS) is not None

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.fast import COLLIDING, FREE, UNDECIDED, axis_kernels
+from rrtik_ompl.errors import PlannerError
 from rrtik_ompl.fast import axis_tables as table
-from rrtik_ompl.fast.axis_rules import AxisRules
-from rrtik_ompl.fast.compiled import WIDTH
-from rrtik_ompl.fast.robot_tables import ALIGNMENT
+from rrtik_ompl.fast.axis_rules import KERNELS, AxisRules
+from rrtik_ompl.fast.layout import ALIGNMENT, COLLIDING, FREE, UNDECIDED
+from rrtik_ompl.fast.library import library
+from rrtik_ompl.fast.processor import WIDTH
 from rrtik_ompl.robot import LIMIT_TOLERANCE
 
 FIRST_CAPACITY = 256
@@ -50,9 +51,12 @@ class AxisSearch:
         goals: Matrix | None = None,
         tolerance: float = 0.0,
     ) -> None:
+        kernels = library(KERNELS)
+        if kernels is None:
+            raise PlannerError("there are no kernels for this processor; see runs_in_kernels")
         self._world = world
         single = goals is not None
-        self._resume = axis_kernels.resume_single if single else axis_kernels.resume_pair
+        self._resume = kernels.resume_single if single else kernels.resume_pair
         self._trees = [_Tree(rows) for rows in roots]
         self._addresses = np.array([tree.address for tree in self._trees])
         dof, aims = len(rules.lower), np.empty((0, 0)) if goals is None else goals
@@ -124,7 +128,7 @@ class AxisSearch:
 
     def _go_on(self, until: int) -> int:
         """Let the kernel work up to a number of iterations, or until it wants an answer or room, and give it that."""
-        status = int(self._resume(self._address, until - self.iterations))
+        status = self._resume(self._address, until - self.iterations)
         if status == table.ASKING:
             self._answer()
         elif status == table.FULL:

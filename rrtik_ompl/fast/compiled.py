@@ -1,37 +1,29 @@
-"""How kernels are compiled: for this processor's width, once per machine.
+"""How kernels are compiled with numba: the decorators, and numba's cache on disk.
 
-Kernels are kept in numba's cache on disk. That cache knows neither the modules that a kernel draws on nor the width,
-so both are made part of the kernel's name: another width or another version of this package finds nothing stale.
+That cache saves those who work on kernels some time: a kernel that several libraries call is compiled once. It knows
+neither the modules that a kernel draws on nor the width, so both are made part of the kernel's name: another width or
+another version of this package finds nothing stale.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from contextlib import suppress
-from hashlib import sha256
-from pathlib import Path
 from typing import Any, TypeVar
 
-import llvmlite.binding as llvm
 from numba import njit
 from numba.core.caching import FunctionCache
 
+from rrtik_ompl.fast.code_files import sources_digest
+from rrtik_ompl.fast.processor import WIDTH
+
+__all__ = ["WIDTH", "entries", "entry", "inlined", "kernel"]
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-
-def processor_width() -> int:
-    """Lanes that fill this processor's widest registers: 16 with AVX-512, 8 otherwise; RRTIK_LANES overrides it."""
-    asked = os.environ.get("RRTIK_LANES", "")
-    if asked in ("8", "16"):
-        return int(asked)
-    return 16 if llvm.get_host_cpu_features().get("avx512f", False) else 8
-
-
-WIDTH = processor_width()
-
-_SOURCES = sorted(Path(__file__).parent.glob("*.py"))
-_IDENTITY = f"{WIDTH}_{sha256(b''.join(file.read_bytes() for file in _SOURCES)).hexdigest()[:16]}"
+_IDENTITY = f"{WIDTH}_{sources_digest()[:16]}"
+_OPTIONS = {"error_model": "numpy", "boundscheck": False, "no_cfunc_wrapper": True}
+_entries: dict[str, dict[str, Any]] = {}
 
 
 class _ForgivingCache(FunctionCache):  # type: ignore[misc]
@@ -53,7 +45,7 @@ class _ForgivingCache(FunctionCache):  # type: ignore[misc]
 def kernel(function: Function) -> Function:
     """Compile a function on its first call; kept on disk, and in memory alone where no folder can be written."""
     function.__qualname__ = f"{function.__qualname__}_{_IDENTITY}"
-    compiled: Any = njit(nogil=True, error_model="numpy", boundscheck=False)(function)
+    compiled: Any = njit(nogil=True, **_OPTIONS)(function)
     with suppress(RuntimeError):  # numba's word for "no place to keep it"
         compiled._cache = _ForgivingCache(function)
     kept: Function = compiled
@@ -61,11 +53,21 @@ def kernel(function: Function) -> Function:
 
 
 def entry(function: Function) -> Function:
-    """Compile a function that Python calls: whole numbers (64 bits) in, one whole number out."""
-    return kernel(function)
+    """Compile a function that Python calls: whole numbers (64 bits) in, one whole number out.
+
+    Python finds it in the :func:`rrtik_ompl.fast.library.library` of its module, by its name.
+    """
+    compiled = kernel(function)
+    _entries.setdefault(function.__module__, {})[function.__name__] = compiled
+    return compiled
+
+
+def entries(module: str) -> dict[str, Any]:
+    """Numba's compiled functions that Python calls, by name, of a module that has been imported."""
+    return dict(_entries.get(module, {}))
 
 
 def inlined(function: Function) -> Function:
     """Compile a function into each of its callers."""
-    compiled: Function = njit(forceinline=True, error_model="numpy", boundscheck=False)(function)
+    compiled: Function = njit(forceinline=True, no_cpython_wrapper=True, **_OPTIONS)(function)
     return compiled

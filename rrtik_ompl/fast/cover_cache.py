@@ -1,16 +1,11 @@
 """Covers kept on disk, so that a geometry is covered once per machine. Nothing here ever fails: no cache, no gain.
 
-One file per geometry, parameters and algorithm, named by a hash of all three. Files appear whole (written aside, then
-renamed), so processes may share the folder.
+One file per geometry, parameters and algorithm, named by a hash of all three.
 """
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
-import os
-import sys
-import tempfile
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -21,41 +16,42 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.collision.solids import is_mesh, mesh_arrays
-from rrtik_ompl.fast.covers import ALGORITHM, inner_spheres, outer_cover
+from rrtik_ompl.fast.cache_files import cache_folder, write_whole
 
-FOLDER_VARIABLE = "RRTIK_CACHE"  # another folder; empty: no cache
 LAYOUT = 1
+ALGORITHM = 1  # counts up when rrtik_ompl.fast.covers makes other spheres of the same geometry
 
 
 def cached_outer_cover(geometry: Any, *, protrusion: float | None = None) -> Matrix:
     """``outer_cover``, from the cache if it is there."""
-    return _cached(geometry, f"outer {protrusion!r}", lambda: outer_cover(geometry, protrusion=protrusion))
+
+    def make() -> Matrix:
+        from rrtik_ompl.fast.covers import outer_cover  # with scipy, which takes longer to load than covers to read
+
+        return outer_cover(geometry, protrusion=protrusion)
+
+    return _cached(geometry, f"outer {protrusion!r}", make)
 
 
 def cached_inner_spheres(geometry: Any, *, count: int | None = None) -> Matrix:
     """``inner_spheres``, from the cache if they are there."""
-    return _cached(geometry, f"inner {count!r}", lambda: inner_spheres(geometry, count=count))
 
+    def make() -> Matrix:
+        from rrtik_ompl.fast.covers import inner_spheres
 
-def cache_folder() -> Path | None:
-    """The folder of the cached covers, or None if the cache is switched off or nobody's home is known."""
-    named = os.environ.get(FOLDER_VARIABLE)
-    if named is not None:
-        return Path(named) / "covers" if named else None
-    try:
-        home = Path.home()
-    except RuntimeError:
-        return None
-    default = home / "Library" / "Caches" if sys.platform == "darwin" else home / ".cache"
-    return Path(os.environ.get("XDG_CACHE_HOME") or default) / "rrtik-ompl" / "covers"
+        return inner_spheres(geometry, count=count)
+
+    return _cached(geometry, f"inner {count!r}", make)
 
 
 def geometry_bytes(geometry: Any) -> bytes | None:
-    """All that a cover depends on, or None for a kind that is not cached (its cover is quick to make)."""
+    """All that a cover depends on, or None for a kind that is not cached."""
     numbers: list[Any]
     if isinstance(geometry, coal.Box):
         numbers = [np.array(geometry.halfSide, dtype=np.float64)]
-    elif isinstance(geometry, coal.Cylinder):
+    elif isinstance(geometry, coal.Sphere):
+        numbers = [np.array([geometry.radius])]
+    elif isinstance(geometry, (coal.Capsule, coal.Cylinder)):
         numbers = [np.array([geometry.radius, geometry.halfLength])]
     elif isinstance(geometry, coal.ConvexBase):
         numbers = [np.array(geometry.points(), dtype=np.float64)]
@@ -71,7 +67,7 @@ def geometry_bytes(geometry: Any) -> bytes | None:
 
 
 def _cached(geometry: Any, parameters: str, make: Callable[[], Matrix]) -> Matrix:
-    folder, data = cache_folder(), geometry_bytes(geometry)
+    folder, data = cache_folder("covers"), geometry_bytes(geometry)
     if folder is None or data is None:
         return make()
     head = f"layout {LAYOUT} algorithm {ALGORITHM} {parameters}\0".encode()
@@ -103,13 +99,5 @@ def _check(spheres: Matrix) -> str:
 
 
 def _write(file: Path, key: str, spheres: Matrix) -> None:
-    with contextlib.suppress(OSError):
-        file.parent.mkdir(parents=True, exist_ok=True)
-        handle, aside = tempfile.mkstemp(dir=file.parent, prefix=".writing-")
-        try:
-            with os.fdopen(handle, "wb") as stream:
-                np.savez(stream, spheres=spheres, key=np.array(key), check=np.array(_check(spheres)))
-            os.replace(aside, file)
-        except OSError:
-            with contextlib.suppress(OSError):
-                os.unlink(aside)
+    name, check = np.array(key), np.array(_check(spheres))
+    write_whole(file, lambda stream: np.savez(stream, spheres=spheres, key=name, check=check))

@@ -31,8 +31,6 @@ from rrtik_ompl.fast.cover_solids import (
     mesh_solid,
 )
 
-ALGORITHM = 1  # counts up when other spheres come out for the same geometry: part of the name of a cached cover
-
 BALLS_PER_METRE, FEWEST, MOST = 70.0, 2, 32
 MOST_ON_REQUEST = 512  # balls, where a protrusion is asked for
 CAPSULE_PROTRUSION = 0.06  # share of the radius

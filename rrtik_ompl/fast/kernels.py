@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.fast import robot_tables as robot
-from rrtik_ompl.fast import scene_tables as scene
+from rrtik_ompl.fast import layout
 from rrtik_ompl.fast.compiled import WIDTH, entry, inlined, kernel
 from rrtik_ompl.fast.lanes import (
     absolute,
+    bits,
     choose,
     double_at,
     field,
@@ -32,29 +32,25 @@ from rrtik_ompl.fast.lanes import (
     smaller,
     wide_lanes_at,
 )
-from rrtik_ompl.fast.overlap import (
-    CENTRES,
-    FOUND,
-    FRAME_BYTES,
+from rrtik_ompl.fast.layout import (
+    ARM,
+    COLLIDING,
     FRAMES,
-    GROUP_CENTRES,
+    FREE,
+    INNER,
+    INNER_ROWS,
     MARKS,
-    MET,
-    NEAR,
-    PLACED,
+    OUTER,
+    OUTER_ROWS,
+    UNDECIDED,
     VALUES,
     WAITING,
-    meets_itself,
-    meets_surroundings,
-    prepare,
+    WORK,
 )
+from rrtik_ompl.fast.overlap import FRAME_BYTES, meets_itself, meets_surroundings, prepare
 from rrtik_ompl.fast.row_kernels import along
 
-FREE, UNDECIDED, COLLIDING = 0, 1, 2
 ALL_LANES = (1 << WIDTH) - 1
-
-# World: addresses of the tables that a check needs.
-ARM, OUTER, INNER, OUTER_ROWS, INNER_ROWS, WORK = range(6)
 
 QUARTERS_PER_RADIAN = 2.0 / np.pi
 QUARTER_HIGH = 1.5707963267948966  # pi / 2 in two parts: the second is what float64 cannot hold of it
@@ -87,12 +83,12 @@ def sine_and_cosine(angle: Any) -> Any:
 @kernel
 def move(arm: int, work: int) -> None:
     """Frames of all joints from the joint values in the workspace (the world's own frame is there already)."""
-    parents, sliding = field(arm, robot.PARENTS), field(arm, robot.SLIDING)
+    parents, sliding = field(arm, layout.PARENTS), field(arm, layout.SLIDING)
     values, frames = field(work, VALUES), field(work, FRAMES)
-    for joint in range(field(arm, robot.JOINT_COUNT)):
+    for joint in range(field(arm, layout.JOINT_COUNT)):
         parent = frames + FRAME_BYTES * int_at(parents, joint)
         frame = frames + FRAME_BYTES * (joint + 1)
-        fixed = field(arm, robot.PLACEMENTS) + 48 * joint
+        fixed = field(arm, layout.PLACEMENTS) + 48 * joint
         value = wide_lanes_at(values, joint)
         if int_at(sliding, joint) != 0:
             slide(parent, frame, fixed, single(value))
@@ -157,7 +153,7 @@ def doubtful_lanes(world: int, wanted: int) -> Any:
 @inlined
 def load_row(world: int, rows: int, row: int, lane: int) -> None:
     """Set the joint values of a lane to a row of an array of float64."""
-    joints = field(field(world, ARM), robot.JOINT_COUNT)
+    joints = field(field(world, ARM), layout.JOINT_COUNT)
     values = field(field(world, WORK), VALUES)
     for joint in range(joints):
         set_double(values, joint * WIDTH + lane, double_at(rows, row * joints + joint))
@@ -208,15 +204,16 @@ def judge_edge(world: int, start: int, end: int, last: int, proving: bool) -> in
 
     The lanes are spread over the whole motion, so that a collision anywhere shows early.
     """
-    joints = field(field(world, ARM), robot.JOINT_COUNT)
+    joints = field(field(world, ARM), layout.JOINT_COUNT)
     values = field(field(world, WORK), VALUES)
     blocks = (last + WIDTH) // WIDTH
+    every = bits(lane_numbers() >= 0.0)  # a number: for a constant numba would compile all that is called apart
     answer = FREE
     for block in range(blocks):
         share = smaller(lane_numbers() * float(blocks) + float(block), float(last)) / float(last)
         for joint in range(joints):
             set_wide_lanes(values, joint, (1.0 - share) * double_at(start, joint) + share * double_at(end, joint))
-        doubtful = doubtful_lanes(world, ALL_LANES)
+        doubtful = doubtful_lanes(world, every)
         if doubtful != 0:
             answer = UNDECIDED
             if not proving:
@@ -230,7 +227,7 @@ def judge_edge(world: int, start: int, end: int, last: int, proving: bool) -> in
 @entry
 def classify_edges(world: int, starts: int, ends: int, steps: int, count: int, answers: int, proving: int) -> int:
     """Judge ``count`` motions between rows of two arrays in the given numbers of steps; int32 answers."""
-    stride = 8 * field(field(world, ARM), robot.JOINT_COUNT)
+    stride = 8 * field(field(world, ARM), layout.JOINT_COUNT)
     for k in range(count):
         answer = judge_edge(world, starts + k * stride, ends + k * stride, int_at(steps, k), proving != 0)
         set_int(answers, k, answer)
@@ -249,37 +246,10 @@ def mark_pairs(world: int, row: int, count: int) -> int:
     move(field(world, ARM), work)
     prepare(balls, work)
     marks, wanted = field(work, MARKS), ALL_LANES >> (WIDTH - count)
-    crossing = field(balls, robot.BODY_COUNT) * field(rows, scene.STANDING_COUNT)
-    total: int = crossing + field(balls, robot.PAIR_COUNT)
+    crossing = field(balls, layout.BODY_COUNT) * field(rows, layout.STANDING_COUNT)
+    total: int = crossing + field(balls, layout.PAIR_COUNT)
     for k in range(total):
         set_int(marks, k, 0)
     meets_surroundings(balls, rows, work, wanted, marks)
     meets_itself(balls, work, wanted, marks + 4 * crossing)
     return total
-
-
-def workspace(arm: robot.Table, balls: tuple[robot.Table, ...], rows: tuple[robot.Table, ...]) -> robot.Table:
-    """Memory for one thread that checks with these tables; the frame of the world is in place."""
-
-    def most(tables: tuple[robot.Table, ...], place: int) -> int:
-        return max(int(t.header[place]) for t in tables)
-
-    frames = np.zeros((int(arm.header[robot.JOINT_COUNT]) + 1, 12, WIDTH), dtype=np.float32)
-    frames[0, [0, 4, 8]] = 1.0
-    ball_count = max(len(t[robot.BALLS]) // 4 for t in balls)
-    row_list = np.zeros(most(rows, scene.PADDED_COUNT), dtype=np.int32)
-    crossing = most(balls, robot.BODY_COUNT) * most(rows, scene.STANDING_COUNT)
-    return robot.table(
-        {
-            VALUES: np.zeros((len(frames), WIDTH)),
-            FRAMES: frames,
-            GROUP_CENTRES: np.zeros((most(balls, robot.GROUP_COUNT), 3, WIDTH), dtype=np.float32),
-            CENTRES: np.zeros((ball_count, 3, WIDTH), dtype=np.float32),
-            PLACED: np.zeros(most(balls, robot.CLUSTER_COUNT), dtype=np.int32),
-            FOUND: row_list,
-            NEAR: row_list,
-            MET: row_list,
-            WAITING: np.zeros(WIDTH, dtype=np.int32),
-            MARKS: np.zeros(crossing + most(balls, robot.PAIR_COUNT), dtype=np.int32),
-        }
-    )

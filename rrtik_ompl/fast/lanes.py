@@ -17,9 +17,8 @@ from numba.core import cgutils
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, models, register_model
 
-from rrtik_ompl.fast.compiled import WIDTH
-
-ALIGNMENT = 64  # [bytes] of every array that whole vectors are read from
+from rrtik_ompl.fast.layout import ALIGNMENT
+from rrtik_ompl.fast.processor import WIDTH
 
 # Values are finite by contract and signs of zero do not matter; sums are not reordered, so error bounds hold.
 FAST_MATH = ("nnan", "ninf", "nsz", "contract")
@@ -273,7 +272,7 @@ wide_lanes_at = _reader(_vector(WIDE_LANES), WIDE_LANES, ALIGNMENT)
 double_at = _reader(_DOUBLE, types.float64, 8)
 float_at = _reader(_SINGLE, types.float32, 4)
 int_at = _reader(_INDEX, types.int64, 4)
-field = _reader(ir.IntType(64), types.int64, 8)  # of a table: see :mod:`rrtik_ompl.fast.robot_tables`
+field = _reader(ir.IntType(64), types.int64, 8)  # of a table: see :mod:`rrtik_ompl.fast.layout`
 set_lanes = _writer(_vector(LANES), LANES, ALIGNMENT // 2)
 set_wide_lanes = _writer(_vector(WIDE_LANES), WIDE_LANES, ALIGNMENT)
 set_double = _writer(_DOUBLE, types.float64, 8)

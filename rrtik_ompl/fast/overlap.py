@@ -8,16 +8,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from rrtik_ompl.fast import robot_tables as robot
-from rrtik_ompl.fast import scene_tables as scene
+from rrtik_ompl.fast import layout
 from rrtik_ompl.fast.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.fast.lanes import bits, field, float_at, int_at, lanes_at, set_int, set_lanes
+from rrtik_ompl.fast.layout import CENTRES, FOUND, FRAMES, GROUP_CENTRES, MET, NEAR, PLACED
 from rrtik_ompl.fast.row_kernels import meets_rows, rows_in_reach, squared
 
-# Workspace: wide lanes of joint values; lanes of frames (rotation row by row, then origin), of the groups' centres and
-# of the balls' centres; flags of clusters whose balls are placed; three lists of rows; flags of what meets; rows that
-# wait for a second look.
-VALUES, FRAMES, GROUP_CENTRES, CENTRES, PLACED, FOUND, NEAR, MET, MARKS, WAITING = range(10)
 FRAME_BYTES = 12 * 4 * WIDTH
 
 
@@ -49,9 +45,9 @@ def store(centres: int, number: int, x: Any, y: Any, z: Any) -> None:
 @inlined
 def checked_rows(rows: int, body: int, source: int, count: int, sink: int) -> int:
     """Copy a list of rows without those that a body need not keep clear of; returns how many are left."""
-    everything = int_at(field(rows, scene.EXCLUDING), body) == 0
-    checked = field(rows, scene.CHECKED) + 4 * body * field(rows, scene.STANDING_COUNT)
-    numbers = field(rows, scene.NUMBERS)
+    everything = int_at(field(rows, layout.EXCLUDING), body) == 0
+    checked = field(rows, layout.CHECKED) + 4 * body * field(rows, layout.STANDING_COUNT)
+    numbers = field(rows, layout.NUMBERS)
     kept = 0
     for k in range(count):
         number = int_at(source, k)
@@ -64,13 +60,13 @@ def checked_rows(rows: int, body: int, source: int, count: int, sink: int) -> in
 @kernel
 def prepare(balls: int, work: int) -> None:
     """Place the groups' centres and forget the balls' centres of the last block."""
-    frames, groups = field(work, FRAMES), field(balls, robot.GROUPS)
-    for group in range(field(balls, robot.GROUP_COUNT)):
+    frames, groups = field(work, FRAMES), field(balls, layout.GROUPS)
+    for group in range(field(balls, layout.GROUP_COUNT)):
         frame = frames + FRAME_BYTES * int_at(groups, 3 * group)
-        x, y, z = placed(frame, field(balls, robot.GROUP_BALLS), group)
+        x, y, z = placed(frame, field(balls, layout.GROUP_BALLS), group)
         store(field(work, GROUP_CENTRES), group, x, y, z)
     flags = field(work, PLACED)
-    for cluster in range(field(balls, robot.CLUSTER_COUNT)):
+    for cluster in range(field(balls, layout.CLUSTER_COUNT)):
         set_int(flags, cluster, 0)
 
 
@@ -80,9 +76,9 @@ def place_cluster(balls: int, work: int, cluster: int) -> None:
     if int_at(field(work, PLACED), cluster) != 0:
         return
     set_int(field(work, PLACED), cluster, 1)
-    numbers = field(balls, robot.CLUSTERS) + 16 * cluster
+    numbers = field(balls, layout.CLUSTERS) + 16 * cluster
     frame = field(work, FRAMES) + FRAME_BYTES * int_at(numbers, 1)
-    centres, all_balls = field(work, CENTRES), field(balls, robot.BALLS)
+    centres, all_balls = field(work, CENTRES), field(balls, layout.BALLS)
     for ball in range(int_at(numbers, 2), int_at(numbers, 3)):
         x, y, z = placed(frame, all_balls, ball)
         store(centres, ball, x, y, z)
@@ -91,20 +87,20 @@ def place_cluster(balls: int, work: int, cluster: int) -> None:
 @kernel
 def cluster_meets(balls: int, rows: int, work: int, cluster: int, count: int, wanted: int, marks: int) -> int:
     """Lanes in which a ball of a cluster meets one of the first ``count`` rows found; see ``meets_surroundings``."""
-    numbers = field(balls, robot.CLUSTERS) + 16 * cluster
+    numbers = field(balls, layout.CLUSTERS) + 16 * cluster
     body, frame = int_at(numbers, 0), field(work, FRAMES) + FRAME_BYTES * int_at(numbers, 1)
     near, met = field(work, NEAR), field(work, MET)
     count = checked_rows(rows, body, field(work, FOUND), count, near)
     if count == 0:
         return 0
-    around = field(balls, robot.CLUSTER_BALLS)
+    around = field(balls, layout.CLUSTER_BALLS)
     x, y, z = placed(frame, around, cluster)
     close, count = meets_rows(rows, x, y, z, float_at(around, 4 * cluster + 3), True, wanted, near, count, near, 0)
     if close == 0:
         return 0
     place_cluster(balls, work, cluster)
-    centres, all_balls = field(work, CENTRES), field(balls, robot.BALLS)
-    flags = 0 if marks == 0 else marks + 4 * body * field(rows, scene.STANDING_COUNT)
+    centres, all_balls = field(work, CENTRES), field(balls, layout.BALLS)
+    flags = 0 if marks == 0 else marks + 4 * body * field(rows, layout.STANDING_COUNT)
     meeting = 0
     for ball in range(int_at(numbers, 2), int_at(numbers, 3)):
         x, y, z = stored(centres, ball)
@@ -124,12 +120,12 @@ def meets_surroundings(balls: int, rows: int, work: int, wanted: int, marks: int
     Unless 0, ``marks`` is the address of one number for each moving and standing body, which collects the lanes in
     which the two meet.
     """
-    if field(rows, scene.ROW_COUNT) == 0:
+    if field(rows, layout.ROW_COUNT) == 0:
         return 0
-    groups, around = field(balls, robot.GROUPS), field(balls, robot.GROUP_BALLS)
+    groups, around = field(balls, layout.GROUPS), field(balls, layout.GROUP_BALLS)
     found = field(work, FOUND)
     meeting = 0
-    for group in range(field(balls, robot.GROUP_COUNT)):
+    for group in range(field(balls, layout.GROUP_COUNT)):
         x, y, z = stored(field(work, GROUP_CENTRES), group)
         radius = float_at(around, 4 * group + 3)
         still = wanted if marks != 0 else wanted & ~meeting
@@ -158,9 +154,9 @@ def clusters_meet(balls: int, work: int, first: int, second: int, wanted: int) -
     """Lanes in which a ball of one cluster meets a ball of another."""
     place_cluster(balls, work, first)
     place_cluster(balls, work, second)
-    centres, all_balls = field(work, CENTRES), field(balls, robot.BALLS)
-    around, frames = field(balls, robot.CLUSTER_BALLS), field(work, FRAMES)
-    mine, others = field(balls, robot.CLUSTERS) + 16 * first, field(balls, robot.CLUSTERS) + 16 * second
+    centres, all_balls = field(work, CENTRES), field(balls, layout.BALLS)
+    around, frames = field(balls, layout.CLUSTER_BALLS), field(work, FRAMES)
+    mine, others = field(balls, layout.CLUSTERS) + 16 * first, field(balls, layout.CLUSTERS) + 16 * second
     hull = placed(frames + FRAME_BYTES * int_at(others, 1), around, second)
     meeting = 0
     for ball in range(int_at(mine, 2), int_at(mine, 3)):
@@ -178,8 +174,8 @@ def clusters_meet(balls: int, work: int, first: int, second: int, wanted: int) -
 @kernel
 def bodies_meet(balls: int, work: int, first: int, second: int, wanted: int) -> int:
     """Lanes in which a ball of one body meets a ball of another."""
-    frames, bodies = field(work, FRAMES), field(balls, robot.BODIES)
-    around, hulls = field(balls, robot.CLUSTER_BALLS), field(balls, robot.BODY_BALLS)
+    frames, bodies = field(work, FRAMES), field(balls, layout.BODIES)
+    around, hulls = field(balls, layout.CLUSTER_BALLS), field(balls, layout.BODY_BALLS)
     first_frame = frames + FRAME_BYTES * int_at(bodies, 3 * first)
     second_frame = frames + FRAME_BYTES * int_at(bodies, 3 * second)
     hull, radius = placed(second_frame, hulls, second), float_at(hulls, 4 * second + 3)
@@ -207,10 +203,10 @@ def bodies_meet(balls: int, work: int, first: int, second: int, wanted: int) -> 
 @kernel
 def meets_itself(balls: int, work: int, wanted: int, marks: int) -> int:
     """Lanes among ``wanted`` in which two bodies of the arm meet; ``marks``, unless 0, collects them for each pair."""
-    groups, pairs = field(balls, robot.PAIR_GROUPS), field(balls, robot.PAIRS)
-    around, centres = field(balls, robot.GROUP_BALLS), field(work, GROUP_CENTRES)
+    groups, pairs = field(balls, layout.PAIR_GROUPS), field(balls, layout.PAIRS)
+    around, centres = field(balls, layout.GROUP_BALLS), field(work, GROUP_CENTRES)
     meeting = 0
-    for k in range(field(balls, robot.PAIR_GROUP_COUNT)):
+    for k in range(field(balls, layout.PAIR_GROUP_COUNT)):
         first, second = int_at(groups, 4 * k), int_at(groups, 4 * k + 1)
         x, y, z = stored(centres, first)
         reach = float_at(around, 4 * first + 3) + float_at(around, 4 * second + 3)

@@ -6,18 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix
-from rrtik_ompl.fast import robot_tables as robot
-from rrtik_ompl.fast import scene_tables as scene
+from rrtik_ompl.fast import layout
+from rrtik_ompl.fast.robot_tables import Table
 
 CHUNK = 64  # configurations at a time, to bound memory
 
 
-def frames(arm: robot.Table, values: Matrix) -> NDArray[np.float64]:
+def frames(arm: Table, values: Matrix) -> NDArray[np.float64]:
     """Joint frames as rotation and origin, world first, shape (m, joints + 1, 3, 4)."""
-    fixed = arm[robot.PLACEMENTS].astype(np.float64).reshape(-1, 12)
+    fixed = arm[layout.PLACEMENTS].astype(np.float64).reshape(-1, 12)
     found = np.zeros((len(values), len(fixed) + 1, 3, 4))
     found[:, 0, :, :3] = np.eye(3)
-    for joint, (parent, sliding) in enumerate(zip(arm[robot.PARENTS], arm[robot.SLIDING], strict=True)):
+    for joint, (parent, sliding) in enumerate(zip(arm[layout.PARENTS], arm[layout.SLIDING], strict=True)):
         above = found[:, parent]
         rotation = above[:, :, :3] @ fixed[joint, :9].reshape(3, 3)
         origin = above[:, :, 3] + above[:, :, :3] @ fixed[joint, 9:]
@@ -29,23 +29,23 @@ def frames(arm: robot.Table, values: Matrix) -> NDArray[np.float64]:
     return found
 
 
-def meets_row(rows: robot.Table, number: int, points: NDArray[np.float64], radii: NDArray[np.float64]) -> Mask:
+def meets_row(rows: Table, number: int, points: NDArray[np.float64], radii: NDArray[np.float64]) -> Mask:
     """Which balls, centres of shape (..., 3), meet a row. Shape (...)."""
-    row = rows[scene.ROWS].reshape(-1, scene.ROW_FLOATS)[number].astype(np.float64)
-    kind, _, start, end = rows[scene.NUMBERS].reshape(-1, 4)[number]
-    if kind == scene.HALF_SPACE:
+    row = rows[layout.ROWS].reshape(-1, layout.ROW_FLOATS)[number].astype(np.float64)
+    kind, _, start, end = rows[layout.NUMBERS].reshape(-1, 4)[number]
+    if kind == layout.HALF_SPACE:
         return np.asarray(points @ row[:3] - row[3] < radii)
-    if kind == scene.CONVEX:
-        planes = rows[scene.PLANES].astype(np.float64).reshape(-1, 4)[start:end]
+    if kind == layout.CONVEX:
+        planes = rows[layout.PLANES].astype(np.float64).reshape(-1, 4)[start:end]
         return np.asarray((points @ planes[:, :3].T - planes[:, 3]).max(axis=-1) < row[0] * radii)
     away = points - row[:3]
-    if kind == scene.BOX:
+    if kind == layout.BOX:
         outside = np.maximum(np.abs(away @ row[3:12].reshape(3, 3).T) - row[12:15], 0.0)
         return np.asarray(np.linalg.norm(outside, axis=-1) < radii)
-    if kind == scene.BALL:
+    if kind == layout.BALL:
         return np.asarray(np.linalg.norm(away, axis=-1) < radii + row[3])
     along = away @ row[3:6]
-    if kind == scene.CAPSULE:
+    if kind == layout.CAPSULE:
         foot = np.clip(along * row[6], 0.0, 1.0)[..., None] * row[3:6]
         return np.asarray(np.linalg.norm(away - foot, axis=-1) < radii + row[7])
     across = np.linalg.norm(away - along[..., None] * row[3:6], axis=-1)
@@ -55,9 +55,7 @@ def meets_row(rows: robot.Table, number: int, points: NDArray[np.float64], radii
 class PlainChecks:
     """The three-valued checks on the tables of a world."""
 
-    def __init__(
-        self, arm: robot.Table, balls: tuple[robot.Table, robot.Table], rows: tuple[robot.Table, robot.Table]
-    ) -> None:
+    def __init__(self, arm: Table, balls: tuple[Table, Table], rows: tuple[Table, Table]) -> None:
         self._arm, self._balls, self._rows = arm, balls, rows
 
     def classify(self, values: Matrix, *, prove: bool) -> NDArray[np.int8]:
@@ -89,12 +87,12 @@ class PlainChecks:
     def _meeting(self, poses: NDArray[np.float64], level: int) -> NDArray[np.bool_]:
         """Which bodies meet, shape (m, moving * standing + pairs of moving bodies)."""
         table, rows = self._balls[level], self._rows[level]
-        body_count, standing = int(table.header[robot.BODY_COUNT]), int(rows.header[scene.STANDING_COUNT])
-        pairs = table[robot.PAIRS].reshape(-1, 2)
+        body_count, standing = int(table.header[layout.BODY_COUNT]), int(rows.header[layout.STANDING_COUNT])
+        pairs = table[layout.PAIRS].reshape(-1, 2)
         found = np.zeros((len(poses), body_count * standing + len(pairs)), dtype=bool)
         points, radii = self._placed(poses, table)
-        checked = rows[scene.CHECKED].reshape(body_count, standing)
-        for number, (_, stands, _, _) in enumerate(rows[scene.NUMBERS].reshape(-1, 4)):
+        checked = rows[layout.CHECKED].reshape(body_count, standing)
+        for number, (_, stands, _, _) in enumerate(rows[layout.NUMBERS].reshape(-1, 4)):
             for body in np.flatnonzero(checked[:, stands]):
                 found[:, body * standing + stands] |= meets_row(rows, number, points[body], radii[body]).any(axis=1)
         for k, (i, j) in enumerate(pairs):
@@ -104,12 +102,12 @@ class PlainChecks:
 
     @staticmethod
     def _placed(
-        poses: NDArray[np.float64], table: robot.Table
+        poses: NDArray[np.float64], table: Table
     ) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
         """Centres in the world, shape (m, n, 3), and radii, shape (n,), of each body's balls."""
-        balls, clusters = table[robot.BALLS].astype(np.float64).reshape(-1, 4), table[robot.CLUSTERS].reshape(-1, 4)
+        balls, clusters = table[layout.BALLS].astype(np.float64).reshape(-1, 4), table[layout.CLUSTERS].reshape(-1, 4)
         points, radii = [], []
-        for frame, first, end in table[robot.BODIES].reshape(-1, 3):
+        for frame, first, end in table[layout.BODIES].reshape(-1, 3):
             span = slice(clusters[first, 2], clusters[end - 1, 3]) if end > first else slice(0, 0)
             pose = poses[:, frame]
             points.append(np.einsum("mij,nj->mni", pose[:, :, :3], balls[span, :3]) + pose[:, None, :, 3])

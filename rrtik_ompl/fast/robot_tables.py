@@ -1,8 +1,6 @@
 """The arm as flat tables for the kernels: joints, and balls grouped by joint, body and neighbourhood.
 
-A table is an int64 array of fields; a field is a number or the address of a float32 or int32 array that the table
-owns. The fields' places are the constants below. Frames are counted like Pinocchio's joints: 0 is the world.
-
+Places of fields: :mod:`rrtik_ompl.fast.layout`. A table owns the float32 and int32 arrays whose addresses it holds.
 Every joint frame is turned so that its axis is z; the balls and the frames of the next joints are turned along.
 """
 
@@ -16,23 +14,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.fast.layout import (
+    ALIGNMENT,
+    BALLS,
+    BODIES,
+    BODY_BALLS,
+    BODY_COUNT,
+    CLUSTER_BALLS,
+    CLUSTER_COUNT,
+    CLUSTERS,
+    GROUP_BALLS,
+    GROUP_COUNT,
+    GROUPS,
+    JOINT_COUNT,
+    PAIR_COUNT,
+    PAIR_GROUP_COUNT,
+    PAIR_GROUPS,
+    PAIRS,
+    PARENTS,
+    PLACEMENTS,
+    SLIDING,
+)
 from rrtik_ompl.robot import Chain
 
 Spheres: TypeAlias = NDArray[np.float64]  # shape (n, 4): centre and radius [m]
 Header: TypeAlias = NDArray[np.int64]
 
-# Arm: placements are 12 floats a joint, the rotation row by row and then the translation.
-JOINT_COUNT, PARENTS, SLIDING, PLACEMENTS = range(4)
-
-# Balls (of the outer cover, or inner ones). Balls are 4 floats: centre in the joint frame and radius.
-# group: frame, clusters from, to · cluster: body, frame, balls from, to · body: frame, clusters from, to
-# pair group: group, group, pairs from, to · pair: body, body
-GROUP_COUNT, GROUPS, GROUP_BALLS, CLUSTERS, CLUSTER_BALLS, BALLS, BODIES, BODY_BALLS = range(8)
-PAIR_GROUP_COUNT, PAIR_GROUPS, PAIRS, CLUSTER_COUNT, BODY_COUNT, PAIR_COUNT = range(8, 14)
-
 CLUSTER_SIZE = 8  # balls in the smallest neighbourhood, at most
 FAR = 1e6  # [m] radius of the ball that stands for a body without end
-ALIGNMENT = 64  # [bytes]
 
 SMALLEST_MARGIN = 2e-5  # [m]
 MARGIN_PER_LEVER = 1e-6  # a joint's rotation in float32 errs by less than this angle [rad]

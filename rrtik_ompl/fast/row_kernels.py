@@ -1,6 +1,6 @@
 """Kernels that test a ball, in all lanes at once, against what stands still.
 
-Lanes are bits of an integer. Rows: see :mod:`rrtik_ompl.fast.scene_tables`.
+Lanes are bits of an integer. Rows: see :mod:`rrtik_ompl.fast.layout`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.fast import scene_tables as scene
+from rrtik_ompl.fast import layout
 from rrtik_ompl.fast.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.fast.lanes import (
     absolute,
@@ -85,22 +85,22 @@ def meets_convex(planes: int, start: int, end: int, share: Any, x: Any, y: Any, 
 @inlined
 def meets_row(rows: int, number: int, x: Any, y: Any, z: Any, radius: float, bound: bool) -> Any:
     """Lanes in which a ball meets a row; ``bound`` tells that the ball only stands for balls inside it."""
-    row = field(rows, scene.ROWS) + 4 * scene.ROW_FLOATS * number
-    numbers = field(rows, scene.NUMBERS) + 16 * number
+    row = field(rows, layout.ROWS) + 4 * layout.ROW_FLOATS * number
+    numbers = field(rows, layout.NUMBERS) + 16 * number
     kind = int_at(numbers, 0)
-    if kind == scene.HALF_SPACE:
+    if kind == layout.HALF_SPACE:
         return bits(along(row, 0, x, y, z) - float_at(row, 3) < radius)
-    if kind == scene.CONVEX:
-        planes = field(rows, scene.PLANES)
+    if kind == layout.CONVEX:
+        planes = field(rows, layout.PLANES)
         share = ONE if bound else float_at(row, 0)
         return meets_convex(planes, int_at(numbers, 2), int_at(numbers, 3), share, x, y, z, radius)
     x, y, z = x - float_at(row, 0), y - float_at(row, 1), z - float_at(row, 2)
-    if kind == scene.BOX:
+    if kind == layout.BOX:
         return bits(to_box(row, x, y, z) < radius * radius)
-    if kind == scene.BALL:
+    if kind == layout.BALL:
         reach = radius + float_at(row, 3)
         return bits(squared(x, y, z) < reach * reach)
-    if kind == scene.CAPSULE:
+    if kind == layout.CAPSULE:
         reach = radius + float_at(row, 7)
         return bits(to_capsule(row, x, y, z) < reach * reach)
     return bits(to_cylinder(row, x, y, z) < radius * radius)
@@ -133,7 +133,7 @@ def meets_rows(
             set_int(sink, kept, number)
             kept += 1
             if marks != 0:
-                body = int_at(field(rows, scene.NUMBERS), 4 * number + 1)
+                body = int_at(field(rows, layout.NUMBERS), 4 * number + 1)
                 set_int(marks, body, int_at(marks, body) | found)
     return meeting, kept
 
@@ -147,8 +147,8 @@ def rows_in_reach(rows: int, x: Any, y: Any, z: Any, radius: float, found: int) 
     low_x, high_x = lowest(x) - radius, highest(x) + radius
     low_y, high_y = lowest(y) - radius, highest(y) + radius
     low_z, high_z = lowest(z) - radius, highest(z) + radius
-    boxes = field(rows, scene.BOXES)
-    steps = field(rows, scene.PADDED_COUNT) // WIDTH
+    boxes = field(rows, layout.BOXES)
+    steps = field(rows, layout.PADDED_COUNT) // WIDTH
     count = 0
     for k in range(steps):
         inside_x = (lanes_at(boxes, k) < high_x) & (lanes_at(boxes, steps + k) > low_x)

@@ -16,21 +16,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.fast.layout import (
+    BALL,
+    BOX,
+    BOXES,
+    CAPSULE,
+    CHECKED,
+    CONVEX,
+    CYLINDER,
+    EXCLUDING,
+    HALF_SPACE,
+    NUMBERS,
+    PADDED_COUNT,
+    PLANES,
+    ROW_COUNT,
+    ROW_FLOATS,
+    ROWS,
+    STANDING_COUNT,
+)
 from rrtik_ompl.fast.robot_tables import Spheres, Table, table, usable_cover
-
-# Kinds, and the floats of their rows.
-BALL = 0  # centre, radius
-CAPSULE = 1  # one end, the way to the other end, 1 / length^2 (0 for a ball), radius
-BOX = 2  # centre, axes, half sizes
-CYLINDER = 3  # centre, axis, half length, radius
-HALF_SPACE = 4  # outward normal, offset
-CONVEX = 5  # 1 if a ball meets it that reaches behind all planes, 0 if the ball's centre must lie behind them
-ROW_FLOATS = 16
-
-# Rows. BOXES: 6 runs of PADDED_COUNT floats, lowest x, highest x, lowest y, ... · numbers: kind, body, planes from, to
-# PLANES: outward normal and offset · CHECKED: one int for each moving and standing body, 0 to ignore that pair
-# EXCLUDING: for each moving body whether it has a pair to ignore
-ROW_COUNT, PADDED_COUNT, BOXES, ROWS, NUMBERS, PLANES, STANDING_COUNT, CHECKED, EXCLUDING = range(9)
 
 MOST_PLANES = 64  # of the outer polyhedron of a convex solid: fewer planes make it larger, never smaller
 LANE_PADDING = 16  # boxes are compared this many at a time, or half as many

@@ -1,0 +1,42 @@
+"""Where things stand in the tables that Python packs and kernels read.
+
+A table is an int64 array of fields; a field is a number or the address of an array. The names below are the fields'
+places. Frames are counted like Pinocchio's joints: 0 is the world. This module imports nothing, so that packing needs
+no compiler and compiling no collision library.
+"""
+
+from __future__ import annotations
+
+ALIGNMENT = 64  # [bytes] of every array that whole vectors are read from
+FREE, UNDECIDED, COLLIDING = 0, 1, 2  # answers
+
+# World: addresses of the tables that a check needs.
+ARM, OUTER, INNER, OUTER_ROWS, INNER_ROWS, WORK = range(6)
+
+# Arm: placements are 12 floats a joint, the rotation row by row and then the translation.
+JOINT_COUNT, PARENTS, SLIDING, PLACEMENTS = range(4)
+
+# Balls (of the outer cover, or inner ones). Balls are 4 floats: centre in the joint frame and radius.
+# group: frame, clusters from, to · cluster: body, frame, balls from, to · body: frame, clusters from, to
+# pair group: group, group, pairs from, to · pair: body, body
+GROUP_COUNT, GROUPS, GROUP_BALLS, CLUSTERS, CLUSTER_BALLS, BALLS, BODIES, BODY_BALLS = range(8)
+PAIR_GROUP_COUNT, PAIR_GROUPS, PAIRS, CLUSTER_COUNT, BODY_COUNT, PAIR_COUNT = range(8, 14)
+
+# Rows: what stands still. BOXES: 6 runs of PADDED_COUNT floats, lowest x, highest x, lowest y, ... · numbers: kind,
+# body, planes from, to · PLANES: outward normal and offset · CHECKED: one int for each moving and standing body, 0 to
+# ignore that pair · EXCLUDING: for each moving body whether it has a pair to ignore
+ROW_COUNT, PADDED_COUNT, BOXES, ROWS, NUMBERS, PLANES, STANDING_COUNT, CHECKED, EXCLUDING = range(9)
+
+# Kinds of rows, and their floats.
+BALL = 0  # centre, radius
+CAPSULE = 1  # one end, the way to the other end, 1 / length^2 (0 for a ball), radius
+BOX = 2  # centre, axes, half sizes
+CYLINDER = 3  # centre, axis, half length, radius
+HALF_SPACE = 4  # outward normal, offset
+CONVEX = 5  # 1 if a ball meets it that reaches behind all planes, 0 if the ball's centre must lie behind them
+ROW_FLOATS = 16
+
+# Workspace: wide lanes of joint values; lanes of frames (rotation row by row, then origin), of the groups' centres and
+# of the balls' centres; flags of clusters whose balls are placed; three lists of rows; flags of what meets; rows that
+# wait for a second look.
+VALUES, FRAMES, GROUP_CENTRES, CENTRES, PLACED, FOUND, NEAR, MET, MARKS, WAITING = range(10)
