@@ -17,7 +17,7 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.layout import MARKS, UNDECIDED
 from rrtik_ompl.fast.library import library
-from rrtik_ompl.fast.packing import ArmTables, arm_tables, flag_places, standing_tables
+from rrtik_ompl.fast.packing import ArmTables, alike, arm_tables, flag_places, standing_tables
 from rrtik_ompl.fast.plain import PlainChecks
 from rrtik_ompl.fast.robot_tables import Spheres, table
 from rrtik_ompl.fast.workspace import workspace
@@ -72,7 +72,7 @@ class FastWorld:
         self._smallest_limit = float(self._limits.min(initial=LARGEST_ANGLE))
         kept = [(i, j) for i, j in pairs if bodies[i].joint > 0 or bodies[j].joint > 0]
         concerned = sorted({k for pair in kept for k in pair})
-        moving = [k for k in concerned if bodies[k].joint > 0]
+        moving = alike(bodies, kept)
         standing = [k for k in concerned if bodies[k].joint == 0]
         self._pairs = kept
         same = like._arm if like is not None and like._joints == self._joints else None
@@ -159,7 +159,7 @@ class FastWorld:
             marks = self._marked(rows[start : start + MARKED_ROWS])
             pairs: list[list[tuple[int, int]]] = [[] for _ in marks]
             for row, flag in np.argwhere(marks).tolist():
-                pairs[row].append(self._flagged[flag])
+                pairs[row] += self._flagged[flag]
             found += pairs
         for far in np.flatnonzero(beyond) if beyond is not None else ():
             found[far] = list(self._pairs)

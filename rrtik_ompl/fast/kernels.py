@@ -38,16 +38,18 @@ from rrtik_ompl.fast.layout import (
     FRAMES,
     FREE,
     INNER,
+    INNER_LAST,
     INNER_ROWS,
     MARKS,
     OUTER,
+    OUTER_LAST,
     OUTER_ROWS,
     UNDECIDED,
     VALUES,
     WAITING,
     WORK,
 )
-from rrtik_ompl.fast.overlap import FRAME_BYTES, meets_itself, meets_surroundings, prepare
+from rrtik_ompl.fast.overlap import FRAME_BYTES, meets_itself, meets_surroundings, prepare, still_meets
 from rrtik_ompl.fast.row_kernels import along
 
 ALL_LANES = (1 << WIDTH) - 1
@@ -134,20 +136,32 @@ def rotated(fixed: int, a: Any, b: Any, c: Any) -> Any:
 
 
 @kernel
-def meeting(world: int, balls: int, rows: int, wanted: int) -> Any:
-    """Lanes among ``wanted`` in which these balls meet these rows or each other."""
-    prepare(balls, field(world, WORK))
-    found = meets_surroundings(balls, rows, field(world, WORK), wanted, 0)
-    if found != wanted:
-        found |= meets_itself(balls, field(world, WORK), wanted & ~found, 0)
+def meeting(world: int, balls: int, rows: int, wanted: int, last: int, one: bool) -> Any:
+    """Lanes among ``wanted`` in which these balls meet these rows or each other; if ``one`` is enough, not all."""
+    work = field(world, WORK)
+    if one:
+        found = still_meets(balls, rows, work, wanted, last)
+        if found != 0:
+            return found
+    prepare(balls, work)
+    found = meets_surroundings(balls, rows, work, wanted, 0, one, last)
+    if found != wanted and not (one and found != 0):
+        found |= meets_itself(balls, work, wanted & ~found, 0, one)
     return found
 
 
-@kernel
-def doubtful_lanes(world: int, wanted: int) -> Any:
-    """Lanes that the outer balls cannot prove free, for the joint values in the workspace."""
-    move(field(world, ARM), field(world, WORK))
-    return meeting(world, field(world, OUTER), field(world, OUTER_ROWS), wanted)
+@inlined
+def outer_meeting(world: int, wanted: int, one: bool) -> Any:
+    """Lanes that the outer balls cannot prove free, for the frames in the workspace."""
+    last = field(field(world, WORK), OUTER_LAST)
+    return meeting(world, field(world, OUTER), field(world, OUTER_ROWS), wanted, last, one)
+
+
+@inlined
+def inner_meeting(world: int, wanted: int, one: bool) -> Any:
+    """Lanes that the inner balls prove colliding, for the frames in the workspace."""
+    last = field(field(world, WORK), INNER_LAST)
+    return meeting(world, field(world, INNER), field(world, INNER_ROWS), wanted, last, one)
 
 
 @inlined
@@ -166,7 +180,7 @@ def prove(world: int, rows: int, waiting: int, answers: int) -> None:
     for lane in range(WIDTH):
         load_row(world, rows, int_at(queue, min(lane, waiting - 1)), lane)
     move(field(world, ARM), field(world, WORK))
-    colliding = meeting(world, field(world, INNER), field(world, INNER_ROWS), ALL_LANES >> (WIDTH - waiting))
+    colliding = inner_meeting(world, ALL_LANES >> (WIDTH - waiting), waiting < 0)
     for lane in range(waiting):
         if (colliding >> lane) & 1:
             set_int(answers, int_at(queue, lane), COLLIDING)
@@ -183,7 +197,8 @@ def classify(world: int, rows: int, count: int, answers: int, proving: int) -> i
         filled = min(WIDTH, count - start)
         for lane in range(WIDTH):
             load_row(world, rows, start + min(lane, filled - 1), lane)
-        doubtful = doubtful_lanes(world, ALL_LANES >> (WIDTH - filled))
+        move(field(world, ARM), field(world, WORK))
+        doubtful = outer_meeting(world, ALL_LANES >> (WIDTH - filled), filled < 0)
         for lane in range(filled):
             open_ = (doubtful >> lane) & 1
             set_int(answers, start + lane, open_)
@@ -205,7 +220,8 @@ def judge_edge(world: int, start: int, end: int, last: int, proving: bool) -> in
     The lanes are spread over the whole motion, so that a collision anywhere shows early.
     """
     joints = field(field(world, ARM), layout.JOINT_COUNT)
-    values = field(field(world, WORK), VALUES)
+    work = field(world, WORK)
+    values, inner_last = field(work, VALUES), field(work, INNER_LAST)
     blocks = (last + WIDTH) // WIDTH
     every = bits(lane_numbers() >= 0.0)  # a number: for a constant numba would compile all that is called apart
     answer = FREE
@@ -213,12 +229,16 @@ def judge_edge(world: int, start: int, end: int, last: int, proving: bool) -> in
         share = smaller(lane_numbers() * float(blocks) + float(block), float(last)) / float(last)
         for joint in range(joints):
             set_wide_lanes(values, joint, (1.0 - share) * double_at(start, joint) + share * double_at(end, joint))
-        doubtful = doubtful_lanes(world, every)
+        move(field(world, ARM), work)
+        if proving and still_meets(field(world, INNER), field(world, INNER_ROWS), work, every, inner_last) != 0:
+            answer = COLLIDING
+            break
+        doubtful = outer_meeting(world, every, not proving)
         if doubtful != 0:
             answer = UNDECIDED
             if not proving:
                 break
-            if meeting(world, field(world, INNER), field(world, INNER_ROWS), doubtful) != 0:
+            if inner_meeting(world, doubtful, proving) != 0:
                 answer = COLLIDING
                 break
     return answer
@@ -250,6 +270,6 @@ def mark_pairs(world: int, row: int, count: int) -> int:
     total: int = crossing + field(balls, layout.PAIR_COUNT)
     for k in range(total):
         set_int(marks, k, 0)
-    meets_surroundings(balls, rows, work, wanted, marks)
-    meets_itself(balls, work, wanted, marks + 4 * crossing)
+    meets_surroundings(balls, rows, work, wanted, marks, count < 0, field(work, OUTER_LAST))
+    meets_itself(balls, work, wanted, marks + 4 * crossing, count < 0)
     return total

@@ -38,5 +38,5 @@ ROW_FLOATS = 16
 
 # Workspace: wide lanes of joint values; lanes of frames (rotation row by row, then origin), of the groups' centres and
 # of the balls' centres; flags of clusters whose balls are placed; three lists of rows; flags of what meets; rows that
-# wait for a second look.
-VALUES, FRAMES, GROUP_CENTRES, CENTRES, PLACED, FOUND, NEAR, MET, MARKS, WAITING = range(10)
+# wait for a second look; for the outer and the inner balls what met last: ball, frame and row (-1: nothing yet).
+VALUES, FRAMES, GROUP_CENTRES, CENTRES, PLACED, FOUND, NEAR, MET, MARKS, WAITING, OUTER_LAST, INNER_LAST = range(12)

@@ -85,7 +85,9 @@ def place_cluster(balls: int, work: int, cluster: int) -> None:
 
 
 @kernel
-def cluster_meets(balls: int, rows: int, work: int, cluster: int, count: int, wanted: int, marks: int) -> int:
+def cluster_meets(
+    balls: int, rows: int, work: int, cluster: int, count: int, wanted: int, marks: int, one: bool, last: int
+) -> int:
     """Lanes in which a ball of a cluster meets one of the first ``count`` rows found; see ``meets_surroundings``."""
     numbers = field(balls, layout.CLUSTERS) + 16 * cluster
     body, frame = int_at(numbers, 0), field(work, FRAMES) + FRAME_BYTES * int_at(numbers, 1)
@@ -107,18 +109,22 @@ def cluster_meets(balls: int, rows: int, work: int, cluster: int, count: int, wa
         still = close if marks != 0 else close & ~meeting
         radius = float_at(all_balls, 4 * ball + 3)
         found, _ = meets_rows(rows, x, y, z, radius, False, still, near, count, met, flags)
-        meeting |= found
-        if meeting == close and marks == 0:
+        if found != 0:
+            meeting |= found
+            set_int(last, 0, ball)
+            set_int(last, 1, int_at(numbers, 1))
+            set_int(last, 2, int_at(met, 0))
+        if marks == 0 and (meeting == close or (one and meeting != 0)):
             break
     return meeting
 
 
 @kernel
-def meets_surroundings(balls: int, rows: int, work: int, wanted: int, marks: int) -> int:
-    """Lanes among ``wanted`` in which the arm meets a row.
+def meets_surroundings(balls: int, rows: int, work: int, wanted: int, marks: int, one: bool, last: int) -> int:
+    """Lanes among ``wanted`` in which the arm meets a row; if ``one`` is enough, not all of them.
 
-    Unless 0, ``marks`` is the address of one number for each moving and standing body, which collects the lanes in
-    which the two meet.
+    What met is written to ``last``. Unless 0, ``marks`` is the address of one number for each moving and standing
+    body, which collects the lanes in which the two meet.
     """
     if field(rows, layout.ROW_COUNT) == 0:
         return 0
@@ -137,10 +143,24 @@ def meets_surroundings(balls: int, rows: int, work: int, wanted: int, marks: int
             continue
         for cluster in range(int_at(groups, 3 * group + 1), int_at(groups, 3 * group + 2)):
             left = close if marks != 0 else close & ~meeting
-            meeting |= cluster_meets(balls, rows, work, cluster, count, left, marks)
+            meeting |= cluster_meets(balls, rows, work, cluster, count, left, marks, one, last)
+            if one and meeting != 0 and marks == 0:
+                return meeting
         if meeting == wanted and marks == 0:
             break
     return meeting
+
+
+@kernel
+def still_meets(balls: int, rows: int, work: int, wanted: int, last: int) -> int:
+    """Lanes among ``wanted`` in which the ball and the row meet that met last: often the quickest way to an answer."""
+    if int_at(last, 2) < 0:
+        return 0
+    ball, all_balls = int_at(last, 0), field(balls, layout.BALLS)
+    x, y, z = placed(field(work, FRAMES) + FRAME_BYTES * int_at(last, 1), all_balls, ball)
+    radius = float_at(all_balls, 4 * ball + 3)
+    found, _ = meets_rows(rows, x, y, z, radius, False, wanted, last + 8, 1, field(work, MET), 0)
+    return int(found)
 
 
 @inlined
@@ -201,8 +221,11 @@ def bodies_meet(balls: int, work: int, first: int, second: int, wanted: int) -> 
 
 
 @kernel
-def meets_itself(balls: int, work: int, wanted: int, marks: int) -> int:
-    """Lanes among ``wanted`` in which two bodies of the arm meet; ``marks``, unless 0, collects them for each pair."""
+def meets_itself(balls: int, work: int, wanted: int, marks: int, one: bool) -> int:
+    """Lanes among ``wanted`` in which two bodies of the arm meet; if ``one`` is enough, not all of them.
+
+    Unless 0, ``marks`` is the address of one number for each pair, which collects the lanes.
+    """
     groups, pairs = field(balls, layout.PAIR_GROUPS), field(balls, layout.PAIRS)
     around, centres = field(balls, layout.GROUP_BALLS), field(work, GROUP_CENTRES)
     meeting = 0
@@ -220,6 +243,6 @@ def meets_itself(balls: int, work: int, wanted: int, marks: int) -> int:
             meeting |= found
             if marks != 0 and found != 0:
                 set_int(marks, pair, int_at(marks, pair) | found)
-        if meeting == wanted and marks == 0:
+        if marks == 0 and (meeting == wanted or (one and meeting != 0)):
             break
     return meeting

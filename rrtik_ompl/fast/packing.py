@@ -29,6 +29,7 @@ class ArmTables:
     """All that depends on the moving bodies alone."""
 
     bodies: tuple[Any, ...]
+    sizes: tuple[int, ...]
     covers: tuple[Spheres, ...]
     pairs: tuple[tuple[int, int], ...]
     strokes: Vector
@@ -37,11 +38,17 @@ class ArmTables:
     balls: tuple[Table, Table]
 
     def serves(
-        self, bodies: Sequence[Any], covers: Sequence[Spheres], pairs: Sequence[tuple[int, int]], strokes: Vector
+        self,
+        bodies: Sequence[Any],
+        sizes: Sequence[int],
+        covers: Sequence[Spheres],
+        pairs: Sequence[tuple[int, int]],
+        strokes: Vector,
     ) -> bool:
         """Whether the tables of these bodies would be the same."""
         return (
             len(bodies) == len(self.bodies)
+            and tuple(sizes) == self.sizes
             and tuple(pairs) == self.pairs
             and np.array_equal(strokes, self.strokes)
             and all(np.array_equal(a, b) for a, b in zip(covers, self.covers, strict=True))
@@ -49,35 +56,57 @@ class ArmTables:
         )
 
 
+def alike(bodies: Sequence[Any], pairs: Sequence[tuple[int, int]]) -> list[tuple[int, ...]]:
+    """Numbers of the moving bodies in sets that one joint carries and that have the same bodies to keep clear of.
+
+    To the kernels a set is one body: a link of many small solids costs no more than one with a cover of as many balls.
+    """
+    partners: dict[int, set[int]] = {k: set() for pair in pairs for k in pair}
+    for i, j in pairs:
+        partners[i].add(j)
+        partners[j].add(i)
+    sets: dict[tuple[int, frozenset[int]], list[int]] = {}
+    for k in sorted(partners):
+        if bodies[k].joint > 0:
+            sets.setdefault((bodies[k].joint, frozenset(partners[k])), []).append(k)
+    return [tuple(members) for members in sets.values()]
+
+
 def arm_tables(
     chain: Chain,
     bodies: Sequence[Any],
-    moving: Sequence[int],
+    moving: Sequence[tuple[int, ...]],
     pairs: Sequence[tuple[int, int]],
     outer: Sequence[Spheres],
     inner: Sequence[Spheres],
     limits: Vector,
     like: ArmTables | None,
 ) -> ArmTables:
-    """Tables of the moving bodies (numbers in ``bodies``); those of ``like`` if they are the same."""
-    place = {body: k for k, body in enumerate(moving)}
-    own = tuple((place[i], place[j]) for i, j in pairs if i in place and j in place)
-    carried = tuple(bodies[k] for k in moving)
-    covers = tuple(np.asarray(spheres[k], dtype=np.float64) for k in moving for spheres in (outer, inner))
-    if like is not None and like.serves(carried, covers, own, limits):
+    """Tables of the moving bodies (see :func:`alike`); those of ``like`` if they are the same."""
+    place = {body: k for k, members in enumerate(moving) for body in members}
+    own = tuple(dict.fromkeys((place[i], place[j]) for i, j in map(sorted, pairs) if i in place and j in place))
+    carried, sizes = tuple(bodies[k] for members in moving for k in members), tuple(map(len, moving))
+    covers = tuple(np.asarray(s[k], dtype=np.float64) for members in moving for k in members for s in (outer, inner))
+    if like is not None and like.serves(carried, sizes, covers, own, limits):
         return like
-    reaches = [(b.joint, _reach(b, covers[2 * k])) for k, b in enumerate(carried)]
+    reaches = [(bodies[k].joint, _reach(bodies[k], outer[k])) for members in moving for k in members]
     margin = rounding_margin(chain, reaches, limits)
-    packed: list[MovingBody] = [
-        moving_body(chain, body, covers[2 * k], covers[2 * k + 1], margin) for k, body in enumerate(carried)
+    packed = [
+        as_one([moving_body(chain, bodies[k], outer[k], inner[k], margin) for k in members]) for members in moving
     ]
     balls = (ball_table(packed, own, inner=False), ball_table(packed, own, inner=True))
-    return ArmTables(carried, covers, own, limits, margin, arm_table(chain), balls)
+    return ArmTables(carried, sizes, covers, own, limits, margin, arm_table(chain), balls)
+
+
+def as_one(parts: Sequence[MovingBody]) -> MovingBody:
+    """Bodies that one joint carries as a single one."""
+    outer, inner = np.concatenate([p.outer for p in parts]), np.concatenate([p.inner for p in parts])
+    return MovingBody(parts[0].frame, outer, inner)
 
 
 def standing_tables(
     bodies: Sequence[Any],
-    moving: Sequence[int],
+    moving: Sequence[tuple[int, ...]],
     standing: Sequence[int],
     pairs: Sequence[tuple[int, int]],
     outer: Sequence[Spheres],
@@ -85,7 +114,7 @@ def standing_tables(
 ) -> tuple[Table, Table]:
     """Rows that contain what stands still, and rows inside it."""
     listed = {frozenset(pair) for pair in pairs}
-    checked = np.array([[frozenset((i, j)) in listed for j in standing] for i in moving], dtype=bool)
+    checked = np.array([[frozenset((members[0], j)) in listed for j in standing] for members in moving], dtype=bool)
     checked = checked.reshape(len(moving), len(standing))
     around = [(s, row) for s, k in enumerate(standing) for row in outer_rows(bodies[k], outer[k])]
     inside = [(s, row) for s, k in enumerate(standing) for row in inner_rows(bodies[k], inner[k])]
@@ -93,19 +122,18 @@ def standing_tables(
 
 
 def flag_places(
-    pairs: Sequence[tuple[int, int]], arm: ArmTables, moving: Sequence[int], standing: Sequence[int]
-) -> dict[int, tuple[int, int]]:
-    """For each flag that the kernels can set its pair."""
-    number = {frozenset(pair): pair for pair in pairs}
-    crossing = {
-        m * len(standing) + s: number[frozenset((i, j))]
-        for m, i in enumerate(moving)
-        for s, j in enumerate(standing)
-        if frozenset((i, j)) in number
-    }
-    own = arm.balls[0][PAIRS].reshape(-1, 2)
-    start = len(moving) * len(standing)
-    return crossing | {start + k: number[frozenset((moving[i], moving[j]))] for k, (i, j) in enumerate(own)}
+    pairs: Sequence[tuple[int, int]], arm: ArmTables, moving: Sequence[tuple[int, ...]], standing: Sequence[int]
+) -> dict[int, list[tuple[int, int]]]:
+    """For each flag that the kernels can set the pairs that it stands for."""
+    listed = {frozenset(pair): pair for pair in pairs}
+
+    def between(first: Sequence[int], second: Sequence[int]) -> list[tuple[int, int]]:
+        both = (frozenset((i, j)) for i in first for j in second)
+        return [listed[pair] for pair in both if pair in listed]
+
+    crossing = [between(members, (j,)) for members in moving for j in standing]
+    own = [between(moving[i], moving[j]) for i, j in arm.balls[0][PAIRS].reshape(-1, 2)]
+    return dict(enumerate(crossing + own))
 
 
 def _reach(body: Any, outer: Spheres) -> float:

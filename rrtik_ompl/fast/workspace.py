@@ -31,6 +31,8 @@ def workspace(arm: Table, balls: tuple[Table, ...], rows: tuple[Table, ...]) -> 
             layout.NEAR: row_list,
             layout.MET: row_list,
             layout.WAITING: np.zeros(WIDTH, dtype=np.int32),
+            layout.OUTER_LAST: np.full(3, -1, dtype=np.int32),
+            layout.INNER_LAST: np.full(3, -1, dtype=np.int32),
             layout.MARKS: np.zeros(crossing + most(balls, layout.PAIR_COUNT), dtype=np.int32),
         }
     )
