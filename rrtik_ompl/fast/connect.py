@@ -14,12 +14,11 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast import connect_kernels as kernels
 from rrtik_ompl.fast.compiled import WIDTH
+from rrtik_ompl.fast.connect_lengths import connect_lengths, positive
 from rrtik_ompl.fast.random_kernels import inverse_bases
 from rrtik_ompl.fast.robot_tables import Table, table
 from rrtik_ompl.fast.tree_kernels import SIZE, grow, tree_table
 
-RANGE_SHARE = 0.08  # of the diagonal of the box, no joint counted for more than a turn
-DOMAIN_RANGES = 4.0  # radius of the domain of a vertex that was blocked, in ranges
 PATIENCE = 4  # rejected paths until undecided motions are asked for at once
 FIRST_CAPACITY = 64 * WIDTH  # vertices
 FIRST_ROOTS = 16
@@ -38,8 +37,6 @@ class ConnectSearch:
     Attributes:
         range: Length of a motion of the trees, at most [unit of the box].
         domain: Radius in which a vertex is extended once it was blocked [unit of the box].
-        iterations, vertices, motions, questions, rejected: Counts of the last search: samples, vertices of both trees,
-            motions judged, motions asked for, and paths that an answer has broken.
 
     Args:
         fast: The checks; must have kernels (an ``address`` other than 0).
@@ -48,7 +45,7 @@ class ConnectSearch:
         resolution: See ``weights``, above 0.
         steps_per_unit: At least this many steps for each unit of Euclidean length; with zero weights the only rule.
         gain, offset: Joint values are ``gain @ q + offset``, shapes (joints, n) and (joints,); q itself if None.
-        range_: See ``range``; drawn from the box if None.
+        range_: See ``range``; what suits the box if None.
         domain: See ``domain``; some ranges if None.
         patience: Paths that may be rejected until undecided motions are asked for before they are used.
 
@@ -79,9 +76,8 @@ class ConnectSearch:
         if dof == 0 or len(box[1]) != dof or (box[0] > box[1]).any():
             raise InputError(f"bounds: expected {dof} upper ones, none below its lower one, and at least one")
         matrix, shift = _lifting(gain, offset, dof)
-        self.range = _positive(range_ or default_range(*box), "range")
-        self.domain = _positive(domain or DOMAIN_RANGES * self.range, "domain")
-        self._numbers = np.array([self.range, self.domain, _positive(resolution, "resolution"), steps_per_unit])
+        self.range, self.domain = connect_lengths(*box, range_, domain)
+        self._numbers = np.array([self.range, self.domain, positive(resolution, "resolution"), steps_per_unit])
         joints = 0 if _is_identity(matrix, shift) else len(shift)
         self._trees = [tree_table(dof, joints, FIRST_CAPACITY) for _ in range(2)]
         self._search = _search_table(
@@ -92,7 +88,7 @@ class ConnectSearch:
         self._search.header[kernels.PATIENCE] = patience
         self._address = self._search.address
         self._roots = [self._room_for_roots(side, FIRST_ROOTS) for side in range(2)]
-        self.iterations = self.vertices = self.motions = self.questions = self.rejected = 0
+        self._questions = 0
 
     def solve(
         self,
@@ -126,15 +122,27 @@ class ConnectSearch:
         self._set_roots(1, goals)
         header[kernels.PROVING] = ask is not None
         header[kernels.LIMIT] = NO_LIMIT if max_iterations is None else max_iterations
-        self.questions = 0
+        self._questions = 0
         outside = kernels.begin(self._address, len(starts), len(goals), seed & (2**63 - 1))
         if outside >= 0:
             what = f"start {outside}" if outside < len(starts) else f"goal {outside - len(starts)}"
             raise InputError(f"search: {what} is not in the box of configurations")
-        path = self._path() if self._run(ask, stop) == kernels.SOLVED else None
-        self.iterations, self.rejected, self.motions = header[_COUNTS].tolist()
-        self.vertices = int(self._trees[0].header[SIZE] + self._trees[1].header[SIZE])
-        return path
+        return self._path() if self._run(ask, stop) == kernels.SOLVED else None
+
+    def statistics(self) -> dict[str, int | float]:
+        """Counts of the last search.
+
+        Samples, vertices of both trees, motions judged, motions asked for, and paths that an answer has broken.
+        """
+        iterations, rejected, motions = self._search.header[_COUNTS].tolist()
+        vertices = sum(int(tree.header[SIZE]) for tree in self._trees)
+        return {
+            "iterations": iterations,
+            "vertices": vertices,
+            "motions": motions,
+            "questions": self._questions,
+            "rejected": rejected,
+        }
 
     def _run(self, ask: Ask | None, stop: Callable[[], bool] | None) -> int:
         """Call the kernel until it is done; its last status."""
@@ -159,7 +167,7 @@ class ConnectSearch:
         count, shape = int(self._search.header[kernels.QUESTIONS]), (-1, self._dof)
         ends = (self._search[place].reshape(shape)[:count].copy() for place in _QUESTIONS)
         self._search[kernels.ANSWERS][:count] = ask(*ends)
-        self.questions += count
+        self._questions += count
 
     def _grow(self) -> None:
         for tree in self._trees:
@@ -190,11 +198,6 @@ class ConnectSearch:
 
 _QUESTIONS = (kernels.QUESTION_STARTS, kernels.QUESTION_ENDS)
 _COUNTS = slice(kernels.ITERATIONS, kernels.JUDGED + 1)
-
-
-def default_range(lower: Vector, upper: Vector) -> float:
-    """A length of motions that suits a box of configurations, shapes (n,)."""
-    return max(RANGE_SHARE * float(np.linalg.norm(np.minimum(upper - lower, 2.0 * np.pi))), 1e-9)
 
 
 def _search_table(
@@ -232,8 +235,3 @@ def _is_identity(gain: Matrix, offset: Vector) -> bool:
     return gain.shape[0] == gain.shape[1] and bool((gain == np.eye(len(gain))).all() and (offset == 0.0).all())
 
 
-def _positive(value: float, what: str) -> float:
-    number = float(finite_array(value, (), what))
-    if number <= 0.0:
-        raise InputError(f"{what}: expected a number above 0, got {number:g}")
-    return number
