@@ -40,7 +40,7 @@ def next_in_base(x: float, inverse: float) -> float:
     The carry runs towards the later digits. From a random first point it is a randomised Halton sequence (Struckmeier
     1995; Wang and Hickernell 2000).
     """
-    rest = max(1.0 - x, LEAST_REST)
+    rest = max(1.0 - x - LEAST_REST, LEAST_REST)  # less, as x is rounded
     if inverse < rest:
         return x + inverse
     digit = inverse

@@ -159,12 +159,13 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
             text = "the goal cannot be sampled; use a GoalState, GoalStates or a GoalSampleableRegion"
             raise _Refused(ob.PlannerStatus.UNRECOGNIZED_GOAL_TYPE, text)
         goals = self._goals(inputs, io, goal, ptc)
-        rows = np.array([*starts, *goals])
-        free = np.asarray(checker.valid_batch(rows), dtype=bool)  # all at once: a question costs more than its answer
-        split = len(starts)
-        if not free[:split].any():
+        rows, split = np.array([*starts, *goals]), len(starts)
+        free = checker.valid_batch(rows).tolist()  # all at once: a question costs more than its answer
+        if all(free):
+            return rows[:split], rows[split:]
+        if not any(free[:split]):
             raise _Refused(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
-        if not free[split:].any():
+        if not any(free[split:]):
             raise _Refused(ob.PlannerStatus.INVALID_GOAL, f"no valid goal: {NONE_USABLE}")
         return rows[:split][free[:split]], rows[split:][free[split:]]
 
