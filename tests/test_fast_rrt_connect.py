@@ -1,6 +1,7 @@
 """RRT-Connect in kernels finds the paths that the world calls free, on any arm, lazily or eagerly."""
 
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -84,7 +85,7 @@ def require_path(world, path, starts, goals):
     assert path is not None
     assert path[0].tolist() in starts.tolist()
     assert path[-1].tolist() in goals.tolist()
-    assert all(World.motion_valid(world, a, b) for a, b in zip(path, path[1:], strict=False))
+    assert all(World.motion_valid(world, a, b) for a, b in pairwise(path))
     assert (np.diff(path, axis=0) != 0.0).any(axis=1).all()
 
 
@@ -134,7 +135,7 @@ def test_motions_that_an_answer_rejects_are_never_part_of_the_path():
         for seed in range(2):
             world.asked.clear()
             path = search.solve(START, GOAL, seed, ask=world.motion_valid_batch)
-            edges = [(a, b) for a, b in zip(path.tolist(), path[1:].tolist(), strict=False)]
+            edges = list(pairwise(path.tolist()))
             refused = [(a, b) for a, b, free in world.asked if not free]
             rejected += len(refused)
             assert not any((a, b) in edges or (b, a) in edges for a, b in refused)
@@ -244,6 +245,10 @@ def test_what_makes_no_sense_is_refused():
         search_in(world).solve(START[:, :2], GOAL, 0)
     with pytest.raises(InputError, match="range"):
         search_in(world, range_=-1.0)
+    with pytest.raises(InputError, match="gain"):
+        search_in(world, gain=np.eye(3)[:2], offset=np.zeros(2))
+    with pytest.raises(InputError, match="farther than the checks cover"):
+        search_in(world, offset=np.full(3, 2e8))
     with pytest.raises(InputError, match="resolution"):
         search_in(world, resolution=0.0)
 

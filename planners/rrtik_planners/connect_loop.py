@@ -43,7 +43,8 @@ class ConnectTree:
 
     def row(self, vertex: int) -> Vector:
         """The configuration of a vertex, shape (n,)."""
-        return self._rows[vertex]
+        row: Vector = self._rows[vertex]
+        return row
 
     def add(self, row: Vector, parent: int) -> int:
         """Append a vertex; returns its number."""
@@ -66,7 +67,8 @@ class ConnectTree:
         while vertex >= 0:
             vertices.append(vertex)
             vertex = self._parents[vertex]
-        return self._rows[vertices[::-1]]
+        rows: Matrix = self._rows[vertices[::-1]]
+        return rows
 
 
 def connect(

@@ -16,9 +16,9 @@ from rrtik_planners.crdt import iteration_limit
 class FastRRTConnect(SafePlanner):
     """RRT-Connect with dynamic domain and balanced trees; the straight motion is tried first.
 
-    With a world that has kernels (``world.fast``) the search runs in them and a path comes back in microseconds. Motions
-    that they cannot decide are asked of the world once they stand on a path, and never in a conservative world. With
-    any other world, or none, a plain loop does the same on one motion at a time.
+    With a world that has kernels (``world.fast``) the search runs in them and a path comes back in microseconds.
+    Motions that they cannot decide are asked of the world once they stand on a path, and never in a conservative
+    world. With any other world, or none, a plain loop does the same on one motion at a time.
     """
 
     def __init__(

@@ -131,6 +131,11 @@ class FastWorld:
         """What is added to outer and taken from inner radii against rounding [m]."""
         return self._arm.margin
 
+    @property
+    def limits(self) -> Vector:
+        """Largest absolute value of each joint that the margin covers [rad or m], shape (joints,)."""
+        return self._limits
+
     def classify(self, V: ArrayLike, *, prove: bool = True) -> NDArray[np.int8]:
         """Judge rows of joint values V, shape (m, joints): FREE, UNDECIDED or COLLIDING each. Shape (m,).
 

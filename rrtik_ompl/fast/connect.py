@@ -76,6 +76,7 @@ class ConnectSearch:
         if dof == 0 or len(box[1]) != dof or (box[0] > box[1]).any():
             raise InputError(f"bounds: expected {dof} upper ones, none below its lower one, and at least one")
         matrix, shift = _lifting(gain, offset, dof)
+        _require_certain(fast, matrix, shift, np.maximum(np.abs(box[0]), np.abs(box[1])))
         self.range, self.domain = connect_lengths(*box, range_, domain)
         self._numbers = np.array([self.range, self.domain, positive(resolution, "resolution"), steps_per_unit])
         joints = 0 if _is_identity(matrix, shift) else len(shift)
@@ -229,6 +230,15 @@ def _lifting(gain: ArrayLike | None, offset: ArrayLike | None, dof: int) -> tupl
     matrix = np.eye(dof) if gain is None else finite_array(gain, (None, dof), "gain")
     joints = len(matrix)
     return matrix, np.zeros(joints) if offset is None else finite_array(offset, (joints,), "offset")
+
+
+def _require_certain(fast: FastWorld, gain: Matrix, offset: Vector, farthest: Vector) -> None:
+    """The kernels do not look whether joint values are among those that their margin covers."""
+    if len(offset) != len(fast.limits):
+        raise InputError(f"gain and offset: expected {len(fast.limits)} rows, one for each joint, got {len(offset)}")
+    beyond = np.flatnonzero(np.abs(gain) @ farthest + np.abs(offset) > fast.limits)
+    if len(beyond):
+        raise InputError(f"bounds: joint {beyond[0]} can go farther than the checks cover ({fast.limits[beyond[0]]:g})")
 
 
 def _is_identity(gain: Matrix, offset: Vector) -> bool:

@@ -12,10 +12,12 @@ The search runs in short calls of :func:`resume`. Nothing depends on how its wor
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from rrtik_ompl.fast.compiled import entry, inlined, kernel
-from rrtik_ompl.fast.kernels import COLLIDING, FREE, UNDECIDED, judge_part
+from rrtik_ompl.fast.kernels import FREE, UNDECIDED, judge_part
 from rrtik_ompl.fast.lanes import double_at, field, float_at, int_at, set_double, set_field, set_float, set_int
 from rrtik_ompl.fast.random_kernels import next_point, next_share, start_points
 from rrtik_ompl.fast.tree_kernels import (
@@ -62,13 +64,13 @@ SLACK = 1e-9  # as in World.steps
 
 
 @inlined
-def number(search: int, place: int) -> float:
+def number(search: int, place: int) -> Any:
     """One of the numbers."""
     return double_at(field(search, NUMBERS), place)
 
 
 @inlined
-def tree_of(search: int, side: int) -> int:
+def tree_of(search: int, side: int) -> Any:
     """The tree from the starts (0) or from the goals (1)."""
     return field(search, TREES + side)
 
@@ -111,7 +113,7 @@ def nearest_to(search: int, side: int, row: int) -> int:
 
 
 @kernel
-def steer(search: int, start: int, aim: int, length: float) -> bool:
+def steer(search: int, start: int, aim: int, length: float) -> Any:
     """Set ROW to ``aim``, or to the point at the range on the way there; tells whether it is ``aim``."""
     row, span = field(search, ROW), number(search, RANGE)
     reached = length <= span * (1.0 + SLACK)
@@ -126,7 +128,7 @@ def steer(search: int, start: int, aim: int, length: float) -> bool:
 
 
 @kernel
-def steps_of(search: int, start: int, end: int) -> int:
+def steps_of(search: int, start: int, end: int) -> Any:
     """Number of steps in which a motion is checked; the rule of :meth:`rrtik_ompl.world.World.steps`."""
     travel, dof = 0.0, field(search, DOF)
     for k in range(dof):
@@ -138,7 +140,7 @@ def steps_of(search: int, start: int, end: int) -> int:
 
 
 @kernel
-def descends(dof: int, start: int, end: int) -> bool:
+def descends(dof: int, start: int, end: int) -> Any:
     """Whether the start comes after the end in the order of their coordinates."""
     for k in range(dof):
         if double_at(start, k) != double_at(end, k):
@@ -339,7 +341,7 @@ def candidate(search: int) -> bool:
 
 
 @inlined
-def is_full(search: int, side: int) -> bool:
+def is_full(search: int, side: int) -> Any:
     """Whether a tree has no room for one more vertex."""
     return field(tree_of(search, side), SIZE) >= field(tree_of(search, side), CAPACITY)
 

@@ -16,7 +16,8 @@ def connect_lengths(lower: Vector, upper: Vector, range_: float | None, domain: 
     """Range and domain in use: as given, or else what suits a box of configurations.
 
     Args:
-        lower, upper: The box, shapes (n,).
+        lower: Lower bounds of the box, shape (n,).
+        upper: Its upper bounds, shape (n,).
         range_: Length of a motion of the trees, at most.
         domain: Radius in which a vertex is extended once it was blocked.
 

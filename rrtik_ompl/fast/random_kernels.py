@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from rrtik_ompl.fast.compiled import inlined, kernel
@@ -18,7 +20,7 @@ LEAST_REST = 1e-12
 
 
 @inlined
-def shifted(number: int, places: int) -> int:
+def shifted(number: Any, places: int) -> Any:
     """Bits moved down by ``places``, zeros moved in (a signed number would move in its sign)."""
     return (number >> places) & ((np.int64(1) << (np.int64(64) - places)) - 1)
 

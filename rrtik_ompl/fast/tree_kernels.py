@@ -41,31 +41,31 @@ ZERO, FARTHEST, LAST_BLOCK = np.float32(0.0), np.float32(3e38), np.float32(3e38)
 
 
 @inlined
-def row_of(tree: int, vertex: int) -> int:
+def row_of(tree: int, vertex: int) -> Any:
     """Address of a vertex's configuration."""
     return field(tree, ROWS) + 8 * field(tree, DOF) * vertex
 
 
 @inlined
-def values_of(tree: int, vertex: int) -> int:
+def values_of(tree: int, vertex: int) -> Any:
     """Address of a vertex's joint values."""
     return field(tree, VALUES) + 8 * field(tree, JOINTS) * vertex
 
 
 @inlined
-def parent_of(tree: int, vertex: int) -> int:
+def parent_of(tree: int, vertex: int) -> Any:
     """The parent of a vertex, -1 for a root."""
     return int_at(field(tree, PARENTS), vertex)
 
 
 @inlined
-def state_of(tree: int, vertex: int) -> int:
+def state_of(tree: int, vertex: int) -> Any:
     """CERTAIN, OPEN or CUT."""
     return int_at(field(tree, STATES), vertex)
 
 
 @kernel
-def nearest_vertex(tree: int, query: int) -> int:
+def nearest_vertex(tree: int, query: int) -> Any:
     """The vertex nearest to ``DOF`` floats; of several the first one."""
     dof, points = field(tree, DOF), field(tree, POINTS)
     least, place = spread(FARTHEST), spread(ZERO)
@@ -83,7 +83,7 @@ def nearest_vertex(tree: int, query: int) -> int:
 
 
 @kernel
-def add_vertex(tree: int, row: int, values: int, parent: int, state: int, radius: float) -> int:
+def add_vertex(tree: int, row: int, values: int, parent: int, state: int, radius: float) -> Any:
     """Append a vertex; there must be room. Returns its number."""
     dof, vertex = field(tree, DOF), field(tree, SIZE)
     block, lane = vertex // WIDTH, vertex % WIDTH
@@ -115,7 +115,7 @@ def cut_vertex(tree: int, vertex: int) -> int:
 
 
 @kernel
-def cut_branch(tree: int, vertex: int) -> int:
+def cut_branch(tree: int, vertex: int) -> Any:
     """Cut a vertex and all its descendants off; returns how many vertices are left."""
     if state_of(tree, vertex) != CUT:
         cut_vertex(tree, vertex)
