@@ -104,7 +104,7 @@ def distance(dof: int, one: int, two: int) -> float:
 
 
 @kernel
-def nearest_to(search: int, side: int, row: int) -> int:
+def nearest_to(search: int, side: int, row: int) -> Any:
     """The vertex of a tree that is nearest to a configuration."""
     query = field(search, QUERY)
     for k in range(field(search, DOF)):
