@@ -19,7 +19,7 @@ from rrtik_ompl.fast.random_kernels import inverse_bases
 from rrtik_ompl.fast.robot_tables import Table, table
 from rrtik_ompl.fast.tree_kernels import SIZE, grow, tree_table
 
-PATIENCE = 4  # rejected paths until undecided motions are asked for at once
+PATIENCE = 8  # rejected paths until undecided motions are asked for at once
 FIRST_CAPACITY = 64 * WIDTH  # vertices
 FIRST_ROOTS = 16
 FIRST_BUDGET, LEAST_BUDGET, MOST_BUDGET = 256, 16, 1 << 20  # motions in one call of the kernel

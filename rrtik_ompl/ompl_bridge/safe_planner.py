@@ -161,7 +161,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         goals = self._goals(inputs, io, goal, ptc)
         rows, split = np.array([*starts, *goals]), len(starts)
         free = checker.valid_batch(rows).tolist()  # all at once: a question costs more than its answer
-        if all(free):
+        if goals and all(free):
             return rows[:split], rows[split:]
         if not any(free[:split]):
             raise _Refused(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
