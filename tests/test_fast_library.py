@@ -210,7 +210,7 @@ def test_a_compiler_that_fails_is_told_once_and_replaced_by_numpy(cached, monkey
     cached.unlink()
     monkeypatch.setattr(bitcode, "compiled_module", fail)
     monkeypatch.setattr(library, "_warned", False)
-    with pytest.warns(RuntimeWarning, match="plain numpy, many times slower: ValueError: no kernels"):
+    with pytest.warns(RuntimeWarning, match="plain numpy, many times slower: ValueError: no \\w*kernels"):
         assert not warm_up(print)
     assert library.library(KERNELS) is None
 

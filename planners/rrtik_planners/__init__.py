@@ -2,5 +2,6 @@
 
 from rrtik_planners.bicrdt import BiCRDT
 from rrtik_planners.crdt import CRDT
+from rrtik_planners.fast_rrt_connect import FastRRTConnect
 
-__all__ = ["CRDT", "BiCRDT"]
+__all__ = ["CRDT", "BiCRDT", "FastRRTConnect"]

@@ -9,6 +9,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.fast.axis_rules import AxisRules, runs_in_kernels
+from rrtik_ompl.fast.axis_search import AxisSearch
 from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
 from rrtik_planners.axis_endings import Endings
 from rrtik_planners.axis_options import AxisOptions, Joints, PerJoint, joint_names, joint_numbers
@@ -85,8 +86,6 @@ class BiCRDT(SafePlanner):
         limit, path = self.options.max_iterations, _common_row(starts, goals)
         trees: Any
         if runs_in_kernels(self._world, starts, goals, rules.lower[None], rules.upper[None]):
-            from rrtik_ompl.fast.axis_search import AxisSearch
-
             trees = AxisSearch(self._world, rules, seed, limit, starts, goals)
         else:
             trees = TreePair(rules, seed, limit, starts, goals, checker)

@@ -10,6 +10,7 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.axis_rules import AxisRules, runs_in_kernels
+from rrtik_ompl.fast.axis_search import AxisSearch
 from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
 from rrtik_planners.axis_options import AxisOptions, Joints, PerJoint, joint_names
 from rrtik_planners.axis_stream import AxisStream
@@ -84,8 +85,6 @@ class CRDT(SafePlanner):
         limit, path = self.options.max_iterations, None
         tree: Any
         if runs_in_kernels(self._world, starts, goals, rules.lower[None], rules.upper[None]):
-            from rrtik_ompl.fast.axis_search import AxisSearch
-
             tree = AxisSearch(self._world, rules, seed, limit, starts, goals=goals, tolerance=tolerance)
         else:
             tree = SingleTree(rules, seed, limit, starts, goals, tolerance, checker)

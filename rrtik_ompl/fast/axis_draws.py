@@ -4,28 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from rrtik_ompl.fast import axis_tables as table
 from rrtik_ompl.fast.compiled import inlined, kernel
-from rrtik_ompl.fast.lanes import double_at, field, int_at, set_double, set_field, set_int
-
-# splitmix64. Source: Steele, Lea, Flood, Fast splittable pseudorandom number generators, 2014.
-GOLDEN, FIRST_FACTOR, SECOND_FACTOR = (
-    np.uint64(x) for x in (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB)
-)
-SHIFT_30, SHIFT_27, SHIFT_31, SHIFT_11 = (np.uint64(x) for x in (30, 27, 31, 11))
-UNIT = 2.0**-53
+from rrtik_ompl.fast.lanes import double_at, field, int_at, set_double, set_int
+from rrtik_ompl.fast.random_kernels import next_share
 
 
 @inlined
 def draw(search: int) -> Any:
     """The next number of the stream, from 0 to 1, less than 1."""
-    state = np.uint64(field(search, table.RANDOM)) + GOLDEN
-    set_field(search, table.RANDOM, np.int64(state))
-    z = (state ^ (state >> SHIFT_30)) * FIRST_FACTOR
-    z = (z ^ (z >> SHIFT_27)) * SECOND_FACTOR
-    return float(np.int64((z ^ (z >> SHIFT_31)) >> SHIFT_11)) * UNIT
+    return next_share(search, table.RANDOM)
 
 
 @inlined

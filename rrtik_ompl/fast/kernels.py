@@ -214,19 +214,20 @@ def classify(world: int, rows: int, count: int, answers: int, proving: int) -> i
 
 
 @kernel
-def judge_edge(world: int, start: int, end: int, last: int, proving: bool) -> int:
-    """Judge the motion between two rows of joint values by its configurations at k / last, k = 0..last.
+def judge_part(world: int, start: int, end: int, last: int, first: int, count: int, proving: bool) -> int:
+    """Judge ``count`` configurations of a motion between two rows of joint values: those at k / last, k = first, ...
 
-    The lanes are spread over the whole motion, so that a collision anywhere shows early.
+    The lanes are spread over the whole part, so that a collision anywhere shows early.
     """
     joints = field(field(world, ARM), layout.JOINT_COUNT)
     work = field(world, WORK)
     values, inner_last = field(work, VALUES), field(work, INNER_LAST)
-    blocks = (last + WIDTH) // WIDTH
+    blocks = (count + WIDTH - 1) // WIDTH
     every = bits(lane_numbers() >= 0.0)  # a number: for a constant numba would compile all that is called apart
     answer = FREE
     for block in range(blocks):
-        share = smaller(lane_numbers() * float(blocks) + float(block), float(last)) / float(last)
+        places = smaller(lane_numbers() * float(blocks) + float(block), float(count - 1)) + float(first)
+        share = places / float(last)
         for joint in range(joints):
             set_wide_lanes(values, joint, (1.0 - share) * double_at(start, joint) + share * double_at(end, joint))
         move(field(world, ARM), work)
@@ -242,6 +243,12 @@ def judge_edge(world: int, start: int, end: int, last: int, proving: bool) -> in
                 answer = COLLIDING
                 break
     return answer
+
+
+@kernel
+def judge_edge(world: int, start: int, end: int, last: int, proving: bool) -> int:
+    """Judge the motion between two rows of joint values by its configurations at k / last, k = 0..last."""
+    return judge_part(world, start, end, last, 0, last + 1, proving)
 
 
 @entry

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -37,6 +38,9 @@ class MotionChecker(Protocol):
     def valid(self, q: Vector) -> bool:
         """Whether q, shape (n,), is free."""
 
+    def valid_batch(self, Q: Matrix) -> Mask:
+        """Which of the configurations Q, shape (m, n), are free, shape (m,)."""
+
     def motion_valid(self, a: Vector, b: Vector) -> bool:
         """Whether the straight motion from a to b, shapes (n,), is free."""
 
@@ -56,6 +60,14 @@ class WorldChecker:
         """Whether q, shape (n,), is free."""
         self.checked_states += 1
         return bool(self._world.valid(q))
+
+    def valid_batch(self, Q: Matrix) -> Mask:
+        """Which of the configurations Q, shape (m, n), are free, shape (m,); at once if the world can do that."""
+        together: Callable[[Matrix], Mask] | None = getattr(self._world, "valid_batch", None)
+        if together is None:
+            return np.array([self.valid(q) for q in Q], dtype=bool)
+        self.checked_states += len(Q)
+        return together(Q)
 
     def motion_valid(self, a: Vector, b: Vector) -> bool:
         """Whether the straight motion from a to b, shapes (n,), is free."""
@@ -88,6 +100,10 @@ class SpaceChecker:
         self.checked_states += 1
         self._io.write(self._a, q)
         return bool(self._si.satisfiesBounds(self._a) and self._si.isValid(self._a))
+
+    def valid_batch(self, Q: Matrix) -> Mask:
+        """Which of the configurations Q, shape (m, n), are within the bounds and free, shape (m,)."""
+        return np.array([self.valid(q) for q in Q], dtype=bool)
 
     def motion_valid(self, a: Vector, b: Vector) -> bool:
         """Whether the straight motion from a to b, shapes (n,), is free; a itself is taken to be."""

@@ -18,7 +18,7 @@ from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.errors import InputError, PlannerError
 from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker, WorldLike
 from rrtik_ompl.ompl_bridge.states import StateIO, real_vector_space, space_bounds
@@ -85,6 +85,8 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self.statistics: dict[str, int | float] = {}
         self.error: str | None = None
         self._world = world
+        self._io = StateIO(si)  # holds the space, which knows nothing of planners, so both can be freed
+        self._known_bounds: tuple[Any, Any] = ((), ())
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
         """Look for a path from any start to any goal until ``ptc()`` is true. For subclasses.
@@ -122,14 +124,19 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self.statistics, self.error = {}, None
 
     def bounds(self) -> tuple[Vector, Vector]:
-        """Lower and upper bounds of the space, shapes (n,)."""
-        return space_bounds(self.getSpaceInformation())
+        """Lower and upper bounds of the space, shapes (n,); the same read-only arrays as long as they do not change."""
+        numbers = self._io.bounds()
+        if numbers != self._known_bounds[0]:
+            lower, upper = space_bounds(self.getSpaceInformation())
+            self._known_bounds = numbers, (frozen(lower), frozen(upper))
+        known: tuple[Vector, Vector] = self._known_bounds[1]
+        return known
 
     def _solve(self, ptc: Any) -> Any:
         si, pdef = self.getSpaceInformation(), self.getProblemDefinition()
         if pdef is None:
             raise PlannerError(f"{self.getName()}: no problem definition; use SimpleSetup or setProblemDefinition()")
-        space_bounds(si)  # refuses missing bounds in clearer words than OMPL
+        self.bounds()  # refuses missing ones in clearer words than OMPL
         checker: MotionChecker = SpaceChecker(si) if self._world is None else WorldChecker(self._world)
         starts, goals = self._inputs(checker, ptc)
         result = self.search(starts, goals, checker, ptc)
@@ -142,32 +149,37 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
 
     def _inputs(self, checker: MotionChecker, ptc: Any) -> tuple[Matrix, Matrix]:
         """Starts and goals of the problem definition, shapes (s, n) and (g, n), at least one each."""
-        inputs, io = self.getPlannerInputStates(), StateIO(self.getSpaceInformation())
+        inputs, io = self.getPlannerInputStates(), self._io
         inputs.restart()
-        starts = self._starts(inputs, io, checker)
-        if len(starts) == 0:
+        starts = self._starts(inputs, io)
+        if not starts:
             raise _Refused(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
         goal = self.getProblemDefinition().getGoal()
         if goal is not None and not isinstance(goal, ob.GoalSampleableRegion):
             text = "the goal cannot be sampled; use a GoalState, GoalStates or a GoalSampleableRegion"
             raise _Refused(ob.PlannerStatus.UNRECOGNIZED_GOAL_TYPE, text)
-        goals = self._goals(inputs, io, checker, ptc)
-        if len(goals) == 0:
+        goals = self._goals(inputs, io, goal, ptc)
+        rows, split = np.array([*starts, *goals]), len(starts)
+        free = checker.valid_batch(rows).tolist()  # all at once: a question costs more than its answer
+        if goals and all(free):
+            return rows[:split], rows[split:]
+        if not any(free[:split]):
+            raise _Refused(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
+        if not any(free[split:]):
             raise _Refused(ob.PlannerStatus.INVALID_GOAL, f"no valid goal: {NONE_USABLE}")
-        return starts, goals
+        return rows[:split][free[:split]], rows[split:][free[split:]]
 
-    def _starts(self, inputs: Any, io: StateIO, checker: MotionChecker) -> Matrix:
+    def _starts(self, inputs: Any, io: StateIO) -> list[Vector]:
         rows = []
         while inputs.haveMoreStartStates():
             state = inputs.nextStart()  # borrowed; None if invalid
             if state is not None:
                 rows.append(io.read(state))
             del state
-        return _free(rows, io.dof, checker)
+        return _different(rows)
 
-    def _goals(self, inputs: Any, io: StateIO, checker: MotionChecker, ptc: Any) -> Matrix:
+    def _goals(self, inputs: Any, io: StateIO, goal: Any, ptc: Any) -> list[Vector]:
         """Goal configurations: all of a finite goal; else a number of samples, or as many as it takes to find one."""
-        goal = self.getProblemDefinition().getGoal()
         limit = max(GOAL_SAMPLES, goal.getStateCount() if isinstance(goal, ob.GoalStates) else 0)
         lazy = isinstance(goal, ob.GoalLazySamples)
         rows: list[Vector] = []
@@ -183,26 +195,25 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
                 time.sleep(WAIT_FOR_GOAL)  # lets the thread of the goal have the interpreter
             else:
                 break
-        return _free(rows, io.dof, checker)
+        return _different(rows)
 
     def _report(self, result: SearchResult) -> Any:
         """Hand the path to OMPL; returns the status."""
         if result.path is None:
             return ob.PlannerStatus.TIMEOUT
-        si = self.getSpaceInformation()
-        io, path, state = StateIO(si), og.PathGeometric(si), si.allocState()
+        si, write = self.getSpaceInformation(), self._io.write
+        path, state = og.PathGeometric(si), si.allocState()
         for row in result.path:
-            io.write(state, row)
+            write(state, row)
             path.append(state)  # copies
         approximate = result.difference > 0.0
         self.getProblemDefinition().addSolutionPath(path, approximate, float(result.difference), self.getName())
         return ob.PlannerStatus.APPROXIMATE_SOLUTION if approximate else ob.PlannerStatus.EXACT_SOLUTION
 
 
-def _free(rows: list[Vector], dof: int, checker: MotionChecker) -> Matrix:
-    """The different free configurations among ``rows``, in their order, shape (m, dof)."""
-    different = {row.tobytes(): row for row in rows}
-    return np.array([row for row in different.values() if checker.valid(row)]).reshape(-1, dof)
+def _different(rows: list[Vector]) -> list[Vector]:
+    """The rows in their order, each once."""
+    return rows if len(rows) < 2 else list({row.tobytes(): row for row in rows}.values())
 
 
 def _condition(ptc: Any) -> Any:

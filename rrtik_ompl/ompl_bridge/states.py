@@ -52,7 +52,7 @@ class StateIO:
     that the bindings expect, copies a state several times faster than reading its coordinates one by one. The name is
     an internal of the bindings: it is tried once at construction, and if it fails, slices do the same work.
 
-    Keep an instance in local variables of one thread; it holds C++ objects.
+    For one thread. It holds the space and no state, so whatever a space does not lead to may keep it.
     """
 
     def __init__(self, si: Any) -> None:
@@ -61,6 +61,11 @@ class StateIO:
         self._buffer = np.zeros(self.dof)
         self._capsule = _capsule(self._buffer)
         self.fast = self._capsule is not None and self._capsule_works(si)
+
+    def bounds(self) -> tuple[list[float], list[float]]:
+        """Lower and upper bounds of the space as they are."""
+        bounds = self._space.getBounds()
+        return list(bounds.low), list(bounds.high)
 
     def read(self, state: Any) -> Vector:
         """A private copy of the coordinates of a state, shape (n,)."""

@@ -1,0 +1,100 @@
+"""RRT-Connect at the speed of its collision checks: the whole search runs in a kernel where the world has kernels."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.fast.connect import ConnectSearch
+from rrtik_ompl.fast.connect_layout import KERNELS
+from rrtik_ompl.fast.connect_lengths import connect_lengths, positive
+from rrtik_ompl.fast.library import library
+from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
+from rrtik_planners.axis_options import iteration_limit
+from rrtik_planners.connect_loop import ConnectRules, connect
+
+
+class FastRRTConnect(SafePlanner):
+    """RRT-Connect with dynamic domain and balanced trees; the straight motion is tried first.
+
+    With a world that has kernels (``world.fast``) the search runs in them and a path comes back in microseconds.
+    Motions that they cannot decide are asked of the world once they stand on a path, and never in a conservative
+    world. With any other world, or none, a plain loop does the same on one motion at a time.
+    """
+
+    def __init__(
+        self,
+        si: Any,
+        *,
+        world: WorldLike | None = None,
+        seed: int | None = None,
+        range: float | None = None,
+        domain: float | None = None,
+        max_iterations: int | None = None,
+    ) -> None:
+        """Make a planner.
+
+        Args:
+            si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
+            world: Asked instead of ``si`` whether configurations and motions are free, if given.
+            seed: At least 0; drawn from OMPL's if None.
+            range: Length of a motion of the trees, at most [unit of the space]; what suits the bounds if None.
+            domain: Radius in which a vertex is extended once it was blocked [unit of the space]; 4 ranges if None.
+            max_iterations: Samples at most; without limit if None.
+
+        Raises:
+            InputError: If an option is out of range or the space is of another kind.
+        """
+        super().__init__(si, "FastRRTConnect", world=world, seed=seed)
+        self.range = None if range is None else positive(range, "range")
+        self.domain = None if domain is None else positive(domain, "domain")
+        self.max_iterations = iteration_limit(max_iterations)
+        self._kept: Any = None  # the search in kernels and what it was made for
+
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+        """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
+        kernels = self._kernels()
+        if kernels is None:
+            lower, upper = self.bounds()
+            rules = ConnectRules(lower, upper, *connect_lengths(lower, upper, *self._lengths), self.max_iterations)
+            return SearchResult(*connect(starts, goals, rules, checker, self.rng, ptc))
+        conservative = getattr(self._world, "accuracy", "exact") == "conservative"
+        path = kernels.solve(
+            starts,
+            goals,
+            self.rng.bit_generator.random_raw(),
+            ask=None if conservative else checker.motion_valid_batch,
+            stop=ptc,
+            max_iterations=self.max_iterations,
+        )
+        return SearchResult(path, kernels.statistics())
+
+    @property
+    def _lengths(self) -> tuple[float | None, float | None]:
+        return self.range, self.domain
+
+    def _kernels(self) -> Any:
+        """The search in kernels for the world and bounds of this solve, or None where the world has no kernels."""
+        world: Any = self._world
+        fast = getattr(world, "fast", None)
+        if fast is None or library(KERNELS) is None:
+            return None
+        lower, upper = self.bounds()
+        if self._kept is None or self._kept[0] is not fast or self._kept[1] is not lower or self._kept[2] is not upper:
+            robot = world.robot
+            range_, domain = connect_lengths(lower, upper, *self._lengths)
+            made = ConnectSearch(
+                fast,
+                np.maximum(lower, robot.lower),  # the kernels do not know the robot's limits
+                np.minimum(upper, robot.upper),
+                weights=world.weights,
+                resolution=world.motion_resolution,
+                gain=robot.chain.gain,
+                offset=robot.chain.offset,
+                range_=range_,
+                domain=domain,
+            )
+            self._kept = fast, lower, upper, made
+        return self._kept[3]

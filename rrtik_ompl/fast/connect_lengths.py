@@ -1,0 +1,42 @@
+"""The two lengths of RRT-Connect with dynamic domain, for kernels and for plain Python."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rrtik_ompl.arrays import Vector, finite_array
+from rrtik_ompl.errors import InputError
+
+RANGE_SHARE = 0.08  # of the diagonal of the box, no joint counted for more than a turn
+DOMAIN_RANGES = 4.0
+SMALLEST_RANGE = 1e-9  # where lower and upper bounds coincide
+
+
+def connect_lengths(lower: Vector, upper: Vector, range_: float | None, domain: float | None) -> tuple[float, float]:
+    """Range and domain in use: as given, or else what suits a box of configurations.
+
+    Args:
+        lower: Lower bounds of the box, shape (n,).
+        upper: Its upper bounds, shape (n,).
+        range_: Length of a motion of the trees, at most.
+        domain: Radius in which a vertex is extended once it was blocked.
+
+    Raises:
+        InputError: If one of them is not a number above 0.
+    """
+    if range_ is None:
+        range_ = max(RANGE_SHARE * float(np.linalg.norm(np.minimum(upper - lower, 2.0 * np.pi))), SMALLEST_RANGE)
+    used = positive(range_, "range")
+    return used, positive(DOMAIN_RANGES * used if domain is None else domain, "domain")
+
+
+def positive(value: float, what: str) -> float:
+    """A number above 0.
+
+    Raises:
+        InputError: If it is not.
+    """
+    number = float(finite_array(value, (), what))
+    if number <= 0.0:
+        raise InputError(f"{what}: expected a number above 0, got {number:g}")
+    return number
