@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.fast import plain_distances
 from rrtik_ompl.fast.plain import PlainChecks
 from rrtik_ompl.fast.robot_tables import (
     PAIRS,
@@ -38,8 +39,9 @@ FREE, UNDECIDED, COLLIDING = 0, 1, 2
 LARGEST_ANGLE = 1e8  # [rad]; float64 cannot hold larger ones to the precision of the margin
 STROKE = 4.0  # [m] a sliding joint may go this far from its zero unless told otherwise
 MOST_STEPS = 2**30
+DISTANCE_ROUNDING = 3e-6  # relative error of a distance in float32, with room to spare; the margin covers the rest
 
-__all__ = ["COLLIDING", "FREE", "UNDECIDED", "FastWorld", "needs_covers"]
+__all__ = ["COLLIDING", "FREE", "UNDECIDED", "Clearance", "FastWorld", "needs_covers"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,6 +67,22 @@ class _ArmTables:
             and all(np.array_equal(a, b) for a, b in zip(covers, self.covers, strict=True))
             and all(_same(a, b) for a, b in zip(bodies, self.bodies, strict=True))
         )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Clearance:
+    """Bounds of the signed distance between the arm and all that it must not touch, for m configurations.
+
+    Attributes:
+        lower: No more than the distance [m], shape (m,); not above 0 means that nothing is proven. +inf if nothing can
+            collide, -inf for joint values beyond what the margin covers.
+        upper: No less than the distance [m], shape (m,); below 0 means a collision, +inf that nothing is known.
+        pairs: Numbers of the two bodies that the lower bound is of, -1 where there are none, shape (m, 2).
+    """
+
+    lower: Vector
+    upper: Vector
+    pairs: NDArray[np.int64]
 
 
 class FastWorld:
@@ -118,6 +136,7 @@ class FastWorld:
         self._flagged = self._flag_places(moving, standing)
         self._plain = PlainChecks(self._arm.arm, self._arm.balls, self._rows)
         self._kernels = _kernels() if compiled else None
+        self._probe: Table | None = None
         self.address = 0
         if self._kernels is not None:
             self._work = self._kernels.workspace(self._arm.arm, self._arm.balls, self._rows)
@@ -178,6 +197,48 @@ class FastWorld:
         for beyond in (first, second):
             answers = answers if beyond is None else np.where(beyond, np.int8(UNDECIDED), answers)
         return answers
+
+    def covered(self, V: ArrayLike) -> bool:
+        """Whether the margin covers all joint values V, shape (m, joints): only then may kernels be given them.
+
+        Raises:
+            InputError: If V has the wrong shape or a value that is not finite.
+        """
+        return self._values(V, "joint values")[1] is None
+
+    def clearance(self, V: ArrayLike, *, upper: bool = False) -> Clearance:
+        """Bounds of the distance to contact for rows of joint values V, shape (m, joints).
+
+        Args:
+            V: Joint values [rad or m].
+            upper: Whether to look for an upper bound too, which takes as long again.
+
+        Raises:
+            InputError: If V has the wrong shape or a value that is not finite.
+        """
+        rows, beyond = self._values(V, "joint values")
+        lowest, nearest = self._measured(rows, 0)
+        highest = self._measured(rows, 1)[0] if upper else np.full(len(rows), np.inf)
+        if beyond is not None:
+            lowest, highest = np.where(beyond, -np.inf, lowest), np.where(beyond, np.inf, highest)
+            nearest = np.where(beyond, -1, nearest)
+        pairs = np.array([*self._pairs, (-1, -1)], dtype=np.int64)
+        places = np.array([self._flagged[flag] if flag >= 0 else -1 for flag in nearest.tolist()], dtype=np.int64)
+        return Clearance(_rounded(lowest, -1.0), _rounded(highest, 1.0), pairs[places])
+
+    def _measured(self, rows: Matrix, level: int) -> tuple[Vector, NDArray[np.int32]]:
+        """Distances between outer (0) or inner (1) solids and the flags of the nearest pairs, -1 for none."""
+        balls, scene = self._arm.balls[level], self._rows[level]
+        if self._kernels is None:
+            return plain_distances.measure(self._arm.arm, balls, scene, rows)
+        from rrtik_ompl.fast import distance_kernels
+
+        if self._probe is None:
+            self._probe = distance_kernels.probe_table(self._rows)
+        found, pairs = np.empty(len(rows)), np.empty(len(rows), dtype=np.int32)
+        tables = (self.address, balls.address, scene.address, rows.ctypes.data, len(rows), self._probe.address)
+        distance_kernels.measure(*tables, found.ctypes.data, pairs.ctypes.data)
+        return np.where(pairs < 0, np.inf, found), pairs
 
     def undecided_pairs(self, v: ArrayLike) -> list[tuple[int, int]]:
         """Pairs of body numbers that the outer spheres cannot prove free at joint values v, shape (joints,).
@@ -275,6 +336,11 @@ def _reach(body: Any, outer: Spheres) -> float:
     spheres = usable_cover(body.geometry, outer)
     centres = spheres[:, :3] @ np.array(body.placement.rotation).T + np.array(body.placement.translation)
     return float((np.linalg.norm(centres, axis=1) + spheres[:, 3]).max())
+
+
+def _rounded(distances: Vector, sign: float) -> Vector:
+    """Distances moved up (sign 1) or down (-1) by what float32 may have lost."""
+    return distances * (1.0 + sign * DISTANCE_ROUNDING * np.sign(distances))
 
 
 def _same(first: Any, second: Any) -> bool:

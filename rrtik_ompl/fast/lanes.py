@@ -251,7 +251,7 @@ def _writer(element: Any, value_type: Any, align: int) -> Any:
     """Function (address, index, value) that sets element number ``index`` of an array at an address."""
 
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        value = builder.trunc(args[2], element) if value_type == types.int64 else args[2]
+        value = builder.trunc(args[2], element) if element == _INDEX else args[2]
         builder.store(value, _pointer(builder, element, *args[:2]), align=align)
         return context.get_dummy_value()
 
@@ -268,3 +268,4 @@ set_lanes = _writer(_vector(LANES), LANES, ALIGNMENT // 2)
 set_wide_lanes = _writer(_vector(WIDE_LANES), WIDE_LANES, ALIGNMENT)
 set_double = _writer(_DOUBLE, types.float64, 8)
 set_int = _writer(_INDEX, types.int64, 4)
+set_field = _writer(ir.IntType(64), types.int64, 8)
