@@ -251,7 +251,7 @@ def _writer(element: Any, value_type: Any, align: int) -> Any:
     """Function (address, index, value) that sets element number ``index`` of an array at an address."""
 
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        value = builder.trunc(args[2], element) if element == _INDEX else args[2]
+        value = builder.trunc(args[2], element) if value_type == types.int64 else args[2]
         builder.store(value, _pointer(builder, element, *args[:2]), align=align)
         return context.get_dummy_value()
 
