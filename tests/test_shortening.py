@@ -252,5 +252,29 @@ def test_the_command_line_offers_every_method():
     assert {choice.value for choice in Shorten} == {*METHODS, "none"}
 
 
-def test_the_bench_of_shortening_can_be_imported():
-    runpy.run_path(str(Path(__file__).parent.parent / "bench" / "shortening_report.py"))
+@pytest.fixture(scope="module")
+def planes():
+    return runpy.run_path(str(Path(__file__).parent.parent / "bench" / "plane_worlds.py"))
+
+
+def test_the_bench_knows_the_shortest_route_of_a_class(planes):
+    block = [(4, 4), (6, 4), (6, 9), (4, 9)]
+    plane = planes["_plane"]("block", [block], (10.0, 12.0), (1, 5), (9, 5))
+    below = np.array([[1, 5], [5, 1], [9, 5]], dtype=float)
+    above = np.array([[1, 5], [1, 11], [9, 11], [9, 5]], dtype=float)
+    assert plane.class_optimum(below) == pytest.approx(2.0 * np.hypot(3, 1) + 2.0, abs=1e-5)
+    assert plane.class_optimum(above) == pytest.approx(10.0 + 2.0, abs=1e-5)
+    assert plane.word(below) == ()
+    assert plane.word(above) == (1,)
+    assert not plane.free(below[0], below[2])
+    assert not plane.free(np.array([5.0, 5.0]), np.array([5.5, 5.0]))
+
+
+@pytest.mark.parametrize("name", ["three polygons", "two Ls", "disc robot"])
+def test_retraction_meets_its_published_quality(name, planes):
+    plane = planes["PUBLISHED"][name]()
+    for seed in range(2):
+        route = planes["sampled_route"](plane, seed)
+        found = retract(route, Task(plane), step=1.0)
+        assert 1.0 - 1e-4 < route_length(found) / plane.class_optimum(route) < 1.06
+        assert all(plane.free(a, b) for a, b in pairwise(found))

@@ -33,6 +33,7 @@ class Task:
         one_joint: Whether every edge of the answer must move one joint, as the edges of the question do.
         bounded: Whether there is an end to the time.
         asked: How many straight motions have been asked about.
+        confirmed_again: How many of an answer's motions have been checked on top of that, as parts of free ones.
 
     Args:
         motions: A world, or anything that judges straight motions.
@@ -54,7 +55,8 @@ class Task:
         stop: Callable[[], bool] | None = None,
     ) -> None:
         self.motions: Any = motions
-        self.seed, self.one_joint, self.asked = seed, one_joint, 0
+        self.seed, self.one_joint = seed, one_joint
+        self.asked = self.confirmed_again = 0
         self.bounded = bool(np.isfinite(seconds))
         self._deadline = time.monotonic() + seconds
         self._known: set[tuple[bytes, bytes]] = set()
@@ -75,6 +77,7 @@ class Task:
         """Which straight motions are free, shapes (m, n) and (m,); none when the time is up."""
         if len(A) == 0 or self.expired():
             return np.zeros(len(A), dtype=bool)
+        self.asked += len(A)
         return self._ask(A, B)
 
     def confirmed(self, new: Matrix, old: Matrix) -> bool:
@@ -85,10 +88,10 @@ class Task:
         """
         known = self._known.union(_edges(old))
         fresh = [k for k, edge in enumerate(_edges(new)) if edge not in known and edge[::-1] not in known]
+        self.confirmed_again += len(fresh)
         return not fresh or bool(self._ask(new[fresh], new[np.add(fresh, 1)]).all())
 
     def _ask(self, A: Matrix, B: Matrix) -> Mask:
-        self.asked += len(A)
         free: Mask = self.motions.motion_valid_batch(A, B)
         self._known.update((A[k].tobytes(), B[k].tobytes()) for k in np.flatnonzero(free))
         return free
