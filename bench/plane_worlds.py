@@ -92,6 +92,16 @@ class Plane:
                     heapq.heappush(queue, (length + way, there, after))
         raise RuntimeError(f"{self.name}: no route of the class {word}")
 
+    def connected(self) -> bool:
+        """Whether there is a route at all."""
+        roads, reached, open_ = self._roads(), {0}, [0]
+        while open_:
+            for there, _, _ in roads[open_.pop()]:
+                if there not in reached:
+                    reached.add(there)
+                    open_.append(there)
+        return 1 in reached
+
     def _roads(self) -> list[list[tuple[int, float, tuple[int, ...]]]]:
         """For the start, the goal and every corner: what it sees, how far it is, which rays the way crosses."""
         if not hasattr(self, "_known_roads"):
@@ -242,6 +252,8 @@ def generated(seed: int) -> Plane:
         centre, reach = rng.uniform((4.0, 2.0), (22.0, 18.0)), rng.uniform(1.5, 4.0)
         shape = centre + reach * np.column_stack([np.cos(angles), np.sin(angles)])
         alone = all(np.linalg.norm(centre - p.mean(axis=0)) > reach + 1.5 for p in polygons)
+        alone &= min(np.linalg.norm(centre - end) for end in (start, goal)) > reach + radius + 0.5
         if gaps.max() < 2.5 and gaps.min() > 0.4 and alone:
             polygons.append(shape)
-    return Plane(f"generated {seed}", polygons, (26.0, 20.0), start, goal, radius)
+    plane = Plane(f"generated {seed}", polygons, (26.0, 20.0), start, goal, radius)
+    return plane if plane.connected() else generated(seed + 1000)
