@@ -73,6 +73,8 @@ def machine() -> str:
     """Processor, width of the kernels, versions, the planner that was measured."""
     packages = ", ".join(package_version(name) for name in PACKAGES)
     about = f"{processor()}, {os.cpu_count()} cores; Python {platform.python_version()}; {packages}."
+    load = ", ".join(f"{value:.1f}" for value in os.getloadavg())  # what else ran shows in wall times
+    about += f" Load at the start (1, 5, 15 minutes): {load}."
     return f"{about}\n\nOur planner: `{PLANNER}`. Kernels: {lanes()}. CPU time of the process unless said otherwise."
 
 

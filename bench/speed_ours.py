@@ -36,7 +36,7 @@ def our_search(problem: Problem, *, seconds: float, per_radian: float | None = N
         planner: Another one than the kernel planner.
     """
     goals = goal_configurations(problem, np.random.default_rng(0)).rows
-    if KERNEL and planner == PLANNER:
+    if KERNEL and planner == PLANNER and problem.world.fast is not None:
         return _kernel_search(problem, goals, seconds, per_radian)
     factory = find_planner(planner)
     return lambda seed: attempt(problem, factory, goals, seconds=seconds, seed=seed, parameters={}).rows
