@@ -10,7 +10,7 @@ import numpy as np
 from acceptance import Report
 from numpy.typing import ArrayLike
 from speed_cases import Options, exact_problem, family, panda_files, shipped_problems, sphere_problem
-from speed_ours import PLANNER, our_search, through_ompl, timed, warm_up
+from speed_ours import PLANNER, ompl_overhead, our_search, timed, warm_up
 from speed_peers import (
     HAS_ROBOPLAN,
     HAS_VAMP,
@@ -30,6 +30,7 @@ NO_ROBOPLAN = "roboplan is not installed (`pip install rrtik-ompl[peers]`): its 
 STORED = "VAMP 0.6.4, stored, inner time, indicative"
 VAMP_STORED = (43.5, 108.9, 519.0)  # [us], on the Xeon of the project's first measurements
 CALLBACK_LIMIT = 10.0  # [s]
+TITAN_COLUMNS = ("ours", "plan()", "bicrdt")
 
 Times = dict[str, list[float]]
 
@@ -51,10 +52,11 @@ def spheres(options: Options, report: Report) -> None:
             warm_up(problem)
         runs = [timed(lambda ours=ours: ours(options.seed)) for _ in range(REPEATS)]
         times["ours"].append(min(seconds for seconds, _ in runs))
-        solved += runs[0][1] is not None
+        solved += _verified(problem, runs[0][1])
         if HAS_ROBOPLAN:
             peer = roboplan_search(problem, file.parents[2] / "panda_spherized.urdf", options.limit)
-            times["roboplan"].append(timed(lambda peer=peer: peer(options.seed))[0])
+            calls = [timed(lambda peer=peer: peer(options.seed))[0] for _ in range(REPEATS)]
+            times["roboplan"].append(min(calls))
         if HAS_VAMP:
             vamp = vamp_search(problem)
             calls = [timed(vamp) for _ in range(REPEATS)]
@@ -68,7 +70,7 @@ def spheres(options: Options, report: Report) -> None:
     measured = _three(ours_us)
     found = (float(np.median(ours_us)), float(ours_us.mean()), float(np.quantile(ours_us, 0.95)))
     report.bar(
-        f"{count} Panda problems of 59 spheres, Python call, median / mean / 95 %; {solved} solved",
+        f"{count} Panda problems of 59 spheres, Python call, median / mean / 95 %; {solved} solved and verified",
         "35 / 90 / 450 us (aim 22 / 55 / 260)",
         measured,
         solved == count and all(a <= b for a, b in zip(found, (35.0, 90.0, 450.0), strict=True)),
@@ -119,18 +121,24 @@ def exact(options: Options, report: Report) -> None:
 
 
 def _exact_searches(problem: Problem, file: Path, options: Options) -> dict[str, Callable[[int], Matrix | None]]:
-    def whole(seed: int) -> Matrix | None:
-        found = plan(problem, PLANNER, seconds=options.limit, seed=seed)
-        return None if found.path is None else found.path.waypoints
-
     searches = {
         "ours, 32 checks per radian": our_search(problem, seconds=options.limit, per_radian=PER_RADIAN),
         "ours, own rule": our_search(problem, seconds=options.limit),
-        "plan()": whole,
+        "plan()": _whole_plan(problem, options),
     }
     if HAS_ROBOPLAN:
         searches["roboplan"] = roboplan_search(problem, file.parents[2] / "panda.urdf", options.limit)
     return searches
+
+
+def _whole_plan(problem: Problem, options: Options) -> Callable[[int], Matrix | None]:
+    """The call that a person makes: search, restarts and second check; from a seed to a path."""
+
+    def whole(seed: int) -> Matrix | None:
+        found = plan(problem, PLANNER, seconds=options.limit, seed=seed)
+        return None if found.path is None else found.path.waypoints
+
+    return whole
 
 
 def callbacks(options: Options, report: Report) -> None:
@@ -164,23 +172,23 @@ def callbacks(options: Options, report: Report) -> None:
 
 
 def ompl_layer(options: Options, report: Report) -> None:
-    """Row 8: what OMPL around the kernel planner costs."""
+    """Row 8: what OMPL around the kernel planner costs, call by call."""
     title = "8. SimpleSetup.solve() against the bare search"
     files = panda_files(options, options.peer_problems)
     problems = [exact_problem(options, file) for file in files] or shipped_problems()
     bare, whole = [], []
     for problem in problems:
-        search, solve = our_search(problem, seconds=1.0), through_ompl(problem, seconds=1.0, seed=options.seed)
+        solve = ompl_overhead(problem, seconds=1.0, seed=options.seed)
         if solve is None:
             return report.note(title, "Not run: the kernel planner is not there.")
         warm_up(problem)
-        runs = [(timed(lambda search=search: search(options.seed))[0], timed(solve)[0]) for _ in range(4 * REPEATS)]
-        bare.append(min(a for a, _ in runs))
-        whole.append(min(b for _, b in runs))
+        runs = [solve() for _ in range(4 * REPEATS)]
+        bare += [inner for _, inner in runs]
+        whole += [outer for outer, _ in runs]
     more = 1e6 * float(np.median(np.array(whole) - np.array(bare)))
     report.table(
         title,
-        ["problems", "bare [us]", "solve() [us]", "difference [us]"],
+        ["problems", "search inside [us]", "solve() [us]", "difference [us]"],
         [[str(len(problems)), *(f"{1e6 * np.median(t):.1f}" for t in (bare, whole)), f"{more:.1f}"]],
     )
     report.bar(
@@ -195,9 +203,12 @@ def titan(options: Options, report: Report) -> None:
     for problem in shipped_problems():
         warm_up(problem)
         cells = [problem.name]
-        for name in ("ours", "bicrdt"):
-            planner = PLANNER if name == "ours" else name
-            search = our_search(problem, seconds=options.limit, planner=planner)
+        searches = {
+            "ours": our_search(problem, seconds=options.limit),
+            "plan()": _whole_plan(problem, options),
+            "bicrdt": our_search(problem, seconds=options.limit, planner="bicrdt"),
+        }
+        for name, search in searches.items():
             runs = [timed(lambda search=search, seed=seed: search(seed)) for seed in seeds]
             verified = sum(_verified(problem, rows) for _, rows in runs)
             times = [seconds for seconds, _ in runs]
@@ -205,10 +216,12 @@ def titan(options: Options, report: Report) -> None:
             cells += [_ms(np.median(times)), _ms(np.quantile(times, 0.95)), f"{verified} of {len(runs)}"]
         rows.append(cells)
     columns = ("median [ms]", "95 % [ms]", "verified")
-    head = ["", *(f"{name}, {column}" for name in ("ours", "bicrdt") for column in columns)]
+    head = ["", *(f"{name}, {column}" for name in TITAN_COLUMNS for column in columns)]
     report.table("9. TITAN-4, shipped problems", head, rows)
     worst, bar = 1e3 * max(medians), "2 ms (aim 0.5 ms)"
-    report.bar("TITAN-4, all shipped problems, exact: largest median", bar, f"{worst:.3g} ms", worst <= 2.0)
+    report.bar(
+        "TITAN-4, all shipped problems, exact: largest median of the search", bar, f"{worst:.3g} ms", worst <= 2.0
+    )
 
 
 def _verified(problem: Problem, rows: Matrix | None) -> bool:

@@ -37,7 +37,7 @@ def test_rows_without_their_data_say_so(page):
 
 
 def test_rows_that_need_no_data_are_measured(page):
-    for title in ("5. Along free motions", "6, 7. Exact", "9. TITAN-4", "11. Memory over 50 plans"):
+    for title in ("5. Panda along free motions", "6, 7. Exact", "9. TITAN-4", "11. Memory over 50 plans"):
         assert f"## {title}" in page
 
 
