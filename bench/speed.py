@@ -59,13 +59,12 @@ def main() -> int:
     ou.setLogLevel(ou.LogLevel.LOG_ERROR)
     report = Report("Speed", "python bench/speed.py FOLDER")
     report.note("Machine", machine())
+    given.out.parent.mkdir(parents=True, exist_ok=True)
     for name in given.only or ROWS:
         print(f"{name} ...", file=sys.stderr, flush=True)
         ROWS[name](options, report)
-    page = report.markdown()
-    print(page)
-    given.out.parent.mkdir(parents=True, exist_ok=True)
-    given.out.write_text(page)
+        given.out.write_text(report.markdown())  # after every row: a run that is cut short leaves what it has measured
+    print(report.markdown())
     return 0 if all(bar[3] for bar in report.bars) else 1
 
 
