@@ -59,6 +59,8 @@ def main() -> int:
     ou.setLogLevel(ou.LogLevel.LOG_ERROR)
     report = Report("Speed", "python bench/speed.py FOLDER")
     report.note("Machine", machine())
+    work = f"At most {most} problems of each family, {slow} for the slow peers; {given.plans} plans; seed {given.seed}."
+    report.note("Work", work + (" Quick: a fraction of the configurations and plans." if given.quick else ""))
     given.out.parent.mkdir(parents=True, exist_ok=True)
     for name in given.only or ROWS:
         print(f"{name} ...", file=sys.stderr, flush=True)
