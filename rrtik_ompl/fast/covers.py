@@ -1,9 +1,7 @@
 """Balls around a solid (outer cover, contains it) and balls inside it (inner spheres), for any coal geometry.
 
 An outer cover is proven, not sampled: the solid is cut into convex elements without gaps (``cover_cells``) and every
-element lies wholly inside one ball. Among the candidate centres, a ball may reach as far as its depth plus the
-protrusion; greedy set cover (Chvatal 1979) picks few of them, and bisection finds the smallest protrusion for the
-wanted number of balls.
+element lies wholly inside one ball (``cover_search`` finds the balls).
 
 Spheres are float64 arrays of shape (n, 4): centre x, y, z and radius [m], in the frame of the geometry. Containment
 holds within 1e-9 of the size of the solid [m per m].
@@ -44,7 +42,7 @@ from rrtik_ompl.fast.cover_solids import (
 
 ALGORITHM = 2  # counts up when other spheres come out for the same geometry: part of the name of a cached cover
 
-BALLS_PER_METRE, FEWEST, MOST = 90.0, 2, 40
+BALLS_PER_METRE, FEWEST, MOST = 70.0, 2, 32  # 32: four full clusters of the kernels; 36 make eight
 INNER_SHARE = 1.5  # inner balls for each outer one
 MOST_ON_REQUEST = 512  # balls, where a protrusion is asked for
 # A mesh of more triangles or open edges is taken as its bounding box, and nothing is proven to collide with it.
