@@ -44,11 +44,16 @@ class Kind(str, Enum):
 
 
 class Shorten(str, Enum):
-    """What `rrtik plan` does to the raw path; `auto` is axis for a path of single-joint moves and none otherwise."""
+    """What `rrtik plan` does to the raw path; `auto` is axis for a path of single-joint moves."""
 
     auto = "auto"
     axis = "axis"
     axis_rounds = "axis-rounds"
+    sequential = "sequential"
+    random = "random"
+    shortcut = "shortcut"
+    retraction = "retraction"
+    ompl = "ompl"
     none = "none"
 
 
@@ -98,7 +103,7 @@ def plan(
             question, planner, seconds=seconds, seed=seed, restarts=restarts, parameters=_parameters(parameter or [])
         )
     with progress("shortening"):
-        path, shorten_seconds = _shortened(found.path, question, shorten)
+        path, shorten_seconds = _shortened(found.path, question, shorten, found.seed)
     if path is not None and out is not None:
         path.save(out)
     if path is not None and html is not None:
@@ -262,16 +267,14 @@ def _usage(error: Any) -> int:
     return _fail(f"{' '.join(text.replace('Value error, ', '').split())} (see: {command} --help)")
 
 
-def _shortened(path: Any, problem: Any, method: Shorten) -> tuple[Any, float]:
+def _shortened(path: Any, problem: Any, method: Shorten, seed: int) -> tuple[Any, float]:
     from rrtik_ompl.shortening import shorten
 
-    wanted = method
-    if path is not None and method is Shorten.auto:
-        wanted = Shorten.axis if path.one_joint_at_a_time else Shorten.none
-    if path is None or wanted is Shorten.none:
+    if path is None or method is Shorten.none or len(path.waypoints) < 2:
         return path, 0.0
+    wanted = Shorten.axis if method is Shorten.auto and path.one_joint_at_a_time else method
     begin = time.perf_counter()
-    return shorten(path, problem, method=wanted.value), time.perf_counter() - begin
+    return shorten(path, problem, method=wanted.value, seed=seed), time.perf_counter() - begin
 
 
 def _parameters(pairs: list[str]) -> dict[str, Any]:

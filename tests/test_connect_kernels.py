@@ -113,6 +113,18 @@ def test_shares_are_those_of_splitmix64():
         assert uniform(seed, 20).tolist() == [next(wanted) for _ in range(20)]
 
 
+@entry
+def second_share(random: int) -> int:
+    if next_share(random, 0) < 1.0:
+        return int(next_share(random, 0) * 2.0**53)
+    return -1
+
+
+def test_a_second_share_in_one_kernel_is_the_next_of_the_stream():
+    for seed in (0, 1, 2**62 + 12345):
+        assert second_share(table({0: seed}).address) == uniform(seed, 2)[1] * 2.0**53
+
+
 def points(dimensions, count, start=None, seed=3):
     random, point = table({0: seed}), np.array(start if start is not None else np.zeros(dimensions))
     bases = np.array(inverse_bases(dimensions))

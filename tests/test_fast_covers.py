@@ -5,19 +5,23 @@ import os
 
 import coal
 import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.solids import bvh, hull, inside_mesh, is_mesh, mesh_arrays, pieces, robot_solids
-from rrtik_ompl.fast import cover_cache, covers
+from rrtik_ompl.fast import COLLIDING, FREE, FastWorld, cover_cache, covers, needs_covers
 from rrtik_ompl.fast.cache_files import FOLDER_VARIABLE
 from rrtik_ompl.fast.cover_cache import cached_inner_spheres, cached_outer_cover
 from rrtik_ompl.fast.cover_solids import distance_to_triangles, rim_caps
 from rrtik_ompl.fast.covers import inner_spheres, outer_cover, protrusion_bound
-from rrtik_ompl.shapes import Prism
+from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.shapes import Mesh, Prism
+from rrtik_ompl.world import World
 
 TOLERANCE = 1e-9
 LETTER_L = [(0.0, 0.0), (0.3, 0.0), (0.3, 0.1), (0.1, 0.1), (0.1, 0.4), (0.0, 0.4)]
@@ -175,7 +179,7 @@ def _check(geometry, count=6000):
     cover = outer_cover(geometry)
     assert cover.dtype == np.float64
     assert cover.shape == (len(cover), 4)
-    assert 1 <= len(cover) <= 32
+    assert 1 <= len(cover) <= covers.MOST
     assert _outside(_points_of(geometry, np.random.default_rng(1), count), cover) <= TOLERANCE
     _assert_inside(inner_spheres(geometry), geometry)
 
@@ -333,12 +337,135 @@ def test_a_padded_solid_is_covered_with_its_padding():
 
 
 def test_open_edges_are_found_and_closed():
-    assert len(rim_caps(_torus()[0][_torus()[1]])) == 0
+    assert len(rim_caps(*_torus())) == 0
     vertices, faces = _with_hole()
-    corners = vertices[faces]
-    caps = rim_caps(corners)
+    caps = rim_caps(vertices, faces)
     assert len(caps) > 0
-    assert len(rim_caps(np.concatenate([corners, caps]))) == 0
+    corners = np.concatenate([vertices[faces], caps]).reshape(-1, 3)
+    points, number = np.unique(corners, axis=0, return_inverse=True)
+    assert len(rim_caps(points, number.reshape(-1, 3))) == 0
+
+
+DEGENERATE = {
+    "a point": np.full((3, 3), 0.3),
+    "a line": np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]),
+    "a triangle": np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]),
+    "a far triangle": np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]) + 1e4,
+    "a needle of a triangle": np.array([[0.0, 0, 0], [1, 1e-9, 0], [1, 0, 1e-9]]),
+    "flat": np.column_stack([np.random.default_rng(0).uniform(size=(60, 2)), np.zeros(60)]),
+    "a point and a line": np.array([[0.0, 0, 0]] * 3 + [[1, 1, 1], [1, 1, 2], [1, 1, 3]]),
+}
+
+
+@pytest.mark.parametrize("name", DEGENERATE)
+def test_a_mesh_without_volume_is_covered_and_proves_nothing(name):
+    points = DEGENERATE[name]
+    solid = bvh(points, np.arange(len(points)).reshape(-1, 3))
+    cover = outer_cover(solid)
+    assert np.isfinite(cover).all()
+    corners = points.reshape(-1, 3, 3)
+    assert _outside(_in_triangles(corners, 2000, np.random.default_rng(0)), cover) <= TOLERANCE * np.abs(points).max()
+    assert len(inner_spheres(solid)) == 0
+
+
+@pytest.mark.parametrize(
+    "scale", [(1e-6, 1e-6, 1e-6), (1e-3, 1e-3, 1e-3), (500, 500, 500), (4, 1e-6, 1e-6), (1, 1, 1e-5)]
+)
+def test_meshes_of_any_size_and_slenderness_are_covered(scale):
+    vertices, faces = _torus()
+    solid = bvh(vertices * scale, faces)
+    size = float(np.max(scale))
+    sample = _in_triangles((vertices * scale)[faces], 4000, np.random.default_rng(0))
+    assert _outside(sample, outer_cover(solid)) <= TOLERANCE * size
+    _assert_inside(inner_spheres(solid), solid)
+
+
+def _fine_torus(n, m):
+    vertices, _ = _torus(n=n, m=m)
+    i, j = (k.ravel() for k in np.meshgrid(np.arange(n), np.arange(m), indexing="ij"))
+    a, b, c, d = (p % n * m + q % m for p, q in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)))
+    return vertices, np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+
+
+def test_a_huge_mesh_is_taken_as_its_box(monkeypatch):
+    vertices, faces = _fine_torus(120, 60)
+    fine, few = bvh(vertices, faces), outer_cover(bvh(vertices, faces))
+    assert len(inner_spheres(fine)) > 0
+    monkeypatch.setattr(covers, "MOST_TRIANGLES", len(faces) - 1)
+    coarse = outer_cover(fine)
+    assert not np.array_equal(coarse, few)
+    corners = np.array(list(itertools.product(*np.stack([vertices.min(axis=0), vertices.max(axis=0)], axis=1))))
+    assert _outside(np.concatenate([vertices, corners]), coarse) <= TOLERANCE
+    assert len(inner_spheres(fine)) == 0
+
+
+@pytest.mark.parametrize("shared", [False, True])
+def test_a_mesh_of_open_edges_only_is_taken_as_its_box(shared):
+    rng = np.random.default_rng(1)
+    faces = rng.integers(0, 300, (6000, 3)) if shared else np.arange(6000).reshape(-1, 3)
+    faces = faces[(np.diff(np.sort(faces, axis=1), axis=1) > 0).all(axis=1)]
+    vertices = rng.uniform(-0.2, 0.2, (faces.max() + 1, 3))
+    solid = bvh(vertices, faces)
+    cover = outer_cover(solid)
+    assert len(cover) > 4
+    assert _outside(np.concatenate([vertices, rng.uniform(-0.199, 0.199, (2000, 3))]), cover) <= 1e-3
+    assert _outside(vertices, cover) <= TOLERANCE
+    assert len(inner_spheres(solid)) == 0
+
+
+def _worst_near_half(geometry, cover, rng):
+    """Largest distance from the balls of points that World takes as inside a mesh: few, so many are tried."""
+    vertices, faces = mesh_arrays(geometry)
+    tried = rng.uniform(vertices.min(axis=0), vertices.max(axis=0), (6000, 3))
+    away = (np.linalg.norm(tried[:, None] - cover[:, :3], axis=2) - cover[:, 3]).min(axis=1)
+    outside = tried[away > 0.0]
+    return [p for p in outside[:1500] if inside_mesh(vertices, faces, p)]
+
+
+@pytest.mark.parametrize("share", [0.95, 0.9, 0.75, 0.5, 0.3])
+def test_no_point_inside_an_open_mesh_is_left_out(share):
+    solid = bvh(*_with_hole(share))
+    assert _worst_near_half(solid, outer_cover(solid), np.random.default_rng(0)) == []
+
+
+def test_no_point_inside_the_open_links_of_robots_is_left_out():
+    solids = robot_solids(load_robot("ur10"))[3], robot_solids(load_robot("ur3"))[4]
+    for solid in solids:
+        assert _worst_near_half(solid, outer_cover(solid), np.random.default_rng(0)) == []
+        assert len(inner_spheres(solid)) == 0
+
+
+def _two_cubes():
+    """Two cubes with one edge in common: no edge is open, yet four triangles meet at one."""
+    cube = np.array(list(itertools.product((0.0, 0.1), repeat=3)))
+    faces = _outward(cube, ConvexHull(cube).simplices)
+    corners = np.concatenate([cube[faces], (cube + np.array([0.1, 0.1, 0.0]))[faces]]).reshape(-1, 3)
+    points, number = np.unique(corners, axis=0, return_inverse=True)
+    return points, number.reshape(-1, 3)
+
+
+def test_only_what_the_world_takes_as_solid_asks_for_inner_balls():
+    solids = {"hollow": bvh(*_two_cubes()), "closed": _mesh("torus"), "box": coal.Box(1, 1, 1)}
+    for joint, kind in ((0, "obstacle"), (1, "attached")):
+        asked = {n: needs_covers(Body(n, joint, pin.SE3.Identity(), g, kind))[1] for n, g in solids.items()}
+        assert not asked["hollow"]
+        assert asked["closed"]
+    assert needs_covers(Body("link", 1, pin.SE3.Identity(), solids["hollow"], "link"))[1]
+
+
+def test_a_body_inside_a_mesh_that_is_not_closed_is_free_for_kernels_and_world():
+    robot = load_robot("point2d")
+    cubes = _two_cubes()[0] * 30.0 - [1.5, 1.5, 1.5], _two_cubes()[1]
+    scene = Scene([Obstacle("cubes", Mesh(*cubes), pin.SE3.Identity())])
+    world = World(robot, scene)
+    outer = [outer_cover(b.geometry) for b in world.bodies]
+    inner = [inner_spheres(b.geometry) if needs_covers(b)[1] else np.empty((0, 4)) for b in world.bodies]
+    fast = FastWorld(robot.chain, world.bodies, world.pairs, outer=outer, inner=inner, compiled=False)
+    Q = np.random.default_rng(0).uniform(robot.lower, robot.upper, (300, robot.dof))
+    judged = fast.classify(Q @ robot.chain.gain.T + robot.chain.offset)
+    valid = world.valid_batch(Q)
+    assert not valid[judged == COLLIDING].any()
+    assert valid[judged == FREE].all()
 
 
 @pytest.fixture

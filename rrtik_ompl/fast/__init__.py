@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rrtik_ompl.fast.clearance import Clearance as Clearance
     from rrtik_ompl.fast.fast_world import FastWorld as FastWorld
     from rrtik_ompl.fast.layout import COLLIDING as COLLIDING
     from rrtik_ompl.fast.layout import FREE as FREE
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 else:
     _HOME_OF = {
         **dict.fromkeys(("COLLIDING", "FREE", "UNDECIDED"), "layout"),
+        "Clearance": "clearance",
         "FastWorld": "fast_world",
         "needs_covers": "scene_tables",
         "warm_up": "library",

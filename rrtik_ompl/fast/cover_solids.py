@@ -6,6 +6,7 @@ leads back.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -13,15 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull, cKDTree
+from scipy.spatial import ConvexHull
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.solids import inside_mesh
 
 ROUNDING = 1e-12  # relative to the extent of the solid; far above float64's rounding, far below any length that matters
 CYLINDER_SIDES = 64
-NEIGHBOURS = 16  # patches of each size looked at closely when the distance to a surface is bounded from below
-LARGEST_PATCH = 0.03  # longest side of such a patch, as a share of the solid
 
 Triangles = NDArray[np.float64]  # shape (m, 3, 3): triangle, corner, coordinate
 
@@ -61,11 +60,11 @@ class Solid(Protocol):
     def slack(self) -> float:
         """How far the true solid may reach beyond ``triangles`` by rounding."""
 
-    def depth(self, points: Matrix, inside: Mask) -> Vector:
-        """A lower bound of the depth, shape (n,): distance to the surface, negative where not surely inside."""
+    def depth(self, points: Matrix) -> Vector:
+        """Distance of points, shape (n, 3), to the surface, negative outside; rounding is on the safe side."""
 
-    def exact_depth(self, points: Matrix) -> Vector:
-        """The depth itself, up to rounding that is on the safe side; slower."""
+    def distance(self, points: Matrix) -> Vector:
+        """The same for points that are known to be inside; quicker."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,12 +77,12 @@ class ConvexSolid:
     slack: float
     rim: Triangles = field(default_factory=lambda: np.empty((0, 3, 3)))
 
-    def depth(self, points: Matrix, inside: Mask | None = None) -> Vector:
+    def depth(self, points: Matrix) -> Vector:
         """Smallest distance to the planes."""
         return np.asarray((self.offsets - points @ self.normals.T).min(axis=1) - self.slack)
 
-    def exact_depth(self, points: Matrix) -> Vector:
-        """The same: planes are exact."""
+    def distance(self, points: Matrix) -> Vector:
+        """The same."""
         return self.depth(points)
 
 
@@ -97,15 +96,15 @@ class CylinderSolid:
     slack: float
     rim: Triangles = field(default_factory=lambda: np.empty((0, 3, 3)))
 
-    def depth(self, points: Matrix, inside: Mask | None = None) -> Vector:
+    def depth(self, points: Matrix) -> Vector:
         """Smallest distance to mantle and caps (outside: to the farther of the two)."""
         radial = self.radius - np.hypot(points[:, 0], points[:, 1])
         axial = self.half_length - np.abs(points[:, 2])
         outside = -np.hypot(np.minimum(radial, 0.0), np.minimum(axial, 0.0))
         return np.asarray(np.where(outside < 0.0, outside, np.minimum(radial, axial)) - ROUNDING)
 
-    def exact_depth(self, points: Matrix) -> Vector:
-        """The same: the formula is exact."""
+    def distance(self, points: Matrix) -> Vector:
+        """The same."""
         return self.depth(points)
 
 
@@ -117,33 +116,22 @@ class MeshSolid:
 
     slack = ROUNDING
 
-    def __init__(self, triangles: Triangles) -> None:
-        self.triangles = triangles
-        self.rim = rim_caps(triangles)
-        self._closed = np.concatenate([triangles, self.rim])
+    def __init__(self, vertices: Matrix, faces: NDArray[np.int64]) -> None:
+        self.triangles = vertices[faces]
+        self.rim = rim_caps(vertices, faces)
+        self._closed = np.concatenate([self.triangles, self.rim])
         self._centres, self._reach = _round_about(self._closed)
-        self._patches = _patches(self._closed)
         self._corners = self._closed.reshape(-1, 3)
         self._indices = np.arange(len(self._corners)).reshape(-1, 3)
 
-    def depth(self, points: Matrix, inside: Mask) -> Vector:
-        """Distance to the surface: the nearest patches of every size exactly, the rest from below by their reach."""
-        above = below = np.full(len(points), np.inf)
-        for tree, patches, reach in self._patches:
-            count = min(NEIGHBOURS, len(patches))
-            far, near = (a.reshape(len(points), -1) for a in tree.query(points, k=count))
-            close = distance_to_triangles(np.repeat(points, count, axis=0), patches[near.ravel()])
-            above = np.minimum(above, close.reshape(len(points), -1).min(axis=1))
-            if count < len(patches):
-                below = np.minimum(below, far[:, -1] - reach)
-        below = np.maximum(np.minimum(above, below), 0.0)
-        return np.asarray(np.where(inside, below, -above) - ROUNDING)
-
-    def exact_depth(self, points: Matrix) -> Vector:
+    def depth(self, points: Matrix) -> Vector:
         """Distance to the surface, negative outside."""
-        distance = np.array([self._distance(p) for p in points])
         inside = np.array([inside_mesh(self._corners, self._indices, p) for p in points], dtype=bool)
-        return np.asarray(np.where(inside, distance, -distance) - ROUNDING)
+        return np.asarray(np.where(inside, 1.0, -1.0) * (self.distance(points) + ROUNDING) - ROUNDING)
+
+    def distance(self, points: Matrix) -> Vector:
+        """Distance to the surface."""
+        return np.asarray(np.array([self._distance(p) for p in points]) - ROUNDING)
 
     def _distance(self, point: Vector) -> float:
         to_centre = np.linalg.norm(self._centres - point, axis=1)
@@ -183,6 +171,11 @@ def convex_solid(points: Matrix) -> tuple[ConvexSolid, Frame]:
     return ConvexSolid(triangles, normals, offsets, max(beyond, 0.0) + max(below, 0.0) + ROUNDING), frame
 
 
+def box_corners(half: Vector) -> Matrix:
+    """Corners of a box about the origin with these half sides, shape (8, 3)."""
+    return np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * half
+
+
 def cylinder_solid(radius: float, half_length: float) -> tuple[CylinderSolid, Frame]:
     """A cylinder about z, inside a regular prism."""
     frame = Frame(np.zeros(3), np.eye(3), 2.0 * float(np.hypot(radius, half_length)))
@@ -202,12 +195,13 @@ def _prism(ring: Matrix, high: float) -> Triangles:
     return np.concatenate([np.stack(side, axis=1) for side in sides])
 
 
-def mesh_solid(triangles: Triangles) -> tuple[MeshSolid, Frame]:
+def mesh_solid(vertices: Matrix, triangles: NDArray[np.int64]) -> tuple[MeshSolid, Frame]:
     """A mesh; degenerate triangles are kept, they are part of the surface."""
-    points = triangles.reshape(-1, 3)
+    used, number = np.unique(triangles, return_inverse=True)
+    points, same = np.unique(vertices[used], axis=0, return_inverse=True)
     low, high = points.min(axis=0), points.max(axis=0)
-    frame = Frame(0.5 * (low + high), np.eye(3), max(float(np.linalg.norm(high - low)), 1e-300))
-    return MeshSolid(frame.to_local(triangles)), frame
+    frame = Frame(0.5 * (low + high), np.eye(3), float(np.linalg.norm(high - low)))
+    return MeshSolid(frame.to_local(points), same.ravel()[number.reshape(-1, 3)]), frame
 
 
 def _round_about(triangles: Triangles) -> tuple[Matrix, Vector]:
@@ -216,37 +210,22 @@ def _round_about(triangles: Triangles) -> tuple[Matrix, Vector]:
     return centres, np.linalg.norm(triangles - centres[:, None], axis=2).max(axis=1)
 
 
-def _patches(triangles: Triangles) -> list[tuple[cKDTree, Triangles, float]]:
-    """The surface in small triangles, sorted by size: search tree of the centres, triangles, largest reach."""
-    done, rest = [], triangles
-    while len(rest):
-        sides = np.linalg.norm(rest - np.roll(rest, -1, axis=1), axis=2)
-        large = sides.max(axis=1) > LARGEST_PATCH
-        done.append(rest[~large])
-        first, row = sides[large].argmax(axis=1), np.arange(int(large.sum()))
-        a, b, c = (rest[large][row, (first + k) % 3] for k in range(3))
-        middle = 0.5 * (a + b)
-        rest = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
-    small = np.concatenate(done)
-    centres, reach = _round_about(small)
-    size = np.digitize(reach, LARGEST_PATCH / 2.0 ** np.arange(1, 5))
-    return [(cKDTree(centres[size == k]), small[size == k], float(reach[size == k].max())) for k in np.unique(size)]
-
-
-def rim_caps(triangles: Triangles) -> Triangles:
+def rim_caps(vertices: Matrix, faces: NDArray[np.int64]) -> Triangles:
     """Triangles that close a surface: one for each edge that the orientations of its triangles leave open.
 
     The open edges form loops (the boundary of a boundary is empty), so coning each group of loops that hang together
-    to one point closes the surface.
+    to one point closes the surface. The open edge of a cap is the one opposite to its first corner.
+
+    Args:
+        vertices: Shape (n, 3), no two of them equal.
+        faces: Vertex numbers, shape (m, 3).
     """
-    corners, number = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-    face = number.reshape(-1, 3)
-    start, end = face.T.ravel(), np.roll(face, -1, axis=1).T.ravel()
-    key = np.minimum(start, end) * len(corners) + np.maximum(start, end)
+    start, end = faces.T.ravel(), np.roll(faces, -1, axis=1).T.ravel()
+    key = np.minimum(start, end) * len(vertices) + np.maximum(start, end)
     edges, which = np.unique(key, return_inverse=True)
     turns = np.bincount(which.ravel(), weights=np.sign(end - start), minlength=len(edges)).astype(np.int64)
     open_edges = np.flatnonzero(turns)
-    low, high = corners[edges[open_edges] // len(corners)], corners[edges[open_edges] % len(corners)]
+    low, high = vertices[edges[open_edges] // len(vertices)], vertices[edges[open_edges] % len(vertices)]
     flip = (turns[open_edges] < 0)[:, None]
     ends = np.stack([np.where(flip, low, high), np.where(flip, high, low)], axis=1)
     ends = np.repeat(ends, np.abs(turns[open_edges]), axis=0)

@@ -1,9 +1,7 @@
 """Balls around a solid (outer cover, contains it) and balls inside it (inner spheres), for any coal geometry.
 
 An outer cover is proven, not sampled: the solid is cut into convex elements without gaps (``cover_cells``) and every
-element lies wholly inside one ball. Among the candidate centres, a ball may reach as far as its depth plus the
-protrusion; greedy set cover (Chvatal 1979) picks few of them, and bisection finds the smallest protrusion for the
-wanted number of balls.
+element lies wholly inside one ball (``cover_search`` finds the balls).
 
 Spheres are float64 arrays of shape (n, 4): centre x, y, z and radius [m], in the frame of the geometry. Containment
 holds within 1e-9 of the size of the solid [m per m].
@@ -11,35 +9,46 @@ holds within 1e-9 of the size of the solid [m per m].
 
 from __future__ import annotations
 
-import itertools
 from typing import Any
 
 import coal
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import QhullError
+from scipy.spatial import QhullError, cKDTree
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.collision.solids import is_mesh, mesh_arrays
-from rrtik_ompl.fast.cover_cells import Elements, elements
+from rrtik_ompl.fast.cover_cells import elements
+from rrtik_ompl.fast.cover_inner import inscribed
+from rrtik_ompl.fast.cover_regular import (
+    CAPSULE_PROTRUSION,
+    balls_on_axis,
+    capsule_cover,
+    regular_cover,
+    row_on_z,
+    spread,
+)
+from rrtik_ompl.fast.cover_search import smallest_cover, surface_points
 from rrtik_ompl.fast.cover_solids import (
     ROUNDING,
     Frame,
+    MeshSolid,
     Solid,
+    box_corners,
     convex_solid,
     cylinder_solid,
     mesh_solid,
 )
 
-BALLS_PER_METRE, FEWEST, MOST = 70.0, 2, 32
+BALLS_PER_METRE, FEWEST, MOST = 70.0, 2, 32  # 32: four full clusters of the kernels; 36 make eight
+INNER_SHARE = 1.5  # inner balls for each outer one
 MOST_ON_REQUEST = 512  # balls, where a protrusion is asked for
-CAPSULE_PROTRUSION = 0.06  # share of the radius
-CROSSED_CELLS = 1500
-CANDIDATES = 1000
-BISECTIONS = 8
-THIN_CANDIDATES = 200  # for solids without lattice points inside
-CHUNK = 128
-OFFSETS = np.array([p for p in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(p)])
+# A mesh of more triangles or open edges is taken as its bounding box, and nothing is proven to collide with it.
+MOST_TRIANGLES, MOST_OPEN_EDGES = 300_000, 4000
+CROSSED_CELLS = 1500  # at most
+CELLS_PER_BALL = 80
+SURFACE_POINTS = 6000
+SMALLEST = 1e-12  # [m]; what is smaller counts as a point
 
 
 def outer_cover(geometry: Any, *, protrusion: float | None = None) -> Matrix:
@@ -56,7 +65,7 @@ def outer_cover(geometry: Any, *, protrusion: float | None = None) -> Matrix:
     if isinstance(geometry, coal.Sphere):
         return np.array([[0.0, 0.0, 0.0, geometry.radius + swept]])
     if isinstance(geometry, coal.Capsule):
-        return _grown(_capsule_cover(geometry.radius, geometry.halfLength, protrusion), swept)
+        return _grown(_capsule_balls(geometry, protrusion), swept)
     if is_mesh(geometry) and geometry.num_tris == 0:
         return np.empty((0, 4))
     made = _solid(geometry)
@@ -65,8 +74,8 @@ def outer_cover(geometry: Any, *, protrusion: float | None = None) -> Matrix:
     solid, frame = made
     wanted = None if protrusion is None else max(protrusion, 0.0) / frame.scale
     limit = balls_for(frame.scale) if protrusion is None else MOST_ON_REQUEST
-    found = _smallest_cover(solid, limit, wanted)
-    regular = _regular_cover(geometry, limit, protrusion)
+    found = _searched_cover(solid, limit, wanted)
+    regular = regular_cover(geometry, limit, protrusion)
     cover = frame.spheres_out(found, solid.slack + ROUNDING)
     if regular is not None and _better(geometry, regular, cover, protrusion):
         cover = regular
@@ -83,17 +92,15 @@ def inner_spheres(geometry: Any, *, count: int | None = None) -> Matrix:
     if isinstance(geometry, coal.Sphere):
         return np.array([[0.0, 0.0, 0.0, geometry.radius]])[:count]
     if isinstance(geometry, coal.Capsule):
-        radius, half = float(geometry.radius), float(geometry.halfLength)
-        number = min(_on_axis(radius, half, CAPSULE_PROTRUSION * radius), balls_for(2.0 * (half + radius)))
-        return _on_z(_spread(half, number if count is None else min(count, number)), radius)
-    if is_mesh(geometry) and geometry.num_tris == 0:
-        return np.empty((0, 4))
+        return _capsule_core(geometry, count)
     made = _solid(geometry)
-    if made is None or len(made[0].rim):
+    if made is None or not _closed(geometry, made[0]):
         return np.empty((0, 4))
     solid, frame = made
-    found = _inscribed(solid, balls_for(frame.scale) if count is None else count)
-    found = frame.spheres_out(found, -ROUNDING)
+    wanted = round(INNER_SHARE * balls_for(frame.scale)) if count is None else count
+    found = frame.spheres_out(
+        inscribed(solid, cKDTree(surface_points(solid.triangles, SURFACE_POINTS)), wanted), -ROUNDING
+    )
     return np.asarray(found[found[:, 3] > 0.0], dtype=np.float64)
 
 
@@ -113,7 +120,7 @@ def protrusion_bound(geometry: Any, spheres: Matrix) -> float:
     if made is None:
         return np.inf
     solid, frame = made
-    depth = frame.scale * solid.exact_depth(frame.to_local(spheres[:, :3]))
+    depth = frame.scale * solid.depth(frame.to_local(spheres[:, :3]))
     return max(float((spheres[:, 3] - depth).max()), 0.0)
 
 
@@ -136,11 +143,9 @@ def _solid(geometry: Any) -> tuple[Solid, Frame] | None:
         sizes = geometry.radius, geometry.halfLength
         return cylinder_solid(*sizes) if min(sizes) > 0.0 and np.isfinite(sizes).all() else None
     if is_mesh(geometry):
-        vertices, triangles = mesh_arrays(geometry)
-        corners = vertices[triangles]
-        return mesh_solid(corners) if np.isfinite(corners).all() else None
+        return _mesh(*mesh_arrays(geometry))
     if isinstance(geometry, coal.Box):
-        points = _box_corners(np.array(geometry.halfSide))
+        points = box_corners(np.array(geometry.halfSide))
     elif isinstance(geometry, coal.ConvexBase):
         points = np.array(geometry.points(), dtype=np.float64).reshape(-1, 3)
     else:
@@ -153,8 +158,42 @@ def _solid(geometry: Any) -> tuple[Solid, Frame] | None:
         return None
 
 
-def _box_corners(half: Vector) -> Matrix:
-    return np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * half
+def _mesh(vertices: Matrix, triangles: NDArray[np.int64]) -> tuple[Solid, Frame] | None:
+    used = vertices[np.unique(triangles)]
+    if not len(used) or not np.isfinite(used).all() or not np.ptp(used, axis=0).max() > SMALLEST:
+        return None
+    if len(triangles) <= MOST_TRIANGLES:
+        made = mesh_solid(vertices, triangles)
+        if len(made[0].rim) <= MOST_OPEN_EDGES:
+            return made
+    low, high = used.min(axis=0), used.max(axis=0)
+    thick = np.maximum(0.5 * (high - low), 1e-6 * float((high - low).max()))  # a box may be larger, never flat
+    return convex_solid(box_corners(thick) + 0.5 * (low + high))
+
+
+def _closed(geometry: Any, solid: Solid) -> bool:
+    """Whether a body that touches a ball inside the geometry surely collides with it.
+
+    Coal's meshes are hollow: a body collides with one if it meets the surface, or if its reference point is inside
+    (winding number above one half). A body that meets an inner ball but not the surface lies in one piece of the space
+    that the surface leaves. Without open edges the winding number is the same whole number all over that piece, so it
+    is that of the ball, and the reference point is inside. Through an open edge the winding number fades to nothing,
+    and a body may hold on to the ball with its reference point where it counts as outside: then nothing is proven.
+    """
+    return not len(solid.rim) and (not is_mesh(geometry) or isinstance(solid, MeshSolid))
+
+
+def _capsule_balls(capsule: Any, protrusion: float | None) -> Matrix:
+    radius, half = float(capsule.radius), float(capsule.halfLength)
+    limit = balls_for(2.0 * (half + radius)) if protrusion is None else MOST_ON_REQUEST
+    return capsule_cover(radius, half, limit, protrusion)
+
+
+def _capsule_core(capsule: Any, count: int | None) -> Matrix:
+    """Balls inside a capsule, as many as its cover has."""
+    radius, half = float(capsule.radius), float(capsule.halfLength)
+    number = min(balls_on_axis(radius, half, CAPSULE_PROTRUSION * radius), balls_for(2.0 * (half + radius)))
+    return row_on_z(spread(half, number if count is None else min(count, number)), radius)
 
 
 def _bounding_ball(geometry: Any, swept: float) -> Matrix:
@@ -172,68 +211,6 @@ def _finite(geometry: Any) -> bool:
     return not isinstance(geometry, coal.ConvexBase) or bool(np.isfinite(np.array(geometry.points())).all())
 
 
-def _on_axis(radius: float, half: float, protrusion: float) -> int:
-    """Number of balls along an axis of length ``2 half`` that hold the rod around it of the given radius."""
-    if half <= 0.0:
-        return 1
-    step = 2.0 * np.sqrt(max(protrusion * (protrusion + 2.0 * radius), 0.0))
-    return int(min(np.ceil(2.0 * half / step), 1e6)) + 1 if step > 0.0 else 10**6
-
-
-def _capsule_cover(radius: float, half: float, protrusion: float | None) -> Matrix:
-    limit = balls_for(2.0 * (half + radius)) if protrusion is None else MOST_ON_REQUEST
-    number = _on_axis(radius, half, CAPSULE_PROTRUSION * radius if protrusion is None else protrusion)
-    number = max(min(number, max(limit, 2)), 1 if half <= 0.0 else 2)
-    step = 2.0 * half / max(number - 1, 1)
-    return _on_z(_spread(half, number), np.hypot(radius, 0.5 * step) * (1.0 + ROUNDING))
-
-
-def _spread(half: float, number: int) -> Vector:
-    return np.linspace(-half, half, number) if number > 1 else np.zeros(max(number, 0))
-
-
-def _on_z(heights: Vector, radius: float) -> Matrix:
-    spheres = np.zeros((len(heights), 4))
-    spheres[:, 2], spheres[:, 3] = heights, radius
-    return spheres
-
-
-def _regular_cover(geometry: Any, limit: int, protrusion: float | None) -> Matrix | None:
-    """Boxes as grids of balls, cylinders as rows of balls: the best one of at most ``limit`` balls."""
-    if isinstance(geometry, coal.Box):
-        half = np.array(geometry.halfSide)
-        pairs = ((a, b) for a in range(1, limit + 1) for b in range(1, limit // a + 1))
-        grids = np.array([(a, b, c) for a, b in pairs for c in range(1, limit // (a * b) + 1)])
-        cells = half / grids
-        sticks = np.linalg.norm(cells, axis=1) - cells.min(axis=1)
-    elif isinstance(geometry, coal.Cylinder):
-        grids = np.array([(1, 1, k) for k in range(1, limit + 1)])
-        step = geometry.halfLength / grids[:, 2]
-        radius = np.hypot(geometry.radius, step)
-        sticks = radius - np.minimum(step, geometry.radius)
-    else:
-        return None
-    return _regular(geometry, _chosen(grids, sticks, protrusion))
-
-
-def _chosen(grids: NDArray[np.int64], sticks: Vector, protrusion: float | None) -> NDArray[np.int64]:
-    enough = np.flatnonzero(sticks <= protrusion) if protrusion is not None else np.empty(0, dtype=np.int64)
-    if len(enough):
-        return np.asarray(grids[enough[grids[enough].prod(axis=1).argmin()]])
-    return np.asarray(grids[sticks.argmin()])
-
-
-def _regular(geometry: Any, grid: NDArray[np.int64]) -> Matrix:
-    if isinstance(geometry, coal.Cylinder):
-        step = geometry.halfLength / grid[2]
-        heights = _spread(geometry.halfLength - step, int(grid[2]))
-        return _on_z(heights, np.hypot(geometry.radius, step) * (1.0 + ROUNDING))
-    cell = np.array(geometry.halfSide) / grid
-    axes = [_spread(float(h - c), int(n)) for h, c, n in zip(geometry.halfSide, cell, grid, strict=True)]
-    centres = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    return np.column_stack([centres, np.full(len(centres), np.linalg.norm(cell) * (1.0 + ROUNDING))])
-
-
 def _better(geometry: Any, first: Matrix, second: Matrix, protrusion: float | None) -> bool:
     """Whether the first cover is better: it sticks out less or, if both stay within what is asked for, is smaller."""
     reach = [protrusion_bound(geometry, cover) for cover in (first, second)]
@@ -242,123 +219,17 @@ def _better(geometry: Any, first: Matrix, second: Matrix, protrusion: float | No
     return reach[0] <= reach[1]
 
 
-def _smallest_cover(solid: Solid, limit: int, wanted: float | None) -> Matrix:
-    """Greedy cover with at most ``limit`` balls, of the smallest protrusion or of the wanted one."""
-    for crossed in (CROSSED_CELLS,) if wanted is None else (CROSSED_CELLS, 4 * CROSSED_CELLS):
-        parts = elements(solid, crossed)
-        centres, inside = _candidates(solid, parts)
-        depth = solid.depth(centres, inside)
-        reach = _reach(parts, centres)
-        chosen = _cover(reach, depth, limit, wanted)
-        near, near_depth = _around(solid, parts, centres[chosen], depth[chosen])
-        centres, depth = np.concatenate([centres[chosen], near]), np.concatenate([depth[chosen], near_depth])
-        reach = np.concatenate([reach[chosen], _reach(parts, near)])
-        chosen = _cover(reach, depth, limit, wanted)
-        need = reach[chosen] - depth[chosen, None]
-        spheres = _shrunk(parts, centres[chosen], need)
-        if wanted is None or need.min(axis=0).max() <= wanted or len(spheres) >= limit:
+def _searched_cover(solid: Solid, limit: int, wanted: float | None) -> Matrix:
+    """A cover found by search, at most ``limit`` balls unless ``wanted`` takes more; a finer cut if that helps."""
+    surface = cKDTree(surface_points(solid.triangles, SURFACE_POINTS))
+    aim = None if wanted is None else 0.9 * wanted  # depths are estimated in the search
+    few = min(CROSSED_CELLS, CELLS_PER_BALL * (limit + 4))
+    for crossed in (few,) if wanted is None else (CROSSED_CELLS, 4 * CROSSED_CELLS):
+        spheres = smallest_cover(
+            elements(solid, crossed), surface, limit, aim, lenient=wanted is None and len(solid.rim) > 0
+        )
+        if wanted is None or len(spheres) >= limit:
+            break
+        if (spheres[:, 3] - solid.depth(spheres[:, :3])).max() <= wanted:
             break
     return spheres
-
-
-def _candidates(solid: Solid, parts: Elements) -> tuple[Matrix, Mask]:
-    """Places for centres: lattice points inside, and points at the surface for what is thin or open."""
-    inside = _every(parts.inside, CANDIDATES)
-    edge = _every(parts.on_surface, max(CANDIDATES - len(inside), CANDIDATES // 3))
-    return np.concatenate([inside, edge]), np.arange(len(inside) + len(edge)) < len(inside)
-
-
-def _every(points: Matrix, most: int) -> Matrix:
-    """At most so many of the points, spread evenly by lot (the same every time)."""
-    if len(points) <= most:
-        return points
-    return points[np.sort(np.random.default_rng(0).choice(len(points), most, replace=False))]
-
-
-def _around(solid: Solid, parts: Elements, centres: Matrix, depth: Vector) -> tuple[Matrix, Vector]:
-    """More candidates around chosen centres; a step shorter than the depth stays inside."""
-    step = 0.5 * float(np.prod(np.ptp(parts.points, axis=0)) / CANDIDATES) ** (1.0 / 3.0)
-    steps = [np.minimum(share * step, 0.55 * np.maximum(depth, 0.0)) for share in (1.0, 0.4)]
-    points = np.concatenate([centres[:, None] + OFFSETS * s[:, None, None] for s in steps]).reshape(-1, 3)
-    return points, solid.depth(points, np.repeat(np.tile(depth > 0.0, 2), len(OFFSETS)))
-
-
-def _reach(parts: Elements, centres: Matrix) -> NDArray[np.float32]:
-    """Radius that a ball around each centre needs to hold each element, shape (centres, elements)."""
-    points = parts.points.astype(np.float32).T
-    squares, radii = (points**2).sum(axis=0), parts.radii.astype(np.float32)
-    found = np.empty((len(centres), len(parts.start)), dtype=np.float32)
-    for k in range(0, len(centres), CHUNK):
-        some = centres[k : k + CHUNK].astype(np.float32)
-        square = squares - 2.0 * some @ points + (some**2).sum(axis=1)[:, None]
-        np.maximum.reduceat(np.sqrt(np.maximum(square, 0.0)) + radii, parts.start, axis=1, out=found[k : k + CHUNK])
-    return found
-
-
-def _cover(reach: NDArray[np.float32], depth: Vector, limit: int, wanted: float | None) -> NDArray[np.int64]:
-    """Numbers of the centres of a cover."""
-    need = reach - depth[:, None].astype(np.float32)
-    low, high = float(need.min(axis=0).max()), float(need.max(axis=1).min())
-    if wanted is not None:
-        found = _greedy(need <= max(low, wanted))
-        if len(found) <= limit:
-            return found
-    best = np.array([int(need.max(axis=1).argmin())])
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        found = _greedy(need <= middle)
-        if len(found) <= limit:
-            best, high = found, min(middle, float(need[found].min(axis=0).max()))
-        else:
-            low = middle
-    return best
-
-
-def _greedy(holds: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Rows that together hold every column, the one that adds most first."""
-    by_column = np.ascontiguousarray(holds.T)
-    left = np.ones(len(by_column), dtype=bool)
-    gain = holds.sum(axis=1)
-    chosen = []
-    while left.any():
-        row = int(gain.argmax())
-        new = holds[row] & left
-        chosen.append(row)
-        gain = gain - by_column[new].sum(axis=0)
-        left &= ~new
-    return np.array(chosen)
-
-
-def _shrunk(parts: Elements, centres: Matrix, need: NDArray[np.floating[Any]]) -> Matrix:
-    """Balls no larger than what they have to hold; each element goes to the ball that sticks out least for it."""
-    element = np.repeat(np.arange(len(parts.start)), np.diff(np.r_[parts.start, len(parts.points)]))
-    owner = need.argmin(axis=0)[element]
-    away = np.linalg.norm(parts.points - centres[owner], axis=1) + parts.radii
-    radius = np.zeros(len(centres))
-    np.maximum.at(radius, owner, away)
-    used = np.bincount(owner, minlength=len(centres)) > 0
-    return np.column_stack([centres, radius])[used]
-
-
-def _inscribed(solid: Solid, count: int) -> Matrix:
-    """Greedy inscribed balls: each the one that holds most lattice points that no ball holds yet."""
-    parts = elements(solid, CROSSED_CELLS)
-    targets = _every(parts.inside, 2 * CANDIDATES)
-    centres = _every(parts.inside, CANDIDATES)
-    depth = solid.depth(centres, np.ones(len(centres), dtype=bool)) if len(centres) else np.empty(0)
-    if len(centres) < count:  # thinner than a cell: the middles of the cells may be inside
-        middles = _every(parts.on_surface, THIN_CANDIDATES)
-        centres, depth = np.concatenate([centres, middles]), np.concatenate([depth, solid.exact_depth(middles)])
-        targets = centres[depth > 0.0]
-    away = ((centres**2).sum(axis=1)[:, None] + (targets**2).sum(axis=1)) - 2.0 * centres @ targets.T
-    holds = (away <= np.maximum(depth, 0.0)[:, None] ** 2) & (depth > 0.0)[:, None]
-    chosen: list[int] = []
-    while len(chosen) < count:
-        gain = holds.sum(axis=1)
-        row = int(gain.argmax())
-        if gain[row] == 0:
-            break
-        chosen.append(row)
-        holds &= ~holds[row]
-    places = centres[chosen]
-    return np.column_stack([places, solid.exact_depth(places)])

@@ -15,12 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.fast import plain_distances
+from rrtik_ompl.fast.clearance import Clearance, rounded
 from rrtik_ompl.fast.layout import MARKS, UNDECIDED
 from rrtik_ompl.fast.library import library
 from rrtik_ompl.fast.packing import ArmTables, alike, arm_tables, flag_places, standing_tables
 from rrtik_ompl.fast.plain import PlainChecks
-from rrtik_ompl.fast.robot_tables import Spheres, table
-from rrtik_ompl.fast.workspace import workspace
+from rrtik_ompl.fast.robot_tables import Spheres, Table, table
+from rrtik_ompl.fast.workspace import probe_table, workspace
 from rrtik_ompl.robot import Chain
 
 LARGEST_ANGLE = 1e8  # [rad]; float64 cannot hold larger ones to the precision of the margin
@@ -81,6 +83,7 @@ class FastWorld:
         self._flagged = flag_places(kept, self._arm, moving, standing)
         self._plain = PlainChecks(self._arm.arm, self._arm.balls, self._rows)
         self._kernels = library("kernels") if compiled else None
+        self._probe: Table | None = None
         self.address = 0
         if self._kernels is not None:
             self._work = workspace(self._arm.arm, self._arm.balls, self._rows)
@@ -146,6 +149,46 @@ class FastWorld:
         for beyond in (first, second):
             answers = answers if beyond is None else np.where(beyond, np.int8(UNDECIDED), answers)
         return answers
+
+    def covered(self, V: ArrayLike) -> bool:
+        """Whether the margin covers all joint values V, shape (m, joints): only then may kernels be given them.
+
+        Raises:
+            InputError: If V has the wrong shape or a value that is not finite.
+        """
+        return self._values(V, "joint values")[1] is None
+
+    def clearance(self, V: ArrayLike, *, upper: bool = False) -> Clearance:
+        """Bounds of the distance to contact for rows of joint values V, shape (m, joints).
+
+        Args:
+            V: Joint values [rad or m].
+            upper: Whether to look for an upper bound too, which takes as long again.
+
+        Raises:
+            InputError: If V has the wrong shape or a value that is not finite.
+        """
+        rows, beyond = self._values(V, "joint values")
+        lowest, nearest = self._measured(rows, 0)
+        highest = self._measured(rows, 1)[0] if upper else np.full(len(rows), np.inf)
+        if beyond is not None:
+            lowest, highest = np.where(beyond, -np.inf, lowest), np.where(beyond, np.inf, highest)
+            nearest = np.where(beyond, -1, nearest)
+        pairs = [self._flagged[flag] if flag >= 0 else (-1, -1) for flag in nearest.tolist()]
+        return Clearance(rounded(lowest, -1.0), rounded(highest, 1.0), np.array(pairs, dtype=np.int64).reshape(-1, 2))
+
+    def _measured(self, rows: Matrix, level: int) -> tuple[Vector, NDArray[np.int32]]:
+        """Distances between outer (0) or inner (1) solids and the flags of the nearest pairs, -1 for none."""
+        balls, scene = self._arm.balls[level], self._rows[level]
+        kernels = None if self._kernels is None else library("distance_kernels")
+        if kernels is None:
+            return plain_distances.measure(self._arm.arm, balls, scene, rows)
+        if self._probe is None:
+            self._probe = probe_table(self._rows)
+        found, pairs = np.empty(len(rows)), np.empty(len(rows), dtype=np.int32)
+        tables = (self.address, balls.address, scene.address, rows.ctypes.data, len(rows), self._probe.address)
+        kernels.measure(*tables, found.ctypes.data, pairs.ctypes.data)
+        return np.where(pairs < 0, np.inf, found), pairs
 
     def undecided_pairs(self, V: ArrayLike) -> list[list[tuple[int, int]]]:
         """For each row of joint values V, shape (m, joints), the pairs that the outer spheres cannot prove free.

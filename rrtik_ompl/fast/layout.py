@@ -40,3 +40,7 @@ ROW_FLOATS = 16
 # of the balls' centres; flags of clusters whose balls are placed; three lists of rows; flags of what meets; rows that
 # wait for a second look; for the outer and the inner balls what met last: ball, frame and row (-1: nothing yet).
 VALUES, FRAMES, GROUP_CENTRES, CENTRES, PLACED, FOUND, NEAR, MET, MARKS, WAITING, OUTER_LAST, INNER_LAST = range(12)
+
+# Probe, for distances: lanes of the smallest distance so far, ints of the pair that has it, lanes of distances of
+# listed rows.
+BEST, WHICH, GAPS = range(3)

@@ -90,7 +90,7 @@ class PlainChecks:
         body_count, standing = int(table.header[layout.BODY_COUNT]), int(rows.header[layout.STANDING_COUNT])
         pairs = table[layout.PAIRS].reshape(-1, 2)
         found = np.zeros((len(poses), body_count * standing + len(pairs)), dtype=bool)
-        points, radii = self._placed(poses, table)
+        points, radii = placed_balls(poses, table)
         checked = rows[layout.CHECKED].reshape(body_count, standing)
         for number, (_, stands, _, _) in enumerate(rows[layout.NUMBERS].reshape(-1, 4)):
             for body in np.flatnonzero(checked[:, stands]):
@@ -100,16 +100,16 @@ class PlainChecks:
             found[:, body_count * standing + k] = (gaps < radii[i][:, None] + radii[j]).any(axis=(1, 2))
         return found
 
-    @staticmethod
-    def _placed(
-        poses: NDArray[np.float64], table: Table
-    ) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
-        """Centres in the world, shape (m, n, 3), and radii, shape (n,), of each body's balls."""
-        balls, clusters = table[layout.BALLS].astype(np.float64).reshape(-1, 4), table[layout.CLUSTERS].reshape(-1, 4)
-        points, radii = [], []
-        for frame, first, end in table[layout.BODIES].reshape(-1, 3):
-            span = slice(clusters[first, 2], clusters[end - 1, 3]) if end > first else slice(0, 0)
-            pose = poses[:, frame]
-            points.append(np.einsum("mij,nj->mni", pose[:, :, :3], balls[span, :3]) + pose[:, None, :, 3])
-            radii.append(balls[span, 3])
-        return points, radii
+
+def placed_balls(
+    poses: NDArray[np.float64], table: Table
+) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
+    """Centres in the world, shape (m, n, 3), and radii, shape (n,), of each body's balls."""
+    balls, clusters = table[layout.BALLS].astype(np.float64).reshape(-1, 4), table[layout.CLUSTERS].reshape(-1, 4)
+    points, radii = [], []
+    for frame, first, end in table[layout.BODIES].reshape(-1, 3):
+        span = slice(clusters[first, 2], clusters[end - 1, 3]) if end > first else slice(0, 0)
+        pose = poses[:, frame]
+        points.append(np.einsum("mij,nj->mni", pose[:, :, :3], balls[span, :3]) + pose[:, None, :, 3])
+        radii.append(balls[span, 3])
+    return points, radii

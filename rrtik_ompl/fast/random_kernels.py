@@ -6,31 +6,26 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.fast.compiled import inlined, kernel
+from rrtik_ompl.fast.compiled import kernel
 from rrtik_ompl.fast.lanes import double_at, field, set_double, set_field
 
-# Constants of splitmix64 as signed whole numbers.
-GOLDEN = np.int64(0x9E3779B97F4A7C15 - 2**64)
-FIRST_FACTOR = np.int64(0xBF58476D1CE4E5B9 - 2**64)
-SECOND_FACTOR = np.int64(0x94D049BB133111EB - 2**64)
+# Constants of splitmix64, without signs: LLVM may assume that a signed number never overflows.
+GOLDEN, FIRST_FACTOR, SECOND_FACTOR = (
+    np.uint64(x) for x in (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB)
+)
+SHIFT_30, SHIFT_27, SHIFT_31, SHIFT_11 = (np.uint64(x) for x in (30, 27, 31, 11))
 SHARE_OF_BIT = 2.0**-53
 LEAST_REST = 1e-12
-
-
-@inlined
-def shifted(number: Any, places: int) -> Any:
-    """Bits moved down by ``places``, zeros moved in (a signed number would move in its sign)."""
-    return (number >> places) & ((np.int64(1) << (np.int64(64) - places)) - 1)
 
 
 @kernel
 def next_share(table: int, place: int) -> float:
     """The next number in [0, 1); the state is a field of a table. Source: splitmix64 (Steele, Lea, Flood 2014)."""
-    state = field(table, place) + GOLDEN
-    set_field(table, place, state)
-    mixed = (state ^ shifted(state, 30)) * FIRST_FACTOR
-    mixed = (mixed ^ shifted(mixed, 27)) * SECOND_FACTOR
-    return float(shifted(mixed ^ shifted(mixed, 31), 11)) * SHARE_OF_BIT
+    state: Any = np.uint64(field(table, place)) + GOLDEN
+    set_field(table, place, np.int64(state))
+    mixed = (state ^ (state >> SHIFT_30)) * FIRST_FACTOR
+    mixed = (mixed ^ (mixed >> SHIFT_27)) * SECOND_FACTOR
+    return float(np.int64((mixed ^ (mixed >> SHIFT_31)) >> SHIFT_11)) * SHARE_OF_BIT
 
 
 @kernel

@@ -36,3 +36,15 @@ def workspace(arm: Table, balls: tuple[Table, ...], rows: tuple[Table, ...]) -> 
             layout.MARKS: np.zeros(crossing + most(balls, layout.PAIR_COUNT), dtype=np.int32),
         }
     )
+
+
+def probe_table(rows: tuple[Table, ...]) -> Table:
+    """Memory for measuring distances against any of these tables of rows."""
+    listed = max(int(t.header[layout.PADDED_COUNT]) for t in rows)
+    return table(
+        {
+            layout.BEST: np.zeros(WIDTH, dtype=np.float32),
+            layout.WHICH: np.zeros(WIDTH, dtype=np.int32),
+            layout.GAPS: np.zeros((listed, WIDTH), dtype=np.float32),
+        }
+    )

@@ -82,7 +82,7 @@ def attempt(
     own = issubclass(factory, SafePlanner) if isinstance(factory, type) else False
     name = getattr(factory, "__name__", str(factory))
     goals = goals[:1] if name in ONE_GOAL_PLANNERS else goals
-    with _quiet():
+    with quiet():
         ou.RNG.setSeed(1 + seed % (2**31 - 2))  # before any object that draws from it; OMPL does not take 0
         judge = Judge(problem.world, most_motions=BRIEF_MOTIONS if brief else np.inf)
         si = space_information(problem, goals, judge)
@@ -101,7 +101,7 @@ def attempt(
             straight = _straight_motion(problem, goals) if name in STRAIGHT_FIRST_PLANNERS else None
             if straight is not None:
                 return Attempt(straight, "Exact solution", {})
-            with _interrupt_ends(condition):
+            with interrupt_ends(condition):
                 status = planner.solve(condition)
         except RuntimeError as error:  # what C++ throws
             raise PlannerError(f"planner {name} broke: {error}") from None
@@ -169,7 +169,7 @@ def _snake(setter: str) -> str:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """Silence OMPL's log, which goes to standard output, for the time of one attempt."""
     level = ou.getLogLevel()
     ou.setLogLevel(ou.LogLevel.LOG_NONE)
@@ -180,7 +180,7 @@ def _quiet() -> Iterator[None]:
 
 
 @contextmanager
-def _interrupt_ends(condition: Any) -> Iterator[None]:
+def interrupt_ends(condition: Any) -> Iterator[None]:
     """Ctrl-C ends the planner through its termination condition and is raised afterwards.
 
     Raised inside a callback it would end the process under planners that run a second thread.

@@ -2,48 +2,137 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TypeAlias
 
-from rrtik_ompl.arrays import Matrix
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix, finite_array
 from rrtik_ompl.errors import InputError, UnknownNameError, require
+from rrtik_ompl.ompl_bridge.simplify import simplified
 from rrtik_ompl.path import SECOND_CHECK, JointPath
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.shortening.axis import MotionValid, double_axis_cut
+from rrtik_ompl.shortening.axis import double_axis_cut
 from rrtik_ompl.shortening.axis_rounds import axis_cut_rounds
+from rrtik_ompl.shortening.best import best_in_time
+from rrtik_ompl.shortening.random_cut import random_cut, shortcut
+from rrtik_ompl.shortening.retraction import retract
+from rrtik_ompl.shortening.sequential import sequential_cut
+from rrtik_ompl.shortening.task import Task
 
-Method: TypeAlias = Callable[[Matrix, MotionValid], Matrix]
-
-METHODS: Mapping[str, Method] = MappingProxyType({"axis": double_axis_cut, "axis-rounds": axis_cut_rounds})
+__all__ = ["METHODS", "Method", "Task", "shorten"]
 
 
-def shorten(path: JointPath, problem: Problem, *, method: str = "axis") -> JointPath:
+@dataclass(frozen=True, slots=True, eq=False)
+class Method:
+    """A way to shorten.
+
+    Attributes:
+        run: Shortens a route, shape (k, n), of a problem, as a task asks for it.
+        keeps_moves: Whether a path of single-joint moves stays one, asked or not, and has no more moves afterwards;
+            its length may grow then.
+        can_keep_moves: Whether it stays one if that is asked for.
+    """
+
+    run: Callable[[Matrix, Task, Problem], Matrix]
+    keeps_moves: bool = False
+    can_keep_moves: bool = True
+
+
+def _ompl(route: Matrix, task: Task, problem: Problem) -> Matrix:
+    rows, asked = simplified(problem, route, seconds=task.seconds_left, seed=task.seed)
+    task.asked += asked
+    return rows
+
+
+METHODS: Mapping[str, Method] = MappingProxyType(
+    {
+        "axis": Method(lambda route, task, _: double_axis_cut(route, task.free), keeps_moves=True),
+        "axis-rounds": Method(
+            lambda route, task, _: axis_cut_rounds(route, task.free, seed=task.seed), keeps_moves=True
+        ),
+        "sequential": Method(lambda route, task, _: sequential_cut(route, task)),
+        "random": Method(lambda route, task, _: random_cut(route, task)),
+        "shortcut": Method(lambda route, task, _: shortcut(route, task)),
+        "retraction": Method(lambda route, task, _: retract(route, task)),
+        "ompl": Method(_ompl, can_keep_moves=False),
+        "auto": Method(lambda route, task, _: best_in_time(route, task)),
+    }
+)
+
+
+def shorten(
+    path: JointPath,
+    problem: Problem,
+    *,
+    method: str = "axis",
+    seconds: float | None = None,
+    seed: int = 0,
+    one_joint: bool = False,
+    on_better: Callable[[JointPath], object] | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> JointPath:
     """Shorten a path of a problem.
 
     Args:
         path: A valid path of the problem.
         problem: Whose world judges the new motions.
         method: "axis" is the published double axis cut: fewer moves of one joint at a time. "axis-rounds" goes on with
-            twenty passes in random joint orders (always the same ones): fewer moves still, several times as long.
+            twenty passes in random joint orders: fewer moves still, several times as long. "sequential", "random" and
+            "retraction" are the published methods for straight motions: quick, simple, and near the shortest path of
+            the same class. "shortcut" is a random cut that takes waypoints as ends too and pulls them straight.
+            "ompl" is OMPL's PathSimplifier. "auto" is the best that these find together.
+        seconds: Time limit [s]. With a limit, random methods go on until nothing is gained any more; without one they
+            make a fixed number of tries, so that a seed always gives the same path.
+        seed: Of the random methods.
+        one_joint: Keep a path of single-joint moves one: fewer moves first, length second.
+        on_better: Called with every better path on the way; these have not yet passed the second check.
+        stop: Asked from time to time; True ends the work, and the best so far is returned.
 
     Returns:
         A path with the same ends. It passes the same second check as a plan: if a shortened path does not, its
-        motions are checked as densely as that; if that does not help, the input is returned.
+        motions are checked as densely as that; if that does not help, the input is returned. It is not longer than
+        the input, and where one joint moves at a time it has no more moves.
 
     Raises:
         UnknownNameError: If there is no such method.
-        InputError: If the path is not valid for the problem.
+        InputError: If the path is not valid for the problem or has one waypoint, the time is not positive, or the
+            method cannot do what is asked.
     """
+    chosen = _checked(path, problem, method, seconds, one_joint)
+    end = time.monotonic() + (np.inf if seconds is None else float(seconds))
+    listener = None if on_better is None else lambda rows: on_better(path.with_waypoints(rows))
+    # What is as short as can be touches what it goes round, so most methods check as densely as the second check.
+    refined = problem.refined(SECOND_CHECK)
+    for asked in (problem, refined) if chosen.keeps_moves else (refined,):
+        left = end - time.monotonic()
+        task = Task(asked.world, seconds=left, seed=seed, one_joint=one_joint, on_better=listener, stop=stop)
+        rows = chosen.run(path.waypoints, task, asked)
+        worse = not chosen.keeps_moves and task.rank(rows) > task.rank(path.waypoints)
+        same_ends = (rows[[0, -1]] == path.waypoints[[0, -1]]).all()
+        shorter = path.with_waypoints(rows)
+        if same_ends and not worse and not shorter.violations(problem.world):
+            return shorter
+    return path
+
+
+def _checked(path: JointPath, problem: Problem, method: str, seconds: float | None, one_joint: bool) -> Method:
+    """The method, if the request makes sense."""
     require(path, JointPath, "path to shorten", "a plan has one if plan.found")
     require(problem, Problem, "problem of a path to shorten")
     if method not in METHODS:
         raise UnknownNameError("shortening method", method, METHODS)
+    if seconds is not None and float(finite_array(seconds, (), "seconds")) <= 0.0:
+        raise InputError(f"seconds must be greater than 0, got {seconds:g}")
+    if len(path.waypoints) < 2:
+        raise InputError("path to shorten: it has one waypoint, so there is nothing to shorten")
     faults = path.violations(problem.world)
     if faults:
         raise InputError(f"path to shorten: edge {faults[0].edge} is not valid: {faults[0].reason}")
-    for world in (problem.world, problem.refined(SECOND_CHECK).world):  # the finer one if the second check objects
-        shorter = path.with_waypoints(METHODS[method](path.waypoints, world.motion_valid))
-        if not shorter.violations(problem.world):
-            return shorter
-    return path
+    if one_joint and not path.one_joint_at_a_time:
+        raise InputError("path to shorten: it moves several joints at once, so one_joint cannot be kept")
+    if one_joint and not METHODS[method].can_keep_moves:
+        raise InputError(f"shortening method '{method}' cannot keep one joint at a time; use axis or auto")
+    return METHODS[method]

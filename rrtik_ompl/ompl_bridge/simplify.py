@@ -1,0 +1,48 @@
+"""OMPL's own shortening, PathSimplifier, as arrays in and out."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from ompl import base as ob
+from ompl import geometric as og
+from ompl import util as ou
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.errors import PlannerError
+from rrtik_ompl.ompl_bridge.attempt import interrupt_ends, quiet
+from rrtik_ompl.ompl_bridge.setup import Judge, space_information
+from rrtik_ompl.ompl_bridge.states import StateIO
+from rrtik_ompl.problem import Problem
+
+ENDLESS = 1e9  # [s]
+
+
+def simplified(problem: Problem, route: Matrix, *, seconds: float, seed: int) -> tuple[Matrix, int]:
+    """Let ``ompl.geometric.PathSimplifier`` shorten a route, shape (k, n); also how many motions it has asked about.
+
+    Its last step asks configurations alone about what it has bent, so the answer must be checked. When the time is up
+    no motion counts as free, and what was found so far is returned.
+
+    Raises:
+        PlannerError: If a check raised an error.
+        KeyboardInterrupt: After it has stopped in good order.
+    """
+    with quiet():
+        ou.RNG.setSeed(1 + seed % (2**31 - 2))  # before any object that draws from it; OMPL does not take 0
+        judge = Judge(problem.world)
+        si = space_information(problem, route, judge)
+        judge.deadline = time.monotonic() + min(seconds, ENDLESS)
+        condition = ob.timedPlannerTerminationCondition(min(seconds, ENDLESS))
+        judge.stop = condition.terminate
+        states, state, path = StateIO(si), si.allocState(), og.PathGeometric(si)
+        for row in route:
+            states.write(state, row)
+            path.append(state)
+        with interrupt_ends(condition):
+            og.PathSimplifier(si).simplify(path, condition, True)
+        if judge.error is not None:
+            raise PlannerError(f"PathSimplifier broke: {str(judge.error).splitlines()[-1]}")
+        rows = np.array([states.read(path.getState(k)) for k in range(path.getStateCount())])
+        return rows, judge.motions

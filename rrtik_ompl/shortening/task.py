@@ -1,0 +1,155 @@
+"""What a method of shortening is given: the questions it may ask, its time, its seed, and who listens."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any, Protocol
+
+import numpy as np
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.shortening.axis import axis_moves
+from rrtik_ompl.transitions import route_length, transitions
+
+
+class Motions(Protocol):
+    """Anything that judges straight motions: ``rrtik_ompl.World`` or a stand-in."""
+
+    def motion_valid_batch(self, A: Matrix, B: Matrix) -> Mask:
+        """Which straight motions A[k] -> B[k], shapes (m, n), are free, shape (m,)."""
+
+
+class Task:
+    """One request to shorten a route.
+
+    When the time is up, nothing else counts as free, so that a method that heeds its answers ends soon with a free
+    route: whatever it has replaced by then stays replaced.
+
+    Attributes:
+        motions: Who judges, as given.
+        seed: Of all random choices.
+        one_joint: Whether every edge of the answer must move one joint, as the edges of the question do.
+        bounded: Whether there is an end to the time.
+        asked: How many straight motions have been asked about.
+        confirmed_again: How many of an answer's motions have been checked on top of that, as parts of free ones.
+
+    Args:
+        motions: A world, or anything that judges straight motions.
+        seconds: Time limit [s].
+        seed: See above.
+        one_joint: See above.
+        on_better: Called with every better route, shape (k, n).
+        stop: Asked between two questions; True ends the time.
+    """
+
+    def __init__(
+        self,
+        motions: Motions,
+        *,
+        seconds: float = np.inf,
+        seed: int = 0,
+        one_joint: bool = False,
+        on_better: Callable[[Matrix], object] | None = None,
+        stop: Callable[[], bool] | None = None,
+    ) -> None:
+        self.motions: Any = motions
+        self.seed, self.one_joint = seed, one_joint
+        self.asked = self.confirmed_again = 0
+        self.bounded = bool(np.isfinite(seconds))
+        self._deadline = time.monotonic() + seconds
+        self._known: set[tuple[bytes, bytes]] = set()
+        self._on_better, self._stop, self._told = on_better, stop, (np.inf, np.inf)
+
+    @property
+    def seconds_left(self) -> float:
+        """Time that is left [s], at least 0; +inf without a limit."""
+        if self._stop is not None and self._stop():
+            self._deadline = -np.inf
+        return max(self._deadline - time.monotonic(), 0.0)
+
+    def expired(self) -> bool:
+        """Whether the time is up."""
+        return self.seconds_left <= 0.0
+
+    def free_batch(self, A: Matrix, B: Matrix) -> Mask:
+        """Which straight motions are free, shapes (m, n) and (m,); none when the time is up."""
+        if len(A) == 0 or self.expired():
+            return np.zeros(len(A), dtype=bool)
+        self.asked += len(A)
+        return self._ask(A, B)
+
+    def confirmed(self, new: Matrix, old: Matrix) -> bool:
+        """Whether every edge of a route, shape (k, n), is free; those of the old route and those found free are known.
+
+        Parts of free edges are checked at other configurations than the whole, so they count as new. This is asked
+        even when the time is up.
+        """
+        known = self._known.union(_edges(old))
+        fresh = [k for k, edge in enumerate(_edges(new)) if edge not in known and edge[::-1] not in known]
+        self.confirmed_again += len(fresh)
+        return not fresh or bool(self._ask(new[fresh], new[np.add(fresh, 1)]).all())
+
+    def _ask(self, A: Matrix, B: Matrix) -> Mask:
+        free: Mask = self.motions.motion_valid_batch(A, B)
+        self._known.update((A[k].tobytes(), B[k].tobytes()) for k in np.flatnonzero(free))
+        return free
+
+    def free(self, a: Vector, b: Vector) -> bool:
+        """Whether a straight motion is free; not when the time is up."""
+        return bool(self.free_batch(a[None], b[None])[0])
+
+    def moves(self, a: Vector, b: Vector) -> Matrix:
+        """The waypoints after a on the way to b, shape (k, n): b alone, or those of single-joint moves."""
+        if not self.one_joint:
+            return b[None]
+        return axis_moves(a, b, range(len(a))[::-1])
+
+    def link(self, a: Vector, b: Vector) -> Matrix | None:
+        """The waypoints after a of a free way to b, shape (k, n), or None."""
+        found = self.first_link(a, b[None])
+        return None if found is None else found[1]
+
+    def first_link(self, a: Vector, goals: Matrix) -> tuple[int, Matrix] | None:
+        """The first of the goals, shape (m, n), to which there is a free way, and its waypoints after a; or None.
+
+        The first goal is asked about alone, then twice as many together each time.
+        """
+        first, count = 0, 1
+        while first < len(goals) and not self.expired():
+            ways = [self.moves(a, goal) for goal in goals[first : first + count]]
+            starts = [np.vstack([a[None], way])[:-1] for way in ways]
+            free = self.free_batch(np.vstack(starts), np.vstack(ways))
+            ends = np.cumsum([len(way) for way in ways])
+            for number, (end, way) in enumerate(zip(ends.tolist(), ways, strict=True)):
+                if free[end - len(way) : end].all():
+                    return first + number, way
+            first, count = first + count, 2 * count
+        return None
+
+    def rank(self, route: Matrix) -> tuple[float, float]:
+        """What is to be made small: the length, after the number of moves where one joint moves at a time."""
+        return (float(transitions(route)) if self.one_joint else 0.0), route_length(route)
+
+    def better(self, *routes: Matrix) -> Matrix:
+        """The best of several routes, the first of equal ones."""
+        return min(routes, key=self.rank)
+
+    def report(self, route: Matrix) -> None:
+        """Tell whoever listens of a route that is better than those told before."""
+        if self._on_better is not None and self.rank(route) < self._told:
+            self._told = self.rank(route)
+            self._on_better(route)
+
+
+def _edges(route: Matrix) -> list[tuple[bytes, bytes]]:
+    """The edges of a route as keys."""
+    keys = [row.tobytes() for row in route]
+    return list(pairwise(keys))
+
+
+def without_repeats(route: Matrix) -> Matrix:
+    """The route without waypoints that repeat the one before, shape (k, n); both ends stay."""
+    kept: Matrix = route[np.append(True, (np.diff(route, axis=0) != 0.0).any(axis=1))]
+    return kept
