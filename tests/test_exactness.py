@@ -12,7 +12,7 @@ from rrtik_ompl.world import World
 
 CONTACT = 2e-6  # [m]: nearer than this to contact, coal's own answer depends on the order of its arguments
 SWEEP = 64  # configurations along one short motion, so that many of them are near a contact
-ROBOTS = ("titan4", "panda", "puma560", "ur5", "planar3", "kinova")
+ROBOTS = ("titan4", "panda", "puma560", "ur5", "planar3", "xarm7", "panda_primitives")
 
 
 def surroundings(robot, rng, mesh):
@@ -61,7 +61,7 @@ def test_on_millions_of_configurations_the_world_says_what_coal_says(name, dente
             assert abs(world.clearance(q)) < CONTACT
         compared, free = compared + len(Q), free + int(ours.sum())
     assert compared >= 300_000
-    assert 0.05 < free / compared < 0.98
+    assert 0.05 < free / compared < 0.995
 
 
 @pytest.mark.parametrize("name", ["titan4", "panda"])
@@ -90,7 +90,3 @@ def test_a_conservative_world_calls_nothing_free_that_is_not(name, dented_cube):
     assert 0.8 * exact.sum() < careful.sum() < exact.sum()
     undecided = world.fast.classify(robot.joint_values(Q)) == UNDECIDED
     np.testing.assert_array_equal(careful, exact & ~undecided)
-
-
-def test_reused_collision_data_miss_overlaps_that_fresh_requests_see():
-    """The trap: Pinocchio's geometry data start each query from the last one's support points."""
