@@ -90,3 +90,14 @@ def test_a_conservative_world_calls_nothing_free_that_is_not(name, dented_cube):
     assert 0.8 * exact.sum() < careful.sum() < exact.sum()
     undecided = world.fast.classify(robot.joint_values(Q)) == UNDECIDED
     np.testing.assert_array_equal(careful, exact & ~undecided)
+
+
+@pytest.mark.parametrize("name", ["titan4", "ur5", "panda_primitives"])
+def test_the_certificate_says_the_same_in_whatever_order_rows_come(name, dented_cube):
+    robot, rng = load_robot(name), np.random.default_rng(13)
+    world = World(robot, surroundings(robot, rng, dented_cube))
+    Q = short_sweeps(world, rng, 150)  # neighbours stand for each other; strangers do not
+    order = rng.permutation(len(Q))
+    in_line = world.certify(Q)
+    assert 0.05 < in_line.mean() < 0.995
+    np.testing.assert_array_equal(world.certify(Q[order]), in_line[order])
