@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.collision.solids import inside_mesh, is_mesh, mesh_arrays
-from rrtik_ompl.shapes import Mesh
+from rrtik_ompl.collision.enclosure import enclosure
+from rrtik_ompl.collision.solids import inside_mesh, is_closed, is_mesh, mesh_arrays
 
 ROUNDING = 1e-9  # [m]
 
@@ -51,27 +51,25 @@ class Containment:
         self._halves = np.array([_half_extents(b.geometry) for b in outer]).reshape(-1, 3) + ROUNDING
         everywhere = np.array([[0.0, 0.0, 0.0, np.inf]])
         self._covers = {o: everywhere if covers is None else covers[o] for o, _ in self.pairs}
-        self._meshes = {o: mesh_arrays(bodies[o].geometry) for o, _ in self.pairs}
+        self._meshes = {o: bodies[o].geometry for o, _ in self.pairs}
 
-    def first(self, frames: NDArray[np.float64]) -> tuple[int, ...]:
-        """Numbers of two bodies of which one holds the other, or ().
+    def holds(self, pair: tuple[int, int], frames: NDArray[np.float64]) -> bool:
+        """Whether one of two bodies holds the other.
 
         Args:
+            pair: Numbers of the bodies, in either order.
             frames: Pose of every joint frame in the world, world first, shape (joints + 1, 4, 4).
         """
-        if not self.pairs:
-            return ()
-        inner, outer = frames[self._inner_joint], frames[self._outer_joint]
-        world = self._points @ inner[:, :3, :3].transpose(0, 2, 1) + inner[:, None, :3, 3]
-        in_joint = (world - outer[:, None, :3, 3]) @ outer[:, :3, :3]  # the inverse of a rotation is its transpose
-        to_outer = self._to_outer
-        local = in_joint @ to_outer[:, :3, :3].transpose(0, 2, 1) + to_outer[:, None, :3, 3]
-        beyond = np.abs(local - self._centres[:, None]) > self._halves[:, None]
-        for row in np.flatnonzero(~beyond.any(axis=(1, 2))):
-            pair: tuple[int, ...] = self.pairs[row]
-            if inside_mesh(*self._meshes[pair[0]], local[row, 0]):
-                return pair
-        return ()
+        return any(self._holds(self._places[p], frames) for p in (pair, pair[::-1]) if p in self._places)
+
+    def _holds(self, k: int, frames: NDArray[np.float64]) -> bool:
+        inner, outer = frames[self._inner_joint[k]], frames[self._outer_joint[k]]
+        world = self._points[k] @ inner[:3, :3].T + inner[:3, 3]
+        in_joint = (world - outer[:3, 3]) @ outer[:3, :3]  # the inverse of a rotation is its transpose
+        local = in_joint @ self._to_outer[k, :3, :3].T + self._to_outer[k, :3, 3]
+        if (np.abs(local - self._centres[k]) > self._halves[k]).any():
+            return False
+        return self._inside(k, local)
 
     def between(self, pairs: Iterable[tuple[int, int]], joints: Any) -> bool:
         """Whether in one of some pairs, in either order, a body holds the other.
@@ -83,19 +81,30 @@ class Containment:
         both_ways = (pair for i, j in pairs for pair in ((i, j), (j, i)) if pair in self._places)
         for pair in both_ways:
             k = self._places[pair]
-            world = joints[int(self._inner_joint[k])].act(self._points[k, 0])
-            in_joint = joints[int(self._outer_joint[k])].actInv(world)
-            local = self._to_outer[k, :3, :3] @ in_joint + self._to_outer[k, :3, 3]
+            between = joints[int(self._outer_joint[k])].actInv(joints[int(self._inner_joint[k])])
+            in_joint = self._points[k] @ between.rotation.T + between.translation
+            local = in_joint @ self._to_outer[k, :3, :3].T + self._to_outer[k, :3, 3]
+            if (np.abs(local - self._centres[k]) > self._halves[k]).any():
+                continue
             balls = self._covers[pair[0]]
-            near = ((balls[:, :3] - local) ** 2).sum(axis=1) <= (balls[:, 3] + ROUNDING) ** 2
-            if near.any() and inside_mesh(*self._meshes[pair[0]], local):
+            away = ((balls[:, None, :3] - local) ** 2).sum(axis=2) - (balls[:, None, 3] + ROUNDING) ** 2
+            if (away <= 0.0).any() and self._inside(k, local):
                 return True
         return False
+
+    def _inside(self, k: int, local: Matrix) -> bool:
+        """Whether the end points of a body, shape (6, 3), are inside the mesh that may hold it.
+
+        Surfaces that do not cross have all of a body on one side, but the cells at an open mesh's surface belong to no
+        side; hence all of the points are tried there.
+        """
+        mesh = self._meshes[self.pairs[k][0]]
+        return inside_mesh(*mesh_arrays(mesh), local[0]) if is_closed(mesh) else enclosure(mesh).holds(local)
 
 
 def _has_inside(body: Body) -> bool:
     """Whether a body is a hollow mesh that stands for a solid: a link's always does, another one if it is closed."""
-    return is_mesh(body.geometry) and (body.kind == "link" or Mesh(*mesh_arrays(body.geometry)).closed)
+    return is_mesh(body.geometry) and (body.kind == "link" or is_closed(body.geometry))
 
 
 def _may_hold(outer: Any, inner: Any) -> bool:

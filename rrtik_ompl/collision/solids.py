@@ -113,7 +113,7 @@ def is_mesh(geometry: Any) -> bool:
     return isinstance(geometry, coal.BVHModelBase)
 
 
-class _SameObject:
+class SameObject:
     """Makes a coal geometry a key: equal only to itself."""
 
     __slots__ = ("geometry",)
@@ -122,7 +122,7 @@ class _SameObject:
         self.geometry = geometry
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _SameObject) and other.geometry is self.geometry
+        return isinstance(other, SameObject) and other.geometry is self.geometry
 
     def __hash__(self) -> int:
         return id(self.geometry)
@@ -130,11 +130,21 @@ class _SameObject:
 
 def mesh_arrays(geometry: Any) -> tuple[Matrix, NDArray[np.int64]]:
     """Vertices, shape (n, 3), and triangles, shape (m, 3), of a coal mesh, read-only."""
-    return _mesh_arrays(_SameObject(geometry))
+    return _mesh_arrays(SameObject(geometry))
+
+
+def is_closed(geometry: Any) -> bool:
+    """Whether a coal mesh has an inside (see :attr:`rrtik_ompl.shapes.Mesh.closed`)."""
+    return _is_closed(SameObject(geometry))
+
+
+@lru_cache(maxsize=128)
+def _is_closed(key: SameObject) -> bool:
+    return Mesh(*mesh_arrays(key.geometry)).closed
 
 
 @lru_cache(maxsize=128)  # coal hands out one triangle at a time
-def _mesh_arrays(key: _SameObject) -> tuple[Matrix, NDArray[np.int64]]:
+def _mesh_arrays(key: SameObject) -> tuple[Matrix, NDArray[np.int64]]:
     geometry = key.geometry
     vertices = np.array(geometry.vertices(), dtype=np.float64).reshape(-1, 3)
     corners = (geometry.tri_indices(k) for k in range(geometry.num_tris))
