@@ -39,6 +39,13 @@ class Enclosure:
             _mark(near, part)
         self.inside = ~near & ~_outside(near)
 
+    def boxes(self) -> tuple[Matrix, Matrix]:
+        """Boxes that make up the enclosed cells: lowest and highest corners [m], shape (k, 3) each."""
+        runs = np.diff(self.inside.astype(np.int8), axis=2, prepend=0, append=0)
+        begin, end = np.argwhere(runs == 1), np.argwhere(runs == -1)  # along z, in the same order
+        high = np.column_stack([end[:, :2] + 1, end[:, 2]])
+        return self.origin + self.size * begin, self.origin + self.size * high
+
     def holds(self, points: Matrix) -> bool:
         """Whether one of some points, shape (k, 3), is enclosed."""
         cells = np.floor((points - self.origin) / self.size).astype(np.int64)

@@ -134,13 +134,22 @@ def mesh_arrays(geometry: Any) -> tuple[Matrix, NDArray[np.int64]]:
 
 
 def is_closed(geometry: Any) -> bool:
-    """Whether a coal mesh has an inside (see :attr:`rrtik_ompl.shapes.Mesh.closed`)."""
+    """Whether a coal mesh has an inside: every edge is passed as often one way as the other.
+
+    Then winding numbers are whole, and change only where the surface is crossed.
+    """
     return _is_closed(SameObject(geometry))
 
 
 @lru_cache(maxsize=128)
 def _is_closed(key: SameObject) -> bool:
-    return Mesh(*mesh_arrays(key.geometry)).closed
+    vertices, triangles = mesh_arrays(key.geometry)
+    _, welded = np.unique(vertices, axis=0, return_inverse=True)
+    corners = np.asarray(welded).ravel()[triangles]
+    start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+    edges = np.minimum(start, end) * len(vertices) + np.maximum(start, end)
+    _, which = np.unique(edges, return_inverse=True)
+    return not np.bincount(np.asarray(which).ravel(), weights=np.sign(end - start)).any()
 
 
 @lru_cache(maxsize=128)  # coal hands out one triangle at a time

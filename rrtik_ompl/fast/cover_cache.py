@@ -19,7 +19,7 @@ from rrtik_ompl.collision.solids import is_mesh, mesh_arrays
 from rrtik_ompl.fast.cache_files import cache_folder, write_whole
 
 LAYOUT = 1
-ALGORITHM = 2  # counts up when rrtik_ompl.fast.covers makes other spheres of the same geometry
+ALGORITHM = 3  # counts up when rrtik_ompl.fast.covers makes other spheres of the same geometry
 
 
 def cached_outer_cover(geometry: Any, *, protrusion: float | None = None) -> Matrix:

@@ -3,7 +3,8 @@
 The box around the solid is cut into cells. The part of a solid in a cell lies in the convex hull of (a) the corners
 of the surface pieces in the cell and (b) the corners of the cell that are inside: an extreme point of that part is
 either on the surface or has a whole neighbourhood in the solid, and then it can only be a corner of the cell. The
-hulls leave no gap, and a ball, being convex, holds a hull if it holds its corners.
+hulls leave no gap, and a ball, being convex, holds a hull if it holds its corners. An open surface has no inside but
+what it encloses, which comes as boxes.
 """
 
 from __future__ import annotations
@@ -14,23 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.fast.cover_solids import Solid, Triangles
-from rrtik_ompl.fast.cover_winding import (
-    CORNERS,
-    MOST_RIM_WORK,
-    NEAR,
-    Flags,
-    Shape,
-    all_corners,
-    any_corner,
-    open_corners,
-    winding,
-)
+from rrtik_ompl.fast.cover_solids import CORNERS, Solid, Triangles
+from rrtik_ompl.fast.cover_winding import NEAR, Flags, Shape, all_corners, winding
 
 MOST_CELLS = 120_000
 MOST_ALONG = 160.0  # cells along an axis: a long triangle is cut into many more pieces than cells
-FEWEST_CROSSED = 60
-BLOCKS_OF_OPEN = (3, 2, 1)
 LATTICE_CROSSED, MOST_LATTICE_CROSSED = 1500, 25_000
 LATTICE_LEAST = 4  # cells along every axis of a lattice, so that even a thin solid has points inside
 MARGINS = (0.0171, 0.0233, 0.0197)  # of a cell: keeps the faces of axis-aligned solids off the planes between cells
@@ -90,38 +79,19 @@ def elements(solid: Solid, crossed: int, detail: int = 4) -> Elements:
         crossed: About how many cells the surface may cross.
         detail: Points of an element closer than its size over ``detail`` are put together into one small ball.
     """
-    grid, block = _grid_for(solid, crossed)
+    grid = _grid(solid.triangles, crossed)
     pieces, cell = _pieces(grid.to_cells(solid.triangles), grid.shape)
     crossed_cells = np.zeros(grid.shape, dtype=bool)
     crossed_cells.ravel()[cell] = True
     count, doubtful = winding(grid.to_cells(np.concatenate([solid.triangles, solid.rim])), grid.shape)
-    corner_inside = (count != 0) | doubtful
-    full = ~crossed_cells & all_corners(corner_inside)
-    whole = np.zeros_like(full)
-    if len(solid.rim):
-        unclear, corner_inside = open_corners(solid.rim, grid.corners(), grid.size, count, doubtful)
-        full, whole = ~crossed_cells & any_corner(corner_inside), crossed_cells & any_corner(unclear)
-    points, owner = _corner_points(crossed_cells & ~whole, corner_inside)
-    boxes = np.concatenate([_boxes(*level) for level in _blocks(full | whole)])
+    corner_inside = ((count != 0) | doubtful) & (len(solid.rim) == 0)
+    points, owner = _corner_points(crossed_cells, corner_inside)
+    boxes = np.concatenate([_boxes(*level) for level in _blocks(~crossed_cells & all_corners(corner_inside))])
+    boxes = np.concatenate([boxes, grid.to_cells(solid.enclosed)])
     parts = np.concatenate([pieces.reshape(-1, 3), points])
     owners = np.concatenate([np.repeat(cell, 3), owner])
-    parts, radii, owners = _thinned(parts, owners, detail, grid, block)
+    parts, radii, owners = _thinned(parts, owners, detail, grid)
     return _assembled(grid, parts, radii, owners, boxes, np.argwhere((count != 0) & ~doubtful))
-
-
-def _grid_for(solid: Solid, crossed: int) -> tuple[Grid, int]:
-    """The cells, and how many of them in a row have one element together.
-
-    An open surface is judged in smaller cells, as far as the work allows: near its open edges whole cells are taken.
-    """
-    if not len(solid.rim):
-        return _grid(solid.triangles, crossed), 1
-    while True:
-        for block in BLOCKS_OF_OPEN:
-            grid = _grid(solid.triangles, crossed * block**2)
-            if grid.corner_count * len(solid.rim) <= MOST_RIM_WORK or crossed < FEWEST_CROSSED:
-                return grid, block
-        crossed //= 2
 
 
 def lattice_inside(solid: Solid, fewest: int) -> Matrix:
@@ -227,13 +197,11 @@ def _boxes(low: Matrix, size: int) -> NDArray[np.float64]:
 
 
 def _thinned(
-    points: Matrix, owner: NDArray[np.int64], detail: int, grid: Grid, block: int
+    points: Matrix, owner: NDArray[np.int64], detail: int, grid: Grid
 ) -> tuple[Matrix, Vector, NDArray[np.int64]]:
-    """Points of one block of cells that are close together replaced by one ball around them; numbers of the blocks."""
-    cell = np.column_stack(np.unravel_index(owner, grid.shape)) // block
-    within = np.clip(np.floor((points - cell * block) * (detail / block)).astype(np.int64), 0, detail - 1)
-    shape = -(-np.array(grid.shape) // block)
-    owner = (cell[:, 0] * shape[1] + cell[:, 1]) * shape[2] + cell[:, 2]
+    """Points of one cell that are close together replaced by one ball around them; the cell of each."""
+    cell = np.column_stack(np.unravel_index(owner, grid.shape))
+    within = np.clip(np.floor((points - cell) * detail).astype(np.int64), 0, detail - 1)
     key = ((owner * detail + within[:, 0]) * detail + within[:, 1]) * detail + within[:, 2]
     order = np.argsort(key, kind="stable")
     first = np.r_[True, np.diff(key[order]) > 0]

@@ -21,6 +21,7 @@ from rrtik_ompl.collision.solids import inside_mesh
 
 ROUNDING = 1e-12  # relative to the extent of the solid; far above float64's rounding, far below any length that matters
 CYLINDER_SIDES = 64
+CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])  # of a cell
 
 Triangles = NDArray[np.float64]  # shape (m, 3, 3): triangle, corner, coordinate
 
@@ -57,6 +58,10 @@ class Solid(Protocol):
         """Caps, shape (b, 3, 3), that close an open surface; empty where it is closed."""
 
     @property
+    def enclosed(self) -> NDArray[np.float64]:
+        """Corners of boxes that an open surface encloses, shape (k, 8, 3); none where it is closed."""
+
+    @property
     def slack(self) -> float:
         """How far the true solid may reach beyond ``triangles`` by rounding."""
 
@@ -76,6 +81,7 @@ class ConvexSolid:
     offsets: Vector
     slack: float
     rim: Triangles = field(default_factory=lambda: np.empty((0, 3, 3)))
+    enclosed: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 8, 3)))
 
     def depth(self, points: Matrix) -> Vector:
         """Smallest distance to the planes."""
@@ -95,6 +101,7 @@ class CylinderSolid:
     triangles: Triangles
     slack: float
     rim: Triangles = field(default_factory=lambda: np.empty((0, 3, 3)))
+    enclosed: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 8, 3)))
 
     def depth(self, points: Matrix) -> Vector:
         """Smallest distance to mantle and caps (outside: to the farther of the two)."""
@@ -109,15 +116,16 @@ class CylinderSolid:
 
 
 class MeshSolid:
-    """A triangle mesh: its surface, and all points whose winding number is above one half.
+    """A triangle mesh: its surface and, if that is closed, all points whose winding number is not 0; else ``enclosed``.
 
     Depth is measured to the surface and to the caps that close it, if it is open.
     """
 
     slack = ROUNDING
 
-    def __init__(self, vertices: Matrix, faces: NDArray[np.int64]) -> None:
+    def __init__(self, vertices: Matrix, faces: NDArray[np.int64], enclosed: NDArray[np.float64]) -> None:
         self.triangles = vertices[faces]
+        self.enclosed = enclosed
         self.rim = rim_caps(vertices, faces)
         self._closed = np.concatenate([self.triangles, self.rim])
         self._centres, self._reach = _round_about(self._closed)
@@ -195,13 +203,23 @@ def _prism(ring: Matrix, high: float) -> Triangles:
     return np.concatenate([np.stack(side, axis=1) for side in sides])
 
 
-def mesh_solid(vertices: Matrix, triangles: NDArray[np.int64]) -> tuple[MeshSolid, Frame]:
-    """A mesh; degenerate triangles are kept, they are part of the surface."""
+def mesh_solid(
+    vertices: Matrix, triangles: NDArray[np.int64], boxes: tuple[Matrix, Matrix]
+) -> tuple[MeshSolid, Frame]:
+    """A mesh and, if it is open, boxes that it encloses; degenerate triangles are kept, they are part of the surface.
+
+    Args:
+        vertices: Shape (n, 3).
+        triangles: Vertex numbers, shape (m, 3).
+        boxes: Lowest and highest corners, shape (k, 3) each.
+    """
     used, number = np.unique(triangles, return_inverse=True)
     points, same = np.unique(vertices[used], axis=0, return_inverse=True)
     low, high = points.min(axis=0), points.max(axis=0)
     frame = Frame(0.5 * (low + high), np.eye(3), float(np.linalg.norm(high - low)))
-    return MeshSolid(frame.to_local(points), same.ravel()[number.reshape(-1, 3)]), frame
+    enclosed = np.where(CORNERS[None] == 1, boxes[1][:, None], boxes[0][:, None])
+    local = frame.to_local(enclosed.reshape(-1, 3)).reshape(-1, 8, 3)
+    return MeshSolid(frame.to_local(points), same.ravel()[number.reshape(-1, 3)], local), frame
 
 
 def _round_about(triangles: Triangles) -> tuple[Matrix, Vector]:

@@ -1,8 +1,6 @@
 """Winding numbers at the corners of a grid of cells: which corners and cells are inside a surface, surely or perhaps.
 
-A closed surface has whole winding numbers, which change only where it is crossed. What is open is closed by caps first,
-and the caps' own share is taken off again (generalised winding number, Jacobson, Kavan and Sorkine-Hornung 2013).
-Everything here is counted in cells, except where it says otherwise.
+A closed surface has whole winding numbers, which change only where it is crossed. Everything here is counted in cells.
 """
 
 from __future__ import annotations
@@ -11,12 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.fast.cover_solids import Triangles
+from rrtik_ompl.fast.cover_solids import CORNERS, Triangles
 
 NEAR = 1e-9  # in cells: closer than this to an edge or a plane counts as doubtful, and doubt counts as inside
-MOST_RIM_WORK = 5_000_000
-SURELY = 0.49  # a winding number is above one half for World; this leaves room for rounding
-CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 
 Flags = NDArray[np.bool_]
 Shape = tuple[int, int, int]
@@ -80,68 +75,9 @@ def _crossing(a: Matrix, b: Matrix, c: Matrix, line: Matrix) -> tuple[Vector, Ve
     return x, NEAR / np.maximum(steep, 1e-12)
 
 
-def any_corner(flag: Flags) -> Flags:
-    """Cells, shape (x, y, z), of which one corner or more is flagged; corners have shape (x + 1, y + 1, z + 1)."""
-    return ~all_corners(~flag)
-
-
 def all_corners(flag: Flags) -> Flags:
     """Cells of which all corners are flagged."""
     found = np.ones(tuple(n - 1 for n in flag.shape), dtype=bool)
     for x, y, z in CORNERS:
         found &= flag[x : flag.shape[0] - 1 + x, y : flag.shape[1] - 1 + y, z : flag.shape[2] - 1 + z]
     return found
-
-
-def open_corners(
-    rim: Triangles, corners: Matrix, size: Vector, count: NDArray[np.int64], doubtful: Flags
-) -> tuple[Flags, Flags]:
-    """What is inside an open surface near the corners of a grid, all in the solid's frame.
-
-    Within half the diagonal of a cell from a corner (all points of a cell are that near to one of its corners) the
-    winding number differs from the corner's by no more than a bound, apart from crossings of the surface.
-
-    Args:
-        rim: Caps that close the surface, the open edge opposite to the first corner, shape (b, 3, 3).
-        corners: Corners of the cells, shape (k, 3).
-        size: Of a cell, shape (3,).
-        count: Winding number of the surface with its caps, at the corners.
-        doubtful: Where that is not certain.
-
-    Returns:
-        Flags of the shape of ``count``: whether a point near the corner, on any side of the surface, may be inside
-        without a crossing of the surface telling; and whether one on the corner's own side may be.
-    """
-    if count.size * len(rim) > MOST_RIM_WORK:
-        everywhere = np.ones(count.shape, dtype=bool)
-        return everywhere, everywhere
-    share, change = (a.reshape(count.shape) for a in _share_of(rim, corners, 0.5 * float(np.linalg.norm(size))))
-    unclear = doubtful | (np.abs(share - np.round(share)) + change >= SURELY)
-    maybe = doubtful | (np.abs(count - share) + change >= SURELY)
-    return unclear, maybe
-
-
-def _share_of(caps: Triangles, points: Matrix, reach: float) -> tuple[Vector, Vector]:
-    """Winding number of caps at points, shape (k, 3), and a bound of its change within ``reach``.
-
-    Its gradient is the field of a current along the open edges (Biot and Savart's law), and the gradient changes by
-    at most 2 length / distance^3 per length, each edge.
-    """
-    share, bend = np.zeros(len(points)), np.zeros(len(points))
-    pull = np.zeros((len(points), 3))
-    for apex, p, q in caps:
-        a, b, c = apex - points, p - points, q - points
-        la, lb, lc = (np.sqrt(np.einsum("ij,ij->i", v, v)) for v in (a, b, c))
-        ab, bc, ca = (np.einsum("ij,ij->i", u, v) for u, v in ((a, b), (b, c), (c, a)))
-        normal = np.cross(b, c)
-        above = np.einsum("ij,ij->i", a, normal)
-        share += np.arctan2(above, la * lb * lc + ab * lc + bc * la + ca * lb)
-        beside = np.maximum(lb * lc * (lb * lc + bc), 1e-30)
-        pull += normal * ((lb + lc) / beside)[:, None]
-        side = q - p
-        length = float(np.linalg.norm(side))
-        along = np.clip(-(b @ side) / max(length * length, 1e-300), 0.0, 1.0)
-        gap = np.maximum(np.linalg.norm(b + along[:, None] * side, axis=1) - reach, 1e-9)
-        bend += length / gap**3
-    slope = np.linalg.norm(pull, axis=1)
-    return share / (2.0 * np.pi), (slope * reach + bend * reach * reach) / (4.0 * np.pi)

@@ -13,11 +13,11 @@ from typing import Any
 
 import coal
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import QhullError, cKDTree
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.collision.solids import is_mesh, mesh_arrays
+from rrtik_ompl.collision.enclosure import enclosure
+from rrtik_ompl.collision.solids import is_closed, is_mesh, mesh_arrays
 from rrtik_ompl.fast.cover_cells import elements
 from rrtik_ompl.fast.cover_inner import inscribed
 from rrtik_ompl.fast.cover_regular import (
@@ -41,6 +41,7 @@ from rrtik_ompl.fast.cover_solids import (
 )
 
 BALLS_PER_METRE, FEWEST, MOST = 70.0, 2, 32  # 32: four full clusters of the kernels; 36 make eight
+BALLS_OF_OPEN = 3  # times as many for a mere surface: nothing of a ball on it is inside
 INNER_SHARE = 1.5  # inner balls for each outer one
 MOST_ON_REQUEST = 512  # balls, where a protrusion is asked for
 # A mesh of more triangles or open edges is taken as its bounding box, and nothing is proven to collide with it.
@@ -55,8 +56,9 @@ def outer_cover(geometry: Any, *, protrusion: float | None = None) -> Matrix:
     """Balls whose union contains a solid, shape (n, 4).
 
     Args:
-        geometry: A coal geometry. A mesh is taken with its interior: every point whose winding number is above one
-            half. A kind that is not known here gets one ball (of infinite radius if the kind has no bounds).
+        geometry: A coal geometry. A mesh is taken with its interior: every point whose winding number is not 0 or,
+            if it is open, what it encloses (:mod:`rrtik_ompl.collision.enclosure`). A kind that is not known here gets
+            one ball (of infinite radius if the kind has no bounds).
         protrusion: How far a ball may reach beyond the solid [m]; if that takes too many balls or too fine a cut, the
             cover reaches farther (``protrusion_bound`` tells). None: what a number of balls that suits the size of
             the solid allows.
@@ -73,7 +75,8 @@ def outer_cover(geometry: Any, *, protrusion: float | None = None) -> Matrix:
         return _bounding_ball(geometry, swept)
     solid, frame = made
     wanted = None if protrusion is None else max(protrusion, 0.0) / frame.scale
-    limit = balls_for(frame.scale) if protrusion is None else MOST_ON_REQUEST
+    usual = balls_for(frame.scale) * (BALLS_OF_OPEN if len(solid.rim) else 1)
+    limit = usual if protrusion is None else MOST_ON_REQUEST
     found = _searched_cover(solid, limit, wanted)
     regular = regular_cover(geometry, limit, protrusion)
     cover = frame.spheres_out(found, solid.slack + ROUNDING)
@@ -107,7 +110,7 @@ def inner_spheres(geometry: Any, *, count: int | None = None) -> Matrix:
 def protrusion_bound(geometry: Any, spheres: Matrix) -> float:
     """How far balls, shape (n, 4), reach beyond a solid at most [m]; infinite for kinds that are not known here.
 
-    An open mesh counts with the caps that close it.
+    An open mesh counts with caps that close it.
     """
     if not len(spheres):
         return 0.0
@@ -143,7 +146,7 @@ def _solid(geometry: Any) -> tuple[Solid, Frame] | None:
         sizes = geometry.radius, geometry.halfLength
         return cylinder_solid(*sizes) if min(sizes) > 0.0 and np.isfinite(sizes).all() else None
     if is_mesh(geometry):
-        return _mesh(*mesh_arrays(geometry))
+        return _mesh(geometry)
     if isinstance(geometry, coal.Box):
         points = box_corners(np.array(geometry.halfSide))
     elif isinstance(geometry, coal.ConvexBase):
@@ -158,12 +161,14 @@ def _solid(geometry: Any) -> tuple[Solid, Frame] | None:
         return None
 
 
-def _mesh(vertices: Matrix, triangles: NDArray[np.int64]) -> tuple[Solid, Frame] | None:
+def _mesh(geometry: Any) -> tuple[Solid, Frame] | None:
+    vertices, triangles = mesh_arrays(geometry)
     used = vertices[np.unique(triangles)]
     if not len(used) or not np.isfinite(used).all() or not np.ptp(used, axis=0).max() > SMALLEST:
         return None
     if len(triangles) <= MOST_TRIANGLES:
-        made = mesh_solid(vertices, triangles)
+        nothing = (np.empty((0, 3)), np.empty((0, 3)))
+        made = mesh_solid(vertices, triangles, nothing if is_closed(geometry) else enclosure(geometry).boxes())
         if len(made[0].rim) <= MOST_OPEN_EDGES:
             return made
     low, high = used.min(axis=0), used.max(axis=0)
@@ -174,11 +179,10 @@ def _mesh(vertices: Matrix, triangles: NDArray[np.int64]) -> tuple[Solid, Frame]
 def _closed(geometry: Any, solid: Solid) -> bool:
     """Whether a body that touches a ball inside the geometry surely collides with it.
 
-    Coal's meshes are hollow: a body collides with one if it meets the surface, or if its reference point is inside
-    (winding number above one half). A body that meets an inner ball but not the surface lies in one piece of the space
-    that the surface leaves. Without open edges the winding number is the same whole number all over that piece, so it
-    is that of the ball, and the reference point is inside. Through an open edge the winding number fades to nothing,
-    and a body may hold on to the ball with its reference point where it counts as outside: then nothing is proven.
+    Coal's meshes are hollow: a body collides with one if it meets the surface, or if its reference point is inside. A
+    body that meets an inner ball but not the surface lies in one piece of the space that the surface leaves. Without
+    open edges the winding number is the same whole number all over that piece, so it is that of the ball, and the
+    reference point is inside. Through an open edge a body may reach in and hold on to the ball: then nothing is proven.
     """
     return not len(solid.rim) and (not is_mesh(geometry) or isinstance(solid, MeshSolid))
 

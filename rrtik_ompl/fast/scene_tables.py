@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.collision.solids import is_mesh, mesh_arrays
 from rrtik_ompl.fast.layout import (
     BALL,
     BOX,
@@ -36,7 +35,6 @@ from rrtik_ompl.fast.layout import (
     STANDING_COUNT,
 )
 from rrtik_ompl.fast.robot_tables import Spheres, Table, table, usable_cover
-from rrtik_ompl.shapes import Mesh
 
 MOST_PLANES = 64  # of the outer polyhedron of a convex solid: fewer planes make it larger, never smaller
 LANE_PADDING = 16  # boxes are compared this many at a time, or half as many
@@ -59,16 +57,11 @@ class Row:
 
 
 def needs_covers(body: Any) -> tuple[bool, bool]:
-    """Whether a body needs outer and inner spheres: what stands still and has a formula can do without.
-
-    An obstacle or attached object counts as a solid only if its mesh is closed; nothing is inside a mere surface.
-    """
-    link = getattr(body, "kind", "link") == "link"
-    solid = link or not is_mesh(body.geometry) or Mesh(*mesh_arrays(body.geometry)).closed
+    """Whether a body needs outer and inner spheres: what stands still and has a formula can do without."""
     if body.joint > 0:
-        return True, solid
+        return True, True
     exact = _exact(body, grow=1.0)
-    return exact is None, solid and (exact is None or isinstance(body.geometry, coal.ConvexBase))
+    return exact is None, exact is None or isinstance(body.geometry, coal.ConvexBase)
 
 
 def rows_table(rows: Sequence[tuple[int, Row]], checked: NDArray[np.bool_]) -> Table:
