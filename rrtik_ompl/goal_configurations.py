@@ -8,6 +8,8 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.goal import GoalRegion, JointGoal, PoseGoal, PositionGoal, joint_difference
+from rrtik_ompl.ik.face import solve_ik
+from rrtik_ompl.ik.methods import METHODS
 from rrtik_ompl.ik.numeric import numeric_ik, targets
 from rrtik_ompl.problem import TURN, Problem
 
@@ -61,13 +63,16 @@ def _turns(problem: Problem, q: Vector) -> Matrix:
 
 
 def _solved(problem: Problem, goal: PoseGoal | PositionGoal | GoalRegion, rng: np.random.Generator) -> Matrix:
-    """Configurations at the goal, from the start and from random ones."""
+    """Configurations at the goal: all there are where the robot has a closed form, else from many starts."""
     robot = problem.world.robot
+    drawn = targets(goal, STARTS, rng)
+    if not any(METHODS["closed-form"].misfit(robot, target) for target in drawn):
+        seed = int(rng.integers(2**31))
+        return solve_ik(robot, goal, method="closed-form", near=problem.start, all=True, seed=seed).solutions
     starts = rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
     starts[0] = problem.start
-    goals = targets(goal, STARTS, rng)
-    share = -(-STARTS // len(goals))
-    blocks = [numeric_ik(robot, each, starts[k * share : (k + 1) * share]) for k, each in enumerate(goals)]
+    share = -(-STARTS // len(drawn))
+    blocks = [numeric_ik(robot, each, starts[k * share : (k + 1) * share]) for k, each in enumerate(drawn)]
     return np.vstack(blocks)
 
 

@@ -1,5 +1,6 @@
 """The answers of a world are coal's: compared on millions of configurations close to contact."""
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -12,7 +13,7 @@ from rrtik_ompl.world import World
 
 CONTACT = 2e-6  # [m]: nearer than this to contact, coal's own answer depends on the order of its arguments
 SWEEP = 64  # configurations along one short motion, so that many of them are near a contact
-ROBOTS = ("titan4", "panda", "puma560", "ur5", "planar3", "kinova")
+ROBOTS = ("titan4", "panda", "puma560", "ur5", "planar3", "xarm7", "panda_primitives")
 
 
 def surroundings(robot, rng, mesh):
@@ -61,7 +62,7 @@ def test_on_millions_of_configurations_the_world_says_what_coal_says(name, dente
             assert abs(world.clearance(q)) < CONTACT
         compared, free = compared + len(Q), free + int(ours.sum())
     assert compared >= 300_000
-    assert 0.05 < free / compared < 0.98
+    assert 0.05 < free / compared < 0.995
 
 
 @pytest.mark.parametrize("name", ["titan4", "panda"])
@@ -92,5 +93,48 @@ def test_a_conservative_world_calls_nothing_free_that_is_not(name, dented_cube):
     np.testing.assert_array_equal(careful, exact & ~undecided)
 
 
-def test_reused_collision_data_miss_overlaps_that_fresh_requests_see():
-    """The trap: Pinocchio's geometry data start each query from the last one's support points."""
+@pytest.mark.parametrize("name", ["titan4", "ur5", "panda_primitives"])
+def test_the_certificate_says_the_same_in_whatever_order_rows_come(name, dented_cube):
+    robot, rng = load_robot(name), np.random.default_rng(13)
+    world = World(robot, surroundings(robot, rng, dented_cube))
+    Q = short_sweeps(world, rng, 150)  # neighbours stand for each other; strangers do not
+    order = rng.permutation(len(Q))
+    in_line = world.certify(Q)
+    assert 0.05 < in_line.mean() < 0.995
+    np.testing.assert_array_equal(world.certify(Q[order]), in_line[order])
+
+
+def reused_answers(world, sweeps):
+    """Pinocchio's own question on the same geometry data again and again: which rows it calls free."""
+    robot, geometry = world.robot, pin.GeometryModel()
+    for k, body in enumerate(world.bodies):
+        geometry.addGeometryObject(pin.GeometryObject(f"{k}", body.joint, body.placement, body.geometry))
+    for i, j in world.pairs:
+        if world.bodies[i].joint or world.bodies[j].joint:
+            geometry.addCollisionPair(pin.CollisionPair(i, j))
+    data, geometry_data = robot.model.createData(), pin.GeometryData(geometry)
+    return np.array(
+        [
+            not pin.computeCollisions(robot.model, data, geometry, geometry_data, full, True)
+            for full in robot.lift(sweeps)
+        ]
+    )
+
+
+def test_reused_collision_data_miss_overlaps_and_the_world_does_not(dented_cube):
+    """Each query on reused data starts from the last one's support points; that is why the world asks afresh."""
+    robot, rng = load_robot("panda"), np.random.default_rng(3)
+    scene = surroundings(robot, rng, lambda half, _: Box([2.0 * half] * 3))
+    world = World(robot, scene)
+    Q = short_sweeps(world, rng, 300)
+    ours = world.valid_batch(Q)
+    by_sweep = ours.reshape(-1, SWEEP)
+    mixed = np.flatnonzero(by_sweep.any(axis=1) & ~by_sweep.all(axis=1))
+    rows = (mixed[:, None] * SWEEP + np.arange(SWEEP)).ravel()
+    reused = reused_answers(world, Q[rows])
+    missed = Q[rows][reused & ~ours[rows]]
+    if len(missed) == 0:
+        pytest.skip(f"coal {coal.__version__} no longer falls into the trap here")
+    assert min(world.clearance(q) for q in missed) < -0.001
+    assert not world.certify(missed).any()
+    assert not any(world.valid(q) for q in missed)

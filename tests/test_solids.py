@@ -6,7 +6,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from rrtik_ompl.collision.certificate import overlap
+from rrtik_ompl.collision.certificate import distance
 from rrtik_ompl.collision.solids import convex_parts, hull, inside_mesh, pieces
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
@@ -23,7 +23,7 @@ def area(polygon):
 def touches(shape, point):
     pose = np.eye(4)
     pose[:3, 3] = point
-    return any(overlap(p.geometry, p.placement.homogeneous, coal.Sphere(1e-6), pose) for p in pieces(shape))
+    return any(distance(p.geometry, p.placement.homogeneous, coal.Sphere(1e-6), pose) is None for p in pieces(shape))
 
 
 @pytest.mark.parametrize(

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.containment import Containment
-from rrtik_ompl.collision.motion_bound import displacement_weights
+from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.robot import Robot
 
 CHUNK = 256  # configurations at a time, to bound memory
-BLOCK = 16  # configurations that stand for each other where they are near
-ROOM = 1e-6  # [m] for rounding
+RUNS = (64, 8, 1)  # rows that are looked at together
+ROOM = 1e-5  # [m] for rounding, in our arithmetic and in coal's distances
 
 
 class Certificate:
@@ -34,8 +34,8 @@ class Certificate:
         self._joints = np.array([b.joint for b in bodies], dtype=np.int64)
         self._placements = np.array([b.placement.homogeneous for b in bodies]).reshape(-1, 4, 4)
         self._centres, self._halves = _local_boxes(bodies)
-        self._weights = displacement_weights(robot, [b for b in bodies if b.kind != "obstacle"])
-        self._movers: Vector = np.sum(self._joints[self._pairs] > 0, axis=1).astype(np.float64)  # 0, 1 or 2 of a pair
+        approaches = [approach_weights(robot, bodies[i], bodies[j]) for i, j in pairs]
+        self._approach = np.array(approaches).reshape(-1, robot.dof).T  # [m per rad or m] of each pair, shape (dof, k)
         self._half_spaces = list(_half_space_pairs(bodies, pairs))
         self._containment = Containment(bodies, pairs)
         hollow = {frozenset(pair) for pair in self._containment.pairs}
@@ -53,49 +53,45 @@ class Certificate:
         )
 
     def _first(self, Q: Matrix) -> list[tuple[int, ...]]:
-        """For each row of Q the numbers of one colliding pair of bodies, or ()."""
-        found: list[tuple[int, ...]] = [()] * len(Q)
-        open_rows, close = self._open(Q)
-        for start in range(0, len(open_rows), CHUNK):
-            part = slice(start, start + CHUNK)
-            for row, pair in zip(open_rows[part], self._first_of_chunk(Q[open_rows[part]], close[part]), strict=True):
-                found[row] = pair
-        return found
+        """For each row of Q the numbers of one colliding pair of bodies, or ().
 
-    def _open(self, Q: Matrix) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Rows in which something may touch, shape (k,), and for each of them which pairs, shape (k, pairs).
-
-        Of neighbouring rows one in the middle is looked at: a pair whose gap there is wider than what the arm moves
-        within the block is apart in all of it.
+        Neighbouring rows are looked at together: where two bodies are farther apart at the middle one than they can
+        come nearer within the run of rows, they are apart in all of it. What is left open is looked at in shorter runs.
         """
-        rows = np.arange(len(Q))
-        middles = np.minimum(rows[::BLOCK] + BLOCK // 2, len(Q) - 1)
-        block = rows // BLOCK
-        moved = np.abs(Q - Q[middles[block]]) @ self._weights
-        reach = np.maximum.reduceat(moved, rows[::BLOCK]) if len(Q) else moved
-        close = np.zeros((len(middles), len(self._pairs)), dtype=bool)
-        for start in range(0, len(middles), CHUNK):
-            part = slice(start, start + CHUNK)
-            frames = self._robot.joint_frames(Q[middles[part]])
-            gaps = self._gaps(*self._boxes(self._poses(frames)))
-            close[part] = gaps <= self._movers * reach[part, None] + ROOM
-        concerned = np.asarray(close.any(axis=1))
-        open_rows = rows[concerned[block]]
-        return open_rows, close[block[open_rows]]
-
-    def _first_of_chunk(self, Q: Matrix, close: NDArray[np.bool_]) -> list[tuple[int, ...]]:
-        frames = self._robot.joint_frames(Q)
-        poses = self._poses(frames)
-        near: NDArray[np.bool_] = close & (self._gaps(*self._boxes(poses)) <= ROOM)
         found: list[tuple[int, ...]] = [()] * len(Q)
-        for row, pair in zip(*np.nonzero(near), strict=True):
-            if not found[row]:
-                i, j = (int(body) for body in self._pairs[pair])
-                if overlap(self._bodies[i].geometry, poses[row, i], self._bodies[j].geometry, poses[row, j]):
-                    found[row] = (i, j)
-        for row in np.flatnonzero((near & self._hollow).any(axis=1)):
-            found[row] = found[row] or self._containment.first(frames[row])
+        begins, open_ = np.arange(0, len(Q), RUNS[0]), np.ones((-(-len(Q) // RUNS[0]), len(self._pairs)), dtype=bool)
+        for size, shorter in zip(RUNS, (*RUNS[1:], 0), strict=True):
+            for start in range(0, len(begins), CHUNK):
+                part = slice(start, start + CHUNK)
+                open_[part] = self._open(Q, begins[part], size, open_[part], found)
+            if shorter:
+                left = open_.any(axis=1)
+                begins = (begins[left, None] + np.arange(0, size, shorter)).ravel()
+                open_ = np.repeat(open_[left], size // shorter, axis=0)[begins < len(Q)]
+                begins = begins[begins < len(Q)]
         return found
+
+    def _open(
+        self, Q: Matrix, begins: NDArray[np.int64], size: int, asked: NDArray[np.bool_], found: list[tuple[int, ...]]
+    ) -> NDArray[np.bool_]:
+        """Which of the pairs ``asked`` for, shape (runs, pairs), may touch somewhere in runs of rows. Adds to found."""
+        middles = np.minimum(begins + size // 2, len(Q) - 1)
+        ends = np.minimum(begins + size, len(Q))
+        near = np.array([np.abs(Q[a:b] - Q[m]).max(axis=0) for a, b, m in zip(begins, ends, middles, strict=True)])
+        approach = near @ self._approach + ROOM
+        frames = self._robot.joint_frames(Q[middles])
+        poses = self._poses(frames)
+        open_: NDArray[np.bool_] = asked & (self._gaps(*self._boxes(poses)) <= approach)
+        for run, pair in zip(*(k.tolist() for k in np.nonzero(open_)), strict=True):
+            i, j = self._pairs[pair].tolist()
+            gap = distance(self._bodies[i].geometry, poses[run, i], self._bodies[j].geometry, poses[run, j])
+            open_[run, pair] = gap is None or gap <= approach[run, pair]
+            if gap is None:
+                found[middles[run]] = (i, j)
+            elif self._hollow[pair] and self._containment.holds((i, j), frames[run]):
+                rows = slice(middles[run], middles[run] + 1) if open_[run, pair] else slice(begins[run], ends[run])
+                found[rows] = [(i, j)] * (rows.stop - rows.start)  # where surfaces stay apart, what is held stays held
+        return open_
 
     def _poses(self, frames: NDArray[np.float64]) -> NDArray[np.float64]:
         """Poses of the bodies, shape (m, bodies, 4, 4), from those of the joints."""
@@ -117,11 +113,16 @@ class Certificate:
         return gaps
 
 
-def overlap(first: Any, first_pose: NDArray[np.float64], second: Any, second_pose: NDArray[np.float64]) -> bool:
-    """Whether two coal geometries at poses, shape (4, 4), touch; asked with fresh request and result."""
+def distance(first: Any, first_pose: Matrix, second: Any, second_pose: Matrix) -> float | None:
+    """A lower bound of the distance [m] of two coal geometries at poses, shape (4, 4); None if they touch.
+
+    Asked with fresh request and result.
+    """
     transforms = [coal.Transform3s(pose[:3, :3], pose[:3, 3]) for pose in (first_pose, second_pose)]
     result = coal.CollisionResult()
-    return bool(coal.collide(first, transforms[0], second, transforms[1], coal.CollisionRequest(), result))
+    if coal.collide(first, transforms[0], second, transforms[1], coal.CollisionRequest(), result):
+        return None
+    return float(result.distance_lower_bound)
 
 
 def _half_space_pairs(

@@ -53,25 +53,23 @@ class Containment:
         self._covers = {o: everywhere if covers is None else covers[o] for o, _ in self.pairs}
         self._meshes = {o: mesh_arrays(bodies[o].geometry) for o, _ in self.pairs}
 
-    def first(self, frames: NDArray[np.float64]) -> tuple[int, ...]:
-        """Numbers of two bodies of which one holds the other, or ().
+    def holds(self, pair: tuple[int, int], frames: NDArray[np.float64]) -> bool:
+        """Whether one of two bodies holds the other.
 
         Args:
+            pair: Numbers of the bodies, in either order.
             frames: Pose of every joint frame in the world, world first, shape (joints + 1, 4, 4).
         """
-        if not self.pairs:
-            return ()
-        inner, outer = frames[self._inner_joint], frames[self._outer_joint]
-        world = self._points @ inner[:, :3, :3].transpose(0, 2, 1) + inner[:, None, :3, 3]
-        in_joint = (world - outer[:, None, :3, 3]) @ outer[:, :3, :3]  # the inverse of a rotation is its transpose
-        to_outer = self._to_outer
-        local = in_joint @ to_outer[:, :3, :3].transpose(0, 2, 1) + to_outer[:, None, :3, 3]
-        beyond = np.abs(local - self._centres[:, None]) > self._halves[:, None]
-        for row in np.flatnonzero(~beyond.any(axis=(1, 2))):
-            pair: tuple[int, ...] = self.pairs[row]
-            if inside_mesh(*self._meshes[pair[0]], local[row, 0]):
-                return pair
-        return ()
+        return any(self._holds(self._places[p], frames) for p in (pair, pair[::-1]) if p in self._places)
+
+    def _holds(self, k: int, frames: NDArray[np.float64]) -> bool:
+        inner, outer = frames[self._inner_joint[k]], frames[self._outer_joint[k]]
+        world = self._points[k] @ inner[:3, :3].T + inner[:3, 3]
+        in_joint = (world - outer[:3, 3]) @ outer[:3, :3]  # the inverse of a rotation is its transpose
+        local = in_joint @ self._to_outer[k, :3, :3].T + self._to_outer[k, :3, 3]
+        if (np.abs(local - self._centres[k]) > self._halves[k]).any():
+            return False
+        return inside_mesh(*self._meshes[self.pairs[k][0]], local[0])
 
     def between(self, pairs: Iterable[tuple[int, int]], joints: Any) -> bool:
         """Whether in one of some pairs, in either order, a body holds the other.
