@@ -22,6 +22,7 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body, link_bodies
 from rrtik_ompl.collision.containment import Containment
 from rrtik_ompl.collision.motion_bound import approach_weights
+from rrtik_ompl.collision.solids import around
 from rrtik_ompl.fast import FREE, UNDECIDED, FastWorld, needs_covers
 from rrtik_ompl.fast.cover_cache import cached_inner_spheres, cached_outer_cover
 from rrtik_ompl.robot import Robot
@@ -49,7 +50,7 @@ class CollisionChecks:
         self._robot, self._bodies = robot, bodies
         self._data = robot.model.createData()
         self._standing = {k: self._transform(k) for k, body in enumerate(bodies) if body.joint == 0}
-        self._approaches: dict[tuple[int, int], Vector] = {}
+        self._approaches = dict(zip(pairs, approach_weights(robot, bodies, pairs), strict=True))
         self._containment = Containment(bodies, pairs, [around for around, _ in spheres])
 
     def as_conservative(self, conservative: bool) -> CollisionChecks:
@@ -94,16 +95,17 @@ class CollisionChecks:
         rows, order = rows[open_], order[open_]
         marked = self.fast.undecided_pairs(self._robot.joint_values(rows))
         travel = np.abs(end - start)
-        cleared: dict[tuple[int, int], list[tuple[float, float]]] = {}
-        for place, full, pairs in zip(order.tolist(), self._robot.lift(rows), marked, strict=True):
-            left = [p for p in pairs if not any(low < place < high for low, high in cleared.get(p, ()))]
-            gaps = self._gaps(full, left)
+        cleared: dict[tuple[int, int], Mask] = {}
+        for place, full, pairs in zip(order.astype(int).tolist(), self._robot.lift(rows), marked, strict=True):
+            left = [pair for pair in pairs if pair not in cleared or not cleared[pair][place]]
+            gaps = self._gaps(full, left) if left else []
             if gaps is None:
                 return False
             for pair, gap in zip(left, gaps, strict=True):
-                approach = float(self._approach(pair) @ travel)  # [m] along the whole motion
-                reach = steps * max(gap - ROOM, 0.0) / approach if approach > 0.0 else np.inf
-                cleared.setdefault(pair, []).append((place - reach, place + reach))
+                approach = float(self._approaches[pair] @ travel)  # [m] along the whole motion
+                reach = int(min(steps * max(gap - ROOM, 0.0) / approach, steps)) if approach > 0.0 else steps
+                mask = cleared.setdefault(pair, np.zeros(steps + 1, dtype=bool))
+                mask[max(place - reach, 0) : place + reach + 1] = True
         return True
 
     def _gaps(self, full: Vector, pairs: list[tuple[int, int]]) -> list[float] | None:
@@ -114,31 +116,41 @@ class CollisionChecks:
             pairs: Numbers of the bodies.
         """
         pin.forwardKinematics(self._robot.model, self._data, full)
-        transforms = dict(self._standing)
+        transforms: dict[int, Any] = {}
         gaps = []
         for i, j in pairs:
             for k in (i, j):
                 if k not in transforms:
-                    transforms[k] = self._transform(k)
-            ends = (self._bodies[i].geometry, transforms[i], self._bodies[j].geometry, transforms[j])
-            result = coal.CollisionResult()
-            if coal.collide(*ends, coal.CollisionRequest(), result):
+                    transforms[k] = self._standing.get(k) or self._transform(k)
+            gap = distance(self._bodies[i].geometry, transforms[i], self._bodies[j].geometry, transforms[j])
+            if gap is None:
                 return None
-            gaps.append(result.distance_lower_bound)
+            gaps.append(gap)
         return None if self._containment.between(pairs, self._data.oMi) else gaps
-
-    def _approach(self, pair: tuple[int, int]) -> Vector:
-        """See :func:`rrtik_ompl.collision.motion_bound.approach_weights`."""
-        if pair not in self._approaches:
-            first, second = (self._bodies[k] for k in pair)
-            self._approaches[pair] = approach_weights(self._robot, first, second)
-        return self._approaches[pair]
 
     def _transform(self, number: int) -> Any:
         """Coal's pose of a body in the world."""
         body = self._bodies[number]
         pose = self._data.oMi[body.joint] * body.placement
         return coal.Transform3s(pose.rotation, pose.translation)
+
+
+def distance(first: Any, first_pose: Any, second: Any, second_pose: Any) -> float | None:
+    """A lower bound of the distance [m] of two coal geometries at coal's poses, None if they touch.
+
+    For solids coal's answer to "do they touch" comes with the distance. Meshes take much longer, so their hulls are
+    asked first: where those are apart, the meshes are.
+    """
+    result = coal.CollisionResult()
+    hulls = around(first), around(second)
+    if not coal.collide(hulls[0], first_pose, hulls[1], second_pose, coal.CollisionRequest(), result):
+        return float(result.distance_lower_bound)
+    if hulls[0] is first and hulls[1] is second:
+        return None
+    result = coal.CollisionResult()
+    if coal.collide(first, first_pose, second, second_pose, coal.CollisionRequest(), result):
+        return None
+    return float(result.distance_lower_bound)
 
 
 def spread_order(count: int) -> NDArray[np.float64]:

@@ -34,8 +34,7 @@ class Certificate:
         self._joints = np.array([b.joint for b in bodies], dtype=np.int64)
         self._placements = np.array([b.placement.homogeneous for b in bodies]).reshape(-1, 4, 4)
         self._centres, self._halves = _local_boxes(bodies)
-        approaches = [approach_weights(robot, bodies[i], bodies[j]) for i, j in pairs]
-        self._approach = np.array(approaches).reshape(-1, robot.dof).T  # [m per rad or m] of each pair, shape (dof, k)
+        self._approach = approach_weights(robot, bodies, pairs).T  # [m per rad or m], shape (dof, pairs)
         self._half_spaces = list(_half_space_pairs(bodies, pairs))
         self._containment = Containment(bodies, pairs)
         hollow = {frozenset(pair) for pair in self._containment.pairs}

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
 
 import numpy as np
 
-from rrtik_ompl.arrays import Vector, frozen
+from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.robot import Robot
 
@@ -22,13 +23,20 @@ def displacement_weights(robot: Robot, bodies: Iterable[Body]) -> Vector:
     return frozen(np.abs(robot.chain.gain).T @ _joint_weights(robot, points))
 
 
-def approach_weights(robot: Robot, first: Body, second: Body) -> Vector:
-    """Weights w, shape (dof,), such that two bodies come nearer by ``w @ |b - a|`` [m] from a to b at most.
+def approach_weights(robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> Matrix:
+    """Weights w, shape (pairs, dof): two bodies come nearer by ``w @ |b - a|`` [m] from a to b at most.
 
     A joint that carries both of them turns them as one.
     """
-    weights = np.array([_joint_weights(robot, _balls([body])) for body in (first, second)])
-    return frozen(np.abs(robot.chain.gain).T @ np.where((weights > 0.0).all(axis=0), 0.0, weights.sum(axis=0)))
+    each = np.array([_body_weights(robot, body) for body in bodies]).reshape(-1, len(robot.chain.parent))
+    first, second = each[np.array(pairs, dtype=np.int64).reshape(-1, 2).T]
+    return frozen(np.where((first > 0.0) & (second > 0.0), 0.0, first + second) @ np.abs(robot.chain.gain))
+
+
+@lru_cache(maxsize=512)
+def _body_weights(robot: Robot, body: Body) -> Vector:
+    """See :func:`_joint_weights`; cached, for the links of a robot are those of all its worlds."""
+    return frozen(_joint_weights(robot, _balls([body]) if body.joint > 0 else []))
 
 
 def _balls(bodies: Iterable[Body]) -> list[tuple[int, Vector, float]]:

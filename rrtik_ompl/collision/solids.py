@@ -128,6 +128,20 @@ class SameObject:
         return id(self.geometry)
 
 
+def around(geometry: Any) -> Any:
+    """A convex solid that contains a coal geometry: a mesh's hull (the mesh, if it is flat), a solid itself."""
+    return _around(SameObject(geometry)) if is_mesh(geometry) else geometry
+
+
+@lru_cache(maxsize=128)
+def _around(key: SameObject) -> Any:
+    vertices, triangles = mesh_arrays(key.geometry)
+    used = vertices[np.unique(triangles)]
+    if len(used) < 4 or not _thickness(used) >= FLATTEST * _extent(used):
+        return key.geometry
+    return hull(used)
+
+
 def mesh_arrays(geometry: Any) -> tuple[Matrix, NDArray[np.int64]]:
     """Vertices, shape (n, 3), and triangles, shape (m, 3), of a coal mesh, read-only."""
     return _mesh_arrays(SameObject(geometry))
