@@ -13,6 +13,7 @@ import numpy as np
 from rrtik_ompl import catalog
 from rrtik_ompl.arrays import Matrix, finite_array
 from rrtik_ompl.errors import InputError, UnknownNameError, require
+from rrtik_ompl.fast.library import library
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.goal_configurations import goal_configurations
 from rrtik_ompl.ompl_bridge.attempt import (
@@ -104,12 +105,20 @@ def plan(
     used = _seed(seed)
     problem = problem if accuracy == problem.world.accuracy else problem.with_accuracy(accuracy)
     seeds = [int(child) for child in np.random.SeedSequence(used).generate_state(restarts + 1, np.uint32)]
+    _load_kernels(problem, factory)
     begin = time.perf_counter()
     path, reason, totals = _search(problem, factory, name, begin + limit, seeds, parameters or {})
     elapsed = time.perf_counter() - begin
     if path is None and elapsed >= limit:
         reason = f"no path within {limit:g} s ({totals['attempts']} attempts; the last one: {reason or 'out of time'})"
     return Plan(path is not None, path, reason, elapsed, name, used, MappingProxyType(totals))
+
+
+def _load_kernels(problem: Problem, factory: PlannerFactory) -> None:
+    """Load what the search will ask for: compiling it for the first time is no part of planning."""
+    if problem.world.fast is not None:
+        for name in getattr(factory, "kernels", ()):
+            library(name)
 
 
 def _search(

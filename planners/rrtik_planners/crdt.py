@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.axis_rules import AxisRules, runs_in_kernels
+from rrtik_ompl.fast.axis_rules import KERNELS, AxisRules, runs_in_kernels
 from rrtik_ompl.fast.axis_search import AxisSearch
 from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
 from rrtik_planners.axis_options import AxisOptions, Joints, PerJoint, joint_names
@@ -31,6 +31,8 @@ class CRDT(SafePlanner):
 
     In a world with kernels the whole search runs there; it finds the same path as the search in Python.
     """
+
+    kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
 
     def __init__(
         self,

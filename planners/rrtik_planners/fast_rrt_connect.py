@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -23,6 +23,8 @@ class FastRRTConnect(SafePlanner):
     Motions that they cannot decide are asked of the world once they stand on a path, and never in a conservative
     world. With any other world, or none, a plain loop does the same on one motion at a time.
     """
+
+    kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
 
     def __init__(
         self,

@@ -11,7 +11,7 @@ import time
 import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from ompl import base as ob
@@ -59,11 +59,14 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     keeps the text in :attr:`error`. KeyboardInterrupt and SystemExit pass.
 
     Attributes:
+        kernels: For the class: names of the kernel libraries that a search may use (:mod:`rrtik_ompl.fast.library`).
         seed: The seed in use; given, or drawn from OMPL's, so that ``ompl.util.RNG.setSeed`` fixes it too.
         rng: The generator for :meth:`search`.
         statistics: Counts of the last ``solve``, plain ints and floats.
         error: Why the last ``solve`` could not be done, or None. The last line says it in short.
     """
+
+    kernels: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, si: Any, name: str, *, world: WorldLike | None = None, seed: int | None = None) -> None:
         """Make a planner.
