@@ -203,9 +203,7 @@ def _prism(ring: Matrix, high: float) -> Triangles:
     return np.concatenate([np.stack(side, axis=1) for side in sides])
 
 
-def mesh_solid(
-    vertices: Matrix, triangles: NDArray[np.int64], boxes: tuple[Matrix, Matrix]
-) -> tuple[MeshSolid, Frame]:
+def mesh_solid(vertices: Matrix, triangles: NDArray[np.int64], boxes: tuple[Matrix, Matrix]) -> tuple[MeshSolid, Frame]:
     """A mesh and, if it is open, boxes that it encloses; degenerate triangles are kept, they are part of the surface.
 
     Args:
