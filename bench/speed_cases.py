@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from collision_speed import clutter
+import pinocchio as pin
 from ompl import geometric as og
 
 from rrtik_ompl import Obstacle, Problem, ProblemError, Scene, World, list_problems, load_problem, load_robot
@@ -49,6 +49,16 @@ class Options:
     quick: bool
     plans: int
     limit: float = 1.0
+
+
+def clutter(count: int, reach: float, rng: np.random.Generator) -> Scene:
+    """Boxes around the arm; none stands so near to the first axis that the arm could not but touch it."""
+    azimuth = rng.uniform(-np.pi, np.pi, count)
+    radius, height = reach * rng.uniform(0.45, 1.0, count), reach * rng.uniform(-0.2, 0.7, count)
+    centres = np.column_stack([radius * np.cos(azimuth), radius * np.sin(azimuth), height])
+    boxes = (Box(rng.uniform(0.05, 0.15, 3) * reach) for _ in range(count))
+    poses = (pin.SE3(np.eye(3), centre) for centre in centres)
+    return Scene([Obstacle(f"box{k}", box, pose) for k, (box, pose) in enumerate(zip(boxes, poses, strict=True))])
 
 
 def panda_files(options: Options, count: int) -> list[Path]:

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 from acceptance import Report
-from collision_speed import clutter
 from speed_cases import (
     REACHES,
     Options,
     arms_among_boxes,
     asked_configurations,
+    clutter,
     exact_problem,
     family,
     near_contact,
