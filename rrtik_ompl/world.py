@@ -205,7 +205,7 @@ class World:
 
     def _rows(self, Q: ArrayLike, dimensions: int) -> Matrix:
         """Checked configurations as rows, shape (m, dof)."""
-        rows = np.asarray(Q, dtype=np.float64) if isinstance(Q, np.ndarray) and Q.dtype != object else None
+        rows = np.asarray(Q, dtype=np.float64) if isinstance(Q, np.ndarray) and Q.dtype.kind in "fiub" else None
         if rows is None or rows.ndim != dimensions or rows.shape[-1] != self.robot.dof or not np.isfinite(rows).all():
             if dimensions == 1:
                 return self.robot.configuration(Q)[None]

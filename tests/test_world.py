@@ -193,6 +193,16 @@ def test_a_bad_configuration_is_refused(bad):
         world.valid(bad)
 
 
+@pytest.mark.parametrize(
+    "bad", [np.zeros((2, 6), dtype=complex), np.full((2, 6), "0"), np.full((2, 6), np.inf), np.zeros((2, 6, 1))]
+)
+def test_a_bad_batch_is_refused(bad):
+    world = World(load_robot("titan4"))
+    for ask in (world.valid_batch, world.certify, lambda rows: world.motion_valid_batch(rows, rows)):
+        with pytest.raises(InputError, match="titan4"):
+            ask(bad)
+
+
 def test_batches_may_be_empty_of_any_layout_and_any_real_type():
     world = World(load_robot("titan4"))
     Q = np.random.default_rng(0).uniform(-0.5, 0.5, (6, 6))
