@@ -194,7 +194,7 @@ def test_a_bad_configuration_is_refused(bad):
 
 
 @pytest.mark.parametrize(
-    "bad", [np.zeros((2, 6), dtype=complex), np.full((2, 6), "0"), np.full((2, 6), np.inf), np.zeros((2, 6, 1))]
+    "bad", [np.zeros((2, 6), dtype=complex), np.full((2, 6), "x"), np.full((2, 6), np.inf), np.zeros((2, 6, 1))]
 )
 def test_a_bad_batch_is_refused(bad):
     world = World(load_robot("titan4"))
