@@ -528,7 +528,7 @@ def test_a_world_without_pairs_is_free():
 
 
 def test_solids_with_a_formula_need_no_covers():
-    for kind, expected in (("box", (False, False)), ("convex", (False, True)), ("mesh", (True, False))):
+    for kind, expected in (("box", (False, False)), ("convex", (False, True)), ("mesh", (True, True))):
         solid = random_solid(kind, np.random.default_rng(0), 1.0)
         solid.computeLocalAABB()
         assert fast.needs_covers(Body("x", 0, pin.SE3.Identity(), solid, "obstacle")) == expected

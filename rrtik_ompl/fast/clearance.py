@@ -20,7 +20,8 @@ class Clearance:
         lower: No more than the distance [m], shape (m,); not above 0 means that nothing is proven. +inf if nothing can
             collide, -inf for joint values beyond what the margin covers.
         upper: No less than the distance [m], shape (m,); below 0 means a collision, +inf that nothing is known.
-        pairs: Numbers of the two bodies that the lower bound is of, -1 where there are none, shape (m, 2).
+        pairs: Numbers of the two bodies that the lower bound is of, -1 where there are none, shape (m, 2). Solids that
+            one joint carries count as one body, the first of them.
     """
 
     lower: Vector

@@ -174,7 +174,7 @@ class FastWorld:
         if beyond is not None:
             lowest, highest = np.where(beyond, -np.inf, lowest), np.where(beyond, np.inf, highest)
             nearest = np.where(beyond, -1, nearest)
-        pairs = [self._flagged[flag] if flag >= 0 else (-1, -1) for flag in nearest.tolist()]
+        pairs = [self._flagged[flag][0] if flag >= 0 else (-1, -1) for flag in nearest.tolist()]
         return Clearance(rounded(lowest, -1.0), rounded(highest, 1.0), np.array(pairs, dtype=np.int64).reshape(-1, 2))
 
     def _measured(self, rows: Matrix, level: int) -> tuple[Vector, NDArray[np.int32]]:
