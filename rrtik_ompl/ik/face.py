@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal, joint_difference
-from rrtik_ompl.ik.methods import METHODS, Answer, Question, Target, errors
+from rrtik_ompl.ik.methods import METHODS
 from rrtik_ompl.ik.numeric import targets
+from rrtik_ompl.ik.question import Answer, Question, Target, errors
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 
@@ -94,7 +95,7 @@ def solve_ik(
     name = _chosen(robot, drawn, method)
 
     def accept(Q: Matrix) -> Mask:
-        return _free(world, Q)
+        return free_of_collision(world, Q)
 
     answer = METHODS[name].run(Question(robot, drawn, posture, accept, all, begin + limit, rng))
     q = answer.q[robot.within_limits(answer.q) & goal.satisfied(robot, answer.q)] if len(answer.q) else answer.q
@@ -130,8 +131,11 @@ def _chosen(robot: Robot, drawn: tuple[Target, ...], method: str) -> str:
     return method
 
 
-def _free(world: World | None, Q: Matrix) -> Mask:
-    """Which configurations are free of collision: by the fast check first, then by the independent one."""
+def free_of_collision(world: World | None, Q: Matrix) -> Mask:
+    """Which configurations, shape (k, dof), are free: by the fast check first, then by the independent one.
+
+    All are if there is no world.
+    """
     if world is None or len(Q) == 0:
         return np.ones(len(Q), dtype=bool)
     free = np.array(world.valid_batch(Q))

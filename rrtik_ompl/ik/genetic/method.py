@@ -1,0 +1,40 @@
+"""The genetic algorithm as a method of `solve_ik`: one point, in the whole range, near a posture."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from rrtik_ompl.ik.genetic.options import REFINED
+from rrtik_ompl.ik.genetic.search import follow_targets
+from rrtik_ompl.ik.question import Answer, Question
+from rrtik_ompl.ik.restarts import nearest_without_limits
+
+ROUNDS = 16  # populations, after which it gives up
+GENERATIONS = 250  # of each
+MOTION_WEIGHT = 0.005  # [m/rad]: of two ways to the goal the one that moves less, not the goal less well
+
+
+def genetic(question: Question) -> Answer:
+    """One population after another, each until it reaches a target or stands still; the targets take turns."""
+    options = replace(REFINED, generations=GENERATIONS, stall=None, start_over=None, motion_weight=MOTION_WEIGHT)
+    found, generations = np.zeros((0, question.robot.dof)), 0
+    for number in range(ROUNDS):
+        target = question.targets[number % len(question.targets)]
+        run = follow_targets(
+            question.robot,
+            (target,),
+            options,
+            question.rng,
+            accept=question.accept,
+            near=question.near,
+            deadline=question.deadline,
+        )
+        found, generations = np.vstack([found, run.q]), generations + run.generations
+        if len(found) and not question.all:
+            return Answer(found, question.near, target, generations)
+        if run.timed_out or time.monotonic() > question.deadline:
+            return Answer(found, *nearest_without_limits(question, generations), timed_out=True)
+    return Answer(found, *nearest_without_limits(question, generations))
