@@ -30,7 +30,7 @@ class IkResult:
         solutions: Configurations at the goal, inside the limits, free if a world was given, nearest first; shape
             (k, dof). At most one unless all were asked for.
         residuals: Distance [m] and angle [rad] of each from its target by forward kinematics, shape (k, 2).
-        reason: "" or why there is none: ``unreachable``, ``limits``, ``collision``, ``time``.
+        reason: "" or why there is none: ``unreachable``, ``limits``, ``collision``, ``time`` (or the method gave up).
         detail: The same in a line: by how much, which joint, what touches.
         iterations: Steps of a numeric method.
         method: The method that answered.
@@ -169,7 +169,9 @@ def _why(robot: Robot, answer: Answer, world: World | None, q: Matrix) -> tuple[
         return "collision", f"{len(q)} configurations reach the goal, all in collision: {world.explain(q[0])}"
     distance, angle = errors(robot, answer.target, answer.nearest[None])[0]
     if bool(answer.target.satisfied(robot, answer.nearest[None])[0]):
-        fault = robot.limit_fault(answer.nearest) or "the joints' limits leave no way to it"
+        fault = robot.limit_fault(answer.nearest)
+        if not fault:
+            return "time", f"the goal is in reach, but the method gave up after {answer.iterations} steps"
         return "limits", f"the arm could reach the goal, but {fault}"
     if answer.timed_out:
         return "time", f"no solution in time; the nearest posture is {distance:.4g} m and {angle:.4g} rad away"

@@ -10,12 +10,19 @@ import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.goal import PositionGoal
+from rrtik_ompl.ik.ccd import ccd
 from rrtik_ompl.ik.closed_form import family, form_of, has_closed_form, solutions, tip_fault
+from rrtik_ompl.ik.damped import damped_least_squares, pinocchio_iteration
+from rrtik_ompl.ik.fabrik import fabrik, fabrik_misfit
 from rrtik_ompl.ik.genetic.method import genetic
+from rrtik_ompl.ik.hinges import coupled_fault
 from rrtik_ompl.ik.numeric import descend
+from rrtik_ompl.ik.pso import PARTICLES, pso, resampled_pso
 from rrtik_ompl.ik.question import Answer, Method, Question, Target
-from rrtik_ompl.ik.restarts import Walk, restarted
+from rrtik_ompl.ik.restarts import ROUNDS, STARTS, Walk, restarted
 from rrtik_ompl.robot import Robot
+
+ENOUGH = 4  # starts that arrive before the others of a round are given up
 
 
 def _closed_form_misfit(robot: Robot, target: Target) -> str:
@@ -63,8 +70,8 @@ def _matrix(target: Target) -> Matrix:
     return np.asarray(target.T_world_tip.homogeneous, dtype=np.float64)
 
 
-def _walks(walk: Walk) -> Callable[[Question], Answer]:
-    return partial(restarted, walk)
+def _walks(walk: Walk, starts: int = STARTS, rounds: int = ROUNDS) -> Callable[[Question], Answer]:
+    return partial(restarted, walk, starts=starts, rounds=rounds)
 
 
 def _fits_all(robot: Robot, target: Target) -> str:
@@ -72,10 +79,21 @@ def _fits_all(robot: Robot, target: Target) -> str:
     return ""
 
 
+def _stands_alone(robot: Robot, target: Target) -> str:
+    del target
+    return coupled_fault(robot)
+
+
 METHODS: Mapping[str, Method] = MappingProxyType(
     {
         "closed-form": Method(_closed_form_misfit, _closed_form),
         "numeric": Method(_fits_all, _walks(descend)),
         "genetic": Method(_fits_all, genetic),
+        "damped": Method(_fits_all, _walks(partial(damped_least_squares, enough=ENOUGH))),
+        "pinocchio": Method(_fits_all, _walks(pinocchio_iteration, starts=1, rounds=64)),
+        "ccd": Method(_stands_alone, _walks(partial(ccd, enough=ENOUGH))),
+        "fabrik": Method(fabrik_misfit, _walks(partial(fabrik, enough=ENOUGH))),
+        "pso": Method(_fits_all, _walks(pso, starts=4 * PARTICLES)),
+        "pso-resampled": Method(_fits_all, _walks(resampled_pso, starts=4 * PARTICLES)),
     }
 )

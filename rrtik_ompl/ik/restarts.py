@@ -25,7 +25,7 @@ def restarted(walk: Walk, question: Question, *, starts: int = STARTS, rounds: i
     """Walk from the posture and from random ones, round after round until a solution will do.
 
     Args:
-        walk: The method; it keeps inside the joint limits.
+        walk: The method; what it leads to outside the joint limits is left out.
         question: What is asked.
         starts: In one round.
         rounds: At most; the targets take turns.
@@ -38,18 +38,21 @@ def restarted(walk: Walk, question: Question, *, starts: int = STARTS, rounds: i
         if number < len(question.targets):
             Q[0] = question.near
         Q, taken = walk(robot, target, Q)
-        found, steps = np.vstack([found, Q[target.satisfied(robot, Q)]]), steps + taken
+        good = target.satisfied(robot, Q) & robot.within_limits(Q)
+        found, steps = np.vstack([found, Q[good]]), steps + taken
         if question.accept(found).any() and not question.all:
             break
         if time.monotonic() > question.deadline:
-            return Answer(found, *nearest_without_limits(question, steps), timed_out=True)
+            return Answer(found, *nearest_posture(question, steps), timed_out=True)
     if len(found):
         return Answer(found, question.near, target, steps)
-    return Answer(found, *nearest_without_limits(question, steps))
+    return Answer(found, *nearest_posture(question, steps))
 
 
-def nearest_without_limits(question: Question, steps: int = 0) -> tuple[Vector, Target, int]:
-    """The posture that comes nearest to the first target when the joints may turn without limits, for the reason.
+def nearest_posture(question: Question, steps: int = 0) -> tuple[Vector, Target, int]:
+    """The posture that comes nearest to the first target, for the reason of a failure.
+
+    It is one inside the limits if such a one reaches the target; otherwise the joints may turn without limits.
 
     Returns:
         The posture, shape (dof,), the target, and ``steps`` more than were given.
@@ -62,5 +65,9 @@ def nearest_without_limits(question: Question, steps: int = 0) -> tuple[Vector, 
         upper=np.where(turning, 2.0 * np.pi, robot.upper),
     )
     starts = question.rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
-    Q, taken = descend(free, target, starts)
-    return Q[int(np.argmin(errors(robot, target, Q).sum(axis=1)))], target, steps + taken
+    inside, taken = descend(robot, target, starts)
+    at_goal = inside[target.satisfied(robot, inside)]
+    if len(at_goal):
+        return at_goal[0], target, steps + taken
+    anywhere, more = descend(free, target, starts)
+    return anywhere[int(np.argmin(errors(robot, target, anywhere).sum(axis=1)))], target, steps + taken + more

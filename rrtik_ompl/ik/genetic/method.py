@@ -10,7 +10,7 @@ import numpy as np
 from rrtik_ompl.ik.genetic.options import REFINED
 from rrtik_ompl.ik.genetic.search import follow_targets
 from rrtik_ompl.ik.question import Answer, Question
-from rrtik_ompl.ik.restarts import nearest_without_limits
+from rrtik_ompl.ik.restarts import nearest_posture
 
 ROUNDS = 64  # populations, after which it gives up
 GENERATIONS = 40  # of each; most that reach the goal do so in ten
@@ -36,5 +36,5 @@ def genetic(question: Question) -> Answer:
         if len(found) and not question.all:
             return Answer(found, question.near, target, generations)
         if run.timed_out or time.monotonic() > question.deadline:
-            return Answer(found, *nearest_without_limits(question, generations), timed_out=True)
-    return Answer(found, *nearest_without_limits(question, generations))
+            return Answer(found, *nearest_posture(question, generations), timed_out=True)
+    return Answer(found, *nearest_posture(question, generations))
