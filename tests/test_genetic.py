@@ -15,7 +15,7 @@ from rrtik_ompl.ik.closed_form import solutions
 from rrtik_ompl.ik.form import wrapped
 from rrtik_ompl.ik.genetic.breeding import children
 from rrtik_ompl.ik.genetic.genes import LARGEST, Window, around, from_gray, random_genes, to_gray, whole_range
-from rrtik_ompl.ik.genetic.objective import manipulability
+from rrtik_ompl.ik.genetic.objective import manipulability, reach, score
 from rrtik_ompl.ik.genetic.options import HISTORICAL, STANDARD, GeneticOptions
 from rrtik_ompl.ik.genetic.search import follow_targets
 
@@ -27,6 +27,10 @@ EVERY_NUMBER = np.arange(LARGEST + 1, dtype=np.uint16)
 
 def goals(number, count=251):
     return [rrtik.PositionGoal(point, TOLERANCE) for point in PUBLISHED["curve"](number)[:count] * INCH]
+
+
+def everything(Q):
+    return np.ones(len(Q), dtype=bool)
 
 
 def follow(robot, number, options, seed=0, **more):
@@ -149,11 +153,24 @@ def test_joints_move_less_if_motion_counts():
     assert travel[1] < 0.6 * travel[0]
 
 
-def test_manipulability_that_counts_is_greater():
-    robot = rrtik.load_robot("puma560_5dof", lengths={"d7": 4.0 * INCH})
-    plain, away = follow(robot, 4, STANDARD), follow(robot, 4, replace(STANDARD, singularity_weight=1.0))
-    least = [manipulability(robot, run.q, True).min() for run in (plain, away)]
-    assert least[1] > 1.2 * least[0]
+def test_manipulability_counts_in_favour_of_a_posture():
+    robot = rrtik.load_robot("puma560_5dof")
+    Q = np.random.default_rng(0).uniform(robot.lower, robot.upper, (50, 5))
+    goal, weighted = rrtik.PositionGoal([0.5, 0.1, 0.2]), replace(STANDARD, singularity_weight=0.7)
+    plain, counted = (score(robot, goal, Q, None, each, everything).cost for each in (STANDARD, weighted))
+    J = robot.jacobian_batch(Q)[:, :3] / reach(robot)
+    wanted = np.sqrt(np.linalg.det(J @ J.transpose(0, 2, 1)))
+    np.testing.assert_allclose(plain - counted, 0.7 * wanted, atol=1e-9)
+    np.testing.assert_allclose(manipulability(robot, Q, True), wanted, atol=1e-9)
+
+
+def test_who_will_not_do_costs_the_reach_more_and_is_not_there():
+    robot = rrtik.load_robot("puma560_3dof")
+    q = np.zeros((1, 3))
+    goal = rrtik.PositionGoal(robot.fk(q[0]).translation)
+    good, bad = (score(robot, goal, q, None, STANDARD, lambda Q, v=v: np.full(len(Q), v)) for v in (True, False))
+    assert (good.reached[0], bad.reached[0]) == (True, False)
+    assert bad.cost[0] - good.cost[0] == pytest.approx(reach(robot))
 
 
 def test_the_same_seed_gives_the_same_run_and_another_one_another():
@@ -169,6 +186,15 @@ def test_a_point_that_will_not_do_is_not_taken():
     run = follow(robot, 1, STANDARD, accept=lambda Q: Q[:, 0] < 0.0)
     assert len(run.q) == 251
     assert (run.q[:, 0] < 0.0).all()
+
+
+def test_no_step_is_longer_than_wanted_where_the_extrapolation_would_run_away():
+    robot = rrtik.load_robot("puma560_5dof")
+    most = np.radians(3.0)
+    options = replace(STANDARD, gain=1.0, generations=3000, largest_step=most)
+    run = follow(robot, 1, options)
+    assert len(run.q) > 5
+    assert np.abs(np.diff(run.q, axis=0)).max() <= most
 
 
 def test_the_generations_end_where_the_options_say():

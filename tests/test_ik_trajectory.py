@@ -49,6 +49,26 @@ def test_points_are_followed_by_three_joints(method):
     assert np.abs(np.diff(answer.q, axis=0)).max() < 0.2
 
 
+@pytest.mark.parametrize("name", ["puma560_3dof", "planar6", "puma560_5dof"])
+def test_a_population_makes_no_jumps_at_the_end_of_the_reach_either(name):
+    robot = rrtik.load_robot(name)
+    lower, upper = robot.finite_range()
+    for seed in range(3):
+        middle = 0.5 * (lower + upper) + 0.1 * (upper - lower) * np.random.default_rng(seed).uniform(-1, 1, robot.dof)
+        points = robot.fk_batch(middle + np.linspace(0.0, 0.3, 20)[:, None])[:, :3, 3]
+        answer = rrtik.solve_ik_trajectory(robot, points, method="genetic", jump=0.15)
+        assert (answer.found, answer.jumps) == (True, ())
+
+
+def test_a_closed_form_of_positions_is_not_asked_for_poses():
+    robot = rrtik.load_robot("puma560_3dof")
+    poses, _ = line(robot, seed=1)
+    answer = rrtik.solve_ik_trajectory(robot, poses)
+    assert (answer.found, answer.method) == (True, "numeric")
+    with pytest.raises(InputError, match="positions alone"):
+        rrtik.solve_ik_trajectory(robot, poses, method="closed-form")
+
+
 @pytest.mark.parametrize("method", ["closed-form", "numeric", "genetic"])
 def test_a_world_is_kept_clear_of(method):
     robot = rrtik.load_robot("puma560_3dof")

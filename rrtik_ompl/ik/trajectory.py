@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
 
@@ -15,7 +15,7 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.goal import PoseGoal, PositionGoal, joint_difference, pose_errors
 from rrtik_ompl.ik.branch_choice import JUMP, follow
-from rrtik_ompl.ik.closed_form import check_rotations
+from rrtik_ompl.ik.closed_form import check_rotations, form_of
 from rrtik_ompl.ik.face import free_of_collision, solve_ik
 from rrtik_ompl.ik.genetic.options import PRESETS, GeneticOptions
 from rrtik_ompl.ik.genetic.search import follow_targets
@@ -28,7 +28,7 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 
 SECONDS = 60.0
-SECONDS_A_POINT = 1.0  # to say why a point has no configuration
+SECONDS_A_POINT = 5.0  # to say why a point has no configuration
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,7 +112,8 @@ def solve_ik_trajectory(
         world: If given, all configurations are free of collision. Its robot must be this one.
         position_tolerance: Of every point [m].
         orientation_tolerance: Of every pose [rad].
-        jump: Motion of one joint between two points [rad or m] from which on it counts as a jump.
+        jump: Motion of one joint between two points [rad or m] from which on it counts as a jump; the genetic
+            algorithm makes none.
         options: Of the genetic algorithm, or the name of a preset: "standard", "historical", "refined".
         seconds: Time that a method may take, the closed form aside.
         seed: Of the random numbers.
@@ -181,6 +182,8 @@ def _chosen(task: Task, method: str) -> str:
     if method != "auto" and method not in FOLLOWERS:
         raise UnknownNameError("inverse kinematics method for trajectories", method, ("auto", *FOLLOWERS))
     misfits = {name: METHODS[name].misfit(task.robot, task.targets[0]) for name in FOLLOWERS}
+    if not misfits["closed-form"] and form_of(task.robot).kind == "position" and task.poses.ndim == 3:
+        misfits["closed-form"] = "its closed form knows positions alone; give points, shape (k, 3)"
     fitting = [name for name, misfit in misfits.items() if not misfit]
     if method != "auto" and misfits[method]:
         raise InputError(
@@ -196,8 +199,9 @@ def _closed_form(task: Task) -> tuple[Matrix, int]:
 
 def _genetic(task: Task) -> tuple[Matrix, int]:
     quick = None if task.world is None else task.world.valid_batch  # the second opinion comes at the end
+    options = replace(task.options, largest_step=task.options.largest_step or task.jump)
     run = follow_targets(
-        task.robot, task.targets, task.options, task.rng, accept=quick, near=task.near, deadline=task.deadline
+        task.robot, task.targets, options, task.rng, accept=quick, near=task.near, deadline=task.deadline
     )
     q = np.full((len(task.targets), task.robot.dof), np.nan)
     q[: len(run.q)] = run.q

@@ -14,12 +14,11 @@ from rrtik_ompl.ik.restarts import nearest_posture
 
 ROUNDS = 64  # populations, after which it gives up
 GENERATIONS = 40  # of each; most that reach the goal do so in ten
-MOTION_WEIGHT = 0.005  # [m/rad]: of two ways to the goal the one that moves less, not the goal less well
 
 
 def genetic(question: Question) -> Answer:
     """One population after another, each until it reaches a target or stands still; the targets take turns."""
-    options = replace(REFINED, generations=GENERATIONS, stall=None, start_over=None, motion_weight=MOTION_WEIGHT)
+    options = replace(REFINED, generations=GENERATIONS, stall=None, start_over=None)
     found, generations = np.zeros((0, question.robot.dof)), 0
     for number in range(ROUNDS):
         target = question.targets[number % len(question.targets)]

@@ -30,7 +30,7 @@ def score(
     Q: Matrix,
     last: Vector | None,
     options: GeneticOptions,
-    accept: Callable[[Matrix], Mask] | None = None,
+    accept: Callable[[Matrix], Mask],
 ) -> Score:
     """Judge configurations, shape (m, dof).
 
@@ -56,8 +56,8 @@ def score(
         cost += options.motion_weight * np.linalg.norm(joint_difference(robot, Q, last), axis=1)
     if options.singularity_weight:
         cost -= options.singularity_weight * manipulability(robot, Q, isinstance(target, PositionGoal))
-    if accept is not None:
-        good = accept(Q)
+    good = accept(Q)
+    if not good.all():
         reached &= good
         cost += reach(robot) * ~good
     return Score(cost, distance, angle, reached)

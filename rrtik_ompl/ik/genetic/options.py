@@ -32,6 +32,7 @@ class GeneticOptions:
         refined: How many of the best individuals take a damped Newton step each generation (not in the paper).
         orientation_weight: What an angle counts [m/rad] beside the distance.
         motion_weight: What the joints' motion from the last point counts [m/rad].
+        largest_step: Of any joint between two points [rad or m]; individuals farther away are not taken. None: any.
         singularity_weight: What manipulability counts in favour of a posture [m]; lengths in units of the reach.
     """
 
@@ -47,6 +48,7 @@ class GeneticOptions:
     refined: int = 0
     orientation_weight: float = 0.1
     motion_weight: float = 0.0
+    largest_step: float | None = None
     singularity_weight: float = 0.0
 
     def __post_init__(self) -> None:
@@ -54,7 +56,7 @@ class GeneticOptions:
             raise InputError(f"genetic: population must be an even number of at least 2, got {self.population}")
         if not 0 <= self.refined <= self.population:
             raise InputError(f"genetic: refined must lie between 0 and the population, got {self.refined}")
-        for name in ("tournament", "generations", "stall", "start_over", "window"):
+        for name in ("tournament", "generations", "stall", "start_over", "window", "largest_step"):
             value = getattr(self, name)
             if value is not None and not value > 0:
                 raise InputError(f"genetic: {name} must be greater than 0, got {value}")
@@ -70,7 +72,8 @@ class GeneticOptions:
 STANDARD = GeneticOptions()
 # fitted to the published counts after the fact: about two flipped bits a generation in the whole population
 HISTORICAL = GeneticOptions(bit_mutation=0.0, gene_mutation=0.007, stall=1500, start_over=None)
-REFINED = GeneticOptions(refined=10)
+# a little weight on motion keeps joints at rest that the target leaves free, and the extrapolation from running away
+REFINED = GeneticOptions(refined=10, motion_weight=0.005)
 PRESETS: Mapping[str, GeneticOptions] = MappingProxyType(
     {"standard": STANDARD, "historical": HISTORICAL, "refined": REFINED}
 )

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen
-from rrtik_ompl.goal import PositionGoal
+from rrtik_ompl.goal import PositionGoal, joint_difference
 from rrtik_ompl.ik.genetic.breeding import children
 from rrtik_ompl.ik.genetic.genes import around, random_genes, whole_range
 from rrtik_ompl.ik.genetic.objective import Score, score
@@ -128,7 +128,7 @@ class _Run:
         """One generation: judge the population, then move on to the next point or breed."""
         Q = self.window.decode(self.genes)
         Q[: len(self.exact)] = self.exact
-        judged = score(self.robot, self.targets[len(self.points)], Q, self.last, self.options, self.accept)
+        judged = score(self.robot, self.targets[len(self.points)], Q, self.last, self.options, self.will_do)
         self.generation += 1
         self.since_point += 1
         self.remember(Q, judged)
@@ -141,6 +141,15 @@ class _Run:
             self.draw()
         else:
             self.breed(Q, judged)
+
+    def will_do(self, Q: Matrix) -> Mask:
+        """Which configurations may be taken: near enough to the last point, and accepted."""
+        good = np.ones(len(Q), dtype=bool)
+        if self.options.largest_step is not None and self.points:
+            good = np.abs(joint_difference(self.robot, Q, self.points[-1])).max(axis=1) <= self.options.largest_step
+        if self.accept is not None:
+            good[good] = self.accept(Q[good])
+        return good
 
     def remember(self, Q: Matrix, judged: Score) -> None:
         """Keep the best distance for the record, and the posture that came nearest to the farthest point so far."""
@@ -159,7 +168,8 @@ class _Run:
             self.farthest, self.costs_farthest, self.least = self.points.copy(), self.costs.copy(), np.inf
         if self.options.window is not None:
             step = q - self.points[-2] if len(self.points) > 1 else 0.0
-            self.window = around(self.robot, q + self.gain * step, self.options.window)
+            most = np.inf if self.options.largest_step is None else self.options.largest_step
+            self.window = around(self.robot, q + np.clip(self.gain * step, -most, most), self.options.window)
 
     def stands_still(self, cost: float) -> bool:
         """Whether the best cost has not improved for as long as the options allow."""
