@@ -72,7 +72,8 @@ def solve_ik(
     Args:
         robot: The arm.
         goal: A pose, a position, or a region with some freedom (of which targets are drawn).
-        method: A name from `list_ik_methods`; "auto" is the closed form where it fits, else numeric.
+        method: A name from `list_ik_methods`; "auto" is the closed form where it fits, else numeric;
+            the others are there to be compared.
         near: Posture near which a solution is wanted, shape (dof,); the middle of the limits if None.
         all: Every solution that the method finds, not just the nearest: a closed form gives all there are (of a
             singular pose representatives), a numeric one those it comes across.

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.ik.genetic.options import REFINED
 from rrtik_ompl.ik.genetic.search import follow_targets
 from rrtik_ompl.ik.question import Answer, Question
@@ -35,5 +36,14 @@ def genetic(question: Question) -> Answer:
         if len(found) and not question.all:
             return Answer(found, question.near, target, generations)
         if run.timed_out or time.monotonic() > question.deadline:
-            return Answer(found, *nearest_posture(question, generations), timed_out=True)
-    return Answer(found, *nearest_posture(question, generations))
+            return _given_up(question, found, generations, timed_out=True)
+    return _given_up(question, found, generations, timed_out=False)
+
+
+def _given_up(question: Question, found: Matrix, generations: int, *, timed_out: bool) -> Answer:
+    """What there is, and a posture for the reason: if it is at the goal and will not do, that is the reason."""
+    robot = question.robot
+    nearest, target, steps = nearest_posture(question, generations)
+    row = nearest[None]
+    at_goal = row[target.satisfied(robot, row) & robot.within_limits(row)]
+    return Answer(np.vstack([found, at_goal[~question.accept(at_goal)]]), nearest, target, steps, timed_out)
