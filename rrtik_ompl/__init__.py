@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from rrtik_ompl.ik.face import IkResult as IkResult
     from rrtik_ompl.ik.face import list_ik_methods as list_ik_methods
     from rrtik_ompl.ik.face import solve_ik as solve_ik
+    from rrtik_ompl.ik.trajectory import IkTrajectory as IkTrajectory
+    from rrtik_ompl.ik.trajectory import solve_ik_trajectory as solve_ik_trajectory
     from rrtik_ompl.one_joint import one_joint_moves as one_joint_moves
     from rrtik_ompl.path import JointPath as JointPath
     from rrtik_ompl.path import load_path as load_path
@@ -56,6 +58,7 @@ else:
         "goal": ("GoalRegion", "JointGoal", "PoseGoal", "PositionGoal"),
         "ik.batch": ("IkBatch", "solve_ik_batch"),
         "ik.face": ("IkResult", "list_ik_methods", "solve_ik"),
+        "ik.trajectory": ("IkTrajectory", "solve_ik_trajectory"),
         "one_joint": ("one_joint_moves",),
         "path": ("JointPath", "load_path"),
         "planning": ("Plan", "list_planners", "plan"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,7 +100,14 @@ def _nearest_member(robot: Robot, goal: Matrix, near: Vector, scale: Vector) -> 
     return member, least
 
 
-def follow(robot: Robot, targets: ArrayLike, near: ArrayLike | None = None, *, jump: float = JUMP) -> Track:
+def follow(
+    robot: Robot,
+    targets: ArrayLike,
+    near: ArrayLike | None = None,
+    *,
+    jump: float = JUMP,
+    accept: Callable[[Matrix], Mask] | None = None,
+) -> Track:
     """One solution per point of a trajectory, such that the joints jump as seldom and move as little as they can.
 
     The shortest way through the layers of branches (dynamic programming), so that a branch that would run into a limit
@@ -110,6 +118,7 @@ def follow(robot: Robot, targets: ArrayLike, near: ArrayLike | None = None, *, j
         targets: T_world_tip, shape (k, 4, 4), or points, shape (k, 3).
         near: Posture before the first point; any if None.
         jump: Motion of one joint between two points [rad or m] from which on it counts as a jump.
+        accept: Which of some solutions, shape (k, dof), will do; all inside the limits if None.
 
     Raises:
         InputError: If the robot has no closed form, or a target is no pose.
@@ -123,6 +132,9 @@ def follow(robot: Robot, targets: ArrayLike, near: ArrayLike | None = None, *, j
     layers: list[_Layer] = []
     for k in range(len(goals)):
         q, tags = _candidates(robot, goals[k], found, k, before)
+        if accept is not None and len(q):
+            good = accept(q)
+            q, tags = q[good], tags[good]
         parent = np.zeros(len(q), dtype=np.int64)
         if len(q):
             price = _price(robot, q, before, jump) if near is not None or any(len(each.q) for each in layers) else 0.0

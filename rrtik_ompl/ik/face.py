@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal, joint_difference
-from rrtik_ompl.ik.methods import METHODS, Answer, Question, Target, errors
+from rrtik_ompl.ik.methods import METHODS
 from rrtik_ompl.ik.numeric import targets
+from rrtik_ompl.ik.question import Answer, Question, Target, errors
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 
@@ -29,7 +30,7 @@ class IkResult:
         solutions: Configurations at the goal, inside the limits, free if a world was given, nearest first; shape
             (k, dof). At most one unless all were asked for.
         residuals: Distance [m] and angle [rad] of each from its target by forward kinematics, shape (k, 2).
-        reason: "" or why there is none: ``unreachable``, ``limits``, ``collision``, ``time``.
+        reason: "" or why there is none: ``unreachable``, ``limits``, ``collision``, ``time`` (or the method gave up).
         detail: The same in a line: by how much, which joint, what touches.
         iterations: Steps of a numeric method.
         method: The method that answered.
@@ -71,7 +72,8 @@ def solve_ik(
     Args:
         robot: The arm.
         goal: A pose, a position, or a region with some freedom (of which targets are drawn).
-        method: A name from `list_ik_methods`; "auto" is the closed form where it fits, else numeric.
+        method: A name from `list_ik_methods`; "auto" is the closed form where it fits, else numeric;
+            the others are there to be compared.
         near: Posture near which a solution is wanted, shape (dof,); the middle of the limits if None.
         all: Every solution that the method finds, not just the nearest: a closed form gives all there are (of a
             singular pose representatives), a numeric one those it comes across.
@@ -94,7 +96,7 @@ def solve_ik(
     name = _chosen(robot, drawn, method)
 
     def accept(Q: Matrix) -> Mask:
-        return _free(world, Q)
+        return free_of_collision(world, Q)
 
     answer = METHODS[name].run(Question(robot, drawn, posture, accept, all, begin + limit, rng))
     q = answer.q[robot.within_limits(answer.q) & goal.satisfied(robot, answer.q)] if len(answer.q) else answer.q
@@ -130,8 +132,11 @@ def _chosen(robot: Robot, drawn: tuple[Target, ...], method: str) -> str:
     return method
 
 
-def _free(world: World | None, Q: Matrix) -> Mask:
-    """Which configurations are free of collision: by the fast check first, then by the independent one."""
+def free_of_collision(world: World | None, Q: Matrix) -> Mask:
+    """Which configurations, shape (k, dof), are free: by the fast check first, then by the independent one.
+
+    All are if there is no world.
+    """
     if world is None or len(Q) == 0:
         return np.ones(len(Q), dtype=bool)
     free = np.array(world.valid_batch(Q))
@@ -165,7 +170,9 @@ def _why(robot: Robot, answer: Answer, world: World | None, q: Matrix) -> tuple[
         return "collision", f"{len(q)} configurations reach the goal, all in collision: {world.explain(q[0])}"
     distance, angle = errors(robot, answer.target, answer.nearest[None])[0]
     if bool(answer.target.satisfied(robot, answer.nearest[None])[0]):
-        fault = robot.limit_fault(answer.nearest) or "the joints' limits leave no way to it"
+        fault = robot.limit_fault(answer.nearest)
+        if not fault:
+            return "time", f"the goal is in reach, but the method gave up after {answer.iterations} steps"
         return "limits", f"the arm could reach the goal, but {fault}"
     if answer.timed_out:
         return "time", f"no solution in time; the nearest posture is {distance:.4g} m and {angle:.4g} rad away"

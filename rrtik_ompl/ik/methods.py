@@ -1,81 +1,28 @@
-"""The methods of inverse kinematics behind one face: what each is asked, what it answers, and which goals it fits."""
+"""The methods of inverse kinematics behind one face, the preferred ones first, and which goals each fits."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from functools import partial
 from types import MappingProxyType
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.goal import PoseGoal, PositionGoal
+from rrtik_ompl.arrays import Mask, Matrix
+from rrtik_ompl.goal import PositionGoal
+from rrtik_ompl.ik.ccd import ccd
 from rrtik_ompl.ik.closed_form import family, form_of, has_closed_form, solutions, tip_fault
+from rrtik_ompl.ik.damped import damped_least_squares, pinocchio_iteration
+from rrtik_ompl.ik.fabrik import fabrik, fabrik_misfit
+from rrtik_ompl.ik.genetic.method import genetic
+from rrtik_ompl.ik.hinges import coupled_fault
 from rrtik_ompl.ik.numeric import descend
+from rrtik_ompl.ik.pso import PARTICLES, pso, resampled_pso
+from rrtik_ompl.ik.question import Answer, Method, Question, Target
+from rrtik_ompl.ik.restarts import ROUNDS, STARTS, Walk, restarted
 from rrtik_ompl.robot import Robot
 
-STARTS = 32  # of the numeric method in one round
-ROUNDS = 16  # after which it gives up
-
-Target = PoseGoal | PositionGoal
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Question:
-    """What a method is asked.
-
-    Attributes:
-        robot: The arm.
-        targets: Goals without freedom; one of them is enough.
-        near: Posture near which a solution is wanted, shape (dof,).
-        accept: Which of some configurations, shape (k, dof), inside the limits and at the goal, will do.
-        all: Whether every solution is wanted that the method can find, not just one.
-        deadline: Time of ``time.monotonic`` at which to stop.
-        rng: Random numbers.
-    """
-
-    robot: Robot
-    targets: tuple[Target, ...]
-    near: Vector
-    accept: Callable[[Matrix], Mask]
-    all: bool
-    deadline: float
-    rng: np.random.Generator
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Answer:
-    """What a method found.
-
-    Attributes:
-        q: Configurations at one of the targets, inside the limits, in collision or not, shape (k, dof).
-        nearest: If there is none: the posture that came nearest to a target with no regard to limits, shape (dof,).
-        target: The target that it came near to.
-        iterations: Steps, 0 for a closed form.
-        timed_out: Whether the time was up before the method was through.
-    """
-
-    q: Matrix
-    nearest: Vector
-    target: Target
-    iterations: int = 0
-    timed_out: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Method:
-    """A method: ``misfit`` says why it does not fit a robot and a target ("" if it does); ``run`` answers."""
-
-    misfit: Callable[[Robot, Target], str]
-    run: Callable[[Question], Answer]
-
-
-def errors(robot: Robot, target: Target, Q: Matrix) -> Matrix:
-    """Distance [m] and angle [rad] (0 for a position) of configurations from a target, shape (k, 2)."""
-    if isinstance(target, PositionGoal):
-        return np.column_stack([target.distance(robot, Q), np.zeros(len(Q))])
-    return np.column_stack(target.errors(robot, Q))
+ENOUGH = 4  # starts that arrive before the others of a round are given up
 
 
 def _closed_form_misfit(robot: Robot, target: Target) -> str:
@@ -123,38 +70,30 @@ def _matrix(target: Target) -> Matrix:
     return np.asarray(target.T_world_tip.homogeneous, dtype=np.float64)
 
 
-def _numeric(question: Question) -> Answer:
-    """Levenberg-Marquardt from the posture and from random ones, round after round until a solution will do."""
-    robot = question.robot
-    found, steps = np.zeros((0, robot.dof)), 0
-    for number in range(ROUNDS):
-        target = question.targets[number % len(question.targets)]
-        starts = question.rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
-        if number < len(question.targets):
-            starts[0] = question.near
-        Q, taken = descend(robot, target, starts)
-        found, steps = np.vstack([found, Q[target.satisfied(robot, Q)]]), steps + taken
-        if question.accept(found).any() and not question.all:
-            break
-        if time.monotonic() > question.deadline:
-            return Answer(found, *_nearest(question, steps), timed_out=True)
-    return Answer(found, question.near, target, steps) if len(found) else Answer(found, *_nearest(question, steps))
+def _walks(walk: Walk, starts: int = STARTS, rounds: int = ROUNDS) -> Callable[[Question], Answer]:
+    return partial(restarted, walk, starts=starts, rounds=rounds)
 
 
-def _nearest(question: Question, steps: int) -> tuple[Vector, Target, int]:
-    """The posture that comes nearest to the first target when the joints may turn without limits."""
-    robot, target = question.robot, question.targets[0]
-    turning = ~robot.prismatic
-    free = replace(
-        robot,
-        lower=np.where(turning, -2.0 * np.pi, robot.lower),
-        upper=np.where(turning, 2.0 * np.pi, robot.upper),
-    )
-    starts = question.rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
-    Q, taken = descend(free, target, starts)
-    return Q[int(np.argmin(errors(robot, target, Q).sum(axis=1)))], target, steps + taken
+def _fits_all(robot: Robot, target: Target) -> str:
+    del robot, target
+    return ""
+
+
+def _stands_alone(robot: Robot, target: Target) -> str:
+    del target
+    return coupled_fault(robot)
 
 
 METHODS: Mapping[str, Method] = MappingProxyType(
-    {"closed-form": Method(_closed_form_misfit, _closed_form), "numeric": Method(lambda robot, target: "", _numeric)}
+    {
+        "closed-form": Method(_closed_form_misfit, _closed_form),
+        "numeric": Method(_fits_all, _walks(descend)),
+        "genetic": Method(_fits_all, genetic),
+        "damped": Method(_fits_all, _walks(partial(damped_least_squares, enough=ENOUGH))),
+        "pinocchio": Method(_fits_all, _walks(pinocchio_iteration, starts=1, rounds=64)),
+        "ccd": Method(_stands_alone, _walks(partial(ccd, enough=ENOUGH))),
+        "fabrik": Method(fabrik_misfit, _walks(partial(fabrik, enough=ENOUGH))),
+        "pso": Method(_fits_all, _walks(pso, starts=4 * PARTICLES)),
+        "pso-resampled": Method(_fits_all, _walks(resampled_pso, starts=4 * PARTICLES)),
+    }
 )

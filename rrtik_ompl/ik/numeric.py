@@ -7,14 +7,13 @@ from the target and in singular postures, and Newton's near the solution.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal
+from rrtik_ompl.ik.residual import twist, well_inside
 from rrtik_ompl.robot import Robot
 
 ITERATIONS = 60
@@ -46,11 +45,11 @@ def descend(
     reach = float(np.linalg.norm(robot.chain.placement[:, :3, 3], axis=1).sum()) or 1.0
     scale = np.array([1.0 / reach] * 3 + [0.5] * 3)  # a full turn of orientation counts as much as the whole reach
     for step in range(iterations):
-        open_rows = np.flatnonzero(~_well_inside(robot, goal, Q))
+        open_rows = np.flatnonzero(~well_inside(robot, goal, Q))
         if len(open_rows) == 0:
             return Q, step
         q = Q[open_rows]
-        residual, jacobian = _residual(goal, robot.fk_batch(q)), robot.jacobian_batch(q)
+        residual, jacobian = twist(goal, robot.fk_batch(q)), robot.jacobian_batch(q)
         rows = slice(0, 3) if isinstance(goal, PositionGoal) else slice(0, 6)
         e, J = (residual * scale)[:, rows], (jacobian * scale[:, None])[:, rows]
         Q[open_rows] = np.clip(q + _step(J, e), robot.lower, robot.upper)
@@ -77,26 +76,6 @@ def _drawn(region: GoalRegion, member: PoseGoal | PositionGoal, rng: np.random.G
         turn = pin.exp3(rng.uniform(-np.pi, np.pi) * axis)
     shift = pin.SE3(turn, rng.uniform(-0.5, 0.5, 3) * region.box)
     return PoseGoal(member.T_world_tip * shift, member.position_tolerance, member.orientation_tolerance)
-
-
-def _well_inside(robot: Robot, goal: PoseGoal | PositionGoal, Q: Matrix) -> NDArray[np.bool_]:
-    """At most a hundredth of the tolerance away: a solution on the rim would not survive rounding."""
-    if isinstance(goal, PositionGoal):
-        return goal.distance(robot, Q) <= 0.01 * goal.tolerance
-    position, angle = goal.errors(robot, Q)
-    return (position <= 0.01 * goal.position_tolerance) & (angle <= 0.01 * goal.orientation_tolerance)
-
-
-def _residual(goal: PoseGoal | PositionGoal, tips: NDArray[np.float64]) -> Matrix:
-    """Twist from the tips, shape (m, 4, 4), to the goal in world axes: (linear [m]; rotation vector [rad]), (m, 6)."""
-    residual = np.zeros((len(tips), 6))
-    if isinstance(goal, PositionGoal):
-        residual[:, :3] = goal.position - tips[:, :3, 3]
-        return residual
-    target: Any = goal.T_world_tip
-    residual[:, :3] = target.translation - tips[:, :3, 3]
-    residual[:, 3:] = [pin.log3(target.rotation @ tip[:3, :3].T) for tip in tips]
-    return residual
 
 
 def _step(J: NDArray[np.float64], e: Matrix) -> Matrix:

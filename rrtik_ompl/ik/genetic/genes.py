@@ -1,0 +1,69 @@
+"""Chromosomes: 16 bits of Gray code a joint, and the window of joint values that they stand for.
+
+Source: GA-REB, equation 1. Every chromosome is a configuration inside its window, so that limits need no penalty.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.robot import Robot
+
+BITS = 16
+LARGEST = 2**BITS - 1
+
+Genes: TypeAlias = NDArray[np.uint16]  # shape (population, dof)
+
+
+def to_gray(numbers: Genes) -> Genes:
+    """Gray code of numbers: neighbours differ in one bit. Any shape."""
+    codes: Genes = numbers ^ np.right_shift(numbers, 1, dtype=np.uint16)
+    return codes
+
+
+def from_gray(codes: Genes) -> Genes:
+    """Numbers of Gray codes, the inverse of `to_gray`: bit k is the parity of the bits from k on. Any shape."""
+    numbers: Genes = codes
+    for shift in (8, 4, 2, 1):
+        numbers = numbers ^ np.right_shift(numbers, shift, dtype=np.uint16)
+    return numbers
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Window:
+    """The joint values among which is searched: ``centre`` and ``width`` [rad or m], shapes (dof,)."""
+
+    centre: Vector
+    width: Vector
+
+    def decode(self, genes: Genes) -> Matrix:
+        """Configurations of chromosomes, shape (population, dof)."""
+        q: Matrix = self.centre + (from_gray(genes) / LARGEST - 0.5) * self.width
+        return q
+
+    def encode(self, Q: Matrix) -> Genes:
+        """The chromosomes nearest to configurations, shape (m, dof); outside the window those at its edge."""
+        share = (Q - self.centre) / np.where(self.width > 0.0, self.width, 1.0) + 0.5
+        return to_gray(np.round(np.clip(share, 0.0, 1.0) * LARGEST).astype(np.uint16))
+
+
+def whole_range(robot: Robot) -> Window:
+    """All values inside the limits; of a joint without limits one turn."""
+    lower, upper = robot.finite_range()
+    return Window(0.5 * (lower + upper), upper - lower)
+
+
+def around(robot: Robot, centre: Vector, width: float) -> Window:
+    """A window of a width [rad or m] at a posture, moved inside the limits; at most as wide as these."""
+    widths = np.minimum(width, robot.upper - robot.lower)
+    return Window(np.clip(centre, robot.lower + 0.5 * widths, robot.upper - 0.5 * widths), widths)
+
+
+def random_genes(rng: np.random.Generator, population: int, dof: int) -> Genes:
+    """Chromosomes drawn uniformly, shape (population, dof)."""
+    return rng.integers(0, LARGEST + 1, (population, dof), dtype=np.uint16)

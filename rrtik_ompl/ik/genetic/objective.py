@@ -1,0 +1,87 @@
+"""What an individual is worth: distance and angle from the target, motion, singularity, collision, in one batch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.goal import PositionGoal, joint_difference, pose_errors
+from rrtik_ompl.ik.genetic.options import GeneticOptions
+from rrtik_ompl.ik.question import Target
+from rrtik_ompl.robot import Robot
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Score:
+    """Of every individual: its cost [m], distance [m] and angle [rad] from the target, whether it is there."""
+
+    cost: Vector
+    distance: Vector
+    angle: Vector
+    reached: Mask
+
+
+def score(
+    robot: Robot,
+    target: Target,
+    Q: Matrix,
+    last: Vector | None,
+    options: GeneticOptions,
+    accept: Callable[[Matrix], Mask],
+) -> Score:
+    """Judge configurations, shape (m, dof).
+
+    The paper's fitness is 100 inches less the distance; as a tournament asks only who is better, the distance does.
+
+    Args:
+        robot: The arm.
+        target: A pose, or a position with any orientation.
+        Q: The population.
+        last: Configuration at the point before, shape (dof,), or None.
+        options: The weights.
+        accept: Which configurations will do; the others cost as much as the arm's reach more.
+    """
+    tips = robot.fk_batch(Q)
+    if isinstance(target, PositionGoal):
+        distance = np.sqrt(((tips[:, :3, 3] - target.position) ** 2).sum(axis=1))
+        angle, reached, cost = np.zeros(len(Q)), distance < target.tolerance, distance.copy()
+    else:
+        distance, angle = pose_errors(tips, target.T_world_tip)
+        reached = (distance < target.position_tolerance) & (angle < target.orientation_tolerance)
+        cost = distance + options.orientation_weight * angle
+    if options.motion_weight and last is not None:
+        cost += options.motion_weight * np.linalg.norm(joint_difference(robot, Q, last), axis=1)
+    if options.singularity_weight:
+        cost -= options.singularity_weight * manipulability(robot, Q, isinstance(target, PositionGoal))
+    good = accept(Q)
+    if not good.all():
+        reached &= good
+        cost += reach(robot) * ~good
+    return Score(cost, distance, angle, reached)
+
+
+def manipulability(robot: Robot, Q: Matrix, position_only: bool) -> Vector:
+    """Product of the singular values of the Jacobian, sqrt(det(J J^T)) (Yoshikawa 1985), lengths in units of the reach.
+
+    Args:
+        robot: The arm.
+        Q: Shape (m, dof).
+        position_only: Whether the task is the position of the tip, not its pose.
+
+    Returns:
+        Shape (m,).
+    """
+    J = robot.jacobian_batch(Q)
+    J[:, :3] /= reach(robot)
+    if position_only:
+        J = J[:, :3]
+    values: Vector = np.linalg.svd(J, compute_uv=False).prod(axis=1)
+    return values
+
+
+def reach(robot: Robot) -> float:
+    """Sum of the lengths of the links [m]."""
+    return float(np.linalg.norm(robot.chain.placement[:, :3, 3], axis=1).sum()) or 1.0

@@ -1,0 +1,201 @@
+"""The genetic algorithm along a trajectory: one population follows a target that moves on whenever it is reached.
+
+Source: GA-REB. The bit strings are kept when the window moves, so that a constant chromosome is a constant velocity
+(gain 0) or acceleration (gain 1), and the population predicts the next point.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen
+from rrtik_ompl.goal import PositionGoal, joint_difference
+from rrtik_ompl.ik.genetic.breeding import children
+from rrtik_ompl.ik.genetic.genes import around, random_genes, whole_range
+from rrtik_ompl.ik.genetic.objective import Score, score
+from rrtik_ompl.ik.genetic.options import GeneticOptions
+from rrtik_ompl.ik.numeric import descend
+from rrtik_ompl.ik.question import Target
+from rrtik_ompl.robot import Robot
+
+IMPROVEMENT = 0.99  # of the best cost: less counts as standing still
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GeneticRun:
+    """What a run came to.
+
+    Attributes:
+        q: Configurations of the points gained (of the attempt that came farthest), shape (k, dof).
+        generations: In all, over all attempts.
+        cost_of_point: Generations that each of these points took, shape (k,).
+        distances: Of the best individual of every generation from its target [m], shape (generations,).
+        nearest: The configuration that came nearest to the point not gained; that of the last point if all were.
+        fresh: How often the population was drawn anew.
+        attempts: How often the trajectory was begun.
+        timed_out: Whether the clock stopped it, not the limit of generations.
+    """
+
+    q: Matrix
+    generations: int
+    cost_of_point: Vector
+    distances: Vector
+    nearest: Vector
+    fresh: int
+    attempts: int
+    timed_out: bool
+
+
+def follow_targets(
+    robot: Robot,
+    targets: Sequence[Target],
+    options: GeneticOptions,
+    rng: np.random.Generator,
+    *,
+    accept: Callable[[Matrix], Mask] | None = None,
+    near: Vector | None = None,
+    deadline: float = np.inf,
+) -> GeneticRun:
+    """Reach one target after another until the last is reached, the generations are used up or the time is over.
+
+    Args:
+        robot: The arm.
+        targets: Poses or positions, at least one.
+        options: Of the algorithm.
+        rng: Random numbers.
+        accept: Which of some configurations, shape (k, dof), will do; all if None.
+        near: Posture before the first point, shape (dof,): one individual begins there.
+        deadline: Time of ``time.monotonic`` at which to stop.
+    """
+    run = _Run(robot, targets, options, rng, accept, near)
+    while len(run.points) < len(targets) and run.generation < options.generations:
+        if time.monotonic() > deadline:
+            return run.result(timed_out=True)
+        run.step()
+    return run.result(timed_out=False)
+
+
+class _Run:
+    """The state of a run: a population, its window, the points gained so far, and what the restarts watch."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        targets: Sequence[Target],
+        options: GeneticOptions,
+        rng: np.random.Generator,
+        accept: Callable[[Matrix], Mask] | None,
+        near: Vector | None,
+    ) -> None:
+        self.robot, self.targets, self.options, self.rng = robot, targets, options, rng
+        self.accept, self.near = accept, near
+        dimensions = 3 if isinstance(targets[0], PositionGoal) else 6
+        self.gain = options.gain if options.gain is not None else float(robot.dof <= dimensions)
+        self.generation, self.fresh, self.attempts = 0, 0, 0
+        self.distances: list[float] = []
+        self.farthest: list[Vector] = []
+        self.costs_farthest: list[int] = []
+        self.nearest, self.least = robot.clamp(np.zeros(robot.dof)), np.inf
+        self.begin()
+
+    def begin(self) -> None:
+        """Stand before the first point, with a random population in the whole range."""
+        self.points: list[Vector] = []
+        self.costs: list[int] = []
+        self.window = whole_range(self.robot)
+        self.attempts += 1
+        self.draw()
+        if self.near is not None:
+            self.genes[:1] = self.window.encode(self.near[None])
+        self.since_point = 0
+
+    def draw(self) -> None:
+        """A random population."""
+        self.genes = random_genes(self.rng, self.options.population, self.robot.dof)
+        self.exact = np.zeros((0, self.robot.dof))  # refined individuals, not rounded to 16 bits: the first rows
+        self.best, self.standing = np.inf, 0
+
+    @property
+    def last(self) -> Vector | None:
+        """The configuration before the one that is looked for."""
+        return self.points[-1] if self.points else self.near
+
+    def step(self) -> None:
+        """One generation: judge the population, then move on to the next point or breed."""
+        Q = self.window.decode(self.genes)
+        Q[: len(self.exact)] = self.exact
+        judged = score(self.robot, self.targets[len(self.points)], Q, self.last, self.options, self.will_do)
+        self.generation += 1
+        self.since_point += 1
+        self.remember(Q, judged)
+        if judged.reached.any():
+            self.advance(Q[int(np.argmin(np.where(judged.reached, judged.cost, np.inf)))])
+        elif self.options.start_over is not None and self.since_point >= self.options.start_over:
+            self.begin()
+        elif self.stands_still(float(judged.cost.min())):
+            self.fresh += 1
+            self.draw()
+        else:
+            self.breed(Q, judged)
+
+    def will_do(self, Q: Matrix) -> Mask:
+        """Which configurations may be taken: near enough to the last point, and accepted."""
+        good = np.ones(len(Q), dtype=bool)
+        if self.options.largest_step is not None and self.points:
+            good = np.abs(joint_difference(self.robot, Q, self.points[-1])).max(axis=1) <= self.options.largest_step
+        if self.accept is not None:
+            good[good] = self.accept(Q[good])
+        return good
+
+    def remember(self, Q: Matrix, judged: Score) -> None:
+        """Keep the best distance for the record, and the posture that came nearest to the farthest point so far."""
+        best = int(np.argmin(judged.cost))
+        self.distances.append(float(judged.distance[best]))
+        if len(self.points) >= len(self.farthest) and judged.cost[best] < self.least:
+            self.nearest, self.least = Q[best].copy(), float(judged.cost[best])
+
+    def advance(self, q: Vector) -> None:
+        """A point is gained: place the window for the next one; the bit strings stay as they are."""
+        self.costs.append(self.since_point)
+        self.points.append(q.copy())
+        self.since_point, self.best, self.standing = 0, np.inf, 0
+        self.exact = self.exact[:0]
+        if len(self.points) > len(self.farthest):
+            self.farthest, self.costs_farthest, self.least = self.points.copy(), self.costs.copy(), np.inf
+        if self.options.window is not None:
+            step = q - self.points[-2] if len(self.points) > 1 else 0.0
+            most = np.inf if self.options.largest_step is None else self.options.largest_step
+            self.window = around(self.robot, q + np.clip(self.gain * step, -most, most), self.options.window)
+
+    def stands_still(self, cost: float) -> bool:
+        """Whether the best cost has not improved for as long as the options allow."""
+        if cost < self.best - (1.0 - IMPROVEMENT) * abs(self.best) or not np.isfinite(self.best):
+            self.best, self.standing = cost, 0
+        else:
+            self.standing += 1
+        return self.options.stall is not None and self.standing >= self.options.stall
+
+    def breed(self, Q: Matrix, judged: Score) -> None:
+        """The next generation; the best individuals, if some are to be refined, take a damped Newton step into it."""
+        self.genes = children(self.rng, self.genes, judged.cost, self.options)
+        if self.options.refined:
+            best = np.argsort(judged.cost, kind="stable")[: self.options.refined]
+            self.exact, _ = descend(self.robot, self.targets[len(self.points)], Q[best], iterations=1)
+            self.genes[: len(best)] = self.window.encode(self.exact)
+
+    def result(self, timed_out: bool) -> GeneticRun:
+        """The attempt that came farthest."""
+        return GeneticRun(
+            q=frozen(np.array(self.farthest).reshape(-1, self.robot.dof)),
+            generations=self.generation,
+            cost_of_point=frozen(self.costs_farthest),
+            distances=frozen(self.distances),
+            nearest=frozen(self.nearest),
+            fresh=self.fresh,
+            attempts=self.attempts,
+            timed_out=timed_out,
+        )

@@ -1,0 +1,72 @@
+"""What a method of inverse kinematics is asked, what it answers, and what a method is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.goal import PoseGoal, PositionGoal
+from rrtik_ompl.robot import Robot
+
+Target: TypeAlias = PoseGoal | PositionGoal
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Question:
+    """What a method is asked.
+
+    Attributes:
+        robot: The arm.
+        targets: Goals without freedom; one of them is enough.
+        near: Posture near which a solution is wanted, shape (dof,).
+        accept: Which of some configurations, shape (k, dof), inside the limits and at the goal, will do.
+        all: Whether every solution is wanted that the method can find, not just one.
+        deadline: Time of ``time.monotonic`` at which to stop.
+        rng: Random numbers.
+    """
+
+    robot: Robot
+    targets: tuple[Target, ...]
+    near: Vector
+    accept: Callable[[Matrix], Mask]
+    all: bool
+    deadline: float
+    rng: np.random.Generator
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answer:
+    """What a method found.
+
+    Attributes:
+        q: Configurations at one of the targets, inside the limits, in collision or not, shape (k, dof).
+        nearest: If there is none: the posture that came nearest to a target with no regard to limits, shape (dof,).
+        target: The target that it came near to.
+        iterations: Steps, 0 for a closed form.
+        timed_out: Whether the time was up before the method was through.
+    """
+
+    q: Matrix
+    nearest: Vector
+    target: Target
+    iterations: int = 0
+    timed_out: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """A method: ``misfit`` says why it does not fit a robot and a target ("" if it does); ``run`` answers."""
+
+    misfit: Callable[[Robot, Target], str]
+    run: Callable[[Question], Answer]
+
+
+def errors(robot: Robot, target: Target, Q: Matrix) -> Matrix:
+    """Distance [m] and angle [rad] (0 for a position) of configurations from a target, shape (k, 2)."""
+    if isinstance(target, PositionGoal):
+        return np.column_stack([target.distance(robot, Q), np.zeros(len(Q))])
+    return np.column_stack(target.errors(robot, Q))

@@ -1,0 +1,45 @@
+"""How far tips are from a goal, for methods that walk towards it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Mask, Matrix
+from rrtik_ompl.goal import PositionGoal
+from rrtik_ompl.ik.question import Target
+from rrtik_ompl.robot import Robot
+
+SHARE = 0.01  # of the tolerance: a solution on the rim would not survive rounding
+NEAR_HALF_TURN = 1e-4  # [rad] from pi, where the skew part of a rotation no longer tells its axis
+
+
+def well_inside(robot: Robot, goal: Target, Q: Matrix) -> Mask:
+    """Which rows of Q, shape (m, dof), are at most a hundredth of the tolerance away."""
+    if isinstance(goal, PositionGoal):
+        return goal.distance(robot, Q) <= SHARE * goal.tolerance
+    position, angle = goal.errors(robot, Q)
+    return (position <= SHARE * goal.position_tolerance) & (angle <= SHARE * goal.orientation_tolerance)
+
+
+def twist(goal: Target, tips: NDArray[np.float64]) -> Matrix:
+    """Twist from the tips, shape (m, 4, 4), to the goal in world axes: (linear [m]; rotation vector [rad]), (m, 6)."""
+    residual = np.zeros((len(tips), 6))
+    if isinstance(goal, PositionGoal):
+        residual[:, :3] = goal.position - tips[:, :3, 3]
+        return residual
+    residual[:, :3] = goal.T_world_tip.translation - tips[:, :3, 3]
+    residual[:, 3:] = _rotation_vectors(goal.T_world_tip.rotation @ tips[:, :3, :3].transpose(0, 2, 1))
+    return residual
+
+
+def _rotation_vectors(R: NDArray[np.float64]) -> Matrix:
+    """Logarithms of rotations, shape (m, 3, 3): (m, 3)."""
+    skew = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
+    sine = np.linalg.norm(skew, axis=1)
+    angle = np.arctan2(sine, 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0))
+    vectors: Matrix = skew * np.where(sine > 0.0, angle / np.where(sine > 0.0, sine, 1.0), 1.0)[:, None]
+    for k in np.flatnonzero(angle > np.pi - NEAR_HALF_TURN):
+        vectors[k] = pin.log3(R[k])
+    return vectors

@@ -1,0 +1,277 @@
+"""Inverse kinematics of a whole trajectory by one call: configurations that follow a row of poses or points."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.goal import PoseGoal, PositionGoal, joint_difference, pose_errors
+from rrtik_ompl.ik.branch_choice import JUMP, follow
+from rrtik_ompl.ik.closed_form import check_rotations, form_of
+from rrtik_ompl.ik.face import free_of_collision, solve_ik
+from rrtik_ompl.ik.genetic.options import PRESETS, GeneticOptions
+from rrtik_ompl.ik.genetic.search import follow_targets
+from rrtik_ompl.ik.methods import METHODS
+from rrtik_ompl.ik.numeric import descend
+from rrtik_ompl.ik.numeric_track import Tracker
+from rrtik_ompl.ik.question import Target
+from rrtik_ompl.ik.restarts import Walk
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.world import World
+
+SECONDS = 60.0
+SECONDS_A_POINT = 5.0  # to say why a point has no configuration
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IkTrajectory:
+    """Configurations along a trajectory of k points.
+
+    Attributes:
+        q: Shape (k, dof), inside the limits, free if a world was given; NaN where there is none.
+        residuals: Distance [m] and angle [rad] of each from its target by forward kinematics, shape (k, 2); NaN there.
+        reasons: Why a point has none, "" where there is one: ``unreachable``, ``limits``, ``collision``, ``time``.
+        detail: The first of these in a line; "" if there is none.
+        jumps: Points at which a joint moves farther than a jump, or that follow a point without a configuration.
+        blocked: Points to which the straight motion from the point before collides; empty if no world was given.
+        method: The method that answered.
+        iterations: Generations of a genetic algorithm, steps of a numeric method, 0 of a closed form.
+        seconds: Time taken.
+    """
+
+    q: Matrix
+    residuals: Matrix
+    reasons: tuple[str, ...]
+    detail: str
+    jumps: tuple[int, ...]
+    blocked: tuple[int, ...]
+    method: str
+    iterations: int
+    seconds: float
+
+    @property
+    def found(self) -> bool:
+        """Whether every point has a configuration."""
+        return not any(self.reasons)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Task:
+    """What a way of following a trajectory is asked; see `solve_ik_trajectory`."""
+
+    robot: Robot
+    poses: Matrix
+    targets: tuple[Target, ...]
+    near: Vector | None
+    world: World | None
+    jump: float
+    options: GeneticOptions
+    rng: np.random.Generator
+    deadline: float
+
+    def accept(self, Q: Matrix) -> Mask:
+        """Which configurations, shape (k, dof), are free of collision."""
+        return free_of_collision(self.world, Q)
+
+
+def list_ik_trajectory_methods() -> tuple[str, ...]:
+    """Names that `solve_ik_trajectory` takes as a method, beside "auto"."""
+    return tuple(FOLLOWERS)
+
+
+def solve_ik_trajectory(
+    robot: Robot,
+    poses: ArrayLike,
+    *,
+    method: str = "auto",
+    near: ArrayLike | None = None,
+    world: World | None = None,
+    position_tolerance: float = 1e-3,
+    orientation_tolerance: float = 1e-2,
+    jump: float = JUMP,
+    options: GeneticOptions | str = "refined",
+    seconds: float = SECONDS,
+    seed: int = 0,
+) -> IkTrajectory:
+    """Find a configuration for each pose of a trajectory such that the joints move on without jumps.
+
+    Args:
+        robot: The arm.
+        poses: T_world_tip, shape (k, 4, 4), or points [m] with any orientation, shape (k, 3).
+        method: "closed-form" (the shortest way through the branches), "genetic" (GA-REB), a numeric method that
+            follows several solutions side by side, or "auto": the closed form where it fits, else "numeric".
+        near: Posture before the first point, shape (dof,); any if None.
+        world: If given, all configurations are free of collision. Its robot must be this one.
+        position_tolerance: Of every point [m].
+        orientation_tolerance: Of every pose [rad].
+        jump: Motion of one joint between two points [rad or m] from which on it counts as a jump; the genetic
+            algorithm makes none.
+        options: Of the genetic algorithm, or the name of a preset: "standard", "historical", "refined".
+        seconds: Time that a method may take, the closed form aside.
+        seed: Of the random numbers.
+
+    Raises:
+        UnknownNameError: If there is no such method or preset.
+        InputError: If the method does not fit the robot, a pose is none, or an argument makes no sense.
+    """
+    begin = time.monotonic()
+    if world is not None and world.robot is not robot:
+        raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
+    rows = _checked(poses)
+    task = Task(
+        robot=robot,
+        poses=rows,
+        targets=tuple(_target(row, position_tolerance, orientation_tolerance) for row in rows),
+        near=None if near is None else robot.configuration(near, "near"),
+        world=world,
+        jump=float(finite_array(jump, (), "jump")),
+        options=_options(options),
+        rng=np.random.default_rng(seed),
+        deadline=begin + float(finite_array(seconds, (), "seconds")),
+    )
+    name = _chosen(task, method)
+    q, iterations = FOLLOWERS[name](task)
+    residuals = _keep_only_checked(task, q)
+    reasons, detail = _why(task, name, q)
+    return IkTrajectory(
+        q=frozen(q),
+        residuals=frozen(residuals),
+        reasons=reasons,
+        detail=detail,
+        jumps=_jumps(robot, q, task.jump),
+        blocked=_blocked(world, q),
+        method=name,
+        iterations=iterations,
+        seconds=time.monotonic() - begin,
+    )
+
+
+def _checked(poses: ArrayLike) -> Matrix:
+    shape = np.shape(poses)
+    rows = finite_array(poses, (None, 4, 4) if len(shape) == 3 else (None, 3), "poses")
+    if len(rows) == 0:
+        raise InputError("poses: a trajectory needs at least one point")
+    if rows.ndim == 3:
+        check_rotations(rows[:, :3, :3], "poses")
+    return rows
+
+
+def _target(row: Matrix, position_tolerance: float, orientation_tolerance: float) -> Target:
+    if row.ndim == 1:
+        return PositionGoal(row, position_tolerance)
+    return PoseGoal(row, position_tolerance, orientation_tolerance)
+
+
+def _options(options: GeneticOptions | str) -> GeneticOptions:
+    if isinstance(options, GeneticOptions):
+        return options
+    if options not in PRESETS:
+        raise UnknownNameError("preset of the genetic algorithm", options, PRESETS)
+    return PRESETS[options]
+
+
+def _chosen(task: Task, method: str) -> str:
+    if method != "auto" and method not in FOLLOWERS:
+        raise UnknownNameError("inverse kinematics method for trajectories", method, ("auto", *FOLLOWERS))
+    misfits = {name: METHODS[name].misfit(task.robot, task.targets[0]) for name in FOLLOWERS}
+    if not misfits["closed-form"] and form_of(task.robot).kind == "position" and task.poses.ndim == 3:
+        misfits["closed-form"] = "its closed form knows positions alone; give points, shape (k, 3)"
+    fitting = [name for name, misfit in misfits.items() if not misfit]
+    if method != "auto" and misfits[method]:
+        raise InputError(
+            f"method '{method}' does not fit robot '{task.robot.name}' and this trajectory: {misfits[method]}; "
+            f"what fits: {', '.join(fitting)}"
+        )
+    return fitting[0] if method == "auto" else method
+
+
+def _closed_form(task: Task) -> tuple[Matrix, int]:
+    return np.array(follow(task.robot, task.poses, task.near, jump=task.jump, accept=task.accept).q), 0
+
+
+def _genetic(task: Task) -> tuple[Matrix, int]:
+    quick = None if task.world is None else task.world.valid_batch  # the second opinion comes at the end
+    options = replace(task.options, largest_step=task.options.largest_step or task.jump)
+    run = follow_targets(
+        task.robot, task.targets, options, task.rng, accept=quick, near=task.near, deadline=task.deadline
+    )
+    q = np.full((len(task.targets), task.robot.dof), np.nan)
+    q[: len(run.q)] = run.q
+    return q, run.generations
+
+
+def _walked(walk: Walk, task: Task) -> tuple[Matrix, int]:
+    tracker = Tracker(task.robot, task.targets, walk, task.accept, task.jump, task.rng, task.deadline)
+    return tracker.follow(task.near)
+
+
+FOLLOWERS: Mapping[str, Callable[[Task], tuple[Matrix, int]]] = MappingProxyType(
+    {"closed-form": _closed_form, "numeric": partial(_walked, descend), "genetic": _genetic}
+)
+
+
+def _keep_only_checked(task: Task, q: Matrix) -> Matrix:
+    """Residuals, shape (k, 2). Rows that are not at their target, inside the limits and free become NaN, in place."""
+    tips = task.robot.fk_batch(q)
+    residuals = np.zeros((len(q), 2))
+    for k, target in enumerate(task.targets):
+        if isinstance(target, PositionGoal):
+            residuals[k, 0] = np.linalg.norm(tips[k, :3, 3] - target.position)
+        else:
+            residuals[k] = np.ravel(pose_errors(tips[k : k + 1], target.T_world_tip))
+    first = task.targets[0]
+    limits = (
+        (first.tolerance, np.inf)
+        if isinstance(first, PositionGoal)
+        else (first.position_tolerance, first.orientation_tolerance)
+    )
+    good = (residuals <= limits).all(axis=1) & task.robot.within_limits(q)
+    good[good] = task.accept(q[good])
+    q[~good], residuals[~good] = np.nan, np.nan
+    q[:] = task.robot.clamp(q)
+    return residuals
+
+
+def _why(task: Task, name: str, q: Matrix) -> tuple[tuple[str, ...], str]:
+    """Reasons of all points, and the first of them in a line.
+
+    A genetic algorithm knows nothing of the points after the one where it stopped; there and where the time is up the
+    reason is ``time``.
+    """
+    reasons, detail = [""] * len(q), ""
+    for k in np.flatnonzero(np.isnan(q[:, 0])):
+        left = task.deadline - time.monotonic()
+        reasons[k], line = "time", f"method '{name}' came to its limit before it found a way there"
+        if left > 0.0 and (name != "genetic" or not detail):
+            asked = "numeric" if name == "genetic" else name
+            alone = solve_ik(
+                task.robot, task.targets[k], method=asked, world=task.world, seconds=min(left, SECONDS_A_POINT)
+            )
+            reasons[k], line = alone.reason or "time", alone.detail or line
+        detail = detail or f"point {k}: {line}"
+    return tuple(reasons), detail
+
+
+def _jumps(robot: Robot, q: Matrix, jump: float) -> tuple[int, ...]:
+    """Points after a jump, and points that follow a gap."""
+    here, before = ~np.isnan(q[1:, 0]), ~np.isnan(q[:-1, 0])
+    far = np.abs(joint_difference(robot, q[1:], q[:-1])).max(axis=1) > jump
+    after_gap = here & ~before & np.logical_or.accumulate(before)
+    return tuple(int(k) + 1 for k in np.flatnonzero((here & before & far) | after_gap))
+
+
+def _blocked(world: World | None, q: Matrix) -> tuple[int, ...]:
+    """Points to which the straight motion from the point before collides."""
+    whole = np.flatnonzero(~np.isnan(q[1:, 0]) & ~np.isnan(q[:-1, 0]))
+    if world is None or len(whole) == 0:
+        return ()
+    free = world.motion_valid_batch(q[whole], q[whole + 1])
+    return tuple(int(k) + 1 for k in whole[~free])
