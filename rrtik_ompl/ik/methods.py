@@ -12,11 +12,16 @@ import numpy as np
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.goal import PoseGoal, PositionGoal
 from rrtik_ompl.ik.closed_form import family, form_of, has_closed_form, solutions, tip_fault
+from rrtik_ompl.ik.mb_rrt.axes import misfit as no_tree
+from rrtik_ompl.ik.mb_rrt.search import ROUNDS as TREE_ROUNDS
+from rrtik_ompl.ik.mb_rrt.search import search
 from rrtik_ompl.ik.numeric import descend
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.world import World
 
 STARTS = 32  # of the numeric method in one round
 ROUNDS = 16  # after which it gives up
+ALL_ROUNDS = 8  # of the workspace tree where every solution is wanted
 
 Target = PoseGoal | PositionGoal
 
@@ -33,6 +38,7 @@ class Question:
         all: Whether every solution is wanted that the method can find, not just one.
         deadline: Time of ``time.monotonic`` at which to stop.
         rng: Random numbers.
+        world: What ``accept`` asks about collisions, for methods that place the arm link by link.
     """
 
     robot: Robot
@@ -42,6 +48,7 @@ class Question:
     all: bool
     deadline: float
     rng: np.random.Generator
+    world: World | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,6 +162,33 @@ def _nearest(question: Question, steps: int) -> tuple[Vector, Target, int]:
     return Q[int(np.argmin(errors(robot, target, Q).sum(axis=1)))], target, steps + taken
 
 
+def _mb_rrt(question: Question) -> Answer:
+    """A tree in the workspace for one target after the other, until a solution will do."""
+    robot, count = question.robot, len(question.targets)
+    rows, passes = np.zeros((0, robot.dof)), 0
+    for target in question.targets:
+        found = search(
+            robot,
+            target,
+            near=question.near,
+            accept=question.accept,
+            rng=question.rng,
+            deadline=question.deadline,
+            world=question.world,
+            all=question.all,
+            rounds=max(1, (ALL_ROUNDS if question.all else TREE_ROUNDS) // count),
+        )
+        rows, passes = np.vstack([rows, found.q]), passes + found.passes
+        if found.timed_out or (question.accept(found.q).any() and not question.all):
+            break
+    nearest = (question.near, target) if len(rows) else _nearest(question, 0)[:2]
+    return Answer(rows, *nearest, passes, found.timed_out)
+
+
 METHODS: Mapping[str, Method] = MappingProxyType(
-    {"closed-form": Method(_closed_form_misfit, _closed_form), "numeric": Method(lambda robot, target: "", _numeric)}
+    {
+        "closed-form": Method(_closed_form_misfit, _closed_form),
+        "numeric": Method(lambda robot, target: "", _numeric),
+        "mb-rrt": Method(lambda robot, target: no_tree(robot), _mb_rrt),
+    }
 )

@@ -1,0 +1,117 @@
+"""Configurations of a real arm at a position or a pose: the tree's branches, polished where that alone is not exact.
+
+An arm whose axes are all parallel ends exactly on the goal. Elsewhere a sphere about the goal is not all that a joint
+with one axis can keep to; the newest branches, which are near the goal and free as far as the links know, are then
+polished by Levenberg-Marquardt (specification of MB-RRT, section 12.4).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.goal import PoseGoal, PositionGoal
+from rrtik_ompl.ik.mb_rrt.axes import Axes, axes_of
+from rrtik_ompl.ik.mb_rrt.axis_tree import AxisTree, LinkFree
+from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
+from rrtik_ompl.ik.numeric import descend
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.world import World
+
+WIDTH = 16  # passes at a time
+ROUNDS = 64  # after which it gives up
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """Configurations at the goal, shape (k, dof), inside the limits; passes done; whether the time was up."""
+
+    q: Matrix
+    passes: int
+    timed_out: bool = False
+
+
+def search(
+    robot: Robot,
+    target: PoseGoal | PositionGoal,
+    *,
+    near: Vector,
+    accept: Callable[[Matrix], Mask],
+    rng: np.random.Generator,
+    deadline: float,
+    world: World | None = None,
+    all: bool = False,
+    width: int = WIDTH,
+    rounds: int = ROUNDS,
+) -> Found:
+    """Grow the tree until a configuration at the goal will do.
+
+    Args:
+        robot: An arm that `rrtik_ompl.ik.mb_rrt.axes.misfit` accepts.
+        target: The goal.
+        near: Values of joints that the tree does not move, shape (dof,).
+        accept: Which configurations, shape (k, dof), at the goal will do.
+        rng: Random numbers.
+        deadline: Time of ``time.monotonic`` at which to stop.
+        world: If given, every edge of the tree is held clear of its obstacles, link by link.
+        all: Whether to go on for all ``rounds`` and collect every solution.
+        width: Passes at a time.
+        rounds: Limit.
+    """
+    axes = axes_of(robot, isinstance(target, PoseGoal))
+    tree = AxisTree(axes, aimed_point(axes, target), near, rng, _link_check(world, axes))
+    found = np.zeros((0, robot.dof))
+    if axes.shortfall(aimed_point(axes, target)) > 0.0:
+        return Found(found, 0)
+    for _ in range(rounds):
+        ends = polished(robot, axes, target, tree.grow(width))
+        found = np.vstack([found, ends])
+        if not all and accept(ends).any():
+            break
+        if time.monotonic() > deadline:
+            return Found(found, tree.passes, True)
+    return Found(found, tree.passes)
+
+
+def aimed_point(axes: Axes, target: PoseGoal | PositionGoal) -> Vector:
+    """The point in the world that the tree aims at, shape (3,)."""
+    if isinstance(target, PositionGoal):
+        return target.position
+    point: Vector = target.T_world_tip.rotation @ axes.aim + target.T_world_tip.translation
+    return point
+
+
+def polished(robot: Robot, axes: Axes, target: PoseGoal | PositionGoal, ends: Matrix) -> Matrix:
+    """Those of the tree's ends that are at the goal or get there, shape (k, dof)."""
+    if len(ends) == 0:
+        return ends
+    if isinstance(target, PoseGoal):
+        ends = _last_turned(robot, axes, target, ends)
+    at = target.satisfied(robot, ends)
+    if axes.exact:
+        return ends[at & robot.within_limits(ends)]
+    reached, _ = descend(robot, target, ends)
+    return reached[target.satisfied(robot, reached)]
+
+
+def _last_turned(robot: Robot, axes: Axes, target: PoseGoal, ends: Matrix) -> Matrix:
+    """The last joint, which leaves the aimed point where it is, turned as near to the orientation as it gets."""
+    joint, angles = int(axes.joints[-1]), np.array(ends)
+    angles[:, joint] = -axes.offset[-1]
+    frames = robot.fk_batch(angles)[:, :3, :3] @ axes.fixed[-1][:3, :3].T
+    wanted = target.T_world_tip.rotation @ axes.fixed[-1][:3, :3].T
+    off = np.swapaxes(frames, 1, 2) @ wanted  # the turn about z nearest to it
+    turn = np.arctan2(off[:, 1, 0] - off[:, 0, 1], off[:, 0, 0] + off[:, 1, 1])
+    full = 2.0 * np.pi
+    turn += full * np.ceil((axes.lower[-1] - turn) / full - 1e-9)  # the first full turn inside the limits
+    angles[:, joint] = np.clip(turn, axes.lower[-1], axes.upper[-1]) - axes.offset[-1]
+    return angles
+
+
+def _link_check(world: World | None, axes: Axes) -> LinkFree | None:
+    """A check of edges by the world's obstacles."""
+    return None if world is None or not world.pairs else LinkWorlds(world, axes).free
