@@ -2,5 +2,6 @@
 
 from rrtik_planners.bicrdt import BiCRDT
 from rrtik_planners.crdt import CRDT
+from rrtik_planners.mbrrt import MBRRT
 
-__all__ = ["CRDT", "BiCRDT"]
+__all__ = ["CRDT", "MBRRT", "BiCRDT"]

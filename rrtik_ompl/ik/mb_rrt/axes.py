@@ -131,7 +131,7 @@ def _heights(fixed: NDArray[np.float64], oriented: bool) -> Vector:
     for _ in range(ROUNDS):
         scaled = np.sqrt(weight)[:, None]
         rows = (scaled[:, :, None] * matrix).reshape(-1, count)
-        heights = np.linalg.lstsq(rows, -(scaled * shift).ravel(), rcond=1e-10)[0]
+        heights = np.asarray(np.linalg.lstsq(rows, -(scaled * shift).ravel(), rcond=1e-10)[0], dtype=np.float64)
         length = np.linalg.norm(matrix @ heights + shift, axis=1)
         weight = 1.0 / np.maximum(length, 1e-9 * max(float(length.max()), 1e-300))
     return np.append(heights, 0.0)

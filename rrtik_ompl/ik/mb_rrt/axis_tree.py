@@ -39,11 +39,17 @@ class AxisTree:
             rng: Random numbers.
             free: Which rows are free of collision as far as the link of a level; everything if None.
         """
-        self._axes, self._goal, self._rng, self._free = axes, goal, rng, free
-        self._q: list[Matrix] = [np.array(start)[None], *(np.zeros((0, len(start))),) * axes.count]
-        self._frames: list[NDArray[np.float64]] = [axes.fixed[:1], *(np.zeros((0, 4, 4)),) * axes.count]
+        self._axes, self._goal, self._rng = axes, goal, rng
+        self._start = np.array(start)[None]
         self.passes = 0
         self.edges = 0
+        self.check_links(free)
+
+    def check_links(self, free: LinkFree | None) -> None:
+        """Plant the tree anew: its further edges are held free, and no earlier one is built on."""
+        self._free = free
+        self._q: list[Matrix] = [self._start, *(np.zeros((0, self._start.shape[1])),) * self._axes.count]
+        self._frames: list[NDArray[np.float64]] = [self._axes.fixed[:1], *(np.zeros((0, 4, 4)),) * self._axes.count]
 
     def nodes(self, level: int) -> Matrix:
         """Configurations up to a level's joint, in the order in which they were added, shape (k, dof)."""

@@ -16,7 +16,7 @@ import numpy as np
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.goal import PoseGoal, PositionGoal
 from rrtik_ompl.ik.mb_rrt.axes import Axes, axes_of
-from rrtik_ompl.ik.mb_rrt.axis_tree import AxisTree, LinkFree
+from rrtik_ompl.ik.mb_rrt.axis_tree import AxisTree
 from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
 from rrtik_ompl.ik.numeric import descend
 from rrtik_ompl.robot import Robot
@@ -24,6 +24,7 @@ from rrtik_ompl.world import World
 
 WIDTH = 16  # passes at a time
 ROUNDS = 64  # after which it gives up
+BLIND_ROUNDS = 2  # that look at whole postures alone; where free ones are common, that is faster
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,17 +58,20 @@ def search(
         accept: Which configurations, shape (k, dof), at the goal will do.
         rng: Random numbers.
         deadline: Time of ``time.monotonic`` at which to stop.
-        world: If given, every edge of the tree is held clear of its obstacles, link by link.
+        world: If given, and if the first rounds end in collision, every further edge of the tree is held clear of
+            its obstacles, link by link.
         all: Whether to go on for all ``rounds`` and collect every solution.
         width: Passes at a time.
         rounds: Limit.
     """
     axes = axes_of(robot, isinstance(target, PoseGoal))
-    tree = AxisTree(axes, aimed_point(axes, target), near, rng, _link_check(world, axes))
+    tree = AxisTree(axes, aimed_point(axes, target), near, rng)
     found = np.zeros((0, robot.dof))
     if axes.shortfall(aimed_point(axes, target)) > 0.0:
         return Found(found, 0)
-    for _ in range(rounds):
+    for number in range(rounds):
+        if number == BLIND_ROUNDS and world is not None and world.pairs:
+            tree.check_links(LinkWorlds(world, axes).free)
         ends = polished(robot, axes, target, tree.grow(width))
         found = np.vstack([found, ends])
         if not all and accept(ends).any():
@@ -110,8 +114,3 @@ def _last_turned(robot: Robot, axes: Axes, target: PoseGoal, ends: Matrix) -> Ma
     turn += full * np.ceil((axes.lower[-1] - turn) / full - 1e-9)  # the first full turn inside the limits
     angles[:, joint] = np.clip(turn, axes.lower[-1], axes.upper[-1]) - axes.offset[-1]
     return angles
-
-
-def _link_check(world: World | None, axes: Axes) -> LinkFree | None:
-    """A check of edges by the world's obstacles."""
-    return None if world is None or not world.pairs else LinkWorlds(world, axes).free
