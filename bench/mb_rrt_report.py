@@ -126,6 +126,7 @@ def report(quick: bool, folder: Path) -> list[str]:
         "LM: one random start, no restarts. FABRIK, CCD: at most 1000 sweeps (200 above 20 joints). C-space: 1 % of",
         "the reach, 2,000 iterations.", "", *beside, "",
         "## Real arms through `solve_ik`", "", "100 reachable goals each, 0.1 mm and 0.1 mrad.", "", *beyond.arms(), "",
+        "## The planner", "", "To goals of the tip, 5 s, 10 seeds, goal configurations included.", "", *beyond.plans(), "",
     ]  # fmt: skip
 
 
