@@ -80,7 +80,8 @@ def report(quick: bool, folder: Path) -> list[str]:
         "# MB-RRT", "", f"Made by `python bench/mb_rrt_report.py`. {machine}; seed 0.", "",
         "Goals of the published tables: the sunflower of the specification, section 11, row 6. Lengths in cm.", "",
         "## Acceptance (section 13 of the specification)", "",
-        "| bar | wanted | measured | kept |", "|---|---|---|---|", *rows, *laws(rng, exact), *more, "", "## The published tables", "", *tables, *precision, *further,
+        "| bar | wanted | measured | kept |", "|---|---|---|---|", *rows, *laws(rng, exact), *more, "",
+        "## The published tables", "", *tables, *precision, *further,
     ]  # fmt: skip
 
 

@@ -24,6 +24,7 @@ from rrtik_ompl.world import World
 
 WIDTH = 16  # passes at a time
 ROUNDS = 64  # after which it gives up
+FIRST_STEPS = 12  # of the polish, after which most branches that get to the goal at all are there
 BLIND_ROUNDS = 2  # that look at whole postures alone; where free ones are common, that is faster
 
 
@@ -72,7 +73,7 @@ def search(
     for number in range(rounds):
         if number == BLIND_ROUNDS and world is not None and world.pairs:
             tree.check_links(LinkWorlds(world, axes).free)
-        ends = polished(robot, axes, target, tree.grow(width))
+        ends = polished(robot, axes, target, tree.grow(width), all=all)
         found = np.vstack([found, ends])
         if not all and accept(ends).any():
             break
@@ -89,8 +90,16 @@ def aimed_point(axes: Axes, target: PoseGoal | PositionGoal) -> Vector:
     return point
 
 
-def polished(robot: Robot, axes: Axes, target: PoseGoal | PositionGoal, ends: Matrix) -> Matrix:
-    """Those of the tree's ends that are at the goal or get there, shape (k, dof)."""
+def polished(robot: Robot, axes: Axes, target: PoseGoal | PositionGoal, ends: Matrix, *, all: bool = True) -> Matrix:
+    """Those of the tree's ends that are at the goal or get there, shape (k, dof).
+
+    Args:
+        robot: The arm.
+        axes: Of the arm, for this kind of target.
+        target: The goal.
+        ends: Configurations, shape (m, dof).
+        all: Whether to wait for the slowest; if not, the first few that get there are enough.
+    """
     if len(ends) == 0:
         return ends
     if isinstance(target, PoseGoal):
@@ -98,8 +107,20 @@ def polished(robot: Robot, axes: Axes, target: PoseGoal | PositionGoal, ends: Ma
     at = target.satisfied(robot, ends)
     if axes.exact:
         return ends[at & robot.within_limits(ends)]
-    reached, _ = descend(robot, target, ends)
-    return reached[target.satisfied(robot, reached)]
+    if not all:
+        ends, _ = descend(robot, target, ends, iterations=FIRST_STEPS)
+        there = _tightened(target).satisfied(robot, ends)
+        if there.any():
+            return ends[there]
+    ends, _ = descend(robot, target, ends)
+    return ends[target.satisfied(robot, ends)]
+
+
+def _tightened(target: PoseGoal | PositionGoal) -> PoseGoal | PositionGoal:
+    """The same goal with a tenth of the tolerances."""
+    if isinstance(target, PositionGoal):
+        return PositionGoal(target.position, 0.1 * target.tolerance)
+    return PoseGoal(target.T_world_tip, 0.1 * target.position_tolerance, 0.1 * target.orientation_tolerance)
 
 
 def _last_turned(robot: Robot, axes: Axes, target: PoseGoal, ends: Matrix) -> Matrix:
