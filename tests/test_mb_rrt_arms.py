@@ -132,6 +132,14 @@ def test_poses_and_positions_of_every_arm_are_solved(name):
             assert result.iterations >= 16
 
 
+def test_joints_that_do_not_move_the_tip_stay_where_they_are():
+    robot = rrtik.load_robot("puma560")
+    near = robot.configuration([0.3, -0.5, 0.8, 0.4, -0.7, 1.1])
+    goal = rrtik.PositionGoal(robot.fk([0.9, -0.2, 0.4, 0.0, 0.0, 0.0]).translation)
+    result = solve_ik(robot, goal, method="mb-rrt", near=near)
+    np.testing.assert_allclose(result.solutions[0, 3:], near[3:], atol=1e-9)
+
+
 def test_a_planar_pose_is_met_to_the_rounding():
     robot = rrtik.load_robot("planar6")
     q = np.random.default_rng(0).uniform(robot.lower, robot.upper)

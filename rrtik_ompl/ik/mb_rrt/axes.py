@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.ik.mb_rrt.links import ROUNDING, smallest_spans
 from rrtik_ompl.ik.tip_columns import tip_columns
 from rrtik_ompl.robot import Robot
@@ -40,6 +40,7 @@ class Axes:
         folded: Shortest [m], shape (n,).
         reach: Longest and shortest distance from the first joint's point to the aimed point [m].
         aim: The aimed point in the frame of the tip [m], shape (3,).
+        idle: Which joints leave a position where it is, as all after them do; none if the aim is a pose. Shape (n,).
         exact: Whether all axes are parallel, so that the distances that remain are the whole truth.
     """
 
@@ -54,6 +55,7 @@ class Axes:
     folded: Vector
     reach: tuple[float, float]
     aim: Vector
+    idle: Mask
     exact: bool
 
     @property
@@ -98,10 +100,12 @@ def axes_of(robot: Robot, oriented: bool) -> Axes:
     low, high = (end[joints] + tip.offset for end in robot.finite_range())
     parallel = np.abs(np.abs(tip.fixed[1:-1, 2, 2]) - 1.0).max(initial=0.0) < ROUNDING
     flat = np.abs((points - starts)[:, 2]).max() < ROUNDING
+    still = (np.hypot(points[:, 0], points[:, 1]) < ROUNDING) & (remaining[1:] < ROUNDING)
+    idle = still & (not oriented)
     exact = bool(parallel and flat)
     return Axes(
         joints, tip.offset, low, high, tip.fixed, first, points, remaining[1:], folded[1:],
-        (float(remaining[0]), float(folded[0])), aim, exact,
+        (float(remaining[0]), float(folded[0])), aim, idle, exact,
     )  # fmt: skip
 
 

@@ -35,7 +35,7 @@ class AxisTree:
         Args:
             axes: The arm.
             goal: The point in the world that it aims at, shape (3,).
-            start: Values of joints that are not part of the chain, shape (dof,).
+            start: Values of joints that need not move, shape (dof,).
             rng: Random numbers.
             free: Which rows are free of collision as far as the link of a level; everything if None.
         """
@@ -74,8 +74,8 @@ class AxisTree:
     def _step(self, level: int, q: Matrix, frames: NDArray[np.float64]) -> tuple[Matrix, NDArray[np.float64]]:
         """Add a link to each branch, or to another of the same index in its place; those that succeed."""
         done_q, done_frames, wanted = [], [], len(q)
-        for _ in range(TRIES):
-            turned, good = self._turned(level, q, frames)
+        for attempt in range(TRIES):
+            turned, good = self._turned(level, q, frames, stay=attempt == 0)
             done_q.append(turned[good])
             done_frames.append(self._moved(level, frames[good], turned[good]))
             wanted -= int(good.sum())
@@ -85,12 +85,19 @@ class AxisTree:
             q, frames = self._q[level][others], self._frames[level][others]
         return np.vstack(done_q), np.concatenate(done_frames)
 
-    def _turned(self, level: int, q: Matrix, frames: NDArray[np.float64]) -> tuple[Matrix, Mask]:
-        """Rows with the level's joint turned to a useful angle, and which of them will do."""
+    def _turned(self, level: int, q: Matrix, frames: NDArray[np.float64], *, stay: bool) -> tuple[Matrix, Mask]:
+        """Rows with the level's joint turned to a useful angle, and which of them will do.
+
+        With ``stay`` a joint that cannot bring the goal nearer keeps its value.
+        """
         axes = self._axes
         angle, useful = draw_turns(axes, level, frames, self._goal, self._rng)
-        good = useful if axes.exact else np.ones(len(q), dtype=bool)  # elsewhere "useful" is a hint: what counts is
-        turned = np.array(q)  # whether the polish gets the whole chain to the goal
+        # Where the regions are not exact, "useful" is a hint: what counts is whether the polish gets to the goal.
+        good = useful if axes.exact else np.ones(len(q), dtype=bool)
+        if stay and axes.idle[level]:
+            kept = self._start[0, axes.joints[level]] + axes.offset[level]
+            angle = np.full(len(q), np.clip(kept, axes.lower[level], axes.upper[level]))
+        turned = np.array(q)
         turned[:, axes.joints[level]] = angle - axes.offset[level]
         self.edges += len(q)
         if self._free is not None and good.any():
