@@ -72,7 +72,7 @@ def report(quick: bool, folder: Path) -> list[str]:
     rows = [*acceptance_of_precision(exact, structure(rng))]
     tables: list[str] = []
     if not quick:
-        tables, found = published.tables(rng)
+        tables, found = published.tables()
         rows += acceptance_of_tables(found)
     further, more = beyond_the_paper(rng)
     _pictures(folder)

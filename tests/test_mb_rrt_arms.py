@@ -183,6 +183,16 @@ def test_a_goal_behind_obstacles_is_solved_free_of_collision():
     assert world.certify(result.solutions).all()
 
 
+def test_a_goal_that_only_its_tolerance_brings_into_reach_is_solved():
+    robot = rrtik.load_robot("planar10")
+    for point in ([1.0005, 0.0, 0.0], [0.4, 0.3, 0.0008], [0.0, -0.7, -0.0009]):
+        goal = rrtik.PositionGoal(point, tolerance=1e-3)
+        result = solve_ik(robot, goal, method="mb-rrt")
+        assert result.found
+        assert goal.satisfied(robot, result.solutions).all()
+        assert not solve_ik(robot, rrtik.PositionGoal(point, tolerance=1e-4), method="mb-rrt").found
+
+
 def test_failures_say_why():
     robot = rrtik.load_robot("planar10")
     far = solve_ik(robot, rrtik.PositionGoal([1.3, 0.0, 0.0]), method="mb-rrt")

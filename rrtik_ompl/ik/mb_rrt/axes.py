@@ -63,11 +63,21 @@ class Axes:
         """Number of joints."""
         return len(self.joints)
 
-    def shortfall(self, aim: Vector) -> float:
-        """How far a point in the world, shape (3,), is certainly out of reach [m]; 0 if it may be in reach."""
+    def nearest_in_reach(self, point: Vector) -> Vector:
+        """The point nearest to one in the world, shape (3,), that is not certainly out of reach."""
         base = self.fixed[0][:3, :3] @ self.first + self.fixed[0][:3, 3]
-        distance = float(np.linalg.norm(aim - base))
-        outside = max(distance - self.reach[0], self.reach[1] - distance)
+        offset = point - base
+        if self.exact:  # in the plane of the arm
+            axis = self.fixed[0][:3, 2]
+            offset = offset - (axis @ offset) * axis
+        distance = float(np.linalg.norm(offset))
+        towards = offset / distance if distance > 0.0 else self.fixed[0][:3, 0]
+        nearest: Vector = base + min(max(distance, self.reach[1]), self.reach[0]) * towards
+        return nearest
+
+    def shortfall(self, point: Vector) -> float:
+        """How far a point in the world, shape (3,), is certainly out of reach [m]; 0 if it may be in reach."""
+        outside = float(np.linalg.norm(self.nearest_in_reach(point) - point))
         return outside if outside > ROUNDING * self.reach[0] else 0.0
 
 

@@ -66,10 +66,10 @@ def search(
         rounds: Limit.
     """
     axes = axes_of(robot, isinstance(target, PoseGoal))
-    tree = AxisTree(axes, aimed_point(axes, target), near, rng)
-    found = np.zeros((0, robot.dof))
-    if axes.shortfall(aimed_point(axes, target)) > 0.0:
+    aim, found = aimed_point(axes, target), np.zeros((0, robot.dof))
+    if axes.shortfall(aim) > _tolerance(target):
         return Found(found, 0)
+    tree = AxisTree(axes, axes.nearest_in_reach(aim), near, rng)
     for number in range(rounds):
         if number == BLIND_ROUNDS and world is not None and world.pairs:
             tree.check_links(LinkWorlds(world, axes).free)
@@ -114,6 +114,10 @@ def polished(robot: Robot, axes: Axes, target: PoseGoal | PositionGoal, ends: Ma
             return ends[there]
     ends, _ = descend(robot, target, ends)
     return ends[target.satisfied(robot, ends)]
+
+
+def _tolerance(target: PoseGoal | PositionGoal) -> float:
+    return target.tolerance if isinstance(target, PositionGoal) else target.position_tolerance
 
 
 def _tightened(target: PoseGoal | PositionGoal) -> PoseGoal | PositionGoal:
