@@ -2,7 +2,7 @@
 
     nice python bench/mb_rrt_report.py [--quick] [--out bench/reports/mb_rrt.md]
 
-Takes about a quarter of an hour; ``--quick`` leaves the published tables 6 to 9 out.
+Takes five to fifteen minutes; ``--quick`` leaves the published tables 6 to 9 out.
 """
 
 from __future__ import annotations

@@ -145,19 +145,23 @@ def _table(count: int, results: dict[str, dict[float, Measured]]) -> list[str]:
 
 
 READINGS = [
-    "How the figures that differ are read (numbers of the specification's section 11):",
+    "How the figures that differ are read (rows of the specification's section 11):",
     "",
     "- Tables 6 and 7 are rows of 8 and 9 (C-space, Uniforme A, Superficie A) but for two entries: Uniforme A mu",
     "  2681.2731 (8: 2681.2577, a misprint) and Superficie A rho 0.22309, 0.21782 in table 6, which repeats the",
     "  10-joint values of table 7 (rows 10, 11).",
     "- Uniforme A*, 3 joints: \"57142\" is read as 5.7142 % (2 goals of 35), as the trap of rule A predicts (row 9).",
-    "- C-space, Uniforme B, Superficie B, 3 joints: nearer to the print at 0.2 cm, the tolerance of the 2-joint",
-    "  demonstration (row 3). Success is strict `<`, once a pass (row 13); mu is over converged goals (row 2).",
+    "- C-space, 3 joints, is nearer to the print at 0.2 cm, the tolerance of the 2-joint demonstration (row 3); the rate",
+    "  of Uniforme B and mu of Superficie B are printed between what 0.2 and 0.3 cm give, or beside it. Success is",
+    "  strict `<`, once a pass (row 13); mu is over converged goals (row 2).",
+    "- Superficie A, 3 joints: other goal clouds gave the specification 17 to 43 %; the printed one is not known (row 6).",
+    "- Uniforme A*, 10 joints: the rate is as printed, mu is a tenth of it. With the trap success comes early or never;",
+    "  no reading of the rules gives 1672.",
     "- Uniforme B*, 10 joints: printed 71 % with mean 1333; a ring of radius d_n around the goal gives 100 % and",
     "  a mean near L^2 / (pi d_n tol) = 318, which is what is measured. No reading of the rules gives 71 %.",
-    "- rho is about 0.05 to 0.12 above the print in the uniform rows and up to twice in Superficie B: the published",
-    "  goals were probably denser near the base (they lower every rho), and the margin is not stated (rows 6, 7).",
-    "- Uniforme A and A*, 10 joints: success comes early or never, so single clouds differ by ten points (row 12).",
+    "- rho is up to 0.12 above the print in the uniform rows and up to twice in Superficie B: the published goals were",
+    "  probably denser near the base (they lower every rho), and the margin is not stated (rows 6, 7).",
+    "- The other rates and means differ by what single goal clouds differ by (row 12).",
     "",
 ]  # fmt: skip
 
