@@ -181,4 +181,4 @@ def test_with_a_tip_that_the_last_joint_does_not_carry_auto_is_numeric():
 
 
 def test_the_methods_have_names():
-    assert list_ik_methods()[:3] == ("closed-form", "numeric", "genetic")
+    assert list_ik_methods()[:4] == ("closed-form", "numeric", "genetic", "mb-rrt")

@@ -3,5 +3,6 @@
 from rrtik_planners.bicrdt import BiCRDT
 from rrtik_planners.crdt import CRDT
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
+from rrtik_planners.mbrrt import MBRRT
 
-__all__ = ["CRDT", "BiCRDT", "FastRRTConnect"]
+__all__ = ["CRDT", "MBRRT", "BiCRDT", "FastRRTConnect"]

@@ -98,7 +98,7 @@ def solve_ik(
     def accept(Q: Matrix) -> Mask:
         return free_of_collision(world, Q)
 
-    answer = METHODS[name].run(Question(robot, drawn, posture, accept, all, begin + limit, rng))
+    answer = METHODS[name].run(Question(robot, drawn, posture, accept, all, begin + limit, rng, world))
     q = answer.q[robot.within_limits(answer.q) & goal.satisfied(robot, answer.q)] if len(answer.q) else answer.q
     q = robot.clamp(q)
     free = q[accept(q)]

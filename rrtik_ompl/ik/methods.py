@@ -16,6 +16,7 @@ from rrtik_ompl.ik.damped import damped_least_squares, pinocchio_iteration
 from rrtik_ompl.ik.fabrik import fabrik, fabrik_misfit
 from rrtik_ompl.ik.genetic.method import genetic
 from rrtik_ompl.ik.hinges import coupled_fault
+from rrtik_ompl.ik.mb_rrt.method import mb_rrt, mb_rrt_misfit
 from rrtik_ompl.ik.numeric import descend
 from rrtik_ompl.ik.pso import PARTICLES, pso, resampled_pso
 from rrtik_ompl.ik.question import Answer, Method, Question, Target
@@ -89,6 +90,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
         "closed-form": Method(_closed_form_misfit, _closed_form),
         "numeric": Method(_fits_all, _walks(descend)),
         "genetic": Method(_fits_all, genetic),
+        "mb-rrt": Method(mb_rrt_misfit, mb_rrt),
         "damped": Method(_fits_all, _walks(partial(damped_least_squares, enough=ENOUGH))),
         "pinocchio": Method(_fits_all, _walks(pinocchio_iteration, starts=1, rounds=64)),
         "ccd": Method(_stands_alone, _walks(partial(ccd, enough=ENOUGH))),

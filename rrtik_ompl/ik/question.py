@@ -11,6 +11,7 @@ import numpy as np
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.goal import PoseGoal, PositionGoal
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.world import World
 
 Target: TypeAlias = PoseGoal | PositionGoal
 
@@ -27,6 +28,7 @@ class Question:
         all: Whether every solution is wanted that the method can find, not just one.
         deadline: Time of ``time.monotonic`` at which to stop.
         rng: Random numbers.
+        world: What ``accept`` asks about collisions, for methods that place the arm link by link.
     """
 
     robot: Robot
@@ -36,6 +38,7 @@ class Question:
     all: bool
     deadline: float
     rng: np.random.Generator
+    world: World | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,6 +4,7 @@ from rrtik_ompl.ompl_bridge.contract import check_planner
 from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker, WorldLike
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner, SearchResult
 from rrtik_ompl.ompl_bridge.states import StateIO, space_bounds
+from rrtik_ompl.ompl_bridge.tip_goal import TipGoal
 
 __all__ = [
     "MotionChecker",
@@ -11,6 +12,7 @@ __all__ = [
     "SearchResult",
     "SpaceChecker",
     "StateIO",
+    "TipGoal",
     "WorldChecker",
     "WorldLike",
     "check_planner",

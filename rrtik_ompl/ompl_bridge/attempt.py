@@ -34,7 +34,7 @@ ONE_GOAL_PLANNERS = ("PRM", "PRMstar")
 STRAIGHT_FIRST_PLANNERS = ("AORRTC",)
 
 # Options of our planners that `attempt` itself sets.
-GIVEN_OPTIONS = ("world", "seed")
+GIVEN_OPTIONS = ("world", "seed", "goal")
 
 # What a brief attempt may take: iterations of our planners, questions about motions of OMPL's.
 ITERATION_LIMIT = "max_iterations"
@@ -132,8 +132,9 @@ def _own_planner(
     for key in parameters:
         if key not in options or key in GIVEN_OPTIONS:
             raise UnknownNameError(f"parameter of planner {name}", key, set(options).difference(GIVEN_OPTIONS))
+    goal = {"goal": problem.goal} if "goal" in options else {}
     try:
-        return factory(si, world=problem.world, seed=seed, **parameters)
+        return factory(si, world=problem.world, seed=seed, **goal, **parameters)
     except TypeError as error:
         raise InputError(f"planner {name}: {error}") from None
 

@@ -1,0 +1,82 @@
+"""MB-RRT as a planner: a tree in the workspace finds goal configurations, two trees in joint space the way there."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.goal import Goal, JointGoal
+from rrtik_ompl.ik.mb_rrt.aims import tree_aims
+from rrtik_ompl.ik.mb_rrt.axes import misfit
+from rrtik_ompl.ompl_bridge import MotionChecker, SearchResult, WorldLike, space_bounds
+from rrtik_ompl.world import World
+from rrtik_planners.bicrdt import BiCRDT
+
+
+class MBRRT(BiCRDT):
+    """Reaches a pose, a position or a region: its configurations by MB-RRT, the path to one of them by BiCRDT.
+
+    Source: the MB-RRT paper, which names this use and leaves the path to a planner. In plain OMPL give the problem
+    definition a :class:`rrtik_ompl.ompl_bridge.TipGoal`, or any goal of configurations; these are taken as they are.
+    """
+
+    def __init__(
+        self,
+        si: Any,
+        *,
+        world: WorldLike | None = None,
+        seed: int | None = None,
+        goal: Goal | None = None,
+        ik_seconds: float = 1.0,
+        scale_by_range: bool = False,
+        max_iterations: int | None = None,
+    ) -> None:
+        """Make a planner.
+
+        Args:
+            si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
+            world: Asked instead of ``si`` whether configurations and motions are free, if given.
+            seed: At least 0; drawn from OMPL's if None.
+            goal: What the tip has to reach; needs a world. If None, or where the tree finds nothing, the
+                configurations of the problem definition are the goals.
+            ik_seconds: Time that the tree in the workspace may take [s].
+            scale_by_range: See :class:`rrtik_planners.axis_options.AxisOptions`.
+            max_iterations: As there.
+
+        Raises:
+            InputError: If an option is out of range, the space is of another kind, or the robot does not fit.
+        """
+        super().__init__(si, world=world, seed=seed, scale_by_range=scale_by_range, max_iterations=max_iterations)
+        self.setName("MBRRT")
+        if not ik_seconds > 0.0:
+            raise InputError(f"ik_seconds: expected a number greater than 0, got {ik_seconds!r}")
+        self.ik_seconds = ik_seconds
+        self.goal = None if isinstance(goal, JointGoal) else goal
+        if self.goal is not None:
+            _check_fit(world)
+
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+        """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
+        aims = self._aims(starts)
+        result = super().search(starts, aims if len(aims) else goals, checker, ptc)
+        return SearchResult(result.path, {**result.statistics, "tree_goals": len(aims)}, result.difference)
+
+    def _aims(self, starts: Matrix) -> Matrix:
+        """Free configurations at the goal of the tip inside the bounds of the space, shape (k, n)."""
+        if self.goal is None or not isinstance(self._world, World):
+            return np.zeros((0, starts.shape[1]))
+        rows = tree_aims(self._world, self.goal, starts[0], self.rng, seconds=self.ik_seconds)
+        lower, upper = space_bounds(self.getSpaceInformation())
+        inside: Matrix = rows[((rows >= lower) & (rows <= upper)).all(axis=1)]
+        return inside
+
+
+def _check_fit(world: WorldLike | None) -> None:
+    if not isinstance(world, World):
+        raise InputError("goal: MBRRT needs world= to know the arm whose tip it is; or give OMPL a TipGoal")
+    fault = misfit(world.robot)
+    if fault:
+        raise InputError(f"robot '{world.robot.name}' does not fit MB-RRT: {fault}; use planner bicrdt")

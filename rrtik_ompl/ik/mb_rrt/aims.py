@@ -1,0 +1,56 @@
+"""Free goal configurations for a planner, found by the tree in the workspace."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal, joint_difference
+from rrtik_ompl.ik.mb_rrt.search import search
+from rrtik_ompl.ik.numeric import targets
+from rrtik_ompl.world import World
+
+DRAWS = 16  # targets of a goal that leaves freedom
+MOST = 16  # configurations
+
+
+def tree_aims(
+    world: World,
+    goal: PoseGoal | PositionGoal | GoalRegion,
+    near: Vector,
+    rng: np.random.Generator,
+    *,
+    seconds: float = 1.0,
+    most: int = MOST,
+) -> Matrix:
+    """Free configurations at a goal, nearest to a posture first.
+
+    Args:
+        world: The robot, which `rrtik_ompl.ik.mb_rrt.axes.misfit` accepts, and its scene.
+        goal: A goal of the tip.
+        near: Shape (dof,).
+        rng: Random numbers.
+        seconds: Time limit.
+        most: Configurations at most.
+
+    Returns:
+        Shape (k, dof), k <= ``most``, none if none was found in time.
+    """
+    deadline, robot = time.monotonic() + seconds, world.robot
+    rows = np.zeros((0, robot.dof))
+
+    def accept(Q: Matrix) -> Mask:
+        return world.valid_batch(robot.clamp(Q))
+
+    for target in targets(goal, DRAWS, rng):
+        found = search(robot, target, near=near, accept=accept, rng=rng, deadline=deadline, world=world)
+        rows = np.vstack([rows, robot.clamp(found.q)])
+        rows = rows[goal.satisfied(robot, rows) & world.valid_batch(rows)] if len(rows) else rows
+        if found.timed_out or len(rows) >= most:
+            break
+    away = joint_difference(robot, rows, near)
+    order = np.argsort(np.linalg.norm(away, axis=1), kind="stable")[:most]
+    nearest: Matrix = np.where(robot.continuous, near + away[order], rows[order])
+    return nearest

@@ -1,0 +1,151 @@
+"""A real arm as the tree sees it: joints that each turn about one axis, and the lengths that are left after each.
+
+A node carries the frame of a joint, an edge is a turn about its axis, and the joint angles come for free
+(specification of MB-RRT, section 12.4).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.ik.mb_rrt.links import ROUNDING, smallest_spans
+from rrtik_ompl.ik.tip_columns import tip_columns
+from rrtik_ompl.robot import Robot
+
+ROUNDS = 60  # of reweighting, to find the shortest polygon through the axes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Axes:
+    """The chain of turning joints that moves a point, base first.
+
+    Each joint k has a point on its axis, so chosen that the polygon through all of them up to the aimed point is
+    short; a turn of joint k moves the point of joint k + 1 on a circle, and the aimed point is never farther from
+    that than the rest of the polygon is long. Of a pose the tree aims at the point of the last joint, which the pose
+    fixes; of a position at the tip.
+
+    Attributes:
+        joints: Which entry of q each joint is, shape (n,).
+        offset: Angle of each joint = q + offset [rad], shape (n,).
+        lower, upper: Limits of the angles [rad], shape (n,); a full turn where there is none.
+        fixed: Transform before each turn about z, and the one to the tip after all, shape (n + 1, 4, 4).
+        first: Point of the first joint in its frame [m], shape (3,).
+        points: The point after each joint in its turned frame [m], shape (n, 3).
+        remaining: Longest distance from that point to the aimed point [m], shape (n,).
+        folded: Shortest [m], shape (n,).
+        reach: Longest and shortest distance from the first joint's point to the aimed point [m].
+        aim: The aimed point in the frame of the tip [m], shape (3,).
+        idle: Which joints leave a position where it is, as all after them do; none if the aim is a pose. Shape (n,).
+        exact: Whether all axes are parallel, so that the distances that remain are the whole truth.
+    """
+
+    joints: NDArray[np.int64]
+    offset: Vector
+    lower: Vector
+    upper: Vector
+    fixed: NDArray[np.float64]
+    first: Vector
+    points: Matrix
+    remaining: Vector
+    folded: Vector
+    reach: tuple[float, float]
+    aim: Vector
+    idle: Mask
+    exact: bool
+
+    @property
+    def count(self) -> int:
+        """Number of joints."""
+        return len(self.joints)
+
+    def nearest_in_reach(self, point: Vector) -> Vector:
+        """The point nearest to one in the world, shape (3,), that is not certainly out of reach."""
+        base = self.fixed[0][:3, :3] @ self.first + self.fixed[0][:3, 3]
+        offset = point - base
+        if self.exact:  # in the plane of the arm
+            axis = self.fixed[0][:3, 2]
+            offset = offset - (axis @ offset) * axis
+        distance = float(np.linalg.norm(offset))
+        towards = offset / distance if distance > 0.0 else self.fixed[0][:3, 0]
+        nearest: Vector = base + min(max(distance, self.reach[1]), self.reach[0]) * towards
+        return nearest
+
+    def shortfall(self, point: Vector) -> float:
+        """How far a point in the world, shape (3,), is certainly out of reach [m]; 0 if it may be in reach."""
+        outside = float(np.linalg.norm(self.nearest_in_reach(point) - point))
+        return outside if outside > ROUNDING * self.reach[0] else 0.0
+
+
+def misfit(robot: Robot) -> str:
+    """Why the tree cannot grow along an arm: a line, or ""."""
+    tip = tip_columns(robot)
+    if tip.prismatic.any():
+        return "its edges are links, and a joint of the robot slides"
+    one_each = (np.abs(tip.gain).sum(axis=1) == 1.0) & (tip.gain.max(axis=1) == 1.0)
+    if not one_each.all() or (tip.gain.sum(axis=0) > 1.0).any() or len(tip.gain) == 0:
+        return "its edges are links, and joints of the robot are coupled or do not move the tip"
+    return ""
+
+
+@lru_cache(maxsize=64)
+def axes_of(robot: Robot, oriented: bool) -> Axes:
+    """The axes of an arm that `misfit` accepts, for positions or, if ``oriented``, for poses."""
+    tip = tip_columns(robot)
+    joints = np.argmax(tip.gain, axis=1)
+    heights = _heights(tip.fixed, oriented)
+    first, points = np.array([0.0, 0.0, heights[0]]), _points(tip.fixed, heights)
+    starts = np.column_stack([np.zeros((len(joints), 2)), heights[: len(joints)]])
+    aim = points[-1] * 0.0
+    if oriented:
+        points[-1] = starts[-1]
+        aim = np.asarray(np.linalg.inv(tip.fixed[-1]) @ np.append(starts[-1], 1.0))[:3]
+    lengths = np.linalg.norm(points - starts, axis=1)
+    remaining = np.append(np.cumsum(lengths[::-1])[::-1], 0.0)
+    folded = smallest_spans(lengths, remaining)
+    low, high = (end[joints] + tip.offset for end in robot.finite_range())
+    parallel = np.abs(np.abs(tip.fixed[1:-1, 2, 2]) - 1.0).max(initial=0.0) < ROUNDING
+    flat = np.abs((points - starts)[:, 2]).max() < ROUNDING
+    still = (np.hypot(points[:, 0], points[:, 1]) < ROUNDING) & (remaining[1:] < ROUNDING)
+    idle = still & (not oriented)
+    exact = bool(parallel and flat)
+    return Axes(
+        joints, tip.offset, low, high, tip.fixed, first, points, remaining[1:], folded[1:],
+        (float(remaining[0]), float(folded[0])), aim, idle, exact,
+    )  # fmt: skip
+
+
+def _points(fixed: NDArray[np.float64], heights: Vector) -> Matrix:
+    """The point after each joint in its turned frame, shape (n, 3)."""
+    points: Matrix = fixed[1:, :3, 3] + heights[1:, None] * fixed[1:, :3, 2]
+    return points
+
+
+def _heights(fixed: NDArray[np.float64], oriented: bool) -> Vector:
+    """Where on each joint's axis its point lies [m], so that the polygon through the points is shortest; (n + 1,).
+
+    The last entry belongs to the tip and is 0. Each side is the length of a vector that is linear in the heights:
+    least squares, reweighted by the inverse lengths.
+    """
+    count = len(fixed) - 1
+    sides = count - 1 if oriented else count
+    if sides == 0:
+        return np.zeros(count + 1)
+    matrix, shift = np.zeros((sides, 3, count)), fixed[1 : sides + 1, :3, 3]
+    for side in range(sides):
+        matrix[side, 2, side] = -1.0
+        if side + 1 < count:
+            matrix[side, :, side + 1] = fixed[side + 1, :3, 2]
+    heights: Vector = np.zeros(count)
+    weight: Vector = np.ones(sides)
+    for _ in range(ROUNDS):
+        scaled = np.sqrt(weight)[:, None]
+        rows = (scaled[:, :, None] * matrix).reshape(-1, count)
+        heights = np.asarray(np.linalg.lstsq(rows, -(scaled * shift).ravel(), rcond=1e-10)[0], dtype=np.float64)
+        length = np.linalg.norm(matrix @ heights + shift, axis=1)
+        weight = 1.0 / np.maximum(length, 1e-9 * max(float(length.max()), 1e-300))
+    return np.append(heights, 0.0)

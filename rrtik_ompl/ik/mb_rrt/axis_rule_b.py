@@ -1,0 +1,68 @@
+"""Surface sampling and rule B for joints with one axis, without any look ahead: the plain carry-over to real arms.
+
+A node carries a frame, and the parent is the one whose circle of next points passes closest to the sample
+(specification of MB-RRT, section 12.4). It shows what the arcs and the polish add; joint limits are not regarded.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.ik.mb_rrt.axes import Axes
+from rrtik_ompl.ik.mb_rrt.links import directions
+from rrtik_ompl.ik.mb_rrt.run import first_hit
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AxisRun:
+    """What a search brought.
+
+    Attributes:
+        q: Joint angles less their offsets of each pass's end, in the order of the axes, shape (passes, n).
+        misses: Distance of each end from the goal [m], shape (passes,).
+        solved_in: The first pass, counted from 1, within the tolerance; 0 if there is none.
+    """
+
+    q: Matrix
+    misses: Vector
+    solved_in: int
+
+
+def grow_by_rule_b(axes: Axes, goal: Vector, *, tolerance: float, passes: int, rng: np.random.Generator) -> AxisRun:
+    """Grow a tree of frames pass by pass until an end is within the tolerance [m] of a point, shape (3,)."""
+    frames = [np.zeros((passes if level else 1, 4, 4)) for level in range(axes.count + 1)]
+    q = [np.zeros((passes if level else 1, axes.count)) for level in range(axes.count + 1)]
+    frames[0][0] = axes.fixed[0]
+    misses = np.zeros(passes)
+    for done in range(passes):
+        for level in range(axes.count):
+            known = done + 1 if level else 1
+            sample = goal + axes.remaining[level] * directions(1, 3, rng)[0]
+            parent, angle = _closest_circle(frames[level][:known], axes.points[level], sample)
+            q[level + 1][done] = q[level][parent]
+            q[level + 1][done, level] = angle
+            frames[level + 1][done] = frames[level][parent] @ _about_z(angle) @ axes.fixed[level + 1]
+        end = frames[-1][done]
+        misses[done] = np.linalg.norm(end[:3, :3] @ axes.aim + end[:3, 3] - goal)
+        if misses[done] < tolerance:
+            break
+    return AxisRun(q[-1][: done + 1] - axes.offset, misses[: done + 1], first_hit(misses[: done + 1], tolerance))
+
+
+def _closest_circle(frames: NDArray[np.float64], point: Vector, sample: Vector) -> tuple[int, float]:
+    """The frame whose circle, on which a turn about z moves a point, passes closest to a sample, and that turn."""
+    local = np.einsum("mji,mj->mi", frames[:, :3, :3], sample - frames[:, :3, 3])
+    off = (np.hypot(local[:, 0], local[:, 1]) - np.hypot(point[0], point[1])) ** 2 + (local[:, 2] - point[2]) ** 2
+    best = int(np.argmin(off))
+    turn = np.arctan2(local[best, 1], local[best, 0]) - np.arctan2(point[1], point[0])
+    return best, float((turn + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+def _about_z(angle: float) -> NDArray[np.float64]:
+    turn = np.eye(4)
+    turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    return turn

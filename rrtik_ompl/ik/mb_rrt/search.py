@@ -1,0 +1,141 @@
+"""Configurations of a real arm at a position or a pose: the tree's branches, polished where that alone is not exact.
+
+An arm whose axes are all parallel ends exactly on the goal. Elsewhere a sphere about the goal is not all that a joint
+with one axis can keep to; the newest branches, which are near the goal and free as far as the links know, are then
+polished by Levenberg-Marquardt (specification of MB-RRT, section 12.4).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.goal import PoseGoal, PositionGoal
+from rrtik_ompl.ik.mb_rrt.axes import Axes, axes_of
+from rrtik_ompl.ik.mb_rrt.axis_tree import AxisTree
+from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
+from rrtik_ompl.ik.numeric import descend
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.world import World
+
+WIDTH = 16  # passes at a time
+ROUNDS = 64  # after which it gives up
+FIRST_STEPS = 12  # of the polish, after which most branches that get to the goal at all are there
+BLIND_ROUNDS = 2  # that look at whole postures alone; where free ones are common, that is faster
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """Configurations at the goal, shape (k, dof), inside the limits; passes done; whether the time was up."""
+
+    q: Matrix
+    passes: int
+    timed_out: bool = False
+
+
+def search(
+    robot: Robot,
+    target: PoseGoal | PositionGoal,
+    *,
+    near: Vector,
+    accept: Callable[[Matrix], Mask],
+    rng: np.random.Generator,
+    deadline: float,
+    world: World | None = None,
+    all: bool = False,
+    width: int = WIDTH,
+    rounds: int = ROUNDS,
+) -> Found:
+    """Grow the tree until a configuration at the goal will do.
+
+    Args:
+        robot: An arm that `rrtik_ompl.ik.mb_rrt.axes.misfit` accepts.
+        target: The goal.
+        near: Values of joints that the tree does not move, shape (dof,).
+        accept: Which configurations, shape (k, dof), at the goal will do.
+        rng: Random numbers.
+        deadline: Time of ``time.monotonic`` at which to stop.
+        world: If given, and if the first rounds end in collision, every further edge of the tree is held clear of
+            its obstacles, link by link.
+        all: Whether to go on for all ``rounds`` and collect every solution.
+        width: Passes at a time.
+        rounds: Limit.
+    """
+    axes = axes_of(robot, isinstance(target, PoseGoal))
+    aim, found = aimed_point(axes, target), np.zeros((0, robot.dof))
+    if axes.shortfall(aim) > _tolerance(target):
+        return Found(found, 0)
+    tree = AxisTree(axes, axes.nearest_in_reach(aim), near, rng)
+    for number in range(rounds):
+        if number == BLIND_ROUNDS and world is not None and world.pairs:
+            tree.check_links(LinkWorlds(world, axes).free)
+        ends = polished(robot, axes, target, tree.grow(width), all=all)
+        found = np.vstack([found, ends])
+        if not all and accept(ends).any():
+            break
+        if time.monotonic() > deadline:
+            return Found(found, tree.passes, True)
+    return Found(found, tree.passes)
+
+
+def aimed_point(axes: Axes, target: PoseGoal | PositionGoal) -> Vector:
+    """The point in the world that the tree aims at, shape (3,)."""
+    if isinstance(target, PositionGoal):
+        return target.position
+    point: Vector = target.T_world_tip.rotation @ axes.aim + target.T_world_tip.translation
+    return point
+
+
+def polished(robot: Robot, axes: Axes, target: PoseGoal | PositionGoal, ends: Matrix, *, all: bool = True) -> Matrix:
+    """Those of the tree's ends that are at the goal or get there, shape (k, dof).
+
+    Args:
+        robot: The arm.
+        axes: Of the arm, for this kind of target.
+        target: The goal.
+        ends: Configurations, shape (m, dof).
+        all: Whether to wait for the slowest; if not, the first few that get there are enough.
+    """
+    if len(ends) == 0:
+        return ends
+    if isinstance(target, PoseGoal):
+        ends = _last_turned(robot, axes, target, ends)
+    at = target.satisfied(robot, ends)
+    if axes.exact:
+        return ends[at & robot.within_limits(ends)]
+    if not all:
+        ends, _ = descend(robot, target, ends, iterations=FIRST_STEPS)
+        there = _tightened(target).satisfied(robot, ends)
+        if there.any():
+            return ends[there]
+    ends, _ = descend(robot, target, ends)
+    return ends[target.satisfied(robot, ends)]
+
+
+def _tolerance(target: PoseGoal | PositionGoal) -> float:
+    return target.tolerance if isinstance(target, PositionGoal) else target.position_tolerance
+
+
+def _tightened(target: PoseGoal | PositionGoal) -> PoseGoal | PositionGoal:
+    """The same goal with a tenth of the tolerances."""
+    if isinstance(target, PositionGoal):
+        return PositionGoal(target.position, 0.1 * target.tolerance)
+    return PoseGoal(target.T_world_tip, 0.1 * target.position_tolerance, 0.1 * target.orientation_tolerance)
+
+
+def _last_turned(robot: Robot, axes: Axes, target: PoseGoal, ends: Matrix) -> Matrix:
+    """The last joint, which leaves the aimed point where it is, turned as near to the orientation as it gets."""
+    joint, angles = int(axes.joints[-1]), np.array(ends)
+    angles[:, joint] = -axes.offset[-1]
+    frames = robot.fk_batch(angles)[:, :3, :3] @ axes.fixed[-1][:3, :3].T
+    wanted = target.T_world_tip.rotation @ axes.fixed[-1][:3, :3].T
+    off = np.swapaxes(frames, 1, 2) @ wanted  # the turn about z nearest to it
+    turn = np.arctan2(off[:, 1, 0] - off[:, 0, 1], off[:, 0, 0] + off[:, 1, 1])
+    full = 2.0 * np.pi
+    turn += full * np.ceil((axes.lower[-1] - turn) / full - 1e-9)  # the first full turn inside the limits
+    angles[:, joint] = np.clip(turn, axes.lower[-1], axes.upper[-1]) - axes.offset[-1]
+    return angles

@@ -1,0 +1,73 @@
+"""Useful angles of one joint: those that keep the goal in reach of the links still to come, inside the joint limits.
+
+Arc-of-intersection sampling on the circle that a real joint can move the next one on.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Mask, Vector
+from rrtik_ompl.ik.mb_rrt.axes import Axes
+
+TURN = 2.0 * np.pi
+SLACK = 1e-12  # in cosines and angles: what rounding may add where an interval is a single value
+FLAT = 1e-24  # [m^2] a circle this small is a point
+
+
+def draw_turns(
+    axes: Axes, level: int, frames: NDArray[np.float64], goal: Vector, rng: np.random.Generator
+) -> tuple[Vector, Mask]:
+    """Draw an angle for a joint of each of several branches.
+
+    The squared distance of the next point from the goal is a constant less an amplitude times the cosine of the
+    angle from the direction of the goal, hence the useful angles are two mirrored arcs.
+
+    Args:
+        axes: The arm.
+        level: Number of the joint, from 0.
+        frames: Of the joint in each branch before it turns, T_world_joint, shape (m, 4, 4).
+        goal: The aimed point in the world, shape (3,).
+        rng: Random numbers.
+
+    Returns:
+        Angles inside the limits, shape (m,), uniform on the useful arcs; and which of them are useful. Where no angle
+        is, it is the one that comes nearest to being it.
+    """
+    local = np.einsum("mji,mj->mi", frames[:, :3, :3], goal - frames[:, :3, 3])
+    point, far, near = axes.points[level], float(axes.remaining[level]), float(axes.folded[level])
+    constant = np.einsum("mi,mi->m", local, local) + point @ point - 2.0 * local[:, 2] * point[2]
+    amplitude = 2.0 * np.hypot(local[:, 0], local[:, 1]) * np.hypot(point[0], point[1])
+    centre = np.arctan2(local[:, 1], local[:, 0]) - np.arctan2(point[1], point[0])
+    still = amplitude < FLAT
+    divisor = np.where(still, 1.0, amplitude)
+    least, most = (constant - far**2) / divisor, (constant - near**2) / divisor
+    size = SLACK * (1.0 + np.abs(constant) / divisor)
+    useful = np.where(still, (least <= size) & (most >= -size), (least <= 1.0 + size) & (most >= -1.0 - size))
+    outer = np.where(still, np.pi, np.arccos(np.clip(least, -1.0, 1.0)))
+    inner = np.where(still, 0.0, np.arccos(np.clip(most, -1.0, 1.0)))
+    if far == 0.0 and bool(axes.exact):  # pointing at the goal, without the square root of the rounding
+        outer, inner = np.where(still, outer, 0.0), np.where(still, inner, 0.0)
+    drawn, inside = _draw(centre, inner, outer, float(axes.lower[level]), float(axes.upper[level]), rng)
+    return drawn, useful & inside
+
+
+def _draw(
+    centre: Vector, inner: Vector, outer: Vector, lower: float, upper: float, rng: np.random.Generator
+) -> tuple[Vector, Mask]:
+    """Uniform angles on centre +- inner..outer inside the limits, shape (m,); where there are none the nearest."""
+    turns = TURN * np.arange(np.floor((lower - np.pi) / TURN) - 1.0, np.ceil((upper + np.pi) / TURN) + 2.0)
+    centre = (centre + np.pi) % TURN - np.pi
+    begins = np.stack([centre + inner, centre - outer], axis=1)[:, :, None] + turns
+    widths = (outer - inner)[:, None, None]
+    starts = np.clip(begins, lower, upper).reshape(len(centre), -1)
+    ends = np.clip(begins + widths, lower, upper).reshape(len(centre), -1)
+    missed = np.maximum(np.maximum(lower - begins - widths, begins - upper), 0.0).reshape(len(centre), -1)
+    inside = missed.min(axis=1) <= SLACK
+    weight = np.where(missed <= np.minimum(missed.min(axis=1), np.pi)[:, None] + SLACK, ends - starts + SLACK, 0.0)
+    total = np.cumsum(weight, axis=1)
+    pick = (total > (rng.uniform(size=len(centre)) * total[:, -1])[:, None]).argmax(axis=1)
+    rows = np.arange(len(centre))
+    first, last = starts[rows, pick], ends[rows, pick]
+    return first + rng.uniform(size=len(centre)) * (last - first), inside

@@ -1,0 +1,89 @@
+"""The published variants: how a sample is drawn and which node it is joined to. Source: the MB-RRT paper."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.errors import UnknownNameError
+from rrtik_ompl.ik.mb_rrt.links import Links, directions
+
+Draw = Callable[[Links, Vector, int, int, np.random.Generator], Matrix]
+Rule = Callable[[Matrix, float], Matrix]
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """One configuration of the method.
+
+    Attributes:
+        name: By which it is asked for.
+        title: As the paper calls it.
+        draw: Samples for the joint of an index, from (links, goal, index, count, rng), shape (count, dimension).
+        rule: What the parent must have least of, from squared distances to the sample and the link's length.
+    """
+
+    name: str
+    title: str
+    draw: Draw
+    rule: Rule
+
+
+def square(links: Links, goal: Vector, index: int, count: int, rng: np.random.Generator) -> Matrix:
+    """Uniform in the square, or cube, around the base that holds the whole reach (section 4.1)."""
+    return rng.uniform(-links.reach, links.reach, (count, links.dimension))
+
+
+def square_then_goal(links: Links, goal: Vector, index: int, count: int, rng: np.random.Generator) -> Matrix:
+    """As `square`, and the goal itself for the last index: the "*" option (section 4.5)."""
+    if index < links.count:
+        return square(links, goal, index, count, rng)
+    return np.broadcast_to(goal, (count, links.dimension))
+
+
+def surface(links: Links, goal: Vector, index: int, count: int, rng: np.random.Generator) -> Matrix:
+    """On the circle, or sphere, around the goal whose radius is the length still to come (equation 4.1)."""
+    circle: Matrix = goal + links.remaining[index] * directions(count, links.dimension, rng)
+    return circle
+
+
+def nearest(squared: Matrix, length: float) -> Matrix:
+    """Rule A: the nearest node."""
+    return squared
+
+
+def one_link_away(squared: Matrix, length: float) -> Matrix:
+    """Rule B: the node whose distance from the sample is closest to the link's length (equation 4.2)."""
+    off = np.sqrt(squared, out=squared)
+    off -= length
+    return np.abs(off, out=off)
+
+
+VARIANTS: Mapping[str, Variant] = MappingProxyType(
+    {
+        each.name: each
+        for each in (
+            Variant("uniform-a", "RRT Uniforme A", square, nearest),
+            Variant("uniform-b", "RRT Uniforme B", square, one_link_away),
+            Variant("uniform-a-star", "RRT Uniforme A*", square_then_goal, nearest),
+            Variant("uniform-b-star", "RRT Uniforme B*", square_then_goal, one_link_away),
+            Variant("surface-a", "RRT Superficie A", surface, nearest),
+            Variant("surface-b", "RRT Superficie B (MB-RRT)", surface, one_link_away),
+        )
+    }
+)
+
+
+def variant(name: str) -> Variant:
+    """The variant of a name.
+
+    Raises:
+        UnknownNameError: If there is none.
+    """
+    if name not in VARIANTS:
+        raise UnknownNameError("variant of MB-RRT", name, VARIANTS)
+    return VARIANTS[name]
