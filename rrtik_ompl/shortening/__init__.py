@@ -10,12 +10,20 @@ from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.path import SECOND_CHECK, JointPath
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.shortening.axis import MotionValid, double_axis_cut
+from rrtik_ompl.shortening.axis import double_axis_cut
 from rrtik_ompl.shortening.axis_rounds import axis_cut_rounds
+from rrtik_ompl.shortening.fewest_moves import fewest_moves
+from rrtik_ompl.world import World
 
-Method: TypeAlias = Callable[[Matrix, MotionValid], Matrix]
+Method: TypeAlias = Callable[[Matrix, World], Matrix]
 
-METHODS: Mapping[str, Method] = MappingProxyType({"axis": double_axis_cut, "axis-rounds": axis_cut_rounds})
+METHODS: Mapping[str, Method] = MappingProxyType(
+    {
+        "axis": lambda route, world: double_axis_cut(route, world.motion_valid),
+        "axis-rounds": lambda route, world: axis_cut_rounds(route, world.motion_valid),
+        "fewest-moves": lambda route, world: fewest_moves(route, world).route,
+    }
+)
 
 
 def shorten(path: JointPath, problem: Problem, *, method: str = "axis") -> JointPath:
@@ -26,6 +34,7 @@ def shorten(path: JointPath, problem: Problem, *, method: str = "axis") -> Joint
         problem: Whose world judges the new motions.
         method: "axis" is the published double axis cut: fewer moves of one joint at a time. "axis-rounds" goes on with
             twenty passes in random joint orders (always the same ones): fewer moves still, several times as long.
+            "fewest-moves" takes single-joint moves and looks for the fewest, with the least travel among those.
 
     Returns:
         A path with the same ends. It passes the same second check as a plan: if a shortened path does not, its
@@ -43,7 +52,7 @@ def shorten(path: JointPath, problem: Problem, *, method: str = "axis") -> Joint
     if faults:
         raise InputError(f"path to shorten: edge {faults[0].edge} is not valid: {faults[0].reason}")
     for world in (problem.world, problem.refined(SECOND_CHECK).world):  # the finer one if the second check objects
-        shorter = path.with_waypoints(METHODS[method](path.waypoints, world.motion_valid))
+        shorter = path.with_waypoints(METHODS[method](path.waypoints, world))
         if not shorter.violations(problem.world):
             return shorter
     return path
