@@ -12,6 +12,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.problem import TURN, Problem
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.shortening.move_lattice import MoveLattice
 from rrtik_ompl.shortening.move_proof import sharper_bound
 from rrtik_ompl.shortening.move_search import MoveSearch
 from rrtik_ompl.shortening.questions import Stop, never
@@ -19,6 +20,7 @@ from rrtik_ompl.transitions import single_joint
 from rrtik_ompl.world import World
 
 ROUNDS = 10
+MOST_CELLS = 2_000_000  # of a grid
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,14 +90,47 @@ def least_moves(problem: Problem) -> int:
     Raises:
         InputError: If the goal is of another kind.
     """
-    if not isinstance(problem.goal, JointGoal):
-        raise InputError(f"least_moves: expected a goal in joint values, got a {type(problem.goal).__name__}")
-    world, ends = problem.world, np.array([problem.start, problem.goal.q])
+    world, ends = problem.world, _ends(problem, "least_moves")
     search = MoveSearch(ends[:1], ends[1:], *turning_limits(world.robot, ends), world.motion_valid_batch)
     search.settle_corners()
     if search.moves == search.bound:
         return search.bound
     return max(search.bound, sharper_bound(world, range(world.robot.dof), ends[0], ends[1], never))
+
+
+def grid_route(problem: Problem, step: float) -> Matrix | None:
+    """The route with the fewest moves on a regular grid, least travel second: the C-RDT paper's oracle for few joints.
+
+    Args:
+        problem: Of at most 3 joints, its goal a configuration.
+        step: Of the grid [rad or m]; the values of start and goal are added to it.
+
+    Returns:
+        Shape (moves + 1, n); None if the grid has no route.
+
+    Raises:
+        InputError: If there are more joints, the goal is of another kind, or the grid would be too large.
+    """
+    world, ends = problem.world, _ends(problem, "grid_route")
+    if world.robot.dof > 3:
+        raise InputError(f"grid_route: expected at most 3 joints, got {world.robot.dof}")
+    if not step > 0.0:
+        raise InputError(f"grid_route: step must be greater than 0, got {step:g}")
+    lower, upper = turning_limits(world.robot, ends)
+    size = float(np.prod((upper - lower) / step + 2.0))
+    if size > MOST_CELLS:
+        raise InputError(f"grid_route: {size:.1e} cells are too many (at most {MOST_CELLS:.0e}); use a larger step")
+    limits = zip(lower, upper, ends.T, strict=True)
+    values = [np.union1d(np.linspace(low, high, int((high - low) / step) + 1), both) for low, high, both in limits]
+    lattice = MoveLattice(values, world.motion_valid_batch, np.ones(world.robot.dof))
+    return lattice.best_route(ends[0], ends[1], range(world.robot.dof))
+
+
+def _ends(problem: Problem, what: str) -> Matrix:
+    """Start and goal of a problem, shape (2, n)."""
+    if not isinstance(problem.goal, JointGoal):
+        raise InputError(f"{what}: expected a goal in joint values, got a {type(problem.goal).__name__}")
+    return np.array([problem.start, problem.goal.q])
 
 
 def turning_limits(robot: Robot, rows: Matrix) -> tuple[Vector, Vector]:

@@ -21,7 +21,7 @@ from rrtik_ompl.world import World
 
 MOST_PARTS = 4096  # of a range
 SMALLEST_PART = 1e-5  # of a range
-PROBES = 5  # configurations of a colliding stretch whose depth is asked for
+PROBES = 4  # stretches of a colliding motion in the middle of which the depth is asked for
 MOST_CORNERS = 256
 TURN = 2.0 * np.pi  # a joint that turns for ever gains nothing by more than one turn
 START, FREE, GOAL = range(3)  # where the free joint stands
@@ -64,6 +64,7 @@ class OneFreeValue:
 
     def __init__(self, world: World, start: Vector, goal: Vector, joint: int, stop: Stop) -> None:
         self._world, self._start, self._goal, self._joint, self._stop = world, start, goal, joint, stop
+        self._doubting = world.with_accuracy("conservative")  # its doubts are settled by the depth
         self._others = [k for k in np.flatnonzero(moved(start, goal)).tolist() if k != joint]
         self._full = (1 << len(self._others)) - 1
         self._depth = OverlapDepth(world.robot, world.bodies, world.pairs)
@@ -168,7 +169,8 @@ class OneFreeValue:
     def _collides_deeply(self, step: Step, value: float, reach: float) -> bool:
         """Whether a move collides wherever the free joint stands within ``reach`` of a value."""
         rows = self._between(*((mask, state, value) for mask, state in step))
-        hits = np.flatnonzero(~self._world.valid_batch(rows))
+        hits = np.flatnonzero(~self._doubting.valid_batch(rows))
         needed = float(self._world.weights[self._joint]) * reach
-        probes = hits[np.unique(np.linspace(0, len(hits) - 1, PROBES).astype(int))] if len(hits) else hits
+        stretches = sorted(np.split(hits, np.flatnonzero(np.diff(hits) > 1) + 1), key=len, reverse=True)
+        probes = [stretch[len(stretch) // 2] for stretch in stretches[:PROBES] if len(stretch)]
         return any(self._depth.travel(rows[k]) > needed for k in probes)

@@ -7,9 +7,9 @@ and many values of one, two or three joints hold such routes. Others are made of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from itertools import pairwise, product
+from itertools import combinations, islice, pairwise, product
 from typing import TypeAlias
 
 import numpy as np
@@ -24,6 +24,7 @@ MOST_NODES = 4096  # of a lattice: some milliseconds in the kernels
 DIGITS = 9  # of the travel that count; the rest is rounding
 MOST_FREE = 3  # joints with free values in one lattice
 WIDTHS = 0.1 * 0.5 ** np.arange(0, 16, 3)  # of the search for less travel, shares of a joint's range
+NEAR_NODES = 512  # of a lattice close to a route
 SPARE = 8  # configurations for each of a known part when further values come in
 REPEATS = 8  # of a search for less travel at the same width
 NONE = 2**31  # moves, if there is no route
@@ -67,6 +68,7 @@ class MoveSearch:
     ) -> None:
         self.pairs = [(s, g) for s, g in product(starts, goals)]
         self._bounds = [lower_bound(s, g) for s, g in self.pairs]
+        self._differing = min(self._bounds)
         self._lower, self._upper = lower, upper
         self._ask = Questions(motions_free)
         self._rng = np.random.default_rng(seed)
@@ -138,16 +140,14 @@ class MoveSearch:
                 self._rearrange(offered)
             for joint in self._movable:
                 self._free_values([joint])
-            self._less_travel()
-            for _ in range(rounds):
+            for joints in islice(self._free_joints(), rounds):
                 self._sharpen()
                 if self.proven:
                     break
                 self.rounds += 1
-                self._free_values(self._some_joints(self._most_free()))
+                self._free_values(joints)
                 if self.route is not None:
                     self._around(self.route)
-                    self._less_travel(WIDTHS[self.rounds % len(WIDTHS)])
             self._other_orders()
             self._less_travel()
 
@@ -191,16 +191,16 @@ class MoveSearch:
         joints = self._some_joints(MOST_FREE)
         self._replace(route, first, last, self._with_spread(route[first : last + 1], joints))
 
-    def _less_travel(self, *widths: float) -> None:
+    def _less_travel(self) -> None:
         """Move the free values of the best route by less and less, as long as its travel gets less."""
-        for width in widths or WIDTHS:
+        for width in WIDTHS:
             for _ in range(REPEATS):
                 before = self.route
                 if before is None or len(before) < 2:
                     return
                 last = self._window(before, 0)
                 part = before[: last + 1]
-                near = near_values(part, float(width), self._lower, self._upper, self._most_nodes)
+                near = near_values(part, float(width), self._lower, self._upper, NEAR_NODES)
                 self._replace(before, 0, last, near)
                 if self.route is before:
                     break
@@ -221,9 +221,19 @@ class MoveSearch:
         count = int(self._rng.integers(1, min(most, len(self._movable)) + 1)) if self._movable else 0
         return self._rng.choice(self._movable, size=count, replace=False).tolist() if count else []
 
-    def _most_free(self) -> int:
-        """How many joints may have free values in a route that is better by a move."""
-        return min(max(self.moves - 1 - min(self._bounds), 1), MOST_FREE)
+    def _free_joints(self) -> Iterator[list[int]]:
+        """Which joints are free, without end: all pairs in random order, all sets of three, each alone, and again.
+
+        Never more than can have free values in a route that is better by a move.
+        """
+        alone = False  # each joint alone comes before all others, see `improve`
+        while self._movable:
+            for size in range(1 if alone else 2, MOST_FREE + 1):
+                sets = list(combinations(self._movable, size))
+                for k in self._rng.permutation(len(sets)):
+                    if size <= max(self.moves - 1 - self._differing, 1):
+                        yield list(sets[k])
+            alone = True
 
     def _search(self, values: Values, start: Vector, goal: Vector) -> Matrix | None:
         """The best route on a lattice between a start and a goal; kept if it is better."""
