@@ -64,7 +64,6 @@ class OneFreeValue:
 
     def __init__(self, world: World, start: Vector, goal: Vector, joint: int, stop: Stop) -> None:
         self._world, self._start, self._goal, self._joint, self._stop = world, start, goal, joint, stop
-        self._doubting = world.with_accuracy("conservative")  # its doubts are settled by the depth
         self._others = [k for k in np.flatnonzero(moved(start, goal)).tolist() if k != joint]
         self._full = (1 << len(self._others)) - 1
         self._depth = OverlapDepth(world.robot, world.bodies, world.pairs)
@@ -169,8 +168,8 @@ class OneFreeValue:
     def _collides_deeply(self, step: Step, value: float, reach: float) -> bool:
         """Whether a move collides wherever the free joint stands within ``reach`` of a value."""
         rows = self._between(*((mask, state, value) for mask, state in step))
-        hits = np.flatnonzero(~self._doubting.valid_batch(rows))
         needed = float(self._world.weights[self._joint]) * reach
+        hits = np.flatnonzero(~self._world.valid_batch(rows))
         stretches = sorted(np.split(hits, np.flatnonzero(np.diff(hits) > 1) + 1), key=len, reverse=True)
         probes = [stretch[len(stretch) // 2] for stretch in stretches[:PROBES] if len(stretch)]
         return any(self._depth.travel(rows[k]) > needed for k in probes)
