@@ -43,11 +43,12 @@ class Kind(str, Enum):
 
 
 class Shorten(str, Enum):
-    """What `rrtik plan` does to the raw path; `auto` is axis for a path of single-joint moves and none otherwise."""
+    """What `rrtik plan` does to the raw path; `auto` is axis if that makes a path of single-joint moves better."""
 
     auto = "auto"
     axis = "axis"
     axis_rounds = "axis-rounds"
+    fewest_moves = "fewest-moves"
     none = "none"
 
 
@@ -261,7 +262,10 @@ def _shortened(path: Any, problem: Any, method: Shorten) -> tuple[Any, float]:
     if path is None or wanted is Shorten.none:
         return path, 0.0
     begin = time.perf_counter()
-    return shorten(path, problem, method=wanted.value), time.perf_counter() - begin
+    shorter = shorten(path, problem, method=wanted.value)
+    if method is Shorten.auto and (shorter.transitions, shorter.length) > (path.transitions, path.length):
+        shorter = path
+    return shorter, time.perf_counter() - begin
 
 
 def _parameters(pairs: list[str]) -> dict[str, Any]:
