@@ -204,6 +204,35 @@ def test_without_obstacles_the_bound_is_the_number_of_joints_that_differ_and_is_
     assert route_length(found.route) == pytest.approx(2.0)
 
 
+def test_a_direct_route_needs_no_further_question() -> None:
+    ends = np.array([[0.0, 0, 0], [1, 0.5, -0.5]])
+    search = MoveSearch(ends[:1], ends[1:], -np.ones(3), np.ones(3), lambda tails, _: np.ones(len(tails), dtype=bool))
+    search.settle_corners()
+    asked = search.motions
+    search.improve(100)
+    assert search.direct
+    assert (search.moves, search.motions) == (3, asked)
+
+
+def test_without_a_look_at_all_corners_the_bound_stays_and_nothing_is_proven_on_top_of_it() -> None:
+    start, goal = np.zeros(8), np.ones(8)
+
+    def ask(tails: np.ndarray, heads: np.ndarray) -> np.ndarray:
+        return (tails[:, 7] < 0.0) | (tails[:, 0] == heads[:, 0])  # the first joint moves when the last stands aside
+
+    def prove(*_: object) -> int:
+        raise AssertionError("the corners are not settled")
+
+    search = MoveSearch(start[None], goal[None], -np.ones(8), np.ones(8), ask, most_nodes=64, prove=prove)
+    corners = [np.where(np.arange(8) < k, 1.0, 0.0) for k in range(1, 9)]
+    aside = np.where(np.arange(8) == 7, -1.0, start)  # nine moves: the last joint moves twice
+    search.offer(np.vstack([start, aside, *[np.where(np.arange(8) == 7, -1.0, c) for c in corners[:7]], goal]))
+    search.settle_corners()
+    assert search.bound == 8
+    search.improve(1)
+    assert search.bound == 8
+
+
 def test_a_route_of_one_configuration_stays() -> None:
     found = fewest_moves(np.zeros((1, 3)), open_problem().world)
     assert found.route.tolist() == [[0.0, 0.0, 0.0]]

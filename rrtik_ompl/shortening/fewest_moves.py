@@ -16,7 +16,7 @@ from rrtik_ompl.shortening.move_lattice import MoveLattice
 from rrtik_ompl.shortening.move_proof import sharper_bound
 from rrtik_ompl.shortening.move_search import MoveSearch
 from rrtik_ompl.shortening.questions import Stop, never
-from rrtik_ompl.transitions import single_joint
+from rrtik_ompl.transitions import lower_bound, single_joint
 from rrtik_ompl.world import World
 
 ROUNDS = 10
@@ -93,9 +93,9 @@ def least_moves(problem: Problem) -> int:
     world, ends = problem.world, _ends(problem, "least_moves")
     search = MoveSearch(ends[:1], ends[1:], *turning_limits(world.robot, ends), world.motion_valid_batch)
     search.settle_corners()
-    if search.moves == search.bound:
+    if search.proven or search.bound == lower_bound(ends[0], ends[1]):  # met, or too many corners
         return search.bound
-    return max(search.bound, sharper_bound(world, range(world.robot.dof), ends[0], ends[1], never))
+    return sharper_bound(world, range(world.robot.dof), ends[0], ends[1], never)
 
 
 def grid_route(problem: Problem, step: float) -> Matrix | None:

@@ -19,7 +19,7 @@ from rrtik_ompl.shortening.questions import Stop
 from rrtik_ompl.transitions import moved
 from rrtik_ompl.world import World
 
-MOST_PARTS = 4096  # of a range
+MOST_WORK = 4096  # parts of a range, times the corners of the other joints
 SMALLEST_PART = 1e-5  # of a range
 PROBES = 4  # stretches of a colliding motion in the middle of which the depth is asked for
 MOST_CORNERS = 256
@@ -80,7 +80,7 @@ class OneFreeValue:
         steps = [step for end in (START, GOAL) for step in self._steps_of_others(end)]
         self._standing = {step for step in steps if self._is_free(step, 0.0)}
         parts = [(self._lower, self._upper)]
-        for _ in range(MOST_PARTS):
+        for _ in range(MOST_WORK // (self._full + 1)):
             if not parts:
                 return True
             low, high = parts.pop()

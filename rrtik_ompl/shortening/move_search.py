@@ -21,7 +21,7 @@ from rrtik_ompl.shortening.questions import MotionsFree, OutOfTime, Questions, S
 from rrtik_ompl.transitions import lower_bound, merge_moves, transitions
 
 MOST_NODES = 4096  # of a lattice: some milliseconds in the kernels
-DIGITS = 9  # of the travel that count; the rest is rounding
+DIGITS = 9  # of the travel after the point; the rest is rounding
 MOST_FREE = 3  # joints with free values in one lattice
 WIDTHS = 0.1 * 0.5 ** np.arange(0, 16, 3)  # of the search for less travel, shares of a joint's range
 NEAR_NODES = 512  # of a lattice close to a route
@@ -97,6 +97,11 @@ class MoveSearch:
         return self.moves == self.bound
 
     @property
+    def direct(self) -> bool:
+        """Whether each joint of the best route moves once, straight to the goal: nothing can be better."""
+        return self.route is not None and self.proven and self.moves <= lower_bound(self.route[0], self.route[-1])
+
+    @property
     def motions(self) -> int:
         """How many straight motions have been asked about."""
         return self._ask.asked
@@ -123,7 +128,7 @@ class MoveSearch:
             for number, (start, goal) in enumerate(self.pairs):
                 values = values_of(np.array([start, goal]))
                 least = self._bounds[number]
-                if not 0 < least < self.moves or lattice_size(values) > self._most_nodes:
+                if not 0 < least <= self.moves or lattice_size(values) > self._most_nodes:
                     continue
                 found = self._search(values, start, goal)
                 if found is None or transitions(found) > least:
@@ -134,6 +139,8 @@ class MoveSearch:
 
         Once it is proven that no route has fewer moves, only the travel is still made less, in a few steps.
         """
+        if self.direct:
+            return
         self._ask.stop = stop
         with suppress(OutOfTime):
             for offered in self._offers:
@@ -172,7 +179,7 @@ class MoveSearch:
             return
         prove, self._prove = self._prove, None
         for number, (start, goal) in enumerate(self.pairs):
-            if self._bounds[number] < self.moves:
+            if lower_bound(start, goal) < self._bounds[number] < self.moves:  # its corners are settled
                 self.raise_bound(number, prove(start, goal, self._ask.stop))
 
     def _free_values(self, joints: Sequence[int]) -> None:
@@ -269,7 +276,7 @@ class MoveSearch:
         if route is None:
             return NONE, np.inf
         travel = float((np.abs(np.diff(route, axis=0)) @ self._costs).sum())
-        return transitions(route), float(np.format_float_positional(travel, DIGITS, fractional=False))
+        return transitions(route), round(travel, DIGITS)
 
 
 def _edges(route: Matrix) -> list[tuple[bytes, bytes]]:
