@@ -143,10 +143,11 @@ class MoveSearch:
             return
         self._ask.stop = stop
         with suppress(OutOfTime):
-            for offered in self._offers:
-                self._rearrange(offered)
             for joint in self._movable:
                 self._free_values([joint])
+            for offered in self._offers:
+                if not self.proven:
+                    self._rearrange(offered)
             for joints in islice(self._free_joints(), rounds):
                 self._sharpen()
                 if self.proven:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import TypeAlias
 
@@ -12,7 +13,8 @@ from rrtik_ompl.arrays import Mask, Matrix
 MotionsFree: TypeAlias = Callable[[Matrix, Matrix], Mask]  # as World.motion_valid_batch
 Stop: TypeAlias = Callable[[], object]  # true when it is time to stop
 
-CHUNK = 256  # motions asked about between two looks at the clock
+MOST_AT_ONCE = 1024  # motions
+BLINK = 0.01  # [s] between two looks at the clock; fewer motions are asked about at once if it takes longer
 
 
 def never() -> bool:
@@ -34,6 +36,7 @@ class Questions:
 
     def __init__(self, motions_free: MotionsFree) -> None:
         self._motions_free = motions_free
+        self._at_once = 64
         self.asked = 0
         self.stop: Stop = never
 
@@ -43,10 +46,16 @@ class Questions:
         Raises:
             OutOfTime: If it is time to stop.
         """
-        parts = [np.zeros(0, dtype=bool)]
-        for k in range(0, len(tails), CHUNK):
+        parts, first = [np.zeros(0, dtype=bool)], 0
+        while first < len(tails):
             if self.stop():
                 raise OutOfTime
-            parts.append(self._motions_free(tails[k : k + CHUNK], heads[k : k + CHUNK]))
-            self.asked += len(parts[-1])
+            begin, last = time.perf_counter(), first + self._at_once
+            parts.append(self._motions_free(tails[first:last], heads[first:last]))
+            first = last
+            if time.perf_counter() - begin > BLINK:
+                self._at_once = max(self._at_once // 2, 1)
+            else:
+                self._at_once = min(2 * self._at_once, MOST_AT_ONCE)
+        self.asked += len(tails)
         return np.concatenate(parts)
