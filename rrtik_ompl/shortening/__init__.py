@@ -21,7 +21,8 @@ METHODS: Mapping[str, Method] = MappingProxyType(
     {
         "axis": lambda route, world: double_axis_cut(route, world.motion_valid),
         "axis-rounds": lambda route, world: axis_cut_rounds(route, world.motion_valid),
-        "fewest-moves": lambda route, world: fewest_moves(route, world).route,
+        # what travels little touches what it goes round, so it is judged as densely as by the second check
+        "fewest-moves": lambda route, world: fewest_moves(route, world.refined(SECOND_CHECK)).route,
     }
 )
 
