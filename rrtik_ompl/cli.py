@@ -44,7 +44,7 @@ class Kind(str, Enum):
 
 
 class Shorten(str, Enum):
-    """What `rrtik plan` does to the raw path; `auto` is axis for a path of single-joint moves."""
+    """What `rrtik plan` does to the raw path; `auto` is axis for a path of single-joint moves, if that is better."""
 
     auto = "auto"
     axis = "axis"
@@ -54,6 +54,7 @@ class Shorten(str, Enum):
     shortcut = "shortcut"
     retraction = "retraction"
     ompl = "ompl"
+    fewest_moves = "fewest-moves"
     none = "none"
 
 
@@ -274,7 +275,11 @@ def _shortened(path: Any, problem: Any, method: Shorten, seed: int) -> tuple[Any
         return path, 0.0
     wanted = Shorten.axis if method is Shorten.auto and path.one_joint_at_a_time else method
     begin = time.perf_counter()
-    return shorten(path, problem, method=wanted.value, seed=seed), time.perf_counter() - begin
+    shorter = shorten(path, problem, method=wanted.value, seed=seed)
+    measures = [(p.transitions, p.length) for p in (shorter, path)]
+    if method is Shorten.auto and wanted is Shorten.axis and measures[0] > measures[1]:
+        shorter = path
+    return shorter, time.perf_counter() - begin
 
 
 def _parameters(pairs: list[str]) -> dict[str, Any]:

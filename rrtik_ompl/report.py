@@ -65,9 +65,14 @@ def _rate(value: float, word: str) -> str:
     return f"{value:.4g}" if np.isfinite(value) else word
 
 
-def fewest_moves(problem: Problem) -> int | None:
-    """The lower bound c of the number of moves of any path of the problem; None if the goal is no configuration."""
-    return lower_bound(problem.start, problem.goal.q) if isinstance(problem.goal, JointGoal) else None
+def fewest_moves(problem: Problem, plan: Plan) -> int | None:
+    """A lower bound of the number of moves of any path of the problem; None if the goal is no configuration.
+
+    It is c, the number of joints that differ, or what the planner has proven beyond that.
+    """
+    if not isinstance(problem.goal, JointGoal):
+        return None
+    return max(lower_bound(problem.start, problem.goal.q), int(plan.statistics.get("lower_bound", 0)))
 
 
 def summary(problem: Problem, plan: Plan, path: JointPath | None, shorten_seconds: float) -> list[str]:
@@ -75,7 +80,7 @@ def summary(problem: Problem, plan: Plan, path: JointPath | None, shorten_second
     lines = [f"problem {problem.name}, robot {problem.world.robot.name}, planner {plan.planner}, seed {plan.seed}"]
     if plan.path is None or path is None:
         return [*lines, f"not found: {plan.reason}"]
-    bound = fewest_moves(problem)
+    bound = fewest_moves(problem, plan)
     if path.one_joint_at_a_time:
         least = "" if bound is None else f" (no path can have fewer than {bound})"
         raw = plan.path
@@ -109,7 +114,7 @@ def document(problem: Problem, plan: Plan, path: JointPath | None, shorten_secon
     found |= {
         "length": path.length,
         "transitions": path.transitions,
-        "lower_bound": fewest_moves(problem),
+        "lower_bound": fewest_moves(problem, plan),
         "joint_names": list(path.joint_names),
         "waypoints": path.waypoints.tolist(),
     }

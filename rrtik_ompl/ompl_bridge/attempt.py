@@ -24,7 +24,7 @@ from rrtik_ompl.ompl_bridge.setup import Judge, exact_path, problem_definition, 
 from rrtik_ompl.problem import Problem
 
 # Those that go on improving their path until the time is up.
-ANYTIME_PLANNERS = ("AORRTC", "BITstar", "InformedRRTstar", "PRMstar", "RRTstar", "SORRTstar")
+ANYTIME_PLANNERS = ("AORRTC", "BITstar", "FewestMoves", "InformedRRTstar", "PRMstar", "RRTstar", "SORRTstar")
 
 # Those that take up further goals in a second thread. It asks Python about motions under a lock of the roadmap, for
 # which the first thread waits while it holds Python's lock: with more than one goal they hang.

@@ -17,6 +17,7 @@ from rrtik_ompl.problem import Problem
 from rrtik_ompl.shortening.axis import double_axis_cut
 from rrtik_ompl.shortening.axis_rounds import axis_cut_rounds
 from rrtik_ompl.shortening.best import best_in_time
+from rrtik_ompl.shortening.fewest_moves import fewest_moves
 from rrtik_ompl.shortening.random_cut import random_cut, shortcut
 from rrtik_ompl.shortening.retraction import retract
 from rrtik_ompl.shortening.sequential import sequential_cut
@@ -47,12 +48,18 @@ def _ompl(route: Matrix, task: Task, problem: Problem) -> Matrix:
     return rows
 
 
+def _fewest_moves(route: Matrix, task: Task, problem: Problem) -> Matrix:
+    """What travels little touches what it goes round, so it is judged as densely as by the second check."""
+    return fewest_moves(route, problem.world.refined(SECOND_CHECK), seed=task.seed, stop=task.expired).route
+
+
 METHODS: Mapping[str, Method] = MappingProxyType(
     {
         "axis": Method(lambda route, task, _: double_axis_cut(route, task.free), keeps_moves=True),
         "axis-rounds": Method(
             lambda route, task, _: axis_cut_rounds(route, task.free, seed=task.seed), keeps_moves=True
         ),
+        "fewest-moves": Method(_fewest_moves, keeps_moves=True),
         "sequential": Method(lambda route, task, _: sequential_cut(route, task)),
         "random": Method(lambda route, task, _: random_cut(route, task)),
         "shortcut": Method(lambda route, task, _: shortcut(route, task)),
@@ -80,10 +87,11 @@ def shorten(
         path: A valid path of the problem.
         problem: Whose world judges the new motions.
         method: "axis" is the published double axis cut: fewer moves of one joint at a time. "axis-rounds" goes on with
-            twenty passes in random joint orders: fewer moves still, several times as long. "sequential", "random" and
+            twenty passes in random joint orders: fewer moves still, several times as long. "fewest-moves" takes
+            single-joint moves and looks for the fewest, with the least travel among those. "sequential", "random" and
             "retraction" are the published methods for straight motions: quick, simple, and near the shortest path of
             the same class. "shortcut" is a random cut that takes waypoints as ends too and pulls them straight.
-            "ompl" is OMPL's PathSimplifier. "auto" is the best that these find together.
+            "ompl" is OMPL's PathSimplifier. "auto" is the best that the quick ones find together.
         seconds: Time limit [s]. With a limit, random methods go on until nothing is gained any more; without one they
             make a fixed number of tries, so that a seed always gives the same path.
         seed: Of the random methods.

@@ -1,0 +1,118 @@
+"""FewestMoves: paths that move one joint at a time, as few times as possible, and how far from possible they are."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
+from rrtik_ompl.shortening.move_proof import sharper_bound
+from rrtik_ompl.shortening.move_search import MOST_NODES, MoveSearch
+from rrtik_ompl.world import World
+from rrtik_planners.axis_options import AxisOptions, Joints, PerJoint, joint_names
+from rrtik_planners.bicrdt import BiCRDT
+
+SEARCHES, ROUNDS = 5, 10
+BRIEF_ITERATIONS = 1000  # of BiCRDT, once there is a path
+FEW_NODES = 256  # of a lattice, where each motion is asked about by itself
+
+
+class FewestMoves(SafePlanner):
+    """Fewest moves first, least joint travel second; goes on until the bound is met, its rounds are over or time is up.
+
+    It starts from the best of several quick runs of BiCRDT and looks for better routes on lattices of joint values.
+    ``statistics`` has the lower bound of the moves and the gap: how many moves more than that the path has.
+    """
+
+    def __init__(
+        self,
+        si: Any,
+        *,
+        world: WorldLike | None = None,
+        seed: int | None = None,
+        searches: int = SEARCHES,
+        rounds: int = ROUNDS,
+        joint_costs: PerJoint | None = None,
+        frozen_joints: Joints = (),
+    ) -> None:
+        """Make a planner.
+
+        Args:
+            si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
+            world: Asked instead of ``si`` whether configurations and motions are free, if given. A
+                ``rrtik_ompl.World`` also lets the bound be sharpened by proofs.
+            seed: At least 0; drawn from OMPL's if None.
+            searches: Runs of BiCRDT at the beginning, at least 1.
+            rounds: Of improvement, at least 0, after the first. With time enough they alone decide what comes out.
+            joint_costs: Cost of a joint's travel; see :class:`rrtik_planners.axis_options.AxisOptions`.
+            frozen_joints: See there.
+
+        Raises:
+            InputError: If an option is out of range or the space is of another kind.
+        """
+        super().__init__(si, "FewestMoves", world=world, seed=seed)
+        self.searches = _count(searches, 1, "searches")
+        self.rounds = _count(rounds, 0, "rounds")
+        self.options = AxisOptions(
+            scale_by_range=False,
+            joint_costs=joint_costs,
+            frozen_joints=frozen_joints,
+            smallest_move=0.0,
+            max_iterations=None,
+            names=joint_names(world),
+            dof=si.getStateDimension(),
+        )
+
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+        """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
+        starts, goals = self.options.agreeing(starts, goals)
+        frozen, world = self.options.frozen_joints, self._world
+        movable = [joint for joint in range(starts.shape[1]) if joint not in frozen]
+        moves = MoveSearch(
+            starts,
+            goals,
+            *self.bounds(),
+            checker.motion_valid_batch,
+            seed=int(self.rng.integers(2**63)),
+            costs=self.options.joint_costs,
+            frozen=frozen,
+            most_nodes=FEW_NODES if world is None else MOST_NODES,
+            prove=partial(sharper_bound, world, movable) if isinstance(world, World) else None,
+        )
+        moves.settle_corners(ptc)
+        iterations = self._quick_routes(moves, starts, goals, checker, ptc)
+        if moves.route is None:
+            return SearchResult(None, {"iterations": iterations})
+        moves.improve(self.rounds, ptc)
+        counts = {"iterations": iterations, "rounds": moves.rounds, "lower_bound": moves.bound}
+        return SearchResult(moves.route, {**counts, "gap": moves.moves - moves.bound})
+
+    def _quick_routes(self, moves: MoveSearch, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> int:
+        """Offer the routes of several runs of BiCRDT; returns their iterations."""
+        iterations, seeds = 0, self.rng.integers(2**31, size=self.searches).tolist()
+        for seed in seeds:
+            if moves.proven or ptc():
+                break
+            quick = BiCRDT(
+                self.getSpaceInformation(),
+                world=self._world,
+                seed=seed,
+                joint_costs=self.options.joint_costs.tolist(),
+                frozen_joints=self.options.frozen_joints,
+                max_iterations=None if moves.route is None else BRIEF_ITERATIONS,
+            )
+            found = quick.search(starts, goals, checker, ptc)
+            iterations += int(found.statistics.get("iterations", 0))
+            if found.path is not None:
+                moves.offer(found.path)
+        return iterations
+
+
+def _count(value: int, least: int, option: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise InputError(f"{option}: expected a whole number of at least {least}, got {value!r}")
+    return int(value)

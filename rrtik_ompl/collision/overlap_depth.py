@@ -1,0 +1,56 @@
+"""How far an arm in collision may move in any way and is surely still in collision."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import coal
+import pinocchio as pin
+
+from rrtik_ompl.arrays import Vector
+from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.solids import is_mesh
+from rrtik_ompl.robot import Robot
+
+ROOM = 1e-5  # [m] taken off coal's depths
+
+
+class OverlapDepth:
+    """Depths of overlap between the solids of a world.
+
+    The depth of two convex solids is the shortest translation that parts them. A motion in which no point moves that
+    far does not part them either: along no direction do their extents then cease to overlap. Pairs with a mesh, for
+    which coal knows no depth, are left out.
+
+    Args:
+        robot: The arm.
+        bodies: Solids of the robot and the scene.
+        pairs: Numbers of the bodies that must not touch.
+    """
+
+    def __init__(self, robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> None:
+        self._robot, self._bodies = robot, bodies
+        self._pairs = [pair for pair in pairs if not any(is_mesh(bodies[k].geometry) for k in pair)]
+        self._data = robot.model.createData()
+
+    def travel(self, q: Vector) -> float:
+        """Whatever moves each point of the arm by less than this [m] leaves a collision at q, shape (n,), standing.
+
+        0 if there is no collision, or none whose depth is known.
+        """
+        pin.forwardKinematics(self._robot.model, self._data, self._robot.lift(q[None])[0])
+        return max((self._pair_travel(*pair) for pair in self._pairs), default=0.0)
+
+    def _pair_travel(self, i: int, j: int) -> float:
+        first, second = self._bodies[i], self._bodies[j]
+        ends = (first.geometry, self._transform(first), second.geometry, self._transform(second))
+        if not coal.collide(*ends, coal.CollisionRequest(), coal.CollisionResult()):
+            return 0.0
+        depth = -float(coal.distance(*ends, coal.DistanceRequest(), coal.DistanceResult())) - ROOM
+        both_move = first.joint > 0 and second.joint > 0
+        return max(0.5 * depth if both_move else depth, 0.0)
+
+    def _transform(self, body: Body) -> Any:
+        pose = self._data.oMi[body.joint] * body.placement
+        return coal.Transform3s(pose.rotation, pose.translation)

@@ -1,0 +1,140 @@
+"""Fewest single-joint moves: make a route better, and say how good it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix, Vector, finite_array
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.problem import TURN, Problem
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.shortening.move_lattice import MoveLattice
+from rrtik_ompl.shortening.move_proof import sharper_bound
+from rrtik_ompl.shortening.move_search import MoveSearch
+from rrtik_ompl.shortening.questions import Stop, never
+from rrtik_ompl.transitions import lower_bound, single_joint
+from rrtik_ompl.world import World
+
+ROUNDS = 10
+MOST_CELLS = 2_000_000  # of a grid
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MovesFound:
+    """A route of single-joint moves, and how good it is.
+
+    Attributes:
+        route: Shape (k, n), start first.
+        moves: Its moves.
+        bound: No route between its ends has fewer.
+    """
+
+    route: Matrix
+    moves: int
+    bound: int
+
+    @property
+    def gap(self) -> int:
+        """How many moves it may have too many; 0 if it is proven that there are none."""
+        return self.moves - self.bound
+
+
+def fewest_moves(
+    waypoints: Matrix, world: World, *, rounds: int = ROUNDS, seed: int = 0, stop: Stop = never
+) -> MovesFound:
+    """Look for a route with fewer moves, or with as many and less travel.
+
+    Args:
+        waypoints: A free route, shape (k, n), every edge of which moves one joint.
+        world: Judges motions.
+        rounds: Of improvement at most, after the first; the work ends earlier if it is proven that no route has fewer
+            moves. The same number and seed give the same route.
+        seed: Of all random choices.
+        stop: Asked often; True ends the work, and the best so far is returned.
+
+    Returns:
+        A route with the same ends, bit for bit, that is no worse. Its bound is the number of joints that differ, and
+        more where that has been refuted (see :meth:`MoveSearch.settle_corners` and :mod:`move_proof`).
+
+    Raises:
+        InputError: If an edge moves several joints or ``rounds`` is negative.
+    """
+    rows = finite_array(waypoints, (None, world.robot.dof), "waypoints")
+    if len(rows) > 1 and not single_joint(rows[np.append(True, (np.diff(rows, axis=0) != 0.0).any(axis=1))]):
+        raise InputError(
+            "path to shorten: an edge moves several joints at once; convert it first with one_joint_moves(path, world)"
+        )
+    if rounds < 0:
+        raise InputError(f"rounds: expected at least 0, got {rounds}")
+    search = MoveSearch(
+        rows[:1],
+        rows[-1:],
+        *turning_limits(world.robot, rows),
+        world.motion_valid_batch,
+        seed=seed,
+        prove=partial(sharper_bound, world, range(world.robot.dof)),
+    )
+    search.offer(rows)
+    search.settle_corners(stop)
+    search.improve(rounds, stop)
+    return MovesFound(rows[:1] if search.route is None else search.route, search.moves, search.bound)
+
+
+def least_moves(problem: Problem) -> int:
+    """A lower bound of the number of single-joint moves that solve a problem whose goal is a configuration.
+
+    Raises:
+        InputError: If the goal is of another kind.
+    """
+    world, ends = problem.world, _ends(problem, "least_moves")
+    search = MoveSearch(ends[:1], ends[1:], *turning_limits(world.robot, ends), world.motion_valid_batch)
+    search.settle_corners()
+    if search.proven or search.bound == lower_bound(ends[0], ends[1]):  # met, or too many corners
+        return search.bound
+    return sharper_bound(world, range(world.robot.dof), ends[0], ends[1], never)
+
+
+def grid_route(problem: Problem, step: float) -> Matrix | None:
+    """The route with the fewest moves on a regular grid, least travel second: the C-RDT paper's oracle for few joints.
+
+    Args:
+        problem: Of at most 3 joints, its goal a configuration.
+        step: Of the grid [rad or m]; the values of start and goal are added to it.
+
+    Returns:
+        Shape (moves + 1, n); None if the grid has no route.
+
+    Raises:
+        InputError: If there are more joints, the goal is of another kind, or the grid would be too large.
+    """
+    world, ends = problem.world, _ends(problem, "grid_route")
+    if world.robot.dof > 3:
+        raise InputError(f"grid_route: expected at most 3 joints, got {world.robot.dof}")
+    if not step > 0.0:
+        raise InputError(f"grid_route: step must be greater than 0, got {step:g}")
+    lower, upper = turning_limits(world.robot, ends)
+    size = float(np.prod((upper - lower) / step + 2.0))
+    if size > MOST_CELLS:
+        raise InputError(f"grid_route: {size:.1e} cells are too many (at most {MOST_CELLS:.0e}); use a larger step")
+    limits = zip(lower, upper, ends.T, strict=True)
+    values = [np.union1d(np.linspace(low, high, int((high - low) / step) + 1), both) for low, high, both in limits]
+    lattice = MoveLattice(values, world.motion_valid_batch, np.ones(world.robot.dof))
+    return lattice.best_route(ends[0], ends[1], range(world.robot.dof))
+
+
+def _ends(problem: Problem, what: str) -> Matrix:
+    """Start and goal of a problem, shape (2, n)."""
+    if not isinstance(problem.goal, JointGoal):
+        raise InputError(f"{what}: expected a goal in joint values, got a {type(problem.goal).__name__}")
+    return np.array([problem.start, problem.goal.q])
+
+
+def turning_limits(robot: Robot, rows: Matrix) -> tuple[Vector, Vector]:
+    """Limits of the joints, shapes (n,); of those that turn for ever, one turn more than rows, shape (k, n), go."""
+    lower = np.where(np.isfinite(robot.lower), robot.lower, rows.min(axis=0) - TURN)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, rows.max(axis=0) + TURN)
+    return lower, upper

@@ -1,0 +1,81 @@
+"""Which joint values a lattice of moves is made of: those of a route, and further ones thinned out to fit a size."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import prod
+from typing import TypeAlias
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix, Vector
+
+MOST_VALUES = 64  # of one joint; with more of them the shift at random does more
+STEPS_ASIDE = 4  # new values on each side of a known one
+
+Values: TypeAlias = list[Vector]  # for each joint, ascending
+
+
+def values_of(rows: Matrix) -> Values:
+    """The values that each joint takes in rows, shape (k, n)."""
+    return [np.unique(column) for column in rows.T]
+
+
+def lattice_size(values: Sequence[Vector]) -> int:
+    """Number of configurations of a lattice."""
+    return prod(len(v) for v in values)
+
+
+def spread_values(lower: float, upper: float, count: int, rng: np.random.Generator) -> Vector:
+    """``count`` values between two limits at equal distances, shifted at random."""
+    values: Vector = lower + (np.arange(count) + rng.random()) / count * (upper - lower)
+    return values
+
+
+def with_spread(
+    values: Values, joints: Sequence[int], lower: Vector, upper: Vector, most_nodes: int, rng: np.random.Generator
+) -> Values:
+    """The values, and for some joints as many more between their limits as the size of the lattice allows.
+
+    Args:
+        values: For each of the n joints.
+        joints: Those that get more values.
+        lower: Limits, shape (n,).
+        upper: Limits, shape (n,).
+        most_nodes: Largest size.
+        rng: Shifts the new values.
+    """
+    others = lattice_size([v for joint, v in enumerate(values) if joint not in joints])
+    each = int((most_nodes / others) ** (1.0 / len(joints)))
+    found = list(values)
+    for joint in joints:
+        count = min(each - len(values[joint]), MOST_VALUES)
+        if count > 0:
+            more = spread_values(float(lower[joint]), float(upper[joint]), count, rng)
+            found[joint] = np.union1d(values[joint], more)
+    return found
+
+
+def near_values(route: Matrix, width: float, lower: Vector, upper: Vector, most_nodes: int) -> Values:
+    """The values of a route, and on both sides of those that are free to change as many as the size allows.
+
+    Args:
+        route: Shape (k, n); the values of its ends are not free.
+        width: The farthest new value [share of the joint's range]; the next ones are half, a quarter ... as far.
+        lower: Limits, shape (n,).
+        upper: Limits, shape (n,).
+        most_nodes: Largest size.
+    """
+    values = values_of(route)
+    free = [np.setdiff1d(v, ends) for v, ends in zip(values, route[[0, -1]].T, strict=True)]
+    best = values
+    for count in range(1, STEPS_ASIDE + 1):
+        aside = width * 0.5 ** np.arange(count)
+        steps = np.outer(upper - lower, np.concatenate([-aside, aside]))
+        moved = [np.add.outer(f, step).ravel() for f, step in zip(free, steps, strict=True)]
+        moved = [np.clip(m, low, high) for m, low, high in zip(moved, lower, upper, strict=True)]
+        wider = [np.union1d(v, m) for v, m in zip(values, moved, strict=True)]
+        if lattice_size(wider) > most_nodes:
+            break
+        best = wider
+    return best
