@@ -35,11 +35,13 @@ class Method:
         keeps_moves: Whether a path of single-joint moves stays one, asked or not, and has no more moves afterwards;
             its length may grow then.
         can_keep_moves: Whether it stays one if that is asked for.
+        moves_only: Whether it takes nothing but such a path.
     """
 
     run: Callable[[Matrix, Task, Problem], Matrix]
     keeps_moves: bool = False
     can_keep_moves: bool = True
+    moves_only: bool = False
 
 
 def _ompl(route: Matrix, task: Task, problem: Problem) -> Matrix:
@@ -59,7 +61,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
         "axis-rounds": Method(
             lambda route, task, _: axis_cut_rounds(route, task.free, seed=task.seed), keeps_moves=True
         ),
-        "fewest-moves": Method(_fewest_moves, keeps_moves=True),
+        "fewest-moves": Method(_fewest_moves, keeps_moves=True, moves_only=True),
         "sequential": Method(lambda route, task, _: sequential_cut(route, task)),
         "random": Method(lambda route, task, _: random_cut(route, task)),
         "shortcut": Method(lambda route, task, _: shortcut(route, task)),
