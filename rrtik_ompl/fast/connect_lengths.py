@@ -8,7 +8,7 @@ from rrtik_ompl.arrays import Vector, finite_array
 from rrtik_ompl.errors import InputError
 
 RANGE_SHARE = 0.08  # of the diagonal of the box, no joint counted for more than a turn
-DOMAIN_RANGES = 4.0
+DOMAIN_RANGES = 8.0  # half of that rejects so many samples that cages take twice as long
 SMALLEST_RANGE = 1e-9  # where lower and upper bounds coincide
 
 
