@@ -1,8 +1,8 @@
 """What hatch does when it builds a wheel: kernels go along as LLVM bitcode, so that nobody who installs it compiles.
 
-Only if numba is there when the wheel is built. ``RRTIK_KERNELS=1`` in the environment asks for it (as for a release),
-``RRTIK_KERNELS=0`` goes without in any case. Whatever goes wrong, there is a wheel: kernels are then compiled when they
-are first used. Editable installs compile then too, because their sources change.
+That takes about half a minute and numba, which the built package needs anyway; ``RRTIK_KERNELS=0`` in the environment
+goes without. Whatever goes wrong, there is a wheel: kernels are then compiled when they are first used. Editable
+installs compile then too, because their sources change.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class KernelBitcode(BuildHookInterface):  # type: ignore[misc]
 
     def dependencies(self) -> list[str]:
         """What the build environment needs besides hatch."""
-        return ["numba>=0.68.1"] if ASKED == "1" else []
+        return [] if ASKED == "0" else ["numba>=0.68.1"]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile before the wheel is packed."""
