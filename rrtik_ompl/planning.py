@@ -68,7 +68,7 @@ def plan(
     seed: int | None = None,
     restarts: int = RESTARTS,
     parameters: Mapping[str, Any] | None = None,
-    accuracy: str = "exact",
+    accuracy: str | None = None,
 ) -> Plan:
     """Find a collision-free path from the start to the goal of a problem.
 
@@ -87,7 +87,8 @@ def plan(
         seed: The same seed gives the same path, as long as the time limit does not cut in; drawn if None.
         restarts: Further attempts at most.
         parameters: Options of the planner; of OMPL's planners in snake case, such as ``range`` or ``goal_bias``.
-        accuracy: "conservative" to leave it at what can be proven without coal: faster, and blind to narrow passages.
+        accuracy: "exact", or "conservative" to leave it at what can be proven without coal: faster, and blind to narrow
+            passages. None: that of the problem's world.
 
     Raises:
         UnknownNameError: If there is no planner or no accuracy of that name.
@@ -105,7 +106,7 @@ def plan(
         raise InputError(f"restarts must be a whole number from 0 to {MAX_RESTARTS}, got {restarts!r}")
     name, factory = (planner, find_planner(planner)) if isinstance(planner, str) else (planner.__name__, planner)
     used = _seed(seed)
-    problem = problem if accuracy == problem.world.accuracy else problem.with_accuracy(accuracy)
+    problem = problem if accuracy is None else problem.with_accuracy(accuracy)
     seeds = [int(child) for child in np.random.SeedSequence(used).generate_state(restarts + 1, np.uint32)]
     _load_kernels(problem, factory)
     begin = time.perf_counter()

@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.checks import CollisionChecks
 from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.ompl_bridge.setup import Judge
@@ -237,3 +238,31 @@ def test_after_its_deadline_a_judge_says_no(wall):
     assert Judge(wall.world).valid(wall.start)
     assert not Judge(wall.world, deadline=0.0).valid(wall.start)
     assert not Judge(wall.world, deadline=0.0).motion_valid(wall.start, wall.start)
+
+
+@pytest.mark.parametrize("planner", ["bicrdt", "fastrrtconnect", "RRTConnect"])
+def test_a_conservative_problem_is_planned_without_asking_coal(planner, monkeypatch):
+    exact = load_problem("titan4_prisms")
+    careful = exact.with_accuracy("conservative")
+
+    def asked(*_):
+        raise AssertionError
+
+    monkeypatch.setattr(CollisionChecks, "_gaps", asked)
+    for found in (plan(careful, planner, seed=1), plan(exact, planner, seed=1, accuracy="conservative")):
+        assert found.found, found.reason
+        assert not found.path.violations(exact.world)
+
+
+def test_an_accuracy_given_to_plan_counts_for_more_than_that_of_the_world(monkeypatch):
+    seen = []
+    whole = World.with_accuracy
+    monkeypatch.setattr(World, "with_accuracy", lambda world, name: seen.append(name) or whole(world, name))
+    careful = load_problem("titan4_prisms").with_accuracy("conservative")
+    seen.clear()
+    assert plan(careful, seed=1).found
+    assert seen == []
+    assert plan(careful, seed=1, accuracy="exact").found
+    assert seen[0] == "exact"
+    with pytest.raises(UnknownNameError, match="exact"):
+        plan(careful, accuracy="roughly")
