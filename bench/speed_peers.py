@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -19,6 +18,7 @@ from ompl import util as ou
 
 from rrtik_ompl import Problem, World
 from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.ompl_bridge.attempt import quiet
 from rrtik_ompl.ompl_bridge.setup import exact_path
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, Sphere
@@ -118,17 +118,6 @@ def vamp_search(problem: Problem) -> Callable[[], tuple[bool, float]]:
     return solve
 
 
-@contextmanager
-def no_log() -> Iterator[None]:
-    """OMPL says nothing inside."""
-    level = ou.getLogLevel()
-    ou.setLogLevel(ou.LogLevel.LOG_NONE)
-    try:
-        yield
-    finally:
-        ou.setLogLevel(level)
-
-
 class PlainChecks:
     """What a user of Pinocchio writes: one configuration, all pairs or a broadphase, stop at the first collision.
 
@@ -168,7 +157,7 @@ def callback_search(problem: Problem, *, broadphase: bool, seconds: float) -> Ca
     checks = PlainChecks(problem.world, as_loaded=True, broadphase=broadphase)
 
     def solve(seed: int) -> Matrix | None:
-        with no_log():
+        with quiet():
             ou.RNG.setSeed(1 + seed)  # which OMPL grumbles about from the second time on
         space, bounds = ob.RealVectorStateSpace(robot.dof), ob.RealVectorBounds(robot.dof)
         for k in range(robot.dof):

@@ -8,7 +8,7 @@ start from the last support points and have been seen to miss overlaps.
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
@@ -51,7 +51,7 @@ class CollisionChecks:
         self._data = robot.model.createData()
         self._standing = {k: self._transform(k) for k, body in enumerate(bodies) if body.joint == 0}
         self._approaches = dict(zip(pairs, approach_weights(robot, bodies, pairs), strict=True))
-        self._containment = Containment(bodies, pairs, [around for around, _ in spheres])
+        self._containment = Containment(bodies, pairs, [outer for outer, _ in spheres])
 
     def as_conservative(self, conservative: bool) -> CollisionChecks:
         """The same checks, conservative or not; shares the tables."""
@@ -64,7 +64,11 @@ class CollisionChecks:
         answers = self.fast.classify(self._robot.joint_values(rows), prove=not self.conservative)
         free: Mask = answers == FREE
         if not self.conservative:
-            free[answers == UNDECIDED] = list(self._settled(rows[answers == UNDECIDED]))
+            open_ = rows[answers == UNDECIDED]
+            marked = self.fast.undecided_pairs(self._robot.joint_values(open_))
+            lifted = self._robot.lift(open_)
+            settled = [self._gaps(full, pairs) is not None for full, pairs in zip(lifted, marked, strict=True)]
+            free[answers == UNDECIDED] = settled
         return free
 
     def motions_free(self, starts: Matrix, ends: Matrix, steps: NDArray[np.int64]) -> Mask:
@@ -76,12 +80,6 @@ class CollisionChecks:
             for k in np.flatnonzero(answers == UNDECIDED):
                 free[k] = self._motion_settled(starts[k], ends[k], int(steps[k]))
         return free
-
-    def _settled(self, rows: Matrix) -> Iterator[bool]:
-        """Whether rows are free, by coal, one after the other."""
-        marked = self.fast.undecided_pairs(self._robot.joint_values(rows))
-        for full, pairs in zip(self._robot.lift(rows), marked, strict=True):
-            yield self._gaps(full, pairs) is not None
 
     def _motion_settled(self, start: Vector, end: Vector, steps: int) -> bool:
         """Whether a motion is free, by coal.
