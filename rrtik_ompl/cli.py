@@ -15,6 +15,7 @@ import typer
 
 from rrtik_ompl.errors import InputError, RrtikError
 from rrtik_ompl.fast import announce
+from rrtik_ompl.ik_commands import inverse_kinematics
 from rrtik_ompl.motion_commands import list_moves, time_path
 from rrtik_ompl.path_text import FORMATS as PATH_FORMATS
 from rrtik_ompl.terminal import drop_output, note, prepare_streams, progress, say, warn
@@ -215,6 +216,7 @@ def warmup() -> int:
     return FOUND if warm_up(say) else NOT_FOUND
 
 
+app.command("ik")(inverse_kinematics)
 app.command("moves")(list_moves)
 app.command("time")(time_path)
 

@@ -34,8 +34,20 @@ LADDER = [
         "robot_entry",
     ),
     *("checks", "world", "path", "moves_text", "problem", "one_joint", "ik", "goal_configurations"),
-    *("moveit_messages", "motion_bench_maker", "problem_file", "ompl_bridge", "planning", "shortening"),
-    *("trajectory", "plot", "plot_tree", "viewer", "report", "terminal", "motion_commands", "cli", "command"),
+    *("moveit_messages", "motion_bench_maker", "problem_file", "pose_file", "ompl_bridge", "planning", "shortening"),
+    *(
+        "trajectory",
+        "plot",
+        "plot_tree",
+        "viewer",
+        "report",
+        "ik_report",
+        "terminal",
+        "motion_commands",
+        "ik_commands",
+        "cli",
+        "command",
+    ),
 ]
 
 
