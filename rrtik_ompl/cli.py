@@ -18,6 +18,7 @@ from rrtik_ompl.fast import announce
 from rrtik_ompl.ik_commands import inverse_kinematics
 from rrtik_ompl.motion_commands import list_moves, time_path
 from rrtik_ompl.path_text import FORMATS as PATH_FORMATS
+from rrtik_ompl.reach_commands import reach
 from rrtik_ompl.terminal import drop_output, note, prepare_streams, progress, say, warn
 from rrtik_ompl.text_file import check_target
 
@@ -217,6 +218,7 @@ def warmup() -> int:
 
 
 app.command("ik")(inverse_kinematics)
+app.command("reach")(reach)
 app.command("moves")(list_moves)
 app.command("time")(time_path)
 

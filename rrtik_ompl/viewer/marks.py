@@ -16,7 +16,7 @@ from rrtik_ompl.viewer.meshes import look_of_triangles
 from rrtik_ompl.viewer.triangles import Faces, capsule, tube
 
 SIDES = 6  # of the tubes of a line: there may be thousands
-ROUND = 24  # segments of a ball
+ROUND = 48  # segments of a ball
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])  # of a square face, in its plane
 HALVES = np.array([[0, 1, 2, 0, 2, 3]])  # its triangles
 

@@ -10,7 +10,7 @@ from rrtik_ompl.ik.mb_rrt.run import Run
 from rrtik_ompl.viewer import palette
 from rrtik_ompl.viewer.marks import Mark, balls, tubes
 
-THIN, THICK = 0.0012, 0.006  # radii of links and of the answer, of the reach
+THIN, THICK = 0.0016, 0.006  # radii of links and of the answer, of the reach
 MOST = 600  # links drawn of each index, the first ones
 FAINT = 0.08  # opacity of a region
 
