@@ -189,8 +189,8 @@ def _many(
         if trajectory:
             q, residuals, reasons, notes, line = _followed(robot, rows, tolerances, common)
         else:
-            q, residuals, reasons, line = _each(robot, rows, tolerances, common)
-            notes = [""] * len(rows)
+            q, residuals, reasons = _each(robot, rows, tolerances, common)
+            notes, line = [""] * len(rows), ""
     found = sum(not reason for reason in reasons)
     if output.as_json:
         more = {"jumps": [k for k, note in enumerate(notes) if "jump" in note]} if trajectory else {}
@@ -209,14 +209,14 @@ def _many(
 
 
 def _each(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[str, Any]) -> Any:
-    """Joint values, residuals, reasons and a remark: poses as one batch where it does that, else one by one."""
+    """Joint values, residuals and reasons: poses as one batch where that takes the options, else one by one."""
     import numpy as np
 
     from rrtik_ompl import PoseGoal, solve_ik, solve_ik_batch
 
     if rows.ndim == 3 and common["method"] == "auto" and not tolerances:
         batch = solve_ik_batch(robot, rows, **{name: value for name, value in common.items() if name != "method"})
-        return batch.q, batch.residuals, list(batch.reasons), ""
+        return batch.q, batch.residuals, list(batch.reasons)
     q, residuals, reasons = np.full((len(rows), robot.dof), np.nan), np.full((len(rows), 2), np.nan), []
     for k, row in enumerate(rows):
         goal = _point(row, tolerances) if rows.ndim == 2 else PoseGoal(row, **tolerances)
@@ -224,7 +224,7 @@ def _each(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[str,
         reasons.append(result.reason)
         if result.found:
             q[k], residuals[k] = result.solutions[0], result.residuals[0]
-    return q, residuals, reasons, ""
+    return q, residuals, reasons
 
 
 def _followed(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[str, Any]) -> Any:
@@ -233,14 +233,15 @@ def _followed(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[
 
     options: dict[str, Any] = dict(tolerances)
     done = solve_ik_trajectory(robot, rows, **common, **options)
-    notes = [
-        ", ".join(
-            text for text, where in (("jump", done.jumps), ("collision on the way", done.blocked)) if k in set(where)
-        )
-        for k in range(len(rows))
-    ]
-    jumps = f", {_count(len(done.jumps), 'jump')}, {done.method}, {_time(done)}"
-    return done.q, done.residuals, list(done.reasons), notes, jumps + (f"; {done.detail}" if done.detail else "")
+    notes = [""] * len(rows)
+    for text, where in (("jump", done.jumps), ("collision on the way", done.blocked)):
+        for k in where:
+            notes[k] = f"{notes[k]}, {text}" if notes[k] else text
+    line = f", {_count(len(done.jumps), 'jump')}, {done.method}, {_time(done)}"
+    if done.detail:  # which counts its points from 0
+        first = next(k for k, reason in enumerate(done.reasons) if reason)
+        line += f"; no. {first + 1}: {done.detail.partition(': ')[2]}"
+    return done.q, done.residuals, list(done.reasons), notes, line
 
 
 def _draw(asked: Asked, goal: Any, q: Any, output: Output, *, moving: bool = False) -> None:

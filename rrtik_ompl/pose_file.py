@@ -9,7 +9,7 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.file_format import Section, Vector3, exactly_one, parse
@@ -31,6 +31,11 @@ class PosesFile(Section):
     poses: Annotated[list[PoseEntry], Field(min_length=1)] | None = None
     points: Annotated[list[Vector3], Field(min_length=1)] | None = None
 
+    @model_validator(mode="after")
+    def _one_kind(self) -> PosesFile:
+        exactly_one(self, ("poses", "points"), "a file of poses")
+        return self
+
 
 def load_poses(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     """Poses T_world_tip, shape (m, 4, 4), or points, shape (m, 3), as the file has it; m is at least 1.
@@ -45,8 +50,6 @@ def load_poses(path: str | os.PathLike[str]) -> NDArray[np.float64]:
         return _from_csv(path)
     document = read_yaml(path)
     entry = parse(document, PosesFile)
-    with document.at(()):
-        exactly_one(entry, ("poses", "points"), "a file of poses")
     if entry.points is not None:
         return np.array(entry.points)
     rows = []

@@ -22,6 +22,7 @@ TURNS = 16  # of the first joint for each of them: the whole arm turns as one bo
 CELLS = 18  # of the grid across the farthest reach, if no size is given
 MOST_CELLS = 4_000_000
 PROBE = 4096  # postures that tell how large the grid must be
+BELOW = 1e-3  # of a cell: the layer of a planar arm ends so far above the arm, which is seen from above
 ROOM = 1.1  # how much larger than what the probe reached
 
 
@@ -123,7 +124,7 @@ def _grid(robot: Robot, base: Vector, cell: float | None) -> tuple[Vector, float
     low, high = (np.floor if k == 0 else np.ceil for k in (0, 1))
     first, last = low((tips.min(axis=0) - margin) / size), high((tips.max(axis=0) + margin) / size)
     if robot.planar:
-        first[2], last[2] = -1.0, 0.0  # below the arm, which is seen from above
+        first[2], last[2] = BELOW - 1.0, BELOW
     shape = tuple(int(n) for n in np.maximum(last - first, 1.0))
     if np.prod(shape, dtype=float) > MOST_CELLS:
         raise InputError(f"cell of {size:g} m makes {np.prod(shape, dtype=float):.3g} cells; at most {MOST_CELLS}")
