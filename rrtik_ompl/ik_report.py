@@ -26,7 +26,7 @@ DEGREES = 180.0 / np.pi
 def branch_names(robot: Robot, goal: Any, Q: Matrix) -> list[str]:
     """What the arm's closed form calls each configuration, shape (k, dof); "" where it has no name for it.
 
-    A branch such as ``front near up``; of a singular pose, ``curve of <families>`` for what is no representative.
+    A branch such as ``front near up``; of a singular pose, which has a curve of solutions, its families too.
     """
     targets = _targets(robot, goal)
     if targets is None or len(Q) == 0:

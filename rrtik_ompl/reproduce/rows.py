@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-HELD, DIFFERS, MISSED, ABSENT = "held", "differs", "missed", "not there yet"
+HELD, DIFFERS, MISSED = "held", "differs", "missed"
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +17,7 @@ class Row:
         published: As printed.
         measured: As it comes out here.
         verdict: ``held``: as printed, within what chance or the statement allows; ``differs``: not as printed, and the
-            reading says why; ``missed``: outside what the sources of this package expect too; ``not there yet``.
+            reading says why; ``missed``: outside what is expected too.
         reading: How the text was read, or why the figure differs.
     """
 
