@@ -1,6 +1,9 @@
 """Ghosts and further bodies in the 3-D page, MB-RRT's tree, and the genetic algorithm's picture."""
 
 import json
+import re
+import shutil
+import subprocess
 
 import numpy as np
 import pytest
@@ -106,3 +109,19 @@ def test_the_distance_of_the_best_is_drawn_for_every_run(tmp_path):
     assert "tolerance" in text
     with pytest.raises(InputError, match="there is none"):
         plot_distances({}, tmp_path / "ga.svg")
+
+
+def test_a_browser_lists_ghosts_and_marks_with_a_switch_each(tmp_path, tree):
+    browser = shutil.which("chromium") or shutil.which("chromium-browser")
+    if browser is None:
+        pytest.skip("no chromium on PATH: pages cannot be looked at")
+    rows, marks = np.radians([[0.0] * 6, [90, 60, -120, 30, 40, 20]]), tree_marks(tree)
+    file = view(load_robot("puma560"), ghosts=rows, marks=marks, html=tmp_path / "page.html")
+    options = ("--headless=new", "--no-sandbox", "--virtual-time-budget=8000", "--use-angle=swiftshader")
+    graphics = ("--enable-unsafe-swiftshader", "--dump-dom")
+    command = [browser, *options, *graphics, file.as_uri()]
+    page = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+    legend = page.split('id="legend"', 1)[1].split("</ul>", 1)[0]
+    entries = re.findall(r"</span>([^<]+)</label>", legend)
+    wanted = ["solution 1", "solution 2", *(mark.name for mark in marks)]
+    assert [entry for entry in entries if entry in wanted] == wanted

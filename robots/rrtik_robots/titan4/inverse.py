@@ -148,13 +148,13 @@ def _representatives(
     wanted = np.where(any_psi, near[:, 1:4].sum(axis=1) + np.array([0.0, np.pi])[:, None], psi)
     radius = target.p[0] * turn[0] + target.p[1] * turn[1]
     free, _ = nearest_psi(g, radius, target.p[2], wanted)
-    unknown = ~any_psi & (h < UNSURE) & (np.abs(wrapped(free - psi)) > SINGULAR)
+    close = any_psi | (np.abs(wrapped(free - psi)) * h < SINGULAR)
     room = np.clip(SINGULAR / np.maximum(np.hypot(*target.p[:2]), SINGULAR), SINGULAR, MOST_ROOM)
     height = np.broadcast_to(target.p[2], x.shape)
     other, moved, fits = psi_within_rounding(g, radius, height, SIGMA * x, SIGMA * target.w[2], room)
-    fits &= unknown
+    fits &= ~close & (h < UNSURE)
     theta1 = np.where(fits, _turned_to(target, theta1, SIGMA * moved), theta1)
-    psi = np.where(any_psi, free, np.where(fits, other, psi))
+    psi = np.where(close, free, np.where(fits, other, psi))
     return _completed(g, target, theta1, np.stack([np.cos(theta1), np.sin(theta1)]), np.cos(psi), np.sin(psi))
 
 
