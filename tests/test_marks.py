@@ -111,11 +111,12 @@ def test_the_distance_of_the_best_is_drawn_for_every_run(tmp_path):
         plot_distances({}, tmp_path / "ga.svg")
 
 
-def test_a_browser_lists_ghosts_and_marks_with_a_switch_each(tmp_path, tree):
+def test_a_browser_lists_ghosts_and_marks_with_a_switch_each(tmp_path):
     browser = shutil.which("chromium") or shutil.which("chromium-browser")
     if browser is None:
         pytest.skip("no chromium on PATH: pages cannot be looked at")
-    rows, marks = np.radians([[0.0] * 6, [90, 60, -120, 30, 40, 20]]), tree_marks(tree)
+    rows = np.radians([[0.0] * 6, [90, 60, -120, 30, 40, 20]])
+    marks = tree_marks(grow(Links([0.1] * 4, 3), [0.2, 0.1, 0.2], tolerance=0.01, rng=np.random.default_rng(0)))
     file = view(load_robot("puma560"), ghosts=rows, marks=marks, html=tmp_path / "page.html")
     options = ("--headless=new", "--no-sandbox", "--virtual-time-budget=8000", "--use-angle=swiftshader")
     graphics = ("--enable-unsafe-swiftshader", "--dump-dom")
