@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 from acceptance import Report
-from crdt_baseline import TreeRun, crdt_run, rrt_run
-from crdt_published import CRDT_TABLE, PRISM_LIST, RRT_TABLE, SDU_LIST
-from crdt_runs import STAGES, RouteRun, best_of_groups, histogram, joints_of, route_run, share
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.problem import Problem
+from rrtik_ompl.reproduce.crdt_baseline import TreeRun, crdt_run, rrt_run
+from rrtik_ompl.reproduce.crdt_published import CRDT_TABLE, PRISM_LIST, RRT_TABLE, SDU_LIST
+from rrtik_ompl.reproduce.crdt_runs import STAGES, RouteRun, best_of_groups, histogram, joints_of, route_run, share
 from rrtik_ompl.transitions import lower_bound, route_length, routes, transitions
 
 OPTIMA = {"env_e": 4, "planar3_a": 3, "planar3_b": 4, "planar3_c": 3, "titan4_sdu": 6, "titan4_prisms": 3}

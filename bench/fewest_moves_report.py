@@ -14,10 +14,10 @@ from time import perf_counter
 import numpy as np
 from acceptance import Report
 from crdt_report import WITH_ROOM, case_a_with_room
-from crdt_runs import histogram, joints_of, share, sound
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.problem import Problem
+from rrtik_ompl.reproduce.crdt_runs import histogram, joints_of, share, sound
 from rrtik_ompl.shortening.fewest_moves import grid_route, least_moves
 from rrtik_ompl.transitions import lower_bound, transitions
 from rrtik_planners import FewestMoves

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 from acceptance import Report
-from genetic_published import INCH, TOLERANCE, curve
-from genetic_runs import TRAJECTORIES, Run, arm, mean, median, run, runs
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.ik.genetic.objective import manipulability
 from rrtik_ompl.ik.genetic.options import REFINED, STANDARD
+from rrtik_ompl.reproduce.ga_published import INCH, TOLERANCE, curve
+from rrtik_ompl.reproduce.ga_runs import TRAJECTORIES, Run, arm, mean, median, run, runs
 from rrtik_ompl.shapes import Sphere
 
 FREE = replace(STANDARD, gain=0.0)  # for five joints

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 from acceptance import Report
 from genetic_extensions import extensions
-from genetic_published import FIRST_POINT, INCH, REFERENCE, TABLE_4, TABLE_5, curve, expanded_tip
-from genetic_runs import JUMP, TRAJECTORIES, Run, arm, mean, median, run, runs
 
 from rrtik_ompl.ik.closed_form import solutions
 from rrtik_ompl.ik.genetic.options import HISTORICAL, STANDARD
+from rrtik_ompl.reproduce.ga_published import FIRST_POINT, INCH, REFERENCE, TABLE_4, TABLE_5, curve, expanded_tip
+from rrtik_ompl.reproduce.ga_runs import JUMP, TRAJECTORIES, Run, arm, mean, median, run, runs
 
 SLOW = replace(HISTORICAL, gene_mutation=0.005, stall=None)  # the other fit that the sources name
 D7 = (2.2, 4.0, 8.0)

@@ -18,11 +18,10 @@ from rrtik_ompl.ik.mb_rrt.axis_rule_b import grow_by_rule_b
 from rrtik_ompl.ik.mb_rrt.axis_tree import AxisTree
 from rrtik_ompl.ik.mb_rrt.c_space import grow_in_joint_space
 from rrtik_ompl.ik.mb_rrt.closing import grow_and_close
-from rrtik_ompl.ik.mb_rrt.growth import grow, one_link
+from rrtik_ompl.ik.mb_rrt.growth import grow
 from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
 from rrtik_ompl.ik.mb_rrt.links import Links, directions, sunflower
 from rrtik_ompl.ik.mb_rrt.search import polished
-from rrtik_ompl.ik.mb_rrt.variants import surface
 from rrtik_ompl.ik.numeric import descend
 from rrtik_ompl.shapes import Cylinder
 from rrtik_planners import MBRRT, BiCRDT
@@ -30,18 +29,6 @@ from rrtik_robots.planar import planar
 
 MOST = 1000  # passes
 TIGHT = 1e-3  # [cm]
-
-
-def laws(rng: np.random.Generator) -> tuple[float, float]:
-    """KS distance from the arcsine law, and the share of index-1 nodes outside: 4 x 10 cm, goal (20, 30)."""
-    links, goal, count = Links([10.0] * 4), np.array([20.0, 30.0]), 100_000
-    samples = surface(links, goal, 1, count, rng)
-    nodes = one_link(np.zeros((count, 2)), samples, 10.0, rng)
-    far = float(np.linalg.norm(goal))
-    angle = np.arctan2(nodes[:, 1], nodes[:, 0]) - np.arctan2(goal[1], goal[0])
-    law = 0.5 + np.arcsin(np.clip(far * np.sin(np.sort(angle)) / links.remaining[1], -1.0, 1.0)) / np.pi
-    ks = float(np.abs(law - (np.arange(count) + 0.5) / count).max())
-    return ks, float((np.linalg.norm(nodes - goal, axis=1) > links.remaining[1]).mean())
 
 
 def arcs(rng: np.random.Generator, goals: int = 200) -> tuple[list[str], float, int]:

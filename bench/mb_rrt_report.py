@@ -19,13 +19,15 @@ from rrtik_ompl.ik.mb_rrt.arc import grow_on_arcs
 from rrtik_ompl.ik.mb_rrt.growth import grow
 from rrtik_ompl.ik.mb_rrt.links import Links, headings_to_joints, joints_to_chain, sunflower
 from rrtik_ompl.plot_tree import plot_tree
+from rrtik_ompl.reproduce.mb_rrt_runs import arm
+from rrtik_ompl.reproduce.mb_rrt_runs import laws as laws_of
 
 
 def structure(rng: np.random.Generator) -> float:
     """The largest fault of an edge or of forward kinematics in trees of both kinds of arm, as a share of the reach."""
     worst = 0.0
     for count in (3, 10):
-        links = published.arm(count)
+        links = arm(count)
         for goal in sunflower(links, 20):
             run = grow(links, goal, tolerance=0.01, rng=rng)
             again = joints_to_chain(links.lengths, headings_to_joints(run.chain))
@@ -100,7 +102,7 @@ def acceptance_of_precision(exact: dict, fault: float) -> list[str]:
 
 
 def laws(rng: np.random.Generator, exact: dict) -> list[str]:
-    ks, third = beyond.laws(rng)
+    ks, third = laws_of(rng)
     ratios = [exact[n][0.001][1].mean() / exact[n][0.01][1].mean() for n in (3, 10)]
     kept = ks < 0.01 and abs(third - 1 / 3) < 0.01 and all(2 <= r <= 5 for r in ratios)
     measured = f"{ks:.4f}; {third:.4f}; {ratios[0]:.2f}, {ratios[1]:.2f}"

@@ -7,7 +7,6 @@ bar of the post-processing page holds, else 1.
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,10 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent))
-from plane_worlds import PUBLISHED, Plane, generated, sampled_route
-
 from rrtik_ompl import load_problem, plan, shorten
+from rrtik_ompl.reproduce.plane_worlds import PUBLISHED, Plane, generated, sampled_route
 from rrtik_ompl.shortening import METHODS, Task
 from rrtik_ompl.shortening.random_cut import random_cut
 from rrtik_ompl.shortening.retraction import retract

@@ -38,6 +38,9 @@ if TYPE_CHECKING:
     from rrtik_ompl.problem import Problem as Problem
     from rrtik_ompl.problem_file import load_problem as load_problem
     from rrtik_ompl.problem_file import save_problem as save_problem
+    from rrtik_ompl.reach.grid_map import ReachMap as ReachMap
+    from rrtik_ompl.reach.grid_map import load_reach_map as load_reach_map
+    from rrtik_ompl.reach.sampling import reach_map as reach_map
     from rrtik_ompl.robot import Robot as Robot
     from rrtik_ompl.scene import AttachedObject as AttachedObject
     from rrtik_ompl.scene import Obstacle as Obstacle
@@ -65,6 +68,8 @@ else:
         "plot": ("plot_joints",),
         "problem": ("Problem",),
         "problem_file": ("load_problem", "save_problem"),
+        "reach.grid_map": ("ReachMap", "load_reach_map"),
+        "reach.sampling": ("reach_map",),
         "robot": ("Robot",),
         "scene": ("AttachedObject", "Obstacle", "Scene"),
         "scene_file": ("load_scene", "save_scene"),

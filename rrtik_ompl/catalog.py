@@ -1,8 +1,9 @@
 """Names to things: robots, planners and problems that installed packages offer through entry points, and robot files.
 
 Another package adds its own by entry points in the groups ``rrtik_ompl.robots`` (name -> a function that takes keyword
-options and returns a `Robot`), ``rrtik_ompl.planners`` (name -> a class) and ``rrtik_ompl.problems`` (any name -> the
-``Path`` of a folder of problem files).
+options and returns a `Robot`), ``rrtik_ompl.planners`` (name -> a class), ``rrtik_ompl.problems`` (any name -> the
+``Path`` of a folder of problem files) and ``rrtik_ompl.workspaces`` (name of a robot -> a function that returns slices
+of its effective workspace, see `rrtik_ompl.reach.grid_map.Slice`).
 """
 
 from __future__ import annotations
@@ -48,6 +49,16 @@ def find_planner(name: str) -> Any:
         UnknownNameError: If no package offers it.
     """
     return _load("planner", "planners", name)
+
+
+def find_workspace(robot: str) -> Callable[[], Any]:
+    """What draws a robot's effective workspace: a function without arguments that returns slices.
+
+    Raises:
+        UnknownNameError: If no package offers one for this robot.
+    """
+    found: Callable[[], Any] = _load("effective workspace of robot", "workspaces", robot)
+    return found
 
 
 def list_problems() -> tuple[str, ...]:

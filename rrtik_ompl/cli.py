@@ -15,8 +15,11 @@ import typer
 
 from rrtik_ompl.errors import InputError, RrtikError
 from rrtik_ompl.fast import announce
+from rrtik_ompl.ik_commands import inverse_kinematics
 from rrtik_ompl.motion_commands import list_moves, time_path
 from rrtik_ompl.path_text import FORMATS as PATH_FORMATS
+from rrtik_ompl.reach_commands import reach
+from rrtik_ompl.reproduce_commands import reproduce
 from rrtik_ompl.terminal import drop_output, note, prepare_streams, progress, say, warn
 from rrtik_ompl.text_file import check_target
 
@@ -41,6 +44,7 @@ class Kind(str, Enum):
     robots = "robots"
     planners = "planners"
     problems = "problems"
+    ik = "ik"
 
 
 class Shorten(str, Enum):
@@ -176,11 +180,16 @@ def show(
 
 
 @app.command("list")
-def list_names(kind: Annotated[Kind | None, typer.Argument(help="All three kinds if left out.")] = None) -> int:
+def list_names(kind: Annotated[Kind | None, typer.Argument(help="All kinds if left out.")] = None) -> int:
     """List what is there by name."""
-    from rrtik_ompl import list_planners, list_problems, list_robots
+    from rrtik_ompl import list_ik_methods, list_planners, list_problems, list_robots
 
-    sources = {Kind.robots: list_robots, Kind.planners: list_planners, Kind.problems: list_problems}
+    sources = {
+        Kind.robots: list_robots,
+        Kind.planners: list_planners,
+        Kind.problems: list_problems,
+        Kind.ik: list_ik_methods,
+    }
     for each in Kind if kind is None else (kind,):
         if kind is None:
             say(f"{each.value}:")
@@ -215,6 +224,9 @@ def warmup() -> int:
     return FOUND if warm_up(say) else NOT_FOUND
 
 
+app.command("ik")(inverse_kinematics)
+app.command("reach")(reach)
+app.command("reproduce")(reproduce)
 app.command("moves")(list_moves)
 app.command("time")(time_path)
 

@@ -11,7 +11,7 @@ import typer
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.path_text import FORMATS as PATH_FORMATS
 from rrtik_ompl.terminal import progress, say
-from rrtik_ompl.text_file import check_target
+from rrtik_ompl.text_file import check_target, comma_numbers
 
 TRAJECTORY_FORMATS, PLOT_FORMATS = (".json", ".csv"), (".png", ".svg")
 
@@ -67,7 +67,8 @@ def time_path(
     """Give a path its times, under the robot's limits or those given."""
     check_target(out, TRAJECTORY_FORMATS)
     check_target(plot, PLOT_FORMATS)
-    given = {"velocity": _rates(velocity), "acceleration": _rates(acceleration), "jerk": _rates(jerk)}
+    texts = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
+    given = {name: None if text is None else comma_numbers(text) for name, text in texts.items()}
     import numpy as np
 
     from rrtik_ompl import RateLimits, load_path, load_problem, plot_joints, report, timed
@@ -116,16 +117,6 @@ def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> tupl
         if shorten is not None:
             route = shortened(route, question, method=shorten)
     return route, question.robot
-
-
-def _rates(text: str | None) -> list[float] | None:
-    """Numbers with commas between them, or one alone."""
-    if text is None:
-        return None
-    try:
-        return [float(word) for word in text.split(",")]
-    except ValueError:
-        raise InputError(f"expected a number, or numbers with commas between them, got '{text}'") from None
 
 
 def _scaled(row: list[float], factors: Any) -> Any:

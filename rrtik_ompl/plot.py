@@ -33,10 +33,9 @@ def plot_joints(motion: Trajectory | JointPath, file: str | os.PathLike[str]) ->
     Raises:
         InputError: If the ending is another one, the file cannot be written, or ``motion`` is something else.
     """
-    ending = plot_format(file)
+    plot_format(file)
     require(motion, Trajectory | JointPath, "motion to plot")
     over, label, rows = _rows(motion)
-    import matplotlib
     from matplotlib.figure import Figure
 
     kinds = [(mask, unit) for mask, unit in ((~motion.prismatic, "deg"), (motion.prismatic, "m")) if mask.any()]
@@ -50,11 +49,7 @@ def plot_joints(motion: Trajectory | JointPath, file: str | os.PathLike[str]) ->
     lines = {line.get_label(): line for panel in panels for line in panel.get_lines()}
     handles = [lines[name] for name in motion.joint_names]
     figure.legend(handles, motion.joint_names, loc="outside upper center", ncols=min(len(handles), 6), frameon=False)
-    picture = BytesIO()
-    metadata = {"Date": None} if ending == ".svg" else {}
-    with matplotlib.rc_context({"svg.hashsalt": "rrtik", "svg.fonttype": "none"}):
-        figure.savefig(picture, format=ending[1:], dpi=150, metadata=metadata)
-    write_bytes(file, picture.getvalue())
+    save_figure(figure, file)
 
 
 def plot_format(file: str | os.PathLike[str]) -> str:
@@ -67,6 +62,30 @@ def plot_format(file: str | os.PathLike[str]) -> str:
     if ending not in FORMATS:
         raise InputError(f"{file}: unknown ending '{ending}' for a plot; use {', '.join(FORMATS)}")
     return ending
+
+
+def save_figure(figure: Any, file: str | os.PathLike[str], *, dpi: int = 150) -> None:
+    """Write a matplotlib figure so that the same figure gives the same file, whole or not at all.
+
+    Raises:
+        InputError: If the ending is none of ``FORMATS``, or the file cannot be written.
+    """
+    import matplotlib
+
+    ending, picture = plot_format(file), BytesIO()
+    metadata = {"Date": None} if ending == ".svg" else {}
+    with matplotlib.rc_context({"svg.hashsalt": "rrtik", "svg.fonttype": "none"}):
+        figure.savefig(picture, format=ending[1:], dpi=dpi, metadata=metadata)
+    write_bytes(file, picture.getvalue())
+
+
+def tidy(panel: Any, *, grid: bool = True) -> None:
+    """Leave out the frame's upper and right side; a pale grid behind everything."""
+    if grid:
+        panel.grid(color="#e3e9ef", linewidth=0.8)
+        panel.set_axisbelow(True)
+    for side in ("top", "right"):
+        panel.spines[side].set_visible(False)
 
 
 def _rows(motion: Trajectory | JointPath) -> tuple[Vector, str, list[tuple[str, str, Matrix]]]:
@@ -86,8 +105,5 @@ def _draw(panel: Any, over: Vector, values: Matrix, mask: Any, motion: Trajector
         style = {"color": COLORS[k % len(COLORS)], "linestyle": DASHES[k // len(COLORS) % len(DASHES)]}
         marker = {"marker": "o", "markersize": 3} if isinstance(motion, JointPath) else {}
         panel.plot(over, values[:, k], label=motion.joint_names[k], linewidth=1.6, **style, **marker)
-    panel.grid(color="#e3e9ef", linewidth=0.8)
-    panel.set_axisbelow(True)
+    tidy(panel)
     panel.margins(x=0.01)
-    for side in ("top", "right"):
-        panel.spines[side].set_visible(False)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import os
-from io import BytesIO
 from typing import Any
 
 import numpy as np
 
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.ik.mb_rrt.run import Run
-from rrtik_ompl.plot import COLORS, plot_format
-from rrtik_ompl.text_file import write_bytes
+from rrtik_ompl.plot import COLORS, plot_format, save_figure, tidy
 
 MOST_COLORS = 6  # one an index; then they repeat
 INK, GREY = COLORS[6], COLORS[7]
@@ -29,11 +27,12 @@ def plot_tree(run: Run, file: str | os.PathLike[str]) -> None:
     Raises:
         InputError: If the run is not planar, the ending is another one, or the file cannot be written.
     """
-    ending = plot_format(file)
+    plot_format(file)
     require(run, Run, "tree to plot")
     if run.links.dimension != 2:
-        raise InputError("tree to plot: it grows in space, and only planar ones are drawn; look at it in the viewer")
-    import matplotlib
+        raise InputError(
+            "tree to plot: it grows in space, and only planar ones are drawn; see rrtik_ompl.viewer.tree_marks"
+        )
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.2, 7.2), layout="constrained")
@@ -43,11 +42,7 @@ def plot_tree(run: Run, file: str | os.PathLike[str]) -> None:
     _links(panel, run)
     _chain(panel, run)
     _frame(panel, run)
-    picture = BytesIO()
-    metadata = {"Date": None} if ending == ".svg" else {}
-    with matplotlib.rc_context({"svg.hashsalt": "rrtik", "svg.fonttype": "none"}):
-        figure.savefig(picture, format=ending[1:], dpi=150, metadata=metadata)
-    write_bytes(file, picture.getvalue())
+    save_figure(figure, file, dpi=100)
 
 
 def _color(index: int) -> str:
@@ -99,10 +94,7 @@ def _frame(panel: Any, run: Run) -> None:
     panel.set_xlim(float(low[0]), float(high[0]))
     panel.set_ylim(float(low[1]), float(high[1]))
     panel.set_aspect("equal")
-    panel.grid(color="#e3e9ef", linewidth=0.8)
-    panel.set_axisbelow(True)
-    for side in ("top", "right"):
-        panel.spines[side].set_visible(False)
+    tidy(panel)
     missed = f"{run.misses.min():.2g}"
     panel.set_title(
         f"{run.passes} passes, end within {missed} of the goal; "

@@ -116,6 +116,18 @@ def file_name(path: object) -> Path:
     return Path(path)
 
 
+def comma_numbers(text: str) -> list[float]:
+    """Numbers with commas between them, or one alone.
+
+    Raises:
+        InputError: If the text is something else.
+    """
+    try:
+        return [float(word) for word in text.split(",")]
+    except ValueError:
+        raise InputError(f"expected a number, or numbers with commas between them, got '{text}'") from None
+
+
 def is_number(text: str) -> bool:
     """Whether a text reads as a number."""
     try:

@@ -1,10 +1,16 @@
 """The PUMA 560 arms in closed form."""
 
+import re
+
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.goal import PoseGoal, PositionGoal
 from rrtik_ompl.ik.closed_form import form_of, solutions
+from rrtik_ompl.ik.face import solve_ik
 from rrtik_ompl.ik.form import wrapped
 from rrtik_ompl.ik.singularity import singularity_report
 from rrtik_robots.puma560.singular_samples import CASES, singular_configurations
@@ -97,3 +103,33 @@ def test_the_form_says_what_its_branches_are():
     form = form_of(load_robot("puma560"))
     assert (form.kind, len(form.branches), form.families) == ("pose", 8, ("wrist",))
     assert form_of(load_robot("puma560_3dof")).kind == "position"
+
+
+@pytest.mark.parametrize("d7", [0.05588, 0.2])
+def test_five_joints_reach_their_own_poses_and_the_posture_asked_for_is_among_the_answers(d7):
+    robot = load_robot("puma560_5dof", lengths={"d7": d7})
+    Q = np.random.default_rng(3).uniform(robot.lower, robot.upper, (20_000, 5))
+    Q[:5_000, 4] = 0.0  # a straight wrist
+    found = solutions(robot, robot.fk_batch(Q), near=Q)
+    assert distance_to_branches(found, Q).max() < 1e-8
+    assert found.residuals[found.real].max() < 1e-9
+    assert found.valid.any(axis=1).all()
+
+
+def test_five_joints_do_not_reach_a_pose_that_is_turned_about_its_approach_axis():
+    robot = load_robot("puma560_5dof")
+    q = np.radians([40.0, -60.0, 20.0, 30.0, 40.0])
+    pose = robot.fk(q) * pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, 0.02), np.zeros(3))
+    assert not solutions(robot, pose.homogeneous[None]).real.any()
+    result = solve_ik(robot, PoseGoal(pose))
+    assert (result.method, result.reason) == ("closed-form", "unreachable")
+    assert re.search(r"0\.0[12]\d* rad away", result.detail)
+    assert solve_ik(robot, PoseGoal(pose, orientation_tolerance=0.03)).found
+
+
+def test_a_point_leaves_five_joints_free_so_auto_is_numeric_and_the_closed_form_says_why_it_does_not_fit():
+    robot = load_robot("puma560_5dof")
+    goal = PositionGoal(robot.fk(np.radians([40.0, -60.0, 20.0, 30.0, 40.0])).translation)
+    assert solve_ik(robot, goal).method == "numeric"
+    with pytest.raises(InputError, match=r"needs a pose, and a position leaves a whole family .* numeric"):
+        solve_ik(robot, goal, method="closed-form")

@@ -47,7 +47,9 @@ def test_the_problem_file_loads(tmp_path):
     assert load_problem(file).world.scene.names == ("panel", "seabed")
 
 
-@pytest.mark.parametrize("verb", ["plan", "check", "show", "list", "convert", "moves", "time"])
+@pytest.mark.parametrize(
+    "verb", ["plan", "check", "show", "list", "convert", "moves", "time", "ik", "reach", "reproduce"]
+)
 def test_every_option_that_the_readme_names_is_there(verb, capsys):
     (usage,) = re.findall(rf"^rrtik {verb} [^\n]*(?:\n  [^\n]*)*", README, re.MULTILINE)
     assert run([verb, "--help"]) == 0

@@ -1,9 +1,7 @@
 """Every method of shortening keeps ends and validity, never lengthens, ends when it is told to, and is repeatable."""
 
-import runpy
 import time
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +9,7 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.cli import Shorten
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.reproduce import plane_worlds
 from rrtik_ompl.shortening import METHODS, Task
 from rrtik_ompl.shortening.random_cut import random_cut
 from rrtik_ompl.shortening.retraction import retract
@@ -255,7 +254,7 @@ def test_the_command_line_offers_every_method():
 
 @pytest.fixture(scope="module")
 def planes():
-    return runpy.run_path(str(Path(__file__).parent.parent / "bench" / "plane_worlds.py"))
+    return vars(plane_worlds)
 
 
 def test_the_bench_knows_the_shortest_route_of_a_class(planes):

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import os
 import webbrowser
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
+
+from numpy.typing import ArrayLike
 
 from rrtik_ompl.text_file import write_text
 
@@ -21,6 +23,8 @@ def view(
     path: Any | None = None,
     *,
     before: Any | None = None,
+    ghosts: ArrayLike | None = None,
+    marks: Sequence[Any] = (),
     html: str | os.PathLike[str] | None = None,
     title: str | None = None,
     port: int = 0,
@@ -33,6 +37,9 @@ def view(
         path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m]; what is shown stands still if None.
         before: Another path to compare with, such as the one that ``path`` was shortened from: the way of its tip is
             drawn too.
+        ghosts: Configurations at which the arm is drawn like tinted glass, shape (k, dof), such as the solutions of
+            inverse kinematics; they take the place of the ghosts of start and goal.
+        marks: What else stands in the world: see ``rrtik_ompl.viewer.marks``.
         html: File to write. If None, the page is served on 127.0.0.1 until Ctrl-C is pressed.
         title: Heading of the page; made from the problem's or the robot's name if None.
         port: Port to serve on; a free one if 0.
@@ -47,7 +54,7 @@ def view(
     from rrtik_ompl.viewer.page import page
     from rrtik_ompl.viewer.serve import PageServer
 
-    text = page(shown, path, before=before, title=title)
+    text = page(shown, path, before=before, ghosts=ghosts, marks=marks, title=title)
     if html is not None:
         write_text(html, text)
         return Path(html)

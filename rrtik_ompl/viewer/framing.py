@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from rrtik_ompl.shapes import HalfSpace
 from rrtik_ompl.viewer.meshes import look_of_shape
 
 HUGE = 3.0  # an obstacle this many times larger than the arm's box is surroundings: it may run out of the picture
+EMPTY = np.array([[-0.5] * 3, [0.5] * 3])  # [m] what is looked at where there is nothing
 MARGIN = 0.5  # of the arm's box: how much of such an obstacle is taken in
 
 
@@ -42,7 +43,7 @@ class Frame:
 
 
 def frame_around(
-    arm_points: Matrix | None, scene: Scene, extra: Iterable[Matrix] = (), *, whole: bool = False
+    arm_points: Matrix | None, scene: Scene, extra: Sequence[Matrix] = (), *, whole: bool = False
 ) -> Frame:
     """Box around the arm, the bounded obstacles and further points.
 
@@ -54,7 +55,7 @@ def frame_around(
     """
     boxes = [obstacle_corners(o) for o in scene.obstacles if not isinstance(o.shape, HalfSpace)]
     if arm_points is None or len(arm_points) == 0:
-        everything = np.concatenate([*boxes, *extra]) if boxes else np.array([[-0.5] * 3, [0.5] * 3])
+        everything = np.concatenate([*boxes, *extra, *([] if boxes or extra else [EMPTY])])
         low, high = everything.min(axis=0), everything.max(axis=0)
         return Frame(low, high, max(float(np.linalg.norm(high - low)), 1e-3))
     points = np.concatenate([arm_points, *extra])

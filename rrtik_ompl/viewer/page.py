@@ -5,11 +5,15 @@ from __future__ import annotations
 import base64
 import html
 import json
+from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 from string import Template
 from typing import Any
 
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.viewer.marks import Mark
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.story import story_of
 from rrtik_ompl.viewer.subject import Subject, subject_of
@@ -19,7 +23,15 @@ POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inli
 SCRIPTS = ("kinematics.js", "stage.js", "panel.js", "player.js")
 
 
-def page(shown: Any, path: Any | None = None, *, before: Any | None = None, title: str | None = None) -> str:
+def page(
+    shown: Any,
+    path: Any | None = None,
+    *,
+    before: Any | None = None,
+    ghosts: ArrayLike | None = None,
+    marks: Sequence[Mark] = (),
+    title: str | None = None,
+) -> str:
     """The page that shows something, as the text of one HTML file that needs no other file and no network.
 
     The same input gives the same text.
@@ -28,12 +40,14 @@ def page(shown: Any, path: Any | None = None, *, before: Any | None = None, titl
         shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
         path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m].
         before: Another path, to compare with; the way of its tip is drawn too.
+        ghosts: Configurations, shape (k, dof), drawn like tinted glass.
+        marks: Further bodies.
         title: Heading; made from the problem's or the robot's name if None.
 
     Raises:
         InputError: If that cannot be shown.
     """
-    subject = subject_of(shown, path, before)
+    subject = subject_of(shown, path, before, ghosts, tuple(marks))
     window, frame = draw(subject)
     heading = _title(subject) if title is None else title
     story = json.dumps(story_of(subject, frame, heading), allow_nan=False, separators=(",", ":"))

@@ -14,6 +14,7 @@ from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.viewer.framing import Frame, frame_around
+from rrtik_ompl.viewer.marks import draw_marks
 from rrtik_ompl.viewer.meshes import thickened
 from rrtik_ompl.viewer.robot_picture import (
     GHOST_TRIANGLES,
@@ -39,7 +40,7 @@ def draw(subject: Subject) -> tuple[RecordingWindow, Frame]:
     vis = meshcat.Visualizer(window=window)
     robot, scene = subject.robot, subject.scene
     if robot is None:
-        frame = frame_around(None, scene)
+        frame = frame_around(None, scene, [mark.vertices for mark in subject.marks])
     else:
         frame = _draw_robot(vis, robot, subject)
         draw_goal(vis, subject.goal, frame)
@@ -48,6 +49,7 @@ def draw(subject: Subject) -> tuple[RecordingWindow, Frame]:
         if subject.before is not None:
             draw_before(vis, robot, subject.before, 0.0035 * frame.arm)
     draw_scene(vis, scene, frame)
+    draw_marks(vis, subject.marks)
     draw_triad(vis["frames"]["world"], pin.SE3.Identity(), 0.1 * frame.arm)
     if robot is not None and robot.planar:
         _flatten(vis, frame)
@@ -59,16 +61,18 @@ def _draw_robot(vis: Any, robot: Robot, subject: Subject) -> Frame:
     shown = _spread(subject.waypoints)
     if subject.end is not None:
         shown = np.vstack([shown, subject.end])
+    if subject.ghosts is not None:
+        shown = np.vstack([shown, subject.ghosts])
     frames = robot.joint_frames(shown)
     held = attached_parts(robot, subject.scene.attached)
     parts = link_parts(robot) + held
     points = swept_points(parts, frames)
-    places = _goal_points(subject.goal)
+    places = _goal_points(subject.goal) + [mark.vertices for mark in subject.marks]
     if subject.before is not None:
         places.append(robot.fk_batch(_spread(subject.before))[:, :3, 3])
     frame = frame_around(points, subject.scene, places, whole=robot.planar)
     _draw_parts(vis["robot"], robot, parts, frames[0], frame)
-    if subject.start is not None:
+    if subject.start is not None or subject.ghosts is not None:
         _draw_parts(vis["ghost"], robot, link_parts(robot, GHOST_TRIANGLES) + held, frames[0], frame)
     tip = robot.model.frames[robot.model.getFrameId(robot.tip)]
     draw_triad(vis["robot"][joint_nodes(robot)[tip.parentJoint]]["tip frame"], tip.placement, 0.07 * frame.arm)

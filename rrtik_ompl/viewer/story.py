@@ -15,6 +15,7 @@ from rrtik_ompl.shapes import HalfSpace
 from rrtik_ompl.transitions import moved, route_length
 from rrtik_ompl.viewer import palette
 from rrtik_ompl.viewer.framing import Frame
+from rrtik_ompl.viewer.marks import Mark
 from rrtik_ompl.viewer.robot_picture import joint_nodes, node_name
 from rrtik_ompl.viewer.subject import Subject
 from rrtik_ompl.viewer.trail import pieces
@@ -40,6 +41,8 @@ def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
         "goal": _goal_text(subject.goal),
         "start_ghost": _numbers(subject.start),
         "goal_ghost": _numbers(subject.end),
+        "ghosts": _ghosts(subject.ghosts),
+        "marks": [_mark(mark, number) for number, mark in enumerate(subject.marks)],
         "waypoints": _numbers(subject.waypoints),
         "before": "" if subject.before is None else _compared(subject.before, subject.waypoints),
         "moves": [] if robot is None else _moves(subject.waypoints),
@@ -100,6 +103,25 @@ def _robot(robot: Robot) -> dict[str, Any]:
                 robot.joint_names, robot.prismatic, robot.lower, robot.upper, strict=True
             )
         ],
+    }
+
+
+def _ghosts(rows: Matrix | None) -> list[dict[str, Any]]:
+    """Configurations with a colour each; the colours repeat."""
+    colors = palette.SERIES
+    return [
+        {"name": f"solution {k + 1}", "color": colors[k % len(colors)], "q": _numbers(row)}
+        for k, row in enumerate(np.empty((0, 0)) if rows is None else rows)
+    ]
+
+
+def _mark(mark: Mark, number: int) -> dict[str, Any]:
+    return {
+        "name": mark.name,
+        "color": mark.color,
+        "opacity": max(mark.opacity, 0.3),
+        "node": f"{number}",
+        "shown": mark.shown,
     }
 
 

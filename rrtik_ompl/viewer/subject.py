@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import Goal, JointGoal
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
+from rrtik_ompl.viewer.marks import Mark
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,6 +28,8 @@ class Subject:
         waypoints: Configurations to play, shape (k, dof); a single row if there is no path, (0, 0) without a robot.
         is_path: Whether the waypoints are a path, as opposed to the one posture in which the arm stands.
         before: Waypoints of a path to compare with, shape (m, dof), or None.
+        ghosts: Configurations drawn like tinted glass, shape (m, dof), or None.
+        marks: Further bodies.
     """
 
     name: str
@@ -35,29 +39,59 @@ class Subject:
     waypoints: Matrix
     is_path: bool
     before: Matrix | None = None
+    ghosts: Matrix | None = None
+    marks: tuple[Mark, ...] = ()
 
     @property
     def start(self) -> Vector | None:
         """Configuration of the start ghost, shape (dof,), or None."""
-        start: Vector | None = self.waypoints[0] if self.is_path or self.goal is not None else None
+        wanted = self.ghosts is None and (self.is_path or self.goal is not None)
+        start: Vector | None = self.waypoints[0] if wanted else None
         return start
 
     @property
     def end(self) -> Vector | None:
         """Configuration of the goal ghost, shape (dof,): end of the path or the goal's joint values, or None."""
+        if self.ghosts is not None:
+            return None
         if not self.is_path:
             return self.goal.q if isinstance(self.goal, JointGoal) else None
         end: Vector = self.waypoints[-1]
         return end
 
 
-def subject_of(shown: Any, path: Any | None = None, before: Any | None = None) -> Subject:
+@dataclass(frozen=True, slots=True, eq=False)
+class Shown:
+    """An arm in a posture, what surrounds it and where it should go: shown like a problem, but nothing is checked.
+
+    Attributes:
+        robot: The arm.
+        scene: Its surroundings.
+        goal: A goal to draw, or None.
+        start: The posture, shape (dof,).
+    """
+
+    robot: Robot
+    scene: Scene
+    goal: Goal | None
+    start: Vector
+
+
+def subject_of(
+    shown: Any,
+    path: Any | None = None,
+    before: Any | None = None,
+    ghosts: ArrayLike | None = None,
+    marks: tuple[Mark, ...] = (),
+) -> Subject:
     """Take apart what a caller wants to see.
 
     Args:
         shown: A ``Problem``, a ``World``, a ``Robot`` or a ``Scene``.
         path: A ``JointPath``, or waypoints of shape (k, dof) with k at least 1 [rad or m].
         before: Another path to compare with.
+        ghosts: Configurations, shape (m, dof).
+        marks: Further bodies.
 
     Raises:
         InputError: If ``shown`` is none of these, or the path does not fit the robot, or there is one to compare with
@@ -65,10 +99,11 @@ def subject_of(shown: Any, path: Any | None = None, before: Any | None = None) -
     """
     if before is not None and path is None:
         raise InputError("view: there is a path before, but none after it; give the path to show too")
+    marks = tuple(mark for mark in marks if len(mark.faces))
     if isinstance(shown, Scene):
-        if path is not None:
+        if path is not None or ghosts is not None:
             raise InputError("view: a path needs a robot; show a problem, a world or a robot instead of a scene alone")
-        return Subject("Scene", None, shown, None, frozen(np.empty((0, 0))), False)
+        return Subject("Scene", None, shown, None, frozen(np.empty((0, 0))), False, marks=marks)
     if isinstance(shown, Robot):
         robot, scene = shown, Scene()
     else:
@@ -79,12 +114,13 @@ def subject_of(shown: Any, path: Any | None = None, before: Any | None = None) -
     goal = getattr(shown, "goal", None)
     named = getattr(shown, "name", "problem")
     name = robot.name if named == "problem" else str(named)
+    tinted = None if ghosts is None else _waypoints(robot, ghosts)
     if path is not None:
         earlier = None if before is None else _waypoints(robot, before)
-        return Subject(name, robot, scene, goal, _waypoints(robot, path), True, earlier)
+        return Subject(name, robot, scene, goal, _waypoints(robot, path), True, earlier, tinted, marks)
     start = getattr(shown, "start", None)
     posture = robot.clamp(np.zeros(robot.dof)) if start is None else robot.configuration(start, "start")
-    return Subject(name, robot, scene, goal, frozen(posture[None]), False)
+    return Subject(name, robot, scene, goal, frozen(posture[None]), False, None, tinted, marks)
 
 
 def _waypoints(robot: Robot, path: Any) -> Matrix:

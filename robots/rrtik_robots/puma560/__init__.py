@@ -12,7 +12,7 @@ from rrtik_ompl.arrays import finite_array
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.errors import UnknownNameError
 from rrtik_ompl.robot import Robot
-from rrtik_robots.puma560.inverse import PumaGeometry, pose_form, position_form
+from rrtik_robots.puma560.inverse import PumaGeometry, five_joint_form, pose_form, position_form
 
 INCH = 0.0254  # [m]
 RIGHT = np.pi / 2
@@ -117,7 +117,7 @@ def _cut(name: str, joints: int, lengths: Mapping[str, float] | None, tip: str, 
             for (a, alpha, d, _), limits in zip(table, LIMITS_CUT_DEG, strict=False)
         ],
         convention="modified",
-        closed_form=position_form(geometry) if joints == 3 else None,
+        closed_form=position_form(geometry) if joints == 3 else five_joint_form(geometry, end.d),
         radius=[row[-1] for row in table],
         tool=tool * pin.SE3(np.eye(3), np.array([0.0, 0.0, end.d])),
         tip=tip,

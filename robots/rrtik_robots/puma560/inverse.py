@@ -1,4 +1,4 @@
-"""Inverse kinematics of the PUMA 560 in closed form: eight branches of the six-joint arm, four of the first three.
+"""Inverse kinematics of the PUMA 560 in closed form: eight branches of the six-joint arm, four of the cut ones.
 
 The wrist centre gives the shoulder (front or back of it) and a triangle (elbow up or down); the orientation that is
 left gives the three wrist angles in two ways. Arrays are kept as (shoulder, elbow, wrist, m).
@@ -18,6 +18,7 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.ik.form import REACH_TOLERANCE, SINGULAR, Branches, ClosedFormSolver, two_links, wrapped
 
 Numbers = NDArray[np.float64]
+MISFIT = 1e-9  # sine of the angle between axis 5 and where a pose wants it; more is out of reach for five joints
 SHOULDER_ROOT = 1e-15  # [m^2] of a squared radius: less is rounding, which moves the wrist centre by less than 1e-14 m
 ARM_BRANCHES = tuple(" ".join(tag) for tag in product(("front", "back"), ("up", "down")))
 BRANCHES = tuple(" ".join(tag) for tag in product(("front", "back"), ("up", "down"), ("near", "flip")))
@@ -57,6 +58,12 @@ def position_form(geometry: PumaGeometry) -> ClosedFormSolver:
     """The first three joints in the modified Denavit-Hartenberg sense (theta2, theta3 turn downwards)."""
     solve = partial(arm_branches, geometry)
     return ClosedFormSolver("tip", "position", ARM_BRANCHES, (), (), solve, partial(nearness, geometry))
+
+
+def five_joint_form(geometry: PumaGeometry, tool: float) -> ClosedFormSolver:
+    """Five joints and a segment of length ``tool`` [m] along the last axis, for poses; points leave two joints free."""
+    solve = partial(five_joint_branches, geometry, tool)
+    return ClosedFormSolver("tip", "pose", ARM_BRANCHES, (), (), solve, partial(nearness, geometry))
 
 
 def puma_branches(g: PumaGeometry, poses: Numbers, near: Matrix | None = None, slack: float = 0.0) -> Branches:
@@ -99,6 +106,28 @@ def arm_branches(g: PumaGeometry, poses: Numbers, near: Matrix | None = None, sl
     return Branches(
         q.reshape(3, 4, len(poses)).transpose(2, 1, 0), real.reshape(4, -1).T, np.zeros(len(poses), dtype=np.uint8)
     )
+
+
+def five_joint_branches(
+    g: PumaGeometry, tool: float, poses: Numbers, near: Matrix | None = None, slack: float = 0.0
+) -> Branches:
+    """All four branches for T_base_tip, shape (m, 4, 4); none is singular, for the wrist has no roll to give away.
+
+    Five joints reach a set of poses with five dimensions: a branch whose axis 5 cannot point as the pose wants is not
+    real, and its residual says how far off it is.
+    """
+    arm = arm_branches(g, poses @ np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, -tool], [0, 0, 0, 1.0]]))
+    theta1, forearm = arm.q[..., 0], arm.q[..., 1] + arm.q[..., 2]
+    c1, s1, c, s = np.cos(theta1), np.sin(theta1), np.cos(forearm), np.sin(forearm)
+    (ux, uy, uz), (vx, vy, vz), (_, _, wz) = poses[:, :3, :3].transpose(2, 1, 0)[..., None]
+    wx, wy = poses[:, 0, 2, None], poses[:, 1, 2, None]
+    # the columns in the frame of the forearm, turned so that they are Rz(theta4) Ry(-theta5)
+    v_ahead, v_aside = vx * c1 + vy * s1, vy * c1 - vx * s1
+    u_down, v_down, w_down = (-s * (x * c1 + y * s1) - c * z for x, y, z in ((ux, uy, uz), (vx, vy, vz), (wx, wy, wz)))
+    theta4 = np.arctan2(s * vz - c * v_ahead, -v_aside)
+    theta5 = np.arctan2(u_down, w_down)
+    q = np.concatenate([arm.q, np.stack([theta4, theta5], axis=2)], axis=2)
+    return Branches(q, arm.real & (np.abs(v_down) <= MISFIT), arm.singular)
 
 
 def _arm(g: PumaGeometry, x: Vector, y: Vector, z: Vector) -> tuple[Numbers, NDArray[np.bool_]]:

@@ -49,6 +49,35 @@ def nearest_psi(
     return centre + np.copysign(np.clip(np.abs(away), low, high), away), exists
 
 
+def psi_within_rounding(
+    g: TitanGeometry, radius: Numbers, height: Numbers, x: Numbers, z: Numbers, room: Numbers
+) -> tuple[Numbers, Numbers, NDArray[np.bool_]]:
+    """A reachable psi for a gripper axis so nearly normal to the arm plane that rounding decides its psi, atan2(z, x).
+
+    Beside the azimuth axis the arm plane can be turned at hardly any cost to the wrist point: that moves x.
+
+    Args:
+        g: Lengths of the arm.
+        radius: Of the wrist point in the arm plane [m].
+        height: Above the shoulder axis [m].
+        x: Part of the gripper axis along the arm plane's horizontal, same shape.
+        z: Vertical part.
+        room: By how much x may change; z may by ``SINGULAR``.
+
+    Returns:
+        psi at an end of its intervals, the x that belongs to it, and whether both changes are allowed.
+    """
+    centre, low, high, exists = psi_interval(g, radius, height)
+    psi = centre + np.stack([low, -low, high, -high])
+    c, s = np.cos(psi), np.sin(psi)
+    weight = (SINGULAR / room) ** 2
+    length = np.maximum((weight * x * c + z * s) / (weight * c * c + s * s), 0.0)
+    cost = np.maximum(np.abs(length * c - x) / room, np.abs(length * s - z) / SINGULAR)
+    best = np.argmin(cost, axis=0)[None]
+    psi, moved, least = (np.take_along_axis(each, best, axis=0)[0] for each in (psi, length * c, cost))
+    return psi, moved, exists & (least <= 1.0)
+
+
 def nearest_azimuth(g: TitanGeometry, w: Matrix, height: Vector, wanted: Numbers) -> Numbers:
     """With the wrist point on the azimuth axis: the theta1 nearest to the wanted one that the arm can reach.
 

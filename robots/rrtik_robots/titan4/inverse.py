@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.ik.form import SINGULAR, Branches, ClosedFormSolver, two_links, wrapped
-from rrtik_robots.titan4.families import nearest_azimuth, nearest_psi
+from rrtik_robots.titan4.families import nearest_azimuth, nearest_psi, psi_within_rounding
 from rrtik_robots.titan4.geometry import TitanGeometry
 from rrtik_robots.titan4.singularities import nearness
 
@@ -25,6 +25,7 @@ BRANCHES = tuple(" ".join(tag) for tag in product(("front", "back"), ("near", "f
 ROUNDING = 3e-16  # [m] of the wrist point: divided by its distance from the azimuth axis, of theta1 and so of h
 NORMAL = 4e-10  # sine; largest deviation of the gripper axis from the arm plane's normal that counts as none
 UNSURE = 1e-3  # sine; nearer to normal, rounding in psi can open a triangle that closes
+MOST_ROOM = 0.5  # of the part of the gripper axis in the arm plane: how far rounding may move it at most
 SIGMA = np.array([1.0, -1.0])[:, None]  # the two ways of the wrist: theta5 and pi - theta5
 
 
@@ -133,7 +134,8 @@ def _representatives(
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Branches of singular poses: what is free takes the value nearest to that of ``near`` that the arm can reach.
 
-    Where psi is not free but poorly known, it moves into reach if that turns the gripper by no more than rounding.
+    Where psi is not free but poorly known, it moves into reach if that turns the gripper, or the wrist point about the
+    azimuth axis, by no more than rounding.
     """
     front = np.where(on_axis, near[:, 0], np.arctan2(target.p[1], target.p[0]))
     theta1 = np.broadcast_to((front + np.array([0.0, np.pi])[:, None])[:, None], (2, 2, len(near))).copy()
@@ -146,5 +148,18 @@ def _representatives(
     wanted = np.where(any_psi, near[:, 1:4].sum(axis=1) + np.array([0.0, np.pi])[:, None], psi)
     radius = target.p[0] * turn[0] + target.p[1] * turn[1]
     free, _ = nearest_psi(g, radius, target.p[2], wanted)
-    psi = np.where(any_psi | (np.abs(wrapped(free - psi)) * h < SINGULAR), free, psi)
-    return _completed(g, target, theta1, turn, np.cos(psi), np.sin(psi))
+    close = any_psi | (np.abs(wrapped(free - psi)) * h < SINGULAR)
+    room = np.clip(SINGULAR / np.maximum(np.hypot(*target.p[:2]), SINGULAR), SINGULAR, MOST_ROOM)
+    height = np.broadcast_to(target.p[2], x.shape)
+    other, moved, fits = psi_within_rounding(g, radius, height, SIGMA * x, SIGMA * target.w[2], room)
+    fits &= ~close & (h < UNSURE)
+    theta1 = np.where(fits, _turned_to(target, theta1, SIGMA * moved), theta1)
+    psi = np.where(close, free, np.where(fits, other, psi))
+    return _completed(g, target, theta1, np.stack([np.cos(theta1), np.sin(theta1)]), np.cos(psi), np.sin(psi))
+
+
+def _turned_to(target: Target, theta1: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The azimuth nearest to ``theta1`` at which the gripper axis has the part x along the arm plane."""
+    flat, heading = np.hypot(*target.w[:2]), np.arctan2(target.w[1], target.w[0])
+    away = np.arccos(np.clip(x / np.maximum(flat, SINGULAR), -1.0, 1.0))
+    return wrapped(heading + np.copysign(away, wrapped(theta1 - heading)))

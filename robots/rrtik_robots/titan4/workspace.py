@@ -7,17 +7,22 @@ and vehicle are **chosen** here, their sizes are the specification's defaults; e
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
+from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.ik.closed_form import solutions
+from rrtik_ompl.reach.grid_map import Slice
 from rrtik_ompl.robot import Robot
 
 PITCHES_DEG = tuple(range(-90, 91, 15))  # of the gripper in the arm plane, with a straight wrist
+CELL = 0.025  # [m]
+GRID = ((-1.4, 2.2), (-2.1, 2.2), (-1.7, 2.0))  # x, y, z in the base frame [m]
+FAR_AWAY = frozen([[98.0, 98.0, 98.0], [99.0, 99.0, 99.0]])  # a vehicle that is in nobody's way
 JOINTS_OF_POINTS = ("forearm", "wrist", "yaw_housing")  # links whose origins are elbow, wrist pitch and wrist yaw axis
 
 
@@ -69,6 +74,9 @@ CAMERAS = (
     Camera(np.array([0.1, 0.9, 0.6]), np.array([1.2, 0.0, 0.0])),
     Camera(np.array([0.1, -0.4, 0.6]), np.array([1.2, 0.0, 0.0])),
 )
+
+
+ALL_SEEING = Camera(np.array([-50.0, 0.0, 0.0]), np.zeros(3), diagonal_deg=170.0, farthest=1e3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,6 +147,36 @@ class EffectiveWorkspace:
         base = self._base()
         moved: Matrix = (points - base[:3, 3]) @ base[:3, :3]
         return moved
+
+
+def effective_slices(space: EffectiveWorkspace | None = None, *, cell: float = CELL) -> list[Slice]:
+    """Side and top view: 1 where the gripper reaches, 3 where it can be used (seen, clear, away from the limits).
+
+    Args:
+        space: Of a robot with its cameras and vehicle; the defaults with the envelope limits if None.
+        cell: Of the grid [m].
+    """
+    used = EffectiveWorkspace(load_robot("titan4", limits="envelope")) if space is None else space
+    reach = replace(used, cameras=[ALL_SEEING], vehicle=FAR_AWAY, margin=0.0)
+    x, y, z = (np.arange(low, high, cell) for low, high in GRID)
+    views = (
+        ("side, straight ahead", "z [m]", z, 2, reach.side_view(x, z), used.side_view(x, z)),
+        ("top, height of the shoulder", "y [m]", y, 1, reach.top_view(x, y), used.top_view(x, y)),
+    )
+    low, high = used.vehicle
+    return [
+        Slice(
+            title=f"{title}: {effective.sum() * cell**2:.2f} m2 of {reachable.sum() * cell**2:.2f} m2",
+            across="x [m]",
+            up=up,
+            x=x,
+            y=other,
+            values=np.where(effective, 3.0, np.where(reachable, 1.0, 0.0)),
+            boxes=((float(low[0]), float(low[k]), float(high[0]), float(high[k])),),
+            points=tuple((float(camera.position[0]), float(camera.position[k])) for camera in used.cameras),
+        )
+        for title, up, other, k, reachable, effective in views
+    ]
 
 
 def gripper_poses(points: ArrayLike, heading: ArrayLike, pitch: ArrayLike) -> NDArray[np.float64]:

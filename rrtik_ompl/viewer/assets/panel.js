@@ -1,5 +1,6 @@
 // The panel beside the picture: joints with units, list of moves, legend with switches.
 const MINUS = "\u2212";
+const FEW_GHOSTS = 8;  // up to here each has a switch of its own
 const FEW_MOVES = 12;  // up to here waypoints carry their numbers from the beginning
 
 function make(tag, properties = {}, ...children) {
@@ -153,6 +154,15 @@ function buildLegend() {
   if (robot) addSwitch("robot", colors.robot, 1, toggles("robot"));
   if (story.start_ghost) addSwitch("start (ghost)", colors.start, 0.6, toggles("start ghost"));
   if (story.goal_ghost) addSwitch("goal (ghost)", colors.goal, 0.6, toggles("goal ghost"));
+  if (story.ghosts.length <= FEW_GHOSTS) {
+    story.ghosts.forEach(({ name, color }) => addSwitch(name, color, 0.6, toggles(name)));
+  } else {
+    const names = story.ghosts.map(({ name }) => name);
+    addSwitch(count(names.length, "solution"), story.ghosts[0].color, 0.6, toggles(...names));
+  }
+  for (const { name, color, opacity, node: leaf, shown } of story.marks) {
+    addSwitch(name, color, opacity, (on) => setVisible(["marks", leaf], on), shown, "wide");
+  }
   if (story.goal && story.goal !== "joint values") addSwitch(`goal: ${story.goal}`, colors.goal, 1, toggles("goal"));
   if (story.moves.length) addSwitch("way of the tip", colors.trail, 1, toggles("trail", "beads"));
   if (story.before) addSwitch(`before: ${story.before}`, colors.before, 1, toggles("before"), true, "wide");

@@ -101,6 +101,7 @@ function addGhost(name, color, q) {
 setVisible(["ghost"], false);
 if (robot && story.start_ghost) addGhost("start ghost", story.colors.start, story.start_ghost);
 if (robot && story.goal_ghost) addGhost("goal ghost", story.colors.goal, story.goal_ghost);
+story.ghosts.forEach(({ name, color, q }) => addGhost(name, color, q));
 
 /** Show the piece of the trail that is being travelled in full colour, the others pale. */
 function highlightPiece(piece) {

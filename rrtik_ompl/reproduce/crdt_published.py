@@ -14,7 +14,7 @@ CRDT_TABLE = (
     (233.76, 395.06, 1461.48, 22.76),
 )
 # The final list of moves of the paper's SDU test, degrees as printed.
-SDU_LIST = [
+SDU_LIST: list[list[float]] = [
     [25, 19, -82, 60, 90, 0],
     [48.19, 19, -82, 60, 90, 0],
     [48.19, 19, -82, 60, 80, 0],
@@ -26,4 +26,9 @@ SDU_LIST = [
 ]
 
 # The route of the prism test, degrees as printed.
-PRISM_LIST = [[0, 0, 0, 0, 90, 0], [0, 0, 95.13, 0, 90, 0], [-30, 0, 95.13, 0, 90, 0], [-30, 0, 0, 0, 90, 0]]
+PRISM_LIST: list[list[float]] = [
+    [0, 0, 0, 0, 90, 0],
+    [0, 0, 95.13, 0, 90, 0],
+    [-30, 0, 95.13, 0, 90, 0],
+    [-30, 0, 0, 0, 90, 0],
+]

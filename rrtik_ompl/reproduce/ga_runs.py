@@ -6,13 +6,14 @@ import time
 from dataclasses import dataclass, replace
 
 import numpy as np
-from genetic_published import INCH, POINTS, TOLERANCE, curve
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.arrays import Vector
 from rrtik_ompl.ik.closed_form import solutions
 from rrtik_ompl.ik.form import wrapped
 from rrtik_ompl.ik.genetic.options import GeneticOptions
 from rrtik_ompl.ik.genetic.search import GeneticRun, follow_targets
+from rrtik_ompl.reproduce.ga_published import INCH, POINTS, TOLERANCE, curve
 from rrtik_ompl.robot import Robot
 
 TRAJECTORIES = (1, 2, 3, 4)
@@ -72,7 +73,8 @@ class Run:
     def errors(self) -> np.ndarray:
         """Distances of the stored points from their targets [in]."""
         tips = self.robot.fk_batch(self.result.q)[:, :3, 3] / INCH
-        return np.linalg.norm(tips - curve(self.trajectory)[: len(tips)], axis=1)
+        errors: Vector = np.linalg.norm(tips - curve(self.trajectory)[: len(tips)], axis=1)
+        return errors
 
     @property
     def off_branch(self) -> float:
@@ -83,12 +85,14 @@ class Run:
 
 
 def arm(joints: int, d7: float = 2.2) -> Robot:
+    """The arm of three joints, or that of five with a last segment of ``d7`` inches."""
     return (
         rrtik.load_robot("puma560_3dof") if joints == 3 else rrtik.load_robot("puma560_5dof", lengths={"d7": d7 * INCH})
     )
 
 
 def run(robot: Robot, trajectory: int, options: GeneticOptions, seed: int) -> Run:
+    """Once along a published trajectory, to the published limit of generations."""
     goals = [rrtik.PositionGoal(point, TOLERANCE * INCH) for point in curve(trajectory) * INCH]
     limit = 10_000 if robot.dof == 3 else 20_000
     begin = time.process_time()
@@ -102,8 +106,10 @@ def runs(robot: Robot, options: GeneticOptions, seeds: int) -> dict[int, list[Ru
 
 
 def mean(values: list[Run], what: str) -> float:
+    """Of a property of `Run`."""
     return float(np.mean([getattr(each, what) for each in values]))
 
 
 def median(values: list[Run], what: str) -> float:
+    """Of a property of `Run`."""
     return float(np.median([getattr(each, what) for each in values]))

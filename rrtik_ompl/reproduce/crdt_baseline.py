@@ -8,9 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from rrtik_ompl.arrays import Vector
+from rrtik_ompl.catalog import find_planner
+from rrtik_ompl.errors import require
+from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ompl_bridge.setup import Judge, problem_definition, space_information
 from rrtik_ompl.problem import Problem
-from rrtik_planners import CRDT
 
 STEP = 1.0  # of the RRT, and the tolerance at the goal for both
 SPACING = 0.2  # between two point tests
@@ -64,17 +67,22 @@ def rrt_run(problem: Problem, seed: int) -> TreeRun:
         if tests.motion_valid(near, new):
             vertices[size] = new
             size += 1
-            if np.linalg.norm(new - problem.goal.q) <= STEP:
+            if np.linalg.norm(new - _goal(problem)) <= STEP:
                 return TreeRun(iteration, size, tests.count, perf_counter() - begin, True)
     return TreeRun(CAP, size, tests.count, perf_counter() - begin, False)
+
+
+def _goal(problem: Problem) -> Vector:
+    require(problem.goal, JointGoal, "goal of the problem")
+    return problem.goal.q if isinstance(problem.goal, JointGoal) else problem.start
 
 
 def crdt_run(problem: Problem, seed: int) -> TreeRun:
     """Basic C-RDT as an OMPL planner, with the same goal tolerance and the same counting."""
     tests, begin = PointTests(problem.world), perf_counter()
-    goals = problem.goal.q[None]
+    goals = _goal(problem)[None]
     si = space_information(problem, goals, Judge(problem.world))
-    planner = CRDT(si, world=tests, seed=seed, goal_tolerance=STEP, max_iterations=CAP)
+    planner = find_planner("crdt")(si, world=tests, seed=seed, goal_tolerance=STEP, max_iterations=CAP)
     planner.setProblemDefinition(problem_definition(problem, goals, si))
     planner.setup()
     found = str(planner.solve(600.0)) == "Exact solution"

@@ -1,0 +1,162 @@
+"""A map of reach: a value for every cell of a grid, its slices, and its files."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from io import BytesIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.text_file import file_name, read_bytes, write_bytes, write_text
+
+FORMATS = (".npz", ".csv")
+LARGEST_FILE = 2**30  # bytes
+
+Grid = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReachMap:
+    """A value for every cell of a grid in the world.
+
+    Attributes:
+        robot: Name of the arm.
+        measure: What the values are: one of ``MEASURES``.
+        corner: Low corner of the first cell, shape (3,) [m].
+        size: Side of a cell [m].
+        values: Shape (x, y, z), 0 where no sample came.
+        samples: Postures that counted.
+        base: Where the arm stands, shape (3,) [m].
+    """
+
+    robot: str
+    measure: str
+    corner: Vector
+    size: float
+    values: Grid
+    samples: int
+    base: Vector
+
+    @property
+    def reached(self) -> NDArray[np.bool_]:
+        """Cells in which a sample came, shape (x, y, z)."""
+        inside: NDArray[np.bool_] = self.values > 0.0
+        return inside
+
+    @property
+    def volume(self) -> float:
+        """Of these cells [m3]."""
+        return float(np.count_nonzero(self.reached)) * self.size**3
+
+    @property
+    def best(self) -> Vector:
+        """Middle of the cell with the largest value, shape (3,) [m]."""
+        place = np.unravel_index(int(np.argmax(self.values)), self.values.shape)
+        middle: Vector = self.corner + self.size * (np.array(place) + 0.5)
+        return middle
+
+    def centres(self, axis: int) -> Vector:
+        """Middles of the cells along an axis, shape (n,) [m]."""
+        middles: Vector = self.corner[axis] + self.size * (np.arange(self.values.shape[axis]) + 0.5)
+        return middles
+
+    def value(self, points: Matrix) -> Vector:
+        """The values at points, shape (m, 3) [m]; 0 outside the grid. Shape (m,)."""
+        places = np.floor((finite_array(points, (None, 3), "points") - self.corner) / self.size).astype(int)
+        inside = ((places >= 0) & (places < self.values.shape)).all(axis=1)
+        found = np.zeros(len(places))
+        found[inside] = self.values[tuple(places[inside].T)]
+        return found
+
+    def slices(self) -> list[Slice]:
+        """Two cuts: upright through the base along x, and level at the height where most cells are reached.
+
+        The second alone if there is one layer of cells.
+        """
+        ahead = int(np.clip((self.base[1] - self.corner[1]) / self.size, 0, self.values.shape[1] - 1))
+        level = int(np.argmax(self.reached.sum(axis=(0, 1))))
+        height = self.centres(2)[level]
+        x, y, z = (self.centres(k) for k in range(3))
+        bx, by, bz = (float(value) for value in self.base)
+        side, top = self.values[:, ahead].T, self.values[:, :, level].T
+        cuts = [
+            Slice(f"side, y = {y[ahead]:.2f} m", "x [m]", "z [m]", x, z, side, base=(bx, bz)),
+            Slice(f"top, z = {height:.2f} m", "x [m]", "y [m]", x, y, top, base=(bx, by)),
+        ]
+        return cuts[1:] if len(z) == 1 else cuts
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write everything as .npz, or one row per reached cell (its middle and value) as .csv, whole or not at all.
+
+        Raises:
+            InputError: If the ending is another one or the file cannot be written.
+        """
+        ending = _ending(path)
+        if ending == ".csv":
+            places = np.argwhere(self.reached)
+            rows = np.column_stack([self.corner + self.size * (places + 0.5), self.values[self.reached]])
+            write_text(path, "\n".join([f"x,y,z,{self.measure}", *(",".join(f"{v:.6g}" for v in r) for r in rows), ""]))
+            return
+        data = BytesIO()
+        scalars = {name: getattr(self, name) for name in ("robot", "measure", "size", "samples")}
+        np.savez_compressed(data, corner=self.corner, values=self.values, base=self.base, **scalars)
+        write_bytes(path, data.getvalue())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Slice:
+    """A picture of values over a plane.
+
+    Attributes:
+        title: What is cut.
+        across, up: Labels of the axes.
+        x, y: Middles of the cells [m], shapes (n,) and (m,).
+        values: Shape (m, n).
+        boxes: Rectangles to draw: low x, low y, high x, high y.
+        points: Places to mark, each x, y.
+        base: Where the arm stands in this plane.
+    """
+
+    title: str
+    across: str
+    up: str
+    x: Vector
+    y: Vector
+    values: Grid
+    boxes: tuple[tuple[float, float, float, float], ...] = ()
+    points: tuple[tuple[float, float], ...] = ()
+    base: tuple[float, float] = (0.0, 0.0)
+
+
+def load_reach_map(path: str | os.PathLike[str]) -> ReachMap:
+    """Read a map that was saved as .npz.
+
+    Raises:
+        InputError: If the file cannot be used.
+    """
+    if _ending(path) != ".npz":
+        raise InputError(f"{path}: only .npz holds a whole map; a .csv cannot be read back")
+    try:
+        with np.load(BytesIO(read_bytes(path, LARGEST_FILE)), allow_pickle=False) as data:
+            return ReachMap(
+                robot=str(data["robot"]),
+                measure=str(data["measure"]),
+                corner=frozen(finite_array(data["corner"], (3,), "corner")),
+                size=float(data["size"]),
+                values=frozen(finite_array(data["values"], (None, None, None), "values")),
+                samples=int(data["samples"]),
+                base=frozen(finite_array(data["base"], (3,), "base")),
+            )
+    except (KeyError, ValueError, OSError, EOFError) as error:
+        raise InputError(f"{path}: is no map of reach: {error}; make one with `rrtik reach ... --out`") from error
+
+
+def _ending(path: str | os.PathLike[str]) -> str:
+    ending = file_name(path).suffix.lower()
+    if ending not in FORMATS:
+        raise InputError(f"{path}: unknown ending '{ending}' for a map of reach; use {', '.join(FORMATS)}")
+    return ending

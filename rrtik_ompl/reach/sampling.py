@@ -1,0 +1,131 @@
+"""Maps of reach by forward kinematics of random postures: in which cell the tip is, and which way it points.
+
+A map is a lower bound: more samples fill more of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.reach.grid_map import ReachMap
+from rrtik_ompl.reach.measures import MEASURES
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.world import World
+
+SAMPLES = 200_000
+BLOCK = 20_000  # postures at a time
+TURNS = 16  # of the first joint for each of them: the whole arm turns as one body, which needs no kinematics
+CELLS = 18  # of the grid across the farthest reach, if no size is given
+MOST_CELLS = 4_000_000
+PROBE = 4096  # postures that tell how large the grid must be
+BELOW = 1e-3  # of a cell: the layer of a planar arm ends so far above the arm, which is seen from above
+ROOM = 1.1  # how much larger than what the probe reached
+
+
+def reach_map(
+    robot: Robot,
+    *,
+    measure: str = "orientations",
+    cell: float | None = None,
+    samples: int = SAMPLES,
+    world: World | None = None,
+    axis: str | None = None,
+    seed: int = 0,
+) -> ReachMap:
+    """Map where an arm can bring its tip.
+
+    Args:
+        robot: The arm.
+        measure: ``orientations``: share of 64 evenly spread directions (planar arms: of the plane) in which the tip's
+            axis was seen to point; ``manipulability``: the largest sqrt(det(J J^T)) seen (Yoshikawa 1985);
+            ``samples``: how many came.
+        cell: Side of a cell [m]; about an 18th of the reach if None.
+        samples: Postures to draw; where nothing but the arm is looked at, each in 16 turns of the first joint.
+        world: If given, only postures that are free count. Its robot must be this one.
+        axis: Of the tip's frame, "x", "y" or "z": what points, for ``orientations``; z if None, of planar arms x.
+        seed: Of the random numbers.
+
+    Raises:
+        UnknownNameError: If there is no such measure.
+        InputError: If an argument makes no sense, or the grid would be too large.
+    """
+    if measure not in MEASURES:
+        raise UnknownNameError("measure of reach", measure, MEASURES)
+    axis = axis or ("x" if robot.planar else "z")
+    if axis not in ("x", "y", "z"):
+        raise InputError(f"axis must be x, y or z, got {axis!r}")
+    if samples < 1:
+        raise InputError(f"samples must be at least 1, got {samples}")
+    if world is not None and world.robot is not robot:
+        raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
+    rng = np.random.default_rng(seed)
+    base = robot.fk_batch(np.zeros((1, robot.dof)), robot.link_names[0])[0, :3, 3]
+    corner, size, shape = _grid(robot, base, cell)
+    counter = MEASURES[measure](int(np.prod(shape)), robot.planar)
+    counted = 0
+    low, high = robot.finite_range()
+    turn = _first_turn(robot) if world is None else None
+    for begin in range(0, samples, BLOCK):
+        Q = rng.uniform(low, high, (min(BLOCK, samples - begin), robot.dof))
+        if world is not None:
+            Q = Q[world.valid_batch(Q)]
+        tips, quality = robot.fk_batch(Q), counter.quality(robot, Q)
+        points, pointing = tips[:, :3, 3], tips[:, :3, "xyz".index(axis)]
+        for number in range(1 if turn is None else TURNS):
+            if turn is not None and number:
+                angles = rng.uniform(low[0], high[0], len(Q))
+                points, pointing = turn(points, pointing, angles - Q[:, 0])
+                Q[:, 0] = angles
+            places = np.floor((points - corner) / size).astype(int)
+            inside = ((places >= 0) & (places < shape)).all(axis=1)
+            cells = np.ravel_multi_index(tuple(places[inside].T), shape)
+            counter.add(cells, pointing[inside], quality[inside])
+            counted += len(cells)
+    return ReachMap(robot.name, measure, frozen(corner), size, frozen(counter.values.reshape(shape)), counted, base)
+
+
+def _first_turn(robot: Robot) -> Callable[[Matrix, Matrix, Vector], tuple[Matrix, Matrix]] | None:
+    """Turns points and directions, shapes (m, 3), about the first joint's axis by angles, shape (m,).
+
+    None if the first joint does not carry the whole arm by turning it.
+    """
+    chain = robot.chain
+    alone = np.count_nonzero(chain.gain[:, 0]) == 1 and chain.gain[0, 0] == 1.0
+    if robot.prismatic[0] or not alone or np.count_nonzero(chain.parent == -1) != 1:
+        return None
+    frame = robot.joint_frames(np.zeros((1, robot.dof)))[0, 1]
+    axis, origin = frame[:3, :3] @ chain.axis[0], frame[:3, 3]
+
+    def turn(points: Matrix, pointing: Matrix, angles: Vector) -> tuple[Matrix, Matrix]:
+        c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
+
+        def rotated(v: Matrix) -> Matrix:
+            moved: Matrix = c * v + s * np.cross(axis, v) + (1.0 - c) * (v @ axis)[:, None] * axis
+            return moved
+
+        return origin + rotated(points - origin), rotated(pointing)
+
+    return turn
+
+
+def _grid(robot: Robot, base: Vector, cell: float | None) -> tuple[Vector, float, tuple[int, int, int]]:
+    """Corner, cell size and numbers of cells of a grid that holds all tips; the base is on a cell's corner."""
+    rng = np.random.default_rng(0)
+    tips = robot.fk_batch(rng.uniform(*robot.finite_range(), (PROBE, robot.dof)))[:, :3, 3] - base
+    reach = ROOM * float(np.linalg.norm(tips, axis=1).max())
+    size = reach / CELLS if cell is None else float(finite_array(cell, (), "cell"))
+    if size <= 0.0:
+        raise InputError(f"cell must be greater than 0, got {size}")
+    margin = 0.5 * (ROOM - 1.0) * reach
+    low, high = (np.floor if k == 0 else np.ceil for k in (0, 1))
+    first, last = low((tips.min(axis=0) - margin) / size), high((tips.max(axis=0) + margin) / size)
+    if robot.planar:
+        first[2], last[2] = BELOW - 1.0, BELOW
+    shape = tuple(int(n) for n in np.maximum(last - first, 1.0))
+    if np.prod(shape, dtype=float) > MOST_CELLS:
+        raise InputError(f"cell of {size:g} m makes {np.prod(shape, dtype=float):.3g} cells; at most {MOST_CELLS}")
+    return base + size * first, size, (shape[0], shape[1], shape[2])

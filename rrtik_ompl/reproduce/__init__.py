@@ -1,0 +1,1 @@
+"""Published tables measured again: what was printed, what comes out here, and how the text was read."""

@@ -1,0 +1,33 @@
+"""All tables and figures with numbers, by name, and what is not among them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+
+from rrtik_ompl.errors import UnknownNameError
+from rrtik_ompl.reproduce import crdt, ga_reb, mb_rrt, postprocessing, sensing, titan4
+from rrtik_ompl.reproduce.rows import Table
+
+TABLES: Mapping[str, Table] = MappingProxyType(
+    {table.name: table for page in (titan4, mb_rrt, ga_reb, crdt, postprocessing, sensing) for table in page.TABLES}
+)
+NOT_HERE = (
+    "IKURT and DRRT-Con: published as figures without numbers; their methods are not in this version",
+    "Marker sensing, sections 4 and 5: the measured series need the camera; what follows from them is here",
+)
+
+
+def chosen(names: Iterable[str]) -> list[Table]:
+    """The tables of these names, in the order of the registry; ``mb-rrt`` stands for all whose name begins so.
+
+    Raises:
+        UnknownNameError: If a name fits none.
+    """
+    wanted: set[str] = set()
+    for name in names:
+        fits = [known for known in TABLES if known == name or known.startswith(f"{name}-")]
+        if not fits:
+            raise UnknownNameError("table", name, TABLES)
+        wanted.update(fits)
+    return [table for name, table in TABLES.items() if name in wanted]
