@@ -15,6 +15,7 @@ import typer
 
 from rrtik_ompl.errors import InputError, RrtikError
 from rrtik_ompl.fast import announce
+from rrtik_ompl.marker_commands import markers
 from rrtik_ompl.motion_commands import list_moves, time_path
 from rrtik_ompl.path_text import FORMATS as PATH_FORMATS
 from rrtik_ompl.terminal import drop_output, note, prepare_streams, progress, say, warn
@@ -217,6 +218,7 @@ def warmup() -> int:
 
 app.command("moves")(list_moves)
 app.command("time")(time_path)
+app.add_typer(markers, name="markers")
 
 
 def main() -> None:

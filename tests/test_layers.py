@@ -35,7 +35,19 @@ LADDER = [
     ),
     *("checks", "world", "path", "moves_text", "problem", "one_joint", "ik", "goal_configurations"),
     *("moveit_messages", "motion_bench_maker", "problem_file", "ompl_bridge", "planning", "shortening"),
-    *("trajectory", "plot", "plot_tree", "viewer", "report", "terminal", "motion_commands", "cli", "command"),
+    *(
+        "trajectory",
+        "plot",
+        "plot_tree",
+        "viewer",
+        "report",
+        "sensing",
+        "terminal",
+        "motion_commands",
+        "marker_commands",
+        "cli",
+        "command",
+    ),
 ]
 
 
