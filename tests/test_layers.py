@@ -42,6 +42,7 @@ LADDER = [
         "viewer",
         "report",
         "sensing",
+        "overlay",
         "terminal",
         "motion_commands",
         "marker_commands",
