@@ -46,6 +46,7 @@ LADDER = [
         "terminal",
         "motion_commands",
         "marker_commands",
+        "pilot",
         "cli",
         "command",
     ),
