@@ -81,7 +81,7 @@ def lamps(world: World, thing: MarkedObject, T_base_object: Any, near: Vector, *
 
 
 def _postures(robot: Robot, poses: NDArray[np.float64], near: Vector) -> tuple[NDArray[np.float64], list[str]]:
-    """For each pose the postures inside the limits, NaN where a branch has none, shape (m, b, dof); and why none has."""
+    """For each pose the postures inside the limits, NaN for the others, shape (m, b, dof); and why there is none."""
     if has_closed_form(robot) and form_of(robot).kind == "pose" and not tip_fault(robot, form_of(robot)):
         found = solutions(robot, poses, near=near, check=False)
         postures = np.where(found.valid[..., None], found.branches, np.nan)
@@ -103,11 +103,12 @@ def _free(postures: NDArray[np.float64], worlds: tuple[World, ...]) -> NDArray[n
 
 
 def _nearest(robot: Robot, postures: NDArray[np.float64], free: NDArray[np.bool_], near: Vector) -> NDArray[np.float64]:
-    """Of the free postures of each stage the one nearest to another, NaN where there is none. Shape (m, stages, dof)."""
+    """Of the free postures of each stage the nearest one, NaN where there is none. Shape (m, stages, dof)."""
     away = np.linalg.norm(joint_difference(robot, postures, near), axis=-1)
     best = np.argmin(np.where(free, away, np.inf), axis=2)
     chosen: NDArray[np.float64] = np.take_along_axis(postures, best[..., None, None], axis=2)[:, :, 0]
-    return np.where(free.any(axis=2)[..., None], chosen, np.nan)
+    some: NDArray[np.bool_] = np.asarray(free.any(axis=2))
+    return np.where(some[..., None], chosen, np.nan)
 
 
 def _color(reasons: list[str], clear: NDArray[np.bool_]) -> tuple[str, str]:
