@@ -16,6 +16,7 @@ import typer
 from rrtik_ompl.errors import InputError, RrtikError
 from rrtik_ompl.fast import announce
 from rrtik_ompl.ik_commands import inverse_kinematics
+from rrtik_ompl.marker_commands import markers
 from rrtik_ompl.motion_commands import list_moves, time_path
 from rrtik_ompl.path_text import FORMATS as PATH_FORMATS
 from rrtik_ompl.reach_commands import reach
@@ -229,6 +230,7 @@ app.command("reach")(reach)
 app.command("reproduce")(reproduce)
 app.command("moves")(list_moves)
 app.command("time")(time_path)
+app.add_typer(markers, name="markers")
 
 
 def main() -> None:

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.collision.solids import is_mesh, mesh_arrays
+from rrtik_ompl.collision.shape_of import shape_of
+from rrtik_ompl.collision.solids import is_mesh
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
 from rrtik_ompl.viewer.triangles import Faces, box_corners, capsule, extruded, split_creases, thin_out, tube
@@ -109,28 +110,10 @@ def look_of_coal(geometry: Any, limit: int = MAX_OBSTACLE_TRIANGLES) -> Look | N
         cone = mg.Cylinder(2.0 * geometry.halfLength, radiusTop=0.0, radiusBottom=geometry.radius)
         return _primitive(cone, _Y_TO_Z, half)
     try:
-        shape = _shape_of(geometry)
+        shape = shape_of(geometry)
         return None if shape is None else look_of_shape(shape, limit)
     except InputError:  # a link's mesh without area: nothing to see
         return None
-
-
-def _shape_of(geometry: Any) -> Shape | None:
-    if isinstance(geometry, coal.Box):
-        return Box(2.0 * geometry.halfSide)
-    if isinstance(geometry, coal.Sphere):
-        return Sphere(geometry.radius)
-    if isinstance(geometry, coal.Cylinder):
-        return Cylinder(geometry.radius, 2.0 * geometry.halfLength)
-    if isinstance(geometry, coal.Capsule):
-        return Capsule(geometry.radius, 2.0 * geometry.halfLength)
-    if is_mesh(geometry):
-        return Mesh(*mesh_arrays(geometry))
-    if isinstance(geometry, coal.Convex):
-        corners = np.array(geometry.points(), dtype=np.float64).reshape(-1, 3)
-        faces = [geometry.polygons(k) for k in range(geometry.num_polygons)]
-        return Mesh(corners, np.array([[f[0], f[1], f[2]] for f in faces], dtype=np.int64))
-    return None
 
 
 def _primitive(geometry: Any, placement: NDArray[np.float64], half: ArrayLike) -> Look:

@@ -1,0 +1,140 @@
+"""The commands `rrtik markers print | calibrate | sense`."""
+
+from __future__ import annotations
+
+import json
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.terminal import progress, say
+from rrtik_ompl.text_file import check_target
+
+markers = typer.Typer(help="Print markers, calibrate a camera, sense what it sees.", no_args_is_help=True)
+
+Dictionary = Annotated[str, typer.Option(help="4x4_50 sees farthest; aruco_mip_36h12 confuses least; apriltag_36h11.")]
+PICTURES, SCENES = (".png", ".jpg"), (".yaml", ".yml")
+
+
+class Kind(str, Enum):
+    """What can be printed."""
+
+    markers = "markers"
+    board = "board"
+
+
+@markers.command("print")
+def print_sheet(
+    out: Annotated[Path, typer.Argument(help="Where to: .pdf (true to size) or .png.")],
+    kind: Annotated[Kind, typer.Option(help="Single markers, or a ChArUco board for calibration.")] = Kind.markers,
+    ids: Annotated[str, typer.Option(help="Numbers: 0,1,7 or 0-5.")] = "0-3",
+    side: Annotated[float, typer.Option(help="Of a marker's black square; on a board, of a chess square [mm].")] = 80.0,
+    marker: Annotated[float | None, typer.Option(help="On a board: of its markers [mm]; 0.73 of a square.")] = None,
+    columns: Annotated[int, typer.Option(help="Chess squares of a board across.")] = 6,
+    rows: Annotated[int, typer.Option(help="Chess squares of a board down.")] = 8,
+    dictionary: Dictionary = "4x4_50",
+    paper: Annotated[str, typer.Option(help="a4, a3 or letter.")] = "a4",
+) -> int:
+    """Write sheets of markers or a calibration board at their true size."""
+    from rrtik_ompl.sensing import sheets
+
+    if kind is Kind.board:
+        small = 0.73 * side if marker is None else marker
+        square, inner = 1e-3 * side, 1e-3 * small
+        sheets.print_board(
+            out, columns=columns, rows=rows, square=square, marker=inner, dictionary=dictionary, paper=paper
+        )
+        count = 1
+    else:
+        count = sheets.print_markers(out, _numbers(ids), side=1e-3 * side, dictionary=dictionary, paper=paper)
+    say(f"wrote {out}: {count} sheet{'s' if count > 1 else ''}; print at 100 % and measure the rule")
+    return 0
+
+
+@markers.command("calibrate")
+def calibrate_camera(
+    photographs: Annotated[Path, typer.Argument(help="Folder of photographs of the board, or a video.")],
+    out: Annotated[Path, typer.Option(help="The camera file to write: .yaml.")],
+    columns: Annotated[int, typer.Option(help="Chess squares of the board across.")] = 6,
+    rows: Annotated[int, typer.Option(help="Chess squares of the board down.")] = 8,
+    square: Annotated[float, typer.Option(help="Side of a chess square as printed [mm].")] = 30.0,
+    marker: Annotated[float, typer.Option(help="Side of a marker as printed [mm].")] = 22.0,
+    dictionary: Dictionary = "4x4_50",
+) -> int:
+    """Find out a camera's intrinsics from photographs of a printed board."""
+    check_target(out, SCENES)
+    from rrtik_ompl.sensing.calibration import calibrate
+    from rrtik_ompl.sensing.camera_file import save_camera
+    from rrtik_ompl.sensing.markers import charuco_board
+    from rrtik_ompl.sensing.pictures import pictures_from
+
+    board = charuco_board(columns, rows, 1e-3 * square, 1e-3 * marker, dictionary)
+    with progress("looking for the board"):
+        taken = list(pictures_from(photographs))
+        found = calibrate([picture.pixels for picture in taken], board)
+    save_camera(found, out)
+    for picture, error, unused in zip(taken, found.view_errors, found.unused, strict=True):
+        say(f"{picture.name}: {unused or f'{error:.3f} px'}")
+    names = ("fx", "fy", "cx", "cy")
+    values = found.camera.matrix[[0, 1, 0, 1], [0, 1, 2, 2]]
+    say(", ".join(f"{n} {v:.2f} +- {s:.2f}" for n, v, s in zip(names, values, found.sigmas, strict=True)))
+    say(f"error {found.error:.3f} px over {sum(not r for r in found.unused)} photographs; wrote {out}")
+    return 0
+
+
+@markers.command("sense")
+def sense(
+    source: Annotated[str, typer.Argument(help="An image, a folder of images, a video, or a camera's number.")],
+    camera: Annotated[Path, typer.Option(help="Camera file (see: rrtik markers calibrate).")],
+    marker_map: Annotated[Path, typer.Option("--map", help="Which marker sits on which object: .yaml.")],
+    frames: Annotated[int, typer.Option(help="Look at so many pictures at most; a camera device: 1 unless given.")] = 0,
+    scene: Annotated[Path | None, typer.Option(help="Write the scene in the frame of the base: .yaml.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="Write the last picture with what was seen: .png, .jpg.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object a picture.")] = False,
+) -> int:
+    """Say where the marked objects are, from pictures."""
+    check_target(scene, SCENES)
+    check_target(picture, PICTURES)
+    from rrtik_ompl.sensing.camera_file import load_camera
+    from rrtik_ompl.sensing.marker_map_file import load_marker_map
+    from rrtik_ompl.sensing.sensor import Sensor
+
+    sensor = Sensor(load_camera(camera), load_marker_map(marker_map))
+    view = None
+    for view in _views(sensor, source, frames):
+        say(json.dumps(view.document())) if as_json else say(*view.lines())
+    if view is None or not view.seen:
+        raise InputError(sensor.why_nothing(source))
+    if picture is not None:
+        view.save_picture(picture)
+    if scene is not None:
+        from rrtik_ompl.scene_file import save_scene
+
+        save_scene(view.scene(), scene)
+    return 0
+
+
+def _views(sensor: Any, source: str, frames: int) -> Any:
+    from rrtik_ompl.sensing.pictures import pictures_from
+
+    most = frames or (1 if source.isdecimal() else None)
+    for count, picture in enumerate(pictures_from(source)):
+        if count == most:
+            return
+        yield sensor.view(picture)
+
+
+def _numbers(text: str) -> list[int]:
+    """``0-3,7`` as [0, 1, 2, 3, 7]."""
+    found: list[int] = []
+    for word in text.split(","):
+        first, dash, last = word.strip().partition("-")
+        if not first.isdecimal() or (dash and not last.isdecimal()):
+            raise InputError(f"--ids {text}: expected numbers like 0,1,7 or ranges like 0-5")
+        found.extend(range(int(first), int(last or first) + 1))
+        if len(found) > 1000:
+            raise InputError(f"--ids {text}: more than 1000 markers")
+    return found

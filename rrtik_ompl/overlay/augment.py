@@ -1,0 +1,178 @@
+"""Augmented pictures: arm, ghosts, obstacles, trail and frames over what a camera shows, hidden by what stands before.
+
+Source: shared-control tool, section 3 (video window); AR sensing, section 3 (virtualisation).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix, Vector, finite_array
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.overlay.canvas import NEAR, Canvas
+from rrtik_ompl.overlay.figure import Figure, figure_of, placed
+from rrtik_ompl.overlay.surfaces import ROBOT_TRIANGLES, obstacle_surfaces, robot_surfaces
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import Obstacle
+from rrtik_ompl.sensing.camera import Camera
+from rrtik_ompl.viewer import palette
+
+GHOST_TRIANGLES = 5_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ghost:
+    """The arm at another configuration, in one colour ('#rrggbb') and seen through."""
+
+    q: Vector
+    color: str = palette.GOAL
+    opacity: float = 0.35
+
+
+class Augmenter:
+    """Draws one arm over pictures of one camera."""
+
+    def __init__(self, robot: Robot, camera: Camera, triangles: int = ROBOT_TRIANGLES) -> None:
+        """Prepare the arm's triangles once.
+
+        Args:
+            robot: The arm.
+            camera: Who takes the pictures, or from where they are imagined.
+            triangles: Of the whole arm, at most about.
+        """
+        self.robot, self.camera = robot, camera
+        self._canvas = Canvas(camera)
+        self._arm = figure_of(robot_surfaces(robot, triangles))
+        self._ghost = figure_of(robot_surfaces(robot, min(triangles, GHOST_TRIANGLES)))
+
+    def draw(
+        self,
+        picture: NDArray[np.uint8],
+        T_base_camera: Any,
+        q: Vector | None = None,
+        *,
+        ghosts: Sequence[Ghost] = (),
+        obstacles: Sequence[Obstacle] = (),
+        real: Sequence[Obstacle] = (),
+        trail: Matrix | None = None,
+        frames: Sequence[Any] = (),
+        opacity: float = 0.85,
+        color: str | None = None,
+    ) -> NDArray[np.uint8]:
+        """A copy of a picture with everything drawn over it. Shape (height, width, 3), blue, green, red.
+
+        Args:
+            picture: Of the camera's size; grey or blue, green, red.
+            T_base_camera: Where the camera is, in the frame of the arm's base.
+            q: Configuration of the arm, shape (dof,); no arm if None.
+            ghosts: Further configurations.
+            obstacles: Virtual ones, drawn.
+            real: Solids that are in the picture already: they hide what is behind them.
+            trail: Points that are joined by a line, shape (k, 3) in the frame of the base [m].
+            frames: Poses in the frame of the base, drawn as axes.
+            opacity: Of arm and obstacles.
+            color: Of the arm ('#rrggbb') instead of its own.
+
+        Raises:
+            InputError: If the picture does not have the camera's size.
+        """
+        height, width = self.camera.height, self.camera.width
+        if picture.shape[:2] != (height, width):
+            raise InputError(f"picture has shape {picture.shape[:2]}, the camera's has {(height, width)}")
+        drawn: Any = np.array(picture if picture.ndim == 3 else cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR))
+        T_camera_base = T_base_camera.inverse().homogeneous
+        hidden_by = self._depths(real, T_camera_base)
+        for ghost in ghosts:
+            self._draw_arm(drawn, self._ghost, ghost.q, T_camera_base, hidden_by, ghost.opacity, ghost.color)
+        solids = figure_of(obstacle_surfaces(obstacles))
+        self._draw_arm(drawn, self._arm, q, T_camera_base, hidden_by, opacity, color, solids)
+        if trail is not None:
+            self._draw_line(drawn, trail, T_camera_base, palette.TRAIL)
+        for frame in frames:
+            self._draw_axes(drawn, frame, T_camera_base)
+        return np.asarray(drawn, dtype=np.uint8)
+
+    def depths(self) -> NDArray[np.float32]:
+        """Depths of the arm and obstacles drawn last, `canvas.FAR` where there was nothing. Shape (height, width)."""
+        return self._canvas.depths.copy()
+
+    def _draw_arm(
+        self,
+        drawn: Any,
+        arm: Figure,
+        q: Vector | None,
+        T_camera_base: NDArray[np.float64],
+        hidden_by: NDArray[np.float32] | None,
+        opacity: float,
+        color: str | None,
+        solids: Figure | None = None,
+    ) -> None:
+        self._canvas.clear()
+        if q is not None:
+            shown = placed(arm, T_camera_base @ self._joint_frames(q))
+            self._canvas.draw(shown, both_sides=False)
+        if solids is not None:
+            self._canvas.draw(placed(solids, T_camera_base[None]))
+        mask = self._canvas.drawn if hidden_by is None else self._canvas.drawn & (self._canvas.depths < hidden_by)
+        tint = None if color is None else np.array(palette.fractions(color), dtype=np.float32)
+        _blend(drawn, self._canvas.colors, mask, opacity, tint)
+
+    def _joint_frames(self, q: Vector) -> NDArray[np.float64]:
+        """``T_base_joint`` of all joints at a configuration. Shape (joints + 1, 4, 4)."""
+        return np.asarray(self.robot.joint_frames(self.robot.configuration(q)[None])[0])
+
+    def _depths(self, real: Sequence[Obstacle], T_camera_base: NDArray[np.float64]) -> NDArray[np.float32] | None:
+        if not real:
+            return None
+        self._canvas.clear()
+        self._canvas.draw(placed(figure_of(obstacle_surfaces(real)), T_camera_base[None]))
+        return self._canvas.depths.copy()
+
+    def _pixels(self, points: Matrix, T_camera_base: NDArray[np.float64]) -> tuple[NDArray[np.int64], Any]:
+        """Sixteenths of pixels of points in the base's frame, and which of them are before the camera."""
+        seen = np.asarray(points, dtype=np.float64) @ T_camera_base[:3, :3].T + T_camera_base[:3, 3]
+        before = seen[:, 2] > NEAR
+        pixels = np.zeros((len(seen), 2))
+        if before.any():
+            pixels[before] = self.camera.project(seen[before])
+        return np.clip(np.rint(16.0 * pixels), -(2**20), 2**20).astype(np.int64), before
+
+    def _draw_line(self, drawn: Any, points: Matrix, T_camera_base: NDArray[np.float64], color: str) -> None:
+        pixels, before = self._pixels(finite_array(points, (None, 3), "trail"), T_camera_base)
+        runs = np.split(np.arange(len(pixels)), np.flatnonzero(np.diff(before.astype(int))) + 1)
+        for run in runs:
+            if len(run) > 1 and before[run[0]]:
+                line = pixels[run].astype(np.int32)[:, None]
+                cv2.polylines(drawn, [line], False, _bgr(color), 2, cv2.LINE_AA, 4)
+
+    def _draw_axes(self, drawn: Any, pose: Any, T_camera_base: NDArray[np.float64], length: float = 0.1) -> None:
+        for axis, color in enumerate(palette.AXES):
+            tip = pose.translation + length * pose.rotation[:, axis]
+            self._draw_line(drawn, np.stack([pose.translation, tip]), T_camera_base, color)
+
+
+def _blend(
+    drawn: NDArray[np.uint8], colors: NDArray[np.float32], mask: Any, opacity: float, tint: NDArray[np.float32] | None
+) -> None:
+    """Lay red, green, blue colours over a blue, green, red picture where the mask is, in place."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if len(rows) == 0:
+        return
+    box = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    piece = colors[box]
+    if tint is not None:
+        piece = (0.35 + 0.65 * piece.max(axis=2, keepdims=True)) * tint
+    over = cv2.convertScaleAbs(np.ascontiguousarray(piece[..., ::-1]), alpha=255.0)
+    mixed = cv2.addWeighted(np.ascontiguousarray(drawn[box]), 1.0 - opacity, over, opacity, 0.0)
+    np.copyto(drawn[box], mixed, where=mask[box][..., None])
+
+
+def _bgr(color: str) -> tuple[int, int, int]:
+    red, green, blue = (round(255 * part) for part in palette.fractions(color))
+    return blue, green, red

@@ -1,0 +1,88 @@
+"""The arm behind the tool: read its joints, move one of them. A simulated one, and what others have to offer."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import Vector, finite_array
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.robot import Robot
+
+USUAL_RATE = np.deg2rad(10.0)  # [rad/s]; of an arm that does not say how fast its joints are
+SLIDING_RATE = 0.02  # [m/s]
+
+
+class Arm(Protocol):
+    """What the tool needs to know of an arm."""
+
+    def read(self) -> Vector:
+        """Where the joints are. Shape (dof,), rad or m."""
+
+    def move(self, joint: int, target: float) -> None:
+        """Send one joint to a value [rad or m]; all others stand still. A new move takes the place of the last."""
+
+    def stop(self) -> None:
+        """Stand still at once."""
+
+
+def joint_rates(robot: Robot, rates: ArrayLike | None = None) -> Vector:
+    """How fast each joint goes when it is driven, shape (dof,) [rad/s or m/s]: given, or usual ones below its limit.
+
+    Raises:
+        InputError: If a rate is not positive.
+    """
+    if rates is None:
+        usual = np.where(robot.prismatic, SLIDING_RATE, USUAL_RATE)
+        return np.minimum(usual, robot.velocity)
+    given = finite_array(rates, (robot.dof,), "rates")
+    if (given <= 0.0).any():
+        raise InputError(f"rates must be positive, got {given.tolist()}")
+    return given
+
+
+class SimulatedArm:
+    """An arm that does what it is told, at its rates, and is never wrong about where it is."""
+
+    def __init__(self, robot: Robot, start: ArrayLike, rates: ArrayLike | None = None) -> None:
+        """Stand at a configuration.
+
+        Raises:
+            InputError: If the configuration does not fit the robot.
+        """
+        self.robot = robot
+        self._q = robot.configuration(start, "start")
+        self._rates = joint_rates(robot, rates)
+        self._goal: tuple[int, float] | None = None
+
+    def read(self) -> Vector:
+        """Where the joints are. Shape (dof,), rad or m."""
+        return self._q.copy()
+
+    @property
+    def moving(self) -> int | None:
+        """The joint that moves, None if it stands still."""
+        return None if self._goal is None else self._goal[0]
+
+    def move(self, joint: int, target: float) -> None:
+        """Send one joint to a value [rad or m], inside its limits."""
+        low, high = float(self.robot.lower[joint]), float(self.robot.upper[joint])
+        self._goal = (joint, min(max(target, low), high))
+
+    def stop(self) -> None:
+        """Stand still at once."""
+        self._goal = None
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass."""
+        if self._goal is None:
+            return
+        joint, target = self._goal
+        step = self._rates[joint] * seconds
+        away = target - self._q[joint]
+        if abs(away) <= step:
+            self._q[joint], self._goal = target, None
+        else:
+            self._q[joint] += np.sign(away) * step

@@ -1,0 +1,107 @@
+"""Assisted manoeuvre: what a move of one joint would do, before it is made. Preventive: what must not be is refused.
+
+Source: shared-control tool, section 2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrtik_ompl.arrays import Vector
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.ik.singularity import singularity_report
+from rrtik_ompl.world import World
+
+NEAR_SINGULAR = 0.05  # sines of the angles that vanish in a singular posture, metres of a lever
+LITTLE_ROOM = 0.02  # [m]
+LOOKS = 5  # along the move, for the clearance
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Verdict:
+    """What is to be said about a move.
+
+    Attributes:
+        allowed: Whether it may be made.
+        reason: Why not: the limit, or the pair that would touch and where; "" if it may.
+        warnings: What to look out for.
+        clearance: The least distance to anything along the way, at a few looks [m]; -inf if it collides.
+    """
+
+    allowed: bool
+    reason: str
+    warnings: tuple[str, ...]
+    clearance: float
+
+
+def judge_move(world: World, q: Vector, joint: int, target: float) -> Verdict:
+    """Judge a move of one joint.
+
+    Args:
+        world: Robot and surroundings.
+        q: Where the arm is, shape (dof,).
+        joint: Number of the joint.
+        target: Where it is to go [rad or m].
+
+    Raises:
+        InputError: If there is no such joint or the target is not finite.
+    """
+    robot = world.robot
+    if not 0 <= joint < robot.dof:
+        raise InputError(f"joint must be a number from 0 to {robot.dof - 1}, got {joint}")
+    if not np.isfinite(target):
+        raise InputError(f"target of {robot.joint_names[joint]} must be a finite number, got {target}")
+    start, end = robot.configuration(q), robot.configuration(q).copy()
+    end[joint] = target
+    fault = robot.limit_fault(end)
+    if fault:
+        return Verdict(False, fault, (), -np.inf)
+    end = robot.clamp(end)
+    if not world.motion_valid(start, end):
+        return Verdict(False, _obstruction(world, start, end, joint), (), -np.inf)
+    share = np.linspace(0.0, 1.0, LOOKS)[:, None]
+    looks = start + share * (end - start)
+    rooms = [world.closest(row) for row in looks]
+    tight = min((c for c in rooms if c is not None), key=lambda c: c.distance, default=None)
+    room = np.inf if tight is None else tight.distance
+    warnings = [*_singular(world, end)]
+    if tight is not None and room < LITTLE_ROOM:
+        warnings.append(f"only {1e3 * max(room, 0.0):.0f} mm between {tight.first} and {tight.second}")
+    return Verdict(True, "", tuple(warnings), float(room))
+
+
+def free_until(world: World, q: Vector, joint: int, target: float) -> float:
+    """How far towards a target a joint can go without touching anything or leaving its limits [rad or m].
+
+    By bisection of the way; the arm must be free where it is.
+    """
+    robot, start = world.robot, world.robot.configuration(q)
+    end = start.copy()
+    end[joint] = min(max(target, float(robot.lower[joint])), float(robot.upper[joint]))
+    if world.motion_valid(start, end):
+        return float(end[joint])
+    low, high = 0.0, 1.0
+    for _ in range(12):
+        middle = 0.5 * (low + high)
+        if world.motion_valid(start, start + middle * (end - start)):
+            low = middle
+        else:
+            high = middle
+    return float(start[joint] + low * (end[joint] - start[joint]))
+
+
+def _obstruction(world: World, start: Vector, end: Vector, joint: int) -> str:
+    """Which pair touches first along a move that is not free, and at which value of the joint."""
+    rows = start + np.linspace(0.0, 1.0, world.steps(start, end) + 1)[:, None] * (end - start)
+    stuck = np.flatnonzero(~world.valid_batch(rows))
+    first = rows[stuck[0]] if len(stuck) else end
+    value, unit = (first[joint], "m") if world.robot.prismatic[joint] else (np.rad2deg(first[joint]), "deg")
+    why = world.explain(first) or "too close to tell"
+    return f"{world.robot.joint_names[joint]} at {value:.3g} {unit}: {why}"
+
+
+def _singular(world: World, q: Vector) -> list[str]:
+    report = singularity_report(world.robot, q)
+    return [f"near the singular posture '{case}'" for case, near in report.nearness.items() if near < NEAR_SINGULAR]

@@ -1,0 +1,62 @@
+"""A session as lines of JSON: what the camera saw, what the pilot did, where the arm was. Written as it happens."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from rrtik_ompl.errors import InputError
+
+
+class Record:
+    """A file that grows line by line; whatever ends the session, the lines before it are there."""
+
+    def __init__(self, path: str | os.PathLike[str] | None) -> None:
+        """Begin a record; None keeps none.
+
+        Raises:
+            InputError: If the file cannot be written.
+        """
+        self._file = None
+        if path is not None:
+            try:
+                self._file = open(path, "w", encoding="utf-8", buffering=1)  # noqa: SIM115 - open as long as the session
+            except OSError as error:
+                raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+    def write(self, kind: str, time: float, **values: Any) -> None:
+        """Add a line."""
+        if self._file is not None:
+            self._file.write(json.dumps({"time": round(time, 6), "kind": kind, **values}) + "\n")
+
+    def close(self) -> None:
+        """End the record."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+
+def read_record(path: str | os.PathLike[str]) -> Iterator[dict[str, Any]]:
+    """The lines of a record, in their order; a last line that was cut off is left out.
+
+    Raises:
+        InputError: If the file cannot be read, or a line is none of a record.
+    """
+    try:
+        lines = Path(path).read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not text"
+        raise InputError(f"{path}: {reason.lower()}; give a record of rrtik pilot") from None
+    for number, line in enumerate(lines, start=1):
+        try:
+            entry = json.loads(line)
+        except json.JSONDecodeError:
+            if number == len(lines):
+                return
+            raise InputError(f"{path}:{number}: is no line of a record of rrtik pilot") from None
+        if not isinstance(entry, dict) or not {"time", "kind"} <= entry.keys():
+            raise InputError(f"{path}:{number}: a line of a record needs 'time' and 'kind'")
+        yield entry

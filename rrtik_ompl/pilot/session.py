@@ -1,0 +1,295 @@
+"""The tool without its page: what the camera and the pilot say goes in, what is to be shown comes out.
+
+Source: shared-control tool, section 4 (flow chart). Two ways: assisted manoeuvre moves one joint at a time and refuses
+what must not be; assisted teleoperation chooses a grasp, plans a route, and leads through its moves.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.arrays import Vector, frozen
+from rrtik_ompl.errors import InputError, RrtikError, UnknownNameError
+from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.pilot.arm import Arm, joint_rates
+from rrtik_ompl.pilot.follower import Follower, Progress, still_free
+from rrtik_ompl.pilot.lamps import Lamp, lamps, stage_poses
+from rrtik_ompl.pilot.manoeuvre import Verdict, free_until, judge_move
+from rrtik_ompl.pilot.record import Record
+from rrtik_ompl.pilot.route import Route, route_to, route_to_grasp
+from rrtik_ompl.pilot.surroundings import Surroundings
+from rrtik_ompl.poses import quaternion_xyzw
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.sensing.scene_from_view import SeenObject
+
+MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING = "manoeuvre", "choosing", "proposed", "following"
+NUMBERS = ("joint", "target", "change", "level")  # arguments of commands; all others are words
+STALE = 0.5  # [s]; a picture older than that is not what is there now
+
+
+class Session:
+    """One pilot, one arm, one scene."""
+
+    def __init__(
+        self, problem: Problem, arm: Arm, *, rates: Any = None, record: Record | None = None, seed: int = 0
+    ) -> None:
+        """Begin in manoeuvre.
+
+        Args:
+            problem: Robot and what stands around it; its goal serves `plan` where no object was chosen.
+            arm: What is moved.
+            rates: Of the joints, shape (dof,) [rad/s or m/s]; usual ones if None.
+            record: Where everything is written down.
+            seed: Of the random numbers: the same commands give the same routes.
+        """
+        self.problem, self.robot, self.arm, self.seed = problem, problem.robot, arm, seed
+        self.rates: Vector = joint_rates(self.robot, rates)
+        self.surroundings = Surroundings(problem.world)
+        self.mode, self.selected = MANOEUVRE, 0
+        self.target: str | None = None
+        self.choice: tuple[str, int] | None = None
+        self.route: Route | None = None
+        self.follower: Follower | None = None
+        self.progress: Progress | None = None
+        self.verdict: Verdict | None = None
+        self.message = ""
+        self.q: Vector = frozen(arm.read())
+        self.desired: Vector = self.q
+        self.time = 0.0
+        self.picture_time = -np.inf
+        self._record = record or Record(None)
+        self._lamps: tuple[tuple[Any, ...], tuple[Lamp, ...]] = ((), ())
+        self._commands: dict[str, Callable[..., str]] = {
+            "select": self._select, "move": self._move, "nudge": self._nudge, "stop": self._stop,
+            "object": self._object, "grasp": self._grasp, "plan": self._plan, "accept": self._accept,
+            "reject": self._reject, "next": self._next, "back": self._back, "replan": self._replan,
+        }  # fmt: skip
+
+    # --- what comes in -------------------------------------------------------------------------------------------
+
+    def see(self, objects: Sequence[SeenObject], time: float) -> None:
+        """Take in what a picture shows."""
+        self.time, self.picture_time = max(self.time, time), time
+        if self.surroundings.see(objects):
+            self._record.write("seen", time, objects=[_placed(each) for each in self.surroundings.seen])
+            if self.target is None:
+                targets = [o.object.name for o in objects if o.object.role == "target" and o.object.grasps]
+                self.target = targets[0] if targets else None
+            self._check_route()
+
+    def tick(self, time: float) -> None:
+        """Read the arm and see how far it is on its way."""
+        self.time = max(self.time, time)
+        q = frozen(self.arm.read())
+        if not np.array_equal(q, self.q):
+            self._record.write("joints", time, q=q.tolist())
+        self.q = q
+        if self.follower is None or self.mode != FOLLOWING:
+            return
+        self.progress = self.follower.update(q)
+        if self.progress.advice == "lost":
+            self.arm.stop()
+            self.message = f"off the route: {self.progress.fault}; 'replan' finds a new one from here"
+        elif self.progress.advice == "done":
+            self.mode, self.message = MANOEUVRE, "all moves are done"
+
+    def command(self, verb: str, time: float, **arguments: Any) -> str:
+        """Do what the pilot wants; the answer is a line for a person, and `message` from then on.
+
+        A command that makes no sense here says so and changes nothing.
+        """
+        self.time = max(self.time, time)
+        self._record.write("command", time, name=verb, arguments=arguments)
+        try:
+            if verb not in self._commands:
+                raise UnknownNameError("command", verb, self._commands)
+            act = self._commands[verb]
+            self.message = act(**_fitting(act, verb, arguments))
+        except RrtikError as error:
+            self.message = str(error)
+        self._record.write("answer", time, text=self.message, mode=self.mode)
+        return self.message
+
+    # --- what goes out -------------------------------------------------------------------------------------------
+
+    def lamps(self) -> tuple[Lamp, ...]:
+        """Lamps of the chosen object where it is and for where the arm is; worked out anew only when that changed."""
+        seen = None if self.target is None else self.surroundings.named(self.target)
+        if seen is None:
+            return ()
+        key = (self.target, self.surroundings.version)
+        if key != self._lamps[0]:
+            holding = self.surroundings.holding(seen.object.name)
+            found = lamps(self.surroundings.world, seen.object, seen.T_base_object, self.q, holding=holding)
+            self._lamps = (key, found)
+        return self._lamps[1]
+
+    def lamp(self) -> Lamp | None:
+        """The lamp of the grasp that is chosen."""
+        return next((lamp for lamp in self.lamps() if (lamp.type, lamp.level) == self.choice), None)
+
+    # --- commands ------------------------------------------------------------------------------------------------
+
+    def _select(self, joint: int) -> str:
+        if not 0 <= int(joint) < self.robot.dof:
+            raise InputError(f"joint must be 1 to {self.robot.dof}, got {int(joint) + 1}")
+        self.selected = int(joint)
+        return f"{self.robot.joint_names[self.selected]} selected"
+
+    def _move(self, target: float) -> str:
+        if self.mode == FOLLOWING:
+            raise InputError("a route is being followed: 'next' makes its next move, 'stop' leaves it")
+        return self._send(self.selected, float(target))
+
+    def _nudge(self, change: float) -> str:
+        return self._move(self.q[self.selected] + float(change))
+
+    def _send(self, joint: int, target: float) -> str:
+        self.verdict = judge_move(self.surroundings.world, self.q, joint, target)
+        if not self.verdict.allowed:
+            room = free_until(self.surroundings.world, self.q, joint, target)
+            factor, unit = (1.0, "m") if self.robot.prismatic[joint] else (float(np.rad2deg(1.0)), "deg")
+            return f"refused: {self.verdict.reason}; free until {factor * room:.4g} {unit}"
+        desired = self.q.copy()
+        desired[joint] = target
+        self.desired = frozen(desired)
+        self.arm.move(joint, target)
+        return "; ".join(("moving " + self.robot.joint_names[joint], *self.verdict.warnings))
+
+    def _stop(self) -> str:
+        self.arm.stop()
+        self.desired = self.q
+        if self.mode == FOLLOWING:
+            self.mode = PROPOSED
+            return "stopped; 'accept' goes on with the route, 'reject' leaves it"
+        return "stopped"
+
+    def _object(self, name: str) -> str:
+        seen = self.surroundings.named(name)
+        if seen is None:
+            raise UnknownNameError("object in view", name, [o.object.name for o in self.surroundings.seen])
+        self.target, self.choice, self.mode = name, None, CHOOSING
+        return f"{name} chosen; now a grasp"
+
+    def _grasp(self, type: str, level: int) -> str:
+        if self.target is None:
+            raise InputError("no object is chosen; choose one that is in view")
+        seen = self.surroundings.named(self.target)
+        if seen is None:
+            raise InputError(f"{self.target} was not seen yet")
+        count = len(seen.object.grasp(type).levels)
+        if not 0 <= int(level) < count:
+            raise InputError(f"level must be 1 to {count}, got {int(level) + 1}")
+        self.choice, self.mode = (type, int(level)), CHOOSING
+        lamp = self.lamp()
+        return f"{type} at level {int(level) + 1}: " + ("" if lamp is None else lamp.reason or "can be reached")
+
+    def _plan(self) -> str:
+        self.arm.stop()
+        self.q = frozen(self.arm.read())
+        found = self._route()
+        if isinstance(found, str):
+            self.route = self.follower = self.progress = None
+            self.mode = CHOOSING if self.choice else MANOEUVRE
+            return f"no route: {found}" + ("; choose another grasp" if self.choice else "")
+        self.route, self.mode = found, PROPOSED
+        self.follower, self.progress = Follower(found.path, self.rates), None
+        self.desired = frozen(found.path.end)
+        moves = len(found.path.moves())
+        return (
+            f"{moves} moves, {found.seconds:.0f} s, at least {1e3 * found.clearance:.0f} mm away; 'accept' or 'reject'"
+        )
+
+    def _route(self) -> Route | str:
+        seen = None if self.target is None or self.choice is None else self.surroundings.named(self.target)
+        if seen is None or self.choice is None:
+            goal = self.problem.goal
+            if not isinstance(goal, JointGoal):
+                return "choose an object and a grasp first"
+            return route_to(self.surroundings.world, self.q, np.array(goal.q), self.rates, self.seed)
+        stages = stage_poses(seen.T_base_object, seen.object.grasp(self.choice[0]), self.choice[1])
+        lamp = self.lamp()
+        near = self.q if lamp is None or np.isnan(lamp.q[0]).any() else lamp.q[0]
+        holding = self.surroundings.holding(seen.object.name)
+        return route_to_grasp(self.surroundings.world, holding, self.q, stages, near, self.rates, self.seed)
+
+    def _accept(self) -> str:
+        if self.route is None or self.follower is None or self.mode != PROPOSED:
+            raise InputError("there is no route to accept; 'plan' proposes one")
+        progress = self.follower.update(self.q)
+        if progress.advice == "lost":
+            raise InputError(f"the arm is not where the route starts: {progress.fault}; 'replan' starts it from here")
+        self.mode, self.progress = FOLLOWING, progress
+        return "accepted; 'next' makes the next move"
+
+    def _reject(self) -> str:
+        self.route = self.follower = self.progress = None
+        self.mode, self.desired = (CHOOSING if self.choice else MANOEUVRE), self.q
+        return "rejected"
+
+    def _next(self) -> str:
+        if self.follower is None or self.mode != FOLLOWING:
+            raise InputError("no route is being followed; 'plan' and 'accept' one first")
+        self.progress = self.follower.update(self.q)
+        joint = self.follower.joint()
+        if self.progress.advice == "lost" or joint is None:
+            raise InputError(self.progress.fault or "all moves are done")
+        fault = self._fault_of_rest()
+        if fault:
+            raise InputError(f"the route is blocked now: {fault}; 'replan' looks for another")
+        self.desired = frozen(self.follower.target)
+        self.arm.move(joint, float(self.desired[joint]))
+        move = self.follower.moves[self.follower.current]
+        return f"move {self.follower.current + 1} of {len(self.follower.moves)}: {move.joint}"
+
+    def _back(self) -> str:
+        if self.follower is None:
+            raise InputError("there is no route to go back on")
+        self.arm.stop()
+        way = self.follower.back(self.q)
+        self.follower, self.mode = Follower(way, self.rates), PROPOSED
+        self.progress = None
+        return f"the way back: {len(way.moves())} moves; 'accept' or 'reject'"
+
+    def _replan(self) -> str:
+        return self._plan()
+
+    def _check_route(self) -> None:
+        """The scene is another one: is the route that is followed, or proposed, still free?"""
+        if self.follower is None or self.mode not in (FOLLOWING, PROPOSED):
+            return
+        fault = self._fault_of_rest()
+        if fault:
+            self.arm.stop()
+            self.message = f"the route is blocked now: {fault}; 'replan' looks for another"
+
+    def _fault_of_rest(self) -> str:
+        if self.follower is None:
+            return ""
+        grasped = self.target is not None and self.choice is not None
+        world = self.surroundings.holding(str(self.target)) if grasped else self.surroundings.world
+        return still_free(world, self.follower.rest(self.q))
+
+
+def _fitting(command: Callable[..., str], name: str, arguments: dict[str, Any]) -> dict[str, Any]:
+    """The arguments, if they are those that a command takes."""
+    wanted = tuple(inspect.signature(command).parameters)
+    if set(arguments) != set(wanted):
+        raise InputError(f"{name} takes {', '.join(wanted) or 'no arguments'}, got {', '.join(arguments) or 'none'}")
+    for word, value in arguments.items():
+        if word in NUMBERS and (
+            isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value)
+        ):
+            raise InputError(f"{name}: {word} must be a finite number, got {value!r}")
+        if word not in NUMBERS and not isinstance(value, str):
+            raise InputError(f"{name}: {word} must be a word, got {value!r}")
+    return arguments
+
+
+def _placed(each: SeenObject) -> dict[str, Any]:
+    pose = each.T_base_object
+    return {"name": each.object.name, "xyz": pose.translation.tolist(), "quat_xyzw": quaternion_xyzw(pose).tolist()}

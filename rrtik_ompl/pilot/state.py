@@ -1,0 +1,86 @@
+"""Everything that the page shows beside its pictures, as plain values; angles in degrees, for a person reads them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.moves_text import reading, spoken_moves
+from rrtik_ompl.pilot.session import STALE, Session
+
+
+def state_document(session: Session) -> dict[str, Any]:
+    """What there is to be shown; see `pilot/page` for who shows it."""
+    age = session.time - session.picture_time
+    return {
+        "mode": session.mode,
+        "message": session.message,
+        "picture_age": None if not np.isfinite(age) else round(age, 3),
+        "stale": bool(age > STALE),
+        "selected": session.selected,
+        "joints": _joints(session),
+        "objects": [_object(session, seen) for seen in session.surroundings.seen],
+        "target": session.target,
+        "choice": None if session.choice is None else {"type": session.choice[0], "level": session.choice[1]},
+        "lamps": [
+            {"type": la.type, "level": la.level, "color": la.color, "reason": la.reason} for la in session.lamps()
+        ],
+        "route": _route(session),
+        "tip": _tip(session),
+    }
+
+
+def _joints(session: Session) -> list[dict[str, Any]]:
+    robot, found = session.robot, []
+    for k, name in enumerate(robot.joint_names):
+        unit = "m" if robot.prismatic[k] else "rad"
+        value, shown = reading(float(session.q[k]), unit)
+        low, high = float(robot.lower[k]), float(robot.upper[k])
+        endless = not np.isfinite(low) or not np.isfinite(high)
+        found.append({
+            "name": name, "value": value, "desired": reading(float(session.desired[k]), unit)[0], "unit": shown,
+            "lower": None if endless else reading(low, unit)[0], "upper": None if endless else reading(high, unit)[0],
+            "share": None if endless else float(np.clip((session.q[k] - low) / (high - low), 0.0, 1.0)),
+        })  # fmt: skip
+    return found
+
+
+def _object(session: Session, seen: Any) -> dict[str, Any]:
+    tip = session.robot.fk(session.q).translation
+    return {
+        "name": seen.object.name,
+        "role": seen.object.role,
+        "distance": round(float(np.linalg.norm(seen.T_base_object.translation - tip)), 4),
+        "sigma_mm": round(1e3 * seen.margin / 3.0, 2),
+    }
+
+
+def _route(session: Session) -> dict[str, Any] | None:
+    route, follower = session.route, session.follower
+    if route is None or follower is None:
+        return None
+    endless = [n for n, c in zip(session.robot.joint_names, session.robot.continuous, strict=True) if c]
+    words = spoken_moves(follower.path, continuous=endless)
+    moves = []
+    for number, (move, text) in enumerate(zip(follower.moves, words, strict=True)):
+        (start, unit), (end, _) = reading(move.start, move.unit), reading(move.end, move.unit)
+        status = "done" if number < follower.current else "current" if number == follower.current else "ahead"
+        moves.append({"joint": move.joint, "from": start, "to": end, "unit": unit, "text": text, "status": status})
+    progress = session.progress
+    return {
+        "moves": moves,
+        "grasp_from": route.grasp_from,
+        "seconds": round(route.seconds, 1),
+        "travel": round(reading(route.travel, "rad")[0], 1),
+        "clearance_mm": None if not np.isfinite(route.clearance) else round(1e3 * route.clearance, 1),
+        "joints": list(route.joints),
+        "share": 0.0 if progress is None else progress.share,
+        "advice": "" if progress is None else progress.advice,
+        "fault": "" if progress is None else progress.fault,
+    }
+
+
+def _tip(session: Session) -> dict[str, Any]:
+    pose = session.robot.fk(session.q)
+    return {"xyz": np.round(pose.translation, 4).tolist()}

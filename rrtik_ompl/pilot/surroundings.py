@@ -1,0 +1,87 @@
+"""The world of a session: what the problem says stands there, and what the camera sees; rebuilt only when it moved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.sensing.scene_from_view import SeenObject
+from rrtik_ompl.world import World
+
+SAME_PLACE, SAME_TURN = 1e-3, np.deg2rad(0.2)  # [m], [rad]; less is trembling, and no reason to think anew
+
+
+class Surroundings:
+    """Worlds with what was seen last in them.
+
+    Attributes:
+        world: Nothing may be touched.
+        version: Counts how often the world became another one.
+    """
+
+    def __init__(self, world: World) -> None:
+        """Begin with what a world has."""
+        self._given = world
+        self.world = world
+        self.version = 0
+        self._seen: dict[str, SeenObject] = {}
+        self._holding: dict[str, World] = {}
+
+    @property
+    def seen(self) -> tuple[SeenObject, ...]:
+        """What is known to be there, seen now or earlier."""
+        return tuple(self._seen.values())
+
+    def named(self, name: str) -> SeenObject | None:
+        """What is known of an object, None if it was never seen."""
+        return self._seen.get(name)
+
+    def see(self, objects: Sequence[SeenObject]) -> bool:
+        """Take in what the camera sees; True if something moved or is new, so that the world is another one."""
+        news = [each for each in objects if self._moved(each)]
+        if not news:
+            return False
+        self._seen |= {each.object.name: each for each in news}
+        self.world = self._with(())
+        self._holding.clear()
+        self.version += 1
+        return True
+
+    def holding(self, name: str) -> World:
+        """The world in which the gripper may touch an object."""
+        if name not in self._holding:
+            solids = [solid.name for solid in self._seen[name].solids()]
+            pairs = [(link, solid) for link in gripper_links(self.world.robot) for solid in solids]
+            self._holding[name] = self._with(pairs)
+        return self._holding[name]
+
+    def _moved(self, new: SeenObject) -> bool:
+        old = self._seen.get(new.object.name)
+        if old is None:
+            return True
+        change = old.T_base_object.inverse() * new.T_base_object
+        turned = float(np.linalg.norm(pin.log3(change.rotation)))
+        return float(np.linalg.norm(change.translation)) > SAME_PLACE or turned > SAME_TURN
+
+    def _with(self, allowed: Sequence[tuple[str, str]]) -> World:
+        scene = self._given.scene
+        more: list[Obstacle] = [solid for each in self._seen.values() for solid in each.solids()]
+        kept = tuple(o for o in scene.obstacles if o.name not in {solid.name for solid in more})
+        pairs = (*scene.allowed_collisions, *allowed)
+        changed: Scene = replace(scene, obstacles=(*kept, *more), allowed_collisions=pairs)
+        return World(self._given.robot, changed, motion_resolution=self._given.motion_resolution)
+
+
+def gripper_links(robot: Robot) -> tuple[str, ...]:
+    """The links that the last joint before the tip carries, with all that hangs on them."""
+    model: Any = robot.model
+    last = model.frames[model.getFrameId(robot.tip)].parentJoint
+    below = set(model.subtrees[last])
+    bodies = (frame for frame in model.frames if frame.type == pin.FrameType.BODY)
+    return tuple(frame.name for frame in bodies if frame.parentJoint in below)

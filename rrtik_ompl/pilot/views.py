@@ -1,0 +1,148 @@
+"""The two pictures of the page: what the camera sees, with the arm and what is chosen in it, and the view from outside.
+
+Source: shared-control tool, section 3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import cv2
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.overlay.augment import Augmenter, Ghost
+from rrtik_ompl.overlay.gods_eye import eye_at, imagined_camera, sky
+from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED
+from rrtik_ompl.pilot.session import FOLLOWING, PROPOSED, Session
+from rrtik_ompl.sensing.camera import Camera
+from rrtik_ompl.viewer import palette
+
+LAMP_COLORS = {GREEN: "#1b9e3a", AMBER: "#e6a100", RED: "#c62828"}
+NEXT_MOVE = "#56b4e9"
+LOOKS = 60  # points of a trail
+PRESETS = {"side": (-90.0, 10.0), "top": (-90.0, 89.0), "behind": (180.0, 25.0), "corner": (-50.0, 25.0)}  # degrees
+
+
+class CameraView:
+    """The camera's picture with the virtual arm in it."""
+
+    def __init__(self, camera: Camera, session: Session) -> None:
+        """Prepare the arm's triangles once."""
+        self._session, self._arm = session, Augmenter(session.robot, camera)
+        self._camera = camera
+
+    def draw(self, picture: NDArray[np.uint8], T_base_camera: Any, arm_in_picture: bool = False) -> NDArray[np.uint8]:
+        """The augmented picture.
+
+        Args:
+            picture: From the camera.
+            T_base_camera: Where the camera is.
+            arm_in_picture: The real arm is in the picture (or simulated there): the virtual one is then not drawn
+                over it, only what it will do.
+        """
+        session = self._session
+        real = [solid for seen in session.surroundings.seen for solid in seen.solids()]
+        drawn = self._arm.draw(
+            picture, T_base_camera, None if arm_in_picture else session.q,
+            ghosts=ghosts(session), real=real, trail=trail(session), frames=[session.robot.fk(session.q)],
+        )  # fmt: skip
+        self._depth_aids(drawn, T_base_camera)
+        return drawn
+
+    def _depth_aids(self, drawn: NDArray[np.uint8], T_base_camera: Any) -> None:
+        """A line from the tool to the chosen object with its length, and one straight down from the tool."""
+        session = self._session
+        tip = session.robot.fk(session.q).translation
+        seen = None if session.target is None else session.surroundings.named(session.target)
+        if seen is None:
+            return
+        goal = seen.T_base_object.translation
+        ends = np.stack([tip, goal, [tip[0], tip[1], goal[2]]])
+        points = ends @ T_base_camera.rotation - T_base_camera.rotation.T @ T_base_camera.translation
+        if (points[:, 2] < 0.05).any():
+            return
+        a, b, c = (tuple(int(v) for v in np.clip(pixel, -4000, 4000)) for pixel in self._camera.project(points))
+        cv2.line(drawn, a, b, (255, 255, 255), 1, cv2.LINE_AA)
+        cv2.line(drawn, a, c, (200, 200, 80), 1, cv2.LINE_AA)
+        middle = ((a[0] + b[0]) // 2 + 6, (a[1] + b[1]) // 2)
+        text = f"{float(np.linalg.norm(goal - tip)):.3f} m"
+        cv2.putText(drawn, text, middle, cv2.FONT_HERSHEY_SIMPLEX, 0.5, (255, 255, 255), 1, cv2.LINE_AA)
+
+
+class OutsideView:
+    """The arm and its surroundings from where the pilot likes."""
+
+    def __init__(self, session: Session, width: int = 640, height: int = 480) -> None:
+        """Look at the arm's base from a corner."""
+        self._session, self._camera = session, imagined_camera(width, height)
+        self._arm = Augmenter(session.robot, self._camera)
+        self._sky = sky(self._camera)
+        reach = float(np.linalg.norm(session.robot.fk(session.q).translation))
+        self.centre: Vector = np.array([0.5 * reach, 0.0, 0.15 * reach])
+        self.distance, self.azimuth, self.elevation = 2.2 * max(reach, 0.3), *np.radians(PRESETS["corner"])
+        self.share: float | None = None  # of the route that is played, None to show the arm as it is
+
+    def turn(self, right: float, up: float) -> None:
+        """Go round by angles [rad]."""
+        self.azimuth -= right
+        self.elevation = float(np.clip(self.elevation + up, -1.5, 1.5533))
+
+    def zoom(self, factor: float) -> None:
+        """Go nearer (below 1) or farther."""
+        self.distance = float(np.clip(self.distance * factor, 0.2, 50.0))
+
+    def preset(self, name: str) -> None:
+        """Look from the side, from above, from behind or from a corner; other names are left alone."""
+        if name in PRESETS:
+            self.azimuth, self.elevation = np.radians(PRESETS[name])
+
+    def draw(self) -> NDArray[np.uint8]:
+        """The picture. Shape (height, width, 3), blue, green, red."""
+        session = self._session
+        eye = eye_at(self.centre, self.distance, self.azimuth, self.elevation)
+        shown = session.q if self.share is None or session.route is None else along(session, self.share)
+        return self._arm.draw(
+            self._sky, eye, shown, ghosts=ghosts(session), obstacles=session.surroundings.world.scene.obstacles,
+            trail=trail(session), frames=[session.robot.fk(shown), *_objects(session)], opacity=1.0,
+        )  # fmt: skip
+
+
+def ghosts(session: Session) -> list[Ghost]:
+    """What will be: the chosen grasp in the colour of its lamp, or the next move of a route."""
+    if session.follower is not None and session.mode in (PROPOSED, FOLLOWING):
+        return [Ghost(session.follower.target, NEXT_MOVE, 0.4)]
+    lamp = session.lamp()
+    if lamp is None:
+        return []
+    postures = [q for q in lamp.q[1:2] if not np.isnan(q).any()]
+    return [Ghost(q, LAMP_COLORS[lamp.color], 0.45) for q in postures]
+
+
+def trail(session: Session) -> Matrix | None:
+    """The way of the tip along the route, shape (k, 3), None without one."""
+    if session.route is None:
+        return None
+    path = session.route.path
+    rows = path.resample(max(path.length / LOOKS, 1e-3)).waypoints
+    return np.asarray(session.robot.fk_batch(rows)[:, :3, 3])
+
+
+def along(session: Session, share: float) -> Vector:
+    """The configuration at a share of a route's travel. Shape (dof,)."""
+    if session.route is None:
+        return session.q
+    rows = session.route.path.waypoints
+    lengths = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(rows, axis=0)).sum(axis=1))])
+    at = float(np.clip(share, 0.0, 1.0)) * lengths[-1]
+    return np.array([np.interp(at, lengths, column) for column in rows.T])
+
+
+def _objects(session: Session) -> Sequence[Any]:
+    return [pin.SE3(seen.T_base_object) for seen in session.surroundings.seen]
+
+
+COLORS = {"arm": palette.ROBOT, "next": NEXT_MOVE, **LAMP_COLORS}

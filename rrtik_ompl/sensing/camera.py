@@ -1,0 +1,79 @@
+"""A pinhole camera with lens distortion: points to pixels and back. Frozen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
+from rrtik_ompl.errors import InputError
+
+ORIGIN = np.zeros(3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Camera:
+    """Intrinsics of a camera, in OpenCV's conventions: a whole number is the centre of a pixel.
+
+    Attributes:
+        matrix: Shape (3, 3): fx, fy, cx, cy in pixels; skew is not modelled and must be 0.
+        distortion: Brown's k1, k2, p1, p2, k3. Shape (5,).
+        width: Of the picture, in pixels.
+        height: Of the picture, in pixels.
+    """
+
+    matrix: Matrix
+    distortion: Vector
+    width: int
+    height: int
+
+    def __init__(self, matrix: ArrayLike, width: int, height: int, distortion: ArrayLike = (0.0,) * 5) -> None:
+        """Check and copy the intrinsics.
+
+        Raises:
+            InputError: If the matrix is not that of a pinhole, a number is not finite or the size is not positive.
+        """
+        given = finite_array(matrix, (3, 3), "camera matrix")
+        expected = [[given[0, 0], 0.0, given[0, 2]], [0.0, given[1, 1], given[1, 2]], [0.0, 0.0, 1.0]]
+        if not np.array_equal(given, expected) or given[0, 0] <= 0.0 or given[1, 1] <= 0.0:
+            raise InputError("camera matrix must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] with fx, fy > 0, no skew")
+        if int(width) != width or int(height) != height or width < 1 or height < 1:
+            raise InputError(f"camera size must be two positive whole numbers, got {width} x {height}")
+        object.__setattr__(self, "matrix", frozen(given))
+        object.__setattr__(self, "distortion", frozen(finite_array(distortion, (5,), "camera distortion")))
+        object.__setattr__(self, "width", int(width))
+        object.__setattr__(self, "height", int(height))
+
+    def project(self, points: ArrayLike) -> Matrix:
+        """Pixels of points in the frame of the camera [m]. Shape (m, 3) to (m, 2)."""
+        rows = finite_array(points, (None, 3), "points to project")
+        pixels, _ = cv2.projectPoints(rows[:, None], ORIGIN, ORIGIN, self.matrix, self.distortion)
+        return np.asarray(pixels, dtype=np.float64)[:, 0]
+
+    def rays(self, pixels: ArrayLike) -> Matrix:
+        """Where the rays of pixels meet the plane z = 1. Shape (m, 2) to (m, 2)."""
+        rows = finite_array(pixels, (None, 2), "pixels")
+        if not self.distortion.any():
+            return (rows - self.matrix[:2, 2]) / np.diag(self.matrix)[:2]
+        stop = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 60, 1e-12)
+        found: Any = cv2.undistortPoints(rows[:, None], self.matrix, self.distortion, criteria=stop)
+        return np.asarray(found, dtype=np.float64)[:, 0]
+
+    def jacobian(self, points: ArrayLike, translation: ArrayLike) -> Matrix:
+        """How pixels change with a pose. Shape (2 m, 6).
+
+        Args:
+            points: In the axes of the camera, from the origin of the object (``R @ p_object``). Shape (m, 3) [m].
+            translation: Origin of the object in the frame of the camera. Shape (3,) [m].
+
+        Returns:
+            d pixel / d (translation [m], small rotation about the axes of the camera [rad]).
+        """
+        rows = np.ascontiguousarray(points, dtype=np.float64)
+        shift = np.ascontiguousarray(translation, dtype=np.float64)
+        _, slopes = cv2.projectPoints(rows[:, None], ORIGIN, shift, self.matrix, self.distortion)
+        return np.hstack([slopes[:, 3:6], slopes[:, :3]])

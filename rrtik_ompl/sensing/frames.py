@@ -1,0 +1,51 @@
+"""From what the camera sees to where things are for the arm.
+
+Source: AR sensing, section 1: ``T_camera_tip = T_camera_mount T_mount_base T_base_tip(q)``; with the base known from
+its mount (the camera rides with the arm) nothing but the target trembles, with a marker on it the arm does too.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.sensing.marker_map import MarkerMap
+from rrtik_ompl.sensing.sight import Sighting
+
+
+class NoBaseError(InputError):
+    """The base of the arm is not in view, so that nothing can be said in its frame."""
+
+
+def base_from_camera(marker_map: MarkerMap, sightings: tuple[Sighting, ...]) -> tuple[Any, Matrix]:
+    """``T_base_camera`` and the covariance of the base's pose in the frame of the camera.
+
+    Raises:
+        NoBaseError: If the base has markers and none of them is to be seen, or its pose is refused.
+    """
+    if marker_map.T_base_camera is not None:
+        return marker_map.T_base_camera, np.zeros((6, 6))
+    name = marker_map.base.name if marker_map.base is not None else "base"
+    for each in sightings:
+        if each.object.role == "base":
+            if each.refused:
+                raise NoBaseError(f"base '{name}': {each.refused}")
+            return each.pose.T_camera_object.inverse(), each.pose.covariance
+    raise NoBaseError(f"no marker of the base '{name}' is in view; turn the camera, or say camera_pose in the map")
+
+
+def position_in_base(T_base_camera: Any, base_covariance: Matrix, sight: Sighting) -> tuple[Any, Matrix]:
+    """``T_base_object`` and the covariance of its position in the axes of the base [m^2]. Shape (3, 3).
+
+    The error of the base's rotation counts with the distance between base and object as its lever arm.
+    """
+    pose = T_base_camera * sight.pose.T_camera_object
+    turn = T_base_camera.rotation
+    T_camera_base = T_base_camera.inverse()
+    arm = sight.pose.T_camera_object.translation - T_camera_base.translation
+    lever = np.hstack([np.eye(3), -np.array([[0, -arm[2], arm[1]], [arm[2], 0, -arm[0]], [-arm[1], arm[0], 0]])])
+    spread = sight.pose.covariance[:3, :3] + lever @ base_covariance @ lever.T
+    return pose, turn @ spread @ turn.T

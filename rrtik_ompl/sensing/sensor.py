@@ -1,0 +1,165 @@
+"""A camera that is looked through over time: pictures in, tracked objects in the frame of the arm's base out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.poses import quaternion_xyzw
+from rrtik_ompl.scene import Scene
+from rrtik_ompl.sensing.annotate import annotated
+from rrtik_ompl.sensing.camera import Camera
+from rrtik_ompl.sensing.frames import NoBaseError
+from rrtik_ompl.sensing.marker_map import MarkerMap
+from rrtik_ompl.sensing.markers import dictionaries_seen
+from rrtik_ompl.sensing.pictures import Picture
+from rrtik_ompl.sensing.scene_from_view import SeenObject, objects_in_base
+from rrtik_ompl.sensing.sight import Sighting, as_gray, look
+from rrtik_ompl.sensing.tracker import PoseTracker
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """What one picture shows.
+
+    Attributes:
+        picture: The picture.
+        camera: Who took it.
+        seen: Every object of which a marker is in view, its pose smoothed over the pictures before.
+        placed: Those with a usable pose, in the frame of the base.
+        why_not_placed: Why there are none, if there is no base.
+    """
+
+    picture: Picture
+    camera: Camera
+    seen: tuple[Sighting, ...]
+    placed: tuple[SeenObject, ...]
+    why_not_placed: str = ""
+
+    def scene(self) -> Scene:
+        """The solids of all placed objects.
+
+        Raises:
+            NoBaseError: If nothing says where the base is.
+        """
+        if self.why_not_placed:
+            raise NoBaseError(self.why_not_placed)
+        return Scene(tuple(solid for each in self.placed for solid in each.solids()))
+
+    def save_picture(self, path: Path) -> None:
+        """Write the picture with what was seen in it.
+
+        Raises:
+            InputError: If it cannot be written.
+        """
+        good, data = cv2.imencode(path.suffix, annotated(self.picture.pixels, self.camera, self.seen))
+        try:
+            if good:
+                path.write_bytes(data.tobytes())
+        except OSError as error:
+            raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+    def lines(self) -> list[str]:
+        """One line an object, for a person."""
+        if not self.seen:
+            return [f"{self.picture.name}: no marker of the map in view"]
+        return [f"{self.picture.name}: {_line(each, self._place(each))}" for each in self.seen]
+
+    def document(self) -> dict[str, Any]:
+        """Everything as plain values; metres, radians, quaternions x, y, z, w."""
+        objects = [_data(each, self._place(each)) for each in self.seen]
+        return {"picture": self.picture.name, "time": self.picture.time, "objects": objects}
+
+    def _place(self, sight: Sighting) -> SeenObject | None:
+        return next((p for p in self.placed if p.object is sight.object), None)
+
+
+class Sensor:
+    """Looks at pictures one after the other, and remembers what it saw."""
+
+    def __init__(self, camera: Camera, marker_map: MarkerMap, *, smooth: bool = True) -> None:
+        """Start with nothing seen.
+
+        Args:
+            camera: Who takes the pictures.
+            marker_map: What may be seen.
+            smooth: Smooth poses over time and leave out outliers.
+        """
+        self.camera, self.marker_map = camera, marker_map
+        self._trackers = {each.name: PoseTracker() for each in marker_map.objects} if smooth else {}
+        self._dictionaries_seen: set[str] = set()
+
+    def view(self, picture: Picture) -> View:
+        """What a picture shows, later than the one before.
+
+        Raises:
+            InputError: If the picture does not have the camera's size, or times go backwards.
+        """
+        seen = tuple(self._tracked(each, picture.time) for each in look(picture.pixels, self.camera, self.marker_map))
+        if not seen and not self._dictionaries_seen:
+            self._dictionaries_seen.update(dictionaries_seen(as_gray(picture.pixels)))
+        try:
+            return View(picture, self.camera, seen, objects_in_base(seen, self.marker_map))
+        except NoBaseError as error:
+            return View(picture, self.camera, seen, (), str(error))
+
+    def why_nothing(self, source: str) -> str:
+        """One line on why no object was seen, with a remedy."""
+        known, others = self.marker_map.dictionary in self._dictionaries_seen, sorted(self._dictionaries_seen)
+        if others and not known:
+            return f"{source}: no marker of {self.marker_map.dictionary}, but of {', '.join(others[:3])}; mend its key"
+        if known:
+            return f"{source}: markers are in view, but none that the map knows; add their ids to the map"
+        return f"{source}: no marker in view; go nearer, add light, or check that the white rim of the marker is whole"
+
+    def _tracked(self, sight: Sighting, time: float) -> Sighting:
+        tracker = self._trackers.get(sight.object.name)
+        if tracker is None or sight.refused:
+            return sight
+        found = tracker.update(sight, time)
+        other = sight.pose.T_camera_object if found.other_branch else sight.pose.other
+        refused = "jumped: left out as an outlier" if found.outlier else ""
+        return replace(
+            sight, pose=replace(sight.pose, T_camera_object=found.T_camera_object, other=other), refused=refused
+        )
+
+
+def _line(sight: Sighting, place: SeenObject | None) -> str:
+    if sight.refused:
+        return f"{sight.object.name}: refused: {sight.refused}"
+    pose, frame = _pose_and_frame(sight, place)
+    xyz = " ".join(f"{value:.4f}" for value in pose.translation)
+    rpy = " ".join(f"{value:.2f}" for value in np.degrees(pin.rpy.matrixToRpy(pose.rotation)))
+    sigma = sight.pose.position_sigma if place is None else place.margin / 3.0
+    doubt = "; two poses fit: tilt the marker or add another" if sight.pose.ambiguous else ""
+    return (
+        f"{sight.object.name} in the frame of the {frame}: xyz {xyz} m, rpy {rpy} deg, "
+        f"+- {1e3 * sigma:.2f} mm, quality {sight.quality:.2f}, {len(sight.markers)} markers{doubt}"
+    )
+
+
+def _data(sight: Sighting, place: SeenObject | None) -> dict[str, Any]:
+    pose, frame = _pose_and_frame(sight, place)
+    return {
+        "name": sight.object.name,
+        "role": sight.object.role,
+        "frame": frame,
+        "xyz": pose.translation.tolist(),
+        "quat_xyzw": quaternion_xyzw(pose).tolist(),
+        "position_sigma": sight.pose.position_sigma if place is None else place.margin / 3.0,
+        "rotation_sigma": sight.pose.rotation_sigma,
+        "quality": sight.quality,
+        "ambiguous": sight.pose.ambiguous,
+        "refused": sight.refused,
+        "markers": [marker.number for marker in sight.markers],
+    }
+
+
+def _pose_and_frame(sight: Sighting, place: SeenObject | None) -> tuple[Any, str]:
+    return (sight.pose.T_camera_object, "camera") if place is None else (place.T_base_object, "base")

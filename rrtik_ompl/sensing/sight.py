@@ -1,0 +1,122 @@
+"""From a picture to the poses of objects, each with its quality: what is not to be trusted is refused with a reason."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.sensing.camera import Camera
+from rrtik_ompl.sensing.corner_pose import ALIGNED_SIGMA, ROUGH_SIGMA, CornerPose, pose_of_points, pose_of_square
+from rrtik_ompl.sensing.marker_map import MarkedObject, MarkerMap
+from rrtik_ompl.sensing.markers import SeenMarker, find_markers
+
+LEAST_SIDE = 12.0  # pixels: two a cell of the coarsest dictionaries
+MOST_ERROR = 2.0  # pixels between a corner and where its pose puts it; more is a wrong map or a wrong number
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sighting:
+    """An object in a picture.
+
+    Attributes:
+        object: Which one.
+        pose: Its pose in the frame of the camera, the second one, errors and covariance.
+        markers: Those of its markers that were seen.
+        refused: Why the pose is not to be used; empty if it is.
+    """
+
+    object: MarkedObject
+    pose: CornerPose
+    markers: tuple[SeenMarker, ...]
+    refused: str = ""
+
+    @property
+    def quality(self) -> float:
+        """From 0 (no use) to 1: likeness of the best marker, halved where the pose is ambiguous, 0 if refused."""
+        if self.refused:
+            return 0.0
+        likeness = max((m.likeness for m in self.markers), default=0.0)
+        return max(likeness, 0.5) * (0.5 if self.pose.ambiguous else 1.0)
+
+
+def as_gray(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """A picture of shape (height, width) or (height, width, 3 or 4; blue, green, red) as grey values.
+
+    Raises:
+        InputError: If it is no such picture.
+    """
+    array = np.asarray(picture)
+    if array.dtype != np.uint8 or array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] not in (3, 4)):
+        raise InputError(f"a picture has 8 bits and 1, 3 or 4 channels; got {array.dtype} of shape {array.shape}")
+    if array.ndim == 2:
+        return np.ascontiguousarray(array)
+    import cv2
+
+    code = cv2.COLOR_BGR2GRAY if array.shape[2] == 3 else cv2.COLOR_BGRA2GRAY
+    return np.asarray(cv2.cvtColor(np.ascontiguousarray(array), code), dtype=np.uint8)
+
+
+def look(
+    picture: NDArray[np.uint8], camera: Camera, marker_map: MarkerMap, *, align: bool = True
+) -> tuple[Sighting, ...]:
+    """The objects of a map that a picture shows, in the order of the map.
+
+    Args:
+        picture: Shape (height, width) or (height, width, 3), 8 bits.
+        camera: Who took it; its size must be the picture's.
+        marker_map: What may be there.
+        align: Sharpen corners (`alignment`); costs about a millisecond a marker.
+
+    Raises:
+        InputError: If the picture does not have the camera's size, or is none.
+    """
+    gray = as_gray(picture)
+    if gray.shape != (camera.height, camera.width):
+        raise InputError(
+            f"the picture has {gray.shape[1]} x {gray.shape[0]} pixels, the camera {camera.width} x {camera.height}; "
+            "take pictures of the size that it was calibrated for"
+        )
+    seen = find_markers(gray, marker_map.dictionary, align=align)
+    sightings = (sighting(camera, each, seen) for each in marker_map.objects)
+    return tuple(found for found in sightings if found is not None)
+
+
+def sighting(camera: Camera, thing: MarkedObject, seen: Sequence[SeenMarker]) -> Sighting | None:
+    """What the markers that were seen say about one object; None if none of them is its own."""
+    mounted = {marker.number: marker for marker in thing.markers}
+    own = tuple(marker for marker in seen if marker.number in mounted)
+    usable = [marker for marker in own if marker.side >= LEAST_SIDE] or list(own)
+    if not own:
+        return None
+    sigma = ALIGNED_SIGMA if all(m.likeness > 0.0 for m in usable) else ROUGH_SIGMA
+    if len(usable) == 1:
+        pose = _of_one(camera, usable[0], mounted[usable[0].number], sigma)
+    else:
+        points = np.vstack([mounted[m.number].corners for m in usable])
+        pose = pose_of_points(camera, np.vstack([m.corners for m in usable]), points, sigma)
+    return Sighting(thing, pose, own, _refusal(pose, usable))
+
+
+def _of_one(camera: Camera, marker: SeenMarker, mounted: Any, sigma: float) -> CornerPose:
+    """The pose of the object from that of its only visible marker."""
+    found = pose_of_square(camera, marker.corners, mounted.side, sigma)
+    T_marker_object = mounted.T_object_marker.inverse()
+    first, second = found.T_camera_object * T_marker_object, found.other * T_marker_object
+    arm = first.translation - found.T_camera_object.translation  # a rotation at the marker moves the object's origin
+    lever = np.eye(6)
+    lever[:3, 3:] = -np.array([[0, -arm[2], arm[1]], [arm[2], 0, -arm[0]], [-arm[1], arm[0], 0]])
+    return CornerPose(first, second, found.error, found.other_error, lever @ found.covariance @ lever.T)
+
+
+def _refusal(pose: CornerPose, markers: Sequence[SeenMarker]) -> str:
+    side = max(marker.side for marker in markers)
+    if side < LEAST_SIDE:
+        return f"too far away or too small: {side:.0f} pixels a side, {LEAST_SIDE:.0f} are needed"
+    if pose.error > MOST_ERROR:
+        return f"corners lie {pose.error:.1f} pixels off: check the marker map, the side of the markers and the camera"
+    return ""

@@ -1,0 +1,149 @@
+"""The arm over a picture: silhouettes against a plain z-buffer, registration against projection, what hides what."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from rrtik_ompl import load_robot
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.overlay.augment import Augmenter, Ghost
+from rrtik_ompl.overlay.canvas import FAR, Canvas
+from rrtik_ompl.overlay.figure import figure_of, placed
+from rrtik_ompl.overlay.gods_eye import eye_at, imagined_camera, sky
+from rrtik_ompl.overlay.surfaces import obstacle_surfaces, robot_surfaces, surface_of_shape
+from rrtik_ompl.poses import pose
+from rrtik_ompl.scene import Obstacle
+from rrtik_ompl.sensing.synthetic_camera import published_camera
+from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
+
+CAMERA = published_camera()
+BENT = published_camera((0.05, -0.12, 0.0005, -0.0007, 0.03))
+EYE = eye_at([0.8, 0.0, 0.2], 2.2, np.radians(-50.0), np.radians(25.0))
+
+
+def z_buffer(camera, points, faces):
+    """Depth of the nearest triangle at every pixel's centre, one triangle after the other: slow, and nobody else's."""
+    depths = np.full((camera.height, camera.width), FAR)
+    pixels = points[:, :2] / points[:, 2:] * np.diag(camera.matrix)[:2] + camera.matrix[:2, 2]
+    for face in faces:
+        (ax, ay), (bx, by), (cx, cy) = pixels[face]
+        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        if area >= 0.0:  # seen from inside: pixels have y downwards
+            continue
+        u0, v0 = np.maximum(np.ceil(pixels[face].min(axis=0)), 0).astype(int)
+        u1, v1 = np.minimum(np.floor(pixels[face].max(axis=0)), (camera.width - 1, camera.height - 1)).astype(int)
+        if u1 < u0 or v1 < v0:
+            continue
+        u, v = np.meshgrid(np.arange(u0, u1 + 1), np.arange(v0, v1 + 1))
+        a = ((bx - u) * (cy - v) - (by - v) * (cx - u)) / area
+        b = ((cx - u) * (ay - v) - (cy - v) * (ax - u)) / area
+        c = 1.0 - a - b
+        inside = (a >= 0.0) & (b >= 0.0) & (c >= 0.0)
+        depth = 1.0 / (a / points[face[0], 2] + b / points[face[1], 2] + c / points[face[2], 2])
+        piece = depths[v0 : v1 + 1, u0 : u1 + 1]
+        piece[inside] = np.minimum(piece[inside], depth[inside])
+    return depths
+
+
+@pytest.mark.parametrize("name", ["titan4", "ur5"])
+def test_silhouette_and_depth_are_those_of_a_z_buffer(name):
+    robot = load_robot(name)
+    arm = figure_of(robot_surfaces(robot, 3000))
+    q = 0.3 * np.ones(robot.dof)
+    shown = placed(arm, EYE.inverse().homogeneous @ robot.joint_frames(q[None])[0])
+    canvas = Canvas(CAMERA)
+    canvas.draw(shown)
+    truth = z_buffer(CAMERA, shown.points.astype(np.float64), shown.faces)
+    differ = canvas.drawn != (truth < FAR)
+    both = canvas.drawn & (truth < FAR)
+    assert canvas.drawn.sum() > 3000
+    assert differ.sum() <= 2  # a pixel's centre upon an edge, to the last bit of a float
+    assert np.median(np.abs(canvas.depths[both] - truth[both])) < 1e-5
+
+
+@pytest.mark.parametrize("camera", [CAMERA, BENT], ids=["pinhole", "lens"])
+def test_what_is_drawn_lies_where_the_camera_sees_it(camera):
+    rng = np.random.default_rng(0)
+    for _ in range(12):
+        centre = rng.uniform([-0.35, -0.25, 0.9], [0.35, 0.25, 2.0])
+        ball = figure_of([surface_of_shape(Sphere(0.01), "#ffffff")])
+        canvas = Canvas(camera)
+        canvas.draw(placed(ball, pose(centre).homogeneous[None]))
+        v, u = np.nonzero(canvas.drawn)
+        assert np.array([u.mean(), v.mean()]) == pytest.approx(camera.project(centre[None])[0], abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("shape", "volume"),
+    [
+        (Box([0.2, 0.3, 0.4]), 0.024),
+        (Sphere(0.1), 4 / 3 * np.pi * 1e-3),
+        (Cylinder(0.1, 0.3), np.pi * 3e-3),
+        (Capsule(0.1, 0.3), np.pi * (3e-3 + 4e-3 / 3)),
+        (Prism([[0, 0], [1, 0], [0, 1]], 0.5), 0.25),
+    ],
+)
+def test_surfaces_are_closed_and_face_outwards(shape, volume):
+    surface = surface_of_shape(shape, "#ffffff")
+    a, b, c = (surface.vertices[surface.faces[:, k]] for k in range(3))
+    assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0 == pytest.approx(volume, rel=0.04)
+    assert np.linalg.norm(surface.normals, axis=1) == pytest.approx(1.0)
+
+
+def test_a_half_space_has_no_surface():
+    with pytest.raises(InputError, match="cannot be drawn"):
+        surface_of_shape(HalfSpace([0, 0, 1], 0.0), "#ffffff")
+    assert obstacle_surfaces([Obstacle("floor", HalfSpace([0, 0, 1], 0.0))]) == ()
+
+
+def test_the_arm_is_drawn_and_hidden_by_what_is_really_there():
+    robot, grey = load_robot("titan4"), np.full((480, 640), 120, np.uint8)
+    augmenter = Augmenter(robot, CAMERA)
+    q = np.zeros(6)
+    plain = augmenter.draw(grey, EYE, q)
+    changed = (plain != 120).any(axis=2)
+    middle = EYE.act(np.array([0.0, 0.0, 1.0]))
+    wall = Obstacle("wall", Box([3.0, 3.0, 0.01]), pin.SE3(EYE.rotation, middle))
+    hidden = augmenter.draw(grey, EYE, q, real=[wall])
+    assert changed.sum() > 2000
+    assert (hidden == 120).all()
+    behind = Obstacle("wall", Box([9.0, 9.0, 0.01]), pin.SE3(EYE.rotation, EYE.act(np.array([0.0, 0.0, 8.0]))))
+    assert np.array_equal(augmenter.draw(grey, EYE, q, real=[behind]), plain)
+
+
+def test_ghosts_trails_and_frames_are_seen_through_and_leave_the_picture_as_it_was():
+    robot, grey = load_robot("ur5"), np.full((480, 640, 3), 120, np.uint8)
+    augmenter = Augmenter(robot, CAMERA)
+    q, other = np.zeros(6), np.full(6, 0.4)
+    ghost = augmenter.draw(grey, EYE, ghosts=[Ghost(other, "#00ff00", 0.5)])
+    rows = (ghost != 120).any(axis=2)
+    assert rows.sum() > 500
+    assert (ghost[rows][:, 1] > ghost[rows][:, 2]).all()  # greener than red
+    assert (grey == 120).all()
+    trail = np.array([robot.fk(q + t).translation for t in np.linspace(0.0, 0.4, 15)])
+    lines = augmenter.draw(grey, EYE, trail=trail, frames=[robot.fk(q)])
+    assert 50 < (lines != 120).any(axis=2).sum() < 10_000
+
+
+def test_what_lies_behind_the_camera_is_not_drawn():
+    away = pin.SE3(EYE.rotation @ np.diag([-1.0, 1.0, -1.0]), EYE.translation)
+    robot, grey = load_robot("ur5"), np.full((480, 640, 3), 120, np.uint8)
+    out = Augmenter(robot, CAMERA).draw(grey, away, np.zeros(6), trail=np.zeros((5, 3)), frames=[pose([0, 0, 0.1])])
+    assert (out == 120).all()
+
+
+def test_the_eye_looks_at_its_centre_with_the_world_upright():
+    camera = imagined_camera(320, 240)
+    T = eye_at([1.0, 2.0, 0.5], 3.0, 0.7, 0.4)
+    centre, above = (camera.project(T.actInv(np.array(p))[None])[0] for p in ([1, 2, 0.5], [1, 2, 1.0]))
+    assert centre == pytest.approx([159.5, 119.5])
+    assert above[1] < centre[1]
+    assert above[0] == pytest.approx(centre[0])
+    assert sky(camera).shape == (240, 320, 3)
+    with pytest.raises(InputError, match="distance"):
+        eye_at([0, 0, 0], 0.0, 0.0, 0.0)
+
+
+def test_a_picture_of_another_size_is_refused():
+    with pytest.raises(InputError, match="picture"):
+        Augmenter(load_robot("ur5"), CAMERA).draw(np.zeros((10, 10, 3), np.uint8), EYE)

@@ -1,0 +1,300 @@
+"""Markers seen by a synthetic camera whose truth is known: corners, poses, objects, frames, tracking."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.poses import pose
+from rrtik_ompl.scene import Obstacle
+from rrtik_ompl.sensing.camera import Camera
+from rrtik_ompl.sensing.corner_pose import pose_of_points, pose_of_square, square_corners
+from rrtik_ompl.sensing.frames import NoBaseError, base_from_camera, position_in_base
+from rrtik_ompl.sensing.marker_map import GraspType, MarkedObject, MarkerMap, MountedMarker
+from rrtik_ompl.sensing.markers import DICTIONARIES, dictionaries_seen, find_markers, marker_cells
+from rrtik_ompl.sensing.scene_from_view import objects_in_base, scene_from_image
+from rrtik_ompl.sensing.sight import look
+from rrtik_ompl.sensing.synthetic_camera import clean_picture, marker_print, photograph, published_camera
+from rrtik_ompl.sensing.tracker import PATIENCE, PoseTracker
+from rrtik_ompl.shapes import Box
+
+CAMERA = published_camera((0.05, -0.12, 0.0005, -0.0007, 0.03))
+SIDE = 0.08
+
+
+def facing(turn, place):
+    """T_camera_marker of a marker that looks at the camera, turned by a rotation vector."""
+    return pin.SE3(pin.exp3(np.array(turn, dtype=float)) @ np.diag([1.0, -1.0, -1.0]), np.array(place, dtype=float))
+
+
+def picture_of(markers, seed=0, **how):
+    prints = [(T, marker_print(marker_cells("4x4_50", number), SIDE)) for number, T in markers]
+    return photograph(clean_picture(CAMERA, prints, rays=6), np.random.default_rng(seed), **how)
+
+
+def test_rays_of_projected_points_go_through_them():
+    points = np.random.default_rng(0).uniform([-0.3, -0.2, 0.5], [0.3, 0.2, 2.0], (50, 3))
+    assert CAMERA.rays(CAMERA.project(points)) == pytest.approx(points[:, :2] / points[:, 2:], abs=1e-9)
+
+
+def test_the_jacobian_of_pixels_agrees_with_differences():
+    T, h = facing([0.4, -0.3, 0.2], [0.1, 0.05, 0.9]), 1e-6
+    points = square_corners(SIDE) @ T.rotation.T
+    slopes = CAMERA.jacobian(points, T.translation)
+    for k in range(6):
+        step = np.zeros(6)
+        step[k] = h
+        moved = [points @ pin.exp3(s * step[3:]).T + T.translation + s * step[:3] for s in (1.0, -1.0)]
+        difference = (CAMERA.project(moved[0]) - CAMERA.project(moved[1])) / (2.0 * h)
+        assert slopes[:, k] == pytest.approx(difference.ravel(), rel=1e-5, abs=1e-4)
+
+
+@pytest.mark.parametrize("matrix", [np.eye(3) * 2, np.zeros((3, 3)), [[800, 0.2, 320], [0, 800, 240], [0, 0, 1]]])
+def test_what_is_no_pinhole_is_refused(matrix):
+    with pytest.raises(InputError, match="camera matrix"):
+        Camera(matrix, 640, 480)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.floats(0.2, 2.5), st.floats(0.0, np.radians(70.0)), st.floats(0.0, 2 * np.pi), st.floats(-0.2, 0.2))
+def test_without_noise_a_pose_is_exact(distance, tilt, direction, aside):
+    T = facing([tilt * np.cos(direction), tilt * np.sin(direction), 0.0], [aside * distance, 0.0, distance])
+    pixels = published_camera().project(square_corners(SIDE) @ T.rotation.T + T.translation)
+    found = pose_of_square(published_camera(), pixels, SIDE)
+    assert np.linalg.norm(found.T_camera_object.translation - T.translation) < 1e-9  # 1e-6 mm
+    assert np.linalg.norm(pin.log3(found.T_camera_object.rotation.T @ T.rotation)) < 1e-8
+
+
+def test_alignment_removes_the_inward_pull_of_blur():
+    T = facing([0.4, 0.2, 0.1], [0.1, -0.05, 1.2])
+    errors = {align: [] for align in (True, False)}
+    for seed in range(8):
+        gray = picture_of([(7, T)], seed)
+        for align, list_of_errors in errors.items():
+            (marker,) = find_markers(gray, "4x4_50", align=align)
+            found = pose_of_square(CAMERA, marker.corners, SIDE)
+            list_of_errors.append(found.T_camera_object.translation[2] - T.translation[2])
+    assert abs(np.mean(errors[True])) < 0.6e-3
+    assert abs(np.mean(errors[False])) > 3e-3
+    assert np.std(errors[True]) < 0.4 * np.std(errors[False])
+
+
+def test_the_stated_uncertainty_is_neither_boast_nor_panic():
+    T = facing([0.5, 0.2, 0.1], [0.05, -0.05, 1.0])
+    truth, away, sigma = T.translation, [], []
+    for seed in range(12):
+        (marker,) = find_markers(picture_of([(7, T)], seed), "4x4_50")
+        found = pose_of_square(CAMERA, marker.corners, SIDE)
+        away.append(np.linalg.norm(found.T_camera_object.translation - truth))
+        sigma.append(found.position_sigma)
+    assert 0.3 < np.sqrt(np.mean(np.square(away))) / np.mean(sigma) < 3.0
+
+
+def test_a_marker_seen_from_the_front_is_ambiguous_and_a_tilted_one_is_not():
+    for tilt, doubt in ((0.03, True), (0.6, False)):
+        T = facing([tilt, 0.0, 0.0], [0.0, 0.0, 1.8])
+        (marker,) = find_markers(picture_of([(3, T)]), "4x4_50")
+        assert pose_of_square(CAMERA, marker.corners, SIDE).ambiguous is doubt
+
+
+def test_a_covered_corner_shows_in_the_likeness():
+    T = facing([0.3, 0.2, 0.0], [0.0, 0.0, 0.7])
+    gray = picture_of([(3, T)])
+    (whole,) = find_markers(gray, "4x4_50")
+    x, y = np.rint(whole.corners[0]).astype(int)
+    gray[y - 6 : y + 14, x - 6 : x + 14] = 128
+    covered = find_markers(gray, "4x4_50")
+    assert whole.likeness > 0.99
+    assert all(each.likeness < whole.likeness - 0.005 for each in covered)
+
+
+def test_a_marker_of_another_dictionary_is_named():
+    prints = [(facing([0.3, 0, 0], [0, 0, 0.6]), marker_print(marker_cells("6x6_50", 5), SIDE))]
+    gray = photograph(clean_picture(CAMERA, prints, rays=4), np.random.default_rng(0))
+    assert find_markers(gray, "apriltag_36h11") == ()
+    assert "6x6_50" in dictionaries_seen(gray)
+
+
+def test_unknown_dictionaries_and_numbers_are_refused():
+    with pytest.raises(UnknownNameError, match="4x4_50"):
+        marker_cells("4x4_5", 0)
+    with pytest.raises(InputError, match="0 to 49"):
+        marker_cells("4x4_50", 50)
+
+
+@pytest.mark.parametrize("dictionary", sorted(DICTIONARIES))
+def test_every_dictionary_can_be_drawn(dictionary):
+    assert set(np.unique(marker_cells(dictionary, 3))) == {0, 255}
+
+
+# --- objects and frames ------------------------------------------------------------------------------------------
+
+T_BOX_MARKERS = [pose([0.0, 0.0, 0.05]), pose([0.15, 0.0, 0.05])]
+BOX = MarkedObject(
+    "box",
+    "target",
+    tuple(MountedMarker(10 + k, SIDE, T) for k, T in enumerate(T_BOX_MARKERS)),
+    (Obstacle("body", Box([0.3, 0.1, 0.1])),),
+    (GraspType("top", [pose([0.0, 0.0, 0.1]), pose([0.05, 0.0, 0.1])]),),
+)
+STAND = MarkedObject("stand", "base", (MountedMarker(0, SIDE),))
+
+
+def test_two_markers_of_an_object_give_a_steadier_rotation_than_one():
+    T = facing([0.25, -0.2, 0.1], [-0.05, 0.0, 1.3])
+    spread = {1: [], 2: []}
+    for seed in range(8):
+        shown = [(10 + k, T * T_BOX_MARKERS[k]) for k in range(2)]
+        for count in (1, 2):
+            gray = picture_of(shown[:count], seed)
+            (sight,) = look(gray, CAMERA, MarkerMap("4x4_50", (BOX,), pin.SE3.Identity()))
+            assert len(sight.markers) == count
+            spread[count].append(pin.log3(sight.pose.T_camera_object.rotation @ T.rotation.T))
+    assert np.std(spread[2], axis=0)[0] < 0.5 * np.std(spread[1], axis=0)[0]
+
+
+def test_both_ways_to_the_tip_agree():
+    T_camera_mount, T_mount_base, T_base_tip, T_camera_target = (pin.SE3.Random() for _ in range(4))
+    T_base_camera = (T_camera_mount * T_mount_base).inverse()
+    T_camera_tip = T_camera_mount * T_mount_base * T_base_tip
+    back = T_base_camera * T_camera_target
+    assert (T_base_camera * T_camera_tip).homogeneous == pytest.approx(T_base_tip.homogeneous, abs=1e-12)
+    assert (T_base_camera.inverse() * back).homogeneous == pytest.approx(T_camera_target.homogeneous, abs=1e-12)
+
+
+def test_an_object_is_placed_in_the_frame_of_a_base_that_is_seen():
+    T_camera_base = facing([0.5, 0.1, 0.0], [-0.25, 0.1, 1.1])
+    T_camera_box = facing([0.4, -0.3, 0.1], [0.12, 0.0, 1.0])
+    gray = picture_of(
+        [(0, T_camera_base), (10, T_camera_box * T_BOX_MARKERS[0]), (11, T_camera_box * T_BOX_MARKERS[1])]
+    )
+    marker_map = MarkerMap("4x4_50", (STAND, BOX))
+    (placed,) = objects_in_base(look(gray, CAMERA, marker_map), marker_map)
+    truth = T_camera_base.inverse() * T_camera_box
+    away = np.linalg.norm(placed.T_base_object.translation - truth.translation)
+    assert away < 2.5e-3
+    assert away < 2.0 * placed.margin
+    (solid,) = scene_from_image(gray, CAMERA, marker_map).obstacles
+    assert solid.name == "box"
+    assert solid.pose.homogeneous == pytest.approx(placed.T_base_object.homogeneous)
+    tip = placed.grasp_pose("top", 1)
+    assert (placed.T_base_object.inverse() * tip).translation == pytest.approx([0.05, 0.0, 0.1])
+
+
+def test_a_mounted_camera_needs_no_base_and_leaves_no_doubt_about_it():
+    mount = pose([0.3, 0.0, 0.5])
+    T, spread = base_from_camera(MarkerMap("4x4_50", (BOX,), mount), ())
+    assert T is mount
+    assert not spread.any()
+
+
+def test_a_base_out_of_view_is_said():
+    with pytest.raises(NoBaseError, match="stand"):
+        base_from_camera(MarkerMap("4x4_50", (STAND, BOX)), ())
+
+
+def test_the_error_of_the_base_grows_with_its_lever_arm():
+    T_camera_base, turned = facing([0.5, 0.1, 0.0], [0.0, 0.0, 1.0]), np.zeros((6, 6))
+    turned[3:, 3:] = 1e-6 * np.eye(3)
+    spreads = []
+    for distance in (0.2, 0.8):
+        T = facing([0.4, 0.0, 0.0], [distance, 0.0, 1.0])
+        pixels = CAMERA.project(square_corners(SIDE) @ T.rotation.T + T.translation)
+        found = pose_of_square(CAMERA, pixels, SIDE, sigma=1e-9)
+        sight = type("Sight", (), {"pose": found})()
+        _, covariance = position_in_base(T_camera_base.inverse(), turned, sight)
+        spreads.append(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
+    assert spreads[0] == pytest.approx(0.2e-3, rel=1e-3)
+    assert spreads[1] == pytest.approx(0.8e-3, rel=1e-3)
+
+
+def test_a_marker_that_is_too_small_is_refused_with_its_size():
+    gray = picture_of([(10, facing([0.4, 0.0, 0.0], [0.0, 0.0, 6.5]))], noise=0.002, blur=0.3)
+    sightings = look(gray, CAMERA, MarkerMap("4x4_50", (BOX,), pin.SE3.Identity()))
+    assert all("pixels a side" in sight.refused and sight.quality == 0.0 for sight in sightings)
+
+
+def test_a_wrong_side_in_the_map_is_noticed_where_two_markers_contradict_each_other():
+    wrong = MarkedObject(
+        "box", "target", (MountedMarker(10, SIDE, pose([0, 0, 0])), MountedMarker(11, SIDE, pose([0.3, 0, 0])))
+    )
+    T = facing([0.3, 0.2, 0.0], [-0.05, 0.0, 0.9])
+    gray = picture_of([(10, T), (11, T * pose([0.15, 0.0, 0.0]))])
+    (sight,) = look(gray, CAMERA, MarkerMap("4x4_50", (wrong,), pin.SE3.Identity()))
+    assert "check the marker map" in sight.refused
+
+
+def test_a_picture_of_another_size_is_refused():
+    with pytest.raises(InputError, match="100 x 50 pixels"):
+        look(np.zeros((50, 100), dtype=np.uint8), CAMERA, MarkerMap("4x4_50", (BOX,), pin.SE3.Identity()))
+    with pytest.raises(InputError, match="8 bits"):
+        look(np.zeros((480, 640)), CAMERA, MarkerMap("4x4_50", (BOX,), pin.SE3.Identity()))
+
+
+@pytest.mark.parametrize(
+    ("objects", "message"),
+    [
+        ((STAND, MarkedObject("other", "base", (MountedMarker(1, SIDE),))), "two objects are the base"),
+        ((STAND, MarkedObject("box", "target", (MountedMarker(0, SIDE),))), "marker 0 stands twice"),
+        ((STAND, MarkedObject("stand", "target", (MountedMarker(1, SIDE),))), "object stand stands twice"),
+        ((BOX,), "nothing says where the base is"),
+    ],
+)
+def test_a_map_that_contradicts_itself_is_refused(objects, message):
+    with pytest.raises(InputError, match=message):
+        MarkerMap("4x4_50", objects)
+
+
+# --- over time ---------------------------------------------------------------------------------------------------
+
+
+def sight_at(T, other=None, errors=(0.01, np.inf)):
+    pixels = CAMERA.project(square_corners(SIDE) @ T.rotation.T + T.translation)
+    points = np.vstack([square_corners(SIDE), square_corners(0.5 * SIDE)])
+    base = pose_of_points(CAMERA, CAMERA.project(points @ T.rotation.T + T.translation), points)
+    del pixels
+    found = type(base)(T, other, *errors, base.covariance)
+    return type("Sight", (), {"pose": found})()
+
+
+def test_the_branch_of_before_is_kept_where_two_poses_fit():
+    right, wrong = facing([0.1, 0.0, 0.0], [0.0, 0.0, 1.5]), facing([-0.1, 0.0, 0.0], [0.0, 0.0, 1.5])
+    tracker = PoseTracker()
+    tracker.update(sight_at(right, wrong, (0.01, 1.0)), 0.0)
+    found = tracker.update(sight_at(wrong, right, (0.01, 0.011)), 0.033)
+    assert found.other_branch
+    assert np.linalg.norm(pin.log3(found.T_camera_object.rotation.T @ right.rotation)) < 1e-9
+
+
+def test_one_outlier_is_left_out_and_a_new_place_is_believed_in_the_end():
+    tracker, here, there = PoseTracker(), facing([0.3, 0, 0], [0, 0, 1.0]), facing([0.3, 0, 0], [0.4, 0, 1.0])
+    for k in range(5):
+        tracker.update(sight_at(here), k / 30)
+    first = tracker.update(sight_at(there), 5 / 30)
+    assert first.outlier
+    assert first.T_camera_object.translation == pytest.approx(here.translation)
+    for k in range(1, PATIENCE):
+        last = tracker.update(sight_at(there), (5 + k) / 30)
+    assert not last.outlier
+    assert last.T_camera_object.translation == pytest.approx(there.translation)
+
+
+def test_smoothing_steadies_what_stands_still_and_follows_what_moves():
+    rng, tracker, out = np.random.default_rng(1), PoseTracker(), []
+    for k in range(200):
+        T = facing([0.3, 0, 0], np.array([0.0, 0.0, 1.0]) + 3e-4 * rng.standard_normal(3))
+        out.append(tracker.update(sight_at(T), k / 30).T_camera_object.translation)
+    assert np.std(np.array(out)[50:, 2]) < 0.4 * 3e-4
+    for k in range(200, 260):
+        T = facing([0.3, 0, 0], [0.2 * (k - 199) / 30, 0.0, 1.0])
+        last = tracker.update(sight_at(T), k / 30).T_camera_object.translation
+    assert abs(last[0] - 0.2 * 60 / 30) < 0.05
+
+
+def test_times_must_increase():
+    tracker = PoseTracker()
+    tracker.update(sight_at(facing([0.3, 0, 0], [0, 0, 1])), 1.0)
+    with pytest.raises(InputError, match="increase"):
+        tracker.update(sight_at(facing([0.3, 0, 0], [0, 0, 1])), 1.0)
