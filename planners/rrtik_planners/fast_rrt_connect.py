@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.fast.connect import ConnectSearch
 from rrtik_ompl.fast.connect_layout import KERNELS
 from rrtik_ompl.fast.connect_lengths import connect_lengths, positive
@@ -43,7 +43,7 @@ class FastRRTConnect(SafePlanner):
             world: Asked instead of ``si`` whether configurations and motions are free, if given.
             seed: At least 0; drawn from OMPL's if None.
             range: Length of a motion of the trees, at most [unit of the space]; what suits the bounds if None.
-            domain: Radius in which a vertex is extended once it was blocked [unit of the space]; 4 ranges if None.
+            domain: Radius in which a vertex is extended once it was blocked [unit of the space]; as with ``range``.
             max_iterations: Samples at most; without limit if None.
 
         Raises:
@@ -72,6 +72,14 @@ class FastRRTConnect(SafePlanner):
             max_iterations=self.max_iterations,
         )
         return SearchResult(path, kernels.statistics())
+
+    def ends_free(self, rows: Matrix, checker: MotionChecker) -> Mask:
+        """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.ends_free`; the kernels know in a few microseconds."""
+        kernels = self._kernels()
+        if kernels is None or not kernels.proven_free(rows):
+            return super().ends_free(rows, checker)
+        checker.checked_states += len(rows)
+        return np.ones(len(rows), dtype=bool)
 
     @property
     def _lengths(self) -> tuple[float | None, float | None]:

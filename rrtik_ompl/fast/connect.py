@@ -48,7 +48,7 @@ class ConnectSearch:
         steps_per_unit: At least this many steps for each unit of Euclidean length; with zero weights the only rule.
         gain, offset: Joint values are ``gain @ q + offset``, shapes (joints, n) and (joints,); q itself if None.
         range_: See ``range``; what suits the box if None.
-        domain: See ``domain``; some ranges if None.
+        domain: See ``domain``; what suits the box if None.
         patience: Paths that may be rejected until undecided motions are asked for before they are used.
 
     Raises:
@@ -134,6 +134,12 @@ class ConnectSearch:
             raise InputError(f"search: {what} is not in the box of configurations")
         return self._path() if self._run(ask, stop) == layout.SOLVED else None
 
+    def proven_free(self, rows: Matrix) -> bool:
+        """Whether all configurations, shape (k, n), lie in the box and the covers prove them free."""
+        self._require_rows(rows)
+        kept = np.ascontiguousarray(rows, dtype=np.float64)
+        return bool(self._kernels.rows_free(self._address, kept.ctypes.data, len(kept)))
+
     def statistics(self) -> dict[str, int | float]:
         """Counts of the last search.
 
@@ -187,13 +193,16 @@ class ConnectSearch:
         return path[:count]
 
     def _set_roots(self, side: int, rows: Matrix) -> None:
-        if rows.ndim != 2 or rows.shape[1] != self._dof or len(rows) == 0:
-            raise InputError(f"search: expected starts and goals of shape (k, {self._dof}), got {rows.shape}")
+        self._require_rows(rows)
         while len(rows) > len(self._roots[side]):
             self._roots[side] = self._room_for_roots(side, 2 * len(self._roots[side]))
         while len(rows) >= FIRST_CAPACITY and len(rows) >= self._trees[side].header[0]:
             grow(self._trees[side])
         self._roots[side][: len(rows)] = rows
+
+    def _require_rows(self, rows: Matrix) -> None:
+        if rows.ndim != 2 or rows.shape[1] != self._dof or len(rows) == 0:
+            raise InputError(f"search: expected starts and goals of shape (k, {self._dof}), got {rows.shape}")
 
     def _room_for_roots(self, side: int, count: int) -> Matrix:
         rows = np.zeros((count, self._dof))
