@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix
+from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.fast.connect import ConnectSearch
 from rrtik_ompl.fast.connect_layout import KERNELS
 from rrtik_ompl.fast.connect_lengths import connect_lengths, positive
@@ -85,26 +85,27 @@ class FastRRTConnect(SafePlanner):
     def _lengths(self) -> tuple[float | None, float | None]:
         return self.range, self.domain
 
-    def _kernels(self) -> Any:
+    def _kernels(self) -> ConnectSearch | None:
         """The search in kernels for the world and bounds of this solve, or None where the world has no kernels."""
-        world: Any = self._world
-        fast = getattr(world, "fast", None)
+        fast, bounds = getattr(self._world, "fast", None), self.bounds()
+        if self._kept is None or self._kept[0] is not fast or self._kept[1] is not bounds:
+            self._kept = fast, bounds, self._made(fast, *bounds)
+        return self._kept[2]
+
+    def _made(self, fast: Any, lower: Vector, upper: Vector) -> ConnectSearch | None:
         if fast is None or library(KERNELS) is None:
             return None
-        lower, upper = self.bounds()
-        if self._kept is None or self._kept[0] is not fast or self._kept[1] is not lower or self._kept[2] is not upper:
-            robot = world.robot
-            range_, domain = connect_lengths(lower, upper, *self._lengths)
-            made = ConnectSearch(
-                fast,
-                np.maximum(lower, robot.lower),  # the kernels do not know the robot's limits
-                np.minimum(upper, robot.upper),
-                weights=world.weights,
-                resolution=world.motion_resolution,
-                gain=robot.chain.gain,
-                offset=robot.chain.offset,
-                range_=range_,
-                domain=domain,
-            )
-            self._kept = fast, lower, upper, made
-        return self._kept[3]
+        world: Any = self._world
+        robot = world.robot
+        range_, domain = connect_lengths(lower, upper, *self._lengths)
+        return ConnectSearch(
+            fast,
+            np.maximum(lower, robot.lower),  # the kernels do not know the robot's limits
+            np.minimum(upper, robot.upper),
+            weights=world.weights,
+            resolution=world.motion_resolution,
+            gain=robot.chain.gain,
+            offset=robot.chain.offset,
+            range_=range_,
+            domain=domain,
+        )
