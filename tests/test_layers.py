@@ -35,7 +35,8 @@ LADDER = [
     ),
     *("checks", "world", "path", "moves_text", "problem", "one_joint", "ik", "goal_configurations"),
     *("moveit_messages", "motion_bench_maker", "problem_file", "ompl_bridge", "planning", "shortening"),
-    *("trajectory", "plot", "plot_tree", "viewer", "report", "terminal", "motion_commands", "cli", "command"),
+    *("trajectory", "plot", "plot_tree", "viewer", "report", "terminal"),
+    *("motion_commands", "plan_command", "cli", "command"),
 ]
 
 
