@@ -53,9 +53,7 @@ class FastRRTConnect(SafePlanner):
         self.range = None if range is None else positive(range, "range")
         self.domain = None if domain is None else positive(domain, "domain")
         self.max_iterations = iteration_limit(max_iterations)
-        self._kept: tuple[Any, Any, ConnectSearch | None] | None = (
-            None  # the search in kernels and what it was made for
-        )
+        self._kept: tuple[Any, Any, ConnectSearch | None] | None = None  # world, bounds, and the search made for them
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
