@@ -93,13 +93,17 @@ def exact_problem(options: Options, file: Path) -> Problem:
 
 
 def sphere_problem(options: Options, file: Path) -> Problem | None:
-    """A problem with the spheres and obstacles that VAMP uses; None if an end is in collision, as one of 700 is."""
+    """A problem with the spheres and obstacles that VAMP uses; None if an end is in collision, as one of 700 is.
+
+    The spheres are all there is of the arm, as for VAMP: its world is conservative and never asks coal.
+    """
     assert options.folder is not None
     exact = exact_problem(options, file)
     in_box = family(file) == "box"
     obstacles = (Obstacle(o.name, vamp_shape(o.shape, in_box), o.pose) for o in exact.world.scene.obstacles)
     try:
-        return Problem(World(sphere_panda(options.folder), Scene(obstacles)), exact.start, exact.goal, name=exact.name)
+        world = World(sphere_panda(options.folder), Scene(obstacles), accuracy="conservative")
+        return Problem(world, exact.start, exact.goal, name=exact.name)
     except ProblemError:
         return None
 

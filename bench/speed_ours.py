@@ -16,7 +16,7 @@ from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.fast.connect import ConnectSearch
 from rrtik_ompl.goal_configurations import goal_configurations
 from rrtik_ompl.ompl_bridge.attempt import attempt
-from rrtik_ompl.ompl_bridge.setup import Judge, planning_bounds, space_information
+from rrtik_ompl.ompl_bridge.setup import planning_bounds, unjudged_space
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.planning import find_planner, list_planners
 
@@ -51,7 +51,7 @@ def ompl_overhead(problem: Problem, *, seconds: float, seed: int) -> Callable[[]
     if PLANNER not in KERNEL_PLANNERS:
         return None
     goals = goal_configurations(problem, np.random.default_rng(0)).rows
-    setup = og.SimpleSetup(space_information(problem, goals, Judge(problem.world)))
+    setup = og.SimpleSetup(unjudged_space(problem, goals))  # as plan() does: the planner asks the world itself
     states, ends = StateIO(setup.getSpaceInformation()), []
     for row in (problem.start, goals[0]):
         ends.append(setup.getSpaceInformation().allocState())
@@ -98,8 +98,12 @@ def warm_up(problem: Problem) -> None:
 
 
 def _kernel_search(problem: Problem, goals: Matrix, seconds: float, per_radian: float | None) -> Search:
-    """The search object of the kernel planner without OMPL around it; undecided motions are asked as always."""
+    """The search object of the kernel planner without OMPL around it; undecided motions are asked as always.
+
+    In a conservative world they count as colliding.
+    """
     world, starts = problem.world, problem.start[None]
+    ask = None if world.accuracy == "conservative" else world.motion_valid_batch
     chain, (lower, upper) = world.robot.chain, planning_bounds(problem, goals)
     weights = world.weights if per_radian is None else np.zeros(world.robot.dof)
     search = ConnectSearch(
@@ -115,6 +119,6 @@ def _kernel_search(problem: Problem, goals: Matrix, seconds: float, per_radian: 
 
     def solve(seed: int) -> Matrix | None:
         end = time.perf_counter() + seconds
-        return search.solve(starts, goals, seed, ask=world.motion_valid_batch, stop=lambda: time.perf_counter() > end)
+        return search.solve(starts, goals, seed, ask=ask, stop=lambda: time.perf_counter() > end)
 
     return solve

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import sys
-import time
 import warnings
 from contextlib import redirect_stdout
 from enum import Enum
@@ -13,15 +11,16 @@ from typing import Annotated, Any
 
 import typer
 
-from rrtik_ompl.errors import InputError, RrtikError
+from rrtik_ompl.errors import RrtikError
 from rrtik_ompl.fast import announce
 from rrtik_ompl.ik_commands import inverse_kinematics
 from rrtik_ompl.marker_commands import markers
 from rrtik_ompl.motion_commands import list_moves, time_path
 from rrtik_ompl.path_text import FORMATS as PATH_FORMATS
+from rrtik_ompl.plan_command import plan
 from rrtik_ompl.reach_commands import reach
 from rrtik_ompl.reproduce_commands import reproduce
-from rrtik_ompl.terminal import drop_output, note, prepare_streams, progress, say, warn
+from rrtik_ompl.terminal import drop_output, note, prepare_streams, say, warn
 from rrtik_ompl.text_file import check_target
 
 FOUND, NOT_FOUND, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -48,21 +47,6 @@ class Kind(str, Enum):
     ik = "ik"
 
 
-class Shorten(str, Enum):
-    """What `rrtik plan` does to the raw path; `auto` is axis for a path of single-joint moves, if that is better."""
-
-    auto = "auto"
-    axis = "axis"
-    axis_rounds = "axis-rounds"
-    sequential = "sequential"
-    random = "random"
-    shortcut = "shortcut"
-    retraction = "retraction"
-    ompl = "ompl"
-    fewest_moves = "fewest-moves"
-    none = "none"
-
-
 def _print_version(asked: bool) -> None:
     if asked:
         from rrtik_ompl import __version__
@@ -80,51 +64,7 @@ def _options(
     del version
 
 
-@app.command()
-def plan(
-    problem: ProblemName,
-    planner: Annotated[str, typer.Option(help="See: rrtik list planners.")] = "bicrdt",
-    seconds: Annotated[float, typer.Option(help="Time limit [s].")] = 5.0,
-    seed: Annotated[int | None, typer.Option(help="The same seed gives the same path.")] = None,
-    restarts: Annotated[int, typer.Option(help="New attempts at most, if one gives up early.")] = 20,
-    parameter: Annotated[
-        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="An option of the planner; repeatable.")
-    ] = None,
-    shorten: Annotated[Shorten, typer.Option(help="Post-processing.")] = Shorten.auto,
-    out: Annotated[Path | None, typer.Option(help="Save the path: .json, .csv or .txt (OMPL matrix).")] = None,
-    html: HtmlFile = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
-) -> int:
-    """Find a path and print its moves."""
-    check_target(out, PATH_FORMATS)
-    check_target(html, (".html", ".htm"))
-    from rrtik_ompl import load_problem, report
-    from rrtik_ompl.planning import find_planner
-    from rrtik_ompl.planning import plan as find_path
-
-    find_planner(planner)
-    question = load_problem(problem)
-    with progress(f"planning {question.name} with {planner}"):
-        found = find_path(
-            question, planner, seconds=seconds, seed=seed, restarts=restarts, parameters=_parameters(parameter or [])
-        )
-    with progress("shortening"):
-        path, shorten_seconds = _shortened(found.path, question, shorten, found.seed)
-    if path is not None and out is not None:
-        path.save(out)
-    if path is not None and html is not None:
-        from rrtik_ompl.viewer import view
-
-        with progress("drawing"):
-            view(question, path, html=html, before=None if path is found.path else found.path)
-    if as_json:
-        print(json.dumps(report.document(question, found, path, shorten_seconds)))
-    else:
-        say(*report.summary(question, found, path, shorten_seconds))
-        if path is not None:
-            say(report.moves_table(path) if path.one_joint_at_a_time else report.waypoints_table(path))
-        say(*(f"wrote {file}" for file in (out, html) if path is not None and file is not None))
-    return FOUND if found.found else NOT_FOUND
+app.command()(plan)
 
 
 @app.command()
@@ -280,34 +220,6 @@ def _usage(error: Any) -> int:
     context = getattr(error, "ctx", None)
     command = "rrtik" if context is None else context.command_path
     return _fail(f"{' '.join(text.replace('Value error, ', '').split())} (see: {command} --help)")
-
-
-def _shortened(path: Any, problem: Any, method: Shorten, seed: int) -> tuple[Any, float]:
-    from rrtik_ompl.shortening import shorten
-
-    if path is None or method is Shorten.none or len(path.waypoints) < 2:
-        return path, 0.0
-    wanted = Shorten.axis if method is Shorten.auto and path.one_joint_at_a_time else method
-    begin = time.perf_counter()
-    shorter = shorten(path, problem, method=wanted.value, seed=seed)
-    measures = [(p.transitions, p.length) for p in (shorter, path)]
-    if method is Shorten.auto and wanted is Shorten.axis and measures[0] > measures[1]:
-        shorter = path
-    return shorter, time.perf_counter() - begin
-
-
-def _parameters(pairs: list[str]) -> dict[str, Any]:
-    """``--set range=0.5`` as {"range": 0.5}: JSON values, anything else is text."""
-    found = {}
-    for pair in pairs:
-        name, equals, value = pair.partition("=")
-        if not equals or not name:
-            raise InputError(f"--set {pair}: expected NAME=VALUE, for example --set range=0.5")
-        try:
-            found[name] = json.loads(value)
-        except json.JSONDecodeError:
-            found[name] = value
-    return found
 
 
 def _millimetres(distance: float) -> str:

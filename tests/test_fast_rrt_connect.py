@@ -229,6 +229,38 @@ def test_a_tree_that_outgrows_its_memory_goes_on(monkeypatch):
     assert search.statistics()["vertices"] > 32
 
 
+def test_a_path_longer_than_the_memory_for_paths_comes_back_whole(monkeypatch):
+    world = three_joints()
+    wanted = search_in(world, range_=0.05).solve(START, GOAL, 3)
+    monkeypatch.setattr(connect, "FIRST_PATH", 4)
+    search = search_in(world, range_=0.05)
+    for _ in range(2):  # the second time there is room
+        np.testing.assert_array_equal(search.solve(START, GOAL, 3), wanted)
+    assert len(wanted) > 8
+
+
+def test_a_path_stays_as_it_is_when_the_search_goes_on():
+    search = search_in(three_joints())
+    path = search.solve(START, GOAL, 3)
+    kept = path.copy()
+    search.solve(GOAL, START, 4)
+    np.testing.assert_array_equal(path, kept)
+
+
+def test_what_is_proven_free_lies_in_the_box_and_clear_of_everything():
+    world = three_joints()
+    search, coarse = search_in(world), search_in(three_joints(coarse=True))
+    Q = np.random.default_rng(2).uniform(world.robot.lower, world.robot.upper, (300, 3))
+    free = world.valid_batch(Q)
+    proven = np.array([search.proven_free(q[None]) for q in Q])
+    assert 0.9 * free.sum() < proven.sum() <= free.sum()
+    assert free[proven].all()
+    assert free[[coarse.proven_free(q[None]) for q in Q]].all()
+    assert search.proven_free(Q[proven])
+    assert not search.proven_free(np.vstack([Q[proven], Q[~free][:1]]))
+    assert not search.proven_free(START + np.array([0.0, 4.0, 0.0]))
+
+
 def test_steps_by_length_are_an_alternative_rule():
     world = three_joints()
     search = search_in(world, weights=np.zeros(3), steps_per_unit=200.0)
@@ -253,8 +285,8 @@ def test_what_makes_no_sense_is_refused():
         search_in(world, resolution=0.0)
 
 
-def solved_by_planner(world, si=None, seed=5, **options):
-    """The planner in OMPL, its status and the path."""
+def solved_by_planner(world, seed=5, start=START, goals=GOAL, valid=None, **options):
+    """The planner in OMPL, its status and the path; ``valid`` judges states, by default in C++ that all are."""
     space, bounds = ob.RealVectorStateSpace(3), ob.RealVectorBounds(3)
     for k in range(3):
         bounds.setLow(k, float(world.robot.lower[k]))
@@ -262,21 +294,22 @@ def solved_by_planner(world, si=None, seed=5, **options):
     space.setBounds(bounds)
     si = ob.SpaceInformation(space)
     io, state, definition = StateIO(si), si.allocState(), ob.ProblemDefinition(si)
-    si.setStateValidityChecker(lambda s: world.valid(io.read(s)))
+    everything = ob.AllValidStateValidityChecker(si)
+    si.setStateValidityChecker(everything if valid is None else lambda s: bool(valid(io.read(s))))
     si.setup()
-    io.write(state, START[0])
+    io.write(state, start[0])
     definition.addStartState(state)
     goal = ob.GoalStates(si)
-    io.write(state, GOAL[0])
-    goal.addState(state)
+    for row in goals:
+        io.write(state, row)
+        goal.addState(state)
     definition.setGoal(goal)
     planner = FastRRTConnect(si, world=world, seed=seed, **options)
     planner.setProblemDefinition(definition)
     planner.setup()
     status = str(planner.solve(10.0))
     found = definition.getSolutionPath()
-    path = None if found is None else np.array([io.read(found.getState(k)) for k in range(found.getStateCount())])
-    return planner, status, path
+    return planner, status, None if found is None else io.rows(found)
 
 
 @pytest.mark.parametrize("coarse", [False, True])
@@ -287,6 +320,24 @@ def test_the_planner_uses_the_kernels_of_its_world(coarse):
     require_path(world, path, START, GOAL)
     assert planner.statistics["motions"] > 0
     assert planner.statistics["checked_motions"] == planner.statistics["questions"]
+
+
+@pytest.mark.parametrize("coarse", [False, True])
+def test_ends_that_only_the_world_knows_to_collide_are_refused(coarse):
+    world, colliding = three_joints(coarse), rows([0.45, 0.0, 0.0])
+    assert not world.valid(colliding[0])
+    assert solved_by_planner(world, start=colliding)[1] == "Invalid start"
+    assert solved_by_planner(world, goals=colliding)[1] == "Invalid goal"
+    _, status, path = solved_by_planner(world, goals=np.vstack([colliding, GOAL]))
+    assert status == "Exact solution"
+    require_path(world, path, START, GOAL)
+
+
+def test_what_the_owner_of_the_space_refuses_is_refused():
+    world, other = three_joints(), rows([-1.3, 0.1, 0.1])
+    path = solved_by_planner(world, goals=np.vstack([GOAL, other]), valid=lambda q: q[1] != GOAL[0, 1])[2]
+    require_path(world, path, START, other)
+    assert solved_by_planner(world, valid=lambda q: q[0] < 1.0)[1] == "Invalid start"
 
 
 def test_the_planner_asks_nothing_in_a_conservative_world():

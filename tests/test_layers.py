@@ -49,6 +49,7 @@ LADDER = [
         "reproduce",
         "terminal",
         "motion_commands",
+        "plan_command",
         "ik_commands",
         "reach_commands",
         "reproduce_commands",

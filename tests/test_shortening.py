@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.cli import Shorten
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.plan_command import Shorten
 from rrtik_ompl.reproduce import plane_worlds
 from rrtik_ompl.shortening import METHODS, Task
 from rrtik_ompl.shortening.random_cut import random_cut

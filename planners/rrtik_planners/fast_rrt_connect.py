@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.fast.connect import ConnectSearch
 from rrtik_ompl.fast.connect_layout import KERNELS
 from rrtik_ompl.fast.connect_lengths import connect_lengths, positive
@@ -43,7 +43,7 @@ class FastRRTConnect(SafePlanner):
             world: Asked instead of ``si`` whether configurations and motions are free, if given.
             seed: At least 0; drawn from OMPL's if None.
             range: Length of a motion of the trees, at most [unit of the space]; what suits the bounds if None.
-            domain: Radius in which a vertex is extended once it was blocked [unit of the space]; 4 ranges if None.
+            domain: Radius in which a vertex is extended once it was blocked [unit of the space]; as with ``range``.
             max_iterations: Samples at most; without limit if None.
 
         Raises:
@@ -53,7 +53,7 @@ class FastRRTConnect(SafePlanner):
         self.range = None if range is None else positive(range, "range")
         self.domain = None if domain is None else positive(domain, "domain")
         self.max_iterations = iteration_limit(max_iterations)
-        self._kept: Any = None  # the search in kernels and what it was made for
+        self._kept: tuple[Any, Any, ConnectSearch | None] | None = None  # world, bounds, and the search made for them
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
@@ -73,30 +73,39 @@ class FastRRTConnect(SafePlanner):
         )
         return SearchResult(path, kernels.statistics())
 
+    def ends_free(self, rows: Matrix, checker: MotionChecker) -> Mask:
+        """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.ends_free`; the kernels know in a few microseconds."""
+        kernels = self._kernels()
+        if kernels is None or not kernels.proven_free(rows):
+            return super().ends_free(rows, checker)
+        checker.checked_states += len(rows)
+        return np.ones(len(rows), dtype=bool)
+
     @property
     def _lengths(self) -> tuple[float | None, float | None]:
         return self.range, self.domain
 
-    def _kernels(self) -> Any:
+    def _kernels(self) -> ConnectSearch | None:
         """The search in kernels for the world and bounds of this solve, or None where the world has no kernels."""
-        world: Any = self._world
-        fast = getattr(world, "fast", None)
+        fast, bounds = getattr(self._world, "fast", None), self.bounds()
+        if self._kept is None or self._kept[0] is not fast or self._kept[1] is not bounds:
+            self._kept = fast, bounds, self._made(fast, *bounds)
+        return self._kept[2]
+
+    def _made(self, fast: Any, lower: Vector, upper: Vector) -> ConnectSearch | None:
         if fast is None or library(KERNELS) is None:
             return None
-        lower, upper = self.bounds()
-        if self._kept is None or self._kept[0] is not fast or self._kept[1] is not lower or self._kept[2] is not upper:
-            robot = world.robot
-            range_, domain = connect_lengths(lower, upper, *self._lengths)
-            made = ConnectSearch(
-                fast,
-                np.maximum(lower, robot.lower),  # the kernels do not know the robot's limits
-                np.minimum(upper, robot.upper),
-                weights=world.weights,
-                resolution=world.motion_resolution,
-                gain=robot.chain.gain,
-                offset=robot.chain.offset,
-                range_=range_,
-                domain=domain,
-            )
-            self._kept = fast, lower, upper, made
-        return self._kept[3]
+        world: Any = self._world
+        robot = world.robot
+        range_, domain = connect_lengths(lower, upper, *self._lengths)
+        return ConnectSearch(
+            fast,
+            np.maximum(lower, robot.lower),  # the kernels do not know the robot's limits
+            np.minimum(upper, robot.upper),
+            weights=world.weights,
+            resolution=world.motion_resolution,
+            gain=robot.chain.gain,
+            offset=robot.chain.offset,
+            range_=range_,
+            domain=domain,
+        )

@@ -7,12 +7,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from rrtik_ompl.fast import axis_tables as table
 from rrtik_ompl.fast.axis_draws import draw, shuffle, to_front
 from rrtik_ompl.fast.compiled import WIDTH, inlined, kernel
-from rrtik_ompl.fast.kernels import judge_edge
 from rrtik_ompl.fast.lanes import (
     choose,
     double_at,
@@ -27,23 +24,16 @@ from rrtik_ompl.fast.lanes import (
     spread_wide,
     wide_lanes_at,
 )
-from rrtik_ompl.fast.layout import ARM, COLLIDING, FREE, JOINT_COUNT, UNDECIDED
+from rrtik_ompl.fast.layout import COLLIDING, FREE, UNDECIDED
+from rrtik_ompl.fast.motion_kernels import copy_row, judge_motion, travel, whole_steps
 
 FARTHEST = 1e300
-WHOLE_STEP = 1e-9  # a motion this little longer than a number of steps is checked in that number of steps
 
 
 @inlined
 def coordinate(tree: int, vertex: int, axis: int) -> Any:
     """A coordinate of a vertex."""
     return double_at(field(tree, table.COORDINATES), axis * field(tree, table.CAPACITY) + vertex)
-
-
-@inlined
-def copy_row(dof: int, source: int, sink: int) -> None:
-    """Copy the coordinates at an address to another."""
-    for axis in range(dof):
-        set_double(sink, axis, double_at(source, axis))
 
 
 @inlined
@@ -180,35 +170,21 @@ def aim(search: int, tree: int, near: int, exactly: bool) -> None:
         legs += 1
 
 
-@inlined
-def load_values(search: int, row: int, sink: int) -> None:
-    """Joint values of a configuration."""
-    dof = field(search, table.DOF)
-    for joint in range(field(field(field(search, table.WORLD), ARM), JOINT_COUNT)):
-        value = 0.0
-        for axis in range(dof):
-            value += double_at(field(search, table.GAIN), joint * dof + axis) * double_at(row, axis)
-        set_double(sink, joint, value + double_at(field(search, table.OFFSET), joint))
-
-
 @kernel
 def judge(search: int, start: int, end: int) -> int:
     """Judge the motion between two configurations by the same configurations as the world, whatever its direction."""
-    travel, order = 0.0, 0
-    for axis in range(field(search, table.DOF)):
+    dof = field(search, table.DOF)
+    for axis in range(dof):
         a, b = double_at(start, axis), double_at(end, axis)
         least, most = double_at(field(search, table.LEAST), axis), double_at(field(search, table.MOST), axis)
         if min(a, b) < least or max(a, b) > most:
             return COLLIDING
-        if order == 0 and a != b:
-            order = 1 if a < b else -1
-        travel += double_at(field(search, table.WEIGHTS), axis) * abs(b - a)
-    steps = max(1, int(np.ceil(travel / double_at(field(search, table.NUMBERS), table.RESOLUTION) - WHOLE_STEP)))
-    first = field(search, table.VALUES)
-    second = first + 8 * field(field(field(search, table.WORLD), ARM), JOINT_COUNT)
-    load_values(search, start if order >= 0 else end, first)
-    load_values(search, end if order >= 0 else start, second)
-    return judge_edge(field(search, table.WORLD), first, second, steps, field(search, table.ASKS) != 0)
+    way = travel(dof, field(search, table.WEIGHTS), start, end)
+    steps = whole_steps(way / double_at(field(search, table.NUMBERS), table.RESOLUTION))
+    world, gain, offset = field(search, table.WORLD), field(search, table.GAIN), field(search, table.OFFSET)
+    proving = field(search, table.ASKS) != 0
+    answer: int = judge_motion(world, dof, gain, offset, start, end, steps, field(search, table.VALUES), proving)
+    return answer
 
 
 @kernel

@@ -10,9 +10,10 @@ from typing import Any
 
 from rrtik_ompl.fast import axis_tables as table
 from rrtik_ompl.fast.axis_draws import sample
-from rrtik_ompl.fast.axis_growth import aim, coordinate, copy_row, keep, nearest_vertex, open_edges, read_vertex
+from rrtik_ompl.fast.axis_growth import aim, coordinate, keep, nearest_vertex, open_edges, read_vertex
 from rrtik_ompl.fast.compiled import entry, inlined
 from rrtik_ompl.fast.lanes import double_at, field, set_field
+from rrtik_ompl.fast.motion_kernels import copy_row
 
 
 @inlined

@@ -24,6 +24,7 @@ from rrtik_ompl.fast.tree_memory import grow, tree_table
 PATIENCE = 8  # rejected paths until undecided motions are asked for at once
 FIRST_CAPACITY = 64 * WIDTH  # vertices
 FIRST_ROOTS = 16
+FIRST_PATH = 64  # rows
 FIRST_BUDGET, LEAST_BUDGET, MOST_BUDGET = 256, 16, 1 << 20  # motions in one call of the kernel
 CALL_SECONDS = 1e-3  # what a call should take
 NO_LIMIT = 2**62
@@ -48,7 +49,7 @@ class ConnectSearch:
         steps_per_unit: At least this many steps for each unit of Euclidean length; with zero weights the only rule.
         gain, offset: Joint values are ``gain @ q + offset``, shapes (joints, n) and (joints,); q itself if None.
         range_: See ``range``; what suits the box if None.
-        domain: See ``domain``; some ranges if None.
+        domain: See ``domain``; what suits the box if None.
         patience: Paths that may be rejected until undecided motions are asked for before they are used.
 
     Raises:
@@ -92,7 +93,12 @@ class ConnectSearch:
             self._search.header[layout.ROW_VALUES] = self._search.header[layout.ROW]
         self._search.header[layout.PATIENCE] = patience
         self._address = self._search.address
-        self._roots = [self._room_for_roots(side, FIRST_ROOTS) for side in range(2)]
+        self._roots = [np.empty((0, dof)), np.empty((0, dof))]
+        self._places = [0, 0]  # addresses of the roots in memory, which numpy takes a microsecond to tell
+        for side in range(2):
+            self._make_room(side, FIRST_ROOTS)
+        self._path_rows = np.empty((FIRST_PATH, dof))
+        self._path_place = self._path_rows.ctypes.data
         self._questions = 0
 
     def solve(
@@ -133,6 +139,11 @@ class ConnectSearch:
             what = f"start {outside}" if outside < len(starts) else f"goal {outside - len(starts)}"
             raise InputError(f"search: {what} is not in the box of configurations")
         return self._path() if self._run(ask, stop) == layout.SOLVED else None
+
+    def proven_free(self, rows: Matrix) -> bool:
+        """Whether all configurations, shape (k, n), lie in the box and the covers prove them free."""
+        self._set_roots(0, rows)
+        return self._kernels.rows_free(self._address, self._places[0], len(rows)) != 0
 
     def statistics(self) -> dict[str, int | float]:
         """Counts of the last search.
@@ -179,26 +190,26 @@ class ConnectSearch:
             grow(tree)
 
     def _path(self) -> Matrix:
-        path = np.empty((32, self._dof))
-        count = self._kernels.write_path(self._address, path.ctypes.data, len(path))
-        if count > len(path):
-            path = np.empty((count, self._dof))
-            self._kernels.write_path(self._address, path.ctypes.data, count)
-        return path[:count]
+        count = self._kernels.write_path(self._address, self._path_place, len(self._path_rows))
+        if count > len(self._path_rows):
+            self._path_rows = np.empty((2 * count, self._dof))
+            self._path_place = self._path_rows.ctypes.data
+            self._kernels.write_path(self._address, self._path_place, count)
+        return self._path_rows[:count].copy()
 
     def _set_roots(self, side: int, rows: Matrix) -> None:
         if rows.ndim != 2 or rows.shape[1] != self._dof or len(rows) == 0:
             raise InputError(f"search: expected starts and goals of shape (k, {self._dof}), got {rows.shape}")
-        while len(rows) > len(self._roots[side]):
-            self._roots[side] = self._room_for_roots(side, 2 * len(self._roots[side]))
+        if len(rows) > len(self._roots[side]):
+            self._make_room(side, 2 * len(rows))
         while len(rows) >= FIRST_CAPACITY and len(rows) >= self._trees[side].header[0]:
             grow(self._trees[side])
         self._roots[side][: len(rows)] = rows
 
-    def _room_for_roots(self, side: int, count: int) -> Matrix:
-        rows = np.zeros((count, self._dof))
-        self._search.header[layout.START_ROWS + side] = rows.ctypes.data
-        return rows
+    def _make_room(self, side: int, count: int) -> None:
+        self._roots[side] = np.zeros((count, self._dof))
+        self._places[side] = self._roots[side].ctypes.data
+        self._search.header[layout.START_ROWS + side] = self._places[side]
 
 
 _QUESTIONS = (layout.QUESTION_STARTS, layout.QUESTION_ENDS)

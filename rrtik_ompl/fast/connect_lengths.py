@@ -8,7 +8,7 @@ from rrtik_ompl.arrays import Vector, finite_array
 from rrtik_ompl.errors import InputError
 
 RANGE_SHARE = 0.08  # of the diagonal of the box, no joint counted for more than a turn
-DOMAIN_RANGES = 8.0  # half of that rejects so many samples that cages take twice as long
+DOMAIN_SHARE = 6.0**-0.5  # of the diagonal of the box: the root mean square distance of two random configurations
 SMALLEST_RANGE = 1e-9  # where lower and upper bounds coincide
 
 
@@ -27,7 +27,9 @@ def connect_lengths(lower: Vector, upper: Vector, range_: float | None, domain: 
     if range_ is None:
         range_ = max(RANGE_SHARE * float(np.linalg.norm(np.minimum(upper - lower, 2.0 * np.pi))), SMALLEST_RANGE)
     used = positive(range_, "range")
-    return used, positive(DOMAIN_RANGES * used if domain is None else domain, "domain")
+    if domain is None:
+        domain = max(DOMAIN_SHARE * float(np.linalg.norm(upper - lower)), used)
+    return used, positive(domain, "domain")
 
 
 def positive(value: float, what: str) -> float:

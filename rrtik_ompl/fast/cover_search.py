@@ -53,8 +53,8 @@ def smallest_cover(
         surface: Points spread over the surface (``surface_points``).
         limit: Largest number of balls, unless the protrusion ``wanted`` takes more.
         wanted: Protrusion that is good enough; None for the smallest.
-        lenient: Not to count a protrusion that no candidate can save an element: elements that were taken for safety
-            far outside the surface would hide all the others.
+        lenient: Not to count a protrusion that no candidate can save an element: one such element, as an open mesh has
+            at its rim, would end the search with few balls that stick out as far everywhere.
     """
     places = candidates(parts, surface)
     needs = reaches(parts, places.centres) - places.depth[:, None].astype(np.float32)

@@ -15,9 +15,9 @@ import numpy as np
 
 from rrtik_ompl.fast import shortcut_layout as table
 from rrtik_ompl.fast.compiled import entry, inlined, kernel
-from rrtik_ompl.fast.kernels import judge_edge
 from rrtik_ompl.fast.lanes import double_at, field, set_double, set_field
-from rrtik_ompl.fast.layout import ARM, COLLIDING, FREE, JOINT_COUNT, UNDECIDED
+from rrtik_ompl.fast.layout import COLLIDING, FREE, UNDECIDED
+from rrtik_ompl.fast.motion_kernels import copy_row, judge_motion, travel, whole_steps
 from rrtik_ompl.fast.random_kernels import next_share
 
 PULLED_JOINTS = 0.5  # probability that a pull moves a joint
@@ -37,13 +37,6 @@ def end(search: int, number: int) -> int:
     """Address of an end of the shortcut, 0 or 1."""
     address: int = field(search, table.ENDS) + 8 * field(search, table.DOF) * number
     return address
-
-
-@inlined
-def copy(source: int, target: int, count: int) -> None:
-    """Copy numbers from one address to another."""
-    for k in range(count):
-        set_double(target, k, double_at(source, k))
 
 
 @kernel
@@ -102,7 +95,7 @@ def set_end(search: int, number: int, edge: int, share: float) -> None:
     """Place an end of the shortcut, never outside the box between the waypoints around it."""
     a, target = waypoint(search, edge), end(search, number)
     if share == 0.0:
-        copy(a, target, field(search, table.DOF))
+        copy_row(field(search, table.DOF), a, target)
         return
     b = waypoint(search, edge + 1)
     for k in range(field(search, table.DOF)):
@@ -156,47 +149,18 @@ def propose_shortcut(search: int) -> bool:
     return gain
 
 
-@inlined
-def comes_later(search: int, a: int, b: int) -> bool:
-    """Whether configuration a is lexicographically larger than b."""
-    later = False
-    for k in range(field(search, table.DOF)):
-        if double_at(a, k) != double_at(b, k):
-            later = double_at(a, k) > double_at(b, k)
-            break
-    return later
-
-
-@inlined
-def lift(search: int, q: int, values: int) -> None:
-    """Joint values of a configuration."""
-    dof, gain = field(search, table.DOF), field(search, table.GAIN)
-    for joint in range(field(field(field(search, table.WORLD), ARM), JOINT_COUNT)):
-        value = double_at(field(search, table.OFFSET), joint)
-        for k in range(dof):
-            value += double_at(gain, joint * dof + k) * double_at(q, k)
-        set_double(values, joint, value)
-
-
 @kernel
 def judge(search: int, a: int, b: int) -> int:
     """Judge a straight motion; one that is left undecided becomes a question. The same from both sides."""
-    dof, reach = field(search, table.DOF), field(search, table.REACH)
-    travel = 0.0
-    for k in range(dof):
-        travel += double_at(reach, k) * abs(double_at(b, k) - double_at(a, k))
-    steps = max(1, int(np.ceil(travel / double_at(reach, dof) - 1e-9)))
-    if comes_later(search, a, b):
-        a, b = b, a
-    start = field(search, table.VALUES)
-    goal = start + 8 * field(field(field(search, table.WORLD), ARM), JOINT_COUNT)
-    lift(search, a, start)
-    lift(search, b, goal)
-    answer: int = judge_edge(field(search, table.WORLD), start, goal, steps, field(search, table.ASKS) != 0)
+    world, dof, reach = field(search, table.WORLD), field(search, table.DOF), field(search, table.REACH)
+    gain, offset = field(search, table.GAIN), field(search, table.OFFSET)
+    steps = whole_steps(travel(dof, reach, a, b) / double_at(reach, dof))
+    proving = field(search, table.ASKS) != 0
+    answer: int = judge_motion(world, dof, gain, offset, a, b, steps, field(search, table.VALUES), proving)
     if answer == UNDECIDED:
         number = field(search, table.QUESTIONS)
-        copy(a, field(search, table.STARTS) + 8 * dof * number, dof)
-        copy(b, field(search, table.GOALS) + 8 * dof * number, dof)
+        copy_row(dof, a, field(search, table.STARTS) + 8 * dof * number)
+        copy_row(dof, b, field(search, table.GOALS) + 8 * dof * number)
         set_field(search, table.QUESTIONS, number + 1)
     return answer
 
@@ -244,15 +208,15 @@ def take_shortcut(search: int) -> None:
     size = 8 * dof
     route = field(search, table.ROUTE)
     if tail <= kept_from:
-        copy(route + size * kept_from, route + size * tail, moved * dof)
+        copy_row(moved * dof, route + size * kept_from, route + size * tail)
     else:  # it grows: from behind, so that nothing is overwritten before it is moved
         for k in range(moved * dof - 1, -1, -1):
             set_double(route + size * tail, k, double_at(route + size * kept_from, k))
     if cuts & 1:
-        copy(end(search, 0), waypoint(search, put), dof)
+        copy_row(dof, end(search, 0), waypoint(search, put))
         put += 1
     if cuts & 2:
-        copy(end(search, 1), waypoint(search, put), dof)
+        copy_row(dof, end(search, 1), waypoint(search, put))
     set_field(search, table.COUNT, tail + moved)
     measure_route(search, first)
 
@@ -265,7 +229,7 @@ def settle(search: int, free: bool) -> None:
         return
     if field(search, table.CUTS) == table.PULL:
         chosen = field(search, table.FIRST)
-        copy(end(search, 0), waypoint(search, chosen), field(search, table.DOF))
+        copy_row(field(search, table.DOF), end(search, 0), waypoint(search, chosen))
         measure_route(search, chosen - 1)
     else:
         take_shortcut(search)

@@ -20,7 +20,7 @@ from ompl import util as ou
 from rrtik_ompl.arrays import Matrix, finite_array
 from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
-from rrtik_ompl.ompl_bridge.setup import Judge, exact_path, problem_definition, space_information
+from rrtik_ompl.ompl_bridge.setup import Judge, exact_path, problem_definition, space_information, unjudged_space
 from rrtik_ompl.problem import Problem
 
 # Those that go on improving their path until the time is up.
@@ -85,7 +85,7 @@ def attempt(
     with quiet():
         ou.RNG.setSeed(1 + seed % (2**31 - 2))  # before any object that draws from it; OMPL does not take 0
         judge = Judge(problem.world, most_motions=BRIEF_MOTIONS if brief else np.inf)
-        si = space_information(problem, goals, judge)
+        si = unjudged_space(problem, goals) if own else space_information(problem, goals, judge)
         definition = problem_definition(problem, goals, si)
         if own:
             limited = {ITERATION_LIMIT: BRIEF_ITERATIONS, **parameters} if brief else parameters

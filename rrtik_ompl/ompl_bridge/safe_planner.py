@@ -15,10 +15,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 from ompl import base as ob
-from ompl import geometric as og
 from ompl import util as ou
 
-from rrtik_ompl.arrays import Matrix, Vector, frozen
+from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen
 from rrtik_ompl.errors import InputError, PlannerError
 from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker, WorldLike
 from rrtik_ompl.ompl_bridge.states import StateIO, real_vector_space, space_bounds
@@ -89,7 +88,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self.error: str | None = None
         self._world = world
         self._io = StateIO(si)  # holds the space, which knows nothing of planners, so both can be freed
-        self._known_bounds: tuple[Any, Any] = ((), ())
+        self._known_bounds: tuple[Any, Any] = ((), ())  # numbers of the space, and the arrays made from them
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
         """Look for a path from any start to any goal until ``ptc()`` is true. For subclasses.
@@ -126,8 +125,18 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         super().clear()
         self.statistics, self.error = {}, None
 
+    def ends_free(self, rows: Matrix, checker: MotionChecker) -> Mask:
+        """Which starts and goals, shape (m, n), are free, shape (m,). For subclasses that know a faster way to tell."""
+        return checker.valid_batch(rows)
+
     def bounds(self) -> tuple[Vector, Vector]:
-        """Lower and upper bounds of the space, shapes (n,); the same read-only arrays as long as they do not change."""
+        """Lower and upper bounds of the space, shapes (n,), as they were when ``solve`` was last called.
+
+        They are the same read-only arrays as long as they do not change.
+        """
+        return self._known_bounds[1] or self._read_bounds()
+
+    def _read_bounds(self) -> tuple[Vector, Vector]:
         numbers = self._io.bounds()
         if numbers != self._known_bounds[0]:
             lower, upper = space_bounds(self.getSpaceInformation())
@@ -139,7 +148,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         si, pdef = self.getSpaceInformation(), self.getProblemDefinition()
         if pdef is None:
             raise PlannerError(f"{self.getName()}: no problem definition; use SimpleSetup or setProblemDefinition()")
-        self.bounds()  # refuses missing ones in clearer words than OMPL
+        self._read_bounds()  # refuses missing ones in clearer words than OMPL
         checker: MotionChecker = SpaceChecker(si) if self._world is None else WorldChecker(self._world)
         starts, goals = self._inputs(checker, ptc)
         result = self.search(starts, goals, checker, ptc)
@@ -163,7 +172,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
             raise _Refused(ob.PlannerStatus.UNRECOGNIZED_GOAL_TYPE, text)
         goals = self._goals(inputs, io, goal, ptc)
         rows, split = np.array([*starts, *goals]), len(starts)
-        free = checker.valid_batch(rows).tolist()  # all at once: a question costs more than its answer
+        free = self.ends_free(rows, checker).tolist()  # all at once: a question costs more than its answer
         if goals and all(free):
             return rows[:split], rows[split:]
         if not any(free[:split]):
@@ -204,11 +213,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         """Hand the path to OMPL; returns the status."""
         if result.path is None:
             return ob.PlannerStatus.TIMEOUT
-        si, write = self.getSpaceInformation(), self._io.write
-        path, state = og.PathGeometric(si), si.allocState()
-        for row in result.path:
-            write(state, row)
-            path.append(state)  # copies
+        path = self._io.path(self.getSpaceInformation(), result.path)
         approximate = result.difference > 0.0
         self.getProblemDefinition().addSolutionPath(path, approximate, float(result.difference), self.getName())
         return ob.PlannerStatus.APPROXIMATE_SOLUTION if approximate else ob.PlannerStatus.EXACT_SOLUTION

@@ -81,6 +81,27 @@ def planning_bounds(problem: Problem, goals: Matrix) -> tuple[Vector, Vector]:
 
 def space_information(problem: Problem, goals: Matrix, judge: Judge) -> Any:
     """A set-up ``ompl.base.SpaceInformation`` of a RealVectorStateSpace whose checks are the world's."""
+    si = _bounded(problem, goals)
+    states = StateIO(si)
+    si.setStateValidityChecker(lambda state: judge.valid(states.read(state)))
+    si.setMotionValidator(_Motions(si, judge, StateIO(si)))
+    si.setup()
+    return si
+
+
+def unjudged_space(problem: Problem, goals: Matrix) -> Any:
+    """As :func:`space_information`, but nothing is checked: for planners that ask the world themselves.
+
+    OMPL asks about each start and goal that it hands out, and a question to Python costs more than some searches.
+    """
+    si = _bounded(problem, goals)
+    si.setStateValidityChecker(ob.AllValidStateValidityChecker(si))
+    si.setup()
+    return si
+
+
+def _bounded(problem: Problem, goals: Matrix) -> Any:
+    """A SpaceInformation whose space has the bounds of a problem."""
     lower, upper = planning_bounds(problem, goals)
     space = ob.RealVectorStateSpace(len(lower))
     bounds = ob.RealVectorBounds(len(lower))
@@ -88,12 +109,7 @@ def space_information(problem: Problem, goals: Matrix, judge: Judge) -> Any:
         bounds.setLow(k, float(lower[k]))
         bounds.setHigh(k, float(upper[k]))
     space.setBounds(bounds)
-    si = ob.SpaceInformation(space)
-    states = StateIO(si)
-    si.setStateValidityChecker(lambda state: judge.valid(states.read(state)))
-    si.setMotionValidator(_Motions(si, judge, StateIO(si)))
-    si.setup()
-    return si
+    return ob.SpaceInformation(space)
 
 
 def problem_definition(problem: Problem, goals: Matrix, si: Any) -> Any:
@@ -114,5 +130,4 @@ def exact_path(definition: Any, si: Any) -> Matrix | None:
     if not definition.hasExactSolution():
         return None
     found = definition.getSolutionPath()  # shared ownership: safe to keep while it is copied
-    states = StateIO(si)
-    return np.array([states.read(found.getState(k)) for k in range(found.getStateCount())])
+    return StateIO(si).rows(found)

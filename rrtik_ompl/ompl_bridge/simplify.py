@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 
-import numpy as np
 from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
@@ -36,13 +35,10 @@ def simplified(problem: Problem, route: Matrix, *, seconds: float, seed: int) ->
         judge.deadline = time.monotonic() + min(seconds, ENDLESS)
         condition = ob.timedPlannerTerminationCondition(min(seconds, ENDLESS))
         judge.stop = condition.terminate
-        states, state, path = StateIO(si), si.allocState(), og.PathGeometric(si)
-        for row in route:
-            states.write(state, row)
-            path.append(state)
+        states = StateIO(si)
+        path = states.path(si, route)
         with interrupt_ends(condition):
             og.PathSimplifier(si).simplify(path, condition, True)
         if judge.error is not None:
             raise PlannerError(f"PathSimplifier broke: {str(judge.error).splitlines()[-1]}")
-        rows = np.array([states.read(path.getState(k)) for k in range(path.getStateCount())])
-        return rows, judge.motions
+        return states.rows(path), judge.motions

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 from ompl import base as ob
+from ompl import geometric as og
 
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.errors import InputError
 
 
@@ -81,6 +82,19 @@ class StateIO:
             return
         self._buffer[:] = q
         self._space.deserialize(state, self._capsule)
+
+    def path(self, si: Any, rows: Matrix) -> Any:
+        """Rows, shape (k, n), as an ``ompl.geometric.PathGeometric``."""
+        path, state = og.PathGeometric(si), si.allocState()
+        append = path.append  # copies
+        for row in rows:
+            self.write(state, row)
+            append(state)
+        return path
+
+    def rows(self, path: Any) -> Matrix:
+        """The states of a PathGeometric as rows, shape (k, n)."""
+        return np.array([self.read(path.getState(k)) for k in range(path.getStateCount())])
 
     def _capsule_works(self, si: Any) -> bool:
         state, probe = si.allocState(), np.arange(1.0, self.dof + 1.0)
