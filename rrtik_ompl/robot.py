@@ -216,9 +216,16 @@ class Robot:
 
     def jacobian_batch(self, Q: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
         """Geometric Jacobians of a batch, as :meth:`jacobian`, for Q of shape (m, dof). Shape (m, 6, dof)."""
+        return self.fk_jacobian_batch(Q, frame)[1]
+
+    def fk_jacobian_batch(
+        self, Q: ArrayLike, frame: str | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """:meth:`fk_batch` and :meth:`jacobian_batch` at once, shapes (m, 4, 4) and (m, 6, dof)."""
         target = self.model.frames[self._frame_id(frame)]
         frames = self.joint_frames(Q)
-        point = (frames[:, target.parentJoint] @ target.placement.homogeneous)[:, :3, 3]
+        poses = frames[:, target.parentJoint] @ target.placement.homogeneous
+        point = poses[:, :3, 3]
         columns = np.zeros((len(frames), 6, len(self.chain.parent)))
         joint = target.parentJoint - 1
         while joint >= 0:  # only the joints between the base and the frame move it
@@ -230,7 +237,7 @@ class Robot:
                 columns[:, 3:, joint] = axis
             joint = int(self.chain.parent[joint])
         product: NDArray[np.float64] = columns @ self.chain.gain
-        return product
+        return poses, product
 
     def _rows(self, Q: ArrayLike) -> Matrix:
         """One configuration or several as rows, shape (m, dof)."""
