@@ -233,7 +233,7 @@ class Robot:
             if self.chain.prismatic[joint]:
                 columns[:, :3, joint] = axis
             else:
-                columns[:, :3, joint] = np.cross(axis, point - frames[:, joint + 1, :3, 3])
+                columns[:, :3, joint] = _cross(axis, point - frames[:, joint + 1, :3, 3])
                 columns[:, 3:, joint] = axis
             joint = int(self.chain.parent[joint])
         product: NDArray[np.float64] = columns @ self.chain.gain
@@ -251,6 +251,13 @@ class Robot:
         if not self.model.existFrame(name):
             raise UnknownNameError(f"frame of robot '{self.name}'", name, (f.name for f in self.model.frames))
         return int(self.model.getFrameId(name))
+
+
+def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Cross products of rows, shape (m, 3); numpy's own is some five times slower for few rows."""
+    product = a[:, [1, 2, 0]] * b[:, [2, 0, 1]]
+    product -= a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
+    return product
 
 
 def _joint_motion(axis: Vector, prismatic: bool, values: Vector) -> NDArray[np.float64]:

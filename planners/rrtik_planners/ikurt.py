@@ -71,10 +71,10 @@ class IKURT(TipSeeker):
         metric = self._metric(goals)
         judge = Judge(checker.valid_batch, checker.motion_valid_batch, ptc)
         search = BatchedSearch(metric, self.options, *self.bounds(), judge, self.rng, starts)
-        vertex = search.run()
+        path = search.run()
         counts = {"connects": search.connects, "restarts": search.restarts, "vertices": search.vertices}
-        result = self.result(metric, search.tree, vertex, counts, checker)
-        if vertex is None and isinstance(metric, TipMetric):
+        result = self.result(metric, search.tree, path, counts, checker)
+        if path is None and isinstance(metric, TipMetric):
             return replace(result, reason=self._why(metric, search))
         return result
 

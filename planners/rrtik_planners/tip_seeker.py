@@ -44,19 +44,19 @@ class TipSeeker(SafePlanner):
         self,
         metric: TipMetric | ConfigurationMetric,
         tree: Tree,
-        vertex: int | None,
+        found: Matrix | None,
         counts: dict[str, int],
         checker: MotionChecker,
     ) -> SearchResult:
-        """The way to a vertex at the goal, else to the one nearest to it; with the error of the tip there."""
-        end = int(tree.distance.argmin()) if vertex is None else vertex
-        path, exact, tip = tree.branch(end), vertex is not None, {}
+        """The path found, else that to the vertex nearest to the goal; with the error of the tip at its end."""
+        nearest = int(tree.distance.argmin())
+        path, exact, tip = tree.branch(nearest) if found is None else found, found is not None, {}
         if isinstance(metric, TipMetric):
             away, angle = metric.errors(path[-1])
             tip = {"position_error": float(away), "orientation_error": float(angle)}
         elif exact:
             path, exact = _ended(path, metric.goals, checker)
-        difference = 0.0 if exact else max(float(tree.distance[end]), LEAST_DIFFERENCE)
+        difference = 0.0 if exact else max(float(tree.distance[nearest]), LEAST_DIFFERENCE)
         return SearchResult(path, {**counts, "metric_evaluations": metric.evaluations, **tip}, difference)
 
 

@@ -10,6 +10,7 @@ yet reached keep drawing the exploration towards them.
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import count
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,15 +22,20 @@ from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
 from rrtik_ompl.ik.ikurt.tree import Tree
 
 DIRECTIONS = 16  # that CONNECT tries at once
-MISSES = 6  # rounds of them without a better free one, after which CONNECT gives up
+PATIENCE, FALL = 8, 0.8  # CONNECT goes on as long as so many rounds bring the distance down to this share,
+SLOW_FALL = 0.97  # or to this one where there is no other way to the goal
 GROWN, SHRUNK, SHORTEST = 1.5, 0.7, 1e-4  # of CONNECT's step after a success and a miss, and its smallest [rad]
 CHECKED = 4  # of the better directions, nearest to the goal first, whose motions are checked together
+NEARER = 0.5  # a new descent from the way of CONNECT when the distance has fallen to this share
+MOST_EXPLORED = 256  # batches of exploration between two CONNECTs; one after the first, then always twice as many,
+FEW_EXPLORED = 4  # but no more than these as long as CONNECT alone can reach the goal
 SAMPLES = 24  # of one batch of exploration
 LENGTHS = (1.0, 0.5, 0.2)  # shares of the exploration's step that are tried together
-TOWARDS_GOALS = 0.4  # share of the samples that are known goal configurations
-DESCENTS = 4  # of a batch of exploration
-MOST_GOALS = 32  # goal configurations kept
-NEARER = 0.5  # a new descent from the way of CONNECT when the distance has fallen to this share
+TOWARDS_OTHER = 0.5  # share of the samples that are the newest vertices of the other tree
+DESCENTS = 2  # from vertices of a batch of exploration,
+SCOUTS = 22  # and from samples anywhere, for other goal configurations
+RARE = 32  # once a goal configuration is known, descents follow one batch in so many
+MOST_GOALS = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +57,7 @@ class Options:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judge:
-    """What the search asks: which configurations are free; which motions are; whether to stop."""
+    """What the search asks: which configurations are free; which straight motions are; whether to stop."""
 
     free: Callable[[Matrix], Mask]
     motions_free: Callable[[Matrix, Matrix], Mask]
@@ -70,8 +76,8 @@ class BatchedSearch:
         starts: Roots, shape (k, n).
 
     Attributes:
-        tree: The tree, the last one after restarts.
-        goals: Free goal configurations known so far, shape (k, n).
+        tree: The tree from the start, the last one after restarts.
+        back: The tree from goal configurations that are known.
         blocked: One in collision, if any was met, shape (0 or 1, n).
         nearest: The configuration nearest to the goal that was seen, in collision or not, shape (n,).
         connects, restarts, vertices: Counts.
@@ -87,54 +93,70 @@ class BatchedSearch:
         rng: np.random.Generator,
         starts: Matrix,
     ) -> None:
-        self._metric, self._options, self._radius, self._lower, self._upper = metric, options, metric.radius, lower, upper
+        self._metric, self._options, self._lower, self._upper = metric, options, lower, upper
         self._judge, self._rng, self._starts = judge, rng, starts
         self._distances = metric.distance(starts)
+        self._goals = metric.goals if isinstance(metric, ConfigurationMetric) else starts[:0]
         self.tree = Tree(starts, self._distances)
-        self.goals = metric.goals if isinstance(metric, ConfigurationMetric) else starts[:0]
-        self.blocked = starts[:0]
+        self.back = Tree(self._goals, np.zeros(len(self._goals)))
+        self._newest, self._batches = starts[:0], 0
         self.connects = self.restarts = self._dropped = 0
+        self.blocked = starts[:0]
         self.nearest, self._least = starts[self._distances.argmin()], float(self._distances.min())
 
     @property
     def vertices(self) -> int:
         """Vertices of all trees."""
-        return self.tree.size + self._dropped
+        return self.tree.size + self.back.size + self._dropped
 
-    def run(self) -> int | None:
-        """The vertex at the goal, or None if the time was up first."""
-        if self._least <= self._radius:
-            return int(self._distances.argmin())
+    @property
+    def goals(self) -> Matrix:
+        """Free goal configurations known so far, shape (k, n)."""
+        return self._goals
+
+    def run(self) -> Matrix | None:
+        """The path to the goal, shape (k, n), or None if the time was up first."""
+        if self._least <= self._metric.radius:
+            return self.tree.branch(int(self._distances.argmin()))
+        explored = 1
         while not self._judge.stop():
-            found = self._connect(self.tree.best())
-            if found is None:
-                found = self._explore()
-            if found is not None:
-                return found
+            path = self._connect(self.tree.best())
+            for _ in range(explored):
+                if path is not None or self._judge.stop():
+                    break
+                path = self._explore()
+            if path is not None:
+                return path
+            explored = min(2 * explored, MOST_EXPLORED if self.back.size else FEW_EXPLORED)
             if self.tree.size > self._options.most_vertices:
                 self._restart()
+                explored = 1
         return None
 
-    def _connect(self, first: int) -> int | None:
-        """From one vertex down the metric; the vertex at the goal, or None at the end of the patience."""
+    def _connect(self, first: int) -> Matrix | None:
+        """From one vertex down the metric; the path to the goal, or None at the end of the patience."""
         self.connects += 1
-        vertex, step, misses = first, self._options.step, 0
-        found, tried_at = self._finish(np.array([vertex])), self.tree.distance[vertex]
-        while found is None and misses < MISSES and not self._judge.stop():
+        vertex, step = first, self._options.step
+        path = self._finish(np.array([vertex]))
+        tried_at = before = self.tree.distance[vertex]
+        for number in count(1):
+            if path is not None or self._judge.stop():
+                return path
             lower = self._downhill(vertex, step)
-            misses = misses + 1 if lower is None else 0
             step = max(step * (SHRUNK if lower is None else GROWN), SHORTEST)
-            if lower is None:
-                continue
-            vertex = lower
-            arrived = self.tree.distance[vertex] <= self._radius
-            if arrived or self.tree.distance[vertex] < NEARER * tried_at:
-                found, tried_at = self._finish(np.array([vertex])), self.tree.distance[vertex]
-            if arrived:
-                return vertex if found is None else found
-        if found is None:
-            self.tree.penalise(first, vertex)
-        return found
+            vertex = vertex if lower is None else lower
+            away = self.tree.distance[vertex]
+            if away <= self._metric.radius:
+                path = self._finish(np.array([vertex]))
+                return self.tree.branch(vertex) if path is None else path
+            if away < NEARER * tried_at:
+                path, tried_at = self._finish(np.array([vertex])), away
+            if number % PATIENCE == 0:
+                if away > (FALL if self._options.jacobian else SLOW_FALL) * before:
+                    break
+                before = away
+        self.tree.penalise(first, vertex)
+        return path
 
     def _downhill(self, vertex: int, step: float) -> int | None:
         """The best of some free steps that lower the distance, as a new vertex."""
@@ -145,34 +167,44 @@ class BatchedSearch:
         distances = self._metric.distance(candidates)
         order = np.argsort(distances)[:CHECKED]
         order = order[distances[order] < self.tree.distance[vertex]]
-        if len(order) == 0:
-            return None
         free = self._judge.motions_free(np.broadcast_to(q, (len(order), len(q))), candidates[order])
         if not free.any():
             return None
         k = order[free.argmax()]
         return int(self.tree.add(candidates[k : k + 1], np.array([vertex]), distances[k : k + 1])[0])
 
-    def _explore(self) -> int | None:
-        """A batch of steps of a plain RRT, some towards known goal configurations, and from what it adds to the goal."""
+    def _explore(self) -> Matrix | None:
+        """A batch of steps of the trees, in turn; from what it adds straight to the other tree, or down to the goal."""
+        self._batches += 1
+        forward = self.back.size == 0 or self._batches % 2 == 0
+        tree, other = (self.tree, self.back) if forward else (self.back, self.tree)
+        new = self._grow(tree)
+        if len(new) == 0:
+            return None
+        self._newest = tree.q[new]
+        path = self._join(tree, new, other) if other.size else None
+        if path is not None:
+            return path if forward else path[::-1]
+        if forward and (len(self._goals) == 0 or self._batches % RARE == 0):
+            return self._finish(self._worth_it(new), scouts=SCOUTS)
+        return None
+
+    def _grow(self, tree: Tree) -> NDArray[np.int64]:
+        """Steps of a plain RRT, many at once; the new vertices."""
         samples = self._rng.uniform(self._lower, self._upper, (SAMPLES, len(self._lower)))
-        if len(self.goals):
-            drawn = int(TOWARDS_GOALS * SAMPLES)
-            samples[:drawn] = self.goals[self._rng.integers(len(self.goals), size=drawn)]
-        near = self.tree.nearest(samples)
-        origin = self.tree.q[near]
+        drawn = min(int(TOWARDS_OTHER * SAMPLES), len(self._newest)) if self.back.size else 0
+        samples[:drawn] = self._newest[:drawn]
+        near = tree.nearest(samples)
+        origin = tree.q[near]
         away = samples - origin
         length = np.linalg.norm(away, axis=1)
         share = np.minimum(1.0, self._options.stride / np.maximum(length, 1e-12))
-        ends = np.concatenate([origin + away * (share * part)[:, None] for part in LENGTHS])
-        free = self._judge.motions_free(np.tile(origin, (len(LENGTHS), 1)), ends).reshape(len(LENGTHS), -1)
-        grown = np.flatnonzero(free.any(axis=0) & (length > 0.0))
-        if len(grown) == 0:
-            return None
-        q = ends[free.argmax(axis=0)[grown] * SAMPLES + grown]
-        new = self.tree.add(q, near[grown], self._metric.distance(q))
-        direct = self._reach_known(new)
-        return direct if direct is not None else self._finish(self._worth_it(new))
+        ends = np.stack([origin + away * (share * part)[:, None] for part in LENGTHS])
+        free = self._judge.motions_free(np.tile(origin, (len(LENGTHS), 1)), ends.reshape(-1, len(self._lower)))
+        free = free.reshape(len(LENGTHS), SAMPLES) & (length > 0.0)
+        grown = np.flatnonzero(free.any(axis=0))
+        q = ends[free.argmax(axis=0)[grown], grown]
+        return tree.add(q, near[grown], self._metric.distance(q))
 
     def _worth_it(self, new: NDArray[np.int64]) -> NDArray[np.int64]:
         """Of new vertices those from which to descend: the nearest one in the workspace, and others by chance."""
@@ -180,43 +212,51 @@ class BatchedSearch:
         others = self._rng.choice(new, min(DESCENTS - 1, len(new)), replace=False)
         return np.unique(np.append(others, nearest))
 
-    def _reach_known(self, new: NDArray[np.int64]) -> int | None:
-        """Straight from new vertices to the known goal configuration nearest to each."""
-        if len(self.goals) == 0:
+    def _finish(self, vertices: NDArray[np.int64], scouts: int = 0) -> Matrix | None:
+        """Descend from vertices, shape (k,), and go straight to what that finds; descend from some samples too."""
+        if isinstance(self._metric, ConfigurationMetric):
+            return self._join(self.tree, vertices, self.back)
+        if not self._options.jacobian:
             return None
-        square = np.einsum("ij,ij->i", self.goals, self.goals)
-        goals = self.goals[(square - 2.0 * self.tree.q[new] @ self.goals.T).argmin(axis=1)]
-        return self._straight(new, goals)
-
-    def _finish(self, vertices: NDArray[np.int64]) -> int | None:
-        """Descend from vertices, shape (k,), and go straight to what that finds."""
-        if not self._options.jacobian or isinstance(self._metric, ConfigurationMetric):
-            return self._reach_known(vertices)
-        ends = descend(self._metric, self.tree.q[vertices], self._lower, self._upper)
+        samples = self._rng.uniform(self._lower, self._upper, (scouts, len(self._lower)))
+        origins = np.vstack([self.tree.q[vertices], samples])
+        ends = descend(self._metric, origins, self._lower, self._upper)
         if ends.distance.min() < self._least:
             self.nearest, self._least = ends.q[ends.distance.argmin()], float(ends.distance.min())
-        arrived = ends.distance <= self._radius
-        if not arrived.any():
-            return None
-        found = self._straight(vertices[arrived], ends.q[arrived])
-        if found is None:
+        arrived = ends.distance <= self._metric.radius
+        near = arrived[: len(vertices)]
+        path = self._straight(vertices[near], ends.q[: len(vertices)][near])
+        if path is None and arrived.any():
             self._remember(ends.q[arrived])
-        return found
+        return path
 
-    def _straight(self, vertices: NDArray[np.int64], goals: Matrix) -> int | None:
-        """The first free motion from vertices to goal configurations, as a new vertex."""
+    def _join(self, tree: Tree, vertices: NDArray[np.int64], other: Tree) -> Matrix | None:
+        """The path from the root of one tree to that of the other over the first free motion between two vertices."""
+        near = other.nearest(tree.q[vertices])
+        free = self._judge.motions_free(tree.q[vertices], other.q[near])
+        if not free.any():
+            return None
+        k = int(free.argmax())
+        return np.vstack([tree.branch(int(vertices[k])), other.branch(int(near[k]))[::-1]])
+
+    def _straight(self, vertices: NDArray[np.int64], goals: Matrix) -> Matrix | None:
+        """The path over the first free motion from vertices to goal configurations."""
         free = self._judge.motions_free(self.tree.q[vertices], goals)
         if not free.any():
             return None
         k = int(free.argmax())
-        return int(self.tree.add(goals[k : k + 1], vertices[k : k + 1], self._metric.distance(goals[k : k + 1]))[0])
+        return np.vstack([self.tree.branch(int(vertices[k])), goals[k]])
 
     def _remember(self, q: Matrix) -> None:
+        """Free goal configurations become roots of the tree at the goal."""
         free = self._judge.free(q)
-        self.goals = np.vstack([self.goals, q[free]])[-MOST_GOALS:]
         self.blocked = np.vstack([self.blocked, q[~free]])[:1]
+        if len(self._goals) < MOST_GOALS and free.any():
+            self._goals = np.vstack([self._goals, q[free]])
+            self.back.add(q[free], np.full(int(free.sum()), -1), np.zeros(int(free.sum())))
 
     def _restart(self) -> None:
-        self._dropped += self.tree.size
+        self._dropped += self.tree.size + self.back.size
         self.restarts += 1
         self.tree = Tree(self._starts, self._distances)
+        self.back = Tree(self._goals, np.zeros(len(self._goals)))
