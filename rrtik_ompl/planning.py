@@ -33,7 +33,12 @@ RESTARTS = 20
 MAX_RESTARTS = 1_000_000
 SHORTEST = 1e-3  # [s] that an attempt gets at least
 MAX_SECONDS = 1e9  # thirty years; OMPL's clock overflows at about nine times as much
-OF_THE_PATH = ("lower_bound", "gap", "position_error", "orientation_error")  # what planners count of a path, not of their work
+OF_THE_PATH = (
+    "lower_bound",
+    "gap",
+    "position_error",
+    "orientation_error",
+)  # what planners count of a path, not of their work
 _OMPL_PREFIX, _MOVEIT_SUFFIX = "geometric::", "kConfigDefault"  # as in ompl_planning.yaml
 
 

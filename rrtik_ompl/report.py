@@ -90,6 +90,9 @@ def summary(problem: Problem, plan: Plan, path: JointPath | None, shorten_second
     else:
         size = f"{len(path.waypoints)} waypoints, length {path.length:.2f} {path.unit}"
         lines.append(f"{size}, several joints move at once")
+    if "position_error" in plan.statistics:
+        away, angle = plan.statistics["position_error"], np.degrees(plan.statistics["orientation_error"])
+        lines.append(f"the tip ends {away:.2g} m and {angle:.2g} deg from the goal")
     step = problem.world.motion_resolution / SECOND_CHECK
     lines.append(
         f"planning {plan.seconds:.3f} s, shortening {shorten_seconds:.3f} s; checked again every {step:g} m: valid"

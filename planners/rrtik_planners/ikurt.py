@@ -22,7 +22,7 @@ class IKURT(TipSeeker):
     :class:`rrtik_planners.ikurt_published.IKURTPublished` is the algorithm to the letter. Where the goals are
     configurations, as in plain OMPL, the distance is that in joint space.
 
-    ``statistics`` tells the error of the tip at the end of the path: ``position_error`` [m], ``orientation_error`` [rad].
+    ``statistics`` tells how far from the goal the tip ends: ``position_error`` [m], ``orientation_error`` [rad].
     """
 
     def __init__(
@@ -62,9 +62,7 @@ class IKURT(TipSeeker):
         if not isinstance(jacobian, bool):
             raise InputError(f"jacobian: expected true or false, got {jacobian!r}")
         self.options = Options(positive(step, "step"), positive(stride, "stride"), jacobian, most_vertices)
-        self.metres_per_radian = (
-            None if metres_per_radian is None else positive(metres_per_radian, "metres_per_radian")
-        )
+        self.metres_per_radian = None if metres_per_radian is None else positive(metres_per_radian, "metres_per_radian")
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
@@ -90,4 +88,6 @@ class IKURT(TipSeeker):
         if len(search.blocked) and isinstance(self._world, World):
             what = self._world.explain(search.blocked[0]) or "outside the bounds"
             return f"all configurations found at the goal are in collision: for instance {what}"
-        return f"no configuration found at the goal, is it in reach? {misses(metric, search.nearest, 'the nearest one')}"
+        return (
+            f"no configuration found at the goal, is it in reach? {misses(metric, search.nearest, 'the nearest one')}"
+        )

@@ -71,7 +71,9 @@ class IKURTPublished(TipSeeker):
         search = PublishedSearch(metric, steps, *self.bounds(), checker.motion_valid, ptc, self.rng, start)
         vertex = search.run()
         counts = {"connects": search.connects, "vertices": search.tree.size}
-        result = self.result(metric, search.tree, None if vertex is None else search.tree.branch(vertex), counts, checker)
+        result = self.result(
+            metric, search.tree, None if vertex is None else search.tree.branch(vertex), counts, checker
+        )
         if vertex is None and isinstance(metric, TipMetric):
             nearest = search.tree.q[search.tree.distance.argmin()]
             return replace(result, reason=f"the goal was not reached; {misses(metric, nearest, 'the nearest vertex')}")

@@ -8,7 +8,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, finite_array
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import Goal, JointGoal
+from rrtik_ompl.goal import Goal, JointGoal, PoseGoal
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
 from rrtik_ompl.ik.ikurt.tree import Tree
 from rrtik_ompl.ik.numeric import targets
@@ -75,7 +75,7 @@ def positive(value: float, what: str) -> float:
 def misses(metric: TipMetric, q: Any, what: str) -> str:
     """A line that says by how much a configuration misses the goal."""
     away, angle = metric.errors(q)
-    turned = "" if metric.metres_per_radian == 0.0 else f" and {np.degrees(angle):.3g} deg"
+    turned = f" and {np.degrees(angle):.3g} deg" if any(isinstance(t, PoseGoal) for t in metric.targets) else ""
     return f"{what} misses it by {away:.4g} m{turned}"
 
 

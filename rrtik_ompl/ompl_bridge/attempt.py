@@ -46,7 +46,7 @@ PlannerFactory = Callable[..., Any]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Attempt:
-    """What came out: rows of the path, shape (k, n), or None; OMPL's status in words; plain counts; what it says of it."""
+    """What came out: rows of the path, shape (k, n), or None; OMPL's status in words; plain counts; a reason if any."""
 
     rows: Matrix | None
     status: str
@@ -72,8 +72,9 @@ def attempt(
 ) -> Attempt:
     """Let a planner work for at most ``seconds`` from the start of a problem to any of ``goals``, shape (k, n).
 
-    There may be none if the planner :func:`finds_goals`. PRM and PRMstar aim at the first goal alone. A brief attempt (see :func:`can_be_brief`) ends after a number of
-    iterations or questions, so that what it finds does not depend on the computer's speed.
+    There may be none if the planner :func:`finds_goals`. PRM and PRMstar aim at the first one alone. A brief attempt
+    (see :func:`can_be_brief`) ends after a number of iterations or questions, so that what it finds does not depend on
+    the computer's speed.
 
     Raises:
         InputError: If the planner does not take a parameter.

@@ -38,15 +38,14 @@ def descend(metric: TipMetric, Q: Matrix, lower: Vector, upper: Vector, *, itera
     for step in range(iterations):
         metric.evaluations += len(rows)
         tips, J = metric.robot.fk_jacobian_batch(q)
-        distance = metric.of_tips(tips)
+        e, distance = metric.pull(tips)
         better = distance < best_distance[rows]
         best[rows[better]], best_distance[rows[better]] = q[better], distance[better]
         going = (distance > ACCURACY * length) & (best_distance[rows] < FALLS * history[step % STALE, rows])
         history[step % STALE, rows] = best_distance[rows]
         if not going.any():
             break
-        rows, q, J = rows[going], q[going], J[going]
-        e = metric.pull(tips[going]) / length
+        rows, q, J, e = rows[going], q[going], J[going], e[going] / length
         q = _stepped(q, J * (metric.scale / length)[:, None], e, lower, upper)
     return Descent(best, best_distance)
 

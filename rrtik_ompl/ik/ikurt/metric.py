@@ -29,13 +29,11 @@ class Metric(Protocol):
 
     Attributes:
         evaluations: Configurations so far.
+        radius: Distance within which the goal counts as reached, whichever way the error lies.
     """
 
     evaluations: int
-
-    @property
-    def radius(self) -> float:
-        """Distance within which the goal counts as reached, whichever way the error lies."""
+    radius: float
 
     def distance(self, Q: Matrix) -> Vector:
         """Of each row of Q, shape (m, n), from the goal; shape (m,)."""
@@ -50,6 +48,8 @@ class TipMetric:
         metres_per_radian: Weight of the rotation angle; 0 where the targets are positions.
         unit: What a metre counts; 1 makes it a distance in metres.
         evaluations: Forward kinematics so far.
+        radius: See :class:`Metric`; from the tolerances of the targets.
+        scale: What a metre and a radian count in the metric, shape (6,).
     """
 
     def __init__(
@@ -59,6 +59,8 @@ class TipMetric:
         self.metres_per_radian = reach(robot) / (2.0 * np.pi) * REACH_PER_TURN
         if metres_per_radian is not None:
             self.metres_per_radian = metres_per_radian
+        self.scale = unit * np.array([1.0] * 3 + [self.metres_per_radian] * 3)
+        self.radius = INSIDE * unit * min(_radius(target, self.metres_per_radian) for target in targets)
         self.evaluations = 0
 
     @classmethod
@@ -78,33 +80,19 @@ class TipMetric:
     def distance(self, Q: Matrix) -> Vector:
         """Of the tip at each row of Q, shape (m, n), from the nearest target; shape (m,)."""
         self.evaluations += len(Q)
-        return self.of_tips(self.robot.fk_batch(Q))
+        return self._each(self.robot.fk_batch(Q)).min(axis=0)  # type: ignore[no-any-return]
 
-    def of_tips(self, tips: NDArray[np.float64]) -> Vector:
-        """Of poses of the tip, shape (m, 4, 4), from the nearest target; shape (m,)."""
-        return self._each(tips).min(axis=0)  # type: ignore[no-any-return]
+    def pull(self, tips: NDArray[np.float64]) -> tuple[Matrix, Vector]:
+        """Where tips, shape (m, 4, 4), would have to go, and how far.
 
-    def pull(self, tips: NDArray[np.float64]) -> Matrix:
-        """Where the tips would have to go: twist to the nearest target in units of the metric, shape (m, 6)."""
-        nearest = self._each(tips).argmin(axis=0)
-        twists = np.array([twist(target, tips) for target in self.targets])
-        return twists[nearest, np.arange(len(tips))] * self.scale  # type: ignore[no-any-return]
-
-    @property
-    def scale(self) -> Vector:
-        """What a metre and a radian count in the metric, shape (6,)."""
-        return self.unit * np.array([1.0] * 3 + [self.metres_per_radian] * 3)
-
-    @property
-    def radius(self) -> float:
-        """See :class:`Metric`; from the tolerances of the targets."""
-        each = [
-            (target.tolerance, np.inf)
-            if isinstance(target, PositionGoal)
-            else (target.position_tolerance, self.metres_per_radian * target.orientation_tolerance)
-            for target in self.targets
-        ]
-        return INSIDE * self.unit * float(np.min(each))
+        Returns:
+            The twist to the nearest target in units of the metric, shape (m, 6), and its length, which is the distance
+            of the tip from that target in the metric, shape (m,).
+        """
+        twists = np.array([twist(target, tips) for target in self.targets]) * self.scale
+        lengths = np.linalg.norm(twists, axis=2)
+        nearest = lengths.argmin(axis=0), np.arange(len(tips))
+        return twists[nearest], lengths[nearest]
 
     def errors(self, q: Vector) -> Vector:
         """Distance [m] and angle [rad] of the tip at q, shape (n,), from the nearest target; shape (2,)."""
@@ -125,12 +113,7 @@ class ConfigurationMetric:
     """
 
     def __init__(self, goals: Matrix) -> None:
-        self.goals, self.evaluations = goals, 0
-
-    @property
-    def radius(self) -> float:
-        """See :class:`Metric`."""
-        return JOINT_RADIUS
+        self.goals, self.evaluations, self.radius = goals, 0, JOINT_RADIUS
 
     def distance(self, Q: Matrix) -> Vector:
         """See :class:`Metric`."""
@@ -149,3 +132,10 @@ def _errors(target: Target, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
     if isinstance(target, PoseGoal):
         return pose_errors(tips, target.T_world_tip)
     return np.linalg.norm(tips[:, :3, 3] - target.position, axis=1), np.zeros(len(tips))
+
+
+def _radius(target: Target, metres_per_radian: float) -> float:
+    """Distance within which a target counts as reached [m]."""
+    if isinstance(target, PoseGoal):
+        return min(target.position_tolerance, metres_per_radian * target.orientation_tolerance)
+    return target.tolerance

@@ -72,7 +72,7 @@ class PublishedSearch:
         return None
 
     def _connect(self, near: int) -> tuple[int, bool]:
-        """Algorithm 5: step after step, as long as samples are valid; the last vertex, and whether it is at the goal."""
+        """Algorithm 5: step after step, until a sample is not valid; the last vertex, and whether it is at the goal."""
         delta = self._steps.step
         q_near = self.tree.q[near].copy()
         q_new = _extend(q_near, self._random(), delta)

@@ -3,15 +3,15 @@
 What differs from :mod:`rrtik_ompl.ik.ikurt.published`: CONNECT tries many directions at once, the cheap metric before
 the collision check, takes the best free one, and lives through misses; directions are isotropic, so that joints reach
 their limits; vertices that have failed are penalised; a failure is followed by a whole batch of exploration. With
-``jacobian`` a descent looks for the goal configuration from every place where that is worth it; those found and not
-yet reached keep drawing the exploration towards them.
+``jacobian`` descents look for goal configurations from the vertices where that is worth it, and from anywhere; those
+found and not reached at once become roots of a second tree, and the exploration joins the two.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import count
 from dataclasses import dataclass
+from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +27,10 @@ SLOW_FALL = 0.97  # or to this one where there is no other way to the goal
 GROWN, SHRUNK, SHORTEST = 1.5, 0.7, 1e-4  # of CONNECT's step after a success and a miss, and its smallest [rad]
 CHECKED = 4  # of the better directions, nearest to the goal first, whose motions are checked together
 NEARER = 0.5  # a new descent from the way of CONNECT when the distance has fallen to this share
-MOST_EXPLORED = 256  # batches of exploration between two CONNECTs; one after the first, then always twice as many,
+MOST_EXPLORED = 256  # batches of exploration between two CONNECTs; one before the first, then always twice as many,
 FEW_EXPLORED = 4  # but no more than these as long as CONNECT alone can reach the goal
 SAMPLES = 24  # of one batch of exploration
-LENGTHS = (1.0, 0.5, 0.2)  # shares of the exploration's step that are tried together
+PIECES = (0.2, 0.5, 1.0)  # shares of the exploration's step, asked about one after the other as long as they are free
 TOWARDS_OTHER = 0.5  # share of the samples that are the newest vertices of the other tree
 DESCENTS = 2  # from vertices of a batch of exploration,
 SCOUTS = 22  # and from samples anywhere, for other goal configurations
@@ -65,7 +65,7 @@ class Judge:
 
 
 class BatchedSearch:
-    """One tree from the start; see the module.
+    """The tree from the start, and the one from what is found at the goal; see the module.
 
     Args:
         metric: Distance from the goal.
@@ -77,7 +77,8 @@ class BatchedSearch:
 
     Attributes:
         tree: The tree from the start, the last one after restarts.
-        back: The tree from goal configurations that are known.
+        back: The tree from goal configurations that are known, likewise.
+        goals: Those, shape (k, n).
         blocked: One in collision, if any was met, shape (0 or 1, n).
         nearest: The configuration nearest to the goal that was seen, in collision or not, shape (n,).
         connects, restarts, vertices: Counts.
@@ -96,9 +97,9 @@ class BatchedSearch:
         self._metric, self._options, self._lower, self._upper = metric, options, lower, upper
         self._judge, self._rng, self._starts = judge, rng, starts
         self._distances = metric.distance(starts)
-        self._goals = metric.goals if isinstance(metric, ConfigurationMetric) else starts[:0]
+        self.goals = metric.goals if isinstance(metric, ConfigurationMetric) else starts[:0]
         self.tree = Tree(starts, self._distances)
-        self.back = Tree(self._goals, np.zeros(len(self._goals)))
+        self.back = Tree(self.goals, np.zeros(len(self.goals)))
         self._newest, self._batches = starts[:0], 0
         self.connects = self.restarts = self._dropped = 0
         self.blocked = starts[:0]
@@ -109,29 +110,23 @@ class BatchedSearch:
         """Vertices of all trees."""
         return self.tree.size + self.back.size + self._dropped
 
-    @property
-    def goals(self) -> Matrix:
-        """Free goal configurations known so far, shape (k, n)."""
-        return self._goals
-
     def run(self) -> Matrix | None:
         """The path to the goal, shape (k, n), or None if the time was up first."""
         if self._least <= self._metric.radius:
             return self.tree.branch(int(self._distances.argmin()))
         explored = 1
-        while not self._judge.stop():
-            path = self._connect(self.tree.best())
+        path = self._finish(np.arange(self.tree.size))
+        while path is None and not self._judge.stop():
             for _ in range(explored):
-                if path is not None or self._judge.stop():
-                    break
                 path = self._explore()
-            if path is not None:
-                return path
+                if path is not None or self._judge.stop():
+                    return path
+            path = self._connect(self.tree.best())
             explored = min(2 * explored, MOST_EXPLORED if self.back.size else FEW_EXPLORED)
             if self.tree.size > self._options.most_vertices:
                 self._restart()
                 explored = 1
-        return None
+        return path
 
     def _connect(self, first: int) -> Matrix | None:
         """From one vertex down the metric; the path to the goal, or None at the end of the patience."""
@@ -185,7 +180,7 @@ class BatchedSearch:
         path = self._join(tree, new, other) if other.size else None
         if path is not None:
             return path if forward else path[::-1]
-        if forward and (len(self._goals) == 0 or self._batches % RARE == 0):
+        if forward and (len(self.goals) == 0 or self._batches % RARE == 0):
             return self._finish(self._worth_it(new), scouts=SCOUTS)
         return None
 
@@ -195,16 +190,16 @@ class BatchedSearch:
         drawn = min(int(TOWARDS_OTHER * SAMPLES), len(self._newest)) if self.back.size else 0
         samples[:drawn] = self._newest[:drawn]
         near = tree.nearest(samples)
-        origin = tree.q[near]
-        away = samples - origin
+        ends, away = tree.q[near], samples - tree.q[near]
         length = np.linalg.norm(away, axis=1)
-        share = np.minimum(1.0, self._options.stride / np.maximum(length, 1e-12))
-        ends = np.stack([origin + away * (share * part)[:, None] for part in LENGTHS])
-        free = self._judge.motions_free(np.tile(origin, (len(LENGTHS), 1)), ends.reshape(-1, len(self._lower)))
-        free = free.reshape(len(LENGTHS), SAMPLES) & (length > 0.0)
-        grown = np.flatnonzero(free.any(axis=0))
-        q = ends[free.argmax(axis=0)[grown], grown]
-        return tree.add(q, near[grown], self._metric.distance(q))
+        step = away * np.minimum(1.0, self._options.stride / np.maximum(length, 1e-12))[:, None]
+        going, moved = np.flatnonzero(length > 0.0), np.zeros(SAMPLES, dtype=bool)
+        for piece in PIECES:
+            further = tree.q[near[going]] + piece * step[going]
+            free = self._judge.motions_free(ends[going], further)
+            going = going[free]
+            ends[going], moved[going] = further[free], True
+        return tree.add(ends[moved], near[moved], self._metric.distance(ends[moved]))
 
     def _worth_it(self, new: NDArray[np.int64]) -> NDArray[np.int64]:
         """Of new vertices those from which to descend: the nearest one in the workspace, and others by chance."""
@@ -226,9 +221,7 @@ class BatchedSearch:
         arrived = ends.distance <= self._metric.radius
         near = arrived[: len(vertices)]
         path = self._straight(vertices[near], ends.q[: len(vertices)][near])
-        if path is None and arrived.any():
-            self._remember(ends.q[arrived])
-        return path
+        return self._remember(ends.q[arrived]) if path is None and arrived.any() else path
 
     def _join(self, tree: Tree, vertices: NDArray[np.int64], other: Tree) -> Matrix | None:
         """The path from the root of one tree to that of the other over the first free motion between two vertices."""
@@ -247,16 +240,19 @@ class BatchedSearch:
         k = int(free.argmax())
         return np.vstack([self.tree.branch(int(vertices[k])), goals[k]])
 
-    def _remember(self, q: Matrix) -> None:
-        """Free goal configurations become roots of the tree at the goal."""
+    def _remember(self, q: Matrix) -> Matrix | None:
+        """Free goal configurations become roots of the tree at the goal; the path if one of them is seen at once."""
         free = self._judge.free(q)
         self.blocked = np.vstack([self.blocked, q[~free]])[:1]
-        if len(self._goals) < MOST_GOALS and free.any():
-            self._goals = np.vstack([self._goals, q[free]])
-            self.back.add(q[free], np.full(int(free.sum()), -1), np.zeros(int(free.sum())))
+        if len(self.goals) >= MOST_GOALS or not free.any():
+            return None
+        self.goals = np.vstack([self.goals, q[free]])
+        roots = self.back.add(q[free], np.full(int(free.sum()), -1), np.zeros(int(free.sum())))
+        path = self._join(self.back, roots, self.tree)
+        return None if path is None else path[::-1]
 
     def _restart(self) -> None:
         self._dropped += self.tree.size + self.back.size
         self.restarts += 1
         self.tree = Tree(self._starts, self._distances)
-        self.back = Tree(self._goals, np.zeros(len(self._goals)))
+        self.back = Tree(self.goals, np.zeros(len(self.goals)))
