@@ -16,13 +16,8 @@ from rrtik_ompl.ik.ikurt.metric import TipMetric, reach
 from rrtik_ompl.motion_bench_maker import load_motion_bench_maker
 from rrtik_ompl.shapes import Sphere
 
-EXAMPLES = ("planar3_boxes", "planar6_c", "planar6_c_pose", "puma_position", "puma_pose")
-TITAN_GOALS_DEG = {  # joint values whose pose is the goal; the first is regular, the others are singular
-    "titan4_regular": (20, 30, -70, 20, 30, 40),
-    "titan4_wrist": (20, 30, -70, 40, 90, 10),
-    "titan4_axis1": (11.4592, 80, 43.9549, -33.9549, 0, 17.1887),
-    "titan4_tip_on_axis1": (11.4592, 80, 40.8559, -20.8559, 22.9183, 17.1887),
-}
+TITAN = ("titan4_regular", "titan4_wrist", "titan4_axis1", "titan4_p_axis1")  # the last three are singular
+EXAMPLES = ("planar3_boxes", "planar6_c", "planar6_c_pose", "puma_position", "puma_pose", *TITAN)
 METRIC = 1e-2  # accuracy of poses in the published metric
 ARMS = ("ur5", "panda", "titan4")
 OBSTACLES = 8
@@ -30,14 +25,8 @@ TRIES = 1000
 
 
 def examples() -> dict[str, Any]:
-    """Every published example by its name, as shipped or by the same rule."""
-    found = {name: rrtik.load_problem(name) for name in EXAMPLES}
-    arm = rrtik.load_robot("titan4")
-    world = rrtik.World(arm)
-    for name, degrees in TITAN_GOALS_DEG.items():
-        goal = PoseGoal(arm.fk(np.radians(degrees)))
-        found[name] = rrtik.Problem(world, np.zeros(arm.dof), goal, name=name)
-    return found
+    """Every published example by its name, as shipped."""
+    return {name: rrtik.load_problem(name) for name in EXAMPLES}
 
 
 def metric_of(problem: Any) -> TipMetric:

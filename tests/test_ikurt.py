@@ -25,7 +25,7 @@ from rrtik_planners import IKURT, IKURTPublished
 
 EXAMPLES = (
     *("planar3_boxes", "planar6_c", "planar6_c_pose", "puma_position", "puma_pose"),
-    *("titan4_wrist", "titan4_axis1"),
+    *("titan4_regular", "titan4_wrist", "titan4_axis1", "titan4_p_axis1"),
 )
 
 

@@ -38,11 +38,10 @@ class IKURTPublished(TipSeeker):
         """Make a planner.
 
         Args:
-            si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
-            world: Asked instead of ``si`` whether configurations and motions are free, if given.
-            seed: At least 0; drawn from OMPL's if None.
-            goal: What the tip has to reach; needs a world. If None, the configurations of the problem definition are
-                the goals.
+            si: See :class:`rrtik_planners.ikurt.IKURT`.
+            world: As there.
+            seed: As there.
+            goal: As there.
             mu: Weight of the distance in the metric of poses [1/m]; if None the distance at the start counts as much
                 as the largest angle.
             step: Growth step delta0 [rad].

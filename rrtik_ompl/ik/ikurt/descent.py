@@ -16,7 +16,8 @@ from rrtik_ompl.ik.ikurt.metric import TipMetric, reach
 from rrtik_ompl.ik.numeric import bounded_step
 
 ITERATIONS = 24
-ACCURACY = 1e-9  # of the reach; a solution that is meant to hold for tolerances of 1e-6
+ACCURACY = 1e-9  # of the reach; less where the goal wants that
+SHARE = 0.1  # of the distance within which the goal counts as reached
 STALE = 4  # iterations in which the distance has to fall to FALLS of what it was, or the row is given up
 FALLS = 0.7
 
@@ -32,6 +33,7 @@ class Descent:
 def descend(metric: TipMetric, Q: Matrix, lower: Vector, upper: Vector, *, iterations: int = ITERATIONS) -> Descent:
     """Walk from each row of Q, shape (m, n), towards the goal, inside bounds of shape (n,)."""
     length = reach(metric.robot) * metric.unit
+    enough = min(ACCURACY * length, SHARE * metric.radius)
     best, best_distance = Q.copy(), np.full(len(Q), np.inf)
     history = np.full((STALE, len(Q)), np.inf)
     rows, q = np.arange(len(Q)), Q
@@ -41,7 +43,7 @@ def descend(metric: TipMetric, Q: Matrix, lower: Vector, upper: Vector, *, itera
         e, distance = metric.pull(tips)
         better = distance < best_distance[rows]
         best[rows[better]], best_distance[rows[better]] = q[better], distance[better]
-        going = (distance > ACCURACY * length) & (best_distance[rows] < FALLS * history[step % STALE, rows])
+        going = (distance > enough) & (best_distance[rows] < FALLS * history[step % STALE, rows])
         history[step % STALE, rows] = best_distance[rows]
         if not going.any():
             break
