@@ -33,12 +33,8 @@ RESTARTS = 20
 MAX_RESTARTS = 1_000_000
 SHORTEST = 1e-3  # [s] that an attempt gets at least
 MAX_SECONDS = 1e9  # thirty years; OMPL's clock overflows at about nine times as much
-OF_THE_PATH = (
-    "lower_bound",
-    "gap",
-    "position_error",
-    "orientation_error",
-)  # what planners count of a path, not of their work
+# What planners count of a path, not of their work.
+OF_THE_PATH = ("lower_bound", "gap", "position_error", "orientation_error")
 _OMPL_PREFIX, _MOVEIT_SUFFIX = "geometric::", "kConfigDefault"  # as in ompl_planning.yaml
 
 
@@ -146,6 +142,7 @@ def _search(
     if _nothing_to_do(problem):  # some planners wander off and come back, others break
         return JointPath.of(problem.world.robot, problem.start[None]), "", totals
     turns_matter = isinstance(problem.goal, JointGoal) and bool(problem.world.robot.continuous.any())
+    needless = finds_goals(factory) and not isinstance(problem.goal, JointGoal)
     # An optimal path touches what it goes round, and an anytime planner has no time left for a second attempt.
     asked = problem.refined(SECOND_CHECK) if getattr(factory, "__name__", "") in ANYTIME_PLANNERS else problem
     for number, seed in enumerate(seeds):
@@ -153,12 +150,12 @@ def _search(
             break
         totals["attempts"] += 1
         short_way = turns_matter and number == 0 and len(seeds) > 1
-        left_to_it = finds_goals(factory) and not isinstance(problem.goal, JointGoal)
-        aims = GoalConfigurations(np.zeros((0, problem.robot.dof)))
-        if not left_to_it:
+        if needless:
+            aims = GoalConfigurations(np.zeros((0, problem.robot.dof)))
+        else:
             aims = goal_configurations(problem, np.random.default_rng(seed), all_turns=not short_way)
         left = deadline - time.perf_counter()
-        if not (left_to_it or len(aims.rows)) or left <= 0.0:
+        if not (needless or len(aims.rows)) or left <= 0.0:
             reason = aims.reason
             continue
         if number == 0 and problem.world.accuracy == "exact" and can_be_brief(factory):

@@ -192,7 +192,8 @@ def test_every_published_example_is_solved_and_the_error_of_the_tip_reported(nam
     away = np.linalg.norm(tip.translation - wanted)
     assert plan.statistics["position_error"] == pytest.approx(away, abs=1e-12)
     assert away < 1e-6
-    assert "the tip ends" in " ".join(summary(problem, plan, plan.path, 0.0))
+    (line,) = (line for line in summary(problem, plan, plan.path, 0.0) if "the tip ends" in line)
+    assert ("deg" in line) == isinstance(problem.goal, PoseGoal)
 
 
 def test_the_tree_alone_reaches_the_tolerance_without_the_jacobian() -> None:
@@ -223,6 +224,18 @@ def test_a_region_of_several_poses_is_reached_at_one_of_them(puma: Any) -> None:
     plan = rrtik.plan(problem, IKURT, seconds=5.0, seed=1)
     assert plan.found, plan.reason
     assert puma.goal.satisfied(puma.robot, plan.path.end[None])[0]
+
+
+def test_a_region_with_a_free_rotation_and_a_box_is_reached() -> None:
+    robot = rrtik.load_robot("panda_primitives")
+    start = robot.posture("default")
+    region = GoalRegion(
+        [PoseGoal(robot.fk(start) * pose([0.1, 0.1, -0.1]))], free_rotation_axis="z", box=[0.1, 0.1, 0.0]
+    )
+    problem = rrtik.Problem(rrtik.World(robot), start, region)
+    plan = rrtik.plan(problem, IKURT, seconds=5.0, seed=1)
+    assert plan.found, plan.reason
+    assert problem.reached(plan.path.end)
 
 
 def test_a_goal_in_joint_values_is_met_to_the_bit() -> None:
