@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,16 +26,24 @@ from rrtik_planners import IKURT, FastRRTConnect, IKURTPublished
 SECONDS = 10.0  # of an acceptance run
 SOON = 5.0  # [s] for the hundred seeds
 POSE_SECONDS, PANDA_SECONDS, BLOCKED_SECONDS = 2.0, 1.0, 1.0
+STRETCH = [1.0]  # limits of wall time are so many times those of processor time
 VARIANTS = {"literal": IKURTPublished, "improved": IKURT}
 
 
 @dataclass
 class Run:
-    """One plan: what came out, and how far its end is from the goal in the published metric."""
+    """One plan: its processor time, how far its end is from the goal in the published metric, whether it is sound."""
 
     plan: Any
-    away: float
-    sound: bool
+    limit: float
+    seconds: float
+    away: float = np.inf
+    sound: bool = True
+
+    @property
+    def solved(self) -> bool:
+        """Whether there is a path, within the limit of processor time."""
+        return bool(self.plan.found) and self.seconds <= self.limit
 
     @property
     def metres(self) -> float:
@@ -42,29 +51,32 @@ class Run:
         return float(self.plan.statistics.get("position_error", np.inf))
 
     def count(self, name: str) -> float:
-        """A count of the planner's."""
-        return float(self.plan.statistics.get(name, 0))
+        """A count of the planner's, or its seconds."""
+        return self.seconds if name == "seconds" else float(self.plan.statistics.get(name, 0))
 
 
-def run(problem: Any, planner: Any, seed: int, seconds: float, **parameters: Any) -> Run:
-    plan = rrtik.plan(problem, planner, seconds=seconds, seed=seed, parameters=parameters)
+def run(problem: Any, planner: Any, seed: int, limit: float, **parameters: Any) -> Run:
+    begin = time.process_time()
+    plan = rrtik.plan(problem, planner, seconds=limit * STRETCH[0], seed=seed, parameters=parameters)
+    seconds = time.process_time() - begin
     if plan.path is None:
-        return Run(plan, np.inf, True)
+        return Run(plan, limit, seconds)
     sound = not plan.path.violations(problem.world) and bool((plan.path.start == problem.start).all())
-    return Run(plan, float(cases.metric_of(problem).distance(plan.path.end[None])[0]), sound)
+    away = float(cases.metric_of(problem).distance(plan.path.end[None])[0])
+    return Run(plan, limit, seconds, away, sound)
 
 
 def solved(runs: list[Run]) -> float:
-    return 100.0 * float(np.mean([each.plan.found for each in runs]))
+    return 100.0 * float(np.mean([each.solved for each in runs]))
 
 
 def middle(runs: list[Run], name: str) -> float:
-    """Median of a count, or of the seconds, over all runs; of one that failed what it had used up by then."""
-    return float(np.median([each.plan.seconds if name == "seconds" else each.count(name) for each in runs]))
+    """Median of a count over all runs; of one that failed what it had used up by then."""
+    return float(np.median([each.count(name) for each in runs]))
 
 
 def worst(runs: list[Run]) -> float:
-    return max((each.away for each in runs if each.plan.found), default=np.inf)
+    return max((each.away for each in runs if each.solved), default=np.inf)
 
 
 def acceptance(report: Report, literal: int, improved: int) -> None:
@@ -109,8 +121,11 @@ def rows(report: Report, which: str, done: dict[str, list[Run]]) -> None:
     problem = cases.blocked()
     ends = [run(problem, VARIANTS[which], seed, BLOCKED_SECONDS) for seed in range(5)]
     longest, false = max(each.plan.seconds for each in ends), sum(each.plan.found for each in ends)
-    shown = f"{false} false; ends after {longest:.2f} s of {BLOCKED_SECONDS:g}"
-    report.bar(what + "goal blocked by a ball", "no false success, ends in time", shown, not false and longest < 1.3)
+    allowed = BLOCKED_SECONDS * STRETCH[0]
+    shown = f"{false} false; ends after {longest:.2f} s of {allowed:g}"
+    report.bar(
+        what + "goal blocked by a ball", "no false success, ends in time", shown, not false and longest < allowed + 0.5
+    )
     falls, adds = (literal_falls if which == "literal" else improved_falls)()
     report.bar(what + "CONNECT adds vertices of falling metric", "strictly", f"{adds} vertices", falls and adds > 0)
 
@@ -133,7 +148,7 @@ def table(report: Report, done: dict[str, dict[str, list[Run]]]) -> None:
             counts = (
                 f"{middle(runs, c):.0f}" for c in ("metric_evaluations", "checked_motions", "vertices", "connects")
             )
-            found = f"{sum(r.plan.found for r in runs)} of {len(runs)}"
+            found = f"{sum(r.solved for r in runs)} of {len(runs)}"
             lines.append([name, which, found, f"{middle(runs, 'seconds'):.4f}", *counts, f"{worst(runs):.1e}"])
     head = [
         "example",
@@ -154,9 +169,9 @@ def hundred(report: Report, seeds: int) -> None:
     for name, problem in cases.examples().items():
         runs = [run(problem, IKURT, seed, SOON) for seed in range(seeds)]
         everything &= solved(runs) == 100.0
-        seconds = [each.plan.seconds for each in runs]
+        seconds = [each.seconds for each in runs]
         counts = (f"{middle(runs, c):.0f}" for c in ("vertices", "checked_states", "checked_motions"))
-        found = f"{sum(each.plan.found for each in runs)} of {seeds}"
+        found = f"{sum(each.solved for each in runs)} of {seeds}"
         lines.append([name, found, f"{np.median(seconds):.4f}", f"{max(seconds):.3f}", *counts])
     head = ["example", "solved", "median s", "longest s", "vertices", "states checked", "motions checked"]
     report.table(f"The improved one, {seeds} seeds, {SOON:g} s", head, lines)
@@ -206,51 +221,58 @@ def falls(search: Any) -> tuple[bool, int]:
     return all(held), added[0]
 
 
-def two_steps(problem: Any, seconds: float, seed: int) -> tuple[bool, float]:
+def two_steps(problem: Any, seconds: float, seed: int) -> bool:
     """The nearest free solution of inverse kinematics, then RRT-Connect to that one alone."""
-    begin = time.perf_counter()
     ik = rrtik.solve_ik(
         problem.robot, problem.goal, near=problem.start, world=problem.world, seconds=seconds, seed=seed
     )
-    left = seconds - (time.perf_counter() - begin)
-    if not ik.found or left <= 0.0:
-        return False, time.perf_counter() - begin
+    if not ik.found:
+        return False
     joints = rrtik.Problem(problem.world, problem.start, ik.solutions[0])
-    found = rrtik.plan(joints, og.RRTConnect, seconds=left, seed=seed).found
-    return found, time.perf_counter() - begin
+    return rrtik.plan(joints, og.RRTConnect, seconds=seconds, seed=seed).found
 
 
-def beside(problems: list[Any], seconds: float) -> list[list[str]]:
-    """Solved share and times of each way, one problem after the other, each by all."""
-    ways: dict[str, list[tuple[bool, float]]] = {}
+WAYS = {
+    "IKURT": IKURT,
+    "RRT-Connect to goals from IK (OMPL's)": og.RRTConnect,
+    "FastRRTConnect (kernel) to goals from IK": FastRRTConnect,
+    "two steps: IK, then RRT-Connect (OMPL's)": None,
+}
+
+
+def beside(problems: Iterable[Any], limit: float) -> tuple[int, list[list[str]]]:
+    """How many problems, and solved share and times of each way; one problem after the other, each by all."""
+    outcomes: dict[str, list[float]] = {name: [] for name in WAYS}
     for number, problem in enumerate(problems):
         for world in (problem.world, problem.world.with_accuracy("conservative")):
             world.motion_valid(problem.start, problem.start + 1e-3)  # loads covers and kernels
-        for name, planner in (
-            ("IKURT", IKURT),
-            ("RRT-Connect to goals from IK (OMPL's)", og.RRTConnect),
-            ("FastRRTConnect (kernel) to goals from IK", FastRRTConnect),
-        ):
-            plan = rrtik.plan(problem, planner, seconds=seconds, seed=number)
-            ways.setdefault(name, []).append((plan.found, plan.seconds))
-        ways.setdefault("two steps: IK, then RRT-Connect", []).append(two_steps(problem, seconds, number))
+        for name, planner in WAYS.items():
+            begin = time.process_time()
+            if planner is None:
+                found = two_steps(problem, limit * STRETCH[0], number)
+            else:
+                found = rrtik.plan(problem, planner, seconds=limit * STRETCH[0], seed=number).found
+            taken = time.process_time() - begin
+            outcomes[name].append(taken if found and taken <= limit else np.inf)
     rows = []
-    for name, outcomes in ways.items():
-        found = np.array([each[0] for each in outcomes])
-        taken = np.array([each[1] if each[0] else seconds for each in outcomes])
-        share = f"{found.sum()} of {len(found)} ({100 * found.mean():.1f} %)"
+    for name, each in outcomes.items():
+        taken = np.array(each)
+        found = int(np.isfinite(taken).sum())
+        share = f"{found} of {len(taken)} ({100 * found / len(taken):.1f} %)"
+        taken = np.minimum(taken, limit)
         rows.append([name, share, f"{np.median(taken):.3f}", f"{taken.mean():.3f}"])
-    return rows
+    return len(next(iter(outcomes.values()))), rows
 
 
-def comparisons(report: Report, problems: int, panda: int, folder: Path | None) -> None:
-    head = ["", "solved", "median s", "mean s (a failure counts the limit)"]
+def generated(report: Report, problems: int) -> None:
     for arm in cases.ARMS:
-        rows = beside(list(cases.generated(arm, problems // len(cases.ARMS))), POSE_SECONDS)
-        report.table(f"Generated poses, {arm} among {cases.OBSTACLES} balls, {POSE_SECONDS:g} s", head, rows)
-    if folder is not None:
-        rows = beside(list(cases.panda_problems(folder, panda)), PANDA_SECONDS)
-        report.table(f"MotionBenchMaker, Panda, goals as poses, {PANDA_SECONDS:g} s", head, rows)
+        count, rows = beside(cases.generated(arm, problems // len(cases.ARMS)), POSE_SECONDS)
+        report.table(f"{count} generated poses, {arm} among {cases.OBSTACLES} balls, {POSE_SECONDS:g} s", HEAD, rows)
+
+
+def panda(report: Report, folder: Path, problems: int) -> None:
+    count, rows = beside(cases.panda_problems(folder, problems), PANDA_SECONDS)
+    report.table(f"{count} problems of MotionBenchMaker, Panda, goals as poses, {PANDA_SECONDS:g} s", HEAD, rows)
 
 
 def main() -> None:
@@ -259,27 +281,34 @@ def main() -> None:
     parser.add_argument("--literal", type=int, default=20, help="runs of the published algorithm, up to 10 s each")
     parser.add_argument("--problems", type=int, default=500, help="generated pose problems, all arms together")
     parser.add_argument("--panda", type=int, default=140, help="problems of MotionBenchMaker")
+    parser.add_argument("--stretch", type=float, default=1.0, help="wall time per processor time, on a busy machine")
     parser.add_argument("--quick", action="store_true", help="a look at everything")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "reports" / "ikurt.md")
     options = parser.parse_args()
     literal, improved, seeds = (2, 5, 10) if options.quick else (options.literal, 20, 100)
-    problems, panda = (12, 7) if options.quick else (options.problems, options.panda)
+    problems, pandas = (12, 7) if options.quick else (options.problems, options.panda)
+    STRETCH[0] = options.stretch
     report = Report("IKURT", "python bench/ikurt_report.py")
     report.note("What was run", INTRODUCTION)
-    acceptance(report, literal, improved)
-    hundred(report, seeds)
-    comparisons(report, problems, panda, options.mbm)
-    options.out.write_text(report.markdown())
+    for section in (
+        lambda: hundred(report, seeds),
+        lambda: generated(report, problems),
+        lambda: panda(report, options.mbm, pandas) if options.mbm else None,
+        lambda: acceptance(report, literal, improved),
+    ):
+        section()
+        options.out.write_text(report.markdown())
     print(report.markdown())
 
 
+HEAD = ["", "solved", "median s", "mean s (a failure counts the limit)"]
 INTRODUCTION = (
     "Literal: the published algorithm with the default numbers of the specification, poses to 1e-2 in its metric, as "
     "acceptance wants it. Improved: the default, to the tolerances of the shipped problems (1 mm and 0.01 rad, or as "
     "the file says), which are tighter. No Jacobian: the improved one with `jacobian=False`, on the looser goals. All "
     "through `plan()`, whose second check every path has passed. Evaluations are forward kinematics; `worst metric` is "
-    "the published metric at the end of the worst path. Limits are of wall time on two cores that other work shares, "
-    "which slowed everything several times: compare within a table only."
+    "the published metric at the end of the worst path. Seconds are of processor time, and so are the limits. Where "
+    "wall time runs out before that, a failure has had the seconds shown."
 )
 
 
