@@ -8,7 +8,7 @@ import numpy as np
 from rich import box
 from rich.table import Table
 
-from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.goal import JointGoal, PositionGoal
 from rrtik_ompl.moves_text import COLUMNS, moves_document, reading
 from rrtik_ompl.path import SECOND_CHECK, JointPath
 from rrtik_ompl.planning import Plan
@@ -90,6 +90,10 @@ def summary(problem: Problem, plan: Plan, path: JointPath | None, shorten_second
     else:
         size = f"{len(path.waypoints)} waypoints, length {path.length:.2f} {path.unit}"
         lines.append(f"{size}, several joints move at once")
+    if "position_error" in plan.statistics:
+        angle = np.degrees(plan.statistics["orientation_error"])
+        turned = "" if isinstance(problem.goal, PositionGoal) else f" and {angle:.2g} deg"
+        lines.append(f"the tip ends {plan.statistics['position_error']:.2g} m{turned} from the goal")
     step = problem.world.motion_resolution / SECOND_CHECK
     lines.append(
         f"planning {plan.seconds:.3f} s, shortening {shorten_seconds:.3f} s; checked again every {step:g} m: valid"

@@ -12,9 +12,15 @@ from rrtik_ompl.yaml_file import read_yaml
 NAMES = [
     *("cut_disc", "cut_polygons", "cut_two_ls", "env_e"),
     *("planar3_a", "planar3_b", "planar3_boxes", "planar3_c", "planar6_c", "planar6_c_pose"),
-    *("puma_pose", "puma_position", "titan4_axis1", "titan4_prisms", "titan4_sdu", "titan4_wrist"),
+    *("puma_pose", "puma_position", "titan4_axis1", "titan4_p_axis1", "titan4_prisms", "titan4_regular"),
+    *("titan4_sdu", "titan4_wrist"),
 ]
-SINGULAR = {"titan4_axis1": (11.4592, 80, 43.9549, -33.9549, 0, 17.1887), "titan4_wrist": (20, 30, -70, 40, 90, 10)}
+SINGULAR = {
+    "titan4_axis1": (11.4592, 80, 43.9549, -33.9549, 0, 17.1887),
+    "titan4_p_axis1": (11.4592, 80, 40.8559, -20.8559, 22.9183, 17.1887),
+    "titan4_wrist": (20, 30, -70, 40, 90, 10),
+}
+REGULAR = {"titan4_regular": (20, 30, -70, 20, 30, 40)}
 PUMA_GOAL = np.radians([40, 60, -120, 30, 40, 20])
 
 
@@ -59,15 +65,15 @@ def test_every_problem_survives_writing_and_reading(name, tmp_path):
     np.testing.assert_array_equal(copy.world.valid_batch(q), problem.world.valid_batch(q))
 
 
-@pytest.mark.parametrize("name", SINGULAR)
-def test_singular_goals_are_the_forward_kinematics_of_their_joint_values(name):
+@pytest.mark.parametrize("name", [*SINGULAR, *REGULAR])
+def test_goals_of_titan4_are_the_forward_kinematics_of_their_joint_values(name):
     problem = load_problem(name)
-    q = np.radians(SINGULAR[name])
+    q = np.radians((SINGULAR | REGULAR)[name])
     position, angle = problem.goal.errors(problem.robot, q)
     assert position < 1e-12
     assert angle < 1e-12
     assert problem.world.valid(q)
-    assert np.linalg.svd(problem.robot.jacobian(q), compute_uv=False)[-1] < 1e-5
+    assert (np.linalg.svd(problem.robot.jacobian(q), compute_uv=False)[-1] < 1e-5) == (name in SINGULAR)
 
 
 def test_puma_goals_are_the_forward_kinematics_of_their_joint_values():

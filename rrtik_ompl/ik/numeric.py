@@ -52,7 +52,7 @@ def descend(
         residual, jacobian = twist(goal, robot.fk_batch(q)), robot.jacobian_batch(q)
         rows = slice(0, 3) if isinstance(goal, PositionGoal) else slice(0, 6)
         e, J = (residual * scale)[:, rows], (jacobian * scale[:, None])[:, rows]
-        Q[open_rows] = np.clip(q + _step(J, e), robot.lower, robot.upper)
+        Q[open_rows] = np.clip(q + bounded_step(J, e), robot.lower, robot.upper)
     return Q, iterations
 
 
@@ -78,7 +78,7 @@ def _drawn(region: GoalRegion, member: PoseGoal | PositionGoal, rng: np.random.G
     return PoseGoal(member.T_world_tip * shift, member.position_tolerance, member.orientation_tolerance)
 
 
-def _step(J: NDArray[np.float64], e: Matrix) -> Matrix:
+def bounded_step(J: NDArray[np.float64], e: Matrix) -> Matrix:
     """Solve (J^T J + (e^T e / 2 + DAMPING) I) dq = J^T e for every row; shapes (m, k, n), (m, k) -> (m, n)."""
     damping: Vector = 0.5 * np.einsum("mi,mi->m", e, e) + DAMPING
     normal = np.einsum("mki,mkj->mij", J, J) + damping[:, None, None] * np.eye(J.shape[2])

@@ -46,11 +46,12 @@ PlannerFactory = Callable[..., Any]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Attempt:
-    """What came out: rows of the path, shape (k, n), or None; OMPL's status in words; plain counts."""
+    """What came out: rows of the path, shape (k, n), or None; OMPL's status in words; plain counts; a reason if any."""
 
     rows: Matrix | None
     status: str
     statistics: Mapping[str, int | float]
+    reason: str = ""
 
 
 def ompl_planners() -> dict[str, Any]:
@@ -71,8 +72,9 @@ def attempt(
 ) -> Attempt:
     """Let a planner work for at most ``seconds`` from the start of a problem to any of ``goals``, shape (k, n).
 
-    PRM and PRMstar aim at the first goal alone. A brief attempt (see :func:`can_be_brief`) ends after a number of
-    iterations or questions, so that what it finds does not depend on the computer's speed.
+    There may be none if the planner :func:`finds_goals`. PRM and PRMstar aim at the first one alone. A brief attempt
+    (see :func:`can_be_brief`) ends after a number of iterations or questions, so that what it finds does not depend on
+    the computer's speed.
 
     Raises:
         InputError: If the planner does not take a parameter.
@@ -109,7 +111,12 @@ def attempt(
         if problem_in_planner is not None:
             raise PlannerError(f"planner {name} broke: {str(problem_in_planner).splitlines()[-1]}")
         counts = dict(planner.statistics) if own else {"checked_states": judge.states, "checked_motions": judge.motions}
-        return Attempt(exact_path(definition, si), str(status), counts)
+        return Attempt(exact_path(definition, si), str(status), counts, planner.reason if own else "")
+
+
+def finds_goals(factory: PlannerFactory) -> bool:
+    """Whether a planner needs no configurations for a goal of the tip."""
+    return isinstance(factory, type) and issubclass(factory, SafePlanner) and factory.finds_goals
 
 
 def can_be_brief(factory: PlannerFactory) -> bool:

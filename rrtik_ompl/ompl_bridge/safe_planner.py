@@ -43,11 +43,13 @@ class SearchResult:
         path: Start first, shape (k, n), or None if there is none.
         statistics: Plain counts of the search.
         difference: Distance from the end of the path to the goal [unit of the space]; 0 if the path is exact.
+        reason: Why there is no exact path, if the search can say it.
     """
 
     path: Matrix | None
     statistics: Mapping[str, int | float] = field(default_factory=dict)
     difference: float = 0.0
+    reason: str = ""
 
 
 class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
@@ -59,13 +61,16 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
 
     Attributes:
         kernels: For the class: names of the kernel libraries that a search may use (:mod:`rrtik_ompl.fast.library`).
+        finds_goals: For the class: whether a goal of the tip, given as the option ``goal``, is enough for it.
         seed: The seed in use; given, or drawn from OMPL's, so that ``ompl.util.RNG.setSeed`` fixes it too.
         rng: The generator for :meth:`search`.
         statistics: Counts of the last ``solve``, plain ints and floats.
         error: Why the last ``solve`` could not be done, or None. The last line says it in short.
+        reason: Why the last ``solve`` was done in vain, if the search could say it.
     """
 
     kernels: ClassVar[tuple[str, ...]] = ()
+    finds_goals: ClassVar[bool] = False
 
     def __init__(self, si: Any, name: str, *, world: WorldLike | None = None, seed: int | None = None) -> None:
         """Make a planner.
@@ -86,6 +91,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self.rng = np.random.default_rng(self.seed)
         self.statistics: dict[str, int | float] = {}
         self.error: str | None = None
+        self.reason = ""
         self._world = world
         self._io = StateIO(si)  # holds the space, which knows nothing of planners, so both can be freed
         self._known_bounds: tuple[Any, Any] = ((), ())  # numbers of the space, and the arrays made from them
@@ -95,11 +101,15 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
 
         Args:
             starts: Free configurations, shape (s, n), s at least 1.
-            goals: Free configurations, shape (g, n), g at least 1.
+            goals: Free configurations, shape (g, n), g at least 1, or 0 if :meth:`needs_goals` says so.
             checker: Judges configurations and motions.
             ptc: Call it: true when it is time to stop.
         """
         raise NotImplementedError(f"{type(self).__name__} has no search()")
+
+    def needs_goals(self) -> bool:
+        """Whether the search needs goal configurations. For subclasses that can do without."""
+        return True
 
     def solve(self, ptc: Any) -> Any:
         """Solve the problem of the problem definition; called by OMPL.
@@ -110,7 +120,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         Returns:
             ``ompl.base.PlannerStatus``.
         """
-        self.statistics, self.error = {}, None
+        self.statistics, self.error, self.reason = {}, None, ""
         try:
             status = self._solve(_condition(ptc))
         except _Refused as refused:
@@ -123,7 +133,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     def clear(self) -> None:
         """Forget the last attempt; called by OMPL."""
         super().clear()
-        self.statistics, self.error = {}, None
+        self.statistics, self.error, self.reason = {}, None, ""
 
     def ends_free(self, rows: Matrix, checker: MotionChecker) -> Mask:
         """Which starts and goals, shape (m, n), are free, shape (m,). For subclasses that know a faster way to tell."""
@@ -157,15 +167,22 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
             "checked_states": checker.checked_states,
             "checked_motions": checker.checked_motions,
         }
+        self.reason = result.reason
         return self._report(result)
 
     def _inputs(self, checker: MotionChecker, ptc: Any) -> tuple[Matrix, Matrix]:
-        """Starts and goals of the problem definition, shapes (s, n) and (g, n), at least one each."""
+        """Starts and, if needed, goals of the problem definition, shapes (s, n) and (g, n), at least one each."""
         inputs, io = self.getPlannerInputStates(), self._io
         inputs.restart()
         starts = self._starts(inputs, io)
         if not starts:
             raise _Refused(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
+        if not self.needs_goals():
+            rows = np.array(starts)
+            rows = rows[checker.valid_batch(rows)]
+            if len(rows) == 0:
+                raise _Refused(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
+            return rows, rows[:0]
         goal = self.getProblemDefinition().getGoal()
         if goal is not None and not isinstance(goal, ob.GoalSampleableRegion):
             text = "the goal cannot be sampled; use a GoalState, GoalStates or a GoalSampleableRegion"

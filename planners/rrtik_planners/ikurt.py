@@ -1,0 +1,93 @@
+"""IKURT: from a posture to a pose of the tip whose joint values nobody knows, and the path to it, by one tree."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.goal import Goal
+from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
+from rrtik_ompl.ik.ikurt.search import BatchedSearch, Judge, Options
+from rrtik_ompl.ompl_bridge import MotionChecker, SearchResult, WorldLike
+from rrtik_ompl.world import World
+from rrtik_planners.tip_seeker import TipSeeker, misses, positive
+
+
+class IKURT(TipSeeker):
+    """Extended inverse kinematics: a tree in joint space, drawn to the goal by the distance of the tip from it.
+
+    Source: the IKURT paper, made faster and more robust (:mod:`rrtik_ompl.ik.ikurt.search`);
+    :class:`rrtik_planners.ikurt_published.IKURTPublished` is the algorithm to the letter. Where the goals are
+    configurations, as in plain OMPL, the distance is that in joint space.
+
+    ``statistics`` tells how far from the goal the tip ends: ``position_error`` [m], ``orientation_error`` [rad].
+    """
+
+    def __init__(
+        self,
+        si: Any,
+        *,
+        world: WorldLike | None = None,
+        seed: int | None = None,
+        goal: Goal | None = None,
+        jacobian: bool = True,
+        metres_per_radian: float | None = None,
+        step: float = 0.15,
+        stride: float = 0.6,
+        most_vertices: int = 10_000,
+    ) -> None:
+        """Make a planner.
+
+        Args:
+            si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
+            world: Asked instead of ``si`` whether configurations and motions are free, if given.
+            seed: At least 0; drawn from OMPL's if None.
+            goal: What the tip has to reach; needs a world. If None, the configurations of the problem definition are
+                the goals.
+            jacobian: Look for goal configurations by Levenberg-Marquardt from the vertices; they are met to 1e-9 of
+                the reach. If False the tree alone gets there, to the tolerances of the goal.
+            metres_per_radian: Weight of the angle in the metric; if None a full turn counts as much as the reach.
+            step: First step of CONNECT [rad].
+            stride: Longest step of the exploration [rad].
+            most_vertices: With more the tree is dropped and another one begun.
+
+        Raises:
+            InputError: If an option is out of range or the space is of another kind.
+        """
+        super().__init__(si, "IKURT", world=world, seed=seed, goal=goal)
+        if isinstance(most_vertices, bool) or not isinstance(most_vertices, int) or most_vertices < 1:
+            raise InputError(f"most_vertices: expected a whole number of at least 1, got {most_vertices!r}")
+        if not isinstance(jacobian, bool):
+            raise InputError(f"jacobian: expected true or false, got {jacobian!r}")
+        self.options = Options(positive(step, "step"), positive(stride, "stride"), jacobian, most_vertices)
+        self.metres_per_radian = None if metres_per_radian is None else positive(metres_per_radian, "metres_per_radian")
+
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+        """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
+        metric = self._metric(goals)
+        judge = Judge(checker.valid_batch, checker.motion_valid_batch, ptc)
+        search = BatchedSearch(metric, self.options, *self.bounds(), judge, self.rng, starts)
+        path = search.run()
+        counts = {"connects": search.connects, "restarts": search.restarts, "vertices": search.vertices}
+        result = self.result(metric, search.tree, path, counts, checker)
+        if path is None and isinstance(metric, TipMetric):
+            return replace(result, reason=self._why(metric, search))
+        return result
+
+    def _metric(self, goals: Matrix) -> TipMetric | ConfigurationMetric:
+        if isinstance(self._world, World) and self.goal is not None:
+            return TipMetric(self._world.robot, self.targets(), metres_per_radian=self.metres_per_radian)
+        return ConfigurationMetric(goals)
+
+    def _why(self, metric: TipMetric, search: BatchedSearch) -> str:
+        """Why the goal was not reached, as far as the search can tell."""
+        if len(search.goals):
+            return f"no path to any of {len(search.goals)} free configurations at the goal"
+        if len(search.blocked) and isinstance(self._world, World):
+            what = self._world.explain(search.blocked[0]) or "outside the bounds"
+            return f"all configurations found at the goal are in collision: for instance {what}"
+        return (
+            f"no configuration found at the goal, is it in reach? {misses(metric, search.nearest, 'the nearest one')}"
+        )

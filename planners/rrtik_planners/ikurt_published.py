@@ -1,0 +1,79 @@
+"""IKURT to the letter, beside which the improved one is measured. Source: the IKURT paper, algorithms 4 and 5."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.goal import Goal
+from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric, reach
+from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
+from rrtik_ompl.ompl_bridge import MotionChecker, SearchResult, WorldLike
+from rrtik_ompl.world import World
+from rrtik_planners.tip_seeker import TipSeeker, misses, positive
+
+THRESHOLD_ANGLE = 0.5  # [rad] in the metric of poses
+THRESHOLD_REACH = 0.13  # of the reach, for positions
+
+
+class IKURTPublished(TipSeeker):
+    """Extended inverse kinematics as published: one sample at a time, no Jacobian; slow where goals lie on limits.
+
+    The paper gives no numbers; the defaults are a proposal. ``statistics`` as of :class:`rrtik_planners.ikurt.IKURT`.
+    """
+
+    def __init__(
+        self,
+        si: Any,
+        *,
+        world: WorldLike | None = None,
+        seed: int | None = None,
+        goal: Goal | None = None,
+        mu: float | None = None,
+        step: float = 0.15,
+        threshold: float | None = None,
+        accuracy: float | None = None,
+    ) -> None:
+        """Make a planner.
+
+        Args:
+            si: See :class:`rrtik_planners.ikurt.IKURT`.
+            world: As there.
+            seed: As there.
+            goal: As there.
+            mu: Weight of the distance in the metric of poses [1/m]; if None the distance at the start counts as much
+                as the largest angle.
+            step: Growth step delta0 [rad].
+            threshold: Distance in the metric at which the step begins to shrink; 0.5 rad, or 13 % of the reach.
+            accuracy: Distance in the metric at which the goal counts as reached, the published min_threshold; if None
+                as the tolerances of the goal demand.
+
+        Raises:
+            InputError: If an option is out of range or the space is of another kind.
+        """
+        super().__init__(si, "IKURTPublished", world=world, seed=seed, goal=goal)
+        self.step = positive(step, "step")
+        self.mu = None if mu is None else positive(mu, "mu")
+        self.threshold = None if threshold is None else positive(threshold, "threshold")
+        self.accuracy = None if accuracy is None else positive(accuracy, "accuracy")
+
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+        """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`; only the first start is used, as published."""
+        start = starts[0]
+        metric: TipMetric | ConfigurationMetric = ConfigurationMetric(goals)
+        threshold = THRESHOLD_ANGLE
+        if isinstance(self._world, World) and self.goal is not None:
+            metric = TipMetric.published(self._world.robot, self.targets(), start, self.mu)
+            threshold = THRESHOLD_ANGLE if metric.metres_per_radian else THRESHOLD_REACH * reach(self._world.robot)
+        steps = Steps(self.step, self.threshold or threshold, self.accuracy or metric.radius)
+        search = PublishedSearch(metric, steps, *self.bounds(), checker.motion_valid, ptc, self.rng, start)
+        vertex = search.run()
+        counts = {"connects": search.connects, "vertices": search.tree.size}
+        result = self.result(
+            metric, search.tree, None if vertex is None else search.tree.branch(vertex), counts, checker
+        )
+        if vertex is None and isinstance(metric, TipMetric):
+            nearest = search.tree.q[search.tree.distance.argmin()]
+            return replace(result, reason=f"the goal was not reached; {misses(metric, nearest, 'the nearest vertex')}")
+        return result

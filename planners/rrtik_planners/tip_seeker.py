@@ -1,0 +1,87 @@
+"""What the two forms of IKURT share: a goal of the tip is enough for them, and they say how near they came."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix, finite_array
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.goal import Goal, JointGoal, PoseGoal
+from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
+from rrtik_ompl.ik.ikurt.tree import Tree
+from rrtik_ompl.ik.numeric import targets
+from rrtik_ompl.ik.question import Target
+from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
+from rrtik_ompl.world import World
+
+DRAWS = 16  # targets of a goal that leaves freedom
+LEAST_DIFFERENCE = 1e-12  # to the goal, of a path that OMPL is to take for approximate
+
+
+class TipSeeker(SafePlanner):
+    """Base class: knows the goal of the tip, or takes configurations of the problem definition for goals."""
+
+    finds_goals: ClassVar[bool] = True
+
+    def __init__(self, si: Any, name: str, *, world: WorldLike | None, seed: int | None, goal: Goal | None) -> None:
+        """See :class:`rrtik_planners.ikurt.IKURT`."""
+        super().__init__(si, name, world=world, seed=seed)
+        self.goal = None if isinstance(goal, JointGoal) else goal
+        if self.goal is not None and not isinstance(world, World):
+            raise InputError(f"goal: {name} needs world= to know the arm whose tip it is; or give OMPL configurations")
+
+    def needs_goals(self) -> bool:
+        """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.needs_goals`."""
+        return self.goal is None
+
+    def targets(self) -> list[Target]:
+        """The goal of the tip without freedom: itself, or draws from a region; none if the goals are configurations."""
+        return [] if self.goal is None else targets(self.goal, DRAWS, self.rng)
+
+    def result(
+        self,
+        metric: TipMetric | ConfigurationMetric,
+        tree: Tree,
+        found: Matrix | None,
+        counts: dict[str, int],
+        checker: MotionChecker,
+    ) -> SearchResult:
+        """The path found, else that to the vertex nearest to the goal; with the error of the tip at its end."""
+        nearest = int(tree.distance.argmin())
+        path, exact, tip = tree.branch(nearest) if found is None else found, found is not None, {}
+        if isinstance(metric, TipMetric):
+            away, angle = metric.errors(path[-1])
+            tip = {"position_error": float(away), "orientation_error": float(angle)}
+        elif exact:
+            path, exact = _ended(path, metric.goals, checker)
+        difference = 0.0 if exact else max(float(tree.distance[nearest]), LEAST_DIFFERENCE)
+        return SearchResult(path, {**counts, "metric_evaluations": metric.evaluations, **tip}, difference)
+
+
+def positive(value: float, what: str) -> float:
+    """An option that must be a number greater than 0.
+
+    Raises:
+        InputError: If it is not.
+    """
+    number = float(finite_array(value, (), what))
+    if number <= 0.0:
+        raise InputError(f"{what}: expected a number greater than 0, got {value!r}")
+    return number
+
+
+def misses(metric: TipMetric, q: Any, what: str) -> str:
+    """A line that says by how much a configuration misses the goal."""
+    away, angle = metric.errors(q)
+    turned = f" and {np.degrees(angle):.3g} deg" if any(isinstance(t, PoseGoal) for t in metric.targets) else ""
+    return f"{what} misses it by {away:.4g} m{turned}"
+
+
+def _ended(path: Matrix, goals: Matrix, checker: MotionChecker) -> tuple[Matrix, bool]:
+    """The path to exactly the goal configuration that it comes near to, and whether that is free."""
+    goal = goals[np.linalg.norm(goals - path[-1], axis=1).argmin()]
+    if (goal == path[-1]).all():
+        return path, True
+    return np.vstack([path, goal]), checker.motion_valid(path[-1], goal)

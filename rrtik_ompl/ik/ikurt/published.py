@@ -1,0 +1,106 @@
+"""IKURT to the letter: the published algorithms 4 and 5, one sample at a time. Source: the IKURT paper."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrtik_ompl.arrays import Vector
+from rrtik_ompl.ik.ikurt.metric import Metric
+from rrtik_ompl.ik.ikurt.tree import Tree
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """The numbers of the published algorithm.
+
+    Attributes:
+        step: Growth step delta0 [rad].
+        threshold: Distance in the metric at which the step begins to shrink, in proportion.
+        accuracy: Distance in the metric at which the goal counts as reached, the published min_threshold.
+    """
+
+    step: float
+    threshold: float
+    accuracy: float
+
+
+class PublishedSearch:
+    """One tree, greedy in the workspace, with one step of a plain RRT after every failure.
+
+    Args:
+        metric: Distance from the goal.
+        steps: The numbers.
+        lower, upper: Bounds of the samples, shape (n,).
+        motion_free: Whether a straight motion is free, its end inside the limits.
+        stop: True when the time is up.
+        rng: Random numbers.
+        start: Shape (n,).
+    """
+
+    def __init__(
+        self,
+        metric: Metric,
+        steps: Steps,
+        lower: Vector,
+        upper: Vector,
+        motion_free: Callable[[Vector, Vector], bool],
+        stop: Callable[[], object],
+        rng: np.random.Generator,
+        start: Vector,
+    ) -> None:
+        self._metric, self._steps, self._lower, self._upper = metric, steps, lower, upper
+        self._free, self._stop, self._rng = motion_free, stop, rng
+        self.tree = Tree(start[None], metric.distance(start[None]))
+        self.connects = 0
+
+    def run(self) -> int | None:
+        """Algorithm 4: the vertex at the goal, or None if the time was up first."""
+        while not self._stop():
+            vertex = int(self.tree.distance.argmin())
+            self.connects += 1
+            vertex, reached = self._connect(vertex)
+            if reached:
+                return vertex
+            q_rand = self._random()
+            near = int(self.tree.nearest(q_rand[None])[0])
+            q_new = _extend(self.tree.q[near], q_rand, self._steps.step)
+            if self._free(self.tree.q[near], q_new):
+                self._add(q_new, near, self._distance(q_new))
+        return None
+
+    def _connect(self, near: int) -> tuple[int, bool]:
+        """Algorithm 5: step after step, until a sample is not valid; the last vertex, and whether it is at the goal."""
+        delta = self._steps.step
+        q_near = self.tree.q[near].copy()
+        q_new = _extend(q_near, self._random(), delta)
+        while not self._stop() and self._free(q_near, q_new):
+            away = self._distance(q_new)
+            if away < self.tree.distance[near]:
+                near, q_near = self._add(q_new, near, away), q_new
+            best = float(self.tree.distance[near])
+            if best <= self._steps.accuracy:
+                return near, True
+            if best < self._steps.threshold:
+                delta = best * self._steps.step / self._steps.threshold
+            q_new = _extend(q_near, self._random(), delta)
+        return near, False
+
+    def _distance(self, q: Vector) -> float:
+        return float(self._metric.distance(q[None])[0])
+
+    def _random(self) -> Vector:
+        return self._rng.uniform(self._lower, self._upper)
+
+    def _add(self, q: Vector, parent: int, distance: float) -> int:
+        return int(self.tree.add(q[None], np.array([parent]), np.array([distance]))[0])
+
+
+def _extend(a: Vector, b: Vector, step: float) -> Vector:
+    """From a towards b by at most ``step`` [rad]."""
+    away = b - a
+    length = float(np.linalg.norm(away))
+    moved: Vector = b if length <= step else a + away * (step / length)
+    return moved

@@ -1,0 +1,258 @@
+"""IKURT made fast and robust: the published idea on batches, with the Jacobian where the way is clear.
+
+What differs from :mod:`rrtik_ompl.ik.ikurt.published`: CONNECT tries many directions at once, the cheap metric before
+the collision check, takes the best free one, and lives through misses; directions are isotropic, so that joints reach
+their limits; vertices that have failed are penalised; a failure is followed by a whole batch of exploration. With
+``jacobian`` descents look for goal configurations from the vertices where that is worth it, and from anywhere; those
+found and not reached at once become roots of a second tree, and the exploration joins the two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import count
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.ik.ikurt.descent import descend
+from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
+from rrtik_ompl.ik.ikurt.tree import Tree
+
+DIRECTIONS = 16  # that CONNECT tries at once
+PATIENCE, FALL = 8, 0.8  # CONNECT goes on as long as so many rounds bring the distance down to this share,
+SLOW_FALL = 0.97  # or to this one where there is no other way to the goal
+GROWN, SHRUNK, SHORTEST = 1.5, 0.7, 1e-4  # of CONNECT's step after a success and a miss, and its smallest [rad]
+CHECKED = 4  # of the better directions, nearest to the goal first, whose motions are checked together
+NEARER = 0.5  # a new descent from the way of CONNECT when the distance has fallen to this share
+MOST_EXPLORED = 256  # batches of exploration between two CONNECTs; one before the first, then always twice as many,
+FEW_EXPLORED = 4  # but no more than these as long as CONNECT alone can reach the goal
+SAMPLES = 24  # of one batch of exploration
+PIECES = (0.2, 0.5, 1.0)  # shares of the exploration's step, asked about one after the other as long as they are free
+TOWARDS_OTHER = 0.5  # share of the samples that are the newest vertices of the other tree
+DESCENTS = 2  # from vertices of a batch of exploration,
+SCOUTS = 22  # and from samples anywhere, for other goal configurations
+RARE = 32  # once a goal configuration is known, descents follow one batch in so many
+MOST_GOALS = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """How the search works.
+
+    Attributes:
+        step: First step of CONNECT [rad].
+        stride: Longest step of the exploration [rad].
+        jacobian: Whether descents by the Jacobian look for goal configurations.
+        most_vertices: With more the tree is dropped and another one begun; known goal configurations stay.
+    """
+
+    step: float
+    stride: float
+    jacobian: bool
+    most_vertices: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judge:
+    """What the search asks: which configurations are free; which straight motions are; whether to stop."""
+
+    free: Callable[[Matrix], Mask]
+    motions_free: Callable[[Matrix, Matrix], Mask]
+    stop: Callable[[], object]
+
+
+class BatchedSearch:
+    """The tree from the start, and the one from what is found at the goal; see the module.
+
+    Args:
+        metric: Distance from the goal.
+        options: How to work.
+        lower, upper: Bounds, shape (n,).
+        judge: What is free.
+        rng: Random numbers.
+        starts: Roots, shape (k, n).
+
+    Attributes:
+        tree: The tree from the start, the last one after restarts.
+        back: The tree from goal configurations that are known, likewise.
+        goals: Those, shape (k, n).
+        blocked: One in collision, if any was met, shape (0 or 1, n).
+        nearest: The configuration nearest to the goal that was seen, in collision or not, shape (n,).
+        connects, restarts, vertices: Counts.
+    """
+
+    def __init__(
+        self,
+        metric: TipMetric | ConfigurationMetric,
+        options: Options,
+        lower: Vector,
+        upper: Vector,
+        judge: Judge,
+        rng: np.random.Generator,
+        starts: Matrix,
+    ) -> None:
+        self._metric, self._options, self._lower, self._upper = metric, options, lower, upper
+        self._judge, self._rng, self._starts = judge, rng, starts
+        self._distances = metric.distance(starts)
+        self.goals = metric.goals if isinstance(metric, ConfigurationMetric) else starts[:0]
+        self.tree = Tree(starts, self._distances)
+        self.back = Tree(self.goals, np.zeros(len(self.goals)))
+        self._newest, self._batches = starts[:0], 0
+        self.connects = self.restarts = self._dropped = 0
+        self.blocked = starts[:0]
+        self.nearest, self._least = starts[self._distances.argmin()], float(self._distances.min())
+
+    @property
+    def vertices(self) -> int:
+        """Vertices of all trees."""
+        return self.tree.size + self.back.size + self._dropped
+
+    def run(self) -> Matrix | None:
+        """The path to the goal, shape (k, n), or None if the time was up first."""
+        if self._least <= self._metric.radius:
+            return self.tree.branch(int(self._distances.argmin()))
+        explored = 1
+        path = self._finish(np.arange(self.tree.size))
+        while path is None and not self._judge.stop():
+            for _ in range(explored):
+                path = self._explore()
+                if path is not None or self._judge.stop():
+                    return path
+            path = self._connect(self.tree.best())
+            explored = min(2 * explored, MOST_EXPLORED if self.back.size else FEW_EXPLORED)
+            if self.tree.size > self._options.most_vertices:
+                self._restart()
+                explored = 1
+        return path
+
+    def _connect(self, first: int) -> Matrix | None:
+        """From one vertex down the metric; the path to the goal, or None at the end of the patience."""
+        self.connects += 1
+        vertex, step = first, self._options.step
+        path = self._finish(np.array([vertex]))
+        tried_at = before = self.tree.distance[vertex]
+        for number in count(1):
+            if path is not None or self._judge.stop():
+                return path
+            lower = self._downhill(vertex, step)
+            step = max(step * (SHRUNK if lower is None else GROWN), SHORTEST)
+            vertex = vertex if lower is None else lower
+            away = self.tree.distance[vertex]
+            if away <= self._metric.radius:
+                path = self._finish(np.array([vertex]))
+                return self.tree.branch(vertex) if path is None else path
+            if away < NEARER * tried_at:
+                path, tried_at = self._finish(np.array([vertex])), away
+            if number % PATIENCE == 0:
+                if away > (FALL if self._options.jacobian else SLOW_FALL) * before:
+                    break
+                before = away
+        self.tree.penalise(first, vertex)
+        return path
+
+    def _downhill(self, vertex: int, step: float) -> int | None:
+        """The best of some free steps that lower the distance, as a new vertex."""
+        q = self.tree.q[vertex]
+        directions = self._rng.normal(size=(DIRECTIONS, len(q)))
+        directions *= step / np.linalg.norm(directions, axis=1, keepdims=True)
+        candidates = np.clip(q + directions, self._lower, self._upper)
+        distances = self._metric.distance(candidates)
+        order = np.argsort(distances)[:CHECKED]
+        order = order[distances[order] < self.tree.distance[vertex]]
+        free = self._judge.motions_free(np.broadcast_to(q, (len(order), len(q))), candidates[order])
+        if not free.any():
+            return None
+        k = order[free.argmax()]
+        return int(self.tree.add(candidates[k : k + 1], np.array([vertex]), distances[k : k + 1])[0])
+
+    def _explore(self) -> Matrix | None:
+        """A batch of steps of the trees, in turn; from what it adds straight to the other tree, or down to the goal."""
+        self._batches += 1
+        forward = self.back.size == 0 or self._batches % 2 == 0
+        tree, other = (self.tree, self.back) if forward else (self.back, self.tree)
+        new = self._grow(tree)
+        if len(new) == 0:
+            return None
+        self._newest = tree.q[new]
+        path = self._join(tree, new, other) if other.size else None
+        if path is not None:
+            return path if forward else path[::-1]
+        if forward and (len(self.goals) == 0 or self._batches % RARE == 0):
+            return self._finish(self._worth_it(new), scouts=SCOUTS)
+        return None
+
+    def _grow(self, tree: Tree) -> NDArray[np.int64]:
+        """Steps of a plain RRT, many at once; the new vertices."""
+        samples = self._rng.uniform(self._lower, self._upper, (SAMPLES, len(self._lower)))
+        drawn = min(int(TOWARDS_OTHER * SAMPLES), len(self._newest)) if self.back.size else 0
+        samples[:drawn] = self._newest[:drawn]
+        near = tree.nearest(samples)
+        ends, away = tree.q[near], samples - tree.q[near]
+        length = np.linalg.norm(away, axis=1)
+        step = away * np.minimum(1.0, self._options.stride / np.maximum(length, 1e-12))[:, None]
+        going, moved = np.flatnonzero(length > 0.0), np.zeros(SAMPLES, dtype=bool)
+        for piece in PIECES:
+            further = tree.q[near[going]] + piece * step[going]
+            free = self._judge.motions_free(ends[going], further)
+            going = going[free]
+            ends[going], moved[going] = further[free], True
+        return tree.add(ends[moved], near[moved], self._metric.distance(ends[moved]))
+
+    def _worth_it(self, new: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Of new vertices those from which to descend: the nearest one in the workspace, and others by chance."""
+        nearest = new[self.tree.distance[new].argmin()]
+        others = self._rng.choice(new, min(DESCENTS - 1, len(new)), replace=False)
+        return np.unique(np.append(others, nearest))
+
+    def _finish(self, vertices: NDArray[np.int64], scouts: int = 0) -> Matrix | None:
+        """Descend from vertices, shape (k,), and go straight to what that finds; descend from some samples too."""
+        if isinstance(self._metric, ConfigurationMetric):
+            return self._join(self.tree, vertices, self.back)
+        if not self._options.jacobian:
+            return None
+        samples = self._rng.uniform(self._lower, self._upper, (scouts, len(self._lower)))
+        origins = np.vstack([self.tree.q[vertices], samples])
+        ends = descend(self._metric, origins, self._lower, self._upper)
+        if ends.distance.min() < self._least:
+            self.nearest, self._least = ends.q[ends.distance.argmin()], float(ends.distance.min())
+        arrived = ends.distance <= self._metric.radius
+        near = arrived[: len(vertices)]
+        path = self._straight(vertices[near], ends.q[: len(vertices)][near])
+        return self._remember(ends.q[arrived]) if path is None and arrived.any() else path
+
+    def _join(self, tree: Tree, vertices: NDArray[np.int64], other: Tree) -> Matrix | None:
+        """The path from the root of one tree to that of the other over the first free motion between two vertices."""
+        near = other.nearest(tree.q[vertices])
+        free = self._judge.motions_free(tree.q[vertices], other.q[near])
+        if not free.any():
+            return None
+        k = int(free.argmax())
+        return np.vstack([tree.branch(int(vertices[k])), other.branch(int(near[k]))[::-1]])
+
+    def _straight(self, vertices: NDArray[np.int64], goals: Matrix) -> Matrix | None:
+        """The path over the first free motion from vertices to goal configurations."""
+        free = self._judge.motions_free(self.tree.q[vertices], goals)
+        if not free.any():
+            return None
+        k = int(free.argmax())
+        return np.vstack([self.tree.branch(int(vertices[k])), goals[k]])
+
+    def _remember(self, q: Matrix) -> Matrix | None:
+        """Free goal configurations become roots of the tree at the goal; the path if one of them is seen at once."""
+        free = self._judge.free(q)
+        self.blocked = np.vstack([self.blocked, q[~free]])[:1]
+        if len(self.goals) >= MOST_GOALS or not free.any():
+            return None
+        self.goals = np.vstack([self.goals, q[free]])
+        roots = self.back.add(q[free], np.full(int(free.sum()), -1), np.zeros(int(free.sum())))
+        path = self._join(self.back, roots, self.tree)
+        return None if path is None else path[::-1]
+
+    def _restart(self) -> None:
+        self._dropped += self.tree.size + self.back.size
+        self.restarts += 1
+        self.tree = Tree(self._starts, self._distances)
+        self.back = Tree(self.goals, np.zeros(len(self.goals)))

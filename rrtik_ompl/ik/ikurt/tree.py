@@ -1,0 +1,77 @@
+"""The tree of IKURT: configurations, parents, and how far each is from the goal in the workspace."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix, Vector
+
+FIRST_ROOM = 256  # vertices; doubled whenever it is full
+PENALTY = 1.3  # a vertex from which CONNECT has failed counts as so many times as far, each time
+
+
+class Tree:
+    """Vertices in the order in which they were added, roots first.
+
+    Args:
+        roots: Shape (k, n).
+        distances: Of the roots from the goal, shape (k,).
+    """
+
+    def __init__(self, roots: Matrix, distances: Vector) -> None:
+        self._q = np.empty((max(FIRST_ROOM, len(roots)), roots.shape[1]))
+        self._parent = np.empty(len(self._q), dtype=np.int64)
+        self._distance, self._rank = np.empty(len(self._q)), np.empty(len(self._q))
+        self.size = 0
+        self.add(roots, np.full(len(roots), -1), distances)
+
+    @property
+    def q(self) -> Matrix:
+        """The vertices, shape (size, n)."""
+        return self._q[: self.size]
+
+    @property
+    def distance(self) -> Vector:
+        """Workspace distance of each vertex from the goal, shape (size,)."""
+        return self._distance[: self.size]
+
+    def add(self, q: Matrix, parents: NDArray[np.int64], distances: Vector) -> NDArray[np.int64]:
+        """Add vertices q, shape (k, n), below others; returns their numbers, shape (k,)."""
+        while self.size + len(q) > len(self._q):
+            self._grow()
+        numbers = np.arange(self.size, self.size + len(q))
+        self._q[numbers], self._parent[numbers] = q, parents
+        self._distance[numbers] = self._rank[numbers] = distances
+        self.size += len(q)
+        return numbers
+
+    def best(self) -> int:
+        """The vertex nearest to the goal in the workspace, penalties counted."""
+        return int(self._rank[: self.size].argmin())
+
+    def penalise(self, first: int, last: int) -> None:
+        """CONNECT has failed on its way from vertex ``first`` down to ``last``: prefer other vertices to these."""
+        vertex = last
+        while vertex >= 0:
+            self._rank[vertex] *= PENALTY
+            vertex = -1 if vertex == first else int(self._parent[vertex])
+
+    def nearest(self, Q: Matrix) -> NDArray[np.int64]:
+        """The vertex nearest in joint space (Euclidean) to each of Q, shape (m, n); shape (m,)."""
+        square = np.einsum("ij,ij->i", self.q, self.q)
+        nearest: NDArray[np.int64] = (square - 2.0 * Q @ self.q.T).argmin(axis=1)
+        return nearest
+
+    def branch(self, vertex: int) -> Matrix:
+        """The way from a root to a vertex, shape (k, n)."""
+        numbers = [vertex]
+        while self._parent[numbers[-1]] >= 0:
+            numbers.append(int(self._parent[numbers[-1]]))
+        return np.array(self._q[numbers[::-1]])
+
+    def _grow(self) -> None:
+        self._q = np.concatenate([self._q, np.empty_like(self._q)])
+        self._parent = np.concatenate([self._parent, np.empty_like(self._parent)])
+        self._distance = np.concatenate([self._distance, np.empty_like(self._distance)])
+        self._rank = np.concatenate([self._rank, np.empty_like(self._rank)])
