@@ -15,6 +15,7 @@ from rrtik_ompl.goal import GoalRegion, JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.poses import pose
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_file import load_problem, problem_schema, save_problem
+from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.world import World
 from rrtik_ompl.yaml_file import read_yaml, write_yaml
 
@@ -100,12 +101,17 @@ def test_another_robot_can_take_the_place_of_the_one_in_the_file(tmp_path, slide
     assert problem.world.robot.joint_names == ("rail", "turn")
 
 
+BOUNDS = [[-0.1, 0.2], [0, 0], [0, 1 / 3], [-4, 4], [0.1, 0.1], [-0.2, 0.3]]
 GOALS = [
     JointGoal([0.1, 1 / 3, -1e-17]),
     PositionGoal([0.1, 0.2, 0.3], 1e-5),
     PoseGoal(pose([0.1, 0.2, 0.3], [0.1, 0.7, 0.5, 0.5]), 1e-4, 0.2),
     GoalRegion([PoseGoal(pose([1, 0, 0])), PositionGoal([0, 1, 0])]),
     GoalRegion([PoseGoal(pose([1, 0, 0]), 0.01)], "y", [0, 0.1, 0]),
+    GoalRegion([PoseGoal(pose([1, 0, 0]), 0.01), PoseGoal(pose([0, 1, 0])), PositionGoal([0, 1, 0])], "z"),
+    TaskRegion(pose([1, 0, 0], [0.1, 0.7, 0.5, 0.5]), BOUNDS, pose([0, 0.1, 0]), 0.01, 0.02),
+    TaskRegion.about_axis(pose([1, 0, 0.2]), [0, 0.6, 0.8], through=[1, 0.1, 0], slide=[-0.1, 1 / 3]),
+    GoalRegion([TaskRegion.about_axis(pose([1, 0, 0.2]), [0, 0, 1]), PoseGoal(pose([1, 0, 0]))]),
 ]
 
 
@@ -134,9 +140,8 @@ def test_files_of_a_robot_are_named_relative_to_the_new_file(tmp_path, slide):
 
 def test_what_the_format_has_no_words_for_is_refused(tmp_path):
     world = load(tmp_path, text()).world
-    for goal in (JointGoal([0, 0, 0], 0.1), GoalRegion([PoseGoal(pose()), PoseGoal(pose())], "z")):
-        with pytest.raises(InputError, match="goal: a problem file can"):
-            save_problem(Problem(world, [0, 0, 0], goal), tmp_path / "copy.yaml")
+    with pytest.raises(InputError, match="goal: a problem file can"):
+        save_problem(Problem(world, [0, 0, 0], JointGoal([0, 0, 0], 0.1)), tmp_path / "copy.yaml")
     assert not (tmp_path / "copy.yaml").exists()
 
 
