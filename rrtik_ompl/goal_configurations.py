@@ -24,7 +24,7 @@ ROUNDS = 4  # at most, until one free configuration is found
 LAST_ROUND = 64
 TREE_SECONDS = 0.3  # that MB-RRT may take
 MOST = 16  # configurations that one round adds
-LARGEST = 128  # configurations altogether
+LARGEST = 96  # configurations altogether
 SAME_POSTURE = 1e-3  # [rad] or [m]
 
 
@@ -86,7 +86,7 @@ class GoalSearch:
         free = found[world.valid_batch(found)]
         free = free[world.certify(free)]
         self._found = np.vstack([self._found, found])
-        self.rows = frozen(np.vstack([self.rows, _nearest_first(self._problem, free, self.rows)])[:LARGEST])
+        self.rows = frozen(np.vstack([self.rows, _chosen(self._problem, free, self.rows)])[:LARGEST])
         self.exhausted |= self._rounds >= LAST_ROUND or len(self.rows) >= LARGEST
         return len(self.rows) > known
 
@@ -162,14 +162,22 @@ def _turns(problem: Problem, q: Vector) -> Matrix:
     return np.array(rows)
 
 
-def _nearest_first(problem: Problem, rows: Matrix, known: Matrix) -> Matrix:
-    """At most ``MOST`` rows unlike each other and the known ones, turned to lie near the start, nearest first."""
+def _chosen(problem: Problem, rows: Matrix, known: Matrix) -> Matrix:
+    """At most ``MOST`` rows unlike each other and the known ones, turned to lie near the start, nearest first.
+
+    Half of them are the nearest to the start; the others lie farthest from all that were chosen before, for what is
+    near to the start and to each other may all be blocked by the same thing.
+    """
     robot = problem.world.robot
-    difference = joint_difference(robot, rows, problem.start)
-    turned = np.where(robot.continuous, problem.start + difference, rows)
-    kept: list[Vector] = []
-    for k in np.argsort(np.linalg.norm(difference, axis=1), kind="stable"):
-        others = np.vstack([known, *kept])
-        if len(kept) < MOST and (np.abs(joint_difference(robot, others, turned[k])).max(axis=1) > SAME_POSTURE).all():
-            kept.append(turned[k])
-    return np.array(kept).reshape(-1, robot.dof)
+    away = joint_difference(robot, rows, problem.start)
+    turned = np.where(robot.continuous, problem.start + away, rows)
+    distance = np.linalg.norm(away, axis=1)
+    apart = np.full(len(rows), np.inf)  # largest joint difference from the nearest of those chosen
+    for row in known:
+        apart = np.minimum(apart, np.abs(joint_difference(robot, turned, row)).max(axis=1))
+    kept: list[int] = []
+    while len(kept) < MOST and (apart > SAME_POSTURE).any():
+        value = -distance if len(kept) < MOST // 2 else apart
+        kept.append(int(np.argmax(np.where(apart > SAME_POSTURE, value, -np.inf))))
+        apart = np.minimum(apart, np.abs(joint_difference(robot, turned, turned[kept[-1]])).max(axis=1))
+    return turned[sorted(kept, key=lambda k: (distance[k], k))]

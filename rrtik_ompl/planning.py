@@ -33,7 +33,6 @@ RESTARTS = 20
 MAX_RESTARTS = 1_000_000
 SHORTEST = 1e-3  # [s] that an attempt gets at least
 MAX_SECONDS = 1e9  # thirty years; OMPL's clock overflows at about nine times as much
-EFFORT = 4  # of the first attempt at a goal of which there are further configurations; each next one doubles it
 OF_THE_PATH = ("lower_bound", "gap")  # what planners count of a path, not of their work
 _OMPL_PREFIX, _MOVEIT_SUFFIX = "geometric::", "kConfigDefault"  # as in ompl_planning.yaml
 
@@ -166,7 +165,7 @@ def _search(
             left = max(deadline - time.perf_counter(), SHORTEST)
         half = 0.5 if short_way else 1.0  # of the time for the short way round, before the long one is tried too
         others = _others(search, factory, number) and number < len(seeds) - 1
-        effort = EFFORT * 2**number if others and can_be_brief(factory) else None
+        effort = 2**number if others and can_be_brief(factory) else None
         outcome = attempt(asked, factory, aims, seconds=half * left, seed=seed, parameters=parameters, effort=effort)
         _add(totals, outcome.statistics)
         path, reason = _judged(problem, outcome, name)
