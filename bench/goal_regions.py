@@ -1,12 +1,14 @@
 """Every kind of goal of the tip, 100 seeds each: the share that is solved, and the time it takes.
 
-python bench/goal_regions.py [SEEDS]  writes bench/reports/goal_regions.md
+python bench/goal_regions.py [SEEDS [SEEDS_OF_UR5]]  writes bench/reports/goal_regions.md
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +21,7 @@ PLANNERS = ("RRTConnect", "bicrdt", "fastrrtconnect")
 SECONDS = 5.0
 FREE, NONE = (-np.pi, np.pi), (0.0, 0.0)
 REPORT = Path(__file__).parent / "reports" / "goal_regions.md"
-START, AT_GOAL = (-0.9, -1.2, 1.6, -1.9, -1.5, 0.0), (0.8, -1.0, 1.5, -2.0, -1.5, 0.0)
+UR5_START, UR5_GOAL = (-0.9, -1.2, 1.6, -1.9, -1.5, 0.0), (0.8, -1.0, 1.5, -2.0, -1.5, 0.0)
 
 
 def cell() -> rrtik.World:
@@ -32,14 +34,13 @@ def cell() -> rrtik.World:
     return rrtik.World(rrtik.load_robot("ur5"), rrtik.Scene(obstacles))
 
 
-def goals(robot: rrtik.Robot) -> dict[str, Goal]:
+def goals(tip: Any) -> dict[str, Goal]:
     """One goal of each kind round one pose of the tip."""
-    tip = robot.fk(np.array(AT_GOAL))
     up = np.array([0.0, 0.0, 1.0])
     line = np.array([(-0.15, 0.15), NONE, NONE, NONE, NONE, NONE])
     box = np.array([(-0.1, 0.1), (-0.1, 0.1), (-0.05, 0.05), (-0.2, 0.2), (-0.2, 0.2), FREE])
     turned = [tip * pose([0, 0, 0], [0, 0, np.sin(a / 2), np.cos(a / 2)]) for a in (0.0, 1.5, 3.0, -1.5)]
-    far = pose([1.6, 0, 0.3])
+    far = pose([4.0, 0, 0.3])
     return {
         "a pose": rrtik.PoseGoal(tip),
         "a position": rrtik.PositionGoal(tip.translation),
@@ -65,27 +66,34 @@ def measured(problem: rrtik.Problem, planner: str, seeds: int) -> str:
     return f"{solved} of {seeds} | {np.median(times):.0f} | {np.percentile(times, 95):.0f} | {attempts}"
 
 
-def main(seeds: int = 100) -> None:
-    """Measure all and write the report."""
-    world = cell()
-    problems = {kind: rrtik.Problem(world, np.array(START), goal) for kind, goal in goals(world.robot).items()}
-    problems["titan4_bar: two grasps of a bar"] = rrtik.load_problem("titan4_bar")
+def problems(seeds: int, seeds_of_ur5: int) -> Iterator[tuple[str, rrtik.Problem, int]]:
+    """Names, problems and how many seeds each gets."""
+    bar, side = rrtik.load_problem("titan4_bar"), cell()
+    yield "TITAN-4, two grasps of a bar (titan4_bar)", bar, seeds
+    for kind, goal in goals(pose([1.33, 0.2, -0.1], [np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0])).items():
+        yield f"TITAN-4, {kind}", rrtik.Problem(bar.world, bar.start, goal), seeds
+    for kind, goal in goals(side.robot.fk(np.array(UR5_GOAL))).items():
+        yield f"UR5, {kind}", rrtik.Problem(side, np.array(UR5_START), goal), seeds_of_ur5
+
+
+def main(seeds: int = 100, seeds_of_ur5: int = 100) -> None:
+    """Measure all and write the report after each row."""
     lines = [
         "# Goals of the tip",
         "",
-        f"A UR5 between table, post and beam, and the shipped TITAN-4 problem; {seeds} seeds, {SECONDS:g} s each. The time",
-        "is that of `plan()`, inverse kinematics included, on a busy shared machine: compare ratios.",
-        "Made by `python bench/goal_regions.py`.",
+        "TITAN-4 (closed form) before the bar of `titan4_bar`, and a UR5 (numeric) between table, post and beam;",
+        f"{SECONDS:g} s each. The time is that of `plan()`, inverse kinematics included, on a busy shared machine:",
+        "compare ratios. Made by `python bench/goal_regions.py`.",
         "",
         "| goal | planner | solved | median [ms] | 95 % [ms] | attempts, at most |",
         "|---|---|---|---|---|---|",
     ]
-    for kind, problem in problems.items():
+    for name, problem, count in problems(seeds, seeds_of_ur5):
         for planner in PLANNERS:
             rrtik.plan(problem, planner, seed=0)  # what is loaded once
-            lines.append(f"| {kind} | {planner} | {measured(problem, planner, seeds)} |")
+            lines.append(f"| {name} | {planner} | {measured(problem, planner, count)} |")
             print(lines[-1], flush=True)
-    REPORT.write_text("\n".join(lines) + "\n")
+            REPORT.write_text("\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":
