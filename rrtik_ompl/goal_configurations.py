@@ -11,7 +11,7 @@ from rrtik_ompl.goal import JointGoal, TipGoal, as_task_region, joint_difference
 from rrtik_ompl.ik.face import DRAWS, solve_ik
 from rrtik_ompl.ik.methods import METHODS
 from rrtik_ompl.ik.numeric import numeric_ik
-from rrtik_ompl.ik.projection import project, projected, reach_of
+from rrtik_ompl.ik.projection import PER_RADIAN, project, projected, reach_of
 from rrtik_ompl.ik.question import Target
 from rrtik_ompl.ik.targets import leaves_freedom, targets
 from rrtik_ompl.problem import TURN, Problem
@@ -19,6 +19,7 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.task_region import TaskRegion
 
 STARTS = 48  # of inverse kinematics in one round
+FEWEST = 4  # for each part, to tell how near the arm came
 PARTS = 6  # of a grasp set, among which the starts of a round are shared out
 ROUNDS = 4  # at most, until one free configuration is found
 LAST_ROUND = 64
@@ -125,12 +126,13 @@ class GoalSearch:
 
 
 def nearest_miss(robot: Robot, goal: TipGoal) -> tuple[float, float]:
-    """How near the arm came to a goal within its limits: distance [m] and angle [rad]; an angle counts half a reach."""
-    rng = np.random.default_rng(0)
-    starts = rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
-    ends = np.vstack([project(robot, as_task_region(part), starts) for part in parts_of(goal)[:PARTS]])
+    """How near the arm came to a goal within its limits: distance [m] and angle [rad]."""
+    parts = parts_of(goal)
+    count = max(STARTS // len(parts), FEWEST)
+    starts = np.random.default_rng(0).uniform(*robot.finite_range(), (count, robot.dof))
+    ends = np.vstack([project(robot, as_task_region(part), starts) for part in parts])
     distance, angle = tip_errors(goal, robot, ends)
-    best = np.argmin(distance + 0.5 * reach_of(robot) * angle)
+    best = np.argmin(distance + PER_RADIAN * reach_of(robot) * angle)
     return float(distance[best]), float(angle[best])
 
 

@@ -139,20 +139,16 @@ def _search(
     reason = ""
     if _nothing_to_do(problem):  # some planners wander off and come back, others break
         return JointPath.of(problem.world.robot, problem.start[None]), "", totals
+    turns_matter = isinstance(problem.goal, JointGoal) and bool(problem.world.robot.continuous.any())
     # An optimal path touches what it goes round, and an anytime planner has no time left for a second attempt.
     asked = problem.refined(SECOND_CHECK) if getattr(factory, "__name__", "") in ANYTIME_PLANNERS else problem
-    turns_matter = isinstance(problem.goal, JointGoal) and bool(problem.world.robot.continuous.any())
     search = GoalSearch(problem, np.random.default_rng(seeds[0]))
     for number, seed in enumerate(seeds):
         if time.perf_counter() >= deadline:
             break
         totals["attempts"] += 1
         short_way = turns_matter and number == 0 and len(seeds) > 1
-        if number > 0:
-            search.more()
-        aims = (
-            search.first()[:1] if short_way else np.roll(search.first(), -number, axis=0)
-        )  # some heed the first alone
+        aims = _aims(search, number, short_way)
         left = deadline - time.perf_counter()
         if len(aims) == 0 and search.exhausted:
             break
@@ -175,6 +171,14 @@ def _search(
             totals["rejected"] += 1
             asked = problem.refined(SECOND_CHECK)
     return None, reason or search.reason, totals
+
+
+def _aims(search: GoalSearch, number: int, short_way: bool) -> Matrix:
+    """What an attempt aims at: all that is known, the newest first, for some planners heed the first alone."""
+    known = len(search.rows)
+    newer = number > 0 and search.more()
+    rows = search.first()
+    return rows[:1] if short_way else np.roll(rows, -known if newer else -number, axis=0)
 
 
 def _others(search: GoalSearch, factory: PlannerFactory, number: int) -> bool:

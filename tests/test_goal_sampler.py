@@ -15,7 +15,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal, joint_difference
 from rrtik_ompl.goal_configurations import GoalSearch
 from rrtik_ompl.ompl_bridge import GoalSampler, StateIO
-from rrtik_ompl.ompl_bridge.attempt import ANYTIME_PLANNERS, ompl_planners
+from rrtik_ompl.ompl_bridge.attempt import ANYTIME_PLANNERS, ONE_GOAL_PLANNERS, ompl_planners
 from rrtik_ompl.planning import list_planners, plan
 from rrtik_ompl.poses import pose
 from rrtik_ompl.problem import Problem
@@ -26,7 +26,6 @@ from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.world import World
 from rrtik_planners import MBRRT, BiCRDT
 
-ONE_GOAL = ("PRM", "PRMstar", "AORRTC")  # take `states()`
 HERE, THERE = np.array([0, -1.2, 1.2, -1.5, -1.5, 0.0]), np.array([1.6, -1.2, 1.2, -1.5, -1.5, 0.0])
 
 
@@ -108,7 +107,7 @@ def test_a_search_ends(turning):
     assert len(search.rows) <= 96
 
 
-@pytest.mark.parametrize("name", sorted(set(ompl_planners()) - set(ONE_GOAL)))
+@pytest.mark.parametrize("name", sorted(set(ompl_planners()) - set(ONE_GOAL_PLANNERS)))
 def test_the_sampler_serves_every_planner_of_ompl(quiet_ompl, turning, name):
     sampler = GoalSampler(turning, seed=1, most=20)
     setup = setup_of(turning, sampler)
@@ -120,8 +119,8 @@ def test_the_sampler_serves_every_planner_of_ompl(quiet_ompl, turning, name):
         assert turning.reached(end_of(setup, turning))
 
 
-@pytest.mark.parametrize("name", ONE_GOAL)
-def test_planners_with_a_thread_of_their_own_get_states(quiet_ompl, turning, name):
+@pytest.mark.parametrize("name", ONE_GOAL_PLANNERS)
+def test_planners_that_take_one_goal_get_states(quiet_ompl, turning, name):
     sampler = GoalSampler(turning)
     setup = setup_of(turning, sampler, sampler.states())
     setup.setPlanner(ompl_planners()[name](sampler.getSpaceInformation()))

@@ -22,6 +22,7 @@ from rrtik_ompl.poses import rpy_matrices
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.task_region import TURN, TaskRegion
 
+PER_RADIAN = 0.5  # [reach/rad]: two radians count as much as the whole reach
 ITERATIONS = 60
 PATIENCE, STALLED = 10, 0.5  # a walk is given up whose squared residual is not down to this share in so many steps
 DAMPING = 1e-6  # the constant part, in units of the squared residual (1 is the reach)
@@ -44,7 +45,7 @@ def project(robot: Robot, region: TaskRegion, starts: Matrix, *, places: Matrix 
     """
     Q, left = robot.clamp(starts), np.arange(len(starts))
     places = np.full((len(Q), 3), np.nan) if places is None else places
-    scale = np.array([1.0 / reach_of(robot)] * 3 + [0.5] * 3)[:, None]  # a full turn counts as much as the whole reach
+    scale = np.repeat([1.0 / reach_of(robot), PER_RADIAN], 3)[:, None]
     mark = np.full(len(Q), np.inf)
     for step in range(ITERATIONS):
         tips = robot.fk_batch(Q[left])

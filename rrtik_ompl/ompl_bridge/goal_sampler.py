@@ -11,13 +11,12 @@ from rrtik_ompl.arrays import Mask, Matrix, frozen
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import JointGoal, tip_errors
 from rrtik_ompl.goal_configurations import LARGEST, GoalSearch
-from rrtik_ompl.ik.projection import reach_of
+from rrtik_ompl.ik.projection import PER_RADIAN, reach_of
 from rrtik_ompl.ompl_bridge.setup import Judge, space_information
 from rrtik_ompl.ompl_bridge.states import StateIO, space_bounds
 from rrtik_ompl.problem import Problem
 
 MOST = 32
-RAD = 0.5  # in reaches of the arm: a full turn counts about as much as thrice the arm's reach
 
 
 class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no types
@@ -115,7 +114,7 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
         return len(self.rows) > 0
 
     def distanceGoal(self, state: Any) -> float:
-        """0 at the goal, else how far the tip is away [m], an angle counting half the arm's reach; called by OMPL.
+        """0 at the goal, else how far the tip is away [m], an angle of 2 rad counting as the arm's reach; called by OMPL.
 
         For a goal in joint values the largest joint error [rad or m].
         """
@@ -125,7 +124,7 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
         if isinstance(goal, JointGoal):
             return float(goal.distance(robot, q)[0])
         distance, angle = tip_errors(goal, robot, q)
-        return float(distance[0] + RAD * reach_of(robot) * angle[0])
+        return float(distance[0] + PER_RADIAN * reach_of(robot) * angle[0])
 
     def _usable(self, rows: Matrix) -> Mask:
         """Which rows lie inside the bounds and are valid to the checker of the space information, if it has one."""
