@@ -55,7 +55,7 @@ def rigid(T: Any, what: str) -> Any:
         raise InputError(
             f"{what}: its upper left 3 x 3 part is no rotation (it scales, skews or mirrors); make it orthonormal"
         )
-    return T if isinstance(T, pin.SE3) else pin.SE3(matrix)
+    return pin.SE3(matrix)
 
 
 def unit_vector(values: ArrayLike, what: str) -> Vector:

@@ -48,9 +48,8 @@ class TaskRegion:
         object.__setattr__(self, "T_world_w", rigid(self.T_world_w, "goal region: T_world_w"))
         object.__setattr__(self, "T_w_tip", rigid(self.T_w_tip, "goal region: T_w_tip"))
         bounds = finite_array(self.bounds, (6, 2), "goal region: bounds")
-        for name, (low, high) in zip(COORDINATES, bounds, strict=True):
-            if low > high:
-                raise InputError(f"goal region: {name} goes from {low:g} up to {high:g}; put the lower bound first")
+        for name, bound in zip(COORDINATES, bounds, strict=True):
+            _range(bound, f"goal region: {name}")
         object.__setattr__(self, "bounds", frozen(bounds))
         for name in ("position_tolerance", "orientation_tolerance"):
             object.__setattr__(self, name, positive(getattr(self, name), f"goal region: {name}"))
@@ -87,7 +86,7 @@ class TaskRegion:
         R = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), direction).matrix()
         T_world_w = pin.SE3(R, np.array(point))
         bounds = np.zeros((6, 2))
-        bounds[2], bounds[5] = finite_array(slide, (2,), "goal region: slide"), finite_array(turn, (2,), "turn")
+        bounds[2], bounds[5] = _range(slide, "goal region: slide"), _range(turn, "goal region: turn")
         return cls(T_world_w, bounds, T_world_w.actInv(tip), position_tolerance, orientation_tolerance)
 
     @property
@@ -134,6 +133,13 @@ class TaskRegion:
         """Which rows of Q are at the goal, shape (m,)."""
         position, angle = self.errors(robot, Q)
         return (position <= self.position_tolerance) & (angle <= self.orientation_tolerance)
+
+
+def _range(values: ArrayLike, what: str) -> Vector:
+    low, high = bounds = finite_array(values, (2,), what)
+    if low > high:
+        raise InputError(f"{what} goes from {low:g} up to {high:g}; put the lower bound first")
+    return bounds
 
 
 def nearest_angles(rotations: NDArray[np.float64], bounds: Matrix) -> Matrix:

@@ -163,7 +163,10 @@ BAD = {
     "no tolerance": (lambda: TaskRegion(AT, FIXED, position_tolerance=0.0), "position_tolerance must be greater"),
     "a long axis": (lambda: TaskRegion.about_axis(AT, [0, 2, 0]), "axis must have length 1, but has 2"),
     "an axis of nothing": (lambda: TaskRegion.about_axis(AT, [0, 0, 0]), "axis must have length 1"),
-    "a slide upside down": (lambda: TaskRegion.about_axis(AT, [0, 0, 1], slide=[0.1, 0]), "z goes from 0.1 up to 0"),
+    "a slide upside down": (
+        lambda: TaskRegion.about_axis(AT, [0, 0, 1], slide=[0.1, 0]),
+        "slide goes from 0.1 up to 0",
+    ),
     "an empty set": (lambda: GoalRegion([]), "at least one pose"),
 }
 

@@ -114,9 +114,10 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
         return len(self.rows) > 0
 
     def distanceGoal(self, state: Any) -> float:
-        """0 at the goal, else how far the tip is away [m], an angle of 2 rad counting as the arm's reach; called by OMPL.
+        """0 at the goal, else how far the tip is away [m]; called by OMPL.
 
-        For a goal in joint values the largest joint error [rad or m].
+        An angle of two radians counts as much as the arm's reach. For a goal in joint values it is the largest joint
+        error [rad or m].
         """
         robot, goal, q = self._problem.world.robot, self._problem.goal, self._io.read(state)[None]
         if goal.satisfied(robot, q)[0]:
