@@ -234,6 +234,13 @@ def test_plan_reaches_a_grasp_set_with_every_planner(bar, name):
         assert name in ANYTIME_PLANNERS, found.reason
 
 
+@pytest.mark.parametrize("name", ["bicrdt", "RRTConnect"])
+def test_the_same_seed_gives_the_same_path_to_a_grasp_set(bar, name):
+    one, two, other = (plan(bar, name, seconds=20.0, seed=seed).path.waypoints for seed in (4, 4, 5))
+    assert np.array_equal(one, two)
+    assert not np.array_equal(one, other)
+
+
 @pytest.mark.parametrize("name", ["bicrdt", "fastrrtconnect"])
 def test_plan_draws_others_when_what_it_aimed_at_is_out_of_its_reach(name):
     """Most parts of the goal lie in a cage, and these are the nearest to the start."""
