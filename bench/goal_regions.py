@@ -87,7 +87,7 @@ def main(seeds: int = 100, seeds_of_ur5: int = 100) -> None:
         "",
         "TITAN-4 (closed form) before the bar of `titan4_bar`, and a UR5 (numeric) between table, post and beam;",
         f"{SECONDS:g} s each. The time is that of the processor in `plan()`, inverse kinematics included.",
-        "Made by `python bench/goal_regions.py`.",
+        f"Made by `python bench/goal_regions.py {seeds} {seeds_of_ur5}`.",
         "",
         "| goal | planner | solved | median [ms] | 95 % [ms] | attempts, at most |",
         "|---|---|---|---|---|---|",
