@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.ik.face import solve_ik as solve_ik
     from rrtik_ompl.ik.trajectory import IkTrajectory as IkTrajectory
     from rrtik_ompl.ik.trajectory import solve_ik_trajectory as solve_ik_trajectory
+    from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler as GoalSampler
     from rrtik_ompl.one_joint import one_joint_moves as one_joint_moves
     from rrtik_ompl.path import JointPath as JointPath
     from rrtik_ompl.path import load_path as load_path
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.scene_file import load_scene as load_scene
     from rrtik_ompl.scene_file import save_scene as save_scene
     from rrtik_ompl.shortening import shorten as shorten
+    from rrtik_ompl.task_region import TaskRegion as TaskRegion
     from rrtik_ompl.trajectory import RateLimits as RateLimits
     from rrtik_ompl.trajectory import Trajectory as Trajectory
     from rrtik_ompl.trajectory import load_trajectory as load_trajectory
@@ -62,6 +64,7 @@ else:
         "ik.batch": ("IkBatch", "solve_ik_batch"),
         "ik.face": ("IkResult", "list_ik_methods", "solve_ik"),
         "ik.trajectory": ("IkTrajectory", "solve_ik_trajectory"),
+        "ompl_bridge.goal_sampler": ("GoalSampler",),
         "one_joint": ("one_joint_moves",),
         "path": ("JointPath", "load_path"),
         "planning": ("Plan", "list_planners", "plan"),
@@ -74,6 +77,7 @@ else:
         "scene": ("AttachedObject", "Obstacle", "Scene"),
         "scene_file": ("load_scene", "save_scene"),
         "shortening": ("shorten",),
+        "task_region": ("TaskRegion",),
         "trajectory": ("RateLimits", "Trajectory", "load_trajectory", "timed"),
         "viewer": ("view",),
         "world": ("World",),

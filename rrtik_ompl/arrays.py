@@ -49,6 +49,18 @@ def finite_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) ->
     return array
 
 
+def positive(value: ArrayLike, what: str) -> float:
+    """A number greater than 0 given by a user.
+
+    Raises:
+        InputError: If it is none.
+    """
+    number = float(finite_array(value, (), what))
+    if number <= 0.0:
+        raise InputError(f"{what} must be greater than 0, got {number:g}")
+    return number
+
+
 def _short(value: object) -> str:
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."

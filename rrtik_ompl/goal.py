@@ -1,4 +1,4 @@
-"""What a plan has to reach: joint values, an end-effector pose, a position, or any of a region's poses."""
+"""What a plan has to reach: joint values, an end-effector pose, a position, a region of poses, or any of several."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Vector, finite_array, frozen
+from rrtik_ompl.arrays import Mask, Vector, finite_array, frozen, positive
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.poses import rigid, rotation_angles
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.task_region import TaskRegion
 
 JOINT_TOLERANCE = 1e-6  # [rad] or [m]
 NO_BOX = frozen([0.0, 0.0, 0.0])
@@ -35,7 +37,7 @@ class JointGoal:
 
     def __init__(self, q: ArrayLike, tolerance: float = JOINT_TOLERANCE) -> None:
         object.__setattr__(self, "q", frozen(finite_array(q, (None,), "goal joints")))
-        object.__setattr__(self, "tolerance", _tolerance(tolerance, "goal tolerance"))
+        object.__setattr__(self, "tolerance", positive(tolerance, "goal tolerance"))
 
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
         """Largest joint error of each row of Q, shape (m,) [rad or m]."""
@@ -56,13 +58,18 @@ class PositionGoal:
 
     def __init__(self, position: ArrayLike, tolerance: float = 1e-3) -> None:
         object.__setattr__(self, "position", frozen(finite_array(position, (3,), "goal position")))
-        object.__setattr__(self, "tolerance", _tolerance(tolerance, "goal tolerance"))
+        object.__setattr__(self, "tolerance", positive(tolerance, "goal tolerance"))
 
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
         """Distance of the tip from the point for each row of Q, shape (m,) [m]."""
         tips = robot.fk_batch(np.atleast_2d(Q))[:, :3, 3]
         distances: Vector = np.linalg.norm(tips - self.position, axis=1)
         return distances
+
+    def errors(self, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
+        """Distance [m] of each row of Q, and an angle of 0, shapes (m,)."""
+        distances = self.distance(robot, Q)
+        return distances, np.zeros(len(distances))
 
     def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
         """Which rows of Q are at the goal, shape (m,)."""
@@ -78,14 +85,9 @@ class PoseGoal:
     orientation_tolerance: float = 1e-2
 
     def __post_init__(self) -> None:
-        if not isinstance(self.T_world_tip, pin.SE3):
-            matrix = finite_array(self.T_world_tip, (4, 4), "goal pose")
-            if not np.allclose(matrix[3], [0.0, 0.0, 0.0, 1.0]):
-                raise InputError(f"goal pose: the last row must be 0 0 0 1, got {matrix[3].tolist()}")
-            object.__setattr__(self, "T_world_tip", pin.SE3(matrix))
-        _check_rigid(finite_array(self.T_world_tip.homogeneous, (4, 4), "goal pose")[:3, :3])
-        _tolerance(self.position_tolerance, "goal position_tolerance")
-        _tolerance(self.orientation_tolerance, "goal orientation_tolerance")
+        object.__setattr__(self, "T_world_tip", rigid(self.T_world_tip, "goal pose"))
+        positive(self.position_tolerance, "goal position_tolerance")
+        positive(self.orientation_tolerance, "goal orientation_tolerance")
 
     def errors(self, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
         """Position error [m] and rotation angle [rad] of each row of Q, shapes (m,)."""
@@ -104,99 +106,108 @@ class PoseGoal:
         return (position <= self.position_tolerance) & (angle <= self.orientation_tolerance)
 
 
+GoalPart: TypeAlias = PoseGoal | PositionGoal | TaskRegion
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class GoalRegion:
-    """Any of several goals, each of which may leave freedom: a free rotation about an axis, a box of positions.
+    """Any of several goals: a grasp set. Poses may be given freedom: a turn about an axis, a box of positions.
 
     Attributes:
         members: Goals of which one is enough.
-        free_rotation_axis: "x", "y" or "z" of the goal frame about which members may be turned, or None.
-        box: Full side lengths [m], in the goal frame, within which the position is free, shape (3,).
+        free_rotation_axis: "x", "y" or "z" of the goal frame about which poses may be turned, or None.
+        box: Full side lengths [m], in the goal frame, within which the position of poses is free, shape (3,).
+        parts: The members, poses that have freedom as task-space regions.
     """
 
-    members: tuple[PoseGoal | PositionGoal, ...]
+    members: tuple[GoalPart, ...]
     free_rotation_axis: str | None = None
     box: Vector = field(default_factory=lambda: NO_BOX)
+    parts: tuple[GoalPart, ...] = ()
 
     def __init__(
-        self,
-        members: Iterable[PoseGoal | PositionGoal],
-        free_rotation_axis: str | None = None,
-        box: ArrayLike = NO_BOX,
+        self, members: Iterable[GoalPart], free_rotation_axis: str | None = None, box: ArrayLike = NO_BOX
     ) -> None:
         goals = tuple(members)
-        if not goals or not all(isinstance(goal, PoseGoal | PositionGoal) for goal in goals):
-            raise InputError("goal: a region needs at least one pose or position, and nothing else")
+        if not goals or not all(isinstance(goal, PoseGoal | PositionGoal | TaskRegion) for goal in goals):
+            raise InputError(
+                "goal: a region needs at least one pose or position or task-space region, and nothing else"
+            )
         if free_rotation_axis not in (None, "x", "y", "z"):
-            raise InputError(f"goal free_rotation_axis must be x, y or z, got {free_rotation_axis!r}")
+            raise InputError(
+                f"goal free_rotation_axis must be x, y or z, got {free_rotation_axis!r}; "
+                "for another axis use TaskRegion.about_axis"
+            )
         sides = finite_array(box, (3,), "goal box")
         if (sides < 0.0).any():
             raise InputError(f"goal box must not have negative sides, got {sides.tolist()}")
+        freed = free_rotation_axis is not None or bool(sides.any())
+        parts = (_freed(g, free_rotation_axis, sides) if freed and isinstance(g, PoseGoal) else g for g in goals)
         object.__setattr__(self, "members", goals)
         object.__setattr__(self, "free_rotation_axis", free_rotation_axis)
         object.__setattr__(self, "box", frozen(sides))
+        object.__setattr__(self, "parts", tuple(parts))
 
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
-        """Distance to the nearest member in its own units, shape (m,)."""
-        return np.min([self._member_distance(robot, goal, Q) for goal in self.members], axis=0)  # type: ignore[no-any-return]
+        """Distance to the nearest part in its own units, shape (m,)."""
+        nearest: Vector = np.min([part.distance(robot, Q) for part in self.parts], axis=0)
+        return nearest
 
     def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
-        """Which rows of Q are at one of the members, shape (m,)."""
-        rows = np.atleast_2d(Q)
-        inside = np.zeros(len(rows), dtype=bool)
-        for goal in self.members:
-            if isinstance(goal, PositionGoal):
-                inside |= goal.satisfied(robot, rows)
-            else:
-                position, angle = self._region_errors(robot, goal, rows)
-                inside |= (position <= goal.position_tolerance) & (angle <= goal.orientation_tolerance)
+        """Which rows of Q are at one of the parts, shape (m,)."""
+        inside: Mask = np.any([part.satisfied(robot, Q) for part in self.parts], axis=0)
         return inside
 
-    def _member_distance(self, robot: Robot, goal: PoseGoal | PositionGoal, Q: ArrayLike) -> Vector:
-        if isinstance(goal, PositionGoal):
-            return goal.distance(robot, Q)
-        position, angle = self._region_errors(robot, goal, np.atleast_2d(Q))
-        return position / goal.position_tolerance + angle / goal.orientation_tolerance
 
-    def _region_errors(self, robot: Robot, goal: PoseGoal, Q: ArrayLike) -> tuple[Vector, Vector]:
-        """Position outside the box [m] and angle that the free rotation cannot remove [rad], shapes (m,)."""
-        T_goal_tip = np.linalg.inv(goal.T_world_tip.homogeneous) @ robot.fk_batch(Q)
-        outside = np.maximum(np.abs(T_goal_tip[:, :3, 3]) - 0.5 * self.box, 0.0)
-        rotations = T_goal_tip[:, :3, :3]
-        if self.free_rotation_axis is None:
-            angle = _rotation_angle(rotations)
-        else:  # the angle between the axis of the goal and that of the tip is what no turn about it can remove
-            k = "xyz".index(self.free_rotation_axis)
-            angle = np.arctan2(np.linalg.norm(np.delete(rotations[:, :, k], k, axis=1), axis=1), rotations[:, k, k])
-        return np.linalg.norm(outside, axis=1), angle
+TipGoal: TypeAlias = PoseGoal | PositionGoal | TaskRegion | GoalRegion
+Goal: TypeAlias = JointGoal | TipGoal
 
 
-Goal: TypeAlias = JointGoal | PoseGoal | PositionGoal | GoalRegion
+def parts_of(goal: TipGoal) -> tuple[GoalPart, ...]:
+    """The goals of which one is enough: those of a region, or the goal alone."""
+    return goal.parts if isinstance(goal, GoalRegion) else (goal,)
+
+
+def has_task_regions(goal: TipGoal) -> bool:
+    """Whether a goal is a task-space region or has one among its members."""
+    members = goal.members if isinstance(goal, GoalRegion) else (goal,)
+    return any(isinstance(member, TaskRegion) for member in members)
+
+
+def as_task_region(part: GoalPart) -> TaskRegion:
+    """A pose as a region without freedom, a position as one of any orientation; a region as it is."""
+    if isinstance(part, TaskRegion):
+        return part
+    if isinstance(part, PoseGoal):
+        return _freed(part, None, NO_BOX)
+    everywhere = np.outer([0.0, 0.0, 0.0, 1.0, 1.0, 1.0], [-np.pi, np.pi])
+    place = pin.SE3(np.eye(3), np.array(part.position))
+    return TaskRegion(place, everywhere, position_tolerance=part.tolerance)
+
+
+def tip_errors(goal: TipGoal, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
+    """Distance [m] and angle [rad] of the tip from the nearest part of a goal, for each row of Q, shapes (m,)."""
+    parts = parts_of(goal)
+    each = np.array([part.errors(robot, Q) for part in parts])
+    best = np.argmin([part.distance(robot, Q) for part in parts], axis=0)
+    position, angle = each[best, :, np.arange(each.shape[2])].T
+    return position, angle
 
 
 def pose_errors(tips: NDArray[np.float64], target: Any) -> tuple[Vector, Vector]:
     """Distance [m] and rotation angle [rad] between poses, shape (m, 4, 4), and one target pose."""
     position: Vector = np.linalg.norm(tips[:, :3, 3] - target.translation, axis=1)
-    return position, _rotation_angle(target.rotation.T @ tips[:, :3, :3])
+    return position, rotation_angles(target.rotation.T @ tips[:, :3, :3])
 
 
-def _rotation_angle(rotations: NDArray[np.float64]) -> Vector:
-    """Angle of rotations, shape (m, 3, 3): atan2(|R - R^T| / (2 sqrt 2), (tr R - 1) / 2), accurate near 0 and pi."""
-    sine = np.linalg.norm(rotations - np.swapaxes(rotations, 1, 2), axis=(1, 2)) / (2.0 * np.sqrt(2.0))
-    angle: Vector = np.arctan2(sine, 0.5 * (np.trace(rotations, axis1=1, axis2=2) - 1.0))
-    return angle
-
-
-def _check_rigid(rotation: NDArray[np.float64]) -> None:
-    off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
-    if off > 1e-3 or np.linalg.det(rotation) < 0.0:
-        raise InputError(
-            "goal pose: its upper left 3 x 3 part is no rotation (it scales, skews or mirrors); make it orthonormal"
-        )
-
-
-def _tolerance(value: float, what: str) -> float:
-    number = float(finite_array(value, (), what))
-    if number <= 0.0:
-        raise InputError(f"{what} must be greater than 0, got {number:g}")
-    return number
+def _freed(goal: PoseGoal, free_rotation_axis: str | None, box: Vector) -> TaskRegion:
+    bounds = np.zeros((6, 2))
+    bounds[:3] = np.outer(box, [-0.5, 0.5])
+    if free_rotation_axis is not None:
+        bounds[3 + "xyz".index(free_rotation_axis)] = -np.pi, np.pi
+    return TaskRegion(
+        goal.T_world_tip,
+        bounds,
+        position_tolerance=goal.position_tolerance,
+        orientation_tolerance=goal.orientation_tolerance,
+    )

@@ -15,9 +15,10 @@ from rrtik_ompl.arrays import Matrix, finite_array
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast.library import library
 from rrtik_ompl.goal import JointGoal
-from rrtik_ompl.goal_configurations import GoalConfigurations, goal_configurations
+from rrtik_ompl.goal_configurations import GoalSearch
 from rrtik_ompl.ompl_bridge.attempt import (
     ANYTIME_PLANNERS,
+    ONE_GOAL_PLANNERS,
     Attempt,
     PlannerFactory,
     attempt,
@@ -75,8 +76,9 @@ def plan(
 ) -> Plan:
     """Find a collision-free path from the start to the goal of a problem.
 
-    A pose or position is first turned into free goal configurations by inverse kinematics, unless the planner finds
-    them itself.
+    A goal of the tip is first turned into free configurations by inverse kinematics, unless the planner finds them
+    itself. If it does not get to them with some effort, more are drawn and it is started anew with twice the effort
+    (see :class:`GoalSearch`).
 
     The planner first asks what the kernels can prove without coal, for a short while; where that finds no path it asks
     exactly. Either way a path is returned only if a second check agrees, which is twice as dense as the planner's and
@@ -145,26 +147,28 @@ def _search(
     needless = finds_goals(factory) and not isinstance(problem.goal, JointGoal)
     # An optimal path touches what it goes round, and an anytime planner has no time left for a second attempt.
     asked = problem.refined(SECOND_CHECK) if getattr(factory, "__name__", "") in ANYTIME_PLANNERS else problem
+    search = GoalSearch(problem, np.random.default_rng(seeds[0]))
     for number, seed in enumerate(seeds):
         if time.perf_counter() >= deadline:
             break
         totals["attempts"] += 1
         short_way = turns_matter and number == 0 and len(seeds) > 1
-        if needless:
-            aims = GoalConfigurations(np.zeros((0, problem.robot.dof)))
-        else:
-            aims = goal_configurations(problem, np.random.default_rng(seed), all_turns=not short_way)
+        aims = np.zeros((0, problem.robot.dof)) if needless else _aims(search, number, short_way)
         left = deadline - time.perf_counter()
-        if not (needless or len(aims.rows)) or left <= 0.0:
-            reason = aims.reason
+        aimless = len(aims) == 0 and not needless
+        if aimless and search.exhausted:
+            break
+        if aimless or left <= 0.0:
             continue
         if number == 0 and problem.world.accuracy == "exact" and can_be_brief(factory):
-            path = _without_coal(problem, factory, name, aims.rows, left, seed, parameters, totals)
+            path = _without_coal(problem, factory, name, aims, left, seed, parameters, totals)
             if path is not None:
                 return path, "", totals
             left = max(deadline - time.perf_counter(), SHORTEST)
         half = 0.5 if short_way else 1.0  # of the time for the short way round, before the long one is tried too
-        outcome = attempt(asked, factory, aims.rows, seconds=half * left, seed=seed, parameters=parameters)
+        others = not needless and _others(search, factory, number) and number < len(seeds) - 1
+        effort = 2**number if others and can_be_brief(factory) else None
+        outcome = attempt(asked, factory, aims, seconds=half * left, seed=seed, parameters=parameters, effort=effort)
         _add(totals, outcome.statistics)
         path, reason = _judged(problem, outcome, name)
         if path is not None:
@@ -172,7 +176,21 @@ def _search(
         if outcome.rows is not None:
             totals["rejected"] += 1
             asked = problem.refined(SECOND_CHECK)
-    return None, reason, totals
+    return None, reason or search.reason, totals
+
+
+def _aims(search: GoalSearch, number: int, short_way: bool) -> Matrix:
+    """What an attempt aims at: all that is known, the newest first, for some planners heed the first alone."""
+    known = len(search.rows)
+    newer = number > 0 and search.more()
+    rows = search.first()
+    return rows[:1] if short_way else np.roll(rows, -known if newer else -number, axis=0)
+
+
+def _others(search: GoalSearch, factory: PlannerFactory, number: int) -> bool:
+    """Whether later attempts would aim at other configurations than this one."""
+    one = getattr(factory, "__name__", "") in ONE_GOAL_PLANNERS
+    return not search.exhausted or (one and number + 1 < len(search.rows))
 
 
 def _without_coal(
@@ -190,7 +208,7 @@ def _without_coal(
     aims = aims[proven.world.valid_batch(aims)]
     if len(aims) == 0 or not proven.world.valid(problem.start):
         return None
-    outcome = attempt(proven, factory, aims, seconds=seconds, seed=seed, parameters=parameters, brief=True)
+    outcome = attempt(proven, factory, aims, seconds=seconds, seed=seed, parameters=parameters, effort=1)
     _add(totals, outcome.statistics)
     return _judged(problem, outcome, name)[0]
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Vector, finite_array
+from rrtik_ompl.arrays import Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
 
 IDENTITY_QUATERNION = (0.0, 0.0, 0.0, 1.0)  # x, y, z, w
@@ -39,3 +39,52 @@ def quaternion_xyzw(placement: Any) -> Vector:
     """Unit quaternion (x, y, z, w) of a pose, w not negative, so that equal rotations read equal. Shape (4,)."""
     quaternion: Vector = np.asarray(pin.Quaternion(placement.rotation).coeffs(), dtype=np.float64)
     return -quaternion if quaternion[3] < 0.0 else quaternion
+
+
+def rigid(T: Any, what: str) -> Any:
+    """A pose given as ``pinocchio.SE3`` or as a matrix, shape (4, 4).
+
+    Raises:
+        InputError: If it is neither, or scales, skews or mirrors.
+    """
+    matrix = finite_array(T.homogeneous if isinstance(T, pin.SE3) else T, (4, 4), what)
+    if not np.allclose(matrix[3], [0.0, 0.0, 0.0, 1.0]):
+        raise InputError(f"{what}: the last row must be 0 0 0 1, got {matrix[3].tolist()}")
+    rotation = matrix[:3, :3]
+    if float(np.abs(rotation @ rotation.T - np.eye(3)).max()) > 1e-3 or np.linalg.det(rotation) < 0.0:
+        raise InputError(
+            f"{what}: its upper left 3 x 3 part is no rotation (it scales, skews or mirrors); make it orthonormal"
+        )
+    return pin.SE3(matrix)
+
+
+def unit_vector(values: ArrayLike, what: str) -> Vector:
+    """A direction, shape (3,).
+
+    Raises:
+        InputError: If its length differs from 1 by more than 1e-3.
+    """
+    vector = finite_array(values, (3,), what)
+    length = float(np.linalg.norm(vector))
+    if abs(length - 1.0) > 1e-3:
+        raise InputError(f"{what} must have length 1, but has {length:.4g}; divide it by its length")
+    return vector / length
+
+
+def rotation_angles(rotations: NDArray[np.float64]) -> Vector:
+    """Angle of rotations, shape (m, 3, 3): atan2(|R - R^T| / (2 sqrt 2), (tr R - 1) / 2), accurate near 0 and pi."""
+    sine = np.linalg.norm(rotations - np.swapaxes(rotations, 1, 2), axis=(1, 2)) / (2.0 * np.sqrt(2.0))
+    angle: Vector = np.arctan2(sine, 0.5 * (np.trace(rotations, axis1=1, axis2=2) - 1.0))
+    return angle
+
+
+def rpy_matrices(angles: Matrix) -> NDArray[np.float64]:
+    """Rotations Rz(yaw) Ry(pitch) Rx(roll) for rows of roll, pitch, yaw [rad], shape (m, 3): (m, 3, 3)."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(angles).T, np.sin(angles).T
+    rows = [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    matrices: NDArray[np.float64] = np.moveaxis(np.array(rows), 2, 0)
+    return matrices

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Vector, frozen
 from rrtik_ompl.errors import ProblemError, require
-from rrtik_ompl.goal import Goal, GoalRegion, JointGoal, PoseGoal, PositionGoal
+from rrtik_ompl.goal import Goal, JointGoal
 from rrtik_ompl.world import World
 
 TURN = 2.0 * np.pi
@@ -45,7 +45,7 @@ class Problem:
         self.name = name
         self.start: Vector = frozen(_usable(world, start, "start"))
         wanted: Any = goal
-        if not isinstance(wanted, JointGoal | PoseGoal | PositionGoal | GoalRegion):
+        if not isinstance(wanted, Goal):
             wanted = JointGoal(wanted)
         if isinstance(wanted, JointGoal):
             q = _usable(world, wanted.q, "goal")

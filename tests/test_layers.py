@@ -23,6 +23,7 @@ LADDER = [
     ),
     *(
         "scene",
+        "task_region",
         "goal",
         "collision",
         "fast",

@@ -5,7 +5,6 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from ompl import geometric as og
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
@@ -16,11 +15,10 @@ from rrtik_ompl.ik.mb_rrt.axis_rule_b import grow_by_rule_b
 from rrtik_ompl.ik.mb_rrt.axis_tree import AxisTree
 from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
 from rrtik_ompl.ik.mb_rrt.search import search
-from rrtik_ompl.ompl_bridge import TipGoal
-from rrtik_ompl.ompl_bridge.setup import Judge, problem_definition, space_information
+from rrtik_ompl.ompl_bridge.setup import Judge, space_information
 from rrtik_ompl.planning import plan
 from rrtik_ompl.shapes import Cylinder
-from rrtik_planners import MBRRT, BiCRDT
+from rrtik_planners import MBRRT
 from rrtik_robots.planar import planar
 
 LIMITED = planar(lengths=[0.1] * 10, limits_deg=[(-180, 180)] + [(-60, 60)] * 9)
@@ -210,33 +208,6 @@ def test_the_planner_reaches_goals_of_the_tip(name):
     assert found.found, found.reason
     assert found.statistics["tree_goals"] > 0
     assert problem.reached(found.path.end)
-
-
-def test_a_tip_goal_serves_every_planner_of_ompl(quiet_ompl):
-    problem = rrtik.load_problem("puma_pose")
-    rows = TipGoalRows(problem)
-    for factory in (og.RRTConnect, BiCRDT, MBRRT):
-        setup = rows.definition()
-        planner = factory(rows.si)
-        planner.setProblemDefinition(setup)
-        planner.setup()
-        assert str(planner.solve(5.0)) == "Exact solution"
-        path = setup.getSolutionPath()
-        end = path.getState(path.getStateCount() - 1)
-        assert problem.reached(np.array([end[k] for k in range(problem.world.robot.dof)]))
-
-
-class TipGoalRows:
-    """A problem in plain OMPL whose goal is a TipGoal."""
-
-    def __init__(self, problem):
-        self.problem, self.judge = problem, Judge(problem.world)
-        self.si = space_information(problem, problem.start[None], self.judge)
-
-    def definition(self):
-        definition = problem_definition(self.problem, self.problem.start[None], self.si)
-        definition.setGoal(TipGoal(self.si, self.problem.world, self.problem.goal, near=self.problem.start, seed=2))
-        return definition
 
 
 def test_the_planner_says_what_it_needs():

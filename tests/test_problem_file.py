@@ -15,6 +15,7 @@ from rrtik_ompl.goal import GoalRegion, JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.poses import pose
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_file import load_problem, problem_schema, save_problem
+from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.world import World
 from rrtik_ompl.yaml_file import read_yaml, write_yaml
 
@@ -87,6 +88,13 @@ def test_every_kind_of_goal_is_read(tmp_path):
     assert [type(member) for member in goal.members] == [PoseGoal, PositionGoal]
     goal = load(tmp_path, text(goal=f"{{region: {{{place}, free_rotation_axis: z, box: [0.1, 0, 0]}}}}")).goal
     assert (goal.free_rotation_axis, goal.box.tolist()) == ("z", [0.1, 0, 0])
+    words = "frame: {xyz: [1, 0, 0]}, tip: {xyz: [0, 0, 0.1]}, y: [0, 0.2], yaw_deg: [-90, 90]"
+    goal = load(tmp_path, text(goal=f"{{task_region: {{{words}}}}}")).goal
+    assert goal.bounds.tolist() == [[0, 0], [0, 0.2], [0, 0], [0, 0], [0, 0], [-np.pi / 2, np.pi / 2]]
+    assert goal.T_w_tip.translation.tolist() == [0, 0, 0.1]
+    words = f"{place}, axis: [0, 0, 1], through: [2, 1, 0], turn_deg: [0, 90], slide: [-0.1, 0]"
+    goal = load(tmp_path, text(goal=f"{{any_of: [{{about_axis: {{{words}}}}}]}}")).goal.members[0]
+    np.testing.assert_allclose(goal.poses(np.eye(6)[5:] * np.pi / 2)[0, :3, 3], [2, 0, 0], atol=1e-12)
 
 
 def test_the_resolution_is_passed_on_and_has_a_default(tmp_path):
@@ -100,12 +108,17 @@ def test_another_robot_can_take_the_place_of_the_one_in_the_file(tmp_path, slide
     assert problem.world.robot.joint_names == ("rail", "turn")
 
 
+BOUNDS = [[-0.1, 0.2], [0, 0], [0, 1 / 3], [-4, 4], [0.1, 0.1], [-0.2, 0.3]]
 GOALS = [
     JointGoal([0.1, 1 / 3, -1e-17]),
     PositionGoal([0.1, 0.2, 0.3], 1e-5),
     PoseGoal(pose([0.1, 0.2, 0.3], [0.1, 0.7, 0.5, 0.5]), 1e-4, 0.2),
     GoalRegion([PoseGoal(pose([1, 0, 0])), PositionGoal([0, 1, 0])]),
     GoalRegion([PoseGoal(pose([1, 0, 0]), 0.01)], "y", [0, 0.1, 0]),
+    GoalRegion([PoseGoal(pose([1, 0, 0]), 0.01), PoseGoal(pose([0, 1, 0])), PositionGoal([0, 1, 0])], "z"),
+    TaskRegion(pose([1, 0, 0], [0.1, 0.7, 0.5, 0.5]), BOUNDS, pose([0, 0.1, 0]), 0.01, 0.02),
+    TaskRegion.about_axis(pose([1, 0, 0.2]), [0, 0.6, 0.8], through=[1, 0.1, 0], slide=[-0.1, 1 / 3]),
+    GoalRegion([TaskRegion.about_axis(pose([1, 0, 0.2]), [0, 0, 1]), PoseGoal(pose([1, 0, 0]))]),
 ]
 
 
@@ -134,9 +147,8 @@ def test_files_of_a_robot_are_named_relative_to_the_new_file(tmp_path, slide):
 
 def test_what_the_format_has_no_words_for_is_refused(tmp_path):
     world = load(tmp_path, text()).world
-    for goal in (JointGoal([0, 0, 0], 0.1), GoalRegion([PoseGoal(pose()), PoseGoal(pose())], "z")):
-        with pytest.raises(InputError, match="goal: a problem file can"):
-            save_problem(Problem(world, [0, 0, 0], goal), tmp_path / "copy.yaml")
+    with pytest.raises(InputError, match="goal: a problem file can"):
+        save_problem(Problem(world, [0, 0, 0], JointGoal([0, 0, 0], 0.1)), tmp_path / "copy.yaml")
     assert not (tmp_path / "copy.yaml").exists()
 
 
@@ -157,6 +169,10 @@ def test_a_goal_in_collision_names_its_line(tmp_path):
 def test_a_goal_outside_the_limits_names_its_line_and_joint(tmp_path):
     with pytest.raises(ProblemError, match=r"task\.yaml:4: goal: .*joint2"):
         load(tmp_path, text(goal="{joints_deg: [0, 171, 0]}"))
+
+
+def region(words):
+    return text(goal=f"{{task_region: {{frame: {{xyz: [1, 0, 0]}}, {words}}}}}")
 
 
 BAD = {
@@ -193,6 +209,20 @@ BAD = {
     "joints in any_of": (text(goal="{any_of: [{joints: [0, 0, 0]}]}"), r"goal\.any_of\[0\]: a member of any_of needs"),
     "axis of a region": (text(goal="{region: {pose: {xyz: [1, 0, 0]}, free_rotation_axis: w}}"), "'x', 'y' or 'z'"),
     "negative region": (text(goal="{region: {pose: {xyz: [1, 0, 0]}, box: [-1, 0, 0]}}"), r"box\[0\]: must be 0 or"),
+    "ranges upside down": (region("x: [0.2, 0.1]"), ":4: goal: .*x goes from 0.2 up to 0.1"),
+    "a range of nan": (region("yaw: [.nan, 1]"), r"goal\.task_region\.yaw\[0\]: must be a finite number"),
+    "a range of one": (region("yaw: [1]"), r"task_region\.yaw: needs at least 2"),
+    "two units": (region("yaw: [0, 1], yaw_deg: [0, 9]"), "give yaw or yaw_deg, not both"),
+    "a range of nothing known": (region("jaw: [0, 1]"), "unknown key 'jaw'; did you mean 'yaw'"),
+    "a region without a frame": (text(goal="{task_region: {x: [0, 1]}}"), "task_region.frame: missing"),
+    "a long axis": (
+        text(goal="{about_axis: {pose: {xyz: [1, 0, 0]}, axis: [0, 2, 0]}}"),
+        ":4: goal: .*axis must have length 1, but has 2",
+    ),
+    "a bad member": (
+        text(goal="{any_of: [{task_region: {frame: {xyz: [1, 0, 0]}, z: [1, 0]}}]}"),
+        ":4: goal: .*z goes from 1 up to 0",
+    ),
     "zero resolution": (text(rest="motion_resolution: 0\n"), ":5: motion_resolution: must be 1e-05 or more"),
     "resolution with unit": (text(rest="motion_resolution: 1 cm\n"), "must be a number, found text '1 cm'"),
     "unknown section": (text(rest="scenes: {}\n"), ":5: scenes: unknown key 'scenes'; did you mean 'scene'"),

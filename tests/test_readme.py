@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from rrtik_ompl.cli import run
+from rrtik_ompl.ik.face import solve_ik
 from rrtik_ompl.path import load_path
 from rrtik_ompl.problem_file import load_problem
 
@@ -40,11 +41,15 @@ def test_the_python_example_runs_from_top_to_bottom(tmp_path, monkeypatch):
     assert Path("view.html").stat().st_size > 100_000
 
 
-def test_the_problem_file_loads(tmp_path):
-    (text,) = blocks("yaml")
+def test_the_problem_file_loads_and_its_other_goals_can_be_reached(tmp_path):
+    text, goal = blocks("yaml")
     file = tmp_path / "task.yaml"
     file.write_text(text)
     assert load_problem(file).world.scene.names == ("panel", "seabed")
+    file.write_text(text[: text.index("goal:")] + goal)
+    problem = load_problem(file)
+    for member in problem.goal.members:
+        assert solve_ik(problem.robot, member, near=problem.start, world=problem.world).found
 
 
 @pytest.mark.parametrize(

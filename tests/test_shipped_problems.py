@@ -12,8 +12,8 @@ from rrtik_ompl.yaml_file import read_yaml
 NAMES = [
     *("cut_disc", "cut_polygons", "cut_two_ls", "env_e"),
     *("planar3_a", "planar3_b", "planar3_boxes", "planar3_c", "planar6_c", "planar6_c_pose"),
-    *("puma_pose", "puma_position", "titan4_axis1", "titan4_p_axis1", "titan4_prisms", "titan4_regular"),
-    *("titan4_sdu", "titan4_wrist"),
+    *("puma_pose", "puma_position", "titan4_axis1", "titan4_bar", "titan4_p_axis1", "titan4_prisms"),
+    *("titan4_regular", "titan4_sdu", "titan4_wrist"),
 ]
 SINGULAR = {
     "titan4_axis1": (11.4592, 80, 43.9549, -33.9549, 0, 17.1887),

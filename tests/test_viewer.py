@@ -27,6 +27,7 @@ from rrtik_ompl.poses import pose
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, Waypoints
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Sphere
+from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.viewer import palette, view
 from rrtik_ompl.viewer.framing import frame_around
 from rrtik_ompl.viewer.page import page
@@ -177,6 +178,8 @@ def test_goals_are_drawn_as_frames_and_points(crane: Robot) -> None:
         (reach, "0/frame/x"),
         (PositionGoal([0.5, 0.5, 0.5]), "0/point"),
         (GoalRegion([reach, reach], box=[0.1, 0.1, 0.0]), "1/region"),
+        (TaskRegion.about_axis(reach.T_world_tip, [0.0, 0.0, 1.0]), "0/frame 7/y"),
+        (TaskRegion(reach.T_world_tip, [[0.0, 0.1]] + 5 * [[0.0, 0.0]]), "0/region"),
     ]:
         window, _ = draw(subject_of(problem(crane, Scene(), goal)))
         assert f"/meshcat/goal/{part}" in window.paths

@@ -20,7 +20,7 @@ class MBRRT(BiCRDT):
     """Reaches a pose, a position or a region: its configurations by MB-RRT, the path to one of them by BiCRDT.
 
     Source: the MB-RRT paper, which names this use and leaves the path to a planner. In plain OMPL give the problem
-    definition a :class:`rrtik_ompl.ompl_bridge.TipGoal`, or any goal of configurations; these are taken as they are.
+    definition a :class:`rrtik_ompl.GoalSampler`, or any goal of configurations; these are taken as they are.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class MBRRT(BiCRDT):
 
 def _check_fit(world: WorldLike | None) -> None:
     if not isinstance(world, World):
-        raise InputError("goal: MBRRT needs world= to know the arm whose tip it is; or give OMPL a TipGoal")
+        raise InputError("goal: MBRRT needs world= to know the arm whose tip it is; or give OMPL a GoalSampler")
     fault = misfit(world.robot)
     if fault:
         raise InputError(f"robot '{world.robot.name}' does not fit MB-RRT: {fault}; use planner bicrdt")

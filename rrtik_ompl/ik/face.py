@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError, UnknownNameError, require
-from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal, joint_difference
+from rrtik_ompl.goal import TipGoal, has_task_regions, joint_difference, tip_errors
 from rrtik_ompl.ik.methods import METHODS
-from rrtik_ompl.ik.numeric import targets
 from rrtik_ompl.ik.question import Answer, Question, Target, errors
+from rrtik_ompl.ik.targets import targets
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 
@@ -29,7 +29,7 @@ class IkResult:
     Attributes:
         solutions: Configurations at the goal, inside the limits, free if a world was given, nearest first; shape
             (k, dof). At most one unless all were asked for.
-        residuals: Distance [m] and angle [rad] of each from its target by forward kinematics, shape (k, 2).
+        residuals: Distance [m] and angle [rad] of each from the goal by forward kinematics, shape (k, 2).
         reason: "" or why there is none: ``unreachable``, ``limits``, ``collision``, ``time`` (or the method gave up).
         detail: The same in a line: by how much, which joint, what touches.
         iterations: Steps of a numeric method.
@@ -58,7 +58,7 @@ def list_ik_methods() -> tuple[str, ...]:
 
 def solve_ik(
     robot: Robot,
-    goal: PoseGoal | PositionGoal | GoalRegion,
+    goal: TipGoal,
     *,
     method: str = "auto",
     near: ArrayLike | None = None,
@@ -72,8 +72,8 @@ def solve_ik(
     Args:
         robot: The arm.
         goal: A pose, a position, or a region with some freedom (of which targets are drawn).
-        method: A name from `list_ik_methods`; "auto" is the closed form where it fits, else numeric;
-            the others are there to be compared.
+        method: A name from `list_ik_methods`; "auto" is the closed form where it fits, else numeric, or
+            projection onto task-space regions; the others are there to be compared.
         near: Posture near which a solution is wanted, shape (dof,); the middle of the limits if None.
         all: Every solution that the method finds, not just the nearest: a closed form gives all there are (of a
             singular pose representatives), a numeric one those it comes across.
@@ -86,7 +86,7 @@ def solve_ik(
         InputError: If the method does not fit the robot and the goal, or an argument makes no sense.
     """
     begin = time.monotonic()
-    require(goal, PoseGoal | PositionGoal | GoalRegion, "goal", "inverse kinematics needs a goal of the tip")
+    require(goal, TipGoal, "goal", "inverse kinematics needs a goal of the tip")
     if world is not None and world.robot is not robot:
         raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
     limit = float(finite_array(seconds, (), "seconds"))
@@ -94,11 +94,13 @@ def solve_ik(
     posture = 0.5 * np.sum(robot.finite_range(), axis=0) if near is None else robot.configuration(near, "near")
     drawn = tuple(targets(goal, DRAWS, rng))
     name = _chosen(robot, drawn, method)
+    if method == "auto" and name == "numeric" and has_task_regions(goal):
+        name = "projection"
 
     def accept(Q: Matrix) -> Mask:
         return free_of_collision(world, Q)
 
-    answer = METHODS[name].run(Question(robot, drawn, posture, accept, all, begin + limit, rng, world))
+    answer = METHODS[name].run(Question(robot, goal, drawn, posture, accept, all, begin + limit, rng, world))
     q = answer.q[robot.within_limits(answer.q) & goal.satisfied(robot, answer.q)] if len(answer.q) else answer.q
     q = robot.clamp(q)
     free = q[accept(q)]
@@ -106,7 +108,7 @@ def solve_ik(
     reason, detail = ("", "") if len(kept) else _why(robot, answer, world, q)
     return IkResult(
         solutions=frozen(kept),
-        residuals=frozen(_residuals(robot, drawn, kept)),
+        residuals=frozen(np.column_stack(tip_errors(goal, robot, kept)) if len(kept) else np.zeros((0, 2))),
         reason=reason,
         detail=detail,
         iterations=answer.iterations,
@@ -152,16 +154,6 @@ def _different(robot: Robot, q: Matrix, near: Vector) -> Matrix:
         if not kept or np.abs(difference[k] - difference[kept]).max(axis=1).min() > SAME_POSTURE:
             kept.append(int(k))
     return np.where(robot.continuous, near + difference[kept], q[kept])
-
-
-def _residuals(robot: Robot, drawn: tuple[Target, ...], q: Matrix) -> Matrix:
-    """Of each configuration from the target it is nearest to, shape (k, 2)."""
-    if len(q) == 0:
-        return np.zeros((0, 2))
-    each = np.array([errors(robot, target, q) for target in drawn])
-    best = np.argmin(each.sum(axis=2), axis=0)
-    nearest: Matrix = each[best, np.arange(len(q))]
-    return nearest
 
 
 def _why(robot: Robot, answer: Answer, world: World | None, q: Matrix) -> tuple[str, str]:

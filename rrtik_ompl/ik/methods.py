@@ -18,6 +18,7 @@ from rrtik_ompl.ik.genetic.method import genetic
 from rrtik_ompl.ik.hinges import coupled_fault
 from rrtik_ompl.ik.mb_rrt.method import mb_rrt, mb_rrt_misfit
 from rrtik_ompl.ik.numeric import descend
+from rrtik_ompl.ik.projection import projection
 from rrtik_ompl.ik.pso import PARTICLES, pso, resampled_pso
 from rrtik_ompl.ik.question import Answer, Method, Question, Target
 from rrtik_ompl.ik.restarts import ROUNDS, STARTS, Walk, restarted
@@ -91,6 +92,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
         "numeric": Method(_fits_all, _walks(descend)),
         "genetic": Method(_fits_all, genetic),
         "mb-rrt": Method(mb_rrt_misfit, mb_rrt),
+        "projection": Method(_fits_all, projection),
         "damped": Method(_fits_all, _walks(partial(damped_least_squares, enough=ENOUGH))),
         "pinocchio": Method(_fits_all, _walks(pinocchio_iteration, starts=1, rounds=64)),
         "ccd": Method(_stands_alone, _walks(partial(ccd, enough=ENOUGH))),

@@ -8,11 +8,10 @@ from the target and in singular postures, and Newton's near the solution.
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal
+from rrtik_ompl.goal import PoseGoal, PositionGoal
 from rrtik_ompl.ik.residual import twist, well_inside
 from rrtik_ompl.robot import Robot
 
@@ -54,28 +53,6 @@ def descend(
         e, J = (residual * scale)[:, rows], (jacobian * scale[:, None])[:, rows]
         Q[open_rows] = np.clip(q + bounded_step(J, e), robot.lower, robot.upper)
     return Q, iterations
-
-
-def targets(
-    goal: PoseGoal | PositionGoal | GoalRegion, most: int, rng: np.random.Generator
-) -> list[PoseGoal | PositionGoal]:
-    """Goals without freedom: the goal itself, or up to ``most`` draws from a region."""
-    if not isinstance(goal, GoalRegion):
-        return [goal]
-    free = goal.free_rotation_axis is not None or bool(goal.box.any())
-    count = most if free else min(most, len(goal.members))
-    return [_drawn(goal, goal.members[k % len(goal.members)], rng) for k in range(count)]
-
-
-def _drawn(region: GoalRegion, member: PoseGoal | PositionGoal, rng: np.random.Generator) -> PoseGoal | PositionGoal:
-    if isinstance(member, PositionGoal):
-        return member
-    turn = np.eye(3)
-    if region.free_rotation_axis is not None:
-        axis = np.eye(3)["xyz".index(region.free_rotation_axis)]
-        turn = pin.exp3(rng.uniform(-np.pi, np.pi) * axis)
-    shift = pin.SE3(turn, rng.uniform(-0.5, 0.5, 3) * region.box)
-    return PoseGoal(member.T_world_tip * shift, member.position_tolerance, member.orientation_tolerance)
 
 
 def bounded_step(J: NDArray[np.float64], e: Matrix) -> Matrix:

@@ -30,11 +30,11 @@ def twist(goal: Target, tips: NDArray[np.float64]) -> Matrix:
         residual[:, :3] = goal.position - tips[:, :3, 3]
         return residual
     residual[:, :3] = goal.T_world_tip.translation - tips[:, :3, 3]
-    residual[:, 3:] = _rotation_vectors(goal.T_world_tip.rotation @ tips[:, :3, :3].transpose(0, 2, 1))
+    residual[:, 3:] = rotation_vectors(goal.T_world_tip.rotation @ tips[:, :3, :3].transpose(0, 2, 1))
     return residual
 
 
-def _rotation_vectors(R: NDArray[np.float64]) -> Matrix:
+def rotation_vectors(R: NDArray[np.float64]) -> Matrix:
     """Logarithms of rotations, shape (m, 3, 3): (m, 3)."""
     skew = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
     sine = np.linalg.norm(skew, axis=1)

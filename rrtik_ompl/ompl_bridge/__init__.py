@@ -1,18 +1,18 @@
 """The one room where arrays become OMPL states and back: validity, motions, ownership rules, the safe planner base."""
 
 from rrtik_ompl.ompl_bridge.contract import check_planner
+from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker, WorldLike
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner, SearchResult
 from rrtik_ompl.ompl_bridge.states import StateIO, space_bounds
-from rrtik_ompl.ompl_bridge.tip_goal import TipGoal
 
 __all__ = [
+    "GoalSampler",
     "MotionChecker",
     "SafePlanner",
     "SearchResult",
     "SpaceChecker",
     "StateIO",
-    "TipGoal",
     "WorldChecker",
     "WorldLike",
     "check_planner",

@@ -19,6 +19,7 @@ from ompl import util as ou
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen
 from rrtik_ompl.errors import InputError, PlannerError
+from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker, WorldLike
 from rrtik_ompl.ompl_bridge.states import StateIO, real_vector_space, space_bounds
 
@@ -162,6 +163,8 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         checker: MotionChecker = SpaceChecker(si) if self._world is None else WorldChecker(self._world)
         starts, goals = self._inputs(checker, ptc)
         result = self.search(starts, goals, checker, ptc)
+        if result.path is None and isinstance(pdef.getGoal(), GoalSampler):
+            pdef.getGoal().more()  # for the next attempt
         self.statistics = {
             **result.statistics,
             "checked_states": checker.checked_states,
@@ -208,8 +211,12 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         return _different(rows)
 
     def _goals(self, inputs: Any, io: StateIO, goal: Any, ptc: Any) -> list[Vector]:
-        """Goal configurations: all of a finite goal; else a number of samples, or as many as it takes to find one."""
+        """Goal configurations: all of a finite goal; else a number of samples, or as many as it takes to find one.
+
+        Of a :class:`GoalSampler` those that it has.
+        """
         limit = max(GOAL_SAMPLES, goal.getStateCount() if isinstance(goal, ob.GoalStates) else 0)
+        limit = len(goal.rows) if isinstance(goal, GoalSampler) else limit
         lazy = isinstance(goal, ob.GoalLazySamples)
         rows: list[Vector] = []
         asked = 0

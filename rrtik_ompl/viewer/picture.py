@@ -11,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal
+from rrtik_ompl.goal import Goal, JointGoal, as_task_region, parts_of
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.viewer.framing import Frame, frame_around
 from rrtik_ompl.viewer.marks import draw_marks
@@ -25,7 +25,7 @@ from rrtik_ompl.viewer.robot_picture import (
     link_parts,
     swept_points,
 )
-from rrtik_ompl.viewer.scene_picture import draw_goal, draw_scene, draw_triad
+from rrtik_ompl.viewer.scene_picture import draw_goal, draw_scene, draw_triad, goal_frames
 from rrtik_ompl.viewer.subject import Subject
 from rrtik_ompl.viewer.trail import draw_before, draw_trail
 from rrtik_ompl.viewer.window import RecordingWindow
@@ -102,8 +102,9 @@ def _flatten(vis: Any, frame: Frame) -> None:
     vis["later"].set_transform(squeeze)
 
 
-def _goal_points(goal: Any) -> list[Matrix]:
-    members = goal.members if isinstance(goal, GoalRegion) else (goal,)
-    points = [m.T_world_tip.translation for m in members if isinstance(m, PoseGoal)]
-    points += [m.position for m in members if isinstance(m, PositionGoal)]
-    return [np.array(points)] if points else []
+def _goal_points(goal: Goal | None) -> list[Matrix]:
+    """Positions of the tip that show a goal of it, shape (m, 3) each."""
+    if goal is None or isinstance(goal, JointGoal):
+        return []
+    regions = [as_task_region(part) for part in parts_of(goal)]
+    return [goal_frames(region)[:, :3, 3] for region in regions]

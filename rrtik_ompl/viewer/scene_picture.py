@@ -7,11 +7,13 @@ from typing import Any
 import meshcat.geometry as mg
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.goal import Goal, GoalRegion, PoseGoal, PositionGoal
+from rrtik_ompl.goal import Goal, JointGoal, PoseGoal, parts_of
 from rrtik_ompl.scene import ConstantVelocity, Motion, Obstacle, Scene
 from rrtik_ompl.shapes import Box, HalfSpace, Sphere
+from rrtik_ompl.task_region import TURN, TaskRegion
 from rrtik_ompl.viewer import palette
 from rrtik_ompl.viewer.framing import Frame
 from rrtik_ompl.viewer.meshes import half_space_plate, look_of_shape, look_of_triangles
@@ -19,6 +21,7 @@ from rrtik_ompl.viewer.robot_picture import node_name
 from rrtik_ompl.viewer.triangles import tube
 
 MAX_GOALS_DRAWN = 20
+FRAMES_OF_A_RANGE = 7
 LATER_SECONDS = (1.0, 2.0, 3.0)  # when an obstacle of constant velocity is drawn again, faintly
 
 
@@ -54,20 +57,42 @@ def _draw_motion(node: Any, obstacle: Obstacle, motion: Motion, frame: Frame) ->
 
 
 def draw_goal(vis: Any, goal: Goal | None, frame: Frame) -> None:
-    """Draw the frame of a pose goal, the point of a position goal, or all of those of a region, under ``goal``."""
-    members = goal.members[:MAX_GOALS_DRAWN] if isinstance(goal, GoalRegion) else (goal,)
-    for k, member in enumerate(members):
+    """Draw under ``goal`` the frame of a pose, the point of a position, or all parts of a region."""
+    if goal is None or isinstance(goal, JointGoal):
+        return
+    for k, part in enumerate(parts_of(goal)[:MAX_GOALS_DRAWN]):
         node = vis["goal"][f"{k}"]
-        if isinstance(member, PoseGoal):
-            draw_triad(node["frame"], member.T_world_tip, 0.12 * frame.arm)
-            if isinstance(goal, GoalRegion) and goal.box.any():
-                look = look_of_shape(Box(np.maximum(goal.box, 0.002 * frame.arm)))
-                node["region"].set_object(look.geometry, _material(palette.GOAL, opacity=0.3))
-                node["region"].set_transform(member.T_world_tip.homogeneous)
-        elif isinstance(member, PositionGoal):
-            look = look_of_shape(Sphere(max(member.tolerance, 0.012 * frame.arm)))
+        if isinstance(part, PoseGoal):
+            draw_triad(node["frame"], part.T_world_tip, 0.12 * frame.arm)
+        elif isinstance(part, TaskRegion):
+            _draw_region(node, part, frame)
+        else:
+            look = look_of_shape(Sphere(max(part.tolerance, 0.012 * frame.arm)))
             node["point"].set_object(look.geometry, _material(palette.GOAL))
-            node["point"].set_transform(pin.SE3(np.eye(3), np.array(member.position)).homogeneous)
+            node["point"].set_transform(pin.SE3(np.eye(3), np.array(part.position)).homogeneous)
+
+
+def _draw_region(node: Any, region: TaskRegion, frame: Frame) -> None:
+    """Draw the box of a region's positions and frames of the tip along each of its ranges."""
+    low, high = region.bounds.T
+    if (low < high)[:3].any():
+        look = look_of_shape(Box(np.maximum((high - low)[:3], 0.002 * frame.arm)))
+        node["region"].set_object(look.geometry, _material(palette.GOAL, opacity=0.3))
+        middle = pin.SE3(np.eye(3), 0.5 * (low + high)[:3] + region.T_w_tip.translation)
+        node["region"].set_transform((region.T_world_w * middle).homogeneous)
+    for k, pose in enumerate(goal_frames(region)):
+        draw_triad(node["frame" if k == 0 else f"frame {k}"], pin.SE3(pose), (0.12 if k == 0 else 0.05) * frame.arm)
+
+
+def goal_frames(region: TaskRegion) -> NDArray[np.float64]:
+    """Poses of the tip that show a region: the one of least displacement, and others along each range; (k, 4, 4)."""
+    low, high = region.bounds.T
+    least = np.clip(np.zeros(6), low, high)
+    rows = [least]
+    for k in np.flatnonzero(region.free):
+        for value in np.linspace(low[k], min(high[k], low[k] + TURN), FRAMES_OF_A_RANGE):
+            rows.append(np.where(np.arange(6) == k, value, least))
+    return region.poses(np.array(rows))
 
 
 def draw_triad(node: Any, pose: Any, length: float) -> None:

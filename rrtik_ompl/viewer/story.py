@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.goal import Goal, GoalRegion, JointGoal, PoseGoal
+from rrtik_ompl.goal import Goal, GoalRegion, JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.shapes import HalfSpace
@@ -167,7 +167,7 @@ def _goal_text(goal: Goal | None) -> str:
         return "one of several" if len(goal.members) > 1 else "tip region"
     if isinstance(goal, JointGoal):
         return "joint values"
-    return "tip pose" if isinstance(goal, PoseGoal) else "tip position"
+    return {PoseGoal: "tip pose", PositionGoal: "tip position"}.get(type(goal), "tip region")
 
 
 def _colors() -> dict[str, str]:

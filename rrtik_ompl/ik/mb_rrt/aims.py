@@ -7,9 +7,9 @@ import time
 import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal, joint_difference
+from rrtik_ompl.goal import TipGoal, joint_difference
 from rrtik_ompl.ik.mb_rrt.search import search
-from rrtik_ompl.ik.numeric import targets
+from rrtik_ompl.ik.targets import targets
 from rrtik_ompl.world import World
 
 DRAWS = 16  # targets of a goal that leaves freedom
@@ -18,7 +18,7 @@ MOST = 16  # configurations
 
 def tree_aims(
     world: World,
-    goal: PoseGoal | PositionGoal | GoalRegion,
+    goal: TipGoal,
     near: Vector,
     rng: np.random.Generator,
     *,

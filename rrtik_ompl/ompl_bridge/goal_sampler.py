@@ -1,0 +1,141 @@
+"""The goal of a problem as OMPL knows goals: free configurations, more of them as a planner asks for more."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from ompl import base as ob
+
+from rrtik_ompl.arrays import Mask, Matrix, frozen
+from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.goal import JointGoal, tip_errors
+from rrtik_ompl.goal_configurations import LARGEST, GoalSearch
+from rrtik_ompl.ik.projection import PER_RADIAN, reach_of
+from rrtik_ompl.ompl_bridge.setup import Judge, space_information
+from rrtik_ompl.ompl_bridge.states import StateIO, space_bounds
+from rrtik_ompl.problem import Problem
+
+MOST = 32
+
+
+class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no types
+    """Free configurations at the goal of a problem, for every OMPL planner that samples its goal.
+
+    Those of the first rounds of inverse kinematics are looked for when the sampler is made; further ones when a
+    planner has been given all of these and asks for more (:class:`rrtik_ompl.goal_configurations.GoalSearch`).
+    Configurations that the space information refuses, being out of its bounds or invalid, are left out.
+
+    Three planners of OMPL need one goal that is not Python's: give them :meth:`states`. PRM and PRMstar ask for goals
+    in a second thread, which waits for the interpreter for ever, as the first one holds it while it waits for the
+    second. AORRTC takes a second goal for a path of no length and gives up.
+    """
+
+    def __init__(self, problem: Problem, si: Any = None, *, seed: int = 0, most: int = MOST) -> None:
+        """Make a goal.
+
+        Args:
+            problem: Its goal is what is to be reached; its start is what configurations shall be near to.
+            si: ``ompl.base.SpaceInformation`` over the robot's joints; one that asks the problem's world if None, to
+                be had by ``getSpaceInformation()``.
+            seed: The same seed gives the same configurations in the same order.
+            most: Configurations at most.
+
+        Raises:
+            InputError: If the space does not fit the robot, or a number makes no sense.
+        """
+        require(problem, Problem, "problem of a goal sampler")
+        if isinstance(most, bool) or not isinstance(most, int) or not 1 <= most <= LARGEST:
+            raise InputError(f"most: expected a whole number from 1 to {LARGEST}, got {most!r}")
+        if si is None:
+            si = space_information(problem, problem.start[None], Judge(problem.world))
+        io, robot = StateIO(si), problem.world.robot
+        if io.dof != robot.dof:
+            raise InputError(
+                f"state space: it has {io.dof} coordinates, but robot '{robot.name}' has {robot.dof} joints"
+            )
+        super().__init__(si)
+        self._problem, self._io, self._most, self._given, self._seen = problem, io, most, 0, 0
+        self._rows: Matrix = frozen(np.zeros((0, robot.dof)))
+        self._search = GoalSearch(problem, np.random.default_rng(seed))
+        self._search.first()
+
+    @property
+    def rows(self) -> Matrix:
+        """The configurations found so far that the space information takes, shape (k, dof)."""
+        new = self._search.rows[self._seen :]
+        self._seen += len(new)
+        if len(new):
+            self._rows = frozen(np.vstack([self._rows, new[self._usable(new)]])[: self._most])
+        return self._rows
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether there are no others than :attr:`rows`."""
+        return self._search.exhausted or len(self.rows) >= self._most
+
+    @property
+    def reason(self) -> str:
+        """Why there is no configuration at all, in a line; "" if there is one."""
+        if len(self.rows) or len(self._search.rows) == 0:
+            return self._search.reason
+        return "the configurations found are out of the bounds of the state space, or invalid to its checker"
+
+    def more(self) -> bool:
+        """Look for further configurations, for one round; whether there are any."""
+        known = len(self.rows)
+        if not self.exhausted:
+            self._search.more()
+        return len(self.rows) > known
+
+    def states(self, most: int = 1) -> Any:
+        """The first configurations as ``ompl.base.GoalStates``, which OMPL asks without the interpreter."""
+        si = self.getSpaceInformation()
+        states, state = ob.GoalStates(si), si.allocState()
+        for row in self.rows[:most]:
+            self._io.write(state, row)
+            states.addState(state)
+        return states
+
+    def sampleGoal(self, state: Any) -> None:
+        """Write the next configuration into a state, the first again after the last; called by OMPL."""
+        if self._given >= len(self.rows):
+            self.more()
+        if len(self.rows):
+            self._io.write(state, self.rows[self._given % len(self.rows)])
+            self._given += 1
+
+    def maxSampleCount(self) -> int:
+        """How many configurations there may be; called by OMPL."""
+        return len(self.rows) if self.exhausted or len(self.rows) == 0 else self._most
+
+    def couldSample(self) -> bool:
+        """Whether there is any: nothing is computed beside OMPL, so that it need not wait for one; called by OMPL."""
+        return len(self.rows) > 0
+
+    def distanceGoal(self, state: Any) -> float:
+        """0 at the goal, else how far the tip is away [m]; called by OMPL.
+
+        An angle of two radians counts as much as the arm's reach. For a goal in joint values it is the largest joint
+        error [rad or m].
+        """
+        robot, goal, q = self._problem.world.robot, self._problem.goal, self._io.read(state)[None]
+        if goal.satisfied(robot, q)[0]:
+            return 0.0
+        if isinstance(goal, JointGoal):
+            return float(goal.distance(robot, q)[0])
+        distance, angle = tip_errors(goal, robot, q)
+        return float(distance[0] + PER_RADIAN * reach_of(robot) * angle[0])
+
+    def _usable(self, rows: Matrix) -> Mask:
+        """Which rows lie inside the bounds and are valid to the checker of the space information, if it has one."""
+        si = self.getSpaceInformation()
+        lower, upper = space_bounds(si)
+        usable: Mask = np.all((rows >= lower) & (rows <= upper), axis=1)
+        if si.getStateValidityChecker() is None:
+            return usable
+        state = si.allocState()
+        for k in np.flatnonzero(usable):
+            self._io.write(state, rows[k])
+            usable[k] = si.isValid(state)
+        return usable

@@ -1,0 +1,192 @@
+"""A task-space region: poses of the tip with ranges for position and for roll, pitch and yaw.
+
+Source: D. Berenson, S. Srinivasa, J. Kuffner, "Task Space Regions: A framework for pose-constrained manipulation
+planning", International Journal of Robotics Research 30 (2011), 1435-1460: a frame w in the world, bounds of the
+displacement of a frame s in it, and the tip's place in s. Their distance is that of the displacement; here it is that
+of the tip from the nearest pose of the region, in metres and radians.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.poses import rigid, rotation_angles, rpy_matrices, unit_vector
+from rrtik_ompl.robot import Robot
+
+COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
+SWEEPS = 3  # over roll, pitch and yaw; one is exact where a single one of them is free
+TURN = 2.0 * np.pi
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TaskRegion:
+    """Bring the tip to any pose ``T_world_w @ D @ T_w_tip`` whose displacement D lies within bounds.
+
+    Attributes:
+        T_world_w: Frame of the region.
+        bounds: Lowest and highest x, y, z [m] and fixed-axis roll, pitch, yaw [rad] of D, shape (6, 2). Angles that
+            are a full turn apart are the same; a range of a full turn leaves the angle free.
+        T_w_tip: The tip where D is zero.
+        position_tolerance: [m].
+        orientation_tolerance: [rad].
+    """
+
+    T_world_w: Any
+    bounds: Matrix
+    T_w_tip: Any = field(default_factory=pin.SE3.Identity)
+    position_tolerance: float = 1e-3
+    orientation_tolerance: float = 1e-2
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_world_w", rigid(self.T_world_w, "goal region: T_world_w"))
+        object.__setattr__(self, "T_w_tip", rigid(self.T_w_tip, "goal region: T_w_tip"))
+        bounds = finite_array(self.bounds, (6, 2), "goal region: bounds")
+        for name, bound in zip(COORDINATES, bounds, strict=True):
+            _range(bound, f"goal region: {name}")
+        object.__setattr__(self, "bounds", frozen(bounds))
+        for name in ("position_tolerance", "orientation_tolerance"):
+            object.__setattr__(self, name, positive(getattr(self, name), f"goal region: {name}"))
+
+    @classmethod
+    def about_axis(
+        cls,
+        T_world_tip: Any,
+        axis: ArrayLike,
+        *,
+        through: ArrayLike | None = None,
+        turn: ArrayLike = (-np.pi, np.pi),
+        slide: ArrayLike = (0.0, 0.0),
+        position_tolerance: float = 1e-3,
+        orientation_tolerance: float = 1e-2,
+    ) -> TaskRegion:
+        """A pose that may be turned about a line of the world and moved along it: a grasp of a bar.
+
+        Args:
+            T_world_tip: A pose of the tip at the goal.
+            axis: Direction of the line in the world, of length 1, shape (3,).
+            through: A point of the line [m], shape (3,); the tip's if None.
+            turn: Lowest and highest angle from that pose [rad], shape (2,).
+            slide: Lowest and highest displacement along the axis [m], shape (2,).
+            position_tolerance: [m].
+            orientation_tolerance: [rad].
+
+        Raises:
+            InputError: If the axis is not of length 1, or a range is upside down.
+        """
+        tip = rigid(T_world_tip, "goal region: T_world_tip")
+        direction = unit_vector(axis, "goal region: axis")
+        point = tip.translation if through is None else finite_array(through, (3,), "goal region: through")
+        R = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), direction).matrix()
+        T_world_w = pin.SE3(R, np.array(point))
+        bounds = np.zeros((6, 2))
+        bounds[2], bounds[5] = _range(slide, "goal region: slide"), _range(turn, "goal region: turn")
+        return cls(T_world_w, bounds, T_world_w.actInv(tip), position_tolerance, orientation_tolerance)
+
+    @property
+    def free(self) -> Mask:
+        """Which of the six coordinates have a range, shape (6,)."""
+        ranges: Mask = self.bounds[:, 0] < self.bounds[:, 1]
+        return ranges
+
+    def poses(self, coordinates: Matrix) -> NDArray[np.float64]:
+        """T_world_tip for displacements, shape (m, 6): (m, 4, 4)."""
+        D = np.tile(np.eye(4), (len(coordinates), 1, 1))
+        D[:, :3, :3], D[:, :3, 3] = rpy_matrices(coordinates[:, 3:]), coordinates[:, :3]
+        poses: NDArray[np.float64] = self.T_world_w.homogeneous @ D @ self.T_w_tip.homogeneous
+        return poses
+
+    def drawn(self, count: int, rng: np.random.Generator) -> Matrix:
+        """Displacements drawn evenly from the bounds, shape (count, 6)."""
+        return rng.uniform(self.bounds[:, 0], self.bounds[:, 1], (count, 6))
+
+    def nearest(self, tips: NDArray[np.float64]) -> Matrix:
+        """Displacements of the poses of the region that are nearest to tips, shape (m, 4, 4): (m, 6).
+
+        First the nearest orientation, then the nearest position.
+        """
+        R_w, R_tip = self.T_world_w.rotation, self.T_w_tip.rotation
+        angles = nearest_angles(R_w.T @ tips[:, :3, :3] @ R_tip.T, self.bounds[3:])
+        place = (tips[:, :3, 3] - self.T_world_w.translation) @ R_w - rpy_matrices(angles) @ self.T_w_tip.translation
+        return np.hstack([np.clip(place, self.bounds[:3, 0], self.bounds[:3, 1]), angles])
+
+    def errors(self, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
+        """Distance [m] and angle [rad] of the tip from the nearest pose, for each row of Q, shapes (m,)."""
+        tips = robot.fk_batch(np.atleast_2d(Q))
+        poses = self.poses(self.nearest(tips))
+        position: Vector = np.linalg.norm(tips[:, :3, 3] - poses[:, :3, 3], axis=1)
+        return position, rotation_angles(np.swapaxes(poses[:, :3, :3], 1, 2) @ tips[:, :3, :3])
+
+    def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
+        """Errors in units of their tolerances, added; at most 1 each at the goal. Shape (m,)."""
+        position, angle = self.errors(robot, Q)
+        scaled: Vector = position / self.position_tolerance + angle / self.orientation_tolerance
+        return scaled
+
+    def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
+        """Which rows of Q are at the goal, shape (m,)."""
+        position, angle = self.errors(robot, Q)
+        return (position <= self.position_tolerance) & (angle <= self.orientation_tolerance)
+
+
+def _range(values: ArrayLike, what: str) -> Vector:
+    low, high = bounds = finite_array(values, (2,), what)
+    if low > high:
+        raise InputError(f"{what} goes from {low:g} up to {high:g}; put the lower bound first")
+    return bounds
+
+
+def nearest_angles(rotations: NDArray[np.float64], bounds: Matrix) -> Matrix:
+    """Roll, pitch and yaw within bounds, shape (3, 2), whose rotations are near to given ones: (m, 3, 3) -> (m, 3).
+
+    Exact for rotations inside the bounds and where at most one angle has a range. Otherwise the best angle is found
+    in turn with the others held, from both triples that describe the rotation, so that pitch may pass a quarter turn.
+    """
+    best: Matrix = np.tile(bounds[:, 0], (len(rotations), 1))
+    wide = np.flatnonzero(bounds[:, 0] < bounds[:, 1])
+    if len(wide) == 0:
+        return best
+    likeness = np.full(len(rotations), -np.inf)
+    first = _roll_pitch_yaw(rotations)
+    for start in (first, first * [1.0, -1.0, 1.0] + np.pi):
+        angles = _into(start, bounds[:, 0], bounds[:, 1])
+        for k in np.tile(wide[::-1], 1 if len(wide) == 1 else SWEEPS):
+            angles[:, k] = _into(_best_angle(rotations, angles, int(k)), *bounds[k])
+        found = np.einsum("mij,mij->m", rotations, rpy_matrices(angles))
+        better = found > likeness
+        best[better], likeness[better] = angles[better], found[better]
+    return best
+
+
+def _roll_pitch_yaw(R: NDArray[np.float64]) -> Matrix:
+    """Of R = Rz(yaw) Ry(pitch) Rx(roll), pitch within a quarter turn; shape (m, 3)."""
+    pitch = np.arctan2(-R[:, 2, 0], np.hypot(R[:, 0, 0], R[:, 1, 0]))
+    return np.column_stack([np.arctan2(R[:, 2, 1], R[:, 2, 2]), pitch, np.arctan2(R[:, 1, 0], R[:, 0, 0])])
+
+
+def _best_angle(R: NDArray[np.float64], angles: Matrix, k: int) -> Vector:
+    """The k-th angle that brings the rotation nearest to R, the other two held, shape (m,).
+
+    The trace of R^T Rz Ry Rx is a cosine of each angle.
+    """
+    x, y, z = (rpy_matrices(angles * unit) for unit in np.eye(3))
+    before, after = ((z @ y, None), (z, x), (None, y @ x))[k]
+    C = np.swapaxes(R, 1, 2) if before is None else np.swapaxes(R, 1, 2) @ before
+    C = C if after is None else after @ C
+    i, j = (k + 1) % 3, (k + 2) % 3
+    angle: Vector = np.arctan2(C[:, i, j] - C[:, j, i], C[:, i, i] + C[:, j, j])
+    return angle
+
+
+def _into(angles: NDArray[np.float64], low: ArrayLike, high: ArrayLike) -> NDArray[np.float64]:
+    """The nearest of equal angles within bounds, or the nearer bound."""
+    low, high = np.asarray(low), np.asarray(high)
+    middle = 0.5 * (low + high)
+    nearest: NDArray[np.float64] = np.clip(middle + (angles - middle + np.pi) % TURN - np.pi, low, high)
+    return nearest
