@@ -1,14 +1,13 @@
 """What several tests share: the published lists of moves, small meshes, OMPL without its log."""
 
 import os
-import runpy
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import settings
 from ompl import util as ou
 
+from rrtik_ompl.reproduce import crdt_published
 from rrtik_ompl.shapes import Mesh
 
 # Machines differ and are shared: no example may fail for being slow, and an unattended run repeats the same examples.
@@ -25,7 +24,7 @@ PUSHED_IN_TOP = [(1, 5, 8), (5, 7, 8), (7, 3, 8), (3, 1, 8)]
 @pytest.fixture(scope="session")
 def published():
     """The tables of the C-RDT paper by name; its lists of moves in degrees as printed (TITAN-4's joint 5 plus 90)."""
-    return runpy.run_path(str(Path(__file__).parent.parent / "bench" / "crdt_published.py"))
+    return vars(crdt_published)
 
 
 @pytest.fixture(scope="session")

@@ -1,8 +1,6 @@
 """The genetic algorithm with range reduction."""
 
-import runpy
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,15 +16,14 @@ from rrtik_ompl.ik.genetic.genes import LARGEST, Window, around, from_gray, rand
 from rrtik_ompl.ik.genetic.objective import manipulability, reach, score
 from rrtik_ompl.ik.genetic.options import HISTORICAL, STANDARD, GeneticOptions
 from rrtik_ompl.ik.genetic.search import follow_targets
+from rrtik_ompl.reproduce.ga_published import INCH, curve
 
-PUBLISHED = runpy.run_path(str(Path(__file__).parent.parent / "bench" / "genetic_published.py"))
-INCH = PUBLISHED["INCH"]
 TOLERANCE = 0.002 * INCH
 EVERY_NUMBER = np.arange(LARGEST + 1, dtype=np.uint16)
 
 
 def goals(number, count=251):
-    return [rrtik.PositionGoal(point, TOLERANCE) for point in PUBLISHED["curve"](number)[:count] * INCH]
+    return [rrtik.PositionGoal(point, TOLERANCE) for point in curve(number)[:count] * INCH]
 
 
 def everything(Q):
@@ -103,7 +100,7 @@ def test_a_great_tournament_lets_only_the_best_breed():
 @pytest.mark.parametrize("number", [1, 2, 3, 4])
 def test_three_joints_follow_the_published_trajectories_on_one_branch(number):
     robot = rrtik.load_robot("puma560_3dof")
-    branches = solutions(robot, PUBLISHED["curve"](number) * INCH).branches
+    branches = solutions(robot, curve(number) * INCH).branches
     for seed in range(3):
         run = follow(robot, number, STANDARD, seed)
         assert len(run.q) == 251
@@ -218,6 +215,4 @@ def test_settings_that_make_no_sense_are_refused(field, value):
 
 def test_an_unknown_preset_lists_the_known_ones():
     with pytest.raises(UnknownNameError, match="historical, refined, standard"):
-        rrtik.solve_ik_trajectory(
-            rrtik.load_robot("puma560_3dof"), PUBLISHED["curve"](1) * INCH, method="genetic", options="modern"
-        )
+        rrtik.solve_ik_trajectory(rrtik.load_robot("puma560_3dof"), curve(1) * INCH, method="genetic", options="modern")
