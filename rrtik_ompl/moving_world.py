@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
+from rrtik_ompl.arrays import Mask, Vector, finite_array
 from rrtik_ompl.checks import fast_world
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.errors import InputError, require

@@ -1,4 +1,4 @@
-"""Replanning: a robot on its way to a goal while obstacles move. The planner is DRRT-Con, two others to compare with."""
+"""Replanning: a robot on its way to a goal while obstacles move, by DRRT-Con or, to compare with, by two others."""
 
 from __future__ import annotations
 

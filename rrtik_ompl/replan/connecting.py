@@ -1,12 +1,13 @@
 """RRT-Connect between two pieces of a path, each used as a tree from the beginning: in a kernel, or in Python.
 
-Source: DRRT-Con paper, algorithms 1 to 5; in Python as printed but for three slips: EXTEND has reached a target when its
-new vertex is the target, the second tree is extended until it is trapped, and samples are uniform.
+Source: DRRT-Con paper, algorithms 1 to 5; in Python as printed but for three slips: EXTEND has reached a target when
+its new vertex is the target, the second tree is extended until it is trapped, and samples are uniform.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,10 +16,13 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.fast.connect import ConnectSearch
 from rrtik_ompl.fast.connect_layout import KERNELS
 from rrtik_ompl.fast.library import library
+from rrtik_ompl.fast.shortcut import ShortcutSearch
+from rrtik_ompl.fast.shortcut_layout import KERNELS as CUT_KERNELS
 
 Stop = Callable[[], Any]  # true when it is time to stop
 
 ITERATIONS = 4000  # samples of one search at most, so that the same seed gives the same run
+CUTS, PATIENCE = 100, 40  # tries of random shortcuts, and without gain
 SHARED = 1e-12  # two configurations nearer than this are one
 
 
@@ -32,6 +36,20 @@ class Motions(Protocol):
         """Which straight motions A[k] -> B[k], shapes (m, n), are free, shape (m,)."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Joined:
+    """Two pieces of a path and the way between them.
+
+    Attributes:
+        path: From the begin of one to the end of the other, shape (k, n).
+        begin, end: Numbers of the waypoints between which the way is new.
+    """
+
+    path: Matrix
+    begin: int
+    end: int
+
+
 class Connect(Protocol):
     """Looks for a way between two pieces of a path.
 
@@ -43,8 +61,8 @@ class Connect(Protocol):
 
     def __call__(
         self, first: Matrix, second: Matrix, motions: Motions, stop: Stop, *, chain: bool = True
-    ) -> Matrix | None:
-        """The whole path from ``first[0]`` by a way from one piece to the other, shape (k, n), or None.
+    ) -> Joined | None:
+        """The whole path from ``first[0]`` by a way from one piece to the other, or None.
 
         Args:
             first: Configurations from the robot on, a free chain, shape (a, n).
@@ -81,7 +99,7 @@ class KernelConnect:
 
     def __call__(
         self, first: Matrix, second: Matrix, motions: Motions, stop: Stop, *, chain: bool = True
-    ) -> Matrix | None:
+    ) -> Joined | None:
         """See :class:`Connect`; conservative: what the kernel cannot prove counts as blocked."""
         seed, most = int(self._rng.integers(2**63)), self._iterations
         bridge = self._search.solve(first, second, seed, stop=stop, max_iterations=most)
@@ -98,7 +116,7 @@ class PlainConnect:
 
     def __call__(
         self, first: Matrix, second: Matrix, motions: Motions, stop: Stop, *, chain: bool = True
-    ) -> Matrix | None:
+    ) -> Joined | None:
         """See :class:`Connect`."""
         trees, growing = (Tree(first), Tree(second)), 0
         for _ in range(self._iterations):
@@ -117,9 +135,38 @@ class PlainConnect:
         return None
 
 
+class KernelCuts:
+    """Random shortcuts of a route in a kernel, a fixed number of them (:mod:`rrtik_ompl.fast.shortcut`)."""
+
+    def __init__(self, world: Any, seed: int) -> None:
+        self._world, self._rng = world, np.random.default_rng(seed)
+
+    def __call__(self, route: Matrix) -> Matrix:
+        """The route, shape (k, n), shortened; all its edges must be free."""
+        if len(route) < 3:
+            return route
+        world = self._world
+        search = ShortcutSearch(
+            world.fast,
+            world.robot.chain,
+            route,
+            weights=world.weights,
+            resolution=world.motion_resolution,
+            seed=int(self._rng.integers(2**62)),
+            asking=False,
+        )
+        search.run(CUTS, patience=PATIENCE)
+        return search.waypoints
+
+
+def has_kernels(world: Any) -> bool:
+    """Whether searches can run in kernels in this world."""
+    return getattr(world, "fast", None) is not None and None not in (library(KERNELS), library(CUT_KERNELS))
+
+
 def connector(world: Any, lower: Vector, upper: Vector, eps: float, seed: int) -> KernelConnect | PlainConnect:
     """The search in a kernel where the world has kernels, else the one in Python."""
-    if getattr(world, "fast", None) is not None and library(KERNELS) is not None:
+    if has_kernels(world):
         return KernelConnect(world, lower, upper, eps, seed)
     return PlainConnect(lower, upper, eps, seed)
 
@@ -181,10 +228,10 @@ class Tree:
         return self.add(row, near) if free else None
 
 
-def joined(first: Matrix, bridge: Matrix, second: Matrix, *, chain: bool) -> Matrix:
+def joined(first: Matrix, bridge: Matrix, second: Matrix, *, chain: bool) -> Joined:
     """A piece up to the begin of a bridge, the bridge, and the other piece from its end on; no row twice running."""
     begin = int(np.flatnonzero((first == bridge[0]).all(axis=1))[0])
     end = int(np.flatnonzero((second == bridge[-1]).all(axis=1))[-1])
+    bridge = bridge[np.append(True, np.abs(np.diff(bridge, axis=0)).max(axis=1) > SHARED)]
     path = np.vstack([first[:begin], bridge, second[end + 1 :] if chain else second[:0]])
-    kept: Matrix = path[np.append(True, np.abs(np.diff(path, axis=0)).max(axis=1) > SHARED)]
-    return kept
+    return Joined(path, begin, begin + len(bridge) - 1)

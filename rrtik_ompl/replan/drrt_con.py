@@ -7,6 +7,7 @@ samples (a path that becomes free by itself needs none).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -14,9 +15,13 @@ import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.path import subdivided
-from rrtik_ompl.replan.connecting import Connect, Motions, Stop, never
+from rrtik_ompl.replan.connecting import Connect, Joined, Motions, Stop, never
 
 MOST_CUTS = 24  # ends that are tried from one point of a path
+STRAIGHT = 1e-9  # change of direction
+
+
+Post = Callable[[Matrix], Matrix]  # a free route, shape (k, n), made shorter
 
 
 @dataclass(slots=True)
@@ -46,12 +51,12 @@ class DrrtCon:
     Args:
         connect: The search between pieces of a path.
         eps: Longest step of the trees [unit of the space]; the path is cut at points half as far apart.
-        post: Whether to shorten, after repairs and while walking.
+        post: Shortens what is new of a path before the sequential cut; None: nothing does, as published.
     """
 
     name: ClassVar[str] = "drrt-con"
 
-    def __init__(self, connect: Connect, eps: float, *, post: bool = True) -> None:
+    def __init__(self, connect: Connect, eps: float, *, post: Post | None = None) -> None:
         self.connect, self.eps, self.post = connect, eps, post
         self.path: Matrix | None = None
         self.free = False
@@ -99,7 +104,8 @@ class DrrtCon:
         if not motions.valid_batch(piece[:1])[0]:
             return False
         found = self.connect(piece, goals, motions, stop, chain=False)
-        self.path, self.free = (self.path, self.free) if found is None else (found, True)
+        if found is not None:
+            self.path, self.free = found.path, True
         return found is not None
 
     def advance(self, place: Vector, passed: int, motions: Motions) -> None:
@@ -109,7 +115,7 @@ class DrrtCon:
         rest = self.path[1 + passed :]
         rest = rest if len(rest) else self.path[-1:]
         self.path = rest if (rest[0] == place).all() else np.vstack([place, rest])
-        if self.post and self.free and len(self.path) > 2:
+        if self.free and len(self.path) > 2:
             self.path = cut_from_start(self.path, 0.5 * self.eps, motions)
 
     def leave(self, place: Vector) -> None:
@@ -118,18 +124,20 @@ class DrrtCon:
             self.path = np.vstack([place, self.path[1:] if len(self.path) > 1 else self.path])
             self.free = False
 
-    def _reconnected(self, motions: Motions, stop: Stop) -> Matrix | None:
+    def _reconnected(self, motions: Motions, stop: Stop) -> Joined | None:
         """Cut at the first hit seen from the robot and at the first one seen from the goal; join the two pieces."""
         hits = np.flatnonzero(self._hits)
-        if len(hits) == 0:
-            return self.path
         first, last = int(hits[0]), int(hits[-1])
         return self.connect(self._dense[: first + 1], self._dense[last + 1 :], motions, stop)
 
-    def _take(self, found: Matrix | None, motions: Motions) -> bool:
-        if found is not None:
-            self.path = sequential_cut(found, 0.5 * self.eps, motions) if self.post else found
+    def _take(self, found: Joined | None, motions: Motions) -> bool:
+        """Walk on along a new path, if there is one; what is new of it is shortened."""
         self.free = found is not None
+        if found is not None:
+            path, begin, end = found.path, found.begin, found.end
+            new = path[begin : end + 1] if self.post is None else self.post(path[begin : end + 1])
+            new = sequential_cut(new, 0.5 * self.eps, motions)
+            self.path = without_points_between(np.vstack([path[:begin], new, path[end + 1 :]]))
         return self.free
 
 
@@ -138,13 +146,23 @@ class FromScratch(DrrtCon):
 
     name: ClassVar[str] = "rrt-connect"
 
-    def _reconnected(self, motions: Motions, stop: Stop) -> Matrix | None:
+    def _reconnected(self, motions: Motions, stop: Stop) -> Joined | None:
         return self.connect(self._dense[:1], self._dense[-1:], motions, stop)
 
 
 def points_along(path: Matrix, step: float) -> Matrix:
     """The path with further points, none farther than ``step`` from the next; all waypoints stay. Shape (m, n)."""
     return _points_and_edges(path, step)[0]
+
+
+def without_points_between(path: Matrix) -> Matrix:
+    """The path without waypoints at which it goes straight on; both ends stay."""
+    ways = np.diff(path, axis=0)
+    lengths = np.linalg.norm(ways, axis=1)
+    units = ways / np.maximum(lengths, STRAIGHT)[:, None]
+    turns = np.linalg.norm(np.diff(units, axis=0), axis=1) > STRAIGHT
+    kept: Matrix = path[np.concatenate([[True], turns, [True]])]
+    return kept
 
 
 def sequential_cut(path: Matrix, step: float, motions: Motions) -> Matrix:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import pinocchio as pin
 
+from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.solids import pieces
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.scene import Obstacle, Scene
@@ -80,7 +81,7 @@ class Watch:
         self._radii = {o.name: _radius(o) for o in scene.obstacles}
         self._bound, self._warned = bound, set[str]()
         self._last: tuple[float, Scene] | None = None
-        self._velocities: dict[str, object] = {}
+        self._velocities: dict[str, tuple[Vector, Vector]] = {}
         self.speeds: dict[str, float] = {}
 
     def see(self, time: float, scene: Scene) -> bool:
@@ -109,10 +110,10 @@ class Watch:
         moved = (Obstacle(o.name, o.shape, guessed.get(o.name, o.pose), o.motion) for o in ahead.obstacles)
         return Scene(tuple(moved), ahead.attached, ahead.allowed_collisions)
 
-    def _measure(self, obstacle: Obstacle, old: object, seconds: float, time: float) -> None:
-        name, start = obstacle.name, pin.SE3(old)
-        turn = pin.log3(start.rotation.T @ obstacle.pose.rotation) / seconds
-        velocity = (obstacle.pose.translation - start.translation) / seconds
+    def _measure(self, obstacle: Obstacle, old: Any, seconds: float, time: float) -> None:
+        name = obstacle.name
+        turn = pin.log3(old.rotation.T @ obstacle.pose.rotation) / seconds
+        velocity = (obstacle.pose.translation - old.translation) / seconds
         speed = float(np.linalg.norm(velocity) + self._radii[name] * np.linalg.norm(turn))
         self._velocities[name] = (velocity, turn)
         self.speeds[name] = max(speed, self.speeds.get(name, 0.0))
@@ -129,19 +130,21 @@ def too_fast(name: str, speed: float, time: float, bound: float) -> str:
     )
 
 
-def rooms(scene: Scene, margin: float, seconds: float, bound: float | None, seen: Mapping[str, float]) -> dict[str, float]:
+def rooms(
+    scene: Scene, margin: float, seconds: float, bound: float | None, seen: Mapping[str, float]
+) -> dict[str, float]:
     """How far the arm keeps from each obstacle [m]: the margin, and how far what moves can come within a tick.
 
     Args:
         scene: The obstacles.
         margin: Distance that must be left [m].
         seconds: Length of a tick [s].
-        bound: Largest speed of what moves [m/s], if it is stated; what was seen to be faster counts as that fast.
+        bound: Largest speed of what moves [m/s]; what was seen to be faster counts as that fast. None: no room for it.
         seen: Speeds that were seen [m/s].
     """
     found = {}
     for obstacle in scene.obstacles:
-        moves = obstacle.motion is not None or obstacle.name in seen
+        moves = bound is not None and (obstacle.motion is not None or obstacle.name in seen)
         speed = max(bound or 0.0, seen.get(obstacle.name, 0.0)) if moves else 0.0
         found[obstacle.name] = margin + speed * seconds
     return found
@@ -157,6 +160,6 @@ def _radius(obstacle: Obstacle) -> float:
     return max(float(np.linalg.norm(s.aabb_center) + s.aabb_radius) for s in solids)
 
 
-def _extrapolated(pose: object, velocity: object, seconds: float) -> tuple[object, object]:
-    place, (linear, turn) = pin.SE3(pose), velocity  # type: ignore[misc]
-    return place.rotation @ pin.exp3(seconds * turn), place.translation + seconds * linear
+def _extrapolated(pose: Any, velocity: tuple[Vector, Vector], seconds: float) -> tuple[Matrix, Vector]:
+    linear, turn = velocity
+    return pose.rotation @ pin.exp3(seconds * turn), pose.translation + seconds * linear

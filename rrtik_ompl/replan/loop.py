@@ -74,10 +74,9 @@ class Loop:
         checked, event, reason = self._world.checked - checked, "walk", ""
         if not free:
             free, event = self._timed(spent, "repair", self._repair), "repair"
-        place, here = self.q, self.q
+        here = self.q
         if free:
             place = self._walk()
-            event, reason = (event, "") if place is not here else ("wait", "the next step is not free")
         else:
             event, reason, place = self._stand_by()
         path = self._planner.path
@@ -91,7 +90,8 @@ class Loop:
         if not self._watch.see(now, scene):
             return False
         chosen = self._chosen
-        self._room = rooms(scene, chosen.margin, chosen.tick, chosen.speed_bound, self._watch.speeds)
+        clear = chosen.margin + 0.5 * self._world.motion_resolution  # between two looks at a motion too
+        self._room = rooms(scene, clear, chosen.tick, chosen.speed_bound, self._watch.speeds)
         ahead = [chosen.predict * chosen.tick * k / (COPIES - 1) for k in range(1, COPIES)] if chosen.predict else []
         self._world.move(scene, *(self._watch.later(scene, seconds) for seconds in ahead), rooms=self._room)
         return True
@@ -125,13 +125,11 @@ class Loop:
         path, chosen = self._planner.path, self._chosen
         if path is None or len(path) < 2:
             return self.q
-        ways = [one_step(path, chosen.step, chosen.most), to_first_corner(path, chosen.step, chosen.most)]
-        free = self._world.motion_valid_batch(np.array([self.q, self.q]), np.array([place for place, _ in ways]))
-        for allowed, (place, passed) in zip(free, ways, strict=True):
-            if allowed:
-                self._planner.advance(place, passed, self._world)
-                return place
-        return self.q
+        place, passed = one_step(path, chosen.step, chosen.most)
+        if passed and not self._world.motion_valid(self.q, place):
+            place, passed = to_first_corner(path, chosen.step, chosen.most)
+        self._planner.advance(place, passed, self._world)
+        return place
 
     def _stand_by(self) -> tuple[str, str, Vector]:
         """No path: wait, or go out of the way of what comes too near. Event, reason, place."""

@@ -106,7 +106,9 @@ class Run:
         worst = f", the longest {1e3 * repairs.max():.1f} ms" if len(repairs) else ""
         counts = f"{self.count('repair')} repairs{worst}, {self.count('wait')} waits, {self.count('evade')} evasions"
         why = f" ({self.reason})" if self.reason else ""
-        return f"{self.problem}: {self.outcome}{why} after {self.ticks[-1].time:.2f} s: {counts}, length {self.length:.2f}"
+        return (
+            f"{self.problem}: {self.outcome}{why} after {self.ticks[-1].time:.2f} s: {counts}, length {self.length:.2f}"
+        )
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the record as JSON, whole or not at all.
@@ -119,8 +121,8 @@ class Run:
         write_text(path, json.dumps({"version": 1, "kind": KIND, **heads, "ticks": ticks}) + "\n")
 
 
-_HEADS = ("problem", "robot", "joint_names", "planner", "seed", "step", "rate", "margin", "speed_bound", "outcome")
-_HEADS += ("reason",)
+_HEADS: tuple[str, ...] = ("problem", "robot", "joint_names", "planner", "seed", "step", "rate", "margin")
+_HEADS += ("speed_bound", "outcome", "reason")
 
 
 def load_run(path: str | os.PathLike[str]) -> Run:

@@ -9,7 +9,7 @@ import numpy as np
 from rrtik_ompl.arrays import Vector, finite_array
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.fast.connect_lengths import RANGE_SHARE
-from rrtik_ompl.replan.connecting import connector
+from rrtik_ompl.replan.connecting import KernelCuts, connector, has_kernels
 from rrtik_ompl.replan.drrt_con import DrrtCon, FromScratch
 from rrtik_ompl.replan.single_tree import SingleTree
 from rrtik_ompl.robot import Robot
@@ -99,10 +99,11 @@ def settings(
 
 def planner_of(chosen: Settings, world: object, lower: Vector, upper: Vector) -> DrrtCon:
     """The replanner of the name, for a world and a box of configurations to sample in."""
+    post = KernelCuts(world, chosen.seed) if has_kernels(world) else None
     if chosen.planner == SingleTree.name:
-        return SingleTree(lower, upper, chosen.eps, chosen.seed)
+        return SingleTree(lower, upper, chosen.eps, chosen.seed, post=post)
     kind = DrrtCon if chosen.planner == DrrtCon.name else FromScratch
-    return kind(connector(world, lower, upper, chosen.eps, chosen.seed), chosen.eps)
+    return kind(connector(world, lower, upper, chosen.eps, chosen.seed), chosen.eps, post=post)
 
 
 def _above(value: float, name: str, what: str) -> float:

@@ -11,8 +11,8 @@ from typing import ClassVar
 import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.replan.connecting import Motions, Stop, Tree, never
-from rrtik_ompl.replan.drrt_con import DrrtCon
+from rrtik_ompl.replan.connecting import Joined, Motions, Stop, Tree, joined, never
+from rrtik_ompl.replan.drrt_con import DrrtCon, Post
 
 TO_THE_ROBOT = 0.4  # probability
 
@@ -31,26 +31,27 @@ class SingleTree(DrrtCon):
     name: ClassVar[str] = "drrt"
 
     def __init__(
-        self, lower: Vector, upper: Vector, eps: float, seed: int, *, iterations: int = 4000, post: bool = True
+        self, lower: Vector, upper: Vector, eps: float, seed: int, *, iterations: int = 4000, post: Post | None = None
     ) -> None:
-        super().__init__(self._grow, eps, post=post)
+        super().__init__(self, eps, post=post)
         self._lower, self._upper, self._iterations = lower, upper, iterations
         self._rng = np.random.default_rng(seed)
         self._tree: Tree | None = None
+        self.samples = 0
 
     def begin(self, start: Vector, goals: Matrix, motions: Motions, stop: Stop = never) -> bool:
         """See :meth:`DrrtCon.begin`; the tree's only root is the first goal that is free."""
         self._tree = None
         return super().begin(start, goals, motions, stop)
 
-    def _reconnected(self, motions: Motions, stop: Stop) -> Matrix | None:
+    def _reconnected(self, motions: Motions, stop: Stop) -> Joined | None:
         if self._tree is not None:
             self._tree = trimmed(self._tree, motions)
-        return self._grow(self._dense[:1], self._dense[-1:], motions, stop)
+        return self(self._dense[:1], self._dense[-1:], motions, stop)
 
-    def _grow(
+    def __call__(
         self, first: Matrix, second: Matrix, motions: Motions, stop: Stop, *, chain: bool = True
-    ) -> Matrix | None:
+    ) -> Joined | None:
         """Grow the tree until it reaches the end of ``first``; the way back to its root, or None."""
         del chain
         aim = first[-1]
@@ -59,11 +60,12 @@ class SingleTree(DrrtCon):
         for _ in range(self._iterations):
             if stop():
                 return None
+            self.samples += 1
             at_robot = self._rng.random() < TO_THE_ROBOT
             target = aim if at_robot else self._rng.uniform(self._lower, self._upper)
             new = self._tree.extend(target, self.eps, motions)
             if new is not None and float(np.abs(self._tree.rows[new] - aim).max()) == 0.0:
-                return np.vstack([first[:-1], self._tree.branch(new)[::-1]])
+                return joined(first, self._tree.branch(new)[::-1], second, chain=False)
         return None
 
 
