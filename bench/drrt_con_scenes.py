@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.replan.generate import turning_points
 from rrtik_ompl.scene import Obstacle, Scene, Waypoints
 from rrtik_ompl.shapes import Prism
 
@@ -60,7 +61,8 @@ def triangles(ratio: float, seed: int, ticks: int = 400) -> rrtik.Problem:
         places = _wander(rng, np.array(centre, dtype=float), ratio * STEP, ticks)
         motion = None
         if ratio > 0.0:
-            motion = Waypoints(np.arange(ticks + 1) / RATE, [place(*p) for p in places])
+            turns = turning_points(places)
+            motion = Waypoints(turns / RATE, [place(*p) for p in places[turns]])
         obstacles.append(Obstacle(f"triangle{k + 1}", shape, place(*centre), motion))
     return problem("six_triangles", obstacles, (1, 1), (19, 19))
 
@@ -106,7 +108,7 @@ def planar_arm() -> rrtik.Problem:
     """Scene 4: a planar arm; the second box covers the goal posture for a while, the first one leaves its place."""
     robot = rrtik.load_robot("planar", lengths=[1.0, 1.0, 1.0], radius=0.02)
     box = [(-0.25, -0.4), (0.25, -0.4), (0.25, 0.4), (-0.25, 0.4)]
-    first = Waypoints([0.0, 2.0, 5.0], [place(1.6, 1.6), place(1.6, 1.6), place(3.5, 1.6)])
+    first = Waypoints([0.0, 2.0, 5.0], [place(1.6, 1.6), place(1.6, 1.6), place(1.6, 3.4)])
     second = Waypoints([0.0, 0.6, 4.5, 6.5], [place(-3.2, 1.9), place(-1.1, 1.9), place(-1.1, 1.9), place(-3.4, 1.9)])
     obstacles = [Obstacle("first", Prism(box), place(1.6, 1.6), first)]
     obstacles.append(Obstacle("second", Prism(box), place(-3.2, 1.9), second))

@@ -17,6 +17,7 @@ from rrtik_ompl.errors import InputError, RrtikError
 from rrtik_ompl.fast import announce
 from rrtik_ompl.motion_commands import list_moves, time_path
 from rrtik_ompl.path_text import FORMATS as PATH_FORMATS
+from rrtik_ompl.replan_commands import replan_scenario
 from rrtik_ompl.terminal import drop_output, note, prepare_streams, progress, say, warn
 from rrtik_ompl.text_file import check_target
 
@@ -217,6 +218,7 @@ def warmup() -> int:
 
 app.command("moves")(list_moves)
 app.command("time")(time_path)
+app.command("replan")(replan_scenario)
 
 
 def main() -> None:

@@ -33,9 +33,22 @@ LADDER = [
         "goal_file",
         "robot_entry",
     ),
-    *("checks", "world", "path", "moves_text", "problem", "one_joint", "ik", "goal_configurations"),
-    *("moveit_messages", "motion_bench_maker", "problem_file", "ompl_bridge", "planning", "shortening"),
-    *("trajectory", "plot", "plot_tree", "viewer", "report", "terminal", "motion_commands", "cli", "command"),
+    *("checks", "world", "moving_world", "path", "moves_text", "problem", "one_joint", "ik", "goal_configurations"),
+    *("moveit_messages", "motion_bench_maker", "run_section", "problem_file", "ompl_bridge", "planning", "shortening"),
+    *(
+        "trajectory",
+        "replan",
+        "scenario",
+        "plot",
+        "plot_tree",
+        "viewer",
+        "report",
+        "terminal",
+        "motion_commands",
+        "replan_commands",
+        "cli",
+        "command",
+    ),
 ]
 
 

@@ -2,8 +2,9 @@
 
 from rrtik_planners.bicrdt import BiCRDT
 from rrtik_planners.crdt import CRDT
+from rrtik_planners.drrt_con import DRRTCon
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
 from rrtik_planners.fewest_moves import FewestMoves
 from rrtik_planners.mbrrt import MBRRT
 
-__all__ = ["CRDT", "MBRRT", "BiCRDT", "FastRRTConnect", "FewestMoves"]
+__all__ = ["CRDT", "MBRRT", "BiCRDT", "DRRTCon", "FastRRTConnect", "FewestMoves"]

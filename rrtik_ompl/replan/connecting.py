@@ -23,7 +23,6 @@ Stop = Callable[[], Any]  # true when it is time to stop
 
 ITERATIONS = 4000  # samples of one search at most, so that the same seed gives the same run
 CUTS, PATIENCE = 100, 40  # tries of random shortcuts, and without gain
-SHARED = 1e-12  # two configurations nearer than this are one
 
 
 class Motions(Protocol):
@@ -164,11 +163,13 @@ def has_kernels(world: Any) -> bool:
     return getattr(world, "fast", None) is not None and None not in (library(KERNELS), library(CUT_KERNELS))
 
 
-def connector(world: Any, lower: Vector, upper: Vector, eps: float, seed: int) -> KernelConnect | PlainConnect:
+def connector(
+    world: Any, lower: Vector, upper: Vector, eps: float, seed: int, iterations: int = ITERATIONS
+) -> KernelConnect | PlainConnect:
     """The search in a kernel where the world has kernels, else the one in Python."""
     if has_kernels(world):
-        return KernelConnect(world, lower, upper, eps, seed)
-    return PlainConnect(lower, upper, eps, seed)
+        return KernelConnect(world, lower, upper, eps, seed, iterations)
+    return PlainConnect(lower, upper, eps, seed, iterations)
 
 
 class Tree:
@@ -193,7 +194,7 @@ class Tree:
         """CONNECT: steps towards a target until it is reached; the vertex that is the target, or None."""
         vertex: int | None = self.nearest(target)
         while vertex is not None and not stop():
-            if float(np.abs(self.rows[vertex] - target).max()) <= SHARED:
+            if (self.rows[vertex] == target).all():
                 return vertex
             vertex = self._step(vertex, target, eps, motions)
         return None
@@ -228,10 +229,16 @@ class Tree:
         return self.add(row, near) if free else None
 
 
+def without_repeats(path: Matrix) -> Matrix:
+    """The path without waypoints that repeat the one before, shape (k, n)."""
+    kept: Matrix = path[np.concatenate([[True], (np.diff(path, axis=0) != 0.0).any(axis=1)])]
+    return kept
+
+
 def joined(first: Matrix, bridge: Matrix, second: Matrix, *, chain: bool) -> Joined:
     """A piece up to the begin of a bridge, the bridge, and the other piece from its end on; no row twice running."""
     begin = int(np.flatnonzero((first == bridge[0]).all(axis=1))[0])
     end = int(np.flatnonzero((second == bridge[-1]).all(axis=1))[-1])
-    bridge = bridge[np.append(True, np.abs(np.diff(bridge, axis=0)).max(axis=1) > SHARED)]
+    bridge = without_repeats(bridge)
     path = np.vstack([first[:begin], bridge, second[end + 1 :] if chain else second[:0]])
     return Joined(path, begin, begin + len(bridge) - 1)

@@ -15,7 +15,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.path import subdivided
-from rrtik_ompl.replan.connecting import Connect, Joined, Motions, Stop, never
+from rrtik_ompl.replan.connecting import Connect, Joined, Motions, Stop, never, without_repeats
 
 MOST_CUTS = 24  # ends that are tried from one point of a path
 STRAIGHT = 1e-9  # change of direction
@@ -110,18 +110,17 @@ class DrrtCon:
 
     def advance(self, place: Vector, passed: int, motions: Motions) -> None:
         """The robot has gone to ``place``, past ``passed`` waypoints: drop what lies behind it, shorten the rest."""
-        if self.path is None:
-            return
-        rest = self.path[1 + passed :]
-        rest = rest if len(rest) else self.path[-1:]
-        self.path = rest if (rest[0] == place).all() else np.vstack([place, rest])
-        if self.free and len(self.path) > 2:
+        free = self.free
+        self.rejoin(place, passed)
+        self.free = free
+        if self.path is not None and free and len(self.path) > 2:
             self.path = cut_from_start(self.path, 0.5 * self.eps, motions)
 
-    def leave(self, place: Vector) -> None:
-        """The robot has left the path for ``place``; the old path stays behind it as something to reconnect to."""
+    def rejoin(self, place: Vector, passed: int = 0) -> None:
+        """The robot is at ``place``, on its path or not, past ``passed`` waypoints: the way there counts as unknown."""
         if self.path is not None:
-            self.path = np.vstack([place, self.path[1:] if len(self.path) > 1 else self.path])
+            rest = self.path[1 + passed :] if len(self.path) > 1 + passed else self.path[-1:]
+            self.path = rest if (rest[0] == place).all() else np.vstack([place, rest])
             self.free = False
 
     def _reconnected(self, motions: Motions, stop: Stop) -> Joined | None:
@@ -157,6 +156,8 @@ def points_along(path: Matrix, step: float) -> Matrix:
 
 def without_points_between(path: Matrix) -> Matrix:
     """The path without waypoints at which it goes straight on; both ends stay."""
+    if len(path) < 3:
+        return path
     ways = np.diff(path, axis=0)
     lengths = np.linalg.norm(ways, axis=1)
     units = ways / np.maximum(lengths, STRAIGHT)[:, None]
@@ -189,9 +190,7 @@ def cut_from_start(path: Matrix, step: float, motions: Motions) -> Matrix:
     if not free.any():
         return path
     end = ends[np.flatnonzero(free)[-1]]
-    cut = np.vstack([path[:1], points[end], path[edges[end] + 1 :]])
-    kept: Matrix = cut[np.append(True, (np.diff(cut, axis=0) != 0.0).any(axis=1))]
-    return kept
+    return without_repeats(np.vstack([path[:1], points[end], path[edges[end] + 1 :]]))
 
 
 def _points_and_edges(path: Matrix, step: float) -> tuple[Matrix, Vector]:

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.moving_world import MovingWorld
 from rrtik_ompl.problem import Problem
@@ -43,8 +44,9 @@ def moving_scene(robot: Robot, count: int, speed: float, seed: int, *, seconds: 
         low, high = SHELL[0] * reach + size, SHELL[1] * reach
         places = _wander(rng, steps, speed * BETWEEN, low, high) + centre
         turned = _rotation(rng)
-        poses = [pin.SE3(turned, place) for place in places]
-        obstacles.append(Obstacle(f"obstacle{k + 1}", shape, poses[0], Waypoints(times, poses)))
+        turns = turning_points(places)
+        poses = [pin.SE3(turned, place) for place in places[turns]]
+        obstacles.append(Obstacle(f"obstacle{k + 1}", shape, poses[0], Waypoints(times[turns], poses)))
     return Scene(tuple(obstacles))
 
 
@@ -68,6 +70,13 @@ def moving_problem(
         raise InputError(f"no free start and goal among {count} obstacles; take fewer, or another seed than {seed}")
     far = int(np.argmax(np.linalg.norm(free[1:16] - free[0], axis=1))) + 1
     return Problem(world, free[0], free[far], name=f"{robot.name}_{count}_{seed}")
+
+
+def turning_points(places: Matrix) -> NDArray[np.int64]:
+    """Numbers of the first, the last, and those points of a way in equal steps, shape (k, d), at which it turns."""
+    steps = np.diff(places, axis=0)
+    turned = np.linalg.norm(np.diff(steps, axis=0), axis=1) > 1e-9 * np.linalg.norm(steps, axis=1).max(initial=0.0)
+    return np.concatenate([[0], np.flatnonzero(turned) + 1, [len(places) - 1]])
 
 
 def _reach(robot: Robot) -> tuple[Vector, float]:

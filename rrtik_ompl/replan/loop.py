@@ -73,7 +73,8 @@ class Loop:
         free = self._timed(spent, "look", self._look) if changed or not self._planner.free else True
         checked, event, reason = self._world.checked - checked, "walk", ""
         if not free:
-            free, event = self._timed(spent, "repair", self._repair), "repair"
+            event = "repair" if self._planner.path is not None else "plan"
+            free = self._timed(spent, event, self._repair)
         here = self.q
         if free:
             place = self._walk()
@@ -142,7 +143,7 @@ class Loop:
         place = evasion(self.q, chosen.step, chosen.most, self._near, self._alone, self._rng, self._planner.path)
         if place is None:
             return "wait", "an obstacle is too near, and there is nowhere to go", self.q
-        self._planner.leave(place)
+        self._planner.rejoin(place)
         return "evade", "an obstacle is too near", place
 
     def _arrived(self) -> bool:

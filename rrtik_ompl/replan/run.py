@@ -17,7 +17,7 @@ from rrtik_ompl.path_text import json_object
 from rrtik_ompl.text_file import read_text, write_text
 
 KIND = "replan_run"
-EVENTS = ("walk", "repair", "wait", "evade", "arrive")
+EVENTS = ("plan", "walk", "repair", "wait", "evade", "arrive")
 OUTCOMES = ("arrived", "out of time", "interrupted")
 
 
@@ -28,10 +28,10 @@ class Tick:
     Attributes:
         time: Of its begin [s].
         q: Where the robot is then, shape (n,).
-        event: "walk" along the path; "repair": walk along a new one; "wait"; "evade"; "arrive": the last place.
+        event: "walk" along the path; "repair": walk along a new one; "plan": the same at first; "wait"; "evade"; "arrive": the last place.
         path: The path after the tick's work, shape (k, n), or None if there is none.
         poses: Of the obstacles that are not where they were in the first tick: x, y, z and quaternion x, y, z, w.
-        seconds: Wall time of its parts [s]: "sense", "look", "repair" (search and shortening), "all".
+        seconds: Wall time of its parts [s]: "sense", "look", "plan" or "repair" (search and shortening), "all".
         checked: Configurations that the look at the path asked for.
         reason: Why the robot waits or evades, or "".
     """
@@ -89,7 +89,8 @@ class Run:
     @property
     def length(self) -> float:
         """Length of the way that was gone [rad, metres counted alike]."""
-        return float(np.linalg.norm(np.diff(self.configurations, axis=0), axis=1).sum())
+        rows = self.configurations
+        return float(np.linalg.norm(np.diff(rows, axis=0), axis=1).sum()) if len(rows) else 0.0
 
     def count(self, event: str) -> int:
         """Number of ticks of a kind."""
@@ -109,6 +110,18 @@ class Run:
         return (
             f"{self.problem}: {self.outcome}{why} after {self.ticks[-1].time:.2f} s: {counts}, length {self.length:.2f}"
         )
+
+    def figures(self) -> dict[str, Any]:
+        """The run in numbers, for JSON: outcome, times [s], counts of events, length, and wall times of repairs [s]."""
+        repairs = self.seconds("repair")
+        return {
+            **{name: getattr(self, name) for name in ("problem", "robot", "planner", "seed", "outcome", "reason")},
+            "seconds": self.ticks[-1].time if self.ticks else 0.0,
+            "length": self.length,
+            **{event: self.count(event) for event in EVENTS},
+            "repair_median": float(np.median(repairs)) if len(repairs) else None,
+            "repair_p95": float(np.percentile(repairs, 95)) if len(repairs) else None,
+        }
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the record as JSON, whole or not at all.

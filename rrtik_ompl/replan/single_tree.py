@@ -64,7 +64,7 @@ class SingleTree(DrrtCon):
             at_robot = self._rng.random() < TO_THE_ROBOT
             target = aim if at_robot else self._rng.uniform(self._lower, self._upper)
             new = self._tree.extend(target, self.eps, motions)
-            if new is not None and float(np.abs(self._tree.rows[new] - aim).max()) == 0.0:
+            if new is not None and (self._tree.rows[new] == aim).all():
                 return joined(first, self._tree.branch(new)[::-1], second, chain=False)
         return None
 

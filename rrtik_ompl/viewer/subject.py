@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import Goal, JointGoal
+from rrtik_ompl.replan.run import Run
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 
@@ -26,6 +27,7 @@ class Subject:
         waypoints: Configurations to play, shape (k, dof); a single row if there is no path, (0, 0) without a robot.
         is_path: Whether the waypoints are a path, as opposed to the one posture in which the arm stands.
         before: Waypoints of a path to compare with, shape (m, dof), or None.
+        run: The run whose ticks the waypoints are, or None.
     """
 
     name: str
@@ -35,6 +37,7 @@ class Subject:
     waypoints: Matrix
     is_path: bool
     before: Matrix | None = None
+    run: Run | None = None
 
     @property
     def start(self) -> Vector | None:
@@ -85,6 +88,23 @@ def subject_of(shown: Any, path: Any | None = None, before: Any | None = None) -
     start = getattr(shown, "start", None)
     posture = robot.clamp(np.zeros(robot.dof)) if start is None else robot.configuration(start, "start")
     return Subject(name, robot, scene, goal, frozen(posture[None]), False)
+
+
+def subject_of_run(problem: Any, run: Any) -> Subject:
+    """What a run shows: the robot in every tick, and the obstacles where they are in the first one.
+
+    Raises:
+        InputError: If it is no run, or not one of that problem's robot.
+    """
+    require(run, Run, "run to show", "use replan() or load_run(file)")
+    if len(run.ticks) == 0:
+        raise InputError("run to show: it has no tick")
+    shown = subject_of(problem, run.configurations)
+    scene = shown.scene
+    still = tuple(replace(o, motion=None) for o in scene.at(0.0).obstacles)
+    for name in {name for tick in run.ticks for name in tick.poses}:
+        scene.obstacle(name)  # or it is a run of another problem
+    return replace(shown, scene=replace(scene, obstacles=still), run=run)
 
 
 def _waypoints(robot: Robot, path: Any) -> Matrix:
