@@ -62,6 +62,7 @@ def replan(
         slot: Wall time that a repair may take [s]; one tick if None.
         seed: The same seed gives the same run, as long as no repair is cut short by its slot.
         goal_feed: A goal that moves: the configuration at a time [s], in place of the problem's goal.
+            It is reached when the robot is where it was at the begin of the last tick.
         record: A JSON file for the record; it is written on Ctrl-C too.
 
     Raises:

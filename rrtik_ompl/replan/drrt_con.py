@@ -51,7 +51,7 @@ class DrrtCon:
     Args:
         connect: The search between pieces of a path.
         eps: Longest step of the trees [unit of the space]; the path is cut at points half as far apart.
-        post: Shortens what is new of a path before the sequential cut; None: nothing does, as published.
+        post: Shortens what is new of a path; the sequential cut if None, as published.
     """
 
     name: ClassVar[str] = "drrt-con"
@@ -134,8 +134,8 @@ class DrrtCon:
         self.free = found is not None
         if found is not None:
             path, begin, end = found.path, found.begin, found.end
-            new = path[begin : end + 1] if self.post is None else self.post(path[begin : end + 1])
-            new = sequential_cut(new, 0.5 * self.eps, motions)
+            new = path[begin : end + 1]
+            new = sequential_cut(new, 0.5 * self.eps, motions) if self.post is None else self.post(new)
             self.path = without_points_between(np.vstack([path[:begin], new, path[end + 1 :]]))
         return self.free
 

@@ -15,10 +15,10 @@ from rrtik_ompl.collision.bodies import Body, link_bodies, scene_bodies
 from rrtik_ompl.replan.feed import Feed
 from rrtik_ompl.replan.run import Run
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Scene
+from rrtik_ompl.scene import Obstacle, Scene
 
 FINE = 10  # looks in a tick
-NEAR = 0.02  # [m]; distances above are not measured
+NEAR = 0.05  # [m]; distances above are not measured
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +36,7 @@ class Verdict:
     looks: int
 
 
-def judge(robot: Robot, run: Run, feed: Feed, *, fine: int = FINE) -> Verdict:
+def judge(robot: Robot, run: Run, source: Scene | Feed, *, fine: int = FINE) -> Verdict:
     """Look at a run ``fine`` times a tick: the arm on its straight way, every obstacle where it really is then.
 
     Contact of the arm with obstacles alone: the arm with itself is no matter of time. What the arm holds counts.
@@ -44,15 +44,16 @@ def judge(robot: Robot, run: Run, feed: Feed, *, fine: int = FINE) -> Verdict:
     Args:
         robot: Of the run.
         run: What happened.
-        feed: The scene at any time [s], between the ticks too.
+        source: The scene whose obstacles state their motion, or a function from any time [s] to a scene, between the
+            ticks too.
         fine: Looks in a tick.
     """
     ticks, seconds = run.ticks, 1.0 / run.rate
     shares = np.arange(fine) / fine
     rows = [a.q + (b.q - a.q) * s for a, b in pairwise(ticks) for s in shares] + [ticks[-1].q]
     times = [t.time + s * seconds for t in ticks[:-1] for s in shares] + [ticks[-1].time]
-    scenes = [feed(time) for time in times]
-    gaps, names = _gaps(robot, np.array(rows), scenes)
+    first = source if isinstance(source, Scene) else source(0.0)
+    gaps, names = _gaps(robot, np.array(rows), first, _poses(source, times))
     contacts, done = [], set()
     for look in np.flatnonzero((gaps <= 0.0).any(axis=1)):
         if (tick := look // fine) not in done:
@@ -61,17 +62,30 @@ def judge(robot: Robot, run: Run, feed: Feed, *, fine: int = FINE) -> Verdict:
     return Verdict(tuple(contacts), max(float(gaps.min(initial=NEAR)), 0.0), len(times))
 
 
-def _gaps(robot: Robot, rows: Matrix, scenes: list[Scene]) -> tuple[NDArray[np.float64], list[tuple[str, str]]]:
+def _poses(source: Scene | Feed, times: list[float]) -> dict[str, NDArray[np.float64]]:
+    """Where each obstacle is at the times, shape (m, 4, 4)."""
+    if isinstance(source, Scene):
+        return {o.name: np.array([_place(o, time).homogeneous for time in times]) for o in source.obstacles}
+    scenes = [source(time) for time in times]
+    names = [o.name for o in scenes[0].obstacles]
+    return {name: np.array([scene.obstacle(name).pose.homogeneous for scene in scenes]) for name in names}
+
+
+def _place(obstacle: Obstacle, time: float) -> Any:
+    return obstacle.pose if obstacle.motion is None else obstacle.motion.pose_at(obstacle.pose, time)
+
+
+def _gaps(
+    robot: Robot, rows: Matrix, scene: Scene, own: dict[str, NDArray[np.float64]]
+) -> tuple[NDArray[np.float64], list[tuple[str, str]]]:
     """Distances [m] of all pairs of an arm's body and an obstacle, shape (looks, pairs), and the names of the pairs."""
-    placed = scene_bodies(robot, scenes[0])
+    placed = scene_bodies(robot, scene)
     arm = [*link_bodies(robot), *(b for b in placed if b.kind == "attached")]
-    allowed = {frozenset(pair) for pair in scenes[0].allowed_collisions}
+    allowed = {frozenset(pair) for pair in scene.allowed_collisions}
     moving = [b for b in placed if b.kind == "obstacle"]
     pairs = [(a, o) for a in arm for o in moving if frozenset((a.name, o.name)) not in allowed and a.joint > 0]
     frames = robot.joint_frames(rows)
     arm_poses = {id(a): frames[:, a.joint] @ a.placement.homogeneous for a in arm}
-    poses = [{o.name: o.pose.homogeneous for o in scene.obstacles} for scene in scenes]
-    own = {o.name: np.array([each[o.name] for each in poses]) for o in moving}
     gaps = np.full((len(rows), len(pairs)), np.inf)
     for k, (a, o) in enumerate(pairs):
         near = np.flatnonzero(_between_balls(a, arm_poses[id(a)], o, own[o.name]) < NEAR)

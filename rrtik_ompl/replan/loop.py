@@ -62,13 +62,14 @@ class Loop:
     def tick(self, number: int) -> bool:
         """Do one tick and write it down; False when the goal is reached."""
         now, begin = number * self._chosen.tick, time.perf_counter()
-        if self._goal_feed is not None:
-            self._goals = _goal(self._goal_feed, now)
         if self._arrived():
             self._note(now, self.q, "arrive", {}, 0, "")
             return False
+        if self._goal_feed is not None:
+            self._goals = _goal(self._goal_feed, now)
         spent: dict[str, float] = {}
         changed = self._timed(spent, "sense", self._see, now)
+        self._timed(spent, "retarget", self._follow_goal)
         checked = self._world.checked
         free = self._timed(spent, "look", self._look) if changed or not self._planner.free else True
         checked, event, reason = self._world.checked - checked, "walk", ""
@@ -78,6 +79,7 @@ class Loop:
         here = self.q
         if free:
             place = self._walk()
+            event, reason = (event, "") if place is not here else ("wait", "the goal is not free")
         else:
             event, reason, place = self._stand_by()
         path = self._planner.path
@@ -97,6 +99,13 @@ class Loop:
         self._world.move(scene, *(self._watch.later(scene, seconds) for seconds in ahead), rooms=self._room)
         return True
 
+    def _follow_goal(self) -> bool:
+        """Where the goal has moved away from the end of the path, reconnect it, as far as that is free."""
+        path = self._planner.path
+        if self._goal_feed is None or path is None or (path[-1] == self._goals[0]).all():
+            return False
+        return self._planner.retarget(self._goals, self._world, _until(self._chosen.slot))
+
     def _look(self) -> bool:
         return self._planner.look(self._world)
 
@@ -113,9 +122,6 @@ class Loop:
         stop, planner = _until(self._chosen.slot), self._planner
         if planner.path is None:
             return planner.begin(self.q, self._goals, self._world, stop)
-        if self._goal_feed is not None and (planner.path[-1] != self._goals[0]).any():
-            planner.retarget(self._goals, self._world, stop)
-            return planner.look(self._world) or planner.repair(self._world, stop)
         if self._world.valid(planner.path[-1]):
             return planner.repair(self._world, stop)
         others = self._goals[(self._goals != planner.path[-1]).any(axis=1)]
