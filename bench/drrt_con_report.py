@@ -97,7 +97,9 @@ def triangle_rows(report: Report, count: int) -> None:
     least = min(arrived[0.2], arrived[0.5])
     report.bar("six triangles, ratio 0.2 and 0.5: arrival in 400 ticks", ">= 95 %", f"{least:.0%}", least >= 0.95)
     share = float(np.mean(sound))
-    report.bar("the executed edge is free in the exact world of its tick", "100 %", f"{share:.0%} of runs", share == 1.0)
+    report.bar(
+        "the executed edge is free in the exact world of its tick", "100 %", f"{share:.0%} of runs", share == 1.0
+    )
     report.bar(
         "configurations looked at, nothing hit",
         "<= path / resolution + points",
@@ -113,9 +115,7 @@ def predictive_bar(report: Report, plain: list[Run], predictive: list[Run]) -> N
     """The predictive variant against the plain one, ratio 1.0."""
     held = [[sum(r.count(e) for r in found) for e in ("wait", "evade", "repair")] for found in (plain, predictive)]
     stops = [waits + evasions for waits, evasions, _ in held]
-    text = ", ".join(
-        f"{what} {a} -> {b}" for what, a, b in zip(("waits", "evasions", "replans"), *held, strict=True)
-    )
+    text = ", ".join(f"{what} {a} -> {b}" for what, a, b in zip(("waits", "evasions", "replans"), *held, strict=True))
     fewer = held[1][0] <= 0.7 * held[0][0] or held[1][2] <= 0.7 * held[0][2]
     report.bar("Beat: predictive: waits or replans", "at least 30 % fewer", text, fewer and stops[1] <= stops[0])
 
@@ -144,19 +144,25 @@ def goal_rows(report: Report, count: int) -> None:
         clean.append(not verdict.contacts)
     shares = [float(np.mean(values)) for values in (waited, arrived, clean)]
     text = ", ".join(f"{share:.0%}" for share in shares)
-    report.bar("covered goal: waits, arrives within 60 ticks of release, no contact", "100 % each", text, min(shares) == 1)
+    report.bar(
+        "covered goal: waits, arrives within 60 ticks of release, no contact", "100 % each", text, min(shares) == 1
+    )
     caught = []
     for seed in range(count):
         problem, goal = scenes.moving_goal(seed)
         caught.append(plane_run(problem, seed, goal_feed=goal).arrived)
-    report.bar("moving goal, 0.6 of the robot's speed: captured", ">= 95 %", f"{np.mean(caught):.0%}", np.mean(caught) >= 0.95)
+    report.bar(
+        "moving goal, 0.6 of the robot's speed: captured", ">= 95 %", f"{np.mean(caught):.0%}", np.mean(caught) >= 0.95
+    )
 
 
 def arm_order(report: Report, count: int) -> None:
     """Scene 4: the order of events."""
     kept = []
     for seed in range(count):
-        run = replan(scenes.planar_arm(), step=0.08, rate=20, eps=0.3, margin=0.01, limits=slow(3), seconds=30, seed=seed)
+        run = replan(
+            scenes.planar_arm(), step=0.08, rate=20, eps=0.3, margin=0.01, limits=slow(3), seconds=30, seed=seed
+        )
         going = ["go" if t.event in ("plan", "walk", "repair") else t.event for t in run.ticks]
         kept.append([event for event, _ in groupby(going)] == ["go", "wait", "go", "arrive"])
     text = f"{np.mean(kept):.0%} of {count} runs"
@@ -202,7 +208,9 @@ def arm_bars(report: Report, name: str, count: int, found: list) -> None:
     p95 = 1e3 * np.percentile(repairs, 95)
     report.bar(f"{name}: repair, p95 of {len(repairs)}", "< 20 ms", f"{p95:.1f} ms", p95 < 20.0)
     p95 = 1e3 * np.percentile(ticks, 95)
-    report.bar(f"{name}: whole tick (obstacles packed, look, repair, step), p95", "< 20 ms", f"{p95:.1f} ms", p95 < 20.0)
+    report.bar(
+        f"{name}: whole tick (obstacles packed, look, repair, step), p95", "< 20 ms", f"{p95:.1f} ms", p95 < 20.0
+    )
 
 
 def repair_rows(report: Report, count: int) -> None:
@@ -216,7 +224,10 @@ def repair_rows(report: Report, count: int) -> None:
             for what, spent in moments.others.items():
                 times = [f"{1e3 * np.percentile(spent, p):.2f}" for p in (50, 95)]
                 rows.append([name, what, str(len(spent)), *times, f"{moments.ratio(what):.1f}"])
-        for what, moments in (("from scratch, same kernels", quick), *((w, slower) for w in slower.others if "World" in w)):
+        for what, moments in (
+            ("from scratch, same kernels", quick),
+            *((w, slower) for w in slower.others if "World" in w),
+        ):
             ratio = moments.ratio(what)
             report.bar(f"{name}: median repair against {what}", ">= 5 times faster", f"{ratio:.1f} times", ratio >= 5.0)
     head = ["arm", "way to a new path", "repairs", "median [ms]", "p95 [ms]", "median of the ratios to DRRT-Con"]
@@ -243,7 +254,7 @@ def main() -> None:
 
 READING = (
     "The scenes' numbers are proposals: the paper's figures give none. A contact is judged by coal alone, five times a "
-    "tick (ten in the plane), with every obstacle where it really is at that moment; what planned the run was not asked. "
+    "tick (ten in the plane), with every obstacle where it really is at that moment; the planner's world is not asked. "
     "'From scratch, same kernels' is RRT-Connect and shortcuts in the same kernels and the same packed scene as "
     "DRRT-Con's own repair, so it shows what keeping the path is worth; a new World and plan() is what planning from "
     "scratch cost before there was replanning. A repair is the search and the shortening of what is new; a whole tick "

@@ -1,4 +1,4 @@
-"""Runs of replanning for the DRRT-Con report: one row of figures a run, and repairs side by side at the same moments."""
+"""Runs of replanning for the DRRT-Con report, and repairs by several ways side by side at the same moments."""
 
 from __future__ import annotations
 
@@ -48,7 +48,9 @@ def executed_valid(problem: rrtik.Problem, run: Run) -> bool:
     scene = problem.world.scene
     for tick, after in zip(run.ticks[:-1], run.ticks[1:], strict=True):
         if tick.event in ("plan", "walk", "repair") and (tick.q != after.q).any():
-            now = rrtik.World(problem.robot, still(scene.at(tick.time)), motion_resolution=problem.world.motion_resolution)
+            now = rrtik.World(
+                problem.robot, still(scene.at(tick.time)), motion_resolution=problem.world.motion_resolution
+            )
             if not now.certify(np.linspace(tick.q, after.q, 11)).all():
                 return False
     return True
@@ -68,6 +70,7 @@ class Moments:
     others: dict[str, list[float]] = field(default_factory=dict)
 
     def add(self, name: str, seconds: float) -> None:
+        """Note what another way took."""
         self.others.setdefault(name, []).append(seconds)
 
     def ratio(self, name: str) -> float:
@@ -108,7 +111,9 @@ def with_pairs(loop: Loop, quick: Moments, slow: Moments, slow_every: int) -> No
     def timed(motions: object, stop: object) -> bool:
         nonlocal count
         count += 1
-        spent = [_repair_seconds(other, planner, motions) for other in (scratch, *(plain if count % slow_every == 0 else ()))]
+        spent = [
+            _repair_seconds(other, planner, motions) for other in (scratch, *(plain if count % slow_every == 0 else ()))
+        ]
         begin = time.perf_counter()
         found = repair(motions, stop)
         ours = time.perf_counter() - begin

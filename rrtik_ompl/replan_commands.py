@@ -18,7 +18,7 @@ def replan_scenario(
     scenario: Scenario,
     planner: Annotated[str, typer.Option(help="drrt-con, or to compare with: rrt-connect, drrt.")] = "drrt-con",
     seed: Annotated[int, typer.Option(help="The same seed gives the same run.")] = 0,
-    predict: Annotated[int | None, typer.Option(help="Heed where obstacles will be, up to so many ticks ahead.")] = None,
+    predict: Annotated[int | None, typer.Option(help="Heed where obstacles will be, so many ticks ahead.")] = None,
     seconds: Annotated[float | None, typer.Option(help="Simulated time at most [s].")] = None,
     record: Annotated[Path | None, typer.Option(help="Keep everything, on Ctrl-C too: .json.")] = None,
     replay: Annotated[Path | None, typer.Option(help="Show this record instead of a new run.")] = None,

@@ -13,6 +13,7 @@ NAMES = [
     *("cut_disc", "cut_polygons", "cut_two_ls", "env_e"),
     *("planar3_a", "planar3_b", "planar3_boxes", "planar3_c", "planar6_c", "planar6_c_pose"),
     *("puma_pose", "puma_position", "titan4_axis1", "titan4_prisms", "titan4_sdu", "titan4_wrist"),
+    *("replan_planar_arm", "replan_pockets", "replan_titan4", "replan_triangles", "replan_ur5", "replan_walls"),
 ]
 SINGULAR = {"titan4_axis1": (11.4592, 80, 43.9549, -33.9549, 0, 17.1887), "titan4_wrist": (20, 30, -70, 40, 90, 10)}
 PUMA_GOAL = np.radians([40, 60, -120, 30, 40, 20])

@@ -28,7 +28,8 @@ class Tick:
     Attributes:
         time: Of its begin [s].
         q: Where the robot is then, shape (n,).
-        event: "walk" along the path; "repair": walk along a new one; "plan": the same at first; "wait"; "evade"; "arrive": the last place.
+        event: "plan" or "repair": walk along a path found just now, the first one or another one; "walk" along the old
+            one; "wait"; "evade"; "arrive": the last place.
         path: The path after the tick's work, shape (k, n), or None if there is none.
         poses: Of the obstacles that are not where they were in the first tick: x, y, z and quaternion x, y, z, w.
         seconds: Wall time of its parts [s]: "sense", "look", "plan" or "repair" (search and shortening), "all".
