@@ -9,13 +9,13 @@ import numpy as np
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.planning import plan
-from rrtik_ompl.replan import Run, replan
-from rrtik_ompl.replan.connecting import KernelConnect, KernelCuts, PlainConnect
-from rrtik_ompl.replan.drrt_con import DrrtCon, FromScratch
-from rrtik_ompl.replan.generate import moving_problem
-from rrtik_ompl.replan.judge import Verdict, judge
-from rrtik_ompl.replan.loop import Loop
-from rrtik_ompl.replan.settings import settings
+from rrtik_ompl.replanning import Run, replan
+from rrtik_ompl.replanning.connecting import KernelConnect, KernelCuts, PlainConnect
+from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
+from rrtik_ompl.replanning.generate import moving_problem
+from rrtik_ompl.replanning.judge import Verdict, judge
+from rrtik_ompl.replanning.loop import Loop
+from rrtik_ompl.replanning.settings import settings
 from rrtik_ompl.scene import Scene
 
 ARMS = {

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.replan.generate import turning_points
+from rrtik_ompl.replanning.generate import turning_points
 from rrtik_ompl.scene import Obstacle, Scene, Waypoints
 from rrtik_ompl.shapes import Prism
 

@@ -38,7 +38,12 @@ if TYPE_CHECKING:
     from rrtik_ompl.problem import Problem as Problem
     from rrtik_ompl.problem_file import load_problem as load_problem
     from rrtik_ompl.problem_file import save_problem as save_problem
+    from rrtik_ompl.replanning import Run as Run
+    from rrtik_ompl.replanning import load_run as load_run
+    from rrtik_ompl.replanning import replan as replan
     from rrtik_ompl.robot import Robot as Robot
+    from rrtik_ompl.scenario import Scenario as Scenario
+    from rrtik_ompl.scenario import load_scenario as load_scenario
     from rrtik_ompl.scene import AttachedObject as AttachedObject
     from rrtik_ompl.scene import Obstacle as Obstacle
     from rrtik_ompl.scene import Scene as Scene
@@ -65,7 +70,9 @@ else:
         "plot": ("plot_joints",),
         "problem": ("Problem",),
         "problem_file": ("load_problem", "save_problem"),
+        "replanning": ("Run", "load_run", "replan"),
         "robot": ("Robot",),
+        "scenario": ("Scenario", "load_scenario"),
         "scene": ("AttachedObject", "Obstacle", "Scene"),
         "scene_file": ("load_scene", "save_scene"),
         "shortening": ("shorten",),

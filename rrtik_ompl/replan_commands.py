@@ -28,7 +28,7 @@ def replan_scenario(
     """Move a robot to its goal while obstacles move: look, repair, step. Exit 0: arrived; 1: not."""
     check_target(html, (".html", ".htm"))
     check_target(record, (".json",))
-    from rrtik_ompl.replan import load_run
+    from rrtik_ompl.replanning import load_run
     from rrtik_ompl.scenario import load_scenario
 
     chosen = load_scenario(scenario)

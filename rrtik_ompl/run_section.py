@@ -29,7 +29,7 @@ class GoalWaypoint(Section):
 
 
 class RunSection(Section):
-    """Steps, ticks and distances of a run; what is left out is as in ``rrtik_ompl.replan``."""
+    """Steps, ticks and distances of a run; what is left out is as in ``rrtik_ompl.replanning``."""
 
     step: Positive = Field(description="how far the robot goes in a tick [rad or m]")
     rate: Positive = Field(description="ticks a second [Hz]")
@@ -42,7 +42,7 @@ class RunSection(Section):
     goal: Annotated[list[GoalWaypoint], Field(min_length=1)] | None = Field(None, description="a goal that moves")
 
     def options(self) -> dict[str, Any]:
-        """The keyword arguments of :func:`rrtik_ompl.replan.replan` that are numbers."""
+        """The keyword arguments of :func:`rrtik_ompl.replanning.replan` that are numbers."""
         names = ("step", "rate", "margin", "speed_bound", "eps", "predict", "seconds")
         return {name: getattr(self, name) for name in names}
 

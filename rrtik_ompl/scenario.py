@@ -11,8 +11,8 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.file_format import parse
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_file import ProblemFile, load_problem, problem_path
-from rrtik_ompl.replan import Run, replan
-from rrtik_ompl.replan.loop import GoalFeed
+from rrtik_ompl.replanning import Run, replan
+from rrtik_ompl.replanning.loop import GoalFeed
 from rrtik_ompl.trajectory.limits import RateLimits
 from rrtik_ompl.yaml_file import read_yaml
 
@@ -23,7 +23,7 @@ class Scenario:
 
     Attributes:
         problem: Robot, scene with its motions, start and goal.
-        options: Keyword arguments of :func:`rrtik_ompl.replan.replan`: step, rate, margin, ...
+        options: Keyword arguments of :func:`rrtik_ompl.replanning.replan`: step, rate, margin, ...
         goal_feed: A goal that moves, or None.
     """
 
@@ -32,7 +32,7 @@ class Scenario:
     goal_feed: GoalFeed | None = None
 
     def run(self, **changes: Any) -> Run:
-        """Replan, with some options changed; see :func:`rrtik_ompl.replan.replan`."""
+        """Replan, with some options changed; see :func:`rrtik_ompl.replanning.replan`."""
         return replan(self.problem, goal_feed=self.goal_feed, **{**self.options, **changes})
 
 

@@ -37,7 +37,7 @@ LADDER = [
     *("moveit_messages", "motion_bench_maker", "run_section", "problem_file", "ompl_bridge", "planning", "shortening"),
     *(
         "trajectory",
-        "replan",
+        "replanning",
         "scenario",
         "plot",
         "plot_tree",

@@ -16,13 +16,13 @@ from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.moving_world import MovingWorld
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.replan import PLANNERS, SpeedWarning, load_run, replan
-from rrtik_ompl.replan.connecting import KernelConnect, PlainConnect, Tree, never
-from rrtik_ompl.replan.drrt_con import DrrtCon, FromScratch, points_along, sequential_cut, without_points_between
-from rrtik_ompl.replan.generate import moving_problem, moving_scene
-from rrtik_ompl.replan.judge import judge
-from rrtik_ompl.replan.single_tree import trimmed
-from rrtik_ompl.replan.walking import one_step, to_first_corner
+from rrtik_ompl.replanning import PLANNERS, SpeedWarning, load_run, replan
+from rrtik_ompl.replanning.connecting import KernelConnect, PlainConnect, Tree, never
+from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch, points_along, sequential_cut, without_points_between
+from rrtik_ompl.replanning.generate import moving_problem, moving_scene
+from rrtik_ompl.replanning.judge import judge
+from rrtik_ompl.replanning.single_tree import trimmed
+from rrtik_ompl.replanning.walking import one_step, to_first_corner
 from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene, Waypoints
 from rrtik_ompl.shapes import Box, HalfSpace, Prism, Sphere
 from rrtik_ompl.trajectory.limits import RateLimits
@@ -411,6 +411,6 @@ def test_a_six_joint_arm_arrives_among_wandering_obstacles_without_contact():
 
 
 def test_replanning_needs_no_ompl():
-    code = "import sys, rrtik_ompl.replan; print('ompl' in sys.modules)"
+    code = "import sys, rrtik_ompl.replanning; print('ompl' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"

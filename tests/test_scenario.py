@@ -14,8 +14,8 @@ from rrtik_ompl.cli import run as rrtik
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.ompl_bridge.contract import GOAL, small_problem, solution_rows
 from rrtik_ompl.problem_file import load_problem
-from rrtik_ompl.replan import load_run
-from rrtik_ompl.replan.judge import judge
+from rrtik_ompl.replanning import load_run
+from rrtik_ompl.replanning.judge import judge
 from rrtik_ompl.scenario import load_scenario
 from rrtik_ompl.viewer.page import page
 from rrtik_planners import DRRTCon

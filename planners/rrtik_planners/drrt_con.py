@@ -10,8 +10,8 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.fast.connect_layout import KERNELS
 from rrtik_ompl.fast.connect_lengths import connect_lengths, positive
 from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
-from rrtik_ompl.replan.connecting import PlainConnect, connector
-from rrtik_ompl.replan.drrt_con import DrrtCon, points_along
+from rrtik_ompl.replanning.connecting import PlainConnect, connector
+from rrtik_ompl.replanning.drrt_con import DrrtCon, points_along
 
 UNLIMITED = 2**62  # samples; the time is the limit
 
@@ -22,7 +22,7 @@ class DRRTCon(SafePlanner):
     The first ``solve`` is RRT-Connect and the sequential cut. A later one starts from the kept path: what lies behind
     the start is dropped, the rest is checked in one call, cut at the first blocked motion seen from either end and
     reconnected. The start may move along the path or near it, the goal may move, and the validity checker may change
-    its mind. ``clear()`` forgets. Source: DRRT-Con paper, algorithms 6 to 8; the search: :mod:`rrtik_ompl.replan`.
+    its mind. ``clear()`` forgets. Source: DRRT-Con paper, algorithms 6 to 8; the search: :mod:`rrtik_ompl.replanning`.
     """
 
     kernels: ClassVar[tuple[str, ...]] = (KERNELS,)

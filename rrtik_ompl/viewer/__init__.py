@@ -34,7 +34,7 @@ def view(
         path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m]; what is shown stands still if None.
         before: Another path to compare with, such as the one that ``path`` was shortened from: the way of its tip is
             drawn too.
-        run: A ``Run`` of :func:`rrtik_ompl.replan.replan` to replay, in place of a path.
+        run: A ``Run`` of :func:`rrtik_ompl.replanning.replan` to replay, in place of a path.
         html: File to write. If None, the page is served on 127.0.0.1 until Ctrl-C is pressed.
         title: Heading of the page; made from the problem's or the robot's name if None.
         port: Port to serve on; a free one if 0.

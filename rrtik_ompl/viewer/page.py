@@ -10,7 +10,7 @@ from importlib.resources import files
 from string import Template
 from typing import Any
 
-from rrtik_ompl.replan.run import Run
+from rrtik_ompl.replanning.run import Run
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.story import story_of
 from rrtik_ompl.viewer.subject import Subject, subject_of, subject_of_run

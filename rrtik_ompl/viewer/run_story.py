@@ -10,7 +10,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.poses import quaternion_xyzw
-from rrtik_ompl.replan.run import Run, Tick
+from rrtik_ompl.replanning.run import Run, Tick
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.shapes import HalfSpace

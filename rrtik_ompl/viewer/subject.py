@@ -10,7 +10,7 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import Goal, JointGoal
-from rrtik_ompl.replan.run import Run
+from rrtik_ompl.replanning.run import Run
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 

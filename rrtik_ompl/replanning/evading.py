@@ -9,7 +9,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.moving_world import MovingWorld
-from rrtik_ompl.replan.connecting import Motions
+from rrtik_ompl.replanning.connecting import Motions
 
 TRIES = 192  # directions that are compared
 SIZES = (0.25, 1.0)  # lengths of the moves in each direction, in ticks

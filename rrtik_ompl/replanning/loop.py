@@ -16,12 +16,12 @@ from rrtik_ompl.goal_configurations import goal_configurations
 from rrtik_ompl.moving_world import MovingWorld
 from rrtik_ompl.poses import quaternion_xyzw
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.replan.connecting import Stop
-from rrtik_ompl.replan.evading import evasion
-from rrtik_ompl.replan.feed import Feed, Watch, rooms
-from rrtik_ompl.replan.run import Run, Tick
-from rrtik_ompl.replan.settings import COPIES, TURN, Settings, planner_of
-from rrtik_ompl.replan.walking import one_step, to_first_corner
+from rrtik_ompl.replanning.connecting import Stop
+from rrtik_ompl.replanning.evading import evasion
+from rrtik_ompl.replanning.feed import Feed, Watch, rooms
+from rrtik_ompl.replanning.run import Run, Tick
+from rrtik_ompl.replanning.settings import COPIES, TURN, Settings, planner_of
+from rrtik_ompl.replanning.walking import one_step, to_first_corner
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.world import World
 

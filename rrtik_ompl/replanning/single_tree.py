@@ -11,8 +11,8 @@ from typing import ClassVar
 import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.replan.connecting import Joined, Motions, Stop, Tree, joined, never
-from rrtik_ompl.replan.drrt_con import DrrtCon, Post
+from rrtik_ompl.replanning.connecting import Joined, Motions, Stop, Tree, joined, never
+from rrtik_ompl.replanning.drrt_con import DrrtCon, Post
 
 TO_THE_ROBOT = 0.4  # probability
 

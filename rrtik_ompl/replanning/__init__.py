@@ -6,10 +6,10 @@ import os
 
 from rrtik_ompl.errors import require
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.replan.feed import Source, SpeedWarning, feed_of
-from rrtik_ompl.replan.loop import GoalFeed, Loop
-from rrtik_ompl.replan.run import Run, Tick, load_run
-from rrtik_ompl.replan.settings import PLANNERS, settings
+from rrtik_ompl.replanning.feed import Source, SpeedWarning, feed_of
+from rrtik_ompl.replanning.loop import GoalFeed, Loop
+from rrtik_ompl.replanning.run import Run, Tick, load_run
+from rrtik_ompl.replanning.settings import PLANNERS, settings
 from rrtik_ompl.trajectory.limits import RateLimits
 
 __all__ = ["PLANNERS", "Run", "SpeedWarning", "Tick", "load_run", "replan"]

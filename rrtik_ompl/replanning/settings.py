@@ -9,9 +9,9 @@ import numpy as np
 from rrtik_ompl.arrays import Vector, finite_array
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.fast.connect_lengths import RANGE_SHARE
-from rrtik_ompl.replan.connecting import KernelCuts, connector, has_kernels
-from rrtik_ompl.replan.drrt_con import DrrtCon, FromScratch
-from rrtik_ompl.replan.single_tree import SingleTree
+from rrtik_ompl.replanning.connecting import KernelCuts, connector, has_kernels
+from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
+from rrtik_ompl.replanning.single_tree import SingleTree
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.trajectory.limits import RateLimits
 
@@ -23,7 +23,7 @@ COPIES = 3  # places of an obstacle that are heeded at once where its motion is 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Settings:
-    """See :func:`rrtik_ompl.replan.replan`.
+    """See :func:`rrtik_ompl.replanning.replan`.
 
     Attributes:
         most: How far each joint can move in a tick [rad or m], shape (n,).
