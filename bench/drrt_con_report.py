@@ -10,7 +10,10 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from itertools import groupby
+from multiprocessing import get_context
 from pathlib import Path
 
 import drrt_con_runs as runs
@@ -82,24 +85,27 @@ def triangle_rows(report: Report, count: int) -> None:
     for ratio in (0.2, 0.5, 1.0):
         problems = [scenes.triangles(ratio, seed) for seed in range(count)]
         for planner in PLANNERS:
-            some = problems[: 8 if planner == "drrt" else count]
+            some = problems[: 5 if planner == "drrt" else count]
             found = [plane_run(p, seed, planner=planner) for seed, p in enumerate(some)]
             rows.append([f"{ratio:g}", planner, *figures(found)])
             if planner == "drrt-con":
                 arrived[ratio] = np.mean([r.arrived for r in found])
                 p95.append(np.percentile(np.concatenate([r.seconds("all") for r in found]), 95))
-                sound += [runs.executed_valid(p, r) for p, r in zip(problems, found, strict=True)]
+                sound += [runs.executed_valid(p, r) for p, r in zip(problems[::3], found[::3], strict=True)]
                 bounded += [calls_bounded(p, r) for p, r in zip(problems, found, strict=True)]
                 plain = found
         if ratio == 1.0:
             predictive = [plane_run(p, seed, predict=4) for seed, p in enumerate(problems)]
             rows.append([f"{ratio:g}", "drrt-con, 4 ticks ahead", *figures(predictive)])
-    report.table(f"Six triangles, {count} runs each, 8 of drrt", ["speed ratio", "planner", *HEAD], rows)
+    report.table(f"Six triangles, {count} runs each, 5 of drrt", ["speed ratio", "planner", *HEAD], rows)
     least = min(arrived[0.2], arrived[0.5])
     report.bar("six triangles, ratio 0.2 and 0.5: arrival in 400 ticks", ">= 95 %", f"{least:.0%}", least >= 0.95)
     share = float(np.mean(sound))
     report.bar(
-        "the executed edge is free in the exact world of its tick", "100 %", f"{share:.0%} of runs", share == 1.0
+        "the executed edge is free in the exact world of its tick",
+        "100 %",
+        f"{share:.0%} of {len(sound)} runs",
+        share == 1.0,
     )
     report.bar(
         "configurations looked at, nothing hit",
@@ -181,8 +187,8 @@ def arm_rows(report: Report, seconds: float) -> None:
         found, begin = [], time.perf_counter()
         while time.perf_counter() - begin < 0.5 * seconds:
             found.append(runs.arm_run(name, len(found)))
-        for planner, most in (("rrt-connect", 15), ("drrt", 3)):
-            others = [runs.arm_run(name, seed, planner=planner) for seed in range(most)]
+        for planner, most, slot in (("rrt-connect", max(int(seconds / 25), 2), 0.5), ("drrt", 2, 1.0 / runs.RATE)):
+            others = [runs.arm_run(name, seed, planner=planner, slot=slot, seconds=6.0) for seed in range(most)]
             rows.append([name, planner, *figures([r for r, _ in others]), contacts(others)])
         rows.append([name, "drrt-con", *figures([r for r, _ in found]), contacts(found)])
         arm_bars(report, name, arm["count"], found)
@@ -198,7 +204,7 @@ def contacts(found: list) -> str:
 def arm_bars(report: Report, name: str, count: int, found: list) -> None:
     touched = sum(bool(v.contacts) for _, v in found)
     reached = np.mean([r.arrived and not v.contacts for r, v in found])
-    repairs = np.concatenate([[0.0], *(r.seconds("repair") for r, _ in found)])[1:]
+    repairs = np.concatenate([r.seconds("repair") for r, _ in found])
     ticks = np.concatenate([r.seconds("all") for r, _ in found])
     nearest = min(v.nearest for _, v in found)
     text = f"{touched} of {len(found)} runs; nearest {1e3 * nearest:.1f} mm"
@@ -206,7 +212,7 @@ def arm_bars(report: Report, name: str, count: int, found: list) -> None:
     report.bar(what, "0 of 1,000", text + ("" if len(found) >= 1000 else " (fewer runs than wanted)"), touched == 0)
     text = f"{reached:.1%} of {len(found)}"
     report.bar(f"{name}: arrived without contact within {runs.LONGEST:g} s", ">= 95 %", text, reached >= 0.95)
-    p95 = 1e3 * np.percentile(repairs, 95)
+    p95 = 1e3 * np.percentile(repairs, 95) if len(repairs) else 0.0
     report.bar(f"{name}: repair, p95 of {len(repairs)}", "< 20 ms", f"{p95:.1f} ms", p95 < 20.0)
     p95 = 1e3 * np.percentile(ticks, 95)
     report.bar(
@@ -235,20 +241,34 @@ def repair_rows(report: Report, count: int) -> None:
     report.table("Repairs, each also done by the others at the same moment", head, rows)
 
 
+def plane_part(report: Report, count: int) -> None:
+    """Everything in the plane."""
+    static_rows(report, count)
+    triangle_rows(report, count)
+    goal_rows(report, count)
+    arm_order(report, count)
+
+
+def _part(section: Callable[[Report, float], None], amount: float) -> Report:
+    """A part of the report, in a process of its own."""
+    ou.setLogLevel(ou.LogLevel.LOG_NONE)
+    report = Report("", "")
+    section(report, amount)
+    return report
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=30)
     parser.add_argument("--seconds", type=float, default=240.0)
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "reports" / "drrt_con.md")
     given = parser.parse_args()
-    ou.setLogLevel(ou.LogLevel.LOG_NONE)
     report = Report("DRRT-Con", "python bench/drrt_con_report.py")
-    static_rows(report, given.repeats)
-    triangle_rows(report, given.repeats)
-    goal_rows(report, given.repeats)
-    arm_order(report, given.repeats)
-    repair_rows(report, max(given.repeats // 3, 2))
-    arm_rows(report, given.seconds)
+    work = [(plane_part, given.repeats), (repair_rows, max(given.repeats // 5, 2)), (arm_rows, given.seconds)]
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        for part in pool.map(_part, *zip(*work, strict=True)):
+            report.bars += part.bars
+            report.lines += part.lines
     report.note("How it is read", READING)
     given.out.write_text(report.markdown())
 
@@ -259,7 +279,8 @@ READING = (
     "'From scratch, same kernels' is RRT-Connect and shortcuts in the same kernels and the same packed scene as "
     "DRRT-Con's own repair, so it shows what keeping the path is worth; a new World and plan() is what planning from "
     "scratch cost before there was replanning. A repair is the search and the shortening of what is new; a whole tick "
-    "also packs the moved obstacles, checks the path and steps. Times are of a shared machine: compare ratios."
+    "also packs the moved obstacles, checks the path and steps. Times are of a shared machine under load: compare "
+    "ratios. Of the baselines fewer runs were made, of 6 s at most; drrt has one tick for a repair."
 )
 
 if __name__ == "__main__":
