@@ -104,7 +104,7 @@ class Run:
 
     def summary(self) -> str:
         """One line for a person."""
-        repairs = self.seconds("repair")
+        repairs = self.seconds("repair", "repair")
         worst = f", the longest {1e3 * repairs.max():.1f} ms" if len(repairs) else ""
         counts = f"{self.count('repair')} repairs{worst}, {self.count('wait')} waits, {self.count('evade')} evasions"
         why = f" ({self.reason})" if self.reason else ""
@@ -114,7 +114,7 @@ class Run:
 
     def figures(self) -> dict[str, Any]:
         """The run in numbers, for JSON: outcome, times [s], counts of events, length, and wall times of repairs [s]."""
-        repairs = self.seconds("repair")
+        repairs = self.seconds("repair", "repair")
         return {
             **{name: getattr(self, name) for name in ("problem", "robot", "planner", "seed", "outcome", "reason")},
             "seconds": self.ticks[-1].time if self.ticks else 0.0,
