@@ -42,7 +42,12 @@ if TYPE_CHECKING:
     from rrtik_ompl.reach.grid_map import ReachMap as ReachMap
     from rrtik_ompl.reach.grid_map import load_reach_map as load_reach_map
     from rrtik_ompl.reach.sampling import reach_map as reach_map
+    from rrtik_ompl.replanning import Run as Run
+    from rrtik_ompl.replanning import load_run as load_run
+    from rrtik_ompl.replanning import replan as replan
     from rrtik_ompl.robot import Robot as Robot
+    from rrtik_ompl.scenario import Scenario as Scenario
+    from rrtik_ompl.scenario import load_scenario as load_scenario
     from rrtik_ompl.scene import AttachedObject as AttachedObject
     from rrtik_ompl.scene import Obstacle as Obstacle
     from rrtik_ompl.scene import Scene as Scene
@@ -73,7 +78,9 @@ else:
         "problem_file": ("load_problem", "save_problem"),
         "reach.grid_map": ("ReachMap", "load_reach_map"),
         "reach.sampling": ("reach_map",),
+        "replanning": ("Run", "load_run", "replan"),
         "robot": ("Robot",),
+        "scenario": ("Scenario", "load_scenario"),
         "scene": ("AttachedObject", "Obstacle", "Scene"),
         "scene_file": ("load_scene", "save_scene"),
         "shortening": ("shorten",),

@@ -45,8 +45,8 @@ class CollisionChecks:
 
     def __init__(self, robot: Robot, bodies: tuple[Body, ...], pairs: Pairs, *, conservative: bool = False) -> None:
         self.conservative = conservative
-        spheres = _all_spheres(robot, bodies)
-        self.fast = _packed(robot, bodies, pairs, spheres)
+        spheres, arm = _all_spheres(robot, bodies), _arm(robot)
+        self.fast = arm.latest = _packed(robot, bodies, pairs, spheres, arm.latest)
         self._robot, self._bodies = robot, bodies
         self._data = robot.model.createData()
         self._standing = {k: self._transform(k) for k, body in enumerate(bodies) if body.joint == 0}
@@ -174,13 +174,20 @@ def _arm(robot: Robot) -> _Arm:
     return _Arm(tuple(_spheres(body) for body in link_bodies(robot)))
 
 
-def _packed(robot: Robot, bodies: Sequence[Body], pairs: Pairs, spheres: Sequence[Spheres]) -> FastWorld:
-    """The tables of a world; those of the arm are taken over from the robot's last world where they fit."""
+def fast_world(robot: Robot, bodies: Sequence[Body], pairs: Pairs, *, share: bool = True) -> FastWorld:
+    """Tables of bodies, those of the robot's links first; with ``share`` the arm's are those of its last world."""
     arm = _arm(robot)
-    outer, inner = ([both[k] for both in spheres] for k in (0, 1))
-    packed = FastWorld(robot.chain, bodies, pairs, outer=outer, inner=inner, strokes=_strokes(robot), like=arm.latest)
-    arm.latest = packed
+    packed = _packed(robot, bodies, pairs, _all_spheres(robot, bodies), arm.latest if share else None)
+    arm.latest = packed if share else arm.latest
     return packed
+
+
+def _packed(
+    robot: Robot, bodies: Sequence[Body], pairs: Pairs, spheres: Sequence[Spheres], like: FastWorld | None
+) -> FastWorld:
+    """The tables of a world; those of the arm are taken over from another one where they fit."""
+    outer, inner = ([both[k] for both in spheres] for k in (0, 1))
+    return FastWorld(robot.chain, bodies, pairs, outer=outer, inner=inner, strokes=_strokes(robot), like=like)
 
 
 def _all_spheres(robot: Robot, bodies: Sequence[Body]) -> tuple[Spheres, ...]:

@@ -19,6 +19,7 @@ from rrtik_ompl.motion_commands import list_moves, time_path
 from rrtik_ompl.path_text import FORMATS as PATH_FORMATS
 from rrtik_ompl.plan_command import plan
 from rrtik_ompl.reach_commands import reach
+from rrtik_ompl.replan_commands import replan_scenario
 from rrtik_ompl.reproduce_commands import reproduce
 from rrtik_ompl.terminal import drop_output, note, prepare_streams, say, warn
 from rrtik_ompl.text_file import check_target
@@ -170,6 +171,7 @@ app.command("reach")(reach)
 app.command("reproduce")(reproduce)
 app.command("moves")(list_moves)
 app.command("time")(time_path)
+app.command("replan")(replan_scenario)
 app.add_typer(markers, name="markers")
 
 

@@ -19,6 +19,7 @@ from rrtik_ompl.motion_bench_maker import is_motion_bench_maker, load_motion_ben
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.robot_entry import RobotEntry, robot_data
+from rrtik_ompl.run_section import RunSection
 from rrtik_ompl.scene_file import SceneEntry, scene_data
 from rrtik_ompl.text_file import file_name
 from rrtik_ompl.world import FINEST_RESOLUTION, MOTION_RESOLUTION, World
@@ -40,6 +41,7 @@ class ProblemFile(Section):
         ge=FINEST_RESOLUTION,
         description="largest step of any point of the arm between two checked configurations [m]",
     )
+    run: RunSection | None = Field(None, description="how to replan while the obstacles move (rrtik replan)")
 
 
 def load_problem(name_or_file: FilePath, *, robot: Robot | FilePath | None = None) -> Problem:
@@ -53,7 +55,7 @@ def load_problem(name_or_file: FilePath, *, robot: Robot | FilePath | None = Non
         InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
         ProblemError: If start or goal is in collision or outside the limits.
     """
-    path = _problem_path(name_or_file)
+    path = problem_path(name_or_file)
     document = read_yaml(path)
     if is_motion_bench_maker(document.data):
         return load_motion_bench_maker(path, robot=robot)
@@ -95,8 +97,12 @@ def problem_schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
-def _problem_path(name_or_file: FilePath) -> Path:
-    """A bare word is the name of a shipped problem; a file without ending is taken if there is no such name."""
+def problem_path(name_or_file: FilePath) -> Path:
+    """The file of a problem: a bare word is the name of a shipped one, or a file if there is no such name.
+
+    Raises:
+        UnknownNameError: If it is a bare word, and neither.
+    """
     path = file_name(name_or_file)
     if not isinstance(name_or_file, str) or path.suffix or len(path.parts) > 1:
         return path

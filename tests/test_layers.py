@@ -8,58 +8,17 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-LADDER = [
-    *(
-        "errors",
-        "arrays",
-        "text_file",
-        "path_text",
-        "yaml_file",
-        "file_format",
-        "shapes",
-        "poses",
-        "transitions",
-        "robot",
-    ),
-    *(
-        "scene",
-        "task_region",
-        "goal",
-        "collision",
-        "fast",
-        "mesh_file",
-        "description",
-        "catalog",
-        "scene_file",
-        "goal_file",
-        "robot_entry",
-    ),
-    *("checks", "world", "path", "moves_text", "problem", "one_joint", "ik", "goal_configurations", "reach"),
-    *("moveit_messages", "motion_bench_maker", "problem_file", "pose_file", "ompl_bridge", "planning", "shortening"),
-    *(
-        "trajectory",
-        "plot",
-        "plot_tree",
-        "plot_genetic",
-        "plot_reach",
-        "viewer",
-        "report",
-        "ik_report",
-        "sensing",
-        "overlay",
-        "reproduce",
-        "terminal",
-        "motion_commands",
-        "plan_command",
-        "ik_commands",
-        "reach_commands",
-        "reproduce_commands",
-        "marker_commands",
-        "pilot",
-        "cli",
-        "command",
-    ),
-]
+RUNGS = (
+    "errors arrays text_file path_text yaml_file file_format shapes poses transitions robot",
+    "task_region scene goal collision fast mesh_file description catalog scene_file goal_file robot_entry",
+    "checks world moving_world path moves_text problem one_joint ik goal_configurations reach",
+    "moveit_messages motion_bench_maker run_section problem_file pose_file ompl_bridge planning shortening",
+    "trajectory replanning scenario plot plot_tree plot_genetic plot_reach",
+    "viewer report ik_report sensing overlay reproduce terminal",
+    "motion_commands plan_command ik_commands reach_commands replan_commands reproduce_commands marker_commands",
+    "pilot cli command",
+)
+LADDER = [name for rung in RUNGS for name in rung.split()]
 
 
 def _modules():

@@ -13,6 +13,7 @@ NAMES = [
     *("cut_disc", "cut_polygons", "cut_two_ls", "env_e"),
     *("planar3_a", "planar3_b", "planar3_boxes", "planar3_c", "planar6_c", "planar6_c_pose"),
     *("puma_pose", "puma_position", "titan4_axis1", "titan4_bar", "titan4_p_axis1", "titan4_prisms"),
+    *("replan_planar_arm", "replan_pockets", "replan_titan4", "replan_triangles", "replan_ur5", "replan_walls"),
     *("titan4_regular", "titan4_sdu", "titan4_wrist"),
 ]
 SINGULAR = {

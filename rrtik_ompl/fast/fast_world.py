@@ -17,11 +17,20 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast import plain_distances
 from rrtik_ompl.fast.clearance import Clearance, rounded
-from rrtik_ompl.fast.layout import MARKS, UNDECIDED
+from rrtik_ompl.fast.layout import INNER_LAST, MARKS, OUTER_ROWS, UNDECIDED
 from rrtik_ompl.fast.library import library
-from rrtik_ompl.fast.packing import ArmTables, alike, arm_tables, flag_places, standing_tables
+from rrtik_ompl.fast.packing import (
+    ArmTables,
+    PlacedRows,
+    alike,
+    arm_tables,
+    checked_table,
+    flag_places,
+    standing_tables,
+)
 from rrtik_ompl.fast.plain import PlainChecks
 from rrtik_ompl.fast.robot_tables import Spheres, Table, table
+from rrtik_ompl.fast.scene_tables import rows_table
 from rrtik_ompl.fast.workspace import probe_table, workspace
 from rrtik_ompl.robot import Chain
 
@@ -79,7 +88,9 @@ class FastWorld:
         self._pairs = kept
         same = like._arm if like is not None and like._joints == self._joints else None
         self._arm: ArmTables = arm_tables(chain, bodies, moving, kept, outer, inner, self._limits, same)
-        self._rows = standing_tables(bodies, moving, standing, kept, outer, inner)
+        self._checked = checked_table(moving, standing, kept)
+        self._rows = standing_tables(bodies, standing, self._checked, outer, inner)
+        self._standing, self._outer, self._placed = standing, outer, PlacedRows()
         self._flagged = flag_places(kept, self._arm, moving, standing)
         self._plain = PlainChecks(self._arm.arm, self._arm.balls, self._rows)
         self._kernels = library("kernels") if compiled else None
@@ -91,6 +102,24 @@ class FastWorld:
             self._world = table({k: t.address for k, t in enumerate(tables)})
             self.address = self._world.address
             self._marks = self._work[MARKS]
+
+    def move(self, bodies: Sequence[Any], rooms: Sequence[float]) -> None:
+        """Put what stands still elsewhere, in place: the arm, the pairs and addresses stay as they are.
+
+        From then on nothing is proven to be COLLIDING: what is not FREE is UNDECIDED.
+
+        Args:
+            bodies: As at the beginning, those that stand still with other placements. One that is the same object
+                as before is not packed again.
+            rooms: For each body how far from it the arm must stay to be FREE [m]; read for those that stand still.
+        """
+        around = self._placed.rows(bodies, self._standing, self._outer, rooms)
+        self._rows = rows_table(around, self._checked), rows_table([], self._checked)
+        self._plain = PlainChecks(self._arm.arm, self._arm.balls, self._rows)
+        self._probe = None
+        if self._kernels is not None:
+            self._world.header[OUTER_ROWS : OUTER_ROWS + 2] = [rows.address for rows in self._rows]
+            self._work[INNER_LAST][:] = -1  # what met last is there no more
 
     @property
     def margin(self) -> float:

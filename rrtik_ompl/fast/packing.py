@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.fast.layout import PAIRS
@@ -20,7 +21,7 @@ from rrtik_ompl.fast.robot_tables import (
     rounding_margin,
     usable_cover,
 )
-from rrtik_ompl.fast.scene_tables import inner_rows, outer_rows, rows_table
+from rrtik_ompl.fast.scene_tables import Row, inner_rows, outer_rows, rows_table
 from rrtik_ompl.robot import Chain
 
 
@@ -104,21 +105,43 @@ def as_one(parts: Sequence[MovingBody]) -> MovingBody:
     return MovingBody(parts[0].frame, outer, inner)
 
 
+def checked_table(
+    moving: Sequence[tuple[int, ...]], standing: Sequence[int], pairs: Sequence[tuple[int, int]]
+) -> NDArray[np.bool_]:
+    """Which moving bodies must not touch which standing ones, shape (moving, standing)."""
+    listed = {frozenset(pair) for pair in pairs}
+    checked = np.array([[frozenset((members[0], j)) in listed for j in standing] for members in moving], dtype=bool)
+    return checked.reshape(len(moving), len(standing))
+
+
 def standing_tables(
     bodies: Sequence[Any],
-    moving: Sequence[tuple[int, ...]],
     standing: Sequence[int],
-    pairs: Sequence[tuple[int, int]],
+    checked: NDArray[np.bool_],
     outer: Sequence[Spheres],
     inner: Sequence[Spheres],
 ) -> tuple[Table, Table]:
     """Rows that contain what stands still, and rows inside it."""
-    listed = {frozenset(pair) for pair in pairs}
-    checked = np.array([[frozenset((members[0], j)) in listed for j in standing] for members in moving], dtype=bool)
-    checked = checked.reshape(len(moving), len(standing))
     around = [(s, row) for s, k in enumerate(standing) for row in outer_rows(bodies[k], outer[k])]
     inside = [(s, row) for s, k in enumerate(standing) for row in inner_rows(bodies[k], inner[k])]
     return rows_table(around, checked), rows_table(inside, checked)
+
+
+class PlacedRows:
+    """Rows around standing bodies; those of a body that has not changed are kept."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, tuple[Any, float, list[Row]]] = {}
+
+    def rows(
+        self, bodies: Sequence[Any], standing: Sequence[int], outer: Sequence[Spheres], rooms: Sequence[float]
+    ) -> list[tuple[int, Row]]:
+        """Rows that contain all points within ``rooms`` [m] of the bodies, with their places in ``standing``."""
+        for k in standing:
+            known = self._known.get(k)
+            if known is None or known[0] is not bodies[k] or known[1] != rooms[k]:
+                self._known[k] = bodies[k], rooms[k], outer_rows(bodies[k], outer[k], rooms[k])
+        return [(place, row) for place, k in enumerate(standing) for row in self._known[k][2]]
 
 
 def flag_places(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import coal
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.collision.solids import SameObject
 from rrtik_ompl.fast.layout import (
     BALL,
     BOX,
@@ -95,10 +97,13 @@ def rows_table(rows: Sequence[tuple[int, Row]], checked: NDArray[np.bool_]) -> T
     )
 
 
-def outer_rows(body: Any, cover: Spheres) -> list[Row]:
-    """Rows whose union contains a standing body: its own formula if it has one, the balls of its cover otherwise."""
-    exact = _exact(body, grow=1.0)
-    rows = _balls(body, usable_cover(body.geometry, cover), grow=1.0) if exact is None else exact
+def outer_rows(body: Any, cover: Spheres, room: float = 0.0) -> list[Row]:
+    """Rows whose union contains a standing body: its own formula if it has one, the balls of its cover otherwise.
+
+    With ``room`` [m] they contain every point that is no farther from the body.
+    """
+    exact = _exact(body, grow=1.0, room=room)
+    rows = _balls(body, usable_cover(body.geometry, cover), grow=1.0, room=room) if exact is None else exact
     everything = Row(BALL, np.array([0.0, 0.0, 0.0, HUGE]), np.full(3, -HUGE), np.full(3, HUGE))
     return [row if _fits(row) else everything for row in rows]
 
@@ -116,32 +121,35 @@ def _fits(row: Row) -> bool:
     return float(np.abs(row.numbers).max()) < HUGE and (row.planes is None or float(np.abs(row.planes).max()) < HUGE)
 
 
-def _exact(body: Any, grow: float) -> list[Row] | None:
-    """The body by the formula of its kind, a little larger (grow = 1) or smaller (-1); None if there is none."""
+def _exact(body: Any, grow: float, room: float = 0.0) -> list[Row] | None:
+    """The body by the formula of its kind, a little larger (grow = 1) or smaller (-1), and by ``room`` [m] larger.
+
+    None if there is no formula.
+    """
     solid, pose = body.geometry, body.placement
     if isinstance(solid, coal.ShapeBase) and solid.getSweptSphereRadius() != 0.0:
         return None
     if isinstance(solid, coal.Halfspace):
-        return [_half_space(solid, pose, grow)]
+        return [_half_space(solid, pose, grow, room)]
     if isinstance(solid, coal.ConvexBase):
-        planes = outward_planes(solid)
-        return None if planes is None else _convex(solid, pose, planes, grow)
+        planes = _known_planes(SameObject(solid))
+        return None if planes is None else _convex(solid, pose, planes, grow, room)
     if not isinstance(solid, (coal.Sphere, coal.Capsule, coal.Box, coal.Cylinder)):
         return None
-    row = _primitive(solid, np.array(pose.rotation), np.array(pose.translation), grow)
+    row = _primitive(solid, np.array(pose.rotation), np.array(pose.translation), grow, room)
     return [] if row is None else [row]
 
 
-def _primitive(solid: Any, rotation: Matrix, centre: Vector, grow: float) -> Row | None:
+def _primitive(solid: Any, rotation: Matrix, centre: Vector, grow: float, room: float) -> Row | None:
     """Row of a ball, capsule, box or cylinder, or None if nothing is left of it."""
     z = rotation[:, 2]
     if isinstance(solid, coal.Box):
         half = np.array(solid.halfSide)
-        half = half + grow * _slack(centre, float(np.linalg.norm(half)))
+        half = half + grow * _slack(centre, float(np.linalg.norm(half))) + room
         spread = np.abs(rotation) @ half
         return _row(BOX, [*centre, *rotation.T.ravel(), *half], centre, spread, half.min())
     length = 0.0 if isinstance(solid, coal.Sphere) else float(solid.halfLength)
-    radius = float(solid.radius) + grow * _slack(centre, float(solid.radius) + length)
+    radius = float(solid.radius) + grow * _slack(centre, float(solid.radius) + length) + room
     if isinstance(solid, coal.Sphere):
         return _row(BALL, [*centre, radius], centre, np.full(3, radius), radius)
     if isinstance(solid, coal.Capsule):
@@ -149,7 +157,7 @@ def _primitive(solid: Any, rotation: Matrix, centre: Vector, grow: float) -> Row
         share = 1.0 / float(way @ way) if length > 1e-9 else 0.0
         spread = length * np.abs(z) + radius
         return _row(CAPSULE, [*(centre - 0.5 * way), *way, share, radius], centre, spread, radius)
-    length += grow * _slack(centre, radius + length)
+    length += grow * _slack(centre, radius + length) + room
     spread = length * np.abs(z) + radius * np.sqrt(np.maximum(1.0 - z * z, 0.0))
     return _row(CYLINDER, [*centre, *z, length, radius], centre, spread, min(radius, length))
 
@@ -165,35 +173,41 @@ def _slack(centre: Vector, size: float) -> float:
     return SLACK_PER_METRE * (1.0 + float(np.abs(centre).max()) + size)
 
 
-def _balls(body: Any, spheres: Spheres, grow: float) -> list[Row]:
+def _balls(body: Any, spheres: Spheres, grow: float, room: float = 0.0) -> list[Row]:
     rotation, origin = np.array(body.placement.rotation), np.array(body.placement.translation)
     rows = []
     for x, y, z, radius in spheres:
         centre = rotation @ (x, y, z) + origin
-        size = radius + grow * _slack(centre, radius)
+        size = radius + grow * _slack(centre, radius) + room
         rows.append(_row(BALL, [*centre, size], centre, np.full(3, size), size))
     return [row for row in rows if row is not None]
 
 
-def _half_space(solid: Any, pose: Any, grow: float) -> Row:
+def _half_space(solid: Any, pose: Any, grow: float, room: float) -> Row:
     normal = np.array(pose.rotation) @ np.array(solid.n)
     offset = float(solid.d) + float(normal @ pose.translation)
-    offset += grow * _slack(np.array([offset]), 0.0)
+    offset += grow * _slack(np.array([offset]), 0.0) + room
     everywhere = np.full(3, ENDLESS)
     return Row(HALF_SPACE, np.array([*normal, offset]), -everywhere, everywhere)
 
 
-def _convex(solid: Any, pose: Any, planes: Matrix, grow: float) -> list[Row]:
+def _convex(solid: Any, pose: Any, planes: Matrix, grow: float, more: float) -> list[Row]:
     """A convex solid by its planes; the inner row asks that a ball's centre lies behind all of them."""
     rotation, origin = np.array(pose.rotation), np.array(pose.translation)
     corners = np.array(solid.points()).reshape(-1, 3) @ rotation.T + origin
     low, high = corners.min(axis=0), corners.max(axis=0)
-    room = _slack(0.5 * (low + high), float((high - low).max()))
+    room = _slack(0.5 * (low + high), float((high - low).max())) + more
     kept = most_different(planes, MOST_PLANES) if grow > 0.0 else planes
     world = np.empty_like(kept)
     world[:, :3] = kept[:, :3] @ rotation.T
     world[:, 3] = kept[:, 3] + world[:, :3] @ origin + (room if grow > 0.0 else -room - PLANE_SLACK)
     return [Row(CONVEX, np.array([1.0 if grow > 0.0 else 0.0]), low - room, high + room, world)]
+
+
+@lru_cache(maxsize=4096)
+def _known_planes(solid: SameObject) -> Matrix | None:
+    """See :func:`outward_planes`; an obstacle that moves keeps them."""
+    return outward_planes(solid.geometry)
 
 
 def outward_planes(solid: Any) -> Matrix | None:

@@ -25,6 +25,7 @@ def view(
     before: Any | None = None,
     ghosts: ArrayLike | None = None,
     marks: Sequence[Any] = (),
+    run: Any | None = None,
     html: str | os.PathLike[str] | None = None,
     title: str | None = None,
     port: int = 0,
@@ -40,6 +41,7 @@ def view(
         ghosts: Configurations at which the arm is drawn like tinted glass, shape (k, dof), such as the solutions of
             inverse kinematics; they take the place of the ghosts of start and goal.
         marks: What else stands in the world: see ``rrtik_ompl.viewer.marks``.
+        run: A ``Run`` of :func:`rrtik_ompl.replanning.replan` to replay, in place of a path.
         html: File to write. If None, the page is served on 127.0.0.1 until Ctrl-C is pressed.
         title: Heading of the page; made from the problem's or the robot's name if None.
         port: Port to serve on; a free one if 0.
@@ -54,7 +56,7 @@ def view(
     from rrtik_ompl.viewer.page import page
     from rrtik_ompl.viewer.serve import PageServer
 
-    text = page(shown, path, before=before, ghosts=ghosts, marks=marks, title=title)
+    text = page(shown, path, before=before, ghosts=ghosts, marks=marks, run=run, title=title)
     if html is not None:
         write_text(html, text)
         return Path(html)

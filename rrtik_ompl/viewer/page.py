@@ -13,14 +13,15 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from rrtik_ompl.replanning.run import Run
 from rrtik_ompl.viewer.marks import Mark
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.story import story_of
-from rrtik_ompl.viewer.subject import Subject, subject_of
+from rrtik_ompl.viewer.subject import Subject, subject_of, subject_of_run
 
 # The page may run its own script and nothing else: no request leaves the machine that shows it.
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
-SCRIPTS = ("kinematics.js", "stage.js", "panel.js", "player.js")
+SCRIPTS = ("kinematics.js", "stage.js", "panel.js", "replay.js", "player.js")
 
 
 def page(
@@ -30,6 +31,7 @@ def page(
     before: Any | None = None,
     ghosts: ArrayLike | None = None,
     marks: Sequence[Mark] = (),
+    run: Run | None = None,
     title: str | None = None,
 ) -> str:
     """The page that shows something, as the text of one HTML file that needs no other file and no network.
@@ -42,12 +44,16 @@ def page(
         before: Another path, to compare with; the way of its tip is drawn too.
         ghosts: Configurations, shape (k, dof), drawn like tinted glass.
         marks: Further bodies.
+        run: A run to replay in place of a path; obstacles are where they were.
         title: Heading; made from the problem's or the robot's name if None.
 
     Raises:
         InputError: If that cannot be shown.
     """
-    subject = subject_of(shown, path, before, ghosts, tuple(marks))
+    if run is None:
+        subject = subject_of(shown, path, before, ghosts, tuple(marks))
+    else:
+        subject = subject_of_run(shown, run)
     window, frame = draw(subject)
     heading = _title(subject) if title is None else title
     story = json.dumps(story_of(subject, frame, heading), allow_nan=False, separators=(",", ":"))
@@ -66,6 +72,8 @@ def page(
 def _title(subject: Subject) -> str:
     if not subject.is_path:
         return subject.name
+    if subject.run is not None:
+        return f"{subject.name}: {subject.run.planner}, {subject.run.outcome}"
     moves = len(subject.waypoints) - 1
     return f"{subject.name}: path of {moves} move{'' if moves == 1 else 's'}"
 

@@ -17,6 +17,7 @@ from rrtik_ompl.viewer import palette
 from rrtik_ompl.viewer.framing import Frame
 from rrtik_ompl.viewer.marks import Mark
 from rrtik_ompl.viewer.robot_picture import joint_nodes, node_name
+from rrtik_ompl.viewer.run_story import run_story
 from rrtik_ompl.viewer.subject import Subject
 from rrtik_ompl.viewer.trail import pieces
 from rrtik_ompl.viewer.viewpoint import overview
@@ -36,7 +37,7 @@ def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
         "title": title,
         "robot": None if robot is None else _robot(robot),
         "obstacles": _obstacles(subject.scene),
-        "moving": any(o.motion is not None for o in subject.scene.obstacles),
+        "moving": subject.run is not None or any(o.motion is not None for o in subject.scene.obstacles),
         "attached": [item.name for item in subject.scene.attached],
         "goal": _goal_text(subject.goal),
         "start_ghost": _numbers(subject.start),
@@ -46,13 +47,19 @@ def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
         "waypoints": _numbers(subject.waypoints),
         "before": "" if subject.before is None else _compared(subject.before, subject.waypoints),
         "moves": [] if robot is None else _moves(subject.waypoints),
-        "times": [] if robot is None else _numbers(play_times(robot, subject.waypoints, frame.arm)),
+        "times": [] if robot is None else _numbers(_times(subject, robot, frame)),
+        "run": None if subject.run is None or robot is None else run_story(subject.run, robot, subject.scene),
         "frame": {"low": _numbers(frame.low), "high": _numbers(frame.high)},
         "overview": _numbers(overview(_places(subject), subject.scene)),
         "planar": robot is not None and robot.planar,
         "grid": grid_cell(frame.size),
         "colors": _colors(),
     }
+
+
+def _times(subject: Subject, robot: Robot, frame: Frame) -> Vector:
+    """Time [s] at which each waypoint is shown: of a run its own."""
+    return play_times(robot, subject.waypoints, frame.arm) if subject.run is None else subject.run.times
 
 
 def play_times(robot: Robot, waypoints: Matrix, arm: float) -> Vector:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import Goal, JointGoal
+from rrtik_ompl.replanning.run import Run
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.viewer.marks import Mark
@@ -30,6 +31,7 @@ class Subject:
         before: Waypoints of a path to compare with, shape (m, dof), or None.
         ghosts: Configurations drawn like tinted glass, shape (m, dof), or None.
         marks: Further bodies.
+        run: The run whose ticks the waypoints are, or None.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Subject:
     before: Matrix | None = None
     ghosts: Matrix | None = None
     marks: tuple[Mark, ...] = ()
+    run: Run | None = None
 
     @property
     def start(self) -> Vector | None:
@@ -121,6 +124,23 @@ def subject_of(
     start = getattr(shown, "start", None)
     posture = robot.clamp(np.zeros(robot.dof)) if start is None else robot.configuration(start, "start")
     return Subject(name, robot, scene, goal, frozen(posture[None]), False, None, tinted, marks)
+
+
+def subject_of_run(problem: Any, run: Any) -> Subject:
+    """What a run shows: the robot in every tick, and the obstacles where they are in the first one.
+
+    Raises:
+        InputError: If it is no run, or not one of that problem's robot.
+    """
+    require(run, Run, "run to show", "use replan() or load_run(file)")
+    if len(run.ticks) == 0:
+        raise InputError("run to show: it has no tick")
+    shown = subject_of(problem, run.configurations)
+    scene = shown.scene
+    still = tuple(replace(o, motion=None) for o in scene.at(0.0).obstacles)
+    for name in {name for tick in run.ticks for name in tick.poses}:
+        scene.obstacle(name)  # or it is a run of another problem
+    return replace(shown, scene=replace(scene, obstacles=still), run=run)
 
 
 def _waypoints(robot: Robot, path: Any) -> Matrix:

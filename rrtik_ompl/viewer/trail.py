@@ -33,7 +33,7 @@ def draw_before(vis: Any, robot: Robot, waypoints: Matrix, radius: float) -> Non
         draw_tube(vis["before"], tips, 0.6 * radius, palette.BEFORE)
 
 
-def draw_trail(vis: Any, robot: Robot, waypoints: Matrix, radius: float) -> None:
+def draw_trail(vis: Any, robot: Robot, waypoints: Matrix, radius: float, *, beads: bool = True) -> None:
     """Draw the tip's way under ``trail/piece N`` and a bead at every waypoint under ``beads``.
 
     Args:
@@ -41,6 +41,7 @@ def draw_trail(vis: Any, robot: Robot, waypoints: Matrix, radius: float) -> None
         robot: The arm.
         waypoints: Shape (k, dof) with k at least 2.
         radius: Of the tube [m].
+        beads: Whether to draw them.
     """
     piece = pieces(waypoints)
     for k in np.unique(piece):
@@ -49,7 +50,7 @@ def draw_trail(vis: Any, robot: Robot, waypoints: Matrix, radius: float) -> None
         tips = tips[np.insert(np.linalg.norm(np.diff(tips, axis=0), axis=1) > 0.05 * radius, 0, True)]
         if len(tips) > 1:  # a turning wrist need not move the tip
             draw_tube(vis["trail"][f"piece {k}"], tips, radius, palette.TRAIL)
-    if len(waypoints) <= MAX_PIECES:
+    if beads and len(waypoints) <= MAX_PIECES:
         for k, tip in enumerate(robot.fk_batch(waypoints)):
             bead = vis["beads"][f"waypoint {k}"]
             bead.set_object(mg.Sphere(2.0 * radius), mg.MeshPhongMaterial(color=palette.number(palette.TRAIL)))

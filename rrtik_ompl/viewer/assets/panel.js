@@ -164,7 +164,11 @@ function buildLegend() {
     addSwitch(name, color, opacity, (on) => setVisible(["marks", leaf], on), shown, "wide");
   }
   if (story.goal && story.goal !== "joint values") addSwitch(`goal: ${story.goal}`, colors.goal, 1, toggles("goal"));
-  if (story.moves.length) addSwitch("way of the tip", colors.trail, 1, toggles("trail", "beads"));
+  if (story.run) {
+    addSwitch("path ahead", colors.trail, 1, toggles("current path"));
+    addSwitch("path before a repair", colors.before, 1, toggles("replaced path"));
+    addSwitch("way gone", colors.trail, 0.45, toggles("trail"), false);
+  } else if (story.moves.length) addSwitch("way of the tip", colors.trail, 1, toggles("trail", "beads"));
   if (story.before) addSwitch(`before: ${story.before}`, colors.before, 1, toggles("before"), true, "wide");
   if (story.attached.length) addSwitch(`held: ${story.attached.join(", ")}`, colors.attached, 1, () => {});
   if (story.obstacles.length) {
@@ -191,7 +195,7 @@ function addLabels() {
   if (last === 0) return;
   const between = [...Array(last - 1).keys()].map((k) => k + 1);
   const places = [];
-  for (const k of last <= 200 ? [0, last, ...between] : [0, last]) {
+  for (const k of last <= 200 && !story.run ? [0, last, ...between] : [0, last]) {
     const text = k === 0 ? "start" : k === last ? "goal" : `${k}`;
     const tip = tipPosition(story.waypoints[k]);
     const same = places.find((place) => place.tip.distanceTo(tip) < 0.01 * size);

@@ -14,7 +14,8 @@ function show(time) {
   showMove(arrived ? null : k);
   highlightPiece(arrived ? null : story.moves[k].piece);
   scrub.value = now;
-  document.getElementById("now").textContent = arrived
+  if (run) showRun(now, arrived ? k + 1 : k, arrived ? 0 : (now - story.times[k]) / (story.times[k + 1] - story.times[k]));
+  document.getElementById("now").textContent = run ? nowText(k, arrived) : arrived
     ? `Goal reached after ${count(story.moves.length, "move")}`
     : `Move ${k + 1} of ${story.moves.length}: ${describe(k)}`;
 }
@@ -76,8 +77,9 @@ function addPlayer() {
   addEventListener("click", (event) => {  // after a click with the mouse the space bar plays again
     if (event.detail > 0 && event.target.matches("button, [type=checkbox]")) event.target.blur();
   });
-  if (story.times.length <= 200) {
-    for (const time of story.times) {
+  const marked = run ? run.groups.filter((group) => group.event !== "walk").map((group) => story.times[group.first]) : story.times;
+  if (marked.length <= 200) {
+    for (const time of marked) {
       const tick = document.createElement("i");
       tick.style.left = `${(100 * time) / (total || 1)}%`;
       document.getElementById("ticks").append(tick);
@@ -99,7 +101,8 @@ function followAddress() {
 if (robot) {
   buildJoints();
   if (story.moves.length) {
-    buildMoves(goTo);
+    if (run) buildEvents(goTo);
+    else buildMoves(goTo);
     addPlayer();
   } else {
     const q = story.waypoints[0].slice();

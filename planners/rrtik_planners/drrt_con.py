@@ -1,0 +1,93 @@
+"""DRRT-Con: a planner for scenes that change. What it found is kept, and repaired when it is asked again."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.fast.connect_layout import KERNELS
+from rrtik_ompl.fast.connect_lengths import connect_lengths, positive
+from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
+from rrtik_ompl.replanning.connecting import PlainConnect, connector
+from rrtik_ompl.replanning.drrt_con import DrrtCon, points_along
+
+UNLIMITED = 2**62  # samples; the time is the limit
+
+
+class DRRTCon(SafePlanner):
+    """RRT-Connect whose two trees outlive ``solve``: the pieces of the last path on both sides of what blocks it.
+
+    The first ``solve`` is RRT-Connect and the sequential cut. A later one starts from the kept path: what lies behind
+    the start is dropped, the rest is checked in one call, cut at the first blocked motion seen from either end and
+    reconnected. The start may move along the path or near it, the goal may move, and the validity checker may change
+    its mind. ``clear()`` forgets. Source: DRRT-Con paper, algorithms 6 to 8; the search: :mod:`rrtik_ompl.replanning`.
+    """
+
+    kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
+
+    def __init__(
+        self, si: Any, *, world: WorldLike | None = None, seed: int | None = None, range: float | None = None
+    ) -> None:
+        """Make a planner.
+
+        Args:
+            si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
+            world: Asked instead of ``si`` whether configurations and motions are free, if given.
+            seed: At least 0; drawn from OMPL's if None.
+            range: Longest motion of the trees [unit of the space]; what suits the bounds if None.
+
+        Raises:
+            InputError: If an option is out of range or the space is of another kind.
+        """
+        super().__init__(si, "DRRTCon", world=world, seed=seed)
+        self.range = None if range is None else positive(range, "range")
+        self._core: DrrtCon | None = None
+
+    def clear(self) -> None:
+        """Forget the kept path; called by OMPL."""
+        super().clear()
+        self._core = None
+
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+        """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
+        core = self._core if self._core is not None and self._core.path is not None else None
+        reused = core is not None and self._from_kept(core, starts, goals, checker, ptc)
+        if not reused:
+            core = self._core = self._new()
+            for start in starts:
+                if ptc() or core.begin(start, goals, checker, ptc):
+                    break
+        assert core is not None
+        statistics = {"iterations": core.connect.samples, "repairs": core.counts.repairs, "reused": int(reused)}
+        return SearchResult(core.path if core.free else None, statistics)
+
+    def _from_kept(self, core: DrrtCon, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> bool:
+        """Whether the kept path could be made to lead from a start to a goal."""
+        assert core.path is not None
+        start, passed = _nearest_place(core.path, starts, 0.5 * core.eps)
+        core.rejoin(start, passed)
+        if not (goals == core.path[-1]).all(axis=1).any():
+            core.retarget(goals, checker, ptc)
+        if not (goals == core.path[-1]).all(axis=1).any():
+            return False
+        return core.look(checker) or core.repair(checker, ptc)
+
+    def _new(self) -> DrrtCon:
+        lower, upper = self.bounds()
+        eps, _ = connect_lengths(lower, upper, self.range, None)
+        seed, world = int(self.rng.integers(2**63)), self._world
+        if getattr(world, "accuracy", "exact") == "conservative":
+            return DrrtCon(connector(world, lower, upper, eps, seed, UNLIMITED), eps)
+        return DrrtCon(PlainConnect(lower, upper, eps, seed, UNLIMITED), eps)
+
+
+def _nearest_place(path: Matrix, starts: Matrix, step: float) -> tuple[Vector, int]:
+    """The start that is nearest to a path, and how many of its waypoints lie behind that place."""
+    points = points_along(path, step)
+    gaps = np.linalg.norm(starts[:, None] - points[None], axis=2)
+    which, point = (int(k) for k in np.unravel_index(gaps.argmin(), gaps.shape))
+    lengths = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
+    here = float(np.linalg.norm(np.diff(points[: point + 1], axis=0), axis=1).sum())
+    return starts[which], int(np.searchsorted(lengths, here + 1e-9)) - 1

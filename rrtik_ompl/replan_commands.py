@@ -1,0 +1,52 @@
+"""The command of `rrtik` that moves a robot among moving obstacles, and replays what happened."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rrtik_ompl.terminal import progress, say
+from rrtik_ompl.text_file import check_target
+
+Scenario = Annotated[str, typer.Argument(help="A problem with a run: section, shipped or a YAML file.")]
+
+
+def replan_scenario(
+    scenario: Scenario,
+    planner: Annotated[str, typer.Option(help="drrt-con, or to compare with: rrt-connect, drrt.")] = "drrt-con",
+    seed: Annotated[int, typer.Option(help="The same seed gives the same run.")] = 0,
+    predict: Annotated[int | None, typer.Option(help="Heed where obstacles will be, so many ticks ahead.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Simulated time at most [s].")] = None,
+    record: Annotated[Path | None, typer.Option(help="Keep everything, on Ctrl-C too: .json.")] = None,
+    replay: Annotated[Path | None, typer.Option(help="Show this record instead of a new run.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a self-contained page that replays the run.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
+) -> int:
+    """Move a robot to its goal while obstacles move: look, repair, step. Exit 0: arrived; 1: not."""
+    check_target(html, (".html", ".htm"))
+    check_target(record, (".json",))
+    from rrtik_ompl.replanning import load_run
+    from rrtik_ompl.scenario import load_scenario
+
+    chosen = load_scenario(scenario)
+    changes: dict[str, Any] = {"planner": planner, "seed": seed, "record": record}
+    changes |= {name: value for name, value in (("predict", predict), ("seconds", seconds)) if value is not None}
+    if replay is None:
+        with progress(f"{chosen.problem.name} with {planner}"):
+            run = chosen.run(**changes)
+    else:
+        run = load_run(replay)
+    if html is not None:
+        from rrtik_ompl.viewer import view
+
+        with progress("drawing"):
+            view(chosen.problem, run=run, html=html)
+    if as_json:
+        print(json.dumps(run.figures()))
+    else:
+        say(run.summary())
+        say(*(f"wrote {file}" for file in (record if replay is None else None, html) if file is not None))
+    return 0 if run.arrived else 1

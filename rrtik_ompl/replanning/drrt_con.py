@@ -1,0 +1,200 @@
+"""DRRT-Con: a path whose robot end walks and whose blocked part is cut from both sides and reconnected.
+
+Source: DRRT-Con paper, algorithms 6 to 8, with these corrections: where the scene has changed but the path is free the
+robot goes on; where no way is found the path is kept, and what is left of it is tried again at the next call, with new
+samples (a path that becomes free by itself needs none).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.path import subdivided
+from rrtik_ompl.replanning.connecting import Connect, Joined, Motions, Stop, never, without_repeats
+
+MOST_CUTS = 24  # ends that are tried from one point of a path
+STRAIGHT = 1e-9  # change of direction
+
+
+Post = Callable[[Matrix], Matrix]  # a free route, shape (k, n), made shorter
+
+
+@dataclass(slots=True)
+class Counts:
+    """What a replanner has done so far.
+
+    Attributes:
+        looks: Times that the path was checked again.
+        repairs: Times that a new path was looked for.
+        failures: Of these, how often there was none.
+    """
+
+    looks: int = 0
+    repairs: int = 0
+    failures: int = 0
+
+
+class DrrtCon:
+    """A path from where the robot is to a goal, kept free while the scene changes.
+
+    Attributes:
+        path: Shape (k, n), the robot's place first; None before :meth:`begin` has found one. It is kept while it is
+            blocked.
+        free: Whether every motion of the path was free when last looked at.
+        counts: See :class:`Counts`.
+
+    Args:
+        connect: The search between pieces of a path.
+        eps: Longest step of the trees [unit of the space]; the path is cut at points half as far apart.
+        post: Shortens what is new of a path; the sequential cut if None, as published.
+    """
+
+    name: ClassVar[str] = "drrt-con"
+
+    def __init__(self, connect: Connect, eps: float, *, post: Post | None = None) -> None:
+        self.connect, self.eps, self.post = connect, eps, post
+        self.path: Matrix | None = None
+        self.free = False
+        self.counts = Counts()
+        self._dense = np.zeros((0, 0))
+        self._hits: Mask = np.zeros(0, dtype=bool)
+
+    def begin(self, start: Vector, goals: Matrix, motions: Motions, stop: Stop = never) -> bool:
+        """Look for a first path from ``start`` to one of ``goals``, shape (g, n); whether there is one."""
+        usable = motions.valid_batch(np.vstack([start, goals]))
+        if not usable[0] or not usable[1:].any():
+            return False
+        found = self.connect(start[None], goals[usable[1:]], motions, stop, chain=False)
+        return self._take(found, motions)
+
+    def look(self, motions: Motions) -> bool:
+        """Check the path again, all of it in one call; whether it is free."""
+        if self.path is None:
+            return False
+        self.counts.looks += 1
+        self._dense = points_along(self.path, 0.5 * self.eps)
+        self._hits = ~motions.motion_valid_batch(self._dense[:-1], self._dense[1:])
+        self.free = not self._hits.any()
+        return self.free
+
+    def repair(self, motions: Motions, stop: Stop = never) -> bool:
+        """After a :meth:`look` that found the path hit: find another one; whether there is one."""
+        self.counts.repairs += 1
+        ends_free = self.path is not None and bool(motions.valid_batch(self.path[[0, -1]]).all())
+        found = self._reconnected(motions, stop) if ends_free else None
+        self.counts.failures += found is None
+        return self._take(found, motions)
+
+    def retarget(self, goals: Matrix, motions: Motions, stop: Stop = never) -> bool:
+        """Reconnect the free beginning of the path to the nearest of other goals, shape (g, n), without shortening.
+
+        Whether it could be done; if not, the path stays as it is.
+        """
+        goals = goals[motions.valid_batch(goals)]
+        if self.path is None or len(goals) == 0:
+            return False
+        piece = points_along(self.path, 0.5 * self.eps)
+        hit = np.flatnonzero(~motions.motion_valid_batch(piece[:-1], piece[1:]))
+        piece = piece[: hit[0] + 1] if len(hit) else piece
+        if not motions.valid_batch(piece[:1])[0]:
+            return False
+        found = self.connect(piece, goals, motions, stop, chain=False)
+        if found is not None:
+            self.path, self.free = found.path, True
+        return found is not None
+
+    def advance(self, place: Vector, passed: int, motions: Motions) -> None:
+        """The robot has gone to ``place``, past ``passed`` waypoints: drop what lies behind it, shorten the rest."""
+        free = self.free
+        self.rejoin(place, passed)
+        self.free = free
+        if self.path is not None and free and len(self.path) > 2:
+            self.path = cut_from_start(self.path, 0.5 * self.eps, motions)
+
+    def rejoin(self, place: Vector, passed: int = 0) -> None:
+        """The robot is at ``place``, on its path or not, past ``passed`` waypoints: the way there counts as unknown."""
+        if self.path is not None:
+            rest = self.path[1 + passed :] if len(self.path) > 1 + passed else self.path[-1:]
+            self.path = rest if (rest[0] == place).all() else np.vstack([place, rest])
+            self.free = False
+
+    def _reconnected(self, motions: Motions, stop: Stop) -> Joined | None:
+        """Cut at the first hit seen from the robot and at the first one seen from the goal; join the two pieces."""
+        hits = np.flatnonzero(self._hits)
+        first, last = int(hits[0]), int(hits[-1])
+        return self.connect(self._dense[: first + 1], self._dense[last + 1 :], motions, stop)
+
+    def _take(self, found: Joined | None, motions: Motions) -> bool:
+        """Walk on along a new path, if there is one; what is new of it is shortened."""
+        self.free = found is not None
+        if found is not None:
+            path, begin, end = found.path, found.begin, found.end
+            new = path[begin : end + 1]
+            new = sequential_cut(new, 0.5 * self.eps, motions) if self.post is None else self.post(new)
+            self.path = without_points_between(np.vstack([path[:begin], new, path[end + 1 :]]))
+        return self.free
+
+
+class FromScratch(DrrtCon):
+    """The baseline that forgets: RRT-Connect from where the robot is to the goal whenever the path is hit."""
+
+    name: ClassVar[str] = "rrt-connect"
+
+    def _reconnected(self, motions: Motions, stop: Stop) -> Joined | None:
+        return self.connect(self._dense[:1], self._dense[-1:], motions, stop)
+
+
+def points_along(path: Matrix, step: float) -> Matrix:
+    """The path with further points, none farther than ``step`` from the next; all waypoints stay. Shape (m, n)."""
+    return _points_and_edges(path, step)[0]
+
+
+def without_points_between(path: Matrix) -> Matrix:
+    """The path without waypoints at which it goes straight on; both ends stay."""
+    if len(path) < 3:
+        return path
+    ways = np.diff(path, axis=0)
+    lengths = np.linalg.norm(ways, axis=1)
+    units = ways / np.maximum(lengths, STRAIGHT)[:, None]
+    turns = np.linalg.norm(np.diff(units, axis=0), axis=1) > STRAIGHT
+    kept: Matrix = path[np.concatenate([[True], turns, [True]])]
+    return kept
+
+
+def sequential_cut(path: Matrix, step: float, motions: Motions) -> Matrix:
+    """Shorten a free path: from each kept point straight to the last point that can be reached.
+
+    Points stand every ``step`` along the path. Post-processing paper, method 1, as DRRT-Con uses it.
+    """
+    done, rest = [path[:1]], path
+    while len(rest) > 2:
+        rest = cut_from_start(rest, step, motions)
+        done.append(rest[1:2])
+        rest = rest[1:]
+    return np.vstack([*done, rest[1:]])
+
+
+def cut_from_start(path: Matrix, step: float, motions: Motions) -> Matrix:
+    """A free path with its beginning straight to the last point along it that can be reached, asked in one call."""
+    points, edges = _points_and_edges(path, step)
+    known = int(np.searchsorted(edges, 1))  # what follows the end of the first edge, which needs no question
+    ends = np.unique(np.linspace(known, len(points) - 1, MOST_CUTS).round().astype(int))
+    if known >= len(points):
+        return path
+    free = motions.motion_valid_batch(np.broadcast_to(path[0], (len(ends), path.shape[1])), points[ends])
+    if not free.any():
+        return path
+    end = ends[np.flatnonzero(free)[-1]]
+    return without_repeats(np.vstack([path[:1], points[end], path[edges[end] + 1 :]]))
+
+
+def _points_and_edges(path: Matrix, step: float) -> tuple[Matrix, Vector]:
+    """See :func:`points_along`; also the number of the edge on which, or at whose end, each point stands."""
+    path = path if len(path) > 1 else np.vstack([path, path])
+    counts = np.ceil(np.linalg.norm(np.diff(path, axis=0), axis=1) / step - 1e-9)
+    return subdivided(path, counts)

@@ -1,0 +1,165 @@
+"""What the robot sees of a scene over time: from the motions that it states, a function, or a stream of snapshots."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, TypeAlias
+
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.collision.solids import pieces
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.shapes import HalfSpace
+
+Feed: TypeAlias = Callable[[float], Scene]
+Source: TypeAlias = Scene | Feed | Iterable[tuple[float, Scene]]
+
+FASTER = 1.0 + 1e-6  # than the bound, to be warned about
+
+
+class SpeedWarning(UserWarning):
+    """An obstacle moves faster than was stated."""
+
+
+def feed_of(source: Source) -> Feed:
+    """The scene at a time, from any kind of source.
+
+    Args:
+        source: A scene whose obstacles state their motion; a function from a time [s] to a scene; or pairs of a time
+            and a scene in the order of time, as a sensor gives them.
+
+    Raises:
+        InputError: If it is none of these; later, if its times go backwards.
+    """
+    if isinstance(source, Scene):
+        return source.at
+    if callable(source):
+        return source
+    if isinstance(source, Iterable):
+        return Stream(source)
+    raise InputError(f"scene feed: expected a scene, a function of time or pairs, got {type(source).__name__}")
+
+
+class Stream:
+    """Snapshots one after the other; called with a time, the last one that is not later."""
+
+    def __init__(self, snapshots: Iterable[tuple[float, Scene]]) -> None:
+        self._left: Iterator[tuple[float, Scene]] = iter(snapshots)
+        self._next = next(self._left, None)
+        if self._next is None:
+            raise InputError("scene feed: it holds no snapshot; give at least one pair of a time and a scene")
+        self._now = self._next
+
+    def __call__(self, time: float) -> Scene:
+        """The scene as last seen at ``time`` [s].
+
+        Raises:
+            InputError: If a snapshot is older than the one before it, or its time is no number.
+        """
+        while self._next is not None and self._next[0] <= time:
+            self._now = self._next
+            self._next = next(self._left, None)
+            if self._next is not None and not self._next[0] >= self._now[0]:
+                stamps = f"{self._next[0]:g} s comes after {self._now[0]:g} s"
+                raise InputError(f"scene feed: times go backwards: {stamps}; sort the snapshots by time")
+        return self._now[1]
+
+
+class Watch:
+    """Measures how fast obstacles move from one look to the next, and says where they will be.
+
+    Attributes:
+        speeds: Largest speed seen so far of each obstacle that has moved [m/s]: no point of it was faster.
+    """
+
+    def __init__(self, scene: Scene, bound: float | None) -> None:
+        self._radii = {o.name: _radius(o) for o in scene.obstacles}
+        self._bound, self._warned = bound, set[str]()
+        self._last: tuple[float, Scene] | None = None
+        self._velocities: dict[str, tuple[Vector, Vector]] = {}
+        self.speeds: dict[str, float] = {}
+
+    def see(self, time: float, scene: Scene) -> bool:
+        """Take in the scene at a time [s]; whether any obstacle has moved since the last look (True at the first)."""
+        before, self._last = self._last, (time, scene)
+        if before is None or time <= before[0]:
+            return True
+        seconds, old, moved = time - before[0], {o.name: o.pose for o in before[1].obstacles}, False
+        self._velocities = {}
+        for obstacle in scene.obstacles:
+            if obstacle.name in old and not np.array_equal(old[obstacle.name].homogeneous, obstacle.pose.homogeneous):
+                moved = True
+                self._measure(obstacle, old[obstacle.name], seconds, time)
+        return moved
+
+    def later(self, scene: Scene, seconds: float) -> Scene:
+        """Where the obstacles of the last scene will be: by the motion that they state, or else by their velocity."""
+        ahead = scene.at(seconds)
+        guessed = {
+            name: pin.SE3(*_extrapolated(scene.obstacle(name).pose, velocity, seconds))
+            for name, velocity in self._velocities.items()
+            if scene.obstacle(name).motion is None
+        }
+        if not guessed:
+            return ahead
+        moved = (Obstacle(o.name, o.shape, guessed.get(o.name, o.pose), o.motion) for o in ahead.obstacles)
+        return Scene(tuple(moved), ahead.attached, ahead.allowed_collisions)
+
+    def _measure(self, obstacle: Obstacle, old: Any, seconds: float, time: float) -> None:
+        name = obstacle.name
+        turn = pin.log3(old.rotation.T @ obstacle.pose.rotation) / seconds
+        velocity = (obstacle.pose.translation - old.translation) / seconds
+        speed = float(np.linalg.norm(velocity) + self._radii[name] * np.linalg.norm(turn))
+        self._velocities[name] = (velocity, turn)
+        self.speeds[name] = max(speed, self.speeds.get(name, 0.0))
+        if self._bound is not None and speed > FASTER * self._bound and name not in self._warned:
+            self._warned.add(name)
+            warnings.warn(SpeedWarning(too_fast(name, speed, time, self._bound)), stacklevel=4)
+
+
+def too_fast(name: str, speed: float, time: float, bound: float) -> str:
+    """A line that says that an obstacle is faster than the bound."""
+    return (
+        f"obstacle '{name}' moves at {speed:.3g} m/s at {time:.3g} s, faster than the stated speed_bound of "
+        f"{bound:g} m/s: a contact cannot be ruled out; raise speed_bound"
+    )
+
+
+def rooms(
+    scene: Scene, margin: float, seconds: float, bound: float | None, seen: Mapping[str, float]
+) -> dict[str, float]:
+    """How far the arm keeps from each obstacle [m]: the margin, and how far what moves can come within a tick.
+
+    Args:
+        scene: The obstacles.
+        margin: Distance that must be left [m].
+        seconds: Length of a tick [s].
+        bound: Largest speed of what moves [m/s]; what was seen to be faster counts as that fast. None: no room for it.
+        seen: Speeds that were seen [m/s].
+    """
+    found = {}
+    for obstacle in scene.obstacles:
+        moves = bound is not None and (obstacle.motion is not None or obstacle.name in seen)
+        speed = max(bound or 0.0, seen.get(obstacle.name, 0.0)) if moves else 0.0
+        found[obstacle.name] = margin + speed * seconds
+    return found
+
+
+def _radius(obstacle: Obstacle) -> float:
+    """Distance of the farthest point of an obstacle from its own origin [m]; it counts where the obstacle turns."""
+    if isinstance(obstacle.shape, HalfSpace):
+        return math.inf
+    solids = [piece.geometry for piece in pieces(obstacle.shape)]
+    for solid in solids:
+        solid.computeLocalAABB()
+    return max(float(np.linalg.norm(s.aabb_center) + s.aabb_radius) for s in solids)
+
+
+def _extrapolated(pose: Any, velocity: tuple[Vector, Vector], seconds: float) -> tuple[Matrix, Vector]:
+    linear, turn = velocity
+    return pose.rotation @ pin.exp3(seconds * turn), pose.translation + seconds * linear

@@ -1,0 +1,174 @@
+"""The record of a run: every tick with the robot's place, its path, the obstacles and the times; JSON and back."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix, Vector, finite_array
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.path_text import json_object
+from rrtik_ompl.text_file import read_text, write_text
+
+KIND = "replan_run"
+EVENTS = ("plan", "walk", "repair", "wait", "evade", "arrive")
+OUTCOMES = ("arrived", "out of time", "interrupted")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tick:
+    """What happened in one tick.
+
+    Attributes:
+        time: Of its begin [s].
+        q: Where the robot is then, shape (n,).
+        event: "plan" or "repair": walk along a path found just now, the first one or another one; "walk" along the old
+            one; "wait"; "evade"; "arrive": the last place.
+        path: The path after the tick's work, shape (k, n), or None if there is none.
+        poses: Of the obstacles that are not where they were in the first tick: x, y, z and quaternion x, y, z, w.
+        seconds: Wall time of its parts [s]: "sense", "look", "plan" or "repair" (search and shortening), "all".
+        checked: Configurations that the look at the path asked for.
+        reason: Why the robot waits or evades, or "".
+    """
+
+    time: float
+    q: Vector
+    event: str
+    path: Matrix | None
+    poses: Mapping[str, Vector]
+    seconds: Mapping[str, float]
+    checked: int = 0
+    reason: str = ""
+
+
+@dataclass(slots=True, eq=False)
+class Run:
+    """A robot's way to its goal through a scene that changes.
+
+    Attributes:
+        problem, robot, joint_names, planner, seed: What ran.
+        step, rate, margin, speed_bound: As given to :func:`replan` [unit of the space, Hz, m, m/s].
+        ticks: One after the other.
+        outcome: One of ``OUTCOMES``.
+        reason: Why the robot has not arrived, or "".
+    """
+
+    problem: str
+    robot: str
+    joint_names: tuple[str, ...]
+    planner: str
+    seed: int
+    step: float
+    rate: float
+    margin: float
+    speed_bound: float | None
+    ticks: list[Tick] = field(default_factory=list)
+    outcome: str = "interrupted"
+    reason: str = ""
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the goal was reached."""
+        return self.outcome == "arrived"
+
+    @property
+    def times(self) -> Vector:
+        """Begin of each tick [s], shape (ticks,)."""
+        return np.array([tick.time for tick in self.ticks])
+
+    @property
+    def configurations(self) -> Matrix:
+        """Where the robot is at the begin of each tick, shape (ticks, n)."""
+        return np.array([tick.q for tick in self.ticks])
+
+    @property
+    def length(self) -> float:
+        """Length of the way that was gone [rad, metres counted alike]."""
+        rows = self.configurations
+        return float(np.linalg.norm(np.diff(rows, axis=0), axis=1).sum()) if len(rows) else 0.0
+
+    def count(self, event: str) -> int:
+        """Number of ticks of a kind."""
+        return sum(tick.event == event for tick in self.ticks)
+
+    def seconds(self, part: str, *events: str) -> NDArray[np.float64]:
+        """Wall times of a part of the ticks (of some kinds alone) that have it [s], shape (m,)."""
+        chosen = [tick for tick in self.ticks if not events or tick.event in events]
+        return np.array([tick.seconds[part] for tick in chosen if part in tick.seconds])
+
+    def summary(self) -> str:
+        """One line for a person."""
+        repairs = self.seconds("repair", "repair")
+        worst = f", the longest {1e3 * repairs.max():.1f} ms" if len(repairs) else ""
+        counts = f"{self.count('repair')} repairs{worst}, {self.count('wait')} waits, {self.count('evade')} evasions"
+        why = f" ({self.reason})" if self.reason else ""
+        return (
+            f"{self.problem}: {self.outcome}{why} after {self.ticks[-1].time:.2f} s: {counts}, length {self.length:.2f}"
+        )
+
+    def figures(self) -> dict[str, Any]:
+        """The run in numbers, for JSON: outcome, times [s], counts of events, length, and wall times of repairs [s]."""
+        repairs = self.seconds("repair", "repair")
+        return {
+            **{name: getattr(self, name) for name in ("problem", "robot", "planner", "seed", "outcome", "reason")},
+            "seconds": self.ticks[-1].time if self.ticks else 0.0,
+            "length": self.length,
+            **{event: self.count(event) for event in EVENTS},
+            "repair_median": float(np.median(repairs)) if len(repairs) else None,
+            "repair_p95": float(np.percentile(repairs, 95)) if len(repairs) else None,
+        }
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the record as JSON, whole or not at all.
+
+        Raises:
+            InputError: If the file cannot be written.
+        """
+        heads = {name: getattr(self, name) for name in _HEADS}
+        ticks = [_tick_data(tick) for tick in self.ticks]
+        write_text(path, json.dumps({"version": 1, "kind": KIND, **heads, "ticks": ticks}) + "\n")
+
+
+_HEADS: tuple[str, ...] = ("problem", "robot", "joint_names", "planner", "seed", "step", "rate", "margin")
+_HEADS += ("speed_bound", "outcome", "reason")
+
+
+def load_run(path: str | os.PathLike[str]) -> Run:
+    """Read a record written by :meth:`Run.save`.
+
+    Raises:
+        InputError: If the file is missing or malformed; the message names it.
+    """
+    try:
+        document = json_object(read_text(path), KIND, "ticks")
+        given = {name: document[name] for name in _HEADS}
+        ticks = [_tick(entry, len(given["joint_names"])) for entry in document["ticks"]]
+        return Run(**{**given, "joint_names": tuple(given["joint_names"])}, ticks=ticks)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise InputError(f"{path}: not a whole record: {error!r}; write it again with rrtik replan --record") from None
+    except InputError as error:
+        raise error if str(error).startswith(str(path)) else InputError(f"{path}: {error}") from None
+
+
+def _tick_data(tick: Tick) -> dict[str, Any]:
+    data: dict[str, Any] = {"time": tick.time, "q": tick.q.tolist(), "event": tick.event}
+    data |= {"path": None if tick.path is None else tick.path.tolist()}
+    data |= {"poses": {name: pose.tolist() for name, pose in tick.poses.items()}, "seconds": dict(tick.seconds)}
+    return data | {"checked": tick.checked} | ({"reason": tick.reason} if tick.reason else {})
+
+
+def _tick(entry: Mapping[str, Any], joints: int) -> Tick:
+    path = None if entry["path"] is None else finite_array(entry["path"], (None, joints), "path of a tick")
+    poses = {name: finite_array(pose, (7,), f"pose of '{name}'") for name, pose in entry["poses"].items()}
+    q = finite_array(entry["q"], (joints,), "q of a tick")
+    seconds = {part: float(value) for part, value in entry["seconds"].items()}
+    return Tick(
+        float(entry["time"]), q, str(entry["event"]), path, poses, seconds, int(entry["checked"]),
+        str(entry.get("reason", "")),
+    )  # fmt: skip

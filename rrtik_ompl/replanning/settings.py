@@ -1,0 +1,113 @@
+"""What a run keeps to, checked: steps, ticks, distances and limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrtik_ompl.arrays import Vector, finite_array
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.fast.connect_lengths import RANGE_SHARE
+from rrtik_ompl.replanning.connecting import KernelCuts, connector, has_kernels
+from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
+from rrtik_ompl.replanning.single_tree import SingleTree
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.trajectory.limits import RateLimits
+
+PLANNERS = ("drrt-con", "rrt-connect", "drrt")
+TURN = 2.0 * np.pi
+FASTEST = 1e5  # [Hz]
+COPIES = 3  # places of an obstacle that are heeded at once where its motion is predicted
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Settings:
+    """See :func:`rrtik_ompl.replanning.replan`.
+
+    Attributes:
+        most: How far each joint can move in a tick [rad or m], shape (n,).
+    """
+
+    step: float
+    rate: float
+    planner: str
+    eps: float
+    margin: float
+    speed_bound: float | None
+    most: Vector
+    predict: int
+    seconds: float
+    slot: float
+    seed: int
+
+    @property
+    def tick(self) -> float:
+        """Length of a tick [s]."""
+        return 1.0 / self.rate
+
+
+def settings(
+    robot: Robot,
+    *,
+    step: float,
+    rate: float,
+    planner: str,
+    eps: float | None,
+    margin: float,
+    speed_bound: float | None,
+    limits: RateLimits | None,
+    predict: int,
+    seconds: float,
+    slot: float | None,
+    seed: int,
+) -> Settings:
+    """Check what a caller asks for.
+
+    Raises:
+        InputError: If a number is out of range; it names the argument and the remedy.
+        UnknownNameError: If there is no planner of that name.
+    """
+    if planner not in PLANNERS:
+        raise UnknownNameError("replanner", str(planner), PLANNERS)
+    frequency = _above(rate, "rate", "ticks a second, such as 50")
+    if frequency > FASTEST:
+        raise InputError(f"rate must be {FASTEST:g} Hz or less, got {frequency:g}")
+    for value, name in ((predict, "predict"), (seed, "seed")):
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
+            raise InputError(f"{name} must be a whole number of at least 0, got {value!r}")
+    distance = float(finite_array(margin, (), "margin"))
+    if distance < 0.0:
+        raise InputError(f"margin must not be negative, got {distance:g} m")
+    rates = RateLimits.of(robot) if limits is None else limits.for_joints(robot.dof)
+    lower, upper = (np.clip(ends, -TURN, TURN) for ends in (robot.lower, robot.upper))
+    usual = RANGE_SHARE * float(np.linalg.norm(np.minimum(upper - lower, TURN)))
+    return Settings(
+        step=_above(step, "step", "how far to go in a tick [rad or m]"),
+        rate=frequency,
+        planner=planner,
+        eps=usual if eps is None else _above(eps, "eps", "the longest motion of the trees [rad or m]"),
+        margin=distance,
+        speed_bound=None if speed_bound is None else _above(speed_bound, "speed_bound", "metres a second"),
+        most=rates.velocity / frequency,
+        predict=int(predict),
+        seconds=_above(seconds, "seconds", "how long the run may last"),
+        slot=1.0 / frequency if slot is None else _above(slot, "slot", "how long a repair may take [s]"),
+        seed=int(seed),
+    )
+
+
+def planner_of(chosen: Settings, world: object, lower: Vector, upper: Vector) -> DrrtCon:
+    """The replanner of the name, for a world and a box of configurations to sample in."""
+    post = KernelCuts(world, chosen.seed) if has_kernels(world) else None
+    if chosen.planner == SingleTree.name:
+        return SingleTree(lower, upper, chosen.eps, chosen.seed, post=post)
+    kind = DrrtCon if chosen.planner == DrrtCon.name else FromScratch
+    return kind(connector(world, lower, upper, chosen.eps, chosen.seed), chosen.eps, post=post)
+
+
+def _above(value: float, name: str, what: str) -> float:
+    number = float(finite_array(value, (), name))
+    if number <= 0.0:
+        raise InputError(f"{name} must be greater than 0, got {number:g}; give {what}")
+    return number

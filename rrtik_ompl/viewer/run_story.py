@@ -1,0 +1,97 @@
+"""What the page needs to replay a run: groups of ticks, places of obstacles, and the tip's way along each path."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.poses import quaternion_xyzw
+from rrtik_ompl.replanning.run import Run, Tick
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import Scene
+from rrtik_ompl.shapes import HalfSpace
+from rrtik_ompl.viewer.meshes import look_of_shape
+from rrtik_ompl.viewer.robot_picture import node_name
+
+POINTS = 40  # of a path's line at most
+SHOWN = 0.5  # [s] that a path is seen after it was replaced
+DIGITS = 5
+
+
+def run_story(run: Run, robot: Robot, scene: Scene) -> dict[str, Any]:
+    """The part of the page's story that is about a run."""
+    lines, numbers = _lines(run, robot)
+    moved = sorted({name for tick in run.ticks for name in tick.poses})
+    return {
+        "groups": _groups(run.ticks),
+        "outcome": run.outcome + (f": {run.reason}" if run.reason else ""),
+        "moving": {node_name(name): _places(scene, name, run.ticks) for name in moved},
+        "lines": lines,
+        "line": numbers,
+        "replaced": _replaced(run, numbers),
+    }
+
+
+def _groups(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
+    """Ticks of the same kind in a row: the first one's number, how many, the event and a text."""
+    found: list[dict[str, Any]] = []
+    for (event, reason), members in groupby(ticks, lambda tick: (tick.event, tick.reason)):
+        rows = list(members)
+        first = found[-1]["first"] + found[-1]["count"] if found else 0
+        spent = [1e3 * tick.seconds[event] for tick in rows if event in ("plan", "repair")]
+        text = event + (f" ({reason})" if reason else "")
+        text += f", {max(spent):.1f} ms" if spent else ""
+        found.append({"first": first, "count": len(rows), "event": event, "text": text})
+    return found
+
+
+def _places(scene: Scene, name: str, ticks: list[Tick]) -> dict[str, Any]:
+    """Where an obstacle is drawn in its own frame, and where that frame is in each tick."""
+    obstacle = scene.obstacle(name)
+    flat = isinstance(obstacle.shape, HalfSpace)
+    own = np.eye(4) if flat else look_of_shape(obstacle.shape).placement
+    rest = np.concatenate([obstacle.pose.translation, quaternion_xyzw(obstacle.pose)])
+    poses = np.array([tick.poses.get(name, rest) for tick in ticks])
+    return {"placement": own.ravel().tolist(), "poses": np.round(poses, DIGITS).tolist()}
+
+
+def _lines(run: Run, robot: Robot) -> tuple[list[list[list[float]]], list[int]]:
+    """The tip's way along each path, and for each tick the number of its path; -1 for none."""
+    lines: list[list[list[float]]] = []
+    numbers: list[int] = []
+    known: Matrix | None = None
+    for tick in run.ticks:
+        rest = None if tick.path is None else tick.path[1:]
+        if tick.path is None or rest is None or len(rest) == 0:
+            numbers.append(-1)
+        elif known is not None and known.shape == rest.shape and np.array_equal(known, rest):
+            numbers.append(len(lines) - 1)
+        else:
+            lines.append(np.round(_tips(robot, tick.path), DIGITS).tolist())
+            numbers.append(len(lines) - 1)
+        known = rest
+    return lines, numbers
+
+
+def _tips(robot: Robot, path: Matrix) -> Matrix:
+    """Points of the tip's way, shape (m, 3), none twice running."""
+    lengths: Vector = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
+    wanted = np.union1d(np.linspace(0.0, lengths[-1], POINTS), lengths)
+    rows = np.stack([np.interp(wanted, lengths, column) for column in path.T], axis=1)
+    tips = robot.fk_batch(rows)[:, :3, 3]
+    kept: Matrix = tips[np.append(True, np.linalg.norm(np.diff(tips, axis=0), axis=1) > 1e-6)]
+    return kept
+
+
+def _replaced(run: Run, numbers: list[int]) -> list[int]:
+    """For each tick the number of the path that a repair has replaced a moment ago, or -1."""
+    found, last, until = [], -1, -1
+    for k, tick in enumerate(run.ticks):
+        if tick.event == "repair" and k and numbers[k - 1] != numbers[k]:
+            last, until = numbers[k - 1], k + int(SHOWN * run.rate)
+        found.append(last if k <= until else -1)
+    return found

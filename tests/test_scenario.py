@@ -1,0 +1,177 @@
+"""Scenario files, `rrtik replan`, and DRRT-Con as a planner of OMPL."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+from ompl import base as ob
+
+from rrtik_ompl.catalog import find_problem, list_problems
+from rrtik_ompl.cli import run as rrtik
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.ompl_bridge.contract import GOAL, small_problem, solution_rows
+from rrtik_ompl.problem_file import load_problem
+from rrtik_ompl.replanning import load_run
+from rrtik_ompl.replanning.judge import judge
+from rrtik_ompl.scenario import load_scenario
+from rrtik_ompl.viewer.page import page
+from rrtik_planners import DRRTCon
+
+SCENARIOS = [name for name in list_problems() if name.startswith("replan_")]
+BOX = "{name: lift, box: [3, 3, 1], pose: {xyz: [10, 16, 0]}, motion: {velocity: [0, -3, 0]}}"
+TEXT = f"""version: 1
+robot: {{point2d: {{radius: 0.0, bounds: [[0, 20], [0, 20]]}}}}
+scene: {{obstacles: [{BOX}]}}
+start: {{joints: [1, 10]}}
+goal: {{joints: [19, 10]}}
+motion_resolution: 0.05
+run: {{step: 0.5, rate: 10, eps: 1.0, velocity: [1000]}}
+"""
+
+
+@pytest.fixture
+def crossing(tmp_path):
+    """A scenario file."""
+    file = tmp_path / "crossing.yaml"
+    file.write_text(TEXT)
+    return file
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_every_shipped_scenario_is_run_to_its_goal_without_contact(name):
+    scenario = load_scenario(name)
+    run = scenario.run(seed=1, slot=30.0)
+    assert run.arrived, run.summary()
+    if scenario.problem.robot.name != "point2d":  # a point has no room around it to keep
+        assert judge(scenario.problem.robot, run, scenario.problem.world.scene, fine=3).contacts == ()
+
+
+def test_the_scenes_of_the_paper_are_shipped():
+    assert {"replan_pockets", "replan_triangles", "replan_planar_arm", "replan_ur5", "replan_titan4"} <= set(SCENARIOS)
+
+
+def test_a_goal_that_moves_is_read_from_the_file(crossing):
+    moving = "goal: [{time: 0, joints: [19, 10]}, {time: 2, joints: [19, 14]}]"
+    crossing.write_text(TEXT.replace("velocity: [1000]", f"velocity: [1000], {moving}"))
+    scenario = load_scenario(crossing)
+    assert scenario.goal_feed(1.0) == pytest.approx([19.0, 12.0])
+    assert scenario.run(slot=30.0).configurations[-1] == pytest.approx([19.0, 14.0])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("rate: 10", "rate: 0", r"crossing.yaml:7: run.rate: must be greater than 0"),
+        ("step: 0.5, ", "", r"run.step: missing"),
+        ("run: {", "motoin_resolution: {", "unknown key 'motoin_resolution'"),
+        ("velocity: [1000]", "velocity: [1, 2, 3]", r"run: .*2 joints, but got 3"),
+        ("velocity: [1000]", "goal: [{time: 1, joints: [1, 1]}, {time: 0, joints: [1, 2]}]", "times must increase"),
+        (TEXT[TEXT.index("run:") :], "", "needs the key 'run'"),
+    ],
+)
+def test_what_is_wrong_with_a_scenario_is_said_in_one_line(crossing, old, new, words):
+    crossing.write_text(TEXT.replace(old, new))
+    with pytest.raises(InputError, match=words) as caught:
+        load_scenario(crossing)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_command_writes_a_record_and_a_page_that_replays_it(crossing, tmp_path, capsys):
+    record, html = tmp_path / "run.json", tmp_path / "run.html"
+    assert rrtik(["replan", str(crossing), "--seed", "3", "--record", str(record), "--html", str(html)]) == 0
+    said = capsys.readouterr().out
+    assert "crossing: arrived after" in said
+    assert f"wrote {record}" in said
+    run = load_run(record)
+    story = json.loads(re.search(r'id="story" type="application/json">\n(.*?)\n</script>', html.read_text(), re.S)[1])
+    assert len(story["run"]["line"]) == len(run.ticks) == len(story["times"])
+    assert list(story["run"]["moving"]) == ["lift"]
+    assert sum(group["count"] for group in story["run"]["groups"]) == len(run.ticks)
+    assert any(group["event"] == "repair" for group in story["run"]["groups"])
+    again = tmp_path / "again.html"
+    assert rrtik(["replan", str(crossing), "--replay", str(record), "--html", str(again)]) == 0
+    assert again.read_text() == html.read_text()
+
+
+def test_the_command_says_numbers_and_that_the_goal_was_not_reached(crossing, capsys):
+    assert rrtik(["replan", str(crossing), "--seconds", "0.5", "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["outcome"] == "out of time"
+
+
+def test_the_command_refuses_a_problem_that_is_no_scenario(capsys):
+    assert rrtik(["replan", "env_e"]) == 2
+    assert "needs the key 'run'" in capsys.readouterr().err
+
+
+def test_a_record_of_another_problem_is_refused(crossing):
+    run = load_scenario(crossing).run(slot=30.0)
+    with pytest.raises(InputError, match="lift"):
+        page(load_problem("env_e"), run=run)
+
+
+def test_a_scenario_is_a_problem_too():
+    assert load_problem("replan_ur5").start == pytest.approx(load_scenario("replan_ur5").problem.start)
+    assert find_problem("replan_ur5").is_file()
+
+
+# The planner of OMPL ------------------------------------------------------------------------------------------------
+@pytest.fixture
+def kept(quiet_ompl):
+    """A problem in plain OMPL whose obstacle can be switched, solved once."""
+    where = {"bar": (0.0, 0.0)}
+
+    def valid(state):
+        return bool(max(abs(state[0] - where["bar"][0]), abs(state[1] - where["bar"][1])) > 0.5)
+
+    setup = small_problem(valid)
+    planner = DRRTCon(setup.getSpaceInformation(), seed=2, range=0.4)
+    setup.setPlanner(planner)
+    assert str(setup.solve(10.0)) == "Exact solution"
+    return setup, planner, where
+
+
+def test_a_second_solve_starts_from_the_path_of_the_first(kept):
+    setup, planner, where = kept
+    first = solution_rows(setup)
+    middle = 0.5 * (first[0] + first[1])
+    where["bar"] = tuple(0.5 * (first[-2] + first[-1])[:2] * 0.6 + 0.4 * middle[:2])
+    setup.getProblemDefinition().clearSolutionPaths()
+    assert str(setup.solve(10.0)) == "Exact solution"
+    second = solution_rows(setup)
+    assert planner.statistics["reused"] == 1
+    assert (second[[0, -1]] == first[[0, -1]]).all()
+
+
+def test_a_path_that_is_still_free_is_given_back_without_a_sample(kept):
+    setup, planner, where = kept
+    first = solution_rows(setup)
+    drawn = planner.statistics["iterations"]
+    where["bar"] = (9.0, 9.0)
+    setup.getProblemDefinition().clearSolutionPaths()
+    assert str(setup.solve(10.0)) == "Exact solution"
+    assert planner.statistics["iterations"] == drawn
+    assert (solution_rows(setup) == first).all()
+
+
+def test_the_start_may_walk_and_clear_forgets(kept):
+    setup, planner, _ = kept
+    first = solution_rows(setup)
+    si = setup.getSpaceInformation()
+    state, definition, goal = si.allocState(), ob.ProblemDefinition(si), ob.GoalState(si)
+    here = first[0] + 0.3 * (first[1] - first[0])
+    state[0:3] = [float(x) for x in here]
+    definition.addStartState(state)
+    state[0:3] = list(GOAL)
+    goal.setState(state)
+    definition.setGoal(goal)
+    planner.setProblemDefinition(definition)
+    assert str(planner.solve(10.0)) == "Exact solution"
+    assert planner.statistics["reused"] == 1
+    path = definition.getSolutionPath()
+    assert np.array(path.getState(0)[0:3]) == pytest.approx(here)
+    planner.clear()
+    assert str(planner.solve(10.0)) == "Exact solution"
+    assert planner.statistics["reused"] == 0
