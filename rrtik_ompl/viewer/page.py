@@ -50,10 +50,7 @@ def page(
     Raises:
         InputError: If that cannot be shown.
     """
-    if run is None:
-        subject = subject_of(shown, path, before, ghosts, tuple(marks))
-    else:
-        subject = subject_of_run(shown, run)
+    subject = subject_of(shown, path, before, ghosts, tuple(marks)) if run is None else subject_of_run(shown, run)
     window, frame = draw(subject)
     heading = _title(subject) if title is None else title
     story = json.dumps(story_of(subject, frame, heading), allow_nan=False, separators=(",", ":"))
