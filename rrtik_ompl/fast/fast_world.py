@@ -1,8 +1,8 @@
 """Batched collision checks on plain tables, many configurations at a time, with three answers.
 
-``FREE``: spheres that contain the moving bodies are clear of all they are checked against. ``COLLIDING``: spheres
-inside them hit. ``UNDECIDED``: neither; only an exact check can tell. Rounding is covered by a margin, so the first two
-answers are certain.
+``FREE``: spheres that contain the moving bodies, or convex solids that do, are clear of all they are checked against.
+``COLLIDING``: spheres inside them hit, or solids overlap. ``UNDECIDED``: neither; only an exact check can tell. Rounding
+is covered by a margin, so the first two answers are certain.
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ from rrtik_ompl.fast import plain_distances
 from rrtik_ompl.fast.clearance import Clearance, rounded
 from rrtik_ompl.fast.layout import MARKS, UNDECIDED
 from rrtik_ompl.fast.library import library
-from rrtik_ompl.fast.packing import ArmTables, alike, arm_tables, flag_places, standing_tables
+from rrtik_ompl.fast.packing import ArmTables, alike, arm_tables, flag_places, standing_solids, standing_tables
 from rrtik_ompl.fast.plain import PlainChecks
 from rrtik_ompl.fast.robot_tables import Spheres, Table, table
+from rrtik_ompl.fast.solid_tables import ConvexSolid
 from rrtik_ompl.fast.workspace import probe_table, workspace
 from rrtik_ompl.robot import Chain
 
@@ -49,6 +50,7 @@ class FastWorld:
         outer: For each body spheres (x, y, z, r) in its own frame whose union contains it, shape (n, 4); none stand
             for the bounding ball.
         inner: For each body spheres inside it, shape (n, 4), possibly none.
+        solids: For each body convex solids whose union contains it; none leave what spheres cannot tell undecided.
         strokes: Largest value of sliding joints [m], a number or shape (joints,).
         like: A world of the same arm in another scene: what has not changed is not packed again.
         compiled: Whether to use the kernels; False for plain numpy.
@@ -65,6 +67,7 @@ class FastWorld:
         *,
         outer: Sequence[Spheres],
         inner: Sequence[Spheres],
+        solids: Sequence[Sequence[ConvexSolid]] | None = None,
         strokes: ArrayLike = STROKE,
         like: FastWorld | None = None,
         compiled: bool = True,
@@ -77,8 +80,9 @@ class FastWorld:
         moving = alike(bodies, kept)
         standing = [k for k in concerned if bodies[k].joint == 0]
         self._pairs = kept
+        solids = [()] * len(bodies) if solids is None else solids
         same = like._arm if like is not None and like._joints == self._joints else None
-        self._arm: ArmTables = arm_tables(chain, bodies, moving, kept, outer, inner, self._limits, same)
+        self._arm: ArmTables = arm_tables(chain, bodies, moving, kept, outer, inner, solids, self._limits, same)
         self._rows = standing_tables(bodies, moving, standing, kept, outer, inner)
         self._flagged = flag_places(kept, self._arm, moving, standing)
         self._plain = PlainChecks(self._arm.arm, self._arm.balls, self._rows)
@@ -87,7 +91,8 @@ class FastWorld:
         self.address = 0
         if self._kernels is not None:
             self._work = workspace(self._arm.arm, self._arm.balls, self._rows)
-            tables = (self._arm.arm, *self._arm.balls, *self._rows, self._work)
+            self._solids = standing_solids(bodies, standing, solids)
+            tables = (self._arm.arm, *self._arm.balls, *self._rows, self._work, self._arm.solids, self._solids)
             self._world = table({k: t.address for k, t in enumerate(tables)})
             self.address = self._world.address
             self._marks = self._work[MARKS]
@@ -191,7 +196,7 @@ class FastWorld:
         return np.where(pairs < 0, np.inf, found), pairs
 
     def undecided_pairs(self, V: ArrayLike) -> list[list[tuple[int, int]]]:
-        """For each row of joint values V, shape (m, joints), the pairs that the outer spheres cannot prove free.
+        """For each row of joint values V, shape (m, joints), the pairs that nothing here proves free.
 
         Raises:
             InputError: If V has the wrong shape or a value that is not finite.

@@ -11,7 +11,7 @@ ALIGNMENT = 64  # [bytes] of every array that whole vectors are read from
 FREE, UNDECIDED, COLLIDING = 0, 1, 2  # answers
 
 # World: addresses of the tables that a check needs.
-ARM, OUTER, INNER, OUTER_ROWS, INNER_ROWS, WORK = range(6)
+ARM, OUTER, INNER, OUTER_ROWS, INNER_ROWS, WORK, MOVING_SOLIDS, STANDING_SOLIDS = range(8)
 
 # Arm: placements are 12 floats a joint, the rotation row by row and then the translation.
 JOINT_COUNT, PARENTS, SLIDING, PLACEMENTS = range(4)
@@ -35,6 +35,15 @@ CYLINDER = 3  # centre, axis, half length, radius
 HALF_SPACE = 4  # outward normal, offset
 CONVEX = 5  # 1 if a ball meets it that reaches behind all planes, 0 if the ball's centre must lie behind them
 ROW_FLOATS = 16
+
+# Solids of bodies, moving ones or those that stand still · span: of a body, frame, solids from, to · solid: kind, blocks
+# of corners from, to, whether it is the body itself · block: WIDTH floats of x, of y, of z · NOTE: lanes to write to
+SPANS, SOLIDS, SIZES, CORNERS, NOTE = range(5)
+
+# Sizes of a solid: radius of its disc (offset of a half-space), axis, radius of its ball, slack, bounding ball.
+DISC, AXIS, ROUND, SLACK, BOUND = 0, 1, 4, 5, 6
+SIZE_COUNT = 10
+UNKNOWN_SOLID, CONVEX_SOLID, HALF_SPACE_SOLID = range(3)  # kinds
 
 # Workspace: wide lanes of joint values; lanes of frames (rotation row by row, then origin), of the groups' centres and
 # of the balls' centres; flags of clusters whose balls are placed; three lists of rows; flags of what meets; rows that

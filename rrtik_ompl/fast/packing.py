@@ -15,13 +15,17 @@ from rrtik_ompl.fast.robot_tables import (
     Spheres,
     Table,
     arm_table,
+    axis_turns,
     ball_table,
     moving_body,
     rounding_margin,
     usable_cover,
 )
 from rrtik_ompl.fast.scene_tables import inner_rows, outer_rows, rows_table
+from rrtik_ompl.fast.solid_tables import ConvexSolid, solid_table
 from rrtik_ompl.robot import Chain
+
+Solids = Sequence[ConvexSolid]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,17 +35,20 @@ class ArmTables:
     bodies: tuple[Any, ...]
     sizes: tuple[int, ...]
     covers: tuple[Spheres, ...]
+    convex: tuple[ConvexSolid, ...]
     pairs: tuple[tuple[int, int], ...]
     strokes: Vector
     margin: float
     arm: Table
     balls: tuple[Table, Table]
+    solids: Table
 
     def serves(
         self,
         bodies: Sequence[Any],
         sizes: Sequence[int],
         covers: Sequence[Spheres],
+        convex: Sequence[ConvexSolid],
         pairs: Sequence[tuple[int, int]],
         strokes: Vector,
     ) -> bool:
@@ -49,6 +56,7 @@ class ArmTables:
         return (
             len(bodies) == len(self.bodies)
             and tuple(sizes) == self.sizes
+            and tuple(convex) == self.convex
             and tuple(pairs) == self.pairs
             and np.array_equal(strokes, self.strokes)
             and all(np.array_equal(a, b) for a, b in zip(covers, self.covers, strict=True))
@@ -79,6 +87,7 @@ def arm_tables(
     pairs: Sequence[tuple[int, int]],
     outer: Sequence[Spheres],
     inner: Sequence[Spheres],
+    solids: Sequence[Solids],
     limits: Vector,
     like: ArmTables | None,
 ) -> ArmTables:
@@ -87,7 +96,8 @@ def arm_tables(
     own = tuple(dict.fromkeys((place[i], place[j]) for i, j in map(sorted, pairs) if i in place and j in place))
     carried, sizes = tuple(bodies[k] for members in moving for k in members), tuple(map(len, moving))
     covers = tuple(np.asarray(s[k], dtype=np.float64) for members in moving for k in members for s in (outer, inner))
-    if like is not None and like.serves(carried, sizes, covers, own, limits):
+    convex = tuple(solid for members in moving for k in members for solid in solids[k])
+    if like is not None and like.serves(carried, sizes, covers, convex, own, limits):
         return like
     reaches = [(bodies[k].joint, _reach(bodies[k], outer[k])) for members in moving for k in members]
     margin = rounding_margin(chain, reaches, limits)
@@ -95,7 +105,17 @@ def arm_tables(
         as_one([moving_body(chain, bodies[k], outer[k], inner[k], margin) for k in members]) for members in moving
     ]
     balls = (ball_table(packed, own, inner=False), ball_table(packed, own, inner=True))
-    return ArmTables(carried, sizes, covers, own, limits, margin, arm_table(chain), balls)
+    placed = [
+        (bodies[m[0]].joint, [s for k in m for s in _carried(chain, bodies[k], solids[k], margin)]) for m in moving
+    ]
+    return ArmTables(carried, sizes, covers, convex, own, limits, margin, arm_table(chain), balls, solid_table(placed))
+
+
+def _carried(chain: Chain, body: Any, solids: Solids, margin: float) -> Solids:
+    """A body's solids in the turned frame of its joint."""
+    turn = axis_turns(chain)[body.joint - 1].T
+    rotation, origin = turn @ np.array(body.placement.rotation), turn @ np.array(body.placement.translation)
+    return [solid.placed(rotation, origin, margin) for solid in solids]
 
 
 def as_one(parts: Sequence[MovingBody]) -> MovingBody:
@@ -119,6 +139,12 @@ def standing_tables(
     around = [(s, row) for s, k in enumerate(standing) for row in outer_rows(bodies[k], outer[k])]
     inside = [(s, row) for s, k in enumerate(standing) for row in inner_rows(bodies[k], inner[k])]
     return rows_table(around, checked), rows_table(inside, checked)
+
+
+def standing_solids(bodies: Sequence[Any], standing: Sequence[int], solids: Sequence[Solids]) -> Table:
+    """Solids of what stands still."""
+    poses = [(np.array(bodies[k].placement.rotation), np.array(bodies[k].placement.translation)) for k in standing]
+    return solid_table([(0, [s.placed(*p, 0.0) for s in solids[k]]) for k, p in zip(standing, poses, strict=True)])
 
 
 def flag_places(
