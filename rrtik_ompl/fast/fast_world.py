@@ -1,8 +1,8 @@
 """Batched collision checks on plain tables, many configurations at a time, with three answers.
 
 ``FREE``: spheres that contain the moving bodies, or convex solids that do, are clear of all they are checked against.
-``COLLIDING``: spheres inside them hit, or solids overlap. ``UNDECIDED``: neither; only an exact check can tell. Rounding
-is covered by a margin, so the first two answers are certain.
+``COLLIDING``: spheres inside them hit, or solids do. ``UNDECIDED``: neither; only an exact check can tell. Rounding is
+covered by a margin, so the first two answers are certain.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from rrtik_ompl.fast.library import library
 from rrtik_ompl.fast.packing import ArmTables, alike, arm_tables, flag_places, standing_solids, standing_tables
 from rrtik_ompl.fast.plain import PlainChecks
 from rrtik_ompl.fast.robot_tables import Spheres, Table, table
-from rrtik_ompl.fast.solid_tables import ConvexSolid
+from rrtik_ompl.fast.solid_tables import NO_SOLIDS, Solids
 from rrtik_ompl.fast.workspace import probe_table, workspace
 from rrtik_ompl.robot import Chain
 
@@ -50,7 +50,7 @@ class FastWorld:
         outer: For each body spheres (x, y, z, r) in its own frame whose union contains it, shape (n, 4); none stand
             for the bounding ball.
         inner: For each body spheres inside it, shape (n, 4), possibly none.
-        solids: For each body convex solids whose union contains it; none leave what spheres cannot tell undecided.
+        solids: For each body convex solids around and inside it; None leaves what spheres cannot tell undecided.
         strokes: Largest value of sliding joints [m], a number or shape (joints,).
         like: A world of the same arm in another scene: what has not changed is not packed again.
         compiled: Whether to use the kernels; False for plain numpy.
@@ -67,7 +67,7 @@ class FastWorld:
         *,
         outer: Sequence[Spheres],
         inner: Sequence[Spheres],
-        solids: Sequence[Sequence[ConvexSolid]] | None = None,
+        solids: Sequence[Solids] | None = None,
         strokes: ArrayLike = STROKE,
         like: FastWorld | None = None,
         compiled: bool = True,
@@ -80,7 +80,7 @@ class FastWorld:
         moving = alike(bodies, kept)
         standing = [k for k in concerned if bodies[k].joint == 0]
         self._pairs = kept
-        solids = [()] * len(bodies) if solids is None else solids
+        solids = [NO_SOLIDS] * len(bodies) if solids is None else solids
         same = like._arm if like is not None and like._joints == self._joints else None
         self._arm: ArmTables = arm_tables(chain, bodies, moving, kept, outer, inner, solids, self._limits, same)
         self._rows = standing_tables(bodies, moving, standing, kept, outer, inner)

@@ -22,10 +22,8 @@ from rrtik_ompl.fast.robot_tables import (
     usable_cover,
 )
 from rrtik_ompl.fast.scene_tables import inner_rows, outer_rows, rows_table
-from rrtik_ompl.fast.solid_tables import ConvexSolid, solid_table
+from rrtik_ompl.fast.solid_tables import Solids, solid_table
 from rrtik_ompl.robot import Chain
-
-Solids = Sequence[ConvexSolid]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,7 +33,7 @@ class ArmTables:
     bodies: tuple[Any, ...]
     sizes: tuple[int, ...]
     covers: tuple[Spheres, ...]
-    convex: tuple[ConvexSolid, ...]
+    solids_of: tuple[Solids, ...]
     pairs: tuple[tuple[int, int], ...]
     strokes: Vector
     margin: float
@@ -48,7 +46,7 @@ class ArmTables:
         bodies: Sequence[Any],
         sizes: Sequence[int],
         covers: Sequence[Spheres],
-        convex: Sequence[ConvexSolid],
+        solids_of: Sequence[Solids],
         pairs: Sequence[tuple[int, int]],
         strokes: Vector,
     ) -> bool:
@@ -56,7 +54,7 @@ class ArmTables:
         return (
             len(bodies) == len(self.bodies)
             and tuple(sizes) == self.sizes
-            and tuple(convex) == self.convex
+            and tuple(solids_of) == self.solids_of
             and tuple(pairs) == self.pairs
             and np.array_equal(strokes, self.strokes)
             and all(np.array_equal(a, b) for a, b in zip(covers, self.covers, strict=True))
@@ -96,8 +94,8 @@ def arm_tables(
     own = tuple(dict.fromkeys((place[i], place[j]) for i, j in map(sorted, pairs) if i in place and j in place))
     carried, sizes = tuple(bodies[k] for members in moving for k in members), tuple(map(len, moving))
     covers = tuple(np.asarray(s[k], dtype=np.float64) for members in moving for k in members for s in (outer, inner))
-    convex = tuple(solid for members in moving for k in members for solid in solids[k])
-    if like is not None and like.serves(carried, sizes, covers, convex, own, limits):
+    solids_of = tuple(solids[k] for members in moving for k in members)
+    if like is not None and like.serves(carried, sizes, covers, solids_of, own, limits):
         return like
     reaches = [(bodies[k].joint, _reach(bodies[k], outer[k])) for members in moving for k in members]
     margin = rounding_margin(chain, reaches, limits)
@@ -105,17 +103,15 @@ def arm_tables(
         as_one([moving_body(chain, bodies[k], outer[k], inner[k], margin) for k in members]) for members in moving
     ]
     balls = (ball_table(packed, own, inner=False), ball_table(packed, own, inner=True))
-    placed = [
-        (bodies[m[0]].joint, [s for k in m for s in _carried(chain, bodies[k], solids[k], margin)]) for m in moving
-    ]
-    return ArmTables(carried, sizes, covers, convex, own, limits, margin, arm_table(chain), balls, solid_table(placed))
+    placed = [(bodies[m[0]].joint, [_carried(chain, bodies[k], solids[k], margin) for k in m]) for m in moving]
+    tables = (arm_table(chain), balls, solid_table(placed))
+    return ArmTables(carried, sizes, covers, solids_of, own, limits, margin, *tables)
 
 
 def _carried(chain: Chain, body: Any, solids: Solids, margin: float) -> Solids:
     """A body's solids in the turned frame of its joint."""
     turn = axis_turns(chain)[body.joint - 1].T
-    rotation, origin = turn @ np.array(body.placement.rotation), turn @ np.array(body.placement.translation)
-    return [solid.placed(rotation, origin, margin) for solid in solids]
+    return solids.placed(turn @ np.array(body.placement.rotation), turn @ np.array(body.placement.translation), margin)
 
 
 def as_one(parts: Sequence[MovingBody]) -> MovingBody:
@@ -144,7 +140,7 @@ def standing_tables(
 def standing_solids(bodies: Sequence[Any], standing: Sequence[int], solids: Sequence[Solids]) -> Table:
     """Solids of what stands still."""
     poses = [(np.array(bodies[k].placement.rotation), np.array(bodies[k].placement.translation)) for k in standing]
-    return solid_table([(0, [s.placed(*p, 0.0) for s in solids[k]]) for k, p in zip(standing, poses, strict=True)])
+    return solid_table([(0, [solids[k].placed(*pose, 0.0)]) for k, pose in zip(standing, poses, strict=True)])
 
 
 def flag_places(

@@ -24,6 +24,7 @@ from rrtik_ompl.fast.lanes import (
     highest,
     int_at,
     lanes_at,
+    lowest,
     set_int,
     set_lanes,
     spread,
@@ -32,6 +33,7 @@ from rrtik_ompl.fast.layout import (
     COLLIDING,
     FRAMES,
     FREE,
+    INNER_ROWS,
     MARKS,
     MOVING_SOLIDS,
     OUTER,
@@ -42,6 +44,7 @@ from rrtik_ompl.fast.layout import (
     WORK,
 )
 from rrtik_ompl.fast.overlap import FRAME_BYTES, meets_itself, meets_surroundings, prepare
+from rrtik_ompl.fast.row_kernels import row_gap
 
 MOST_STEPS = 24
 CONVERGED = 1e-7  # [m]
@@ -272,7 +275,8 @@ def compare_solids(mine: int, first: int, others: int, second: int, frames: Any,
     A plane that lies between two solids in one lane often does in the next.
     """
     kind = int_at(field(others, layout.SOLIDS), 4 * second)
-    if kind == layout.UNKNOWN_SOLID or int_at(field(mine, layout.SOLIDS), 4 * first) == layout.UNKNOWN_SOLID:
+    own = int_at(field(mine, layout.SOLIDS), 4 * first)
+    if own != layout.CONVEX_SOLID or (kind != layout.CONVEX_SOLID and kind != layout.HALF_SPACE_SOLID):
         return wanted, 0
     open_, overlapping, known, last = 0, 0, False, (1.0, 0.0, 0.0)
     while wanted != 0:
@@ -295,8 +299,8 @@ def compare_solids(mine: int, first: int, others: int, second: int, frames: Any,
 
 @kernel
 def compare_bodies(work: int, mine: int, first: int, others: int, second: int, wanted: int) -> Any:
-    """As ``compare_solids``, for bodies that consist of one solid or more."""
-    spans, other_spans = field(mine, layout.SPANS) + 12 * first, field(others, layout.SPANS) + 12 * second
+    """As ``compare_solids``, for bodies: the solids around them, and then those inside them where they differ."""
+    spans, other_spans = field(mine, layout.SPANS) + 20 * first, field(others, layout.SPANS) + 20 * second
     frames = (
         field(work, FRAMES) + FRAME_BYTES * int_at(spans, 0),
         field(work, FRAMES) + FRAME_BYTES * int_at(other_spans, 0),
@@ -307,7 +311,53 @@ def compare_bodies(work: int, mine: int, first: int, others: int, second: int, w
             left, hit = compare_solids(mine, one, others, other, frames, wanted & ~overlapping)
             open_ |= left
             overlapping |= hit
+    if int_at(spans, 1) == int_at(spans, 3) and int_at(other_spans, 1) == int_at(other_spans, 3):
+        return open_, overlapping
+    for one in range(int_at(spans, 3), int_at(spans, 4)):
+        for other in range(int_at(other_spans, 3), int_at(other_spans, 4)):
+            _, hit = compare_solids(mine, one, others, other, frames, open_ & ~overlapping)
+            overlapping |= hit
     return open_, overlapping
+
+
+@inlined
+def carried_axis(frame: int, lane: int, axis: int, a: Any, b: Any, c: Any) -> Any:
+    """A coordinate in the world of points of a frame. Here lanes hold points; ``lane`` is that of the frame."""
+    row = 3 * axis * WIDTH + lane
+    turned = a * float_at(frame, row) + b * float_at(frame, row + WIDTH) + c * float_at(frame, row + 2 * WIDTH)
+    return turned + float_at(frame, (9 + axis) * WIDTH + lane)
+
+
+@kernel
+def corner_inside(mine: int, one: int, frame: int, lane: int, rows: int, row: int) -> bool:
+    """Whether a corner of a solid lies inside a row, in one lane."""
+    numbers, corners = field(mine, layout.SOLIDS) + 16 * one, field(mine, layout.CORNERS)
+    for block in range(int_at(numbers, 1), int_at(numbers, 2)):
+        a, b, c = lanes_at(corners, 3 * block), lanes_at(corners, 3 * block + 1), lanes_at(corners, 3 * block + 2)
+        x, y = carried_axis(frame, lane, 0, a, b, c), carried_axis(frame, lane, 1, a, b, c)
+        gap = row_gap(rows, row, x, y, carried_axis(frame, lane, 2, a, b, c), False)
+        if lowest(gap) < -size_of(mine, one, layout.SLACK):
+            return True
+    return False
+
+
+@kernel
+def corners_inside(world: int, body: int, standing: int, wanted: int) -> int:
+    """Lanes among ``wanted`` in which a point of a moving body lies inside one that stands still."""
+    mine, rows, overlapping = field(world, MOVING_SOLIDS), field(world, INNER_ROWS), 0
+    row, spans = int_at(field(rows, layout.OWN), standing), field(mine, layout.SPANS) + 20 * body
+    frame = field(field(world, WORK), FRAMES) + FRAME_BYTES * int_at(spans, 0)
+    if row < 0:
+        return 0
+    for one in range(int_at(spans, 3), int_at(spans, 4)):
+        if int_at(field(mine, layout.SOLIDS), 4 * one) == layout.MERE_CORNERS:
+            left = wanted & ~overlapping
+            while left != 0:
+                lane = first_bit(left)
+                left &= left - 1
+                if corner_inside(mine, one, frame, lane, rows, row):
+                    overlapping |= 1 << lane
+    return overlapping
 
 
 @kernel
@@ -352,6 +402,8 @@ def settle(world: int, wanted: int) -> Any:
         else:
             first, second, others = int_at(pairs, 2 * (k - crossing)), int_at(pairs, 2 * (k - crossing) + 1), mine
         left, hit = compare_bodies(work, mine, first, others, second, marked)
+        if k < crossing and left != hit:
+            hit |= corners_inside(world, first, second, left & ~hit)
         set_int(marks, k, left | int_at(marks, k) & colliding)
         open_ |= left
         colliding |= hit

@@ -17,12 +17,13 @@ import coal
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.collision.enclosure import enclosure
-from rrtik_ompl.collision.solids import SameObject, around, is_closed, is_mesh, mesh_arrays
+from rrtik_ompl.collision.solids import SameObject, is_mesh
+from rrtik_ompl.fast.cover_cache import cached_convex_pieces
 from rrtik_ompl.fast.layout import (
     CONVEX_SOLID,
     CORNERS,
     HALF_SPACE_SOLID,
+    MERE_CORNERS,
     NOTE,
     SIZE_COUNT,
     SIZES,
@@ -44,16 +45,16 @@ class ConvexSolid:
 
     Attributes:
         corners: Of its core, shape (n, 3).
-        exact: Whether it is the body; otherwise the body lies in the union of this and other solids.
+        inside: Whether the body contains it.
         disc: Radius of the disc around every corner, across ``axis``; of a half-space its offset along ``axis``.
         axis: Unit vector, shape (3,).
         radius: Of the ball around every point of the core.
         slack: How far rounding may misplace its points [m].
-        kind: CONVEX_SOLID, HALF_SPACE_SOLID or UNKNOWN_SOLID.
+        kind: CONVEX_SOLID, HALF_SPACE_SOLID, UNKNOWN_SOLID, or MERE_CORNERS: points of a body.
     """
 
     corners: Matrix
-    exact: bool = True
+    inside: bool = True
     disc: float = 0.0
     axis: Vector = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     radius: float = 0.0
@@ -80,57 +81,77 @@ class ConvexSolid:
         return [self.disc, *self.axis, self.radius, self.slack, *centre, around]
 
 
-UNKNOWN = ConvexSolid(np.zeros((1, 3)), exact=False, kind=UNKNOWN_SOLID)
+UNKNOWN = ConvexSolid(np.zeros((1, 3)), inside=False, kind=UNKNOWN_SOLID)
 
 
-def convex_solids(geometry: Any) -> tuple[ConvexSolid, ...]:
-    """Convex solids whose union contains a coal geometry, in its frame; none for a kind that is not known here."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Solids:
+    """Convex solids whose union contains a body, and convex solids inside it: the same ones for a convex body."""
+
+    around: tuple[ConvexSolid, ...] = ()
+    inside: tuple[ConvexSolid, ...] = ()
+
+    def placed(self, rotation: Matrix, origin: Vector, slack: float) -> Solids:
+        """See :meth:`ConvexSolid.placed`."""
+        around = tuple(solid.placed(rotation, origin, slack) for solid in self.around)
+        if self.inside == self.around:
+            return Solids(around, around)
+        return Solids(around, tuple(solid.placed(rotation, origin, slack) for solid in self.inside))
+
+
+NO_SOLIDS = Solids()
+
+
+def convex_solids(geometry: Any) -> Solids:
+    """Convex solids around and inside a coal geometry, in its frame; none for a kind that is not known here."""
     return _convex_solids(SameObject(geometry))
 
 
 @lru_cache(maxsize=1024)
-def _convex_solids(key: SameObject) -> tuple[ConvexSolid, ...]:
-    solid = key.geometry
-    if is_mesh(solid):
-        return _around_mesh(solid)
+def _convex_solids(key: SameObject) -> Solids:
+    if is_mesh(key.geometry):
+        around, inside, points = cached_convex_pieces(key.geometry)
+        points = [ConvexSolid(p, kind=MERE_CORNERS) for p in points]
+        return Solids(tuple(ConvexSolid(p, inside=False) for p in around), (*map(ConvexSolid, inside), *points))
+    own = _own_solid(key.geometry)
+    return NO_SOLIDS if own is None else Solids((own,), (own,))
+
+
+def _own_solid(solid: Any) -> ConvexSolid | None:
+    """A convex geometry itself."""
     if isinstance(solid, coal.Halfspace):
-        return (ConvexSolid(np.zeros((1, 3)), disc=float(solid.d), axis=np.array(solid.n), kind=HALF_SPACE_SOLID),)
+        return ConvexSolid(np.zeros((1, 3)), disc=float(solid.d), axis=np.array(solid.n), kind=HALF_SPACE_SOLID)
     if not isinstance(solid, (coal.Box, coal.Sphere, coal.Capsule, coal.Cylinder, coal.ConvexBase)):
-        return ()
+        return None
     swept = float(solid.getSweptSphereRadius())
     if isinstance(solid, coal.Box):
-        return (ConvexSolid(BOX_CORNERS * np.array(solid.halfSide), radius=swept),)
+        return ConvexSolid(BOX_CORNERS * np.array(solid.halfSide), radius=swept)
     if isinstance(solid, coal.ConvexBase):
-        return (ConvexSolid(np.array(solid.points(), dtype=np.float64).reshape(-1, 3), radius=swept),)
+        return ConvexSolid(np.array(solid.points(), dtype=np.float64).reshape(-1, 3), radius=swept)
     if isinstance(solid, coal.Sphere):
-        return (ConvexSolid(np.zeros((1, 3)), radius=float(solid.radius) + swept),)
+        return ConvexSolid(np.zeros((1, 3)), radius=float(solid.radius) + swept)
     ends = np.array([[0.0, 0.0, float(solid.halfLength)], [0.0, 0.0, -float(solid.halfLength)]])
     if isinstance(solid, coal.Capsule):
-        return (ConvexSolid(ends, radius=float(solid.radius) + swept),)
-    return (ConvexSolid(ends, disc=float(solid.radius), radius=swept),)
+        return ConvexSolid(ends, radius=float(solid.radius) + swept)
+    return ConvexSolid(ends, disc=float(solid.radius), radius=swept)
 
 
-def _around_mesh(mesh: Any) -> tuple[ConvexSolid, ...]:
-    """The hull of a mesh and of what it encloses."""
-    hull = around(mesh)
-    vertices, triangles = mesh_arrays(mesh)
-    corners = vertices[np.unique(triangles)] if hull is mesh else np.array(hull.points()).reshape(-1, 3)
-    if not len(corners):
-        return ()
-    if not is_closed(mesh):
-        corners = np.concatenate([corners, *enclosure(mesh).boxes()])
-    return (ConvexSolid(corners, exact=False),)
+def solid_table(bodies: Sequence[tuple[int, Sequence[Solids]]]) -> Table:
+    """Table of bodies: for each the frame that carries it and the solids of its parts in that frame.
 
-
-def solid_table(bodies: Sequence[tuple[int, Sequence[ConvexSolid]]]) -> Table:
-    """Table of bodies: for each the frame that carries it and its solids in that frame."""
-    listed = [list(solids) or [UNKNOWN] for _, solids in bodies]
-    ends = list(accumulate(map(len, listed)))
-    spans = [(frame, end - len(own), end) for (frame, _), own, end in zip(bodies, listed, ends, strict=True)]
-    solids = [solid for own in listed for solid in own]
+    A part without solids around it leaves the body unknown.
+    """
+    solids: list[ConvexSolid] = []
+    spans = []
+    for frame, parts in bodies:
+        around = [solid for part in parts for solid in part.around or (UNKNOWN,)]
+        inside = [solid for part in parts for solid in part.inside]
+        start, middle = len(solids), len(solids) + len(around)
+        solids += around if inside == around else around + inside
+        spans.append((frame, start, middle, start if inside == around else middle, len(solids)))
     blocks = [_blocks(solid.corners) for solid in solids]
     starts = list(accumulate(map(len, blocks), initial=0))
-    numbers = [(s.kind, a, b, int(s.exact)) for s, a, b in zip(solids, starts[:-1], starts[1:], strict=True)]
+    numbers = [(s.kind, a, b, int(s.inside)) for s, a, b in zip(solids, starts[:-1], starts[1:], strict=True)]
     return table(
         {
             SPANS: np.array(spans, dtype=np.int32),
