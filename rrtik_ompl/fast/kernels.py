@@ -281,5 +281,6 @@ def mark_pairs(world: int, row: int, count: int) -> int:
     move(field(world, ARM), work)
     settle(world, wanted)
     balls = field(world, OUTER)
-    standing = field(field(world, OUTER_ROWS), layout.STANDING_COUNT)
-    return field(balls, layout.BODY_COUNT) * standing + field(balls, layout.PAIR_COUNT)
+    crossing = field(balls, layout.BODY_COUNT) * field(field(world, OUTER_ROWS), layout.STANDING_COUNT)
+    total: int = crossing + field(balls, layout.PAIR_COUNT)
+    return total

@@ -1,8 +1,8 @@
 """A mesh as a few convex pieces whose union contains it and all that it encloses.
 
 Planes along the axes cut space into cells. Within a cell, an extreme point of a solid lies on the surface or is a
-corner of the cell: from any other point of the solid there is a way on in some direction and back. So the hull of the surface
-within a cell, and of the cell's corners that are inside the solid, contains what the cell holds of it.
+corner of the cell: from any other point of the solid there is a way on in some direction and back. So the hull of the
+surface within a cell, and of the cell's corners that are inside the solid, contains what the cell holds of it.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from rrtik_ompl.collision.solids import inside_mesh, is_closed, mesh_arrays
 from rrtik_ompl.fast.scene_tables import most_different
 
 MOST_PIECES = 12
+MOST_TRIANGLES = 300_000
 SMALLEST_GAIN = 0.01  # of the whole hull's volume: what a cut takes away at least
 SHARES = (0.25, 0.5, 0.75)  # of a cell, where it may be cut
 GRID = 24  # steps along the longest side, to which corners are moved for a sketch of a mesh
@@ -97,14 +98,17 @@ def convex_pieces(mesh: Any) -> tuple[list[Matrix], list[Matrix], list[Matrix]]:
     """Convex pieces whose union contains a coal mesh and what it encloses, convex pieces inside it, and points of it.
 
     The cell whose pieces come out smallest is cut first (compare Lien and Amato 2007), until cuts gain little. A
-    sketch of the mesh is enough to choose the cuts. Nothing is known to be inside a mesh that is not closed.
+    sketch of the mesh is enough to choose the cuts. Nothing is known to be inside a mesh that is not closed, and
+    there are no pieces of a mesh that is a point or has more than ``MOST_TRIANGLES``.
 
     Returns:
         Corners of the pieces around and of those inside, and points of the solid by cells, shape (n, 3) each.
     """
     vertices, triangles = mesh_arrays(mesh)
     surface = vertices[triangles]
-    if not len(surface) or not np.isfinite(surface).all() or not np.ptp(surface, axis=(0, 1)).max() > 0.0:
+    if not 0 < len(surface) <= MOST_TRIANGLES or not np.isfinite(surface).all():
+        return [], [], []
+    if not np.ptp(surface, axis=(0, 1)).max() > 0.0:
         return [], [], []
     if not is_closed(mesh):
         boxes = np.stack(enclosure(mesh).boxes(), axis=1)

@@ -111,8 +111,8 @@ def convex_solids(geometry: Any) -> Solids:
 def _convex_solids(key: SameObject) -> Solids:
     if is_mesh(key.geometry):
         around, inside, points = cached_convex_pieces(key.geometry)
-        points = [ConvexSolid(p, kind=MERE_CORNERS) for p in points]
-        return Solids(tuple(ConvexSolid(p, inside=False) for p in around), (*map(ConvexSolid, inside), *points))
+        held = (*map(ConvexSolid, inside), *(ConvexSolid(p, kind=MERE_CORNERS) for p in points))
+        return Solids(tuple(ConvexSolid(p, inside=False) for p in around), held)
     own = _own_solid(key.geometry)
     return NO_SOLIDS if own is None else Solids((own,), (own,))
 
