@@ -39,8 +39,8 @@ ROW_FLOATS = 16
 
 # Solids of bodies, moving ones or those that stand still · span: of a body, frame, solids around it from, to, solids
 # inside it from, to · solid: kind, blocks of corners from, to, whether it is inside its body · block: WIDTH floats of
-# x, of y, of z · NOTE: lanes to write to
-SPANS, SOLIDS, SIZES, CORNERS, NOTE = range(5)
+# x, of y, of z
+SPANS, SOLIDS, SIZES, CORNERS = range(4)
 
 # Sizes of a solid: radius of its disc (offset of a half-space), axis, radius of its ball, slack, bounding ball.
 DISC, AXIS, ROUND, SLACK, BOUND = 0, 1, 4, 5, 6
@@ -49,8 +49,11 @@ UNKNOWN_SOLID, CONVEX_SOLID, HALF_SPACE_SOLID, MERE_CORNERS = range(4)  # the la
 
 # Workspace: wide lanes of joint values; lanes of frames (rotation row by row, then origin), of the groups' centres and
 # of the balls' centres; flags of clusters whose balls are placed; three lists of rows; flags of what meets; rows that
-# wait for a second look; for the outer and the inner balls what met last: ball, frame and row (-1: nothing yet).
-VALUES, FRAMES, GROUP_CENTRES, CENTRES, PLACED, FOUND, NEAR, MET, MARKS, WAITING, OUTER_LAST, INNER_LAST = range(12)
+# wait for a second look; for the outer and the inner balls what met last: ball, frame and row (-1: nothing yet);
+# lanes for a note.
+VALUES, FRAMES, GROUP_CENTRES, CENTRES, PLACED, FOUND, NEAR, MET, MARKS, WAITING, OUTER_LAST, INNER_LAST, NOTE = range(
+    13
+)
 
 # Probe, for distances: lanes of the smallest distance so far, ints of the pair that has it, lanes of distances of
 # listed rows.

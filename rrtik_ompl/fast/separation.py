@@ -96,8 +96,11 @@ def carried(frame: int, lane: int, p: Any) -> Any:
 
 
 @kernel
-def farthest(solids: int, number: int, frame: int, lane: int, way: Any) -> Any:
-    """The point of a solid's core that lies farthest along a unit vector, in the world. Here lanes hold corners."""
+def farthest(solids: int, number: int, frame: int, note: int, lane: int, way: Any) -> Any:
+    """The point of a solid's core that lies farthest along a unit vector, in the world. Here lanes hold corners.
+
+    ``note`` is the address of lanes to write to.
+    """
     x = entry_of(frame, lane, 0) * way[0] + entry_of(frame, lane, 3) * way[1] + entry_of(frame, lane, 6) * way[2]
     y = entry_of(frame, lane, 1) * way[0] + entry_of(frame, lane, 4) * way[1] + entry_of(frame, lane, 7) * way[2]
     z = entry_of(frame, lane, 2) * way[0] + entry_of(frame, lane, 5) * way[1] + entry_of(frame, lane, 8) * way[2]
@@ -111,7 +114,6 @@ def farthest(solids: int, number: int, frame: int, lane: int, way: Any) -> Any:
         best = choose(higher, height, best)
         where = choose(higher, spread(np.float32(block)), where)
     first = first_bit(bits(best >= highest(best)))
-    note = field(solids, layout.NOTE)
     set_lanes(note, 0, where)
     corner = 3 * WIDTH * int(float_at(note, first)) + first
     p = (
@@ -184,8 +186,8 @@ def depth_inside(a: Any, b: Any, c: Any, d: Any) -> float:
 @inlined
 def difference(mine: int, first: int, others: int, second: int, frames: Any, lane: int, way: Any) -> Any:
     """The point of (first solid - second solid) that lies farthest against a unit vector."""
-    p = farthest(mine, first, frames[0], lane, scaled(way, -1.0))
-    return minus(p, farthest(others, second, frames[1], lane, way))
+    p = farthest(mine, first, frames[0], frames[2], lane, scaled(way, -1.0))
+    return minus(p, farthest(others, second, frames[1], frames[2], lane, way))
 
 
 @inlined
@@ -260,7 +262,7 @@ def beyond_plane(mine: int, first: int, others: int, second: int, frames: Any, l
     """Compare a solid with a half-space that stands still."""
     sizes = field(others, layout.SIZES) + 8 * layout.SIZE_COUNT * second
     normal = double_at(sizes, layout.AXIS), double_at(sizes, layout.AXIS + 1), double_at(sizes, layout.AXIS + 2)
-    p = farthest(mine, first, frames[0], lane, scaled(normal, -1.0))
+    p = farthest(mine, first, frames[0], frames[2], lane, scaled(normal, -1.0))
     height = dot(normal, p) - size_of(others, second, layout.DISC) - size_of(mine, first, layout.ROUND)
     slack = size_of(mine, first, layout.SLACK) + size_of(others, second, layout.SLACK)
     if height > slack:
@@ -304,6 +306,7 @@ def compare_bodies(work: int, mine: int, first: int, others: int, second: int, w
     frames = (
         field(work, FRAMES) + FRAME_BYTES * int_at(spans, 0),
         field(work, FRAMES) + FRAME_BYTES * int_at(other_spans, 0),
+        field(work, layout.NOTE),
     )
     open_, overlapping = 0, 0
     for one in range(int_at(spans, 1), int_at(spans, 2)):

@@ -24,7 +24,6 @@ from rrtik_ompl.fast.layout import (
     CORNERS,
     HALF_SPACE_SOLID,
     MERE_CORNERS,
-    NOTE,
     SIZE_COUNT,
     SIZES,
     SOLIDS,
@@ -158,7 +157,6 @@ def solid_table(bodies: Sequence[tuple[int, Sequence[Solids]]]) -> Table:
             SOLIDS: np.array(numbers, dtype=np.int32),
             SIZES: np.array([s.sizes() for s in solids], dtype=np.float64).reshape(-1, SIZE_COUNT),
             CORNERS: np.concatenate([np.zeros((0, 3, WIDTH)), *blocks]).astype(np.float32),
-            NOTE: np.zeros(WIDTH, dtype=np.float32),
         }
     )
 
