@@ -50,7 +50,7 @@ from rrtik_ompl.fast.layout import (
 )
 from rrtik_ompl.fast.overlap import FRAME_BYTES, meets_itself, meets_surroundings, prepare, still_meets
 from rrtik_ompl.fast.row_kernels import along
-from rrtik_ompl.fast.separation import settle
+from rrtik_ompl.fast.settling import settle
 
 ALL_LANES = (1 << WIDTH) - 1
 
