@@ -25,6 +25,7 @@ from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.collision.solids import around
 from rrtik_ompl.fast import FREE, UNDECIDED, FastWorld, needs_covers
 from rrtik_ompl.fast.cover_cache import cached_inner_spheres, cached_outer_cover
+from rrtik_ompl.fast.solid_tables import convex_solids
 from rrtik_ompl.robot import Robot
 
 STROKE_ROOM = 1e-3  # [m] beyond the limits of sliding joints
@@ -89,7 +90,7 @@ class CollisionChecks:
         """
         order = spread_order(steps)
         rows = (1.0 - order / steps)[:, None] * start + (order / steps)[:, None] * end
-        open_ = self.fast.classify(self._robot.joint_values(rows), prove=False) != FREE
+        open_ = self.fast.classify(self._robot.joint_values(rows)) != FREE
         rows, order = rows[open_], order[open_]
         marked = self.fast.undecided_pairs(self._robot.joint_values(rows))
         travel = np.abs(end - start)
@@ -187,7 +188,9 @@ def _packed(
 ) -> FastWorld:
     """The tables of a world; those of the arm are taken over from another one where they fit."""
     outer, inner = ([both[k] for both in spheres] for k in (0, 1))
-    return FastWorld(robot.chain, bodies, pairs, outer=outer, inner=inner, strokes=_strokes(robot), like=like)
+    solids = [convex_solids(body.geometry) for body in bodies]
+    covers: dict[str, Any] = {"outer": outer, "inner": inner, "solids": solids}
+    return FastWorld(robot.chain, bodies, pairs, **covers, strokes=_strokes(robot), like=like)
 
 
 def _all_spheres(robot: Robot, bodies: Sequence[Body]) -> tuple[Spheres, ...]:

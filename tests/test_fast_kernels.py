@@ -307,7 +307,7 @@ def test_the_distance_from_every_kind_of_solid_is_exact(kind):
         answers = world.classify(points)
         gap = distance(solid, (points - pose.translation) @ pose.rotation)
         band = 4.0 * world.margin + 2e-5
-        assert (answers[gap < radius] != FREE).all()
+        assert all(apart(solid, pose, p, radius) for p in points[(gap < radius) & (answers == FREE)])  # off a corner
         if kind != "round convex":
             assert (answers[gap > radius + band] == FREE).all()
         for k in np.flatnonzero(np.abs(gap - radius) < 0.02)[:300]:  # alone, so that no other lane widens the search

@@ -44,6 +44,22 @@ def cached_inner_spheres(geometry: Any, *, count: int | None = None) -> Matrix:
     return _cached(geometry, f"inner {count!r}", make)
 
 
+def cached_convex_pieces(mesh: Any) -> tuple[list[Matrix], ...]:
+    """``convex_pieces``, from the cache if they are there; as rows of a corner and a number of piece and kind."""
+
+    def make() -> Matrix:
+        from rrtik_ompl.fast.mesh_pieces import convex_pieces
+
+        kinds = convex_pieces(mesh)
+        numbered = [(len(kinds) * k + kind, p) for kind, pieces in enumerate(kinds) for k, p in enumerate(pieces)]
+        rows = [np.column_stack([corners, np.full(len(corners), float(number))]) for number, corners in numbered]
+        return np.concatenate([np.empty((0, 4)), *rows])
+
+    rows = _cached(mesh, "convex pieces", make)
+    numbers = np.unique(rows[:, 3])
+    return tuple([rows[rows[:, 3] == k, :3] for k in numbers if k % 3 == kind] for kind in range(3))
+
+
 def geometry_bytes(geometry: Any) -> bytes | None:
     """All that a cover depends on, or None for a kind that is not cached."""
     numbers: list[Any]

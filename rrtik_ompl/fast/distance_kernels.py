@@ -9,15 +9,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from rrtik_ompl.fast import layout
 from rrtik_ompl.fast.compiled import WIDTH, entry, inlined, kernel
 from rrtik_ompl.fast.kernels import load_row, move
 from rrtik_ompl.fast.lanes import (
-    absolute,
     bits,
-    choose,
     field,
     first_bit,
     float_at,
@@ -35,49 +31,7 @@ from rrtik_ompl.fast.lanes import (
 )
 from rrtik_ompl.fast.layout import ARM, BEST, CENTRES, FOUND, FRAMES, GAPS, GROUP_CENTRES, WHICH, WORK
 from rrtik_ompl.fast.overlap import FRAME_BYTES, place_cluster, placed, prepare, stored
-from rrtik_ompl.fast.row_kernels import ZERO, along, rows_in_reach, squared, to_capsule
-
-NOTHING = np.float32(1e18)  # [m] where there is nothing to measure; its square is a float32 still
-
-
-@kernel
-def to_convex(planes: int, start: int, end: int, x: Any, y: Any, z: Any) -> Any:
-    """Largest height over the planes of a convex row; no more than the distance from it."""
-    height = along(planes, 4 * start, x, y, z) - float_at(planes, 4 * start + 3)
-    for plane in range(start + 1, end):
-        height = larger(height, along(planes, 4 * plane, x, y, z) - float_at(planes, 4 * plane + 3))
-    return height
-
-
-@kernel
-def row_gap(rows: int, number: int, x: Any, y: Any, z: Any, bound: bool) -> Any:
-    """Signed distance of a point from a row, negative inside; ``bound`` tells that it stands for points near it."""
-    row = field(rows, layout.ROWS) + 4 * layout.ROW_FLOATS * number
-    numbers = field(rows, layout.NUMBERS) + 16 * number
-    kind = int_at(numbers, 0)
-    if kind == layout.HALF_SPACE:
-        return along(row, 0, x, y, z) - float_at(row, 3)
-    if kind == layout.CONVEX:
-        height = to_convex(field(rows, layout.PLANES), int_at(numbers, 2), int_at(numbers, 3), x, y, z)
-        if bound or float_at(row, 0) != ZERO:
-            return height
-        return choose(height < ZERO, height, spread(NOTHING))  # outside, the height is too small for an inner row
-    x, y, z = x - float_at(row, 0), y - float_at(row, 1), z - float_at(row, 2)
-    if kind == layout.BALL:
-        return square_root(squared(x, y, z)) - float_at(row, 3)
-    if kind == layout.CAPSULE:
-        return square_root(to_capsule(row, x, y, z)) - float_at(row, 7)
-    if kind == layout.BOX:
-        a = absolute(along(row, 3, x, y, z)) - float_at(row, 12)
-        b = absolute(along(row, 6, x, y, z)) - float_at(row, 13)
-        c = absolute(along(row, 9, x, y, z)) - float_at(row, 14)
-        outside = square_root(squared(larger(a, ZERO), larger(b, ZERO), larger(c, ZERO)))
-        return outside + smaller(larger(larger(a, b), c), ZERO)
-    height = along(row, 3, x, y, z)
-    across = squared(x - height * float_at(row, 3), y - height * float_at(row, 4), z - height * float_at(row, 5))
-    a, b = absolute(height) - float_at(row, 6), square_root(across) - float_at(row, 7)
-    outside = square_root(larger(a, ZERO) * larger(a, ZERO) + larger(b, ZERO) * larger(b, ZERO))
-    return outside + smaller(larger(a, b), ZERO)
+from rrtik_ompl.fast.row_kernels import NOTHING, ZERO, row_gap, rows_in_reach, squared
 
 
 @inlined

@@ -1,8 +1,8 @@
 """Batched collision checks on plain tables, many configurations at a time, with three answers.
 
-``FREE``: spheres that contain the moving bodies are clear of all they are checked against. ``COLLIDING``: spheres
-inside them hit. ``UNDECIDED``: neither; only an exact check can tell. Rounding is covered by a margin, so the first two
-answers are certain.
+``FREE``: spheres that contain the moving bodies, or convex solids that do, are clear of all they are checked against.
+``COLLIDING``: spheres inside them hit, or solids do. ``UNDECIDED``: neither; only an exact check can tell. Rounding is
+covered by a margin, so the first two answers are certain.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast import plain_distances
 from rrtik_ompl.fast.clearance import Clearance, rounded
-from rrtik_ompl.fast.layout import INNER_LAST, MARKS, OUTER_ROWS, UNDECIDED
+from rrtik_ompl.fast.layout import INNER_LAST, MARKS, OUTER_ROWS, STANDING_SOLIDS, UNDECIDED
 from rrtik_ompl.fast.library import library
 from rrtik_ompl.fast.packing import (
     ArmTables,
@@ -26,11 +26,13 @@ from rrtik_ompl.fast.packing import (
     arm_tables,
     checked_table,
     flag_places,
+    standing_solids,
     standing_tables,
 )
 from rrtik_ompl.fast.plain import PlainChecks
 from rrtik_ompl.fast.robot_tables import Spheres, Table, table
 from rrtik_ompl.fast.scene_tables import rows_table
+from rrtik_ompl.fast.solid_tables import NO_SOLIDS, Solids
 from rrtik_ompl.fast.workspace import probe_table, workspace
 from rrtik_ompl.robot import Chain
 
@@ -58,6 +60,7 @@ class FastWorld:
         outer: For each body spheres (x, y, z, r) in its own frame whose union contains it, shape (n, 4); none stand
             for the bounding ball.
         inner: For each body spheres inside it, shape (n, 4), possibly none.
+        solids: For each body convex solids around and inside it; None leaves what spheres cannot tell undecided.
         strokes: Largest value of sliding joints [m], a number or shape (joints,).
         like: A world of the same arm in another scene: what has not changed is not packed again.
         compiled: Whether to use the kernels; False for plain numpy.
@@ -74,6 +77,7 @@ class FastWorld:
         *,
         outer: Sequence[Spheres],
         inner: Sequence[Spheres],
+        solids: Sequence[Solids] | None = None,
         strokes: ArrayLike = STROKE,
         like: FastWorld | None = None,
         compiled: bool = True,
@@ -86,8 +90,9 @@ class FastWorld:
         moving = alike(bodies, kept)
         standing = [k for k in concerned if bodies[k].joint == 0]
         self._pairs = kept
+        solids = [NO_SOLIDS] * len(bodies) if solids is None else solids
         same = like._arm if like is not None and like._joints == self._joints else None
-        self._arm: ArmTables = arm_tables(chain, bodies, moving, kept, outer, inner, self._limits, same)
+        self._arm: ArmTables = arm_tables(chain, bodies, moving, kept, outer, inner, solids, self._limits, same)
         self._checked = checked_table(moving, standing, kept)
         self._rows = standing_tables(bodies, standing, self._checked, outer, inner)
         self._standing, self._outer, self._placed = standing, outer, PlacedRows()
@@ -98,7 +103,8 @@ class FastWorld:
         self.address = 0
         if self._kernels is not None:
             self._work = workspace(self._arm.arm, self._arm.balls, self._rows)
-            tables = (self._arm.arm, *self._arm.balls, *self._rows, self._work)
+            self._solids = standing_solids(bodies, standing, solids)
+            tables = (self._arm.arm, *self._arm.balls, *self._rows, self._work, self._arm.solids, self._solids)
             self._world = table({k: t.address for k, t in enumerate(tables)})
             self.address = self._world.address
             self._marks = self._work[MARKS]
@@ -119,6 +125,8 @@ class FastWorld:
         self._probe = None
         if self._kernels is not None:
             self._world.header[OUTER_ROWS : OUTER_ROWS + 2] = [rows.address for rows in self._rows]
+            self._solids = standing_solids(bodies, self._standing, [NO_SOLIDS] * len(bodies))
+            self._world.header[STANDING_SOLIDS] = self._solids.address  # the old ones stand where nothing is any more
             self._work[INNER_LAST][:] = -1  # what met last is there no more
 
     @property
@@ -220,7 +228,7 @@ class FastWorld:
         return np.where(pairs < 0, np.inf, found), pairs
 
     def undecided_pairs(self, V: ArrayLike) -> list[list[tuple[int, int]]]:
-        """For each row of joint values V, shape (m, joints), the pairs that the outer spheres cannot prove free.
+        """For each row of joint values V, shape (m, joints), the pairs that nothing here proves free.
 
         Raises:
             InputError: If V has the wrong shape or a value that is not finite.

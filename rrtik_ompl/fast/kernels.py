@@ -40,7 +40,6 @@ from rrtik_ompl.fast.layout import (
     INNER,
     INNER_LAST,
     INNER_ROWS,
-    MARKS,
     OUTER,
     OUTER_LAST,
     OUTER_ROWS,
@@ -51,6 +50,7 @@ from rrtik_ompl.fast.layout import (
 )
 from rrtik_ompl.fast.overlap import FRAME_BYTES, meets_itself, meets_surroundings, prepare, still_meets
 from rrtik_ompl.fast.row_kernels import along
+from rrtik_ompl.fast.settling import settle
 
 ALL_LANES = (1 << WIDTH) - 1
 
@@ -175,15 +175,19 @@ def load_row(world: int, rows: int, row: int, lane: int) -> None:
 
 @kernel
 def prove(world: int, rows: int, waiting: int, answers: int) -> None:
-    """Answer COLLIDING for those of the waiting rows whose inner balls meet something."""
+    """Answer what a second look finds for the rows that wait: by their inner balls, then by their solids."""
     queue = field(field(world, WORK), WAITING)
     for lane in range(WIDTH):
         load_row(world, rows, int_at(queue, min(lane, waiting - 1)), lane)
     move(field(world, ARM), field(world, WORK))
-    colliding = inner_meeting(world, ALL_LANES >> (WIDTH - waiting), waiting < 0)
+    wanted = ALL_LANES >> (WIDTH - waiting)
+    colliding, open_ = inner_meeting(world, wanted, waiting < 0), 0
+    if colliding != wanted:
+        open_, overlapping = settle(world, wanted & ~colliding)
+        colliding |= overlapping
     for lane in range(waiting):
-        if (colliding >> lane) & 1:
-            set_int(answers, int_at(queue, lane), COLLIDING)
+        answer = COLLIDING if (colliding >> lane) & 1 else UNDECIDED if (open_ >> lane) & 1 else FREE
+        set_int(answers, int_at(queue, lane), answer)
 
 
 @entry
@@ -235,13 +239,20 @@ def judge_part(world: int, start: int, end: int, last: int, first: int, count: i
             answer = COLLIDING
             break
         doubtful = outer_meeting(world, every, not proving)
-        if doubtful != 0:
+        if doubtful == 0:
+            continue
+        if not proving:
             answer = UNDECIDED
-            if not proving:
-                break
-            if inner_meeting(world, doubtful, proving) != 0:
-                answer = COLLIDING
-                break
+            break
+        if inner_meeting(world, doubtful, proving) != 0:
+            answer = COLLIDING
+            break
+        open_, overlapping = settle(world, doubtful)
+        if overlapping != 0:
+            answer = COLLIDING
+            break
+        if open_ != 0:
+            answer = UNDECIDED
     return answer
 
 
@@ -263,20 +274,13 @@ def classify_edges(world: int, starts: int, ends: int, steps: int, count: int, a
 
 @entry
 def mark_pairs(world: int, row: int, count: int) -> int:
-    """For up to ``WIDTH`` rows of joint values: in which of them the outer balls cannot prove a pair free, as bits.
-
-    The numbers of moving and standing bodies come first, then those of the pairs of moving bodies.
-    """
-    work, balls, rows = field(world, WORK), field(world, OUTER), field(world, OUTER_ROWS)
+    """For up to ``WIDTH`` rows of joint values: in which of them a pair is not proven free, as bits; see ``mark``."""
+    work, wanted = field(world, WORK), ALL_LANES >> (WIDTH - count)
     for lane in range(WIDTH):
         load_row(world, row, min(lane, count - 1), lane)
     move(field(world, ARM), work)
-    prepare(balls, work)
-    marks, wanted = field(work, MARKS), ALL_LANES >> (WIDTH - count)
-    crossing = field(balls, layout.BODY_COUNT) * field(rows, layout.STANDING_COUNT)
+    settle(world, wanted)
+    balls = field(world, OUTER)
+    crossing = field(balls, layout.BODY_COUNT) * field(field(world, OUTER_ROWS), layout.STANDING_COUNT)
     total: int = crossing + field(balls, layout.PAIR_COUNT)
-    for k in range(total):
-        set_int(marks, k, 0)
-    meets_surroundings(balls, rows, work, wanted, marks, count < 0, field(work, OUTER_LAST))
-    meets_itself(balls, work, wanted, marks + 4 * crossing, count < 0)
     return total

@@ -16,12 +16,14 @@ from rrtik_ompl.fast.robot_tables import (
     Spheres,
     Table,
     arm_table,
+    axis_turns,
     ball_table,
     moving_body,
     rounding_margin,
     usable_cover,
 )
 from rrtik_ompl.fast.scene_tables import Row, inner_rows, outer_rows, rows_table
+from rrtik_ompl.fast.solid_tables import Solids, solid_table
 from rrtik_ompl.robot import Chain
 
 
@@ -32,17 +34,20 @@ class ArmTables:
     bodies: tuple[Any, ...]
     sizes: tuple[int, ...]
     covers: tuple[Spheres, ...]
+    solids_of: tuple[Solids, ...]
     pairs: tuple[tuple[int, int], ...]
     strokes: Vector
     margin: float
     arm: Table
     balls: tuple[Table, Table]
+    solids: Table
 
     def serves(
         self,
         bodies: Sequence[Any],
         sizes: Sequence[int],
         covers: Sequence[Spheres],
+        solids_of: Sequence[Solids],
         pairs: Sequence[tuple[int, int]],
         strokes: Vector,
     ) -> bool:
@@ -50,6 +55,7 @@ class ArmTables:
         return (
             len(bodies) == len(self.bodies)
             and tuple(sizes) == self.sizes
+            and tuple(solids_of) == self.solids_of
             and tuple(pairs) == self.pairs
             and np.array_equal(strokes, self.strokes)
             and all(np.array_equal(a, b) for a, b in zip(covers, self.covers, strict=True))
@@ -80,6 +86,7 @@ def arm_tables(
     pairs: Sequence[tuple[int, int]],
     outer: Sequence[Spheres],
     inner: Sequence[Spheres],
+    solids: Sequence[Solids],
     limits: Vector,
     like: ArmTables | None,
 ) -> ArmTables:
@@ -88,7 +95,8 @@ def arm_tables(
     own = tuple(dict.fromkeys((place[i], place[j]) for i, j in map(sorted, pairs) if i in place and j in place))
     carried, sizes = tuple(bodies[k] for members in moving for k in members), tuple(map(len, moving))
     covers = tuple(np.asarray(s[k], dtype=np.float64) for members in moving for k in members for s in (outer, inner))
-    if like is not None and like.serves(carried, sizes, covers, own, limits):
+    solids_of = tuple(solids[k] for members in moving for k in members)
+    if like is not None and like.serves(carried, sizes, covers, solids_of, own, limits):
         return like
     reaches = [(bodies[k].joint, _reach(bodies[k], outer[k])) for members in moving for k in members]
     margin = rounding_margin(chain, reaches, limits)
@@ -96,7 +104,15 @@ def arm_tables(
         as_one([moving_body(chain, bodies[k], outer[k], inner[k], margin) for k in members]) for members in moving
     ]
     balls = (ball_table(packed, own, inner=False), ball_table(packed, own, inner=True))
-    return ArmTables(carried, sizes, covers, own, limits, margin, arm_table(chain), balls)
+    placed = [(bodies[m[0]].joint, [_carried(chain, bodies[k], solids[k], margin) for k in m]) for m in moving]
+    tables = (arm_table(chain), balls, solid_table(placed))
+    return ArmTables(carried, sizes, covers, solids_of, own, limits, margin, *tables)
+
+
+def _carried(chain: Chain, body: Any, solids: Solids, margin: float) -> Solids:
+    """A body's solids in the turned frame of its joint."""
+    turn = axis_turns(chain)[body.joint - 1].T
+    return solids.placed(turn @ np.array(body.placement.rotation), turn @ np.array(body.placement.translation), margin)
 
 
 def as_one(parts: Sequence[MovingBody]) -> MovingBody:
@@ -142,6 +158,12 @@ class PlacedRows:
             if known is None or known[0] is not bodies[k] or known[1] != rooms[k]:
                 self._known[k] = bodies[k], rooms[k], outer_rows(bodies[k], outer[k], rooms[k])
         return [(place, row) for place, k in enumerate(standing) for row in self._known[k][2]]
+
+
+def standing_solids(bodies: Sequence[Any], standing: Sequence[int], solids: Sequence[Solids]) -> Table:
+    """Solids of what stands still."""
+    poses = [(np.array(bodies[k].placement.rotation), np.array(bodies[k].placement.translation)) for k in standing]
+    return solid_table([(0, [solids[k].placed(*pose, 0.0)]) for k, pose in zip(standing, poses, strict=True)])
 
 
 def flag_places(

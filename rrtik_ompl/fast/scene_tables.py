@@ -29,6 +29,7 @@ from rrtik_ompl.fast.layout import (
     EXCLUDING,
     HALF_SPACE,
     NUMBERS,
+    OWN,
     PADDED_COUNT,
     PLANES,
     ROW_COUNT,
@@ -67,19 +68,24 @@ def needs_covers(body: Any) -> tuple[bool, bool]:
 
 
 def rows_table(rows: Sequence[tuple[int, Row]], checked: NDArray[np.bool_]) -> Table:
-    """Rows with the numbers of their standing bodies; ``checked`` has shape (moving bodies, standing bodies)."""
+    """Rows with the numbers of their standing bodies; ``checked`` has shape (moving bodies, standing bodies).
+
+    The kind of balls comes first, so that the last row of a body is the one with its formula, if it has one.
+    """
     ordered = sorted(rows, key=lambda item: item[1].kind)
     padded = -(-len(ordered) // LANE_PADDING) * LANE_PADDING
     boxes = np.empty((6, padded), dtype=np.float32)
     boxes[0::2], boxes[1::2] = ENDLESS, -ENDLESS
     floats = np.zeros((len(ordered), ROW_FLOATS), dtype=np.float32)
     numbers = np.zeros((len(ordered), 4), dtype=np.int32)
+    own = np.full(checked.shape[1], -1, dtype=np.int32)
     planes: list[Matrix] = [np.zeros((0, 4))]
     for k, (body, row) in enumerate(ordered):
         boxes[0::2, k] = np.nextafter(row.low.astype(np.float32), np.float32(-np.inf))
         boxes[1::2, k] = np.nextafter(row.high.astype(np.float32), np.float32(np.inf))
         floats[k, : len(row.numbers)] = row.numbers
         first = sum(len(p) for p in planes)
+        own[body] = k
         numbers[k] = row.kind, body, first, first + (0 if row.planes is None else len(row.planes))
         planes += [] if row.planes is None else [row.planes]
     return table(
@@ -93,6 +99,7 @@ def rows_table(rows: Sequence[tuple[int, Row]], checked: NDArray[np.bool_]) -> T
             STANDING_COUNT: checked.shape[1],
             CHECKED: checked.astype(np.int32),
             EXCLUDING: np.asarray((~checked).any(axis=1), dtype=np.int32),
+            OWN: own,
         }
     )
 

@@ -33,6 +33,7 @@ def workspace(arm: Table, balls: tuple[Table, ...], rows: tuple[Table, ...]) -> 
             layout.WAITING: np.zeros(WIDTH, dtype=np.int32),
             layout.OUTER_LAST: np.full(3, -1, dtype=np.int32),
             layout.INNER_LAST: np.full(3, -1, dtype=np.int32),
+            layout.NOTE: np.zeros(WIDTH, dtype=np.float32),
             layout.MARKS: np.zeros(crossing + most(balls, layout.PAIR_COUNT), dtype=np.int32),
         }
     )
