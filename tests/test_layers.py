@@ -34,7 +34,7 @@ LADDER = [
         "robot_entry",
     ),
     *("checks", "world", "path", "moves_text", "problem", "one_joint", "ik", "goal_configurations"),
-    *("moveit_messages", "motion_bench_maker", "problem_file", "ompl_bridge", "planning", "shortening"),
+    *("moveit_messages", "motion_bench_maker", "problem_file", "ompl_bridge", "planning", "shortening", "scenarios"),
     *("trajectory", "plot", "plot_tree", "viewer", "report", "terminal", "motion_commands", "cli", "command"),
 ]
 
