@@ -15,6 +15,7 @@ from typing import TypeAlias
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.shortening.axis import double_axis_cut
 from rrtik_ompl.shortening.move_lattice import MoveLattice
 from rrtik_ompl.shortening.move_values import Values, lattice_size, near_values, values_of, with_spread
 from rrtik_ompl.shortening.questions import MotionsFree, OutOfTime, Questions, Stop, never
@@ -143,6 +144,8 @@ class MoveSearch:
             return
         self._ask.stop = stop
         with suppress(OutOfTime):
+            if not self.proven:
+                self._offers = [self._cut(offered) for offered in self._offers]
             for joint in self._movable:
                 self._free_values([joint])
             for offered in self._offers:
@@ -155,9 +158,19 @@ class MoveSearch:
                 self.rounds += 1
                 self._free_values(joints)
                 if self.route is not None:
+                    self._cut(self.route, self._rng.permutation(self.route.shape[1]).tolist())
                     self._around(self.route)
             self._other_orders()
             self._less_travel()
+
+    def _cut(self, route: Matrix, axes: Sequence[int] | None = None) -> Matrix:
+        """The published double axis cut of a route: on long ones it gains much more in a second than a lattice does."""
+        found = double_axis_cut(route, lambda a, b: bool(self._ask(a[None], b[None])[0]), axes=axes)
+        if not self._confirmed(found, route):
+            return route
+        if self._rank(found) < self._rank(self.route):
+            self.route = found
+        return found
 
     def _rearrange(self, route: Matrix) -> None:
         """The best route that the values of a route allow; part by part if they are many."""
