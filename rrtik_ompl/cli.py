@@ -53,6 +53,7 @@ class Shorten(str, Enum):
     random = "random"
     shortcut = "shortcut"
     retraction = "retraction"
+    corners = "corners"
     ompl = "ompl"
     fewest_moves = "fewest-moves"
     none = "none"

@@ -12,6 +12,7 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.cli import Shorten
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.shortening import METHODS, Task
+from rrtik_ompl.shortening.corners import snap_corners
 from rrtik_ompl.shortening.random_cut import random_cut
 from rrtik_ompl.shortening.retraction import retract
 from rrtik_ompl.shortening.sequential import sequential_cut
@@ -60,11 +61,23 @@ def wandering(seed, *, one_joint=False, count=40):
     raise AssertionError
 
 
-METHODS_ON_ARRAYS = {"sequential": sequential_cut, "random": random_cut, "retraction": retract}
+METHODS_ON_ARRAYS = {
+    "sequential": sequential_cut,
+    "random": random_cut,
+    "retraction": retract,
+    "corners": snap_corners,
+}
 
 
-@pytest.mark.parametrize("one_joint", [False, True])
-@pytest.mark.parametrize("name", METHODS_ON_ARRAYS)
+@pytest.mark.parametrize(
+    ("name", "one_joint"),
+    [
+        (name, asked)
+        for name in METHODS_ON_ARRAYS
+        for asked in (False, True)
+        if METHODS[name].can_keep_moves or not asked
+    ],
+)
 def test_a_shortened_route_is_free_and_shorter_with_the_same_ends(name, one_joint):
     gains = []
     for seed in range(10):
@@ -80,7 +93,7 @@ def test_a_shortened_route_is_free_and_shorter_with_the_same_ends(name, one_join
     assert np.median(gains) > 0
 
 
-@pytest.mark.parametrize("name", ["sequential", "retraction"])
+@pytest.mark.parametrize("name", ["sequential", "retraction", "corners"])
 def test_methods_without_chance_give_the_same_route_again(name):
     route = wandering(3)
     first, second = (METHODS_ON_ARRAYS[name](route, Task(Plane(), seed=seed)) for seed in (1, 2))
@@ -279,3 +292,34 @@ def test_retraction_meets_its_published_quality(name, planes):
         found = retract(route, Task(plane), step=1.0)
         assert 1.0 - 1e-4 < route_length(found) / plane.class_optimum(route) < 1.06
         assert all(plane.free(a, b) for a, b in pairwise(found))
+
+
+@pytest.mark.parametrize("name", ["three polygons", "two Ls", "disc robot"])
+def test_corners_come_nearer_to_the_shortest_route_than_the_finest_retraction_and_ask_less(name, planes):
+    plane = planes["PUBLISHED"][name]()
+    ratios, asked = [], []
+    for seed in range(6):
+        route = planes["sampled_route"](plane, seed)
+        best, tasks = plane.class_optimum(route), [Task(plane), Task(plane)]
+        found = snap_corners(route, tasks[0]), retract(route, tasks[1], step=0.1)
+        assert all(plane.free(a, b) for a, b in pairwise(found[0]))
+        ratios.append([route_length(rows) / best for rows in found])
+        asked.append([task.asked + task.confirmed_again for task in tasks])
+    assert np.mean(ratios, axis=0)[0] < 1.0007
+    assert np.max(ratios, axis=0)[0] < 1.005
+    assert np.mean(asked, axis=0)[0] < np.mean(asked, axis=0)[1]
+
+
+class Grazed(Plane):
+    """Refuses short motions: parts of free motions may collide, as with checks at a finite density."""
+
+    def free(self, a, b):
+        return np.linalg.norm(b - a) > 0.3 and super().free(a, b)
+
+
+def test_corners_are_snapped_with_care_where_parts_of_free_motions_are_not_free():
+    plane, route = Grazed(), wandering(3)
+    found, given = snap_corners(route, Task(plane)), {row.tobytes() for row in route}
+    for a, b in pairwise(found):
+        assert plane.free(a, b) or {a.tobytes(), b.tobytes()} <= given
+    assert route_length(found) < route_length(route)

@@ -63,8 +63,8 @@ class _Corners:
 
     def pulled(self, route: Matrix) -> Matrix:
         """Rounds of pulling and cutting, until the chords gain nothing more."""
-        rows = self._few(list(route))
-        share = FIRST_GAIN
+        rows, share = self._few(list(route)), FIRST_GAIN
+        self.task.report(np.array(rows))
         for number in range(ROUNDS):
             if self.task.expired():
                 break

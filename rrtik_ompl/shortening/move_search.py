@@ -26,6 +26,7 @@ DIGITS = 9  # of the travel after the point; the rest is rounding
 MOST_FREE = 3  # joints with free values in one lattice
 WIDTHS = 0.1 * 0.5 ** np.arange(0, 16, 3)  # of the search for less travel, shares of a joint's range
 NEAR_NODES = 512  # of a lattice close to a route
+CUTS = 3  # in random orders, in every round
 SPARE = 8  # configurations for each of a known part when further values come in
 REPEATS = 8  # of a search for less travel at the same width
 NONE = 2**31  # moves, if there is no route
@@ -146,6 +147,7 @@ class MoveSearch:
         with suppress(OutOfTime):
             if not self.proven:
                 self._offers = [self._cut(offered) for offered in self._offers]
+                self._cut_again()
             for joint in self._movable:
                 self._free_values([joint])
             for offered in self._offers:
@@ -157,8 +159,8 @@ class MoveSearch:
                     break
                 self.rounds += 1
                 self._free_values(joints)
+                self._cut_again()
                 if self.route is not None:
-                    self._cut(self.route, self._rng.permutation(self.route.shape[1]).tolist())
                     self._around(self.route)
             self._other_orders()
             self._less_travel()
@@ -171,6 +173,12 @@ class MoveSearch:
         if self._rank(found) < self._rank(self.route):
             self.route = found
         return found
+
+    def _cut_again(self) -> None:
+        """Further cuts of the best route, joints in random orders."""
+        for _ in range(CUTS):
+            if self.route is not None and not self.proven:
+                self._cut(self.route, self._rng.permutation(self.route.shape[1]).tolist())
 
     def _rearrange(self, route: Matrix) -> None:
         """The best route that the values of a route allow; part by part if they are many."""
