@@ -24,7 +24,7 @@ from rrtik_ompl.problem import Problem
 
 PUBLISHED = 4.90  # [rad], median after simplification; of VAMP, whose path before it has 7.76
 LIMIT = 10.0  # [s] of a plan
-METHODS = ("retraction", "corners", "shortcut", "ompl")  # beside auto, without a limit of time
+METHODS = ("corners", "ompl")  # beside auto, without a limit of time
 CONVERTED = 5  # problems of each family whose paths are turned into single-joint moves
 
 

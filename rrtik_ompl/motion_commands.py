@@ -66,7 +66,8 @@ def time_path(
     """Give a path its times, under the robot's limits or those given."""
     check_target(out, TRAJECTORY_FORMATS)
     check_target(plot, PLOT_FORMATS)
-    given = {"velocity": _rates(velocity), "acceleration": _rates(acceleration), "jerk": _rates(jerk)}
+    texts = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
+    given = {name: _rates(name, text) for name, text in texts.items()}
     import numpy as np
 
     from rrtik_ompl import RateLimits, load_path, load_problem, plot_joints, report, timed
@@ -117,14 +118,14 @@ def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> Any:
     return route
 
 
-def _rates(text: str | None) -> list[float] | None:
+def _rates(name: str, text: str | None) -> list[float] | None:
     """Numbers with commas between them, or one alone."""
     if text is None:
         return None
     try:
         return [float(word) for word in text.split(",")]
     except ValueError:
-        raise InputError(f"expected a number, or numbers with commas between them, got '{text}'") from None
+        raise InputError(f"--{name}: expected a number, or numbers with commas between them, got '{text}'") from None
 
 
 def _scaled(row: list[float], factors: Any) -> Any:

@@ -203,7 +203,11 @@ class JointPath:
                 or ``resolution`` is not positive.
         """
         require(world, World, "world of a path's check")
-        rows = finite_array(self.waypoints, (None, world.robot.dof), f"path for robot '{world.robot.name}'")
+        rows, robot = self.waypoints, world.robot
+        if rows.shape[1] != robot.dof:
+            raise InputError(
+                f"path of {rows.shape[1]} joints: robot '{robot.name}' has {robot.dof}; it is another robot's"
+            )
         half = world.motion_resolution / SECOND_CHECK
         fine = half if resolution is None else float(finite_array(resolution, (), "resolution"))
         if fine <= 0.0:

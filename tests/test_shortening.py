@@ -11,6 +11,7 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.cli import Shorten
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.path import JointPath
 from rrtik_ompl.shortening import METHODS, Task
 from rrtik_ompl.shortening.corners import snap_corners
 from rrtik_ompl.shortening.random_cut import random_cut
@@ -247,6 +248,8 @@ def test_requests_that_make_no_sense_are_refused_in_one_line(problem, raw, raw_m
         (lambda: rrtik.shorten(raw[0], problem, seconds=0.0), "seconds must be greater than 0"),
         (lambda: rrtik.shorten(raw[0], problem, seconds=float("nan")), "seconds"),
         (lambda: rrtik.shorten(single, problem), "one waypoint"),
+        (lambda: rrtik.shorten(raw[0], problem, method="random", seed=-1), "seed must be a whole number"),
+        (lambda: rrtik.shorten(JointPath([[0.0], [1.0]]), problem), "path of 1 joints: robot 'planar' has 3"),
         (lambda: rrtik.shorten(raw[0], problem, one_joint=True), "several joints"),
         (lambda: rrtik.shorten(raw_moves[0], problem, method="ompl", one_joint=True), "cannot keep one joint"),
     ):

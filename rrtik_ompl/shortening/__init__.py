@@ -112,10 +112,10 @@ def shorten(
 
     Raises:
         UnknownNameError: If there is no such method.
-        InputError: If the path is not valid for the problem or has one waypoint, the time is not positive, or the
-            method cannot do what is asked.
+        InputError: If the path is not valid for the problem or has one waypoint, the time is not positive, the seed
+            is negative, or the method cannot do what is asked.
     """
-    chosen = _checked(path, problem, method, seconds, one_joint)
+    chosen = _checked(path, problem, method, seconds, seed, one_joint)
     end = time.monotonic() + (np.inf if seconds is None else float(seconds))
     listener = None if on_better is None else lambda rows: on_better(path.with_waypoints(rows))
     # What is as short as can be touches what it goes round, so most methods check as densely as the second check.
@@ -132,7 +132,9 @@ def shorten(
     return path
 
 
-def _checked(path: JointPath, problem: Problem, method: str, seconds: float | None, one_joint: bool) -> Method:
+def _checked(
+    path: JointPath, problem: Problem, method: str, seconds: float | None, seed: int, one_joint: bool
+) -> Method:
     """The method, if the request makes sense."""
     require(path, JointPath, "path to shorten", "a plan has one if plan.found")
     require(problem, Problem, "problem of a path to shorten")
@@ -140,6 +142,8 @@ def _checked(path: JointPath, problem: Problem, method: str, seconds: float | No
         raise UnknownNameError("shortening method", method, METHODS)
     if seconds is not None and float(finite_array(seconds, (), "seconds")) <= 0.0:
         raise InputError(f"seconds must be greater than 0, got {seconds:g}")
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise InputError(f"seed must be a whole number of at least 0, got {seed!r}")
     if len(path.waypoints) < 2:
         raise InputError("path to shorten: it has one waypoint, so there is nothing to shorten")
     faults = path.violations(problem.world)
