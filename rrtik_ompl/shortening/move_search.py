@@ -26,7 +26,7 @@ DIGITS = 9  # of the travel after the point; the rest is rounding
 MOST_FREE = 3  # joints with free values in one lattice
 WIDTHS = 0.1 * 0.5 ** np.arange(0, 16, 3)  # of the search for less travel, shares of a joint's range
 NEAR_NODES = 512  # of a lattice close to a route
-CUTS = 3  # in random orders, in every round
+CUTS = 3  # in random orders, without gain, in every round
 SPARE = 8  # configurations for each of a known part when further values come in
 REPEATS = 8  # of a search for less travel at the same width
 NONE = 2**31  # moves, if there is no route
@@ -175,10 +175,12 @@ class MoveSearch:
         return found
 
     def _cut_again(self) -> None:
-        """Further cuts of the best route, joints in random orders."""
-        for _ in range(CUTS):
-            if self.route is not None and not self.proven:
-                self._cut(self.route, self._rng.permutation(self.route.shape[1]).tolist())
+        """Further cuts of the best route, joints in random orders, until several in a row gain no move."""
+        idle = 0
+        while self.route is not None and not self.proven and idle < CUTS:
+            before = self.moves
+            self._cut(self.route, self._rng.permutation(self.route.shape[1]).tolist())
+            idle = idle + 1 if self.moves == before else 0
 
     def _rearrange(self, route: Matrix) -> None:
         """The best route that the values of a route allow; part by part if they are many."""
