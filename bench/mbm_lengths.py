@@ -86,27 +86,15 @@ def table(report: Report, results: list[Measured]) -> None:
     report.table("Median length [rad] and time [s]", ["family", "problems", *names], rows)
 
 
-def main() -> int:
-    """Measure and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--problems", type=int, default=20, help="of each family")
-    parser.add_argument("--seconds", type=float, default=0.2, help="for auto")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "reports" / "mbm_lengths.md")
-    options = parser.parse_args()
-    results = []
-    for family in sorted(path for path in (options.folder / "problems").glob("*") if path.is_dir()):
-        scenes = sorted(family.glob("scene*.yaml"))
-        chosen = [scenes[k * len(scenes) // options.problems] for k in range(min(options.problems, len(scenes)))]
-        results += measured(chosen, options.folder / "panda.urdf", options.seconds)
+def page(results: list[Measured], seconds: float) -> Report:
+    """The report."""
     report = Report("Lengths of the Panda's MotionBenchMaker problems", "python bench/mbm_lengths.py FOLDER")
     median = float(np.median([r.lengths["auto"] for r in results]))
-    what = f"median length after auto, {options.seconds:g} s, {len(results)} problems"
+    what = f"median length after auto, {seconds:g} s, {len(results)} problems"
     report.bar(what, f"<= {PUBLISHED:.2f} rad", f"{median:.3f} rad", median <= PUBLISHED)
     faults = sum(r.faults for r in results)
     report.bar("shortened paths pass the dense check and are not longer", "all", f"{faults} faults", faults == 0)
-    done = [r for r in results if r.moves is not None]
-    refused = [r for r in results if r.refused]
+    done, refused = [r for r in results if r.moves is not None], [r for r in results if r.refused]
     whole = all(r.whole for r in done)
     text = f"{len(done)} of {len(done) + len(refused)} ({'all' if whole else 'NOT all'} sound)"
     report.bar("paths turned into single-joint moves", "all", text, whole and not refused)
@@ -119,6 +107,23 @@ def main() -> int:
     report.note("Single-joint moves", " ".join([text, *(f"{r.family}: {r.refused}." for r in refused)]))
     text = "RRT-Connect (`fastrrtconnect`, seed 0) on the exact meshes, then each method; wall clock, checks included."
     report.note("What was done", text)
+    return report
+
+
+def main() -> int:
+    """Measure and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--problems", type=int, default=20, help="of each family")
+    parser.add_argument("--seconds", type=float, default=0.2, help="for auto")
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "reports" / "mbm_lengths.md")
+    options = parser.parse_args()
+    results: list[Measured] = []
+    for family in sorted(path for path in (options.folder / "problems").glob("*") if path.is_dir()):
+        scenes = sorted(family.glob("scene*.yaml"))
+        chosen = [scenes[k * len(scenes) // options.problems] for k in range(min(options.problems, len(scenes)))]
+        results += measured(chosen, options.folder / "panda.urdf", options.seconds)
+    report = page(results, options.seconds)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     options.out.write_text(report.markdown(), encoding="utf-8")
     print(report.markdown())
