@@ -223,6 +223,9 @@ def main() -> int:
     lines += ["questions are motions asked about (for retraction with those of its last check); CPU time.", ""]
     lines += [*world_table(worlds), "", "| bar | wanted | measured | holds |", "|---|---|---|---|"]
     lines += [f"| {what} | {bar} | {value} | {'yes' if holds else 'NO'} |" for what, bar, value, holds in rows]
+    asked, prototype = ([f"{n:.0f}" for n in row] for row in ([w.asked["corners"].mean() for w in worlds], PROTOTYPE))
+    lines += ["", f"The page's prototype of retraction / 10 asked {', '.join(prototype)} times, on routes of its own;"]
+    lines += [f"corners ask {', '.join(asked)} times here."]
     lines += ["", "TITAN-4 at the SDU, paths of RRT-Connect, `shorten()` with both checks:", ""]
     lines += ["| method | mean length [rad] | ms | faults |", "|---|---|---|---|", *arm]
     lines += ["", "Made by `python bench/shortening_report.py`."]
