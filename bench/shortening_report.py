@@ -220,7 +220,10 @@ def main() -> int:
     lines = ["# Shortening: published methods against the shortest route of the class", ""]
     lines += [f"{options.paths} routes of RRT-Connect (step {STEP:g}) in each of three worlds of 26 x 20, two in each"]
     lines += [f"of {options.worlds} generated ones; seeds 0, 1, ... Ratio to the exact shortest route of the class;"]
-    lines += ["questions are motions asked about (for retraction with those of its last check); CPU time.", ""]
+    lines += [
+        "questions are motions asked about (of retraction and corners those of the last check too); CPU time.",
+        "",
+    ]
     lines += [*world_table(worlds), "", "| bar | wanted | measured | holds |", "|---|---|---|---|"]
     lines += [f"| {what} | {bar} | {value} | {'yes' if holds else 'NO'} |" for what, bar, value, holds in rows]
     asked, prototype = ([f"{n:.0f}" for n in row] for row in ([w.asked["corners"].mean() for w in worlds], PROTOTYPE))
