@@ -377,6 +377,9 @@ def test_a_long_route_is_cut_before_anything_takes_long() -> None:
     most, looks = next(asked) + 100, count()  # looks at the clock: one at least for every motion of the cut
     found = fewest_moves(route, problem.world, stop=lambda: next(looks) > most)
     assert found.moves <= transitions(cut) < 0.5 * transitions(route)
+    half = count()
+    found = fewest_moves(route, problem.world, stop=lambda: next(half) > most // 2)
+    assert found.moves < transitions(route)  # a cut that is broken off is kept as far as it has come
 
 
 @pytest.mark.parametrize("seed", range(2))

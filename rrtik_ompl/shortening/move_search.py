@@ -15,10 +15,10 @@ from typing import TypeAlias
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.shortening.axis import double_axis_cut
 from rrtik_ompl.shortening.move_lattice import MoveLattice
 from rrtik_ompl.shortening.move_values import Values, lattice_size, near_values, values_of, with_spread
 from rrtik_ompl.shortening.questions import MotionsFree, OutOfTime, Questions, Stop, never
+from rrtik_ompl.shortening.timely_cut import timely_cut
 from rrtik_ompl.transitions import lower_bound, merge_moves, transitions
 
 MOST_NODES = 4096  # of a lattice: some milliseconds in the kernels
@@ -167,8 +167,11 @@ class MoveSearch:
 
     def _cut(self, route: Matrix, axes: Sequence[int] | None = None) -> Matrix:
         """The published double axis cut of a route: on long ones it gains much more in a second than a lattice does."""
-        found = double_axis_cut(route, lambda a, b: bool(self._ask(a[None], b[None])[0]), axes=axes)
-        if not self._confirmed(found, route):
+        found = timely_cut(route, self._ask, axes)
+        stop, self._ask.stop = self._ask.stop, never
+        confirmed = self._confirmed(found, route)
+        self._ask.stop = stop
+        if not confirmed:
             return route
         if self._rank(found) < self._rank(self.route):
             self.route = found
@@ -178,6 +181,8 @@ class MoveSearch:
         """Further cuts of the best route, joints in random orders, until several in a row gain no move."""
         idle = 0
         while self.route is not None and not self.proven and idle < CUTS:
+            if self._ask.stop():
+                raise OutOfTime
             before = self.moves
             self._cut(self.route, self._rng.permutation(self.route.shape[1]).tolist())
             idle = idle + 1 if self.moves == before else 0
