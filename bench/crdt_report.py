@@ -33,6 +33,7 @@ CASE_A = (
     "best route found has {best} moves. Beside the case as proposed, the same one with both squares 10 mm outwards in "
     "x and y is measured, in which the optimum of 3 is real."
 )
+MORE_RUNS = {"titan4_sdu": 5}  # times as many: its bars count groups of five runs
 RAW, ONCE, TWICE, ROUNDS = range(4)
 
 
@@ -165,8 +166,11 @@ def sdu_bars(report: Report, sdu: Measured) -> None:
     mean = sdu.moves[:, TWICE].mean()
     report.bar("SDU: mean transitions after the double pass", "<= 7.5", f"{mean:.2f}", bool(mean <= 7.5))
     _share_bar(report, "SDU: best of 5 double passes is 6 or better", sdu.best_at_optimum(TWICE, 5), 0.95)
-    unused = share(best_of_groups(sdu.runs, TWICE, 5), lambda route: 6 not in joints_of(route))
-    _share_bar(report, "SDU: joint 6 unused in the best of 5", unused, 1.0)
+    groups = best_of_groups(sdu.runs, TWICE, 5)
+    best = [route for route in groups if transitions(route) <= OPTIMA[sdu.name]]
+    unused, everywhere = (share(routes, lambda route: 6 not in joints_of(route)) for routes in (best, groups))
+    text = f"{100 * unused:.1f} % (of all {len(groups)} groups {100 * everywhere:.1f} %)"
+    report.bar("SDU: joint 6 unused in the best of 5 where that has 6 moves", "always", text, unused == 1.0)
 
 
 def prism_bars(report: Report, prisms: Measured) -> None:
@@ -211,7 +215,8 @@ def main() -> None:
     environment_e(report, rrtik.load_problem("env_e"), count)
     for name in OPTIMA:
         problem = case_a_with_room(rrtik.load_problem("planar3_a")) if name == WITH_ROOM else rrtik.load_problem(name)
-        runs = [route_run(problem, seed) for seed in range(count if name == "env_e" else arm_count)]
+        most = count if name == "env_e" else arm_count * MORE_RUNS.get(name, 1)
+        runs = [route_run(problem, seed) for seed in range(most)]
         measured[name] = Measured(name, problem, runs)
     route_bars(report, measured)
     routes_table(report, list(measured.values()))

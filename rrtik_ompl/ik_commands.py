@@ -115,7 +115,7 @@ def _posture(asked: Asked, near: str | None, near_deg: str | None) -> Any:
         return asked.near
     import numpy as np
 
-    q = asked.robot.configuration(comma_numbers(near_deg), "--near-deg")
+    q = asked.robot.configuration(comma_numbers(near_deg, "--near-deg"), "--near-deg")
     return np.where(asked.robot.prismatic, q, np.radians(q))
 
 

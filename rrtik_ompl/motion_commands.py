@@ -35,7 +35,7 @@ def list_moves(
     if as_csv + as_json + spoken > 1:
         raise InputError("give one of --csv, --json and --spoken, not several")
     check_target(out, PATH_FORMATS)
-    route, robot = _path_of_moves(path, problem, shorten)
+    route = _path_of_moves(path, problem, shorten)
     if out is not None:
         route.save(out)
     from rrtik_ompl import moves_text, report
@@ -45,8 +45,7 @@ def list_moves(
     elif as_json:
         print(json.dumps({"robot": route.robot_name, "moves": moves_text.moves_document(route)}))
     elif spoken:
-        endless = () if robot is None else [n for n, c in zip(robot.joint_names, robot.continuous, strict=True) if c]
-        say(*moves_text.spoken_moves(route, continuous=endless))
+        say(*moves_text.spoken_moves(route))
     else:
         say(report.moves_table(route), f"{route.transitions} moves, length {route.length:.2f} {route.unit}")
     return 0
@@ -68,7 +67,7 @@ def time_path(
     check_target(out, TRAJECTORY_FORMATS)
     check_target(plot, PLOT_FORMATS)
     texts = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
-    given = {name: None if text is None else comma_numbers(text) for name, text in texts.items()}
+    given = {name: None if text is None else comma_numbers(text, f"--{name}") for name, text in texts.items()}
     import numpy as np
 
     from rrtik_ompl import RateLimits, load_path, load_problem, plot_joints, report, timed
@@ -97,8 +96,8 @@ def time_path(
     return 0
 
 
-def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> tuple[Any, Any]:
-    """The path as single-joint moves, and the robot if the problem says it."""
+def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> Any:
+    """The path as single-joint moves."""
     from rrtik_ompl import load_path, load_problem, one_joint_moves
     from rrtik_ompl.shortening import shorten as shortened
 
@@ -108,7 +107,7 @@ def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> tupl
             raise InputError("--shorten needs to know what stands in the way: give --problem too")
         if not route.one_joint_at_a_time:
             raise InputError(f"{path}: moves several joints at once; give --problem NAME, and it is converted")
-        return route, None
+        return route
     question = load_problem(problem)
     route = load_path(path, question.robot)
     with progress("converting"):
@@ -116,7 +115,7 @@ def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> tupl
             route = one_joint_moves(route, question)
         if shorten is not None:
             route = shortened(route, question, method=shorten)
-    return route, question.robot
+    return route
 
 
 def _scaled(row: list[float], factors: Any) -> Any:

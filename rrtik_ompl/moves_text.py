@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -44,29 +43,28 @@ def moves_document(path: JointPath) -> list[dict[str, Any]]:
     return [{"joint": m.joint, "from": m.start, "to": m.end, "unit": m.unit} for m in path.moves()]
 
 
-def spoken_moves(path: JointPath, *, continuous: Collection[str] = ()) -> list[str]:
+def spoken_moves(path: JointPath) -> list[str]:
     """One sentence per move, to be read aloud to a pilot: "joint 2 up 36 degrees to 55".
 
-    A joint with limits goes up and down (to larger and to smaller values), a sliding joint goes out and in, a joint
-    without limits turns forward and back.
-
-    Args:
-        path: A path that moves one joint at a time.
-        continuous: Names of the joints without limits.
+    A joint with limits goes up and down (to larger and to smaller values), a sliding joint goes out and in. A joint
+    without limits turns forward and back, and is told where it stops as an angle from minus 180 to 180 degrees.
 
     Raises:
         InputError: If the path does not move one joint at a time.
     """
-    return [_sentence(move, move.joint in continuous) for move in path.moves()]
+    return [_sentence(move) for move in path.moves()]
 
 
-def _sentence(move: Move, endless: bool) -> str:
+def _sentence(move: Move) -> str:
+    end = move.end
     if move.unit == "m":
         words, unit, factor = ("out", "in"), "millimetres", 1e3
     else:
-        words, unit, factor = (("forward", "back") if endless else ("up", "down")), "degrees", float(np.rad2deg(1.0))
+        words, unit, factor = ("up", "down"), "degrees", float(np.rad2deg(1.0))
+    if move.continuous:
+        words, end = ("forward", "back"), float(np.remainder(end + np.pi, 2.0 * np.pi) - np.pi)
     word = words[0] if move.change > 0.0 else words[1]
-    far, target = _rounded(factor * abs(move.change)), _rounded(factor * move.end)
+    far, target = _rounded(factor * abs(move.change)), _rounded(factor * end)
     return f"{_said(move.joint)} {word} {far} {unit} to {target.replace('-', 'minus ')}"
 
 

@@ -31,12 +31,14 @@ class Move(NamedTuple):
         joint: Its name.
         start, end: Its values before and after.
         unit: Of the values, "rad" or "m".
+        continuous: Whether the joint has no limits, so that a whole turn more is the same posture.
     """
 
     joint: str
     start: float
     end: float
     unit: str = "rad"
+    continuous: bool = False
 
     @property
     def change(self) -> float:
@@ -68,12 +70,14 @@ class JointPath:
         joint_names: Names of the n joints.
         prismatic: Which joints slide, shape (n,).
         robot_name: Name of the robot it is for, or "".
+        continuous: Which joints turn without limits, shape (n,).
     """
 
     waypoints: Matrix
     joint_names: tuple[str, ...]
     prismatic: Mask
-    robot_name: str = ""
+    robot_name: str
+    continuous: Mask
 
     def __init__(
         self,
@@ -81,6 +85,7 @@ class JointPath:
         joint_names: Iterable[str] | None = None,
         prismatic: ArrayLike | None = None,
         robot_name: str = "",
+        continuous: ArrayLike | None = None,
     ) -> None:
         rows = finite_array(waypoints, (None, None), "path waypoints")
         if rows.size == 0:
@@ -91,13 +96,15 @@ class JointPath:
             )
         count = rows.shape[1]
         names = tuple(f"joint{k + 1}" for k in range(count)) if joint_names is None else tuple(joint_names)
-        sliding = np.zeros(count, dtype=bool) if prismatic is None else np.asarray(prismatic, dtype=bool)
-        if len(names) != count or sliding.shape != (count,):
+        kinds = (prismatic, continuous)
+        sliding, endless = (np.zeros(count, dtype=bool) if k is None else np.asarray(k, dtype=bool) for k in kinds)
+        if not len(names) == count == sliding.size == endless.size:
             raise InputError(f"path: waypoints have {count} columns, but {len(names)} joint names were given")
         object.__setattr__(self, "waypoints", frozen(rows))
         object.__setattr__(self, "joint_names", names)
         object.__setattr__(self, "prismatic", frozen(sliding, bool))
         object.__setattr__(self, "robot_name", robot_name)
+        object.__setattr__(self, "continuous", frozen(endless, bool))
 
     def __repr__(self) -> str:
         k, n = self.waypoints.shape
@@ -113,11 +120,11 @@ class JointPath:
         """
         require(robot, Robot, "robot of a path")
         rows = finite_array(waypoints, (None, robot.dof), f"path waypoints of robot '{robot.name}'")
-        return cls(rows, robot.joint_names, robot.prismatic, robot.name)
+        return cls(rows, robot.joint_names, robot.prismatic, robot.name, robot.continuous)
 
     def with_waypoints(self, waypoints: ArrayLike) -> JointPath:
         """The same joints, other waypoints."""
-        return JointPath(waypoints, self.joint_names, self.prismatic, self.robot_name)
+        return JointPath(waypoints, self.joint_names, self.prismatic, self.robot_name, self.continuous)
 
     @property
     def start(self) -> Vector:
@@ -170,7 +177,8 @@ class JointPath:
         units = ["m" if sliding else "rad" for sliding in self.prismatic]
         joints = changes.argmax(axis=1)
         return tuple(
-            Move(self.joint_names[j], float(rows[i, j]), float(rows[i + 1, j]), units[j]) for i, j in enumerate(joints)
+            Move(self.joint_names[j], float(rows[i, j]), float(rows[i + 1, j]), units[j], bool(self.continuous[j]))
+            for i, j in enumerate(joints)
         )
 
     def resample(self, step: float) -> JointPath:
@@ -195,7 +203,11 @@ class JointPath:
                 or ``resolution`` is not positive.
         """
         require(world, World, "world of a path's check")
-        rows = finite_array(self.waypoints, (None, world.robot.dof), f"path for robot '{world.robot.name}'")
+        rows, robot = self.waypoints, world.robot
+        if rows.shape[1] != robot.dof:
+            raise InputError(
+                f"path of {rows.shape[1]} joints: robot '{robot.name}' has {robot.dof}; it is another robot's"
+            )
         half = world.motion_resolution / SECOND_CHECK
         fine = half if resolution is None else float(finite_array(resolution, (), "resolution"))
         if fine <= 0.0:
@@ -228,6 +240,7 @@ class JointPath:
             "robot": self.robot_name,
             "joint_names": list(self.joint_names),
             "units": ["m" if sliding else "rad" for sliding in self.prismatic],
+            "continuous": [name for name, endless in zip(self.joint_names, self.continuous, strict=True) if endless],
             "length": self.length,
             "transitions": self.transitions,
             "waypoints": self.waypoints.tolist(),
@@ -258,9 +271,11 @@ def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> Joint
     ending = path_format(path)
     try:
         document = decoded(read_text(path), ending)
-        units, name = document.get("units"), str(document.get("robot", ""))
+        names, name = document.get("joint_names"), str(document.get("robot", ""))
+        units, endless = document.get("units"), document.get("continuous")
         sliding = None if units is None else [unit == "m" for unit in units]
-        found = JointPath(document["waypoints"], document.get("joint_names"), sliding, name)
+        turning = None if names is None or endless is None else [joint in endless for joint in names]
+        found = JointPath(document["waypoints"], names, sliding, name, turning)
         return found if robot is None else _fitted(found, robot)
     except InputError as error:
         raise error if str(error).startswith(str(path)) else InputError(f"{path}: {error}") from None

@@ -39,7 +39,7 @@ def encoded(document: dict[str, Any], ending: str) -> str:
 
 
 def decoded(text: str, ending: str) -> dict[str, Any]:
-    """What :func:`encoded` wrote: ``waypoints``, and ``joint_names``, ``units`` and ``robot`` if the text says them.
+    """What :func:`encoded` wrote: ``waypoints``, and ``joint_names``, ``units`` and so on if the text says them.
 
     Raises:
         InputError: If the text is malformed; the message names the line or the key.
@@ -74,10 +74,11 @@ def _check_heads(document: dict[str, Any], kind: str) -> None:
     for key, expected in (("version", 1), ("kind", kind)):
         if document.get(key, expected) != expected:
             raise InputError(f"{key}: expected {expected!r}, got {document[key]!r}")
-    for key in ("units", "joint_names"):
+    for key in ("units", "joint_names", "continuous"):
         words = document.get(key)
         if words is not None and not (isinstance(words, list) and all(isinstance(word, str) for word in words)):
-            raise InputError(f"{key}: expected a list of text, one per joint")
+            kind = "names of joints" if key == "continuous" else "text, one per joint"
+            raise InputError(f"{key}: expected a list of {kind}")
     for unit in document.get("units") or ():
         if unit not in ("rad", "m"):
             raise InputError(f"units: expected 'rad' or 'm' for each joint, got {unit!r}; convert the waypoints")

@@ -26,6 +26,7 @@ class Shorten(str, Enum):
     random = "random"
     shortcut = "shortcut"
     retraction = "retraction"
+    corners = "corners"
     ompl = "ompl"
     fewest_moves = "fewest-moves"
     none = "none"

@@ -116,8 +116,8 @@ def file_name(path: object) -> Path:
     return Path(path)
 
 
-def comma_numbers(text: str) -> list[float]:
-    """Numbers with commas between them, or one alone.
+def comma_numbers(text: str, option: str) -> list[float]:
+    """The numbers of an option of the command line, with commas between them, or one alone.
 
     Raises:
         InputError: If the text is something else.
@@ -125,7 +125,7 @@ def comma_numbers(text: str) -> list[float]:
     try:
         return [float(word) for word in text.split(",")]
     except ValueError:
-        raise InputError(f"expected a number, or numbers with commas between them, got '{text}'") from None
+        raise InputError(f"{option}: expected a number, or numbers with commas between them, got '{text}'") from None
 
 
 def is_number(text: str) -> bool:

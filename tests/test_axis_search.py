@@ -306,7 +306,10 @@ def test_a_frozen_joint_does_not_move(planner: Any, kernels: bool, joint: Any) -
 def test_start_and_goal_must_agree_in_frozen_joints() -> None:
     problem = shipped("titan4_sdu")
     name = problem.robot.joint_names[0]
-    with pytest.raises(PlannerError, match=f"joint '{name}' must not move, but it is at 0.436.* start .* 0.174.* goal"):
+    with pytest.raises(
+        PlannerError,
+        match=f"^planner .*: frozen_joints: joint '{name}' must not move, but it is at 0.436.* start .* 0.174.* goal",
+    ):
         solved(problem, BiCRDT, 0, frozen_joints=[0])
 
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import signal
 import time
-from itertools import pairwise, product
+from itertools import count, pairwise, product
 
 import numpy as np
 import pytest
@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.collision.overlap_depth import OverlapDepth
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.ompl_bridge import SearchResult
+from rrtik_ompl.one_joint import one_joint_moves
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning import plan
 from rrtik_ompl.problem import Problem
@@ -19,6 +21,7 @@ from rrtik_ompl.problem_file import load_problem
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box
 from rrtik_ompl.shortening import shorten
+from rrtik_ompl.shortening.axis import double_axis_cut
 from rrtik_ompl.shortening.fewest_moves import fewest_moves, grid_route, least_moves
 from rrtik_ompl.shortening.move_lattice import MoveLattice
 from rrtik_ompl.shortening.move_proof import OneFreeValue, sharper_bound
@@ -358,3 +361,36 @@ def test_frozen_joints_rest() -> None:
     assert np.ptp(found.path.waypoints[:, [1, 5]]) == 0.0
     assert found.path.transitions == 3
     assert [(a != b).sum() for a, b in pairwise(found.path.waypoints)] == [1, 1, 1]
+
+
+def test_a_long_route_is_cut_before_anything_takes_long() -> None:
+    problem = load_problem("titan4_sdu")
+    sampled = plan(problem, "RRTConnect", seconds=10.0, seed=2).path
+    assert sampled is not None
+    route, asked = one_joint_moves(sampled, problem).waypoints, count()
+
+    def free(a: np.ndarray, b: np.ndarray) -> bool:
+        next(asked)
+        return bool(problem.world.motion_valid(a, b))
+
+    cut = double_axis_cut(route, free)
+    most, looks = next(asked) + 100, count()  # looks at the clock: one at least for every motion of the cut
+    found = fewest_moves(route, problem.world, stop=lambda: next(looks) > most)
+    assert found.moves <= transitions(cut) < 0.5 * transitions(route)
+    half = count()
+    found = fewest_moves(route, problem.world, stop=lambda: next(half) > most // 2)
+    assert found.moves < transitions(route)  # a cut that is broken off is kept as far as it has come
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_where_single_joint_trees_find_nothing_a_sampled_route_is_converted(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rrtik_planners.bicrdt.BiCRDT.search", lambda *_: SearchResult(None, {}))
+    problem = load_problem("titan4_sdu")
+    found = plan(problem, FewestMoves, seconds=20.0, seed=seed, parameters={"rounds": 1})
+    assert found.path is not None
+    assert found.path.one_joint_at_a_time
+    assert found.path.transitions <= 8
+    frozen = plan(problem, FewestMoves, seconds=0.3, seed=seed, parameters={"frozen_joints": [5]})
+    assert not frozen.found  # a sampled route would move the frozen joint

@@ -12,7 +12,7 @@ RUNGS = (
     "errors arrays text_file path_text yaml_file file_format shapes poses transitions robot",
     "task_region scene goal collision fast mesh_file description catalog scene_file goal_file robot_entry",
     "checks world moving_world path moves_text problem one_joint ik goal_configurations reach",
-    "moveit_messages motion_bench_maker run_section problem_file pose_file ompl_bridge planning shortening",
+    "moveit_messages motion_bench_maker run_section problem_file pose_file ompl_bridge planning shortening scenarios",
     "trajectory replanning scenario plot plot_tree plot_genetic plot_reach",
     "viewer report ik_report sensing overlay reproduce terminal",
     "motion_commands plan_command ik_commands reach_commands replan_commands reproduce_commands marker_commands",

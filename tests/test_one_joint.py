@@ -175,11 +175,13 @@ def test_the_csv_is_in_degrees_and_metres(sdu_route):
 
 def test_moves_are_said_as_a_pilot_says_them():
     degrees = np.deg2rad([[0, 19, 0], [0, 55, 0], [0, 55, 350.25], [-0.5, 55, 350.25]])
-    turning = JointPath(degrees, ["base", "joint2", "wrist_3"])
-    assert spoken_moves(turning, continuous=["wrist_3"]) == [
+    turning = JointPath(degrees, ["base", "joint2", "wrist_3"], continuous=[False, False, True])
+    assert spoken_moves(turning) == [
         "joint 2 up 36 degrees to 55",
-        "wrist 3 forward 350.2 degrees to 350.2",
+        "wrist 3 forward 350.2 degrees to minus 9.7",
         "base down 0.5 degrees to minus 0.5",
     ]
+    limited = JointPath(degrees, ["base", "joint2", "wrist_3"])
+    assert spoken_moves(limited)[1] == "wrist 3 up 350.2 degrees to 350.2"
     sliding = JointPath([[0.3], [0.1]], ["boom"], [True])
     assert spoken_moves(sliding) == ["boom in 200 millimetres to 100"]

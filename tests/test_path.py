@@ -77,6 +77,19 @@ def test_a_path_takes_the_names_of_the_robot_it_is_read_for(tmp_path, sdu_route)
         load_path(file, load_robot("planar3"))
 
 
+def test_a_path_knows_which_joints_turn_without_limits_from_its_robot_and_from_its_file(tmp_path):
+    robot = load_robot("kinova")
+    path = JointPath.of(robot, [[0.0] * 6, [1.0] + [0.0] * 5])
+    assert robot.continuous.any()
+    path.save(tmp_path / "path.json")
+    for same in (path, load_path(tmp_path / "path.json"), path.with_waypoints(path.waypoints[::-1])):
+        np.testing.assert_array_equal(same.continuous, robot.continuous)
+        assert same.moves()[0].continuous == robot.continuous[0]
+    (tmp_path / "odd.json").write_text('{"waypoints": [[0]], "joint_names": ["a"], "continuous": 3}')
+    with pytest.raises(InputError, match="continuous: expected a list of names of joints"):
+        load_path(tmp_path / "odd.json")
+
+
 def test_ompl_and_we_agree_on_the_matrix_text(tmp_path, sdu_route):
     from ompl import base as ob
     from ompl import geometric as og

@@ -8,9 +8,11 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.path import JointPath
 from rrtik_ompl.plan_command import Shorten
 from rrtik_ompl.reproduce import plane_worlds
 from rrtik_ompl.shortening import METHODS, Task
+from rrtik_ompl.shortening.corners import snap_corners
 from rrtik_ompl.shortening.random_cut import random_cut
 from rrtik_ompl.shortening.retraction import retract
 from rrtik_ompl.shortening.sequential import sequential_cut
@@ -59,11 +61,23 @@ def wandering(seed, *, one_joint=False, count=40):
     raise AssertionError
 
 
-METHODS_ON_ARRAYS = {"sequential": sequential_cut, "random": random_cut, "retraction": retract}
+METHODS_ON_ARRAYS = {
+    "sequential": sequential_cut,
+    "random": random_cut,
+    "retraction": retract,
+    "corners": snap_corners,
+}
 
 
-@pytest.mark.parametrize("one_joint", [False, True])
-@pytest.mark.parametrize("name", METHODS_ON_ARRAYS)
+@pytest.mark.parametrize(
+    ("name", "one_joint"),
+    [
+        (name, asked)
+        for name in METHODS_ON_ARRAYS
+        for asked in (False, True)
+        if METHODS[name].can_keep_moves or not asked
+    ],
+)
 def test_a_shortened_route_is_free_and_shorter_with_the_same_ends(name, one_joint):
     gains = []
     for seed in range(10):
@@ -79,7 +93,7 @@ def test_a_shortened_route_is_free_and_shorter_with_the_same_ends(name, one_join
     assert np.median(gains) > 0
 
 
-@pytest.mark.parametrize("name", ["sequential", "retraction"])
+@pytest.mark.parametrize("name", ["sequential", "retraction", "corners"])
 def test_methods_without_chance_give_the_same_route_again(name):
     route = wandering(3)
     first, second = (METHODS_ON_ARRAYS[name](route, Task(Plane(), seed=seed)) for seed in (1, 2))
@@ -233,6 +247,8 @@ def test_requests_that_make_no_sense_are_refused_in_one_line(problem, raw, raw_m
         (lambda: rrtik.shorten(raw[0], problem, seconds=0.0), "seconds must be greater than 0"),
         (lambda: rrtik.shorten(raw[0], problem, seconds=float("nan")), "seconds"),
         (lambda: rrtik.shorten(single, problem), "one waypoint"),
+        (lambda: rrtik.shorten(raw[0], problem, method="random", seed=-1), "seed must be a whole number"),
+        (lambda: rrtik.shorten(JointPath([[0.0], [1.0]]), problem), "path of 1 joints: robot 'planar' has 3"),
         (lambda: rrtik.shorten(raw[0], problem, one_joint=True), "several joints"),
         (lambda: rrtik.shorten(raw_moves[0], problem, method="ompl", one_joint=True), "cannot keep one joint"),
     ):
@@ -278,3 +294,34 @@ def test_retraction_meets_its_published_quality(name, planes):
         found = retract(route, Task(plane), step=1.0)
         assert 1.0 - 1e-4 < route_length(found) / plane.class_optimum(route) < 1.06
         assert all(plane.free(a, b) for a, b in pairwise(found))
+
+
+@pytest.mark.parametrize("name", ["three polygons", "two Ls", "disc robot"])
+def test_corners_come_nearer_to_the_shortest_route_than_the_finest_retraction_and_ask_less(name, planes):
+    plane = planes["PUBLISHED"][name]()
+    ratios, asked = [], []
+    for seed in range(6):
+        route = planes["sampled_route"](plane, seed)
+        best, tasks = plane.class_optimum(route), [Task(plane), Task(plane)]
+        found = snap_corners(route, tasks[0]), retract(route, tasks[1], step=0.1)
+        assert all(plane.free(a, b) for a, b in pairwise(found[0]))
+        ratios.append([route_length(rows) / best for rows in found])
+        asked.append([task.asked + task.confirmed_again for task in tasks])
+    assert np.mean(ratios, axis=0)[0] < 1.0007
+    assert np.max(ratios, axis=0)[0] < 1.005
+    assert np.mean(asked, axis=0)[0] < np.mean(asked, axis=0)[1]
+
+
+class Grazed(Plane):
+    """Refuses short motions: parts of free motions may collide, as with checks at a finite density."""
+
+    def free(self, a, b):
+        return np.linalg.norm(b - a) > 0.3 and super().free(a, b)
+
+
+def test_corners_are_snapped_with_care_where_parts_of_free_motions_are_not_free():
+    plane, route = Grazed(), wandering(3)
+    found, given = snap_corners(route, Task(plane)), {row.tobytes() for row in route}
+    for a, b in pairwise(found):
+        assert plane.free(a, b) or {a.tobytes(), b.tobytes()} <= given
+    assert route_length(found) < route_length(route)

@@ -10,14 +10,20 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
+from rrtik_ompl.one_joint import one_joint_moves
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.shortening import Task
 from rrtik_ompl.shortening.move_proof import sharper_bound
 from rrtik_ompl.shortening.move_search import MOST_NODES, MoveSearch
+from rrtik_ompl.shortening.random_cut import shortcut
 from rrtik_ompl.world import World
 from rrtik_planners.axis_options import AxisOptions, Joints, PerJoint, joint_names
 from rrtik_planners.bicrdt import BiCRDT
+from rrtik_planners.fast_rrt_connect import FastRRTConnect
 
 SEARCHES, ROUNDS = 5, 10
-BRIEF_ITERATIONS = 1000  # of BiCRDT, once there is a path
+BRIEF_ITERATIONS = 1000  # of BiCRDT, before it is started anew
+SAMPLED_ITERATIONS = 20_000  # of RRT-Connect
 FEW_NODES = 256  # of a lattice, where each motion is asked about by itself
 
 
@@ -25,6 +31,7 @@ class FewestMoves(SafePlanner):
     """Fewest moves first, least joint travel second; goes on until the bound is met, its rounds are over or time is up.
 
     It starts from the best of several quick runs of BiCRDT and looks for better routes on lattices of joint values.
+    Where BiCRDT hardly gets anywhere it starts from RRT-Connect's route, turned into single-joint moves.
     ``statistics`` has the lower bound of the moves and the gap: how many moves more than that the path has.
     """
 
@@ -92,24 +99,52 @@ class FewestMoves(SafePlanner):
         return SearchResult(moves.route, {**counts, "gap": moves.moves - moves.bound})
 
     def _quick_routes(self, moves: MoveSearch, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> int:
-        """Offer the routes of several runs of BiCRDT; returns their iterations."""
+        """Offer the routes of several runs of BiCRDT, or others if it finds none; returns its iterations."""
         iterations, seeds = 0, self.rng.integers(2**31, size=self.searches).tolist()
         for seed in seeds:
             if moves.proven or ptc():
-                break
-            quick = BiCRDT(
-                self.getSpaceInformation(),
-                world=self._world,
-                seed=seed,
-                joint_costs=self.options.joint_costs.tolist(),
-                frozen_joints=self.options.frozen_joints,
-                max_iterations=None if moves.route is None else BRIEF_ITERATIONS,
-            )
-            found = quick.search(starts, goals, checker, ptc)
+                return iterations
+            found = self._bicrdt(seed, BRIEF_ITERATIONS).search(starts, goals, checker, ptc)
+            iterations += int(found.statistics.get("iterations", 0))
+            if found.path is not None:
+                moves.offer(found.path)
+            elif moves.route is None:
+                route = self._converted(seed, starts, goals, checker, ptc)
+                if route is not None:
+                    moves.offer(route)
+                    return iterations  # better spent on this route than on further trees
+        if moves.route is None:
+            found = self._bicrdt(seeds[0], None).search(starts, goals, checker, ptc)
             iterations += int(found.statistics.get("iterations", 0))
             if found.path is not None:
                 moves.offer(found.path)
         return iterations
+
+    def _bicrdt(self, seed: int, iterations: int | None) -> BiCRDT:
+        return BiCRDT(
+            self.getSpaceInformation(),
+            world=self._world,
+            seed=seed,
+            joint_costs=self.options.joint_costs.tolist(),
+            frozen_joints=self.options.frozen_joints,
+            max_iterations=iterations,
+        )
+
+    def _converted(self, seed: int, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> Matrix | None:
+        """RRT-Connect's route, made shorter and turned into single-joint moves; None if there is none."""
+        world = self._world
+        if not isinstance(world, World) or self.options.frozen_joints:
+            return None
+        sampled = FastRRTConnect(
+            self.getSpaceInformation(), world=world, seed=seed, max_iterations=SAMPLED_ITERATIONS
+        ).search(starts, goals, checker, ptc)
+        if sampled.path is None:
+            return None
+        short = shortcut(sampled.path, Task(world, seed=seed, stop=ptc))
+        try:
+            return one_joint_moves(JointPath.of(world.robot, short), world).waypoints
+        except InputError:  # it comes so close to something that no single-joint moves follow it
+            return None
 
 
 def _count(value: int, least: int, option: str) -> int:

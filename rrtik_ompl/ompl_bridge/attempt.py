@@ -42,6 +42,8 @@ ITERATION_LIMIT = "max_iterations"
 EFFORT_ITERATIONS = 1000
 EFFORT_MOTIONS = 5000
 
+REFUSAL = f"{InputError.__module__}.{InputError.__name__}: "  # how a planner's error begins if it refused its options
+
 PlannerFactory = Callable[..., Any]
 
 
@@ -110,7 +112,9 @@ def attempt(
             raise PlannerError(f"planner {name} broke: {error}") from None
         problem_in_planner = judge.error or (getattr(planner, "error", None) if str(status) == "Crash" else None)
         if problem_in_planner is not None:
-            raise PlannerError(f"planner {name} broke: {str(problem_in_planner).splitlines()[-1]}")
+            last = str(problem_in_planner).splitlines()[-1]
+            refused = last.removeprefix(REFUSAL)
+            raise PlannerError(f"planner {name}: {refused}" if refused != last else f"planner {name} broke: {last}")
         counts = dict(planner.statistics) if own else {"checked_states": judge.states, "checked_motions": judge.motions}
         return Attempt(exact_path(definition, si), str(status), counts, planner.reason if own else "")
 

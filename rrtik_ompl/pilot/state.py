@@ -60,8 +60,7 @@ def _route(session: Session) -> dict[str, Any] | None:
     route, follower = session.route, session.follower
     if route is None or follower is None:
         return None
-    endless = [n for n, c in zip(session.robot.joint_names, session.robot.continuous, strict=True) if c]
-    words = spoken_moves(follower.path, continuous=endless)
+    words = spoken_moves(follower.path)
     moves = []
     for number, (move, text) in enumerate(zip(follower.moves, words, strict=True)):
         (start, unit), (end, _) = reading(move.start, move.unit), reading(move.end, move.unit)

@@ -17,6 +17,7 @@ from rrtik_ompl.problem import Problem
 from rrtik_ompl.shortening.axis import double_axis_cut
 from rrtik_ompl.shortening.axis_rounds import axis_cut_rounds
 from rrtik_ompl.shortening.best import best_in_time
+from rrtik_ompl.shortening.corners import snap_corners
 from rrtik_ompl.shortening.fewest_moves import fewest_moves
 from rrtik_ompl.shortening.random_cut import random_cut, shortcut
 from rrtik_ompl.shortening.retraction import retract
@@ -66,6 +67,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
         "random": Method(lambda route, task, _: random_cut(route, task)),
         "shortcut": Method(lambda route, task, _: shortcut(route, task)),
         "retraction": Method(lambda route, task, _: retract(route, task)),
+        "corners": Method(lambda route, task, _: snap_corners(route, task), can_keep_moves=False),
         "ompl": Method(_ompl, can_keep_moves=False),
         "auto": Method(lambda route, task, _: best_in_time(route, task)),
     }
@@ -92,8 +94,10 @@ def shorten(
             twenty passes in random joint orders: fewer moves still, several times as long. "fewest-moves" takes
             single-joint moves and looks for the fewest, with the least travel among those. "sequential", "random" and
             "retraction" are the published methods for straight motions: quick, simple, and near the shortest path of
-            the same class. "shortcut" is a random cut that takes waypoints as ends too and pulls them straight.
-            "ompl" is OMPL's PathSimplifier. "auto" is the best that the quick ones find together.
+            the same class. "corners" pulls every bend to the corner that it goes round: nearer to that shortest path
+            than "retraction" in its finest steps, with fewer checks. "shortcut" is a random cut that takes waypoints
+            as ends too and pulls them straight. "ompl" is OMPL's PathSimplifier. "auto" is the best that the quick
+            ones find together.
         seconds: Time limit [s]. With a limit, random methods go on until nothing is gained any more; without one they
             make a fixed number of tries, so that a seed always gives the same path.
         seed: Of the random methods.
@@ -108,10 +112,10 @@ def shorten(
 
     Raises:
         UnknownNameError: If there is no such method.
-        InputError: If the path is not valid for the problem or has one waypoint, the time is not positive, or the
-            method cannot do what is asked.
+        InputError: If the path is not valid for the problem or has one waypoint, the time is not positive, the seed
+            is negative, or the method cannot do what is asked.
     """
-    chosen = _checked(path, problem, method, seconds, one_joint)
+    chosen = _checked(path, problem, method, seconds, seed, one_joint)
     end = time.monotonic() + (np.inf if seconds is None else float(seconds))
     listener = None if on_better is None else lambda rows: on_better(path.with_waypoints(rows))
     # What is as short as can be touches what it goes round, so most methods check as densely as the second check.
@@ -128,7 +132,9 @@ def shorten(
     return path
 
 
-def _checked(path: JointPath, problem: Problem, method: str, seconds: float | None, one_joint: bool) -> Method:
+def _checked(
+    path: JointPath, problem: Problem, method: str, seconds: float | None, seed: int, one_joint: bool
+) -> Method:
     """The method, if the request makes sense."""
     require(path, JointPath, "path to shorten", "a plan has one if plan.found")
     require(problem, Problem, "problem of a path to shorten")
@@ -136,6 +142,8 @@ def _checked(path: JointPath, problem: Problem, method: str, seconds: float | No
         raise UnknownNameError("shortening method", method, METHODS)
     if seconds is not None and float(finite_array(seconds, (), "seconds")) <= 0.0:
         raise InputError(f"seconds must be greater than 0, got {seconds:g}")
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise InputError(f"seed must be a whole number of at least 0, got {seed!r}")
     if len(path.waypoints) < 2:
         raise InputError("path to shorten: it has one waypoint, so there is nothing to shorten")
     faults = path.violations(problem.world)
