@@ -152,6 +152,20 @@ class GoalRegion:
                 inside |= (position <= goal.position_tolerance) & (angle <= goal.orientation_tolerance)
         return inside
 
+    def member_errors(self, robot: Robot, Q: ArrayLike) -> NDArray[np.float64]:
+        """Distance [m] and angle [rad] (0 for a position) of each row of Q from each member, shape (k, m, 2).
+
+        Of what lies inside the box, and of what the free rotation can remove, nothing counts.
+        """
+        rows = np.atleast_2d(Q)
+        each = [
+            (goal.distance(robot, rows), np.zeros(len(rows)))
+            if isinstance(goal, PositionGoal)
+            else self._region_errors(robot, goal, rows)
+            for goal in self.members
+        ]
+        return np.array(each).transpose(0, 2, 1)
+
     def _member_distance(self, robot: Robot, goal: PoseGoal | PositionGoal, Q: ArrayLike) -> Vector:
         if isinstance(goal, PositionGoal):
             return goal.distance(robot, Q)

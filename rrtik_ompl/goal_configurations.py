@@ -71,9 +71,7 @@ def _solved(problem: Problem, goal: PoseGoal | PositionGoal | GoalRegion, rng: n
         return solve_ik(robot, goal, method="closed-form", near=problem.start, all=True, seed=seed).solutions
     starts = rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
     starts[0] = problem.start
-    share = -(-STARTS // len(drawn))
-    blocks = [numeric_ik(robot, each, starts[k * share : (k + 1) * share]) for k, each in enumerate(drawn)]
-    return np.vstack(blocks)
+    return numeric_ik(robot, goal, starts)
 
 
 def _nearest_first(problem: Problem, rows: Matrix) -> Matrix:

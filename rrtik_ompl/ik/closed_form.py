@@ -95,7 +95,7 @@ def solutions(
     placed, hints = _placed(robot, form, poses), None if near is None else _hints(robot, near, count)
     q, real = np.empty((robot.dof, branches, count)), np.empty((branches, count), dtype=bool)
     valid, singular = np.empty_like(real), np.empty(count, dtype=np.uint8)
-    residuals, tip = np.zeros((2, branches, count)), tip_columns(robot)
+    residuals = np.zeros((2, branches, count))
     for begin in range(0, count, BLOCK):
         rows = slice(begin, begin + BLOCK)
         hint = None if hints is None else hints[rows]
@@ -103,7 +103,7 @@ def solutions(
         q[..., rows], real[:, rows], singular[rows] = found.q.T, found.real.T, found.singular
         valid[:, rows] = real[:, rows] & _turn_inside(robot, q[..., rows], hint)
         if check:
-            residuals[..., rows] = _residuals(tip.poses(q[..., rows]), poses[rows], form.kind == "pose")
+            residuals[..., rows] = tip_residuals(robot, q[..., rows], poses[rows], form.kind == "pose")
     for array in (q, real, valid, singular, residuals):
         array.setflags(write=False)
     return ClosedForm(q.T, real.T, valid.T, singular, residuals.T if check else None)
@@ -214,8 +214,21 @@ def _full_turns(
     return inside
 
 
-def _residuals(tips: NDArray[np.float64], poses: NDArray[np.float64], oriented: bool) -> NDArray[np.float64]:
-    """Distance and angle between tips, shape (4, 3, b, m), and poses, shape (m, 4, 4). Shape (2, b, m)."""
+def tip_residuals(
+    robot: Robot, q: NDArray[np.float64], poses: NDArray[np.float64], oriented: bool = True
+) -> NDArray[np.float64]:
+    """By forward kinematics how far configurations are from poses.
+
+    Args:
+        robot: The arm.
+        q: Shape (dof, b, m): b configurations for each of m poses.
+        poses: T_world_tip, shape (m, 4, 4).
+        oriented: Whether the orientation counts; the angle is 0 if not.
+
+    Returns:
+        Distance [m] and angle [rad], shape (2, b, m).
+    """
+    tips = tip_columns(robot).poses(q)
     off = tips - poses[:, :3].transpose(2, 1, 0)[:, :, None]
     off *= off
     residuals = np.zeros((2, *tips.shape[2:]))

@@ -29,7 +29,7 @@ class IkResult:
     Attributes:
         solutions: Configurations at the goal, inside the limits, free if a world was given, nearest first; shape
             (k, dof). At most one unless all were asked for.
-        residuals: Distance [m] and angle [rad] of each from its target by forward kinematics, shape (k, 2).
+        residuals: Distance [m] and angle [rad] of each from the goal by forward kinematics, shape (k, 2).
         reason: "" or why there is none: ``unreachable``, ``limits``, ``collision``, ``time`` (or the method gave up).
         detail: The same in a line: by how much, which joint, what touches.
         iterations: Steps of a numeric method.
@@ -91,14 +91,14 @@ def solve_ik(
         raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
     limit = float(finite_array(seconds, (), "seconds"))
     rng = np.random.default_rng(seed)
-    posture = 0.5 * np.sum(robot.finite_range(), axis=0) if near is None else robot.configuration(near, "near")
+    posture = usual_posture(robot) if near is None else robot.configuration(near, "near")
     drawn = tuple(targets(goal, DRAWS, rng))
-    name = _chosen(robot, drawn, method)
+    name = chosen_method(robot, drawn, method)
 
     def accept(Q: Matrix) -> Mask:
         return free_of_collision(world, Q)
 
-    answer = METHODS[name].run(Question(robot, drawn, posture, accept, all, begin + limit, rng, world))
+    answer = METHODS[name].run(Question(robot, goal, drawn, posture, accept, all, begin + limit, rng, world))
     q = answer.q[robot.within_limits(answer.q) & goal.satisfied(robot, answer.q)] if len(answer.q) else answer.q
     q = robot.clamp(q)
     free = q[accept(q)]
@@ -106,7 +106,7 @@ def solve_ik(
     reason, detail = ("", "") if len(kept) else _why(robot, answer, world, q)
     return IkResult(
         solutions=frozen(kept),
-        residuals=frozen(_residuals(robot, drawn, kept)),
+        residuals=frozen(_residuals(robot, goal, kept)),
         reason=reason,
         detail=detail,
         iterations=answer.iterations,
@@ -115,19 +115,32 @@ def solve_ik(
     )
 
 
-def _chosen(robot: Robot, drawn: tuple[Target, ...], method: str) -> str:
-    misfits = {
-        name: next((m for m in (each.misfit(robot, t) for t in drawn) if m), "") for name, each in METHODS.items()
-    }
-    fitting = [name for name, misfit in misfits.items() if not misfit]
+def usual_posture(robot: Robot) -> Vector:
+    """Where a search begins if nobody says: the middle of the limits, shape (dof,)."""
+    middle: Vector = 0.5 * np.sum(robot.finite_range(), axis=0)
+    return middle
+
+
+def chosen_method(robot: Robot, drawn: tuple[Target, ...], method: str) -> str:
+    """The name of the method for targets: the first that fits if it is "auto".
+
+    Raises:
+        UnknownNameError: If there is no such method.
+        InputError: If it does not fit.
+    """
+
+    def misfit(name: str) -> str:
+        return next((m for m in (METHODS[name].misfit(robot, target) for target in drawn) if m), "")
+
     if method == "auto":
-        return fitting[0]
+        return next(name for name in METHODS if not misfit(name))
     if method not in METHODS:
         raise UnknownNameError("inverse kinematics method", method, ("auto", *METHODS))
-    if misfits[method]:
+    fault = misfit(method)
+    if fault:
         raise InputError(
-            f"method '{method}' does not fit robot '{robot.name}' and this goal: {misfits[method]}; "
-            f"what fits: {', '.join(fitting)}"
+            f"method '{method}' does not fit robot '{robot.name}' and this goal: {fault}; "
+            f"what fits: {', '.join(name for name in METHODS if not misfit(name))}"
         )
     return method
 
@@ -154,11 +167,13 @@ def _different(robot: Robot, q: Matrix, near: Vector) -> Matrix:
     return np.where(robot.continuous, near + difference[kept], q[kept])
 
 
-def _residuals(robot: Robot, drawn: tuple[Target, ...], q: Matrix) -> Matrix:
-    """Of each configuration from the target it is nearest to, shape (k, 2)."""
+def _residuals(robot: Robot, goal: Target | GoalRegion, q: Matrix) -> Matrix:
+    """Of each configuration from the goal, of a region from the member it is nearest to, shape (k, 2)."""
     if len(q) == 0:
         return np.zeros((0, 2))
-    each = np.array([errors(robot, target, q) for target in drawn])
+    if not isinstance(goal, GoalRegion):
+        return errors(robot, goal, q)
+    each = goal.member_errors(robot, q)
     best = np.argmin(each.sum(axis=2), axis=0)
     nearest: Matrix = each[best, np.arange(len(q))]
     return nearest

@@ -17,7 +17,7 @@ from rrtik_ompl.ik.fabrik import fabrik, fabrik_misfit
 from rrtik_ompl.ik.genetic.method import genetic
 from rrtik_ompl.ik.hinges import coupled_fault
 from rrtik_ompl.ik.mb_rrt.method import mb_rrt, mb_rrt_misfit
-from rrtik_ompl.ik.numeric import descend
+from rrtik_ompl.ik.numeric import numeric
 from rrtik_ompl.ik.pso import PARTICLES, pso, resampled_pso
 from rrtik_ompl.ik.question import Answer, Method, Question, Target
 from rrtik_ompl.ik.restarts import ROUNDS, STARTS, Walk, restarted
@@ -88,7 +88,7 @@ def _stands_alone(robot: Robot, target: Target) -> str:
 METHODS: Mapping[str, Method] = MappingProxyType(
     {
         "closed-form": Method(_closed_form_misfit, _closed_form),
-        "numeric": Method(_fits_all, _walks(descend)),
+        "numeric": Method(_fits_all, numeric),
         "genetic": Method(_fits_all, genetic),
         "mb-rrt": Method(mb_rrt_misfit, mb_rrt),
         "damped": Method(_fits_all, _walks(partial(damped_least_squares, enough=ENOUGH))),

@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.goal import PoseGoal, PositionGoal
+from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 
@@ -22,7 +22,8 @@ class Question:
 
     Attributes:
         robot: The arm.
-        targets: Goals without freedom; one of them is enough.
+        goal: What is wanted.
+        targets: Goals without freedom drawn from it, for methods that need such; one of them is enough.
         near: Posture near which a solution is wanted, shape (dof,).
         accept: Which of some configurations, shape (k, dof), inside the limits and at the goal, will do.
         all: Whether every solution is wanted that the method can find, not just one.
@@ -32,6 +33,7 @@ class Question:
     """
 
     robot: Robot
+    goal: Target | GoalRegion
     targets: tuple[Target, ...]
     near: Vector
     accept: Callable[[Matrix], Mask]
