@@ -190,14 +190,16 @@ Goal: TypeAlias = JointGoal | PoseGoal | PositionGoal | GoalRegion
 
 def pose_errors(tips: NDArray[np.float64], target: Any) -> tuple[Vector, Vector]:
     """Distance [m] and rotation angle [rad] between poses, shape (m, 4, 4), and one target pose."""
-    position: Vector = np.linalg.norm(tips[:, :3, 3] - target.translation, axis=1)
+    away = tips[:, :3, 3] - target.translation
+    position: Vector = np.sqrt(np.einsum("mi,mi->m", away, away))
     return position, _rotation_angle(target.rotation.T @ tips[:, :3, :3])
 
 
 def _rotation_angle(rotations: NDArray[np.float64]) -> Vector:
     """Angle of rotations, shape (m, 3, 3): atan2(|R - R^T| / (2 sqrt 2), (tr R - 1) / 2), accurate near 0 and pi."""
-    sine = np.linalg.norm(rotations - np.swapaxes(rotations, 1, 2), axis=(1, 2)) / (2.0 * np.sqrt(2.0))
-    angle: Vector = np.arctan2(sine, 0.5 * (np.trace(rotations, axis1=1, axis2=2) - 1.0))
+    skew = rotations - np.swapaxes(rotations, 1, 2)
+    sine = np.sqrt(np.einsum("mij,mij->m", skew, skew) / 8.0)
+    angle: Vector = np.arctan2(sine, 0.5 * (np.einsum("mii->m", rotations) - 1.0))
     return angle
 
 

@@ -6,14 +6,14 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal, joint_difference
 from rrtik_ompl.ik.methods import METHODS
 from rrtik_ompl.ik.numeric import targets
-from rrtik_ompl.ik.question import Answer, Question, Target, errors
+from rrtik_ompl.ik.question import Answer, Question, Target, errors, tolerances
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 
@@ -99,14 +99,13 @@ def solve_ik(
         return free_of_collision(world, Q)
 
     answer = METHODS[name].run(Question(robot, goal, drawn, posture, accept, all, begin + limit, rng, world))
-    q = answer.q[robot.within_limits(answer.q) & goal.satisfied(robot, answer.q)] if len(answer.q) else answer.q
-    q = robot.clamp(q)
-    free = q[accept(q)]
-    kept = _different(robot, free, posture)[: None if all else 1]
+    q, residuals = _at_goal(robot, goal, answer.q)
+    free = accept(q)
+    kept = _different(robot, q, posture, np.flatnonzero(free))[: None if all else 1]
     reason, detail = ("", "") if len(kept) else _why(robot, answer, world, q)
     return IkResult(
-        solutions=frozen(kept),
-        residuals=frozen(_residuals(robot, goal, kept)),
+        solutions=frozen(np.where(robot.continuous, posture + joint_difference(robot, q[kept], posture), q[kept])),
+        residuals=frozen(residuals[kept]),
         reason=reason,
         detail=detail,
         iterations=answer.iterations,
@@ -157,26 +156,33 @@ def free_of_collision(world: World | None, Q: Matrix) -> Mask:
     return free
 
 
-def _different(robot: Robot, q: Matrix, near: Vector) -> Matrix:
-    """The rows without repetitions, nearest to a posture first; continuous joints turned towards it."""
+def _different(robot: Robot, q: Matrix, near: Vector, rows: NDArray[np.intp]) -> list[int]:
+    """Some of the rows of q without repetitions, nearest to a posture first."""
+    if len(rows) == 1:
+        return [int(rows[0])]
     difference = joint_difference(robot, q, near)
     kept: list[int] = []
-    for k in np.argsort(np.linalg.norm(difference, axis=1), kind="stable"):
+    for k in rows[np.argsort(np.linalg.norm(difference[rows], axis=1), kind="stable")]:
         if not kept or np.abs(difference[k] - difference[kept]).max(axis=1).min() > SAME_POSTURE:
             kept.append(int(k))
-    return np.where(robot.continuous, near + difference[kept], q[kept])
+    return kept
 
 
-def _residuals(robot: Robot, goal: Target | GoalRegion, q: Matrix) -> Matrix:
-    """Of each configuration from the goal, of a region from the member it is nearest to, shape (k, 2)."""
+def _at_goal(robot: Robot, goal: Target | GoalRegion, q: Matrix) -> tuple[Matrix, Matrix]:
+    """The rows of q at the goal and inside the limits, and their residuals, shape (k, 2).
+
+    Of a region those from the member that a row is nearest to.
+    """
+    q = robot.clamp(q[robot.within_limits(q)])
     if len(q) == 0:
-        return np.zeros((0, 2))
-    if not isinstance(goal, GoalRegion):
-        return errors(robot, goal, q)
-    each = goal.member_errors(robot, q)
-    best = np.argmin(each.sum(axis=2), axis=0)
-    nearest: Matrix = each[best, np.arange(len(q))]
-    return nearest
+        return q, np.zeros((0, 2))
+    if isinstance(goal, GoalRegion):
+        each, satisfied = goal.member_errors(robot, q), goal.satisfied(robot, q)
+        residuals = each[np.argmin(each.sum(axis=2), axis=0), np.arange(len(q))]
+    else:
+        residuals = errors(robot, goal, q)
+        satisfied = (residuals <= tolerances(goal)).all(axis=1)
+    return q[satisfied], residuals[satisfied]
 
 
 def _why(robot: Robot, answer: Answer, world: World | None, q: Matrix) -> tuple[str, str]:
