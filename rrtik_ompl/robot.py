@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError, UnknownNameError
 
+FEW = 16  # configurations up to which Pinocchio's calls cost less than numpy's
 LIMIT_TOLERANCE = 1e-6  # [rad] or [m]; a value this far outside counts as inside and is moved onto the limit
 
 
@@ -200,18 +201,19 @@ class Robot:
             Shape (m, 4, 4).
         """
         number, rows = self._frame_id(frame), self._rows(Q)
-        if len(rows) == 1:  # numpy would take thirty times as long
-            return self._one_fk(rows, number)
+        if 0 < len(rows) <= FEW:
+            return self._few_fk(rows, number)
         target = self.model.frames[number]
         poses: NDArray[np.float64] = self.joint_frames(rows)[:, target.parentJoint] @ target.placement.homogeneous
         return poses
 
-    def _one_fk(self, row: Matrix, frame: int) -> NDArray[np.float64]:
-        """Pose of a frame for one configuration, shape (1, dof), by Pinocchio. Shape (1, 4, 4)."""
-        data = _data_of(self, get_ident())
-        pin.forwardKinematics(self.model, data, self.lift(row)[0])
-        pose: NDArray[np.float64] = pin.updateFramePlacement(self.model, data, frame).homogeneous[None]
-        return pose
+    def _few_fk(self, rows: Matrix, frame: int) -> NDArray[np.float64]:
+        """Poses of a frame for configurations, shape (m, dof), by Pinocchio. Shape (m, 4, 4)."""
+        data, poses = _data_of(self, get_ident()), np.empty((len(rows), 4, 4))
+        for k, full in enumerate(self.lift(rows)):
+            pin.forwardKinematics(self.model, data, full)
+            poses[k] = pin.updateFramePlacement(self.model, data, frame).homogeneous
+        return poses
 
     def fk(self, q: ArrayLike, frame: str | None = None) -> Any:
         """Forward kinematics: T_world_tip (or another frame) as ``pinocchio.SE3`` for q, shape (dof,)."""

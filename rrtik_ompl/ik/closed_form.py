@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +13,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.ik.form import ClosedFormSolver, wrapped
 from rrtik_ompl.ik.planar import planar_form
 from rrtik_ompl.ik.tip_columns import tip_columns
-from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
+from rrtik_ompl.robot import FEW, LIMIT_TOLERANCE, Robot
 
 NOT_RIGID = 1e-3  # largest entry of R^T R - 1 that still counts as rounding of a file
 BLOCK = 2048  # targets at a time: their arrays stay in the cache
@@ -177,13 +178,20 @@ def _placed(robot: Robot, form: ClosedFormSolver, poses: NDArray[np.float64]) ->
     fault = tip_fault(robot, form)
     if fault:
         raise InputError(f"robot '{robot.name}': {fault}; method 'numeric' fits every tip")
+    T_base_world, T_tip_frame = _mountings(robot, form)
+    if T_base_world is not None:
+        poses = T_base_world @ poses
+    return poses if T_tip_frame is None else poses @ T_tip_frame
+
+
+@lru_cache(maxsize=64)
+def _mountings(robot: Robot, form: ClosedFormSolver) -> tuple[Matrix | None, Matrix | None]:
+    """T_base_world and T_tip_frame, None where they are the identity."""
     frames = robot.model.frames
     base, tip, own = (frames[robot.model.getFrameId(name)] for name in (robot.link_names[0], robot.tip, form.frame))
-    T_base_world = base.placement.inverse().homogeneous
-    T_tip_frame = (tip.placement.inverse() * own.placement).homogeneous
-    if not np.array_equal(T_base_world, np.eye(4)):
-        poses = T_base_world @ poses
-    return poses if np.array_equal(T_tip_frame, np.eye(4)) else poses @ T_tip_frame
+    mountings = (base.placement.inverse().homogeneous, (tip.placement.inverse() * own.placement).homogeneous)
+    before, after = (None if np.array_equal(matrix, np.eye(4)) else matrix for matrix in mountings)
+    return before, after
 
 
 def _turn_inside(robot: Robot, q: NDArray[np.float64], near: Matrix | None) -> NDArray[np.bool_]:
@@ -214,6 +222,14 @@ def _full_turns(
     return inside
 
 
+def _tips(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Columns x, y, z and position of the tip for q of shape (dof, b, m), shape (4, 3, b, m)."""
+    rows = q.reshape(robot.dof, -1).T
+    if len(rows) > FEW:
+        return tip_columns(robot).poses(q)
+    return robot.fk_batch(rows)[:, :3].T.reshape(4, 3, *q.shape[1:])
+
+
 def tip_residuals(
     robot: Robot, q: NDArray[np.float64], poses: NDArray[np.float64], oriented: bool = True
 ) -> NDArray[np.float64]:
@@ -228,7 +244,7 @@ def tip_residuals(
     Returns:
         Distance [m] and angle [rad], shape (2, b, m).
     """
-    tips = tip_columns(robot).poses(q)
+    tips = _tips(robot, q)
     off = tips - poses[:, :3].transpose(2, 1, 0)[:, :, None]
     off *= off
     residuals = np.zeros((2, *tips.shape[2:]))

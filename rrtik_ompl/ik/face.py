@@ -178,11 +178,11 @@ def _at_goal(robot: Robot, goal: Target | GoalRegion, q: Matrix) -> tuple[Matrix
         return q, np.zeros((0, 2))
     if isinstance(goal, GoalRegion):
         each, satisfied = goal.member_errors(robot, q), goal.satisfied(robot, q)
-        residuals = each[np.argmin(each.sum(axis=2), axis=0), np.arange(len(q))]
-    else:
-        residuals = errors(robot, goal, q)
-        satisfied = (residuals <= tolerances(goal)).all(axis=1)
-    return q[satisfied], residuals[satisfied]
+        residuals: Matrix = each[np.argmin(each.sum(axis=2), axis=0), np.arange(len(q))]
+        return q[satisfied], residuals[satisfied]
+    residuals = errors(robot, goal, q)
+    at = (residuals <= tolerances(goal)).all(axis=1)
+    return q[at], residuals[at]
 
 
 def _why(robot: Robot, answer: Answer, world: World | None, q: Matrix) -> tuple[str, str]:
