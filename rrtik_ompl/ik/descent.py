@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix
-from rrtik_ompl.fast import ik_layout as layout
+from rrtik_ompl.fast.ik_layout import DONE, KERNELS
 from rrtik_ompl.fast.library import library
-from rrtik_ompl.fast.robot_tables import Table
 from rrtik_ompl.goal import PoseGoal, PositionGoal
 from rrtik_ompl.ik.goal_rows import goal_rows
+from rrtik_ompl.ik.kernel_call import KernelCall
 from rrtik_ompl.ik.limb import SEEDS, limb_of, seeded_limb_of, seeds_of
 from rrtik_ompl.ik.plain_descent import farness, walk_plainly
 from rrtik_ompl.robot import Robot
@@ -37,10 +35,10 @@ def walk(
         Where the starts have led to, shape (m, dof), whether that is at the goal, shape (m,), and the most steps taken.
     """
     patience = steps + 1 if patience is None else patience
-    kernels, limb = library(layout.KERNELS), limb_of(robot)
+    kernels, limb = library(KERNELS), limb_of(robot)
     if kernels is None or limb is None:
         return walk_plainly(robot, aims, starts, steps, patience)
-    call = _Call(limb, aims, np.clip(starts, robot.lower, robot.upper), steps, patience)
+    call = KernelCall(limb, aims, np.clip(starts, robot.lower, robot.upper), steps, patience)
     most = kernels.walk(limb.address, call.address)
     return call.q, call.reached.astype(bool), most
 
@@ -80,12 +78,12 @@ class Search:
 
         A goal without one has come to the end of its starts, 513 of them.
         """
-        kernels, limb = library(layout.KERNELS), seeded_limb_of(self._robot)
+        kernels, limb = library(KERNELS), seeded_limb_of(self._robot)
         if kernels is None or limb is None:
             return self._advance_plainly(rows)
-        call = _Call(limb, self._aims[rows], self.q[rows], STEPS, PATIENCE, self._near[rows], self._next[rows])
+        call = KernelCall(limb, self._aims[rows], self.q[rows], STEPS, PATIENCE, self._near[rows], self._next[rows])
         kernels.solve(limb.address, call.address)
-        self.steps += int(call.header[layout.DONE])
+        self.steps += int(call.header[DONE])
         self.q[rows], self._next[rows] = call.q, call.next
         return call.reached.astype(bool)
 
@@ -106,52 +104,3 @@ class Search:
             self.q[going], reached[open_rows] = q, there
             self._next[going] += 1
             self.steps += taken
-
-
-class _Call:
-    """What one call of a kernel works on; the arrays live as long as this."""
-
-    def __init__(
-        self,
-        limb: Table,
-        aims: Matrix,
-        q: Matrix,
-        steps: int,
-        patience: int,
-        near: Matrix | None = None,
-        following: NDArray[np.int64] | None = None,
-    ) -> None:
-        count, dof, joints = len(q), int(limb.header[layout.DOF]), int(limb.header[layout.JOINTS])
-        self.q = np.array(q, dtype=np.float64, order="C")
-        self.reached = np.zeros(count, dtype=np.int32)
-        self.next = np.zeros(0, dtype=np.int64) if following is None else following
-        self.header = header = np.zeros(layout.CALL_FIELDS, dtype=np.int64)
-        aims = np.ascontiguousarray(aims, dtype=np.float64)
-        near = self.q if near is None else np.ascontiguousarray(near)
-        sizes = {
-            layout.FIRST: 12,
-            layout.FRAMES: 12 * (joints + 1),
-            layout.COLUMNS: 6 * dof,
-            layout.ERROR: 6,
-            layout.WEIGHTS: 6,
-            layout.SQUARE: 36,
-            layout.CHANGE: dof,
-            layout.FARNESS: int(limb.header[layout.SEED_COUNT]),
-        }
-        memory = np.empty(sum(sizes.values()))
-        self._kept: tuple[Any, ...] = (aims, near, memory)
-        header[layout.ROWS], header[layout.STEPS], header[layout.PATIENCE] = count, steps, patience
-        header[layout.AIM_BYTES] = 8 * layout.AIM_FLOATS if len(aims) > 1 else 0
-        header[layout.NEAR_BYTES] = 8 * dof
-        header[layout.AIMS], header[layout.NEAR] = aims.ctypes.data, near.ctypes.data
-        header[layout.Q], header[layout.REACHED] = self.q.ctypes.data, self.reached.ctypes.data
-        header[layout.NEXT] = self.next.ctypes.data
-        place = memory.ctypes.data
-        for name, size in sizes.items():
-            header[name] = place
-            place += 8 * size
-
-    @property
-    def address(self) -> int:
-        """Where the fields are."""
-        return int(self.header.ctypes.data)
