@@ -2,7 +2,7 @@
 
     python bench/ik_comparison.py [--poses 1000] [--budget 6] [--out bench/reports/ik_comparison.md]
 
-In blocks of 50 poses all methods take turns; time is processor time of the whole process, so that a library that runs two
+In blocks of 50 poses all methods take turns; time is processor time of the whole process, so that a library with two
 threads pays for both. The others come with ``pip install -e ".[peers]"``; one that is absent is named with the reason.
 A method that has used up its budget takes no more poses: the column "poses" says how many it was asked. Some minutes.
 """

@@ -90,10 +90,17 @@ def solutions(
     Raises:
         InputError: If the robot has no closed form, or a target is no pose or lies beyond numbers.
     """
+    poses = _poses(robot, form_of(robot), targets)
+    return branches_of(robot, poses, None if near is None else _hints(robot, near, len(poses)), slack, check)
+
+
+def branches_of(
+    robot: Robot, poses: NDArray[np.float64], hints: Matrix | None = None, slack: float = 0.0, check: bool = True
+) -> ClosedForm:
+    """As `solutions`, for poses and configurations near them, one for each, that need no check any more."""
     form = form_of(robot)
-    poses = _poses(robot, form, targets)
     count, branches = len(poses), len(form.branches)
-    placed, hints = _placed(robot, form, poses), None if near is None else _hints(robot, near, count)
+    placed = _placed(robot, form, poses)
     q, real = np.empty((robot.dof, branches, count)), np.empty((branches, count), dtype=bool)
     valid, singular = np.empty_like(real), np.empty(count, dtype=np.uint8)
     residuals = np.zeros((2, branches, count))

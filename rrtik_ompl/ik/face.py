@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -114,10 +115,10 @@ def solve_ik(
     )
 
 
+@lru_cache(maxsize=64)
 def usual_posture(robot: Robot) -> Vector:
     """Where a search begins if nobody says: the middle of the limits, shape (dof,)."""
-    middle: Vector = 0.5 * np.sum(robot.finite_range(), axis=0)
-    return middle
+    return frozen(0.5 * np.sum(robot.finite_range(), axis=0))
 
 
 def chosen_method(robot: Robot, drawn: tuple[Target, ...], method: str) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.ik.ccd import ccd
-from rrtik_ompl.ik.closed_form import family, form_of, has_closed_form, solutions, tip_fault
+from rrtik_ompl.ik.closed_form import branches_of, family, form_of, has_closed_form, tip_fault
 from rrtik_ompl.ik.damped import damped_least_squares, pinocchio_iteration
 from rrtik_ompl.ik.fabrik import fabrik, fabrik_misfit
 from rrtik_ompl.ik.genetic.method import genetic
@@ -37,7 +37,8 @@ def _closed_form_misfit(robot: Robot, target: Target) -> str:
 def _closed_form(question: Question) -> Answer:
     """All branches of all targets; if none will do, the curves of those that are singular within their tolerances."""
     robot, targets = question.robot, question.targets
-    found = solutions(robot, np.array([_matrix(target) for target in targets]), near=question.near)
+    hints = np.broadcast_to(question.near, (len(targets), robot.dof))
+    found = branches_of(robot, np.array([_matrix(target) for target in targets]), hints)
     rows, owner = found.branches.reshape(-1, robot.dof), np.repeat(np.arange(len(targets)), found.real.shape[1])
     residuals = np.asarray(found.residuals).reshape(-1, 2)
     near_enough = residuals <= np.array([tolerances(target) for target in targets])[owner]
