@@ -28,7 +28,7 @@ def number(limb: int, place: int) -> float:
 
 @kernel
 def see_from(limb: int, call: int, aim: int) -> None:
-    """Set the frame before the first joint as seen from the goal, and what turns count."""
+    """Set the frame before the first joint as seen from the goal, and whether turns count."""
     first, fixed = field(call, table.FIRST), field(limb, table.FIXED)
     for row in range(3):
         x, y, z = double_at(aim, row), double_at(aim, 3 + row), double_at(aim, 6 + row)
@@ -37,11 +37,10 @@ def see_from(limb: int, call: int, aim: int) -> None:
             set_double(first, 3 * row + column, turned)
         away = x * (double_at(fixed, 9) - double_at(aim, 9)) + y * (double_at(fixed, 10) - double_at(aim, 10))
         set_double(first, 9 + row, away + z * (double_at(fixed, 11) - double_at(aim, 11)))
-    weights, free = field(call, table.WEIGHTS), int(double_at(aim, table.FREE_TURN))
+    weights, turns = field(call, table.WEIGHTS), int(double_at(aim, table.FREE_TURN)) != table.ANY_TURN
     for k in range(3):
         set_double(weights, k, number(limb, table.PER_METRE))
-        turn_counts = free == table.NO_TURN or (free != table.ANY_TURN and free != k)
-        set_double(weights, 3 + k, number(limb, table.PER_CHORD) if turn_counts else 0.0)
+        set_double(weights, 3 + k, number(limb, table.PER_CHORD) if turns else 0.0)
 
 
 @kernel
@@ -120,12 +119,15 @@ def weigh(call: int) -> float:
 
 
 @kernel
-def differentiate(limb: int, call: int, tip: int) -> None:
-    """Columns of the Jacobian, weighted like the residual: what one unit of each q does to the tip."""
+def differentiate(limb: int, call: int, aim: int, tip: int) -> None:
+    """Columns of the Jacobian, weighted like the residual: what one unit of each q does to the tip.
+
+    A turn about an axis of the tip that may point anywhere in its own turn is not felt.
+    """
     columns, weights, frame = field(call, table.COLUMNS), field(call, table.WEIGHTS), field(call, table.FRAMES)
     for k in range(6 * field(limb, table.DOF)):
         set_double(columns, k, 0.0)
-    metre = double_at(weights, 0)
+    metre, chord, free = double_at(weights, 0), double_at(weights, 3), int(double_at(aim, table.FREE_TURN))
     for joint in range(field(limb, table.JOINTS)):
         gain = double_at(field(limb, table.GAIN), joint)
         x, y, z = gain * double_at(frame, 2), gain * double_at(frame, 5), gain * double_at(frame, 8)
@@ -137,7 +139,11 @@ def differentiate(limb: int, call: int, tip: int) -> None:
             b = double_at(tip, 10) - double_at(frame, 10)
             c = double_at(tip, 11) - double_at(frame, 11)
             add(column, metre * (y * c - z * b), metre * (z * a - x * c), metre * (x * b - y * a))
-            add(column + 24, x * double_at(weights, 3), y * double_at(weights, 4), z * double_at(weights, 5))
+            if free == 0 or free == 1 or free == 2:
+                a, b, c = double_at(tip, free), double_at(tip, 3 + free), double_at(tip, 6 + free)
+                own = x * a + y * b + z * c
+                x, y, z = x - own * a, y - own * b, z - own * c
+            add(column + 24, chord * x, chord * y, chord * z)
         frame += FRAME_BYTES
 
 
@@ -235,7 +241,7 @@ def descend(limb: int, call: int, aim: int, q: int) -> bool:
         if square > before:
             share *= number(limb, table.SHARE_GROWTH)
         before = square
-        differentiate(limb, call, tip)
+        differentiate(limb, call, aim, tip)
         pin(limb, call, q)
         solve_square(limb, call, number(limb, table.DAMPING) + share * square)
         step(limb, call, q)

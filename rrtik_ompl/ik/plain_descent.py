@@ -41,7 +41,7 @@ def walk_plainly(robot: Robot, aims: Matrix, Q: Matrix, steps: int, patience: in
     mark, before, share = np.full(len(Q), np.inf), np.full(len(Q), np.inf), np.full(len(Q), DAMPING_SHARE)
     weights = np.repeat([1.0 / reach_of(robot), PER_CHORD], 3)
     for step in range(steps + 1):
-        error, counted, there = residuals(aims[going], robot.fk_batch(Q[going]))
+        error, felt, there = residuals(aims[going], robot.fk_batch(Q[going]))
         reached[going] = there
         error = error * weights
         square = (error * error).sum(axis=1)
@@ -49,23 +49,24 @@ def walk_plainly(robot: Robot, aims: Matrix, Q: Matrix, steps: int, patience: in
         if step > 0 and step % patience == 0:
             kept &= square <= STALLED * mark[going]
             mark[going] = square
-        going, error, counted, square = going[kept], error[kept], counted[kept], square[kept]
+        going, error, felt, square = going[kept], error[kept], felt[kept], square[kept]
         if len(going) == 0 or step == steps:
             break
         share[going[square > before[going]]] *= SHARE_GROWTH
         before[going] = square
-        J = _jacobians(robot, aims[going], Q[going]) * (weights * counted)[:, :, None]
+        J = _jacobians(robot, aims[going], felt, Q[going]) * weights[:, None]
         Q[going] = np.clip(
             Q[going] + _changes(robot, J, error, DAMPING + share[going] * square, Q[going]), robot.lower, robot.upper
         )
     return Q, reached, step
 
 
-def residuals(aims: Matrix, tips: NDArray[np.float64]) -> tuple[Matrix, Matrix, Mask]:
+def residuals(aims: Matrix, tips: NDArray[np.float64]) -> tuple[Matrix, NDArray[np.float64], Mask]:
     """What separates tips, shape (m, 4, 4), from their goals: [m] and chords in the goals' axes, shape (m, 6).
 
     Returns:
-        The residuals, which of their components count (1 or 0), shape (m, 6), and whether they are within tolerance.
+        The residuals; what of a turn they feel as matrices, shape (m, 3, 3), not the part about an axis of the tip
+        that may point anywhere in its own turn; and whether they are within tolerance, shape (m,).
     """
     turned, free = aims[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1), aims[:, FREE_TURN].astype(int)
     place = (turned @ (tips[:, :3, 3] - aims[:, 9:12])[..., None])[..., 0]
@@ -73,18 +74,19 @@ def residuals(aims: Matrix, tips: NDArray[np.float64]) -> tuple[Matrix, Matrix, 
     R = turned @ tips[:, :3, :3]
     skew = -0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
     cosine = 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0)
-    counted = np.ones((len(aims), 6))
+    felt = np.tile(np.eye(3), (len(aims), 1, 1))
     for axis in range(3):
         rows = free == axis
-        skew[rows], cosine[rows] = np.cross(R[rows, :, axis], np.eye(3)[axis]), R[rows, axis, axis]
-        counted[rows, 3 + axis] = 0.0
-    skew[free == ANY_TURN], cosine[free == ANY_TURN], counted[free == ANY_TURN, 3:] = 0.0, 1.0, 0.0
+        own = R[rows, :, axis]
+        skew[rows], cosine[rows] = np.cross(own, np.eye(3)[axis]), own[:, axis]
+        felt[rows] -= own[:, :, None] * own[:, None]
+    skew[free == ANY_TURN], cosine[free == ANY_TURN], felt[free == ANY_TURN] = 0.0, 1.0, 0.0
     half = np.sqrt(np.maximum(0.5 * (1.0 + cosine), 0.0))
     hidden = half < TINY  # half a turn about an axis that rounding hides: any will do, the next step sees better
     skew[hidden], half[hidden] = np.eye(3)[np.where(free[hidden] == 0, 1, 0)], 0.5
     error = np.hstack([np.clip(place, -room, room) - place, skew / half[:, None]])
     away, turn = np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1)
-    return error, counted, (away <= aims[:, POSITION_TOLERANCE]) & (turn <= aims[:, CHORD_TOLERANCE])
+    return error, felt, (away <= aims[:, POSITION_TOLERANCE]) & (turn <= aims[:, CHORD_TOLERANCE])
 
 
 def farness(robot: Robot, aims: Matrix, tips: NDArray[np.float64]) -> Matrix:
@@ -98,10 +100,10 @@ def farness(robot: Robot, aims: Matrix, tips: NDArray[np.float64]) -> Matrix:
     return squared
 
 
-def _jacobians(robot: Robot, aims: Matrix, Q: Matrix) -> NDArray[np.float64]:
-    """Jacobians in the axes of the goals, shape (m, 6, dof)."""
+def _jacobians(robot: Robot, aims: Matrix, felt: NDArray[np.float64], Q: Matrix) -> NDArray[np.float64]:
+    """Jacobians in the axes of the goals, turns as far as they are felt, shape (m, 6, dof)."""
     turned, J = aims[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1), robot.jacobian_batch(Q)
-    return np.concatenate([turned @ J[:, :3], turned @ J[:, 3:]], axis=1)
+    return np.concatenate([turned @ J[:, :3], felt @ turned @ J[:, 3:]], axis=1)
 
 
 def _changes(robot: Robot, J: NDArray[np.float64], error: Matrix, damping: Vector, Q: Matrix) -> Matrix:
