@@ -205,10 +205,13 @@ def _rotation_angle(rotations: NDArray[np.float64]) -> Vector:
 
 def _check_rigid(rotation: NDArray[np.float64]) -> None:
     off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
-    if off > 1e-3 or np.linalg.det(rotation) < 0.0:
+    if off > 1e-3:
         raise InputError(
-            "goal pose: its upper left 3 x 3 part is no rotation (it scales, skews or mirrors); make it orthonormal"
+            f"goal pose: its upper left 3 x 3 part is no rotation: {off:.3g} away from orthonormal (at most 0.001); "
+            "make it orthonormal"
         )
+    if np.linalg.det(rotation) < 0.0:
+        raise InputError("goal pose: its upper left 3 x 3 part mirrors (determinant -1); a rotation is right-handed")
 
 
 def _tolerance(value: float, what: str) -> float:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
 from rrtik_ompl.goal import PoseGoal, joint_difference
-from rrtik_ompl.ik.closed_form import check_rotations, form_of, solutions, tip_residuals
+from rrtik_ompl.ik.closed_form import check_poses, form_of, solutions, tip_residuals
 from rrtik_ompl.ik.descent import Search
 from rrtik_ompl.ik.face import SECONDS, chosen_method, free_of_collision, solve_ik, usual_posture
 from rrtik_ompl.ik.goal_rows import pose_rows
@@ -28,12 +28,14 @@ class IkBatch:
         found: Where there is one, shape (m,).
         residuals: Distance [m] and angle [rad] by forward kinematics, shape (m, 2); NaN where there is none.
         reasons: Why there is none, "" where there is one: see `IkResult`.
+        details: The same in lines: by how much, which joint, what touches.
     """
 
     q: Matrix
     found: Mask
     residuals: Matrix
     reasons: tuple[str, ...]
+    details: tuple[str, ...]
 
 
 def solve_ik_batch(
@@ -66,9 +68,9 @@ def solve_ik_batch(
     posture = usual_posture(robot) if near is None else robot.configuration(near, "near")
     limit = float(finite_array(seconds, (), "seconds"))
     q, residuals = np.full((len(targets), robot.dof), np.nan), np.full((len(targets), 2), np.nan)
-    reasons = [""] * len(targets)
+    reasons, details = [""] * len(targets), [""] * len(targets)
+    check_poses(targets, "poses")
     if len(targets):
-        check_rotations(targets[:, :3, :3], "poses")
         method = chosen_method(robot, (PoseGoal(targets[0]),), method)
     if method == "closed-form" and form_of(robot).kind == "pose":
         _by_closed_form(robot, targets, posture, world, q, residuals)
@@ -77,10 +79,10 @@ def solve_ik_batch(
     for k in np.flatnonzero(np.isnan(q[:, 0])):
         goal = PoseGoal(targets[k])
         result = solve_ik(robot, goal, method=method, near=posture, world=world, seconds=limit, seed=seed + int(k))
-        reasons[k] = result.reason
+        reasons[k], details[k] = result.reason, result.detail
         if result.found:
             q[k], residuals[k] = result.solutions[0], result.residuals[0]
-    return IkBatch(frozen(q), frozen(~np.isnan(q[:, 0]), bool), frozen(residuals), tuple(reasons))
+    return IkBatch(frozen(q), frozen(~np.isnan(q[:, 0]), bool), frozen(residuals), tuple(reasons), tuple(details))
 
 
 def _by_closed_form(

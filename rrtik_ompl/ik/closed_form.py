@@ -15,6 +15,7 @@ from rrtik_ompl.ik.planar import planar_form
 from rrtik_ompl.ik.tip_columns import tip_columns
 from rrtik_ompl.robot import FEW, LIMIT_TOLERANCE, Robot
 
+LAST_ROW = 1e-8  # largest deviation of the last row of a pose
 NOT_RIGID = 1e-3  # largest entry of R^T R - 1 that still counts as rounding of a file
 BLOCK = 2048  # targets at a time: their arrays stay in the cache
 SWEEP = 72  # samples of a singular pose's curve of solutions
@@ -150,17 +151,23 @@ def _poses(robot: Robot, form: ClosedFormSolver, targets: ArrayLike) -> NDArray[
         poses[:, :3, 3] = points
         return poses
     poses = finite_array(targets, (None, 4, 4), "targets")
-    if form.kind == "pose" and len(poses):
-        check_rotations(poses[:, :3, :3], "targets")
+    if form.kind == "pose":
+        check_poses(poses, "targets")
     return poses
 
 
-def check_rotations(rotations: NDArray[np.float64], what: str) -> None:
-    """Refuse matrices, shape (m, 3, 3), that are no rotations.
+def check_poses(poses: NDArray[np.float64], what: str) -> None:
+    """Refuse matrices, shape (m, 4, 4), that are no poses.
 
     Raises:
         InputError: It says which one and how far it is from orthonormal.
     """
+    odd = np.flatnonzero((np.abs(poses[:, 3] - (0.0, 0.0, 0.0, 1.0)) > LAST_ROW).any(axis=1))
+    if len(odd):
+        raise InputError(f"{what}: the last row of entry {odd[0]} must be 0 0 0 1, got {poses[odd[0], 3].tolist()}")
+    if len(poses) == 0:
+        return
+    rotations = poses[:, :3, :3]
     off = np.abs(np.swapaxes(rotations, 1, 2) @ rotations - np.eye(3)).max(axis=(1, 2))
     worst = int(np.argmax(off))
     if off[worst] > NOT_RIGID:

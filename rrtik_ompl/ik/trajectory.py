@@ -15,7 +15,7 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.goal import PoseGoal, PositionGoal, joint_difference, pose_errors
 from rrtik_ompl.ik.branch_choice import JUMP, follow
-from rrtik_ompl.ik.closed_form import check_rotations, form_of
+from rrtik_ompl.ik.closed_form import check_poses, form_of
 from rrtik_ompl.ik.descent import descend
 from rrtik_ompl.ik.face import free_of_collision, solve_ik
 from rrtik_ompl.ik.genetic.options import PRESETS, GeneticOptions
@@ -160,7 +160,7 @@ def _checked(poses: ArrayLike) -> Matrix:
     if len(rows) == 0:
         raise InputError("poses: a trajectory needs at least one point")
     if rows.ndim == 3:
-        check_rotations(rows[:, :3, :3], "poses")
+        check_poses(rows, "poses")
     return rows
 
 
