@@ -12,147 +12,10 @@ from typing import Any
 
 from rrtik_ompl.fast import ik_layout as table
 from rrtik_ompl.fast.compiled import entry, inlined, kernel
-from rrtik_ompl.fast.lanes import double_at, field, int_at, set_double, set_field, set_int
+from rrtik_ompl.fast.ik_kinematics import FRAME_BYTES, differentiate, measure, move_tip, number, see_from, weigh
+from rrtik_ompl.fast.lanes import double_at, field, set_double, set_field, set_int
 
-FRAME_BYTES = 96
-TINY = 1e-12  # cosine of half an angle, below which the turn is a half turn
 FAR = 1e300
-
-
-@inlined
-def number(limb: int, place: int) -> float:
-    """One of the limb's numbers."""
-    value: float = double_at(field(limb, table.NUMBERS), place)
-    return value
-
-
-@kernel
-def see_from(limb: int, call: int, aim: int) -> None:
-    """Set the frame before the first joint as seen from the goal, and whether turns count."""
-    first, fixed = field(call, table.FIRST), field(limb, table.FIXED)
-    for row in range(3):
-        x, y, z = double_at(aim, row), double_at(aim, 3 + row), double_at(aim, 6 + row)
-        for column in range(3):
-            turned = x * double_at(fixed, column) + y * double_at(fixed, 3 + column) + z * double_at(fixed, 6 + column)
-            set_double(first, 3 * row + column, turned)
-        away = x * (double_at(fixed, 9) - double_at(aim, 9)) + y * (double_at(fixed, 10) - double_at(aim, 10))
-        set_double(first, 9 + row, away + z * (double_at(fixed, 11) - double_at(aim, 11)))
-    weights, turns = field(call, table.WEIGHTS), int(double_at(aim, table.FREE_TURN)) != table.ANY_TURN
-    for k in range(3):
-        set_double(weights, k, number(limb, table.PER_METRE))
-        set_double(weights, 3 + k, number(limb, table.PER_CHORD) if turns else 0.0)
-
-
-@kernel
-def move_tip(limb: int, call: int, q: int) -> Any:
-    """Frames of all joints, each after its own motion, and of the tip; returns where the tip's frame is."""
-    frame, gain, offset = field(call, table.FRAMES), field(limb, table.GAIN), field(limb, table.OFFSET)
-    fixed, columns = field(limb, table.FIXED), field(limb, table.COLUMN)
-    for k in range(12):
-        set_double(frame, k, double_at(field(call, table.FIRST), k))
-    for joint in range(field(limb, table.JOINTS)):
-        value = double_at(gain, joint) * double_at(q, int_at(columns, joint)) + double_at(offset, joint)
-        slide, cosine, sine = 0.0, 1.0, 0.0
-        if int_at(field(limb, table.SLIDING), joint) != 0:
-            slide = value
-        else:
-            cosine, sine = math.cos(value), math.sin(value)
-        fixed += FRAME_BYTES
-        after = frame + FRAME_BYTES
-        for row in range(3):
-            a, b, z = double_at(frame, 3 * row), double_at(frame, 3 * row + 1), double_at(frame, 3 * row + 2)
-            x, y = cosine * a + sine * b, cosine * b - sine * a
-            origin = double_at(frame, 9 + row) + slide * z
-            set_double(frame, 9 + row, origin)
-            for k in range(3):
-                turned = x * double_at(fixed, k) + y * double_at(fixed, 3 + k) + z * double_at(fixed, 6 + k)
-                set_double(after, 3 * row + k, turned)
-            lever = x * double_at(fixed, 9) + y * double_at(fixed, 10) + z * double_at(fixed, 11)
-            set_double(after, 9 + row, origin + lever)
-        frame = after
-    return frame
-
-
-@kernel
-def measure(call: int, aim: int, tip: int) -> bool:
-    """Set the residual [m; chord] of a tip seen from the goal; whether it is within the tolerances."""
-    error, free = field(call, table.ERROR), int(double_at(aim, table.FREE_TURN))
-    away = 0.0
-    for k in range(3):
-        place, room = double_at(tip, 9 + k), double_at(aim, table.BOX + k)
-        outside = min(max(place, -room), room) - place
-        set_double(error, k, outside)
-        away += outside * outside
-    x = 0.5 * (double_at(tip, 5) - double_at(tip, 7))
-    y = 0.5 * (double_at(tip, 6) - double_at(tip, 2))
-    z = 0.5 * (double_at(tip, 1) - double_at(tip, 3))
-    cosine = 0.5 * (double_at(tip, 0) + double_at(tip, 4) + double_at(tip, 8) - 1.0)
-    if free == table.ANY_TURN:
-        x, y, z, cosine = 0.0, 0.0, 0.0, 1.0
-    elif free == 0:
-        x, y, z, cosine = 0.0, double_at(tip, 6), -double_at(tip, 3), double_at(tip, 0)
-    elif free == 1:
-        x, y, z, cosine = -double_at(tip, 7), 0.0, double_at(tip, 1), double_at(tip, 4)
-    elif free == 2:
-        x, y, z, cosine = double_at(tip, 5), -double_at(tip, 2), 0.0, double_at(tip, 8)
-    half = math.sqrt(max(0.5 * (1.0 + cosine), 0.0))
-    if half < TINY:  # half a turn about an axis that rounding hides: any will do, the next step sees better
-        x, y, z, half = (1.0 if free != 0 else 0.0), (1.0 if free == 0 else 0.0), 0.0, 0.5
-    set_double(error, 3, x / half)
-    set_double(error, 4, y / half)
-    set_double(error, 5, z / half)
-    turn = (x * x + y * y + z * z) / (half * half)
-    near, small = double_at(aim, table.POSITION_TOLERANCE), double_at(aim, table.CHORD_TOLERANCE)
-    reached: bool = away <= near * near and turn <= small * small
-    return reached
-
-
-@kernel
-def weigh(call: int) -> float:
-    """Turn the residual into one without units; its square."""
-    error, weights, square = field(call, table.ERROR), field(call, table.WEIGHTS), 0.0
-    for k in range(6):
-        value = double_at(error, k) * double_at(weights, k)
-        set_double(error, k, value)
-        square += value * value
-    return square
-
-
-@kernel
-def differentiate(limb: int, call: int, aim: int, tip: int) -> None:
-    """Columns of the Jacobian, weighted like the residual: what one unit of each q does to the tip.
-
-    A turn about an axis of the tip that may point anywhere in its own turn is not felt.
-    """
-    columns, weights, frame = field(call, table.COLUMNS), field(call, table.WEIGHTS), field(call, table.FRAMES)
-    for k in range(6 * field(limb, table.DOF)):
-        set_double(columns, k, 0.0)
-    metre, chord, free = double_at(weights, 0), double_at(weights, 3), int(double_at(aim, table.FREE_TURN))
-    for joint in range(field(limb, table.JOINTS)):
-        gain = double_at(field(limb, table.GAIN), joint)
-        x, y, z = gain * double_at(frame, 2), gain * double_at(frame, 5), gain * double_at(frame, 8)
-        column = columns + 48 * int_at(field(limb, table.COLUMN), joint)
-        if int_at(field(limb, table.SLIDING), joint) != 0:
-            add(column, metre * x, metre * y, metre * z)
-        else:
-            a = double_at(tip, 9) - double_at(frame, 9)
-            b = double_at(tip, 10) - double_at(frame, 10)
-            c = double_at(tip, 11) - double_at(frame, 11)
-            add(column, metre * (y * c - z * b), metre * (z * a - x * c), metre * (x * b - y * a))
-            if free == 0 or free == 1 or free == 2:
-                a, b, c = double_at(tip, free), double_at(tip, 3 + free), double_at(tip, 6 + free)
-                own = x * a + y * b + z * c
-                x, y, z = x - own * a, y - own * b, z - own * c
-            add(column + 24, chord * x, chord * y, chord * z)
-        frame += FRAME_BYTES
-
-
-@inlined
-def add(place: int, x: float, y: float, z: float) -> None:
-    """Add to three numbers."""
-    set_double(place, 0, double_at(place, 0) + x)
-    set_double(place, 1, double_at(place, 1) + y)
-    set_double(place, 2, double_at(place, 2) + z)
 
 
 @inlined
@@ -165,7 +28,7 @@ def along(a: int, b: int) -> Any:
 
 
 @kernel
-def pin(limb: int, call: int, q: int) -> None:
+def hold_at_limits(limb: int, call: int, q: int) -> None:
     """Leave joints out that are at a limit and would be driven beyond it: their columns become 0."""
     for k in range(field(limb, table.DOF)):
         column, value = field(call, table.COLUMNS) + 48 * k, double_at(q, k)
@@ -177,9 +40,9 @@ def pin(limb: int, call: int, q: int) -> None:
 
 
 @kernel
-def solve_square(limb: int, call: int, damping: float) -> None:
-    """Replace the residual e by (J J^T + damping)^-1 e: Cholesky's decomposition, inverse diagonal kept."""
-    square, error = field(call, table.SQUARE), field(call, table.ERROR)
+def fill_square(limb: int, call: int, damping: float) -> None:
+    """The lower half of J J^T + damping."""
+    square = field(call, table.SQUARE)
     for a in range(6):
         for b in range(a + 1):
             set_double(square, 6 * a + b, damping if a == b else 0.0)
@@ -189,6 +52,12 @@ def solve_square(limb: int, call: int, damping: float) -> None:
             for b in range(a + 1):
                 product = double_at(column, a) * double_at(column, b)
                 set_double(square, 6 * a + b, double_at(square, 6 * a + b) + product)
+
+
+@kernel
+def solve_square(call: int) -> None:
+    """Replace the residual e by (J J^T + damping)^-1 e: Cholesky's decomposition, the inverse of its diagonal kept."""
+    square, error = field(call, table.SQUARE), field(call, table.ERROR)
     for a in range(6):
         for b in range(a + 1):
             rest = double_at(square, 6 * a + b)
@@ -242,8 +111,9 @@ def descend(limb: int, call: int, aim: int, q: int) -> bool:
             share *= number(limb, table.SHARE_GROWTH)
         before = square
         differentiate(limb, call, aim, tip)
-        pin(limb, call, q)
-        solve_square(limb, call, number(limb, table.DAMPING) + share * square)
+        hold_at_limits(limb, call, q)
+        fill_square(limb, call, number(limb, table.DAMPING) + share * square)
+        solve_square(call)
         step(limb, call, q)
         set_field(call, table.DONE, field(call, table.DONE) + 1)
     return False

@@ -162,9 +162,6 @@ def check_poses(poses: NDArray[np.float64], what: str) -> None:
     Raises:
         InputError: It says which one and how far it is from orthonormal.
     """
-    odd = np.flatnonzero((np.abs(poses[:, 3] - (0.0, 0.0, 0.0, 1.0)) > LAST_ROW).any(axis=1))
-    if len(odd):
-        raise InputError(f"{what}: the last row of entry {odd[0]} must be 0 0 0 1, got {poses[odd[0], 3].tolist()}")
     if len(poses) == 0:
         return
     rotations = poses[:, :3, :3]
@@ -178,6 +175,9 @@ def check_poses(poses: NDArray[np.float64], what: str) -> None:
     mirrored = np.flatnonzero(np.linalg.det(rotations) < 0.0)
     if len(mirrored):
         raise InputError(f"{what}: entry {mirrored[0]} mirrors (determinant -1); a rotation is right-handed")
+    odd = np.flatnonzero((np.abs(poses[:, 3] - (0.0, 0.0, 0.0, 1.0)) > LAST_ROW).any(axis=1))
+    if len(odd):
+        raise InputError(f"{what}: the last row of entry {odd[0]} must be 0 0 0 1, got {poses[odd[0], 3].tolist()}")
 
 
 def _hints(robot: Robot, near: ArrayLike, count: int) -> Matrix:
