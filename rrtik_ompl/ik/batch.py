@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
 from rrtik_ompl.goal import PoseGoal, joint_difference
 from rrtik_ompl.ik.closed_form import check_poses, form_of, solutions, tip_residuals
-from rrtik_ompl.ik.descent import Search
+from rrtik_ompl.ik.descent import Search, load_kernels
 from rrtik_ompl.ik.face import SECONDS, chosen_method, free_of_collision, solve_ik, usual_posture
 from rrtik_ompl.ik.goal_rows import pose_rows
 from rrtik_ompl.robot import Robot
@@ -63,6 +63,7 @@ def solve_ik_batch(
         UnknownNameError: If there is no such method.
         InputError: If a pose is none, the method does not fit the robot, or an argument makes no sense.
     """
+    load_kernels()
     begin = time.monotonic()
     targets = finite_array(poses, (None, 4, 4), "poses")
     posture = usual_posture(robot) if near is None else robot.configuration(near, "near")

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal, joint_difference
+from rrtik_ompl.ik.descent import load_kernels
 from rrtik_ompl.ik.methods import METHODS
 from rrtik_ompl.ik.numeric import targets
 from rrtik_ompl.ik.question import Answer, Question, Target, errors, tolerances
@@ -86,6 +87,7 @@ def solve_ik(
         UnknownNameError: If there is no such method.
         InputError: If the method does not fit the robot and the goal, or an argument makes no sense.
     """
+    load_kernels()
     begin = time.monotonic()
     require(goal, PoseGoal | PositionGoal | GoalRegion, "goal", "inverse kinematics needs a goal of the tip")
     if world is not None and world.robot is not robot:
@@ -102,7 +104,7 @@ def solve_ik(
     answer = METHODS[name].run(Question(robot, goal, drawn, posture, accept, all, begin + limit, rng, world))
     q, residuals = _at_goal(robot, goal, answer.q)
     free = accept(q)
-    kept = _different(robot, q, posture, np.flatnonzero(free))[: None if all else 1]
+    kept = _different(robot, q, posture, np.flatnonzero(free), None if all else 1)
     reason, detail = ("", "") if len(kept) else _why(robot, answer, world, q)
     return IkResult(
         solutions=frozen(np.where(robot.continuous, posture + joint_difference(robot, q[kept], posture), q[kept])),
@@ -157,13 +159,13 @@ def free_of_collision(world: World | None, Q: Matrix) -> Mask:
     return free
 
 
-def _different(robot: Robot, q: Matrix, near: Vector, rows: NDArray[np.intp]) -> list[int]:
-    """Some of the rows of q without repetitions, nearest to a posture first."""
-    if len(rows) == 1:
-        return [int(rows[0])]
+def _different(robot: Robot, q: Matrix, near: Vector, rows: NDArray[np.intp], most: int | None) -> list[int]:
+    """Some of the rows of q without repetitions, nearest to a posture first, at most so many if not all."""
     difference = joint_difference(robot, q, near)
     kept: list[int] = []
     for k in rows[np.argsort(np.linalg.norm(difference[rows], axis=1), kind="stable")]:
+        if len(kept) == most:
+            break
         if not kept or np.abs(difference[k] - difference[kept]).max(axis=1).min() > SAME_POSTURE:
             kept.append(int(k))
     return kept
