@@ -16,6 +16,7 @@ from rrtik_ompl.ik.plain_descent import farness, walk_plainly
 from rrtik_ompl.robot import Robot
 
 STEPS = 60  # of one start
+AT_A_TIME = 4096  # goals in one call of a kernel, which nothing can interrupt
 PATIENCE = 5  # steps after which a start that has not come nearer is given up
 
 
@@ -83,6 +84,10 @@ class Search:
 
         A goal without one has come to the end of its starts, 513 of them.
         """
+        parts = [self._advance(rows[k : k + AT_A_TIME]) for k in range(0, len(rows), AT_A_TIME)]
+        return parts[0] if len(parts) == 1 else np.concatenate([np.zeros(0, dtype=bool), *parts])
+
+    def _advance(self, rows: NDArray[np.int64]) -> Mask:
         kernels, limb = library(KERNELS), seeded_limb_of(self._robot)
         if kernels is None or limb is None:
             return self._advance_plainly(rows)
