@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -100,22 +101,26 @@ def branches_of(
 ) -> ClosedForm:
     """As `solutions`, for poses and configurations near them, one for each, that need no check any more."""
     form = form_of(robot)
-    count, branches = len(poses), len(form.branches)
-    placed = _placed(robot, form, poses)
-    q, real = np.empty((robot.dof, branches, count)), np.empty((branches, count), dtype=bool)
-    valid, singular = np.empty_like(real), np.empty(count, dtype=np.uint8)
-    residuals = np.zeros((2, branches, count))
-    for begin in range(0, count, BLOCK):
+    parts = []
+    for begin in range(0, max(len(poses), 1), BLOCK):
         rows = slice(begin, begin + BLOCK)
-        hint = None if hints is None else hints[rows]
-        found = form(placed[rows], hint, slack)
-        q[..., rows], real[:, rows], singular[rows] = found.q.T, found.real.T, found.singular
-        valid[:, rows] = real[:, rows] & _turn_inside(robot, q[..., rows], hint)
-        if check:
-            residuals[..., rows] = tip_residuals(robot, q[..., rows], poses[rows], form.kind == "pose")
-    for array in (q, real, valid, singular, residuals):
+        parts.append(_block(robot, form, poses[rows], None if hints is None else hints[rows], slack, check))
+    joined = parts[0] if len(parts) == 1 else [np.concatenate(each, axis=-1) for each in zip(*parts, strict=True)]
+    for array in joined:
         array.setflags(write=False)
+    q, real, valid, singular, residuals = joined
     return ClosedForm(q.T, real.T, valid.T, singular, residuals.T if check else None)
+
+
+def _block(
+    robot: Robot, form: ClosedFormSolver, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool
+) -> list[NDArray[Any]]:
+    """What `ClosedForm` holds, the targets in the last axis, for as many as the cache has room for."""
+    found = form(_placed(robot, form, poses), hints, slack)
+    q, real = np.array(found.q.T, order="C"), np.array(found.real.T)
+    valid = real & _turn_inside(robot, q, hints)
+    residuals = tip_residuals(robot, q, poses, form.kind == "pose") if check else np.zeros((2, 0, len(poses)))
+    return [q, real, valid, np.array(found.singular), residuals]
 
 
 def family(robot: Robot, target: ArrayLike, *, samples: int = SWEEP, slack: float = 0.0) -> Matrix:

@@ -37,8 +37,13 @@ def _closed_form_misfit(robot: Robot, target: Target) -> str:
 def _closed_form(question: Question) -> Answer:
     """All branches of all targets; if none will do, the curves of those that are singular within their tolerances."""
     robot, targets = question.robot, question.targets
+    poses = np.array([_matrix(target) for target in targets])
     hints = np.broadcast_to(question.near, (len(targets), robot.dof))
-    found = branches_of(robot, np.array([_matrix(target) for target in targets]), hints)
+    found = branches_of(robot, poses, hints, check=False)
+    q = found.branches[found.valid]
+    if len(q) and question.accept(q).any():  # the usual case; forward kinematics judges what is returned
+        return Answer(q, question.near, targets[0])
+    found = branches_of(robot, poses, hints)
     rows, owner = found.branches.reshape(-1, robot.dof), np.repeat(np.arange(len(targets)), found.real.shape[1])
     residuals = np.asarray(found.residuals).reshape(-1, 2)
     near_enough = residuals <= np.array([tolerances(target) for target in targets])[owner]
