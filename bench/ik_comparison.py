@@ -185,6 +185,10 @@ def judge(report: Report, name: str, runs: dict[str, Runs], batch: dict[str, tup
         )
 
 
+def _percent(share: float) -> str:
+    return "not judged" if np.isnan(share) else f"{share:.1%}"
+
+
 def versions() -> str:
     found = [f"Python {platform.python_version()}"]
     for package in ("numpy", "pin", "numba", "pytracik", "ikpy", "eaik"):
@@ -212,10 +216,7 @@ def main() -> None:
         missing += absent
         judge(report, name, runs, batch)
         report.table(f"{name}, pose by pose", HEAD, [run.row(each) for each, run in runs.items()])
-        rows = [
-            [each, "not judged" if np.isnan(share) else f"{share:.1%}", f"{us:.1f}"]
-            for each, (share, us) in batch.items()
-        ]
+        rows = [[each, _percent(share), f"{us:.1f}"] for each, (share, us) in batch.items()]
         report.table(f"{name}, {len(poses)} poses in one call", ["method", "solved", "a pose [us]"], rows)
     solved = f"Solved: inside the limits, at most {METRES:g} m and {RADIANS:g} rad away by Pinocchio's kinematics."
     report.note(
