@@ -18,6 +18,7 @@ from rrtik_ompl.robot import Robot
 
 Solver: TypeAlias = Callable[[np.ndarray], np.ndarray | None]
 TURN = 2.0 * np.pi
+TRAC_IK_SECONDS = 0.1  # by the clock, so that a busy machine does not count against it; its default is 0.005
 
 
 def peers(robot: Robot, start: np.ndarray) -> dict[str, Solver | str]:
@@ -40,7 +41,7 @@ def _trac_ik(robot: Robot, start: np.ndarray) -> Solver:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "arm.urdf")
         file.write_text(serial_urdf(robot))
-        solver = TracIK("link0", "tip", str(file))
+        solver = TracIK("link0", "tip", str(file), timeout=TRAC_IK_SECONDS)
     if solver.dof != robot.dof:
         raise ValueError(f"it sees {solver.dof} joints")
 
