@@ -15,6 +15,8 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
 
 JOINT_TOLERANCE = 1e-6  # [rad] or [m]
+LAST_ROW = frozen([0.0, 0.0, 0.0, 1.0])  # of every pose
+LAST_ROW_TOLERANCE = 1e-8
 NO_BOX = frozen([0.0, 0.0, 0.0])
 
 
@@ -80,7 +82,7 @@ class PoseGoal:
     def __post_init__(self) -> None:
         if not isinstance(self.T_world_tip, pin.SE3):
             matrix = finite_array(self.T_world_tip, (4, 4), "goal pose")
-            if not np.allclose(matrix[3], [0.0, 0.0, 0.0, 1.0]):
+            if np.abs(matrix[3] - LAST_ROW).max() > LAST_ROW_TOLERANCE:
                 raise InputError(f"goal pose: the last row must be 0 0 0 1, got {matrix[3].tolist()}")
             object.__setattr__(self, "T_world_tip", pin.SE3(matrix))
         _check_rigid(finite_array(self.T_world_tip.homogeneous, (4, 4), "goal pose")[:3, :3])
@@ -210,11 +212,14 @@ def _check_rigid(rotation: NDArray[np.float64]) -> None:
             f"goal pose: its upper left 3 x 3 part is no rotation: {off:.3g} away from orthonormal (at most 0.001); "
             "make it orthonormal"
         )
-    if np.linalg.det(rotation) < 0.0:
+    x, y, z = rotation.tolist()
+    if x[0] * (y[1] * z[2] - y[2] * z[1]) < x[1] * (y[0] * z[2] - y[2] * z[0]) - x[2] * (y[0] * z[1] - y[1] * z[0]):
         raise InputError("goal pose: its upper left 3 x 3 part mirrors (determinant -1); a rotation is right-handed")
 
 
 def _tolerance(value: float, what: str) -> float:
+    if type(value) is float and 0.0 < value < np.inf:
+        return value
     number = float(finite_array(value, (), what))
     if number <= 0.0:
         raise InputError(f"{what} must be greater than 0, got {number:g}")
