@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ik_peers import eaik_robot
 
 from rrtik_ompl import load_robot
 from rrtik_ompl.ik.closed_form import solutions
@@ -86,18 +87,6 @@ def cases(count: int, rng: np.random.Generator) -> list[tuple[Robot, str, np.nda
     return rows
 
 
-def eaik_of(robot: Robot) -> tuple[Any, np.ndarray]:
-    """EAIK's robot from the axes and offsets at zero, and the rotation of the tip there."""
-    from eaik.IK_HP import HPRobot
-
-    zero = np.zeros((1, robot.dof))
-    frames = robot.joint_frames(zero)[0, 1:]
-    tip = robot.fk_batch(zero)[0]
-    points = np.vstack([np.zeros(3), frames[:, :3, 3], tip[:3, 3]])
-    axes = np.einsum("kij,kj->ki", frames[:, :3, :3], robot.chain.axis)
-    return HPRobot(axes, np.diff(points, axis=0)), tip[:3, :3]
-
-
 def speeds(robot: Robot, repeats: int, rng: np.random.Generator) -> dict[str, float]:
     """Poses per second of CPU time."""
     poses = robot.fk_batch(rng.uniform(robot.lower, robot.upper, (BATCH, robot.dof)))
@@ -106,7 +95,7 @@ def speeds(robot: Robot, repeats: int, rng: np.random.Generator) -> dict[str, fl
         "and residuals of all": partial(solutions, robot, poses),
     }
     if find_spec("eaik") is not None and robot.dof == 6:
-        other, at_zero = eaik_of(robot)
+        other, at_zero = eaik_robot(robot)
         turned = poses.copy()
         turned[:, :3, :3] = poses[:, :3, :3] @ at_zero.T
         work["EAIK"] = partial(other.IK_batched, turned, 1)
@@ -121,7 +110,7 @@ def speeds(robot: Robot, repeats: int, rng: np.random.Generator) -> dict[str, fl
 
 def agreement(robot: Robot, count: int, rng: np.random.Generator) -> str:
     """How our branches and EAIK's compare on random poses."""
-    other, at_zero = eaik_of(robot)
+    other, at_zero = eaik_robot(robot)
     poses = robot.fk_batch(rng.uniform(robot.lower, robot.upper, (count, robot.dof)))
     found = solutions(robot, poses, check=False)
     turned = poses.copy()

@@ -11,6 +11,7 @@ from planar_solvers import ccd, fabrik
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
+from rrtik_ompl.ik.descent import descend
 from rrtik_ompl.ik.face import solve_ik
 from rrtik_ompl.ik.mb_rrt.arc import arc_chains, grow_on_arcs
 from rrtik_ompl.ik.mb_rrt.axes import axes_of
@@ -22,7 +23,6 @@ from rrtik_ompl.ik.mb_rrt.growth import grow
 from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
 from rrtik_ompl.ik.mb_rrt.links import Links, directions, sunflower
 from rrtik_ompl.ik.mb_rrt.search import polished
-from rrtik_ompl.ik.numeric import descend
 from rrtik_ompl.shapes import Cylinder
 from rrtik_planners import MBRRT, BiCRDT
 from rrtik_robots.planar import planar

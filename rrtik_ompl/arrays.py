@@ -55,6 +55,8 @@ def positive(value: ArrayLike, what: str) -> float:
     Raises:
         InputError: If it is none.
     """
+    if type(value) is float and 0.0 < value < np.inf:
+        return value
     number = float(finite_array(value, (), what))
     if number <= 0.0:
         raise InputError(f"{what} must be greater than 0, got {number:g}")

@@ -158,6 +158,13 @@ class GoalRegion:
         inside: Mask = np.any([part.satisfied(robot, Q) for part in self.parts], axis=0)
         return inside
 
+    def member_errors(self, robot: Robot, Q: ArrayLike) -> NDArray[np.float64]:
+        """Distance [m] and angle [rad] (0 for a position) of each row of Q from each member, shape (k, m, 2).
+
+        Of what lies inside the box, and of what the free rotation can remove, nothing counts.
+        """
+        return np.array([part.errors(robot, Q) for part in self.parts]).transpose(0, 2, 1)
+
 
 TipGoal: TypeAlias = PoseGoal | PositionGoal | TaskRegion | GoalRegion
 Goal: TypeAlias = JointGoal | TipGoal
@@ -187,16 +194,18 @@ def as_task_region(part: GoalPart) -> TaskRegion:
 
 def tip_errors(goal: TipGoal, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
     """Distance [m] and angle [rad] of the tip from the nearest part of a goal, for each row of Q, shapes (m,)."""
-    parts = parts_of(goal)
-    each = np.array([part.errors(robot, Q) for part in parts])
-    best = np.argmin([part.distance(robot, Q) for part in parts], axis=0)
-    position, angle = each[best, :, np.arange(each.shape[2])].T
+    if not isinstance(goal, GoalRegion):
+        return goal.errors(robot, Q)
+    each = goal.member_errors(robot, Q)
+    best = np.argmin([part.distance(robot, Q) for part in goal.parts], axis=0)
+    position, angle = each[best, np.arange(each.shape[1])].T
     return position, angle
 
 
 def pose_errors(tips: NDArray[np.float64], target: Any) -> tuple[Vector, Vector]:
     """Distance [m] and rotation angle [rad] between poses, shape (m, 4, 4), and one target pose."""
-    position: Vector = np.linalg.norm(tips[:, :3, 3] - target.translation, axis=1)
+    away = tips[:, :3, 3] - target.translation
+    position: Vector = np.sqrt(np.einsum("mi,mi->m", away, away))
     return position, rotation_angles(target.rotation.T @ tips[:, :3, :3])
 
 

@@ -7,11 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector, frozen
-from rrtik_ompl.goal import JointGoal, TipGoal, as_task_region, joint_difference, parts_of, tip_errors
+from rrtik_ompl.goal import (
+    GoalRegion,
+    JointGoal,
+    PoseGoal,
+    TipGoal,
+    as_task_region,
+    joint_difference,
+    parts_of,
+    tip_errors,
+)
 from rrtik_ompl.ik.face import DRAWS, solve_ik
 from rrtik_ompl.ik.methods import METHODS
 from rrtik_ompl.ik.numeric import numeric_ik
-from rrtik_ompl.ik.projection import PER_RADIAN, project, projected, reach_of
+from rrtik_ompl.ik.plain_descent import reach_of
+from rrtik_ompl.ik.projection import PER_RADIAN, project, projected
 from rrtik_ompl.ik.question import Target
 from rrtik_ompl.ik.targets import leaves_freedom, targets
 from rrtik_ompl.problem import TURN, Problem
@@ -143,15 +153,20 @@ def _fits(method: str, robot: Robot, drawn: list[Target]) -> bool:
 def _walked(robot: Robot, goal: TipGoal, starts: Matrix, number: int, rng: np.random.Generator) -> Matrix:
     """Configurations at the goal to which numeric inverse kinematics leads; of many parts some take turns."""
     parts = parts_of(goal)
-    some = [parts[(number * PARTS + k) % len(parts)] for k in range(min(len(parts), PARTS))]
-    ends = []
-    for part, share in zip(some, np.array_split(starts, len(some)), strict=True):
-        if isinstance(part, TaskRegion):
-            rows = projected(robot, part, share, rng)
-            ends.append(rows[part.satisfied(robot, rows)])
-        else:
-            ends.append(numeric_ik(robot, part, share))
-    return np.vstack(ends)
+    some = [(number * PARTS + k) % len(parts) for k in range(min(len(parts), PARTS))]
+    shares = np.array_split(starts, len(some))
+    return np.vstack([_walked_to(robot, goal, part, share, rng) for part, share in zip(some, shares, strict=True)])
+
+
+def _walked_to(robot: Robot, goal: TipGoal, number: int, starts: Matrix, rng: np.random.Generator) -> Matrix:
+    """The same for one of its parts. Walks end on the rim of ranges, so that these are projected onto, spread out."""
+    part = parts_of(goal)[number]
+    if isinstance(goal, GoalRegion) and isinstance(goal.members[number], PoseGoal) and not goal.box.any():
+        return numeric_ik(robot, GoalRegion([goal.members[number]], goal.free_rotation_axis), starts)
+    if not isinstance(part, TaskRegion):
+        return numeric_ik(robot, part, starts)
+    rows = projected(robot, part, starts, rng)
+    return rows[part.satisfied(robot, rows)]
 
 
 def _turns(problem: Problem, q: Vector) -> Matrix:

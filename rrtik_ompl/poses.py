@@ -8,10 +8,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector, finite_array
+from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError
 
 IDENTITY_QUATERNION = (0.0, 0.0, 0.0, 1.0)  # x, y, z, w
+LAST_ROW = frozen([0.0, 0.0, 0.0, 1.0])  # of every pose
+LAST_ROW_TOLERANCE = 1e-8
+NOT_RIGID = 1e-3  # largest entry of R^T R - 1 that still counts as rounding of a file
 
 
 def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), quat_xyzw: ArrayLike = IDENTITY_QUATERNION, what: str = "pose") -> Any:
@@ -48,12 +51,19 @@ def rigid(T: Any, what: str) -> Any:
         InputError: If it is neither, or scales, skews or mirrors.
     """
     matrix = finite_array(T.homogeneous if isinstance(T, pin.SE3) else T, (4, 4), what)
-    if not np.allclose(matrix[3], [0.0, 0.0, 0.0, 1.0]):
+    if np.abs(matrix[3] - LAST_ROW).max() > LAST_ROW_TOLERANCE:
         raise InputError(f"{what}: the last row must be 0 0 0 1, got {matrix[3].tolist()}")
     rotation = matrix[:3, :3]
-    if float(np.abs(rotation @ rotation.T - np.eye(3)).max()) > 1e-3 or np.linalg.det(rotation) < 0.0:
+    off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
+    if off > NOT_RIGID:
         raise InputError(
-            f"{what}: its upper left 3 x 3 part is no rotation (it scales, skews or mirrors); make it orthonormal"
+            f"{what}: its upper left 3 x 3 part is no rotation: {off:.3g} away from orthonormal "
+            f"(at most {NOT_RIGID:g}); make it orthonormal"
+        )
+    x, y, z = rotation.tolist()
+    if x[0] * (y[1] * z[2] - y[2] * z[1]) < x[1] * (y[0] * z[2] - y[2] * z[0]) - x[2] * (y[0] * z[1] - y[1] * z[0]):
+        raise InputError(
+            f"{what}: its upper left 3 x 3 part mirrors (determinant -1); make it orthonormal and right-handed"
         )
     return pin.SE3(matrix)
 
@@ -73,8 +83,9 @@ def unit_vector(values: ArrayLike, what: str) -> Vector:
 
 def rotation_angles(rotations: NDArray[np.float64]) -> Vector:
     """Angle of rotations, shape (m, 3, 3): atan2(|R - R^T| / (2 sqrt 2), (tr R - 1) / 2), accurate near 0 and pi."""
-    sine = np.linalg.norm(rotations - np.swapaxes(rotations, 1, 2), axis=(1, 2)) / (2.0 * np.sqrt(2.0))
-    angle: Vector = np.arctan2(sine, 0.5 * (np.trace(rotations, axis1=1, axis2=2) - 1.0))
+    skew = rotations - np.swapaxes(rotations, 1, 2)
+    sine = np.sqrt(np.einsum("mij,mij->m", skew, skew) / 8.0)
+    angle: Vector = np.arctan2(sine, 0.5 * (np.einsum("mii->m", rotations) - 1.0))
     return angle
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
+from threading import get_ident
 from types import MappingProxyType
 from typing import Any
 
@@ -14,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError, UnknownNameError
 
+FEW = 16  # configurations up to which Pinocchio's calls cost less than numpy's
 LIMIT_TOLERANCE = 1e-6  # [rad] or [m]; a value this far outside counts as inside and is moved onto the limit
 
 
@@ -197,8 +200,19 @@ class Robot:
         Returns:
             Shape (m, 4, 4).
         """
-        target = self.model.frames[self._frame_id(frame)]
-        poses: NDArray[np.float64] = self.joint_frames(Q)[:, target.parentJoint] @ target.placement.homogeneous
+        return self._poses(self._rows(Q), self._frame_id(frame))
+
+    def _poses(self, rows: Matrix, frame: int, joint_frames: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """Poses of a frame for configurations, shape (m, dof): of few by Pinocchio. Shape (m, 4, 4)."""
+        if not 0 < len(rows) <= FEW:
+            target = self.model.frames[frame]
+            frames = self.joint_frames(rows) if joint_frames is None else joint_frames
+            placed: NDArray[np.float64] = frames[:, target.parentJoint] @ target.placement.homogeneous
+            return placed
+        data, poses = _data_of(self, get_ident()), np.empty((len(rows), 4, 4))
+        for k, full in enumerate(self.lift(rows)):
+            pin.forwardKinematics(self.model, data, full)
+            poses[k] = pin.updateFramePlacement(self.model, data, frame).homogeneous
         return poses
 
     def fk(self, q: ArrayLike, frame: str | None = None) -> Any:
@@ -222,12 +236,12 @@ class Robot:
         self, Q: ArrayLike, frame: str | None = None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """:meth:`fk_batch` and :meth:`jacobian_batch` at once, shapes (m, 4, 4) and (m, 6, dof)."""
-        target = self.model.frames[self._frame_id(frame)]
-        frames = self.joint_frames(Q)
-        poses = frames[:, target.parentJoint] @ target.placement.homogeneous
+        rows, number = self._rows(Q), self._frame_id(frame)
+        frames = self.joint_frames(rows)
+        poses = self._poses(rows, number, frames)
         point = poses[:, :3, 3]
         columns = np.zeros((len(frames), 6, len(self.chain.parent)))
-        joint = target.parentJoint - 1
+        joint = self.model.frames[number].parentJoint - 1
         while joint >= 0:  # only the joints between the base and the frame move it
             axis = frames[:, joint + 1, :3, :3] @ self.chain.axis[joint]
             if self.chain.prismatic[joint]:
@@ -258,6 +272,13 @@ def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64
     product = a[:, [1, 2, 0]] * b[:, [2, 0, 1]]
     product -= a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
     return product
+
+
+@lru_cache(maxsize=64)
+def _data_of(robot: Robot, thread: int) -> Any:
+    """Pinocchio's working memory for a robot, of one thread's own."""
+    del thread
+    return robot.model.createData()
 
 
 def _joint_motion(axis: Vector, prismatic: bool, values: Vector) -> NDArray[np.float64]:

@@ -50,6 +50,31 @@ def test_with_a_world_all_answers_are_free():
     assert {reason for reason in batch.reasons if reason} == {"collision"}
 
 
-def test_something_that_is_no_pose_is_refused():
-    with pytest.raises(InputError, match="poses: entry 0 is no rotation"):
-        solve_ik_batch(rrtik.load_robot("ur5"), 2.0 * np.eye(4)[None])
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        (2.0 * np.eye(4), "poses: entry 1 is no rotation: its columns are 3 away from orthonormal"),
+        (np.diag([1.0, 1.0, -1.0, 1.0]), "poses: entry 1 mirrors"),
+        (np.diag([1.0, 1.0, 1.0, 2.0]), "poses: the last row of entry 1 must be 0 0 0 1"),
+        (np.full((4, 4), np.nan), "poses: every number must be finite"),
+    ],
+)
+def test_something_that_is_no_pose_is_refused(changed, message):
+    with pytest.raises(InputError, match=message):
+        solve_ik_batch(rrtik.load_robot("ur5"), np.array([np.eye(4), changed]))
+
+
+def test_a_goal_that_is_no_pose_is_refused_by_how_far_it_is_off():
+    with pytest.raises(InputError, match=r"no rotation: 0\.21 away from orthonormal"):
+        rrtik.PoseGoal(np.diag([1.1, 1.1, 1.1, 1.0]))
+    with pytest.raises(InputError, match="mirrors"):
+        rrtik.PoseGoal(np.diag([1.0, 1.0, -1.0, 1.0]))
+
+
+def test_a_batch_says_by_how_much_a_pose_is_out_of_reach():
+    far = np.eye(4)
+    far[0, 3] = 3.0
+    batch = solve_ik_batch(rrtik.load_robot("ur5"), far[None])
+    assert batch.reasons == ("unreachable",)
+    assert "m and" in batch.details[0]
+    assert 1.5 < float(batch.details[0].split("posture is ")[1].split(" m")[0]) < 2.5

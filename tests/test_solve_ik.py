@@ -182,3 +182,21 @@ def test_with_a_tip_that_the_last_joint_does_not_carry_auto_is_numeric():
 
 def test_the_methods_have_names():
     assert list_ik_methods()[:4] == ("closed-form", "numeric", "genetic", "mb-rrt")
+
+
+def test_numeric_looks_at_every_grasp_of_a_large_set():
+    robot = rrtik.load_robot("ur5")
+    far = [rrtik.PoseGoal(pose_from_rpy([5.0 + k, 0.0, 0.0], [0.0, 0.0, 0.0])) for k in range(70)]
+    near = pose_goal(robot, Q_TITAN)
+    result = solve_ik(robot, rrtik.GoalRegion([*far, near]), method="numeric", seconds=20.0)
+    assert result.found
+    assert near.satisfied(robot, result.solutions).all()
+
+
+def test_numeric_takes_targets_drawn_from_task_regions():
+    robot = rrtik.load_robot("ur5")
+    bar = rrtik.TaskRegion.about_axis(robot.fk(Q_TITAN), [0.0, 0.0, 1.0], slide=[-0.1, 0.1])
+    goal = rrtik.GoalRegion([rrtik.PositionGoal([5.0, 0.0, 0.0]), bar])
+    result = solve_ik(robot, goal, method="numeric", seconds=20.0)
+    assert result.found
+    assert bar.satisfied(robot, result.solutions).all()

@@ -1,7 +1,8 @@
-"""Inverse kinematics of an array of poses: by closed form all at once, and what that leaves one by one."""
+"""Inverse kinematics of an array of poses: closed forms and the numeric method all at once, the others one by one."""
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
 from rrtik_ompl.goal import PoseGoal, joint_difference
-from rrtik_ompl.ik.closed_form import check_rotations, form_of, has_closed_form, solutions, tip_fault
-from rrtik_ompl.ik.face import SECONDS, solve_ik
+from rrtik_ompl.ik.closed_form import check_poses, form_of, solutions, tip_residuals
+from rrtik_ompl.ik.descent import Search, load_kernels
+from rrtik_ompl.ik.face import SECONDS, chosen_method, free_of_collision, solve_ik, usual_posture
+from rrtik_ompl.ik.goal_rows import pose_rows
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 
@@ -20,74 +23,107 @@ class IkBatch:
     """One answer per pose.
 
     Attributes:
-        q: The solution nearest to the posture asked for, shape (m, dof); NaN where there is none.
+        q: The solution nearest to the posture asked for (of a closed form), or the first found from it, shape
+            (m, dof); NaN where there is none.
         found: Where there is one, shape (m,).
         residuals: Distance [m] and angle [rad] by forward kinematics, shape (m, 2); NaN where there is none.
         reasons: Why there is none, "" where there is one: see `IkResult`.
+        details: The same in lines: by how much, which joint, what touches.
     """
 
     q: Matrix
     found: Mask
     residuals: Matrix
     reasons: tuple[str, ...]
+    details: tuple[str, ...]
 
 
 def solve_ik_batch(
     robot: Robot,
     poses: ArrayLike,
     *,
+    method: str = "auto",
     near: ArrayLike | None = None,
     world: World | None = None,
     seconds: float = SECONDS,
     seed: int = 0,
 ) -> IkBatch:
-    """For each pose the solution nearest to a posture, inside the limits and, if a world is given, free of collision.
+    """For each pose a solution inside the limits and, if a world is given, free of collision.
 
     Args:
         robot: The arm.
         poses: T_world_tip, shape (m, 4, 4).
-        near: Posture, shape (dof,); the middle of the limits if None.
+        method: As for `solve_ik`; "closed-form" and "numeric" take all poses at once.
+        near: Posture near which solutions are wanted, shape (dof,); the middle of the limits if None.
         world: If given, solutions in collision are left out.
         seconds: For each pose that has no closed-form solution.
         seed: Of the random numbers.
 
     Raises:
-        InputError: If a pose is none, or an argument makes no sense.
+        UnknownNameError: If there is no such method.
+        InputError: If a pose is none, the method does not fit the robot, or an argument makes no sense.
     """
+    load_kernels()
+    begin = time.monotonic()
     targets = finite_array(poses, (None, 4, 4), "poses")
-    if len(targets):
-        check_rotations(targets[:, :3, :3], "poses")
-    posture = 0.5 * np.sum(robot.finite_range(), axis=0) if near is None else robot.configuration(near, "near")
+    posture = usual_posture(robot) if near is None else robot.configuration(near, "near")
+    limit = float(finite_array(seconds, (), "seconds"))
     q, residuals = np.full((len(targets), robot.dof), np.nan), np.full((len(targets), 2), np.nan)
-    reasons = [""] * len(targets)
-    if _fits(robot):
-        _all_at_once(robot, targets, posture, world, q, residuals)
+    reasons, details = [""] * len(targets), [""] * len(targets)
+    check_poses(targets, "poses")
+    if len(targets):
+        method = chosen_method(robot, (PoseGoal(targets[0]),), method)
+    if method == "closed-form" and form_of(robot).kind == "pose":
+        _by_closed_form(robot, targets, posture, world, q, residuals)
+    elif method == "numeric":
+        _by_search(robot, targets, posture, world, begin + limit * len(targets), q, residuals)
     for k in np.flatnonzero(np.isnan(q[:, 0])):
         goal = PoseGoal(targets[k])
-        result = solve_ik(robot, goal, near=posture, world=world, seconds=seconds, seed=seed + int(k))
-        reasons[k] = result.reason
+        result = solve_ik(robot, goal, method=method, near=posture, world=world, seconds=limit, seed=seed + int(k))
+        reasons[k], details[k] = result.reason, result.detail
         if result.found:
             q[k], residuals[k] = result.solutions[0], result.residuals[0]
-    return IkBatch(frozen(q), frozen(~np.isnan(q[:, 0]), bool), frozen(residuals), tuple(reasons))
+    return IkBatch(frozen(q), frozen(~np.isnan(q[:, 0]), bool), frozen(residuals), tuple(reasons), tuple(details))
 
 
-def _fits(robot: Robot) -> bool:
-    return has_closed_form(robot) and form_of(robot).kind == "pose" and not tip_fault(robot, form_of(robot))
-
-
-def _all_at_once(
+def _by_closed_form(
     robot: Robot, targets: NDArray[np.float64], near: Vector, world: World | None, q: Matrix, residuals: Matrix
 ) -> None:
     """Write the nearest valid branch of each target into q, shape (m, dof), and residuals, shape (m, 2)."""
     found = solutions(robot, targets, near=near)
     valid = np.array(found.valid)
-    if world is not None:
-        rows = found.branches[valid]
-        free = np.array(world.valid_batch(rows))
-        free[free] = world.certify(rows[free])
-        valid[valid] = free
+    valid[valid] = free_of_collision(world, found.branches[valid])
     distance = np.linalg.norm(joint_difference(robot, found.branches, near), axis=2)
     best = np.argmin(np.where(valid, distance, np.inf), axis=1)
     done = np.flatnonzero(valid.any(axis=1))
     q[done] = robot.clamp(found.branches[done, best[done]])
     residuals[done] = np.asarray(found.residuals)[done, best[done]]
+
+
+def _by_search(
+    robot: Robot,
+    targets: NDArray[np.float64],
+    near: Vector,
+    world: World | None,
+    deadline: float,
+    q: Matrix,
+    residuals: Matrix,
+) -> None:
+    """Write solutions into q, shape (m, dof), and residuals, shape (m, 2): targets in collision are tried again."""
+    search, going = Search(robot, pose_rows(targets), near), np.arange(len(targets))
+    while len(going) and time.monotonic() < deadline:
+        going = going[search.advance(going)]
+        free = free_of_collision(world, search.q[going])
+        done, going = going[free], going[~free]
+        found = search.q[done]
+        q[done] = np.where(robot.continuous, near + joint_difference(robot, found, near), found)
+    residuals[:] = _checked(robot, targets, q)
+
+
+def _checked(robot: Robot, targets: NDArray[np.float64], q: Matrix) -> Matrix:
+    """Residuals by forward kinematics, shape (m, 2); rows of q that are not at their targets become NaN, in place."""
+    residuals = tip_residuals(robot, q.T[:, None], targets)[:, 0].T
+    goal = PoseGoal(np.eye(4))
+    residuals[~(residuals <= (goal.position_tolerance, goal.orientation_tolerance)).all(axis=1)] = np.nan
+    q[np.isnan(residuals[:, 0])] = np.nan
+    return residuals

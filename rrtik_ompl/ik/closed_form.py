@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,9 +14,9 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.ik.form import ClosedFormSolver, wrapped
 from rrtik_ompl.ik.planar import planar_form
 from rrtik_ompl.ik.tip_columns import tip_columns
-from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
+from rrtik_ompl.poses import LAST_ROW, LAST_ROW_TOLERANCE, NOT_RIGID
+from rrtik_ompl.robot import FEW, LIMIT_TOLERANCE, Robot
 
-NOT_RIGID = 1e-3  # largest entry of R^T R - 1 that still counts as rounding of a file
 BLOCK = 2048  # targets at a time: their arrays stay in the cache
 SWEEP = 72  # samples of a singular pose's curve of solutions
 TURN = 2.0 * np.pi
@@ -89,24 +91,35 @@ def solutions(
     Raises:
         InputError: If the robot has no closed form, or a target is no pose or lies beyond numbers.
     """
+    poses = _poses(robot, form_of(robot), targets)
+    return branches_of(robot, poses, None if near is None else _hints(robot, near, len(poses)), slack, check)
+
+
+def branches_of(
+    robot: Robot, poses: NDArray[np.float64], hints: Matrix | None = None, slack: float = 0.0, check: bool = True
+) -> ClosedForm:
+    """As `solutions`, for poses and configurations near them, one for each, that need no check any more."""
     form = form_of(robot)
-    poses = _poses(robot, form, targets)
-    count, branches = len(poses), len(form.branches)
-    placed, hints = _placed(robot, form, poses), None if near is None else _hints(robot, near, count)
-    q, real = np.empty((robot.dof, branches, count)), np.empty((branches, count), dtype=bool)
-    valid, singular = np.empty_like(real), np.empty(count, dtype=np.uint8)
-    residuals, tip = np.zeros((2, branches, count)), tip_columns(robot)
-    for begin in range(0, count, BLOCK):
+    parts = []
+    for begin in range(0, max(len(poses), 1), BLOCK):
         rows = slice(begin, begin + BLOCK)
-        hint = None if hints is None else hints[rows]
-        found = form(placed[rows], hint, slack)
-        q[..., rows], real[:, rows], singular[rows] = found.q.T, found.real.T, found.singular
-        valid[:, rows] = real[:, rows] & _turn_inside(robot, q[..., rows], hint)
-        if check:
-            residuals[..., rows] = _residuals(tip.poses(q[..., rows]), poses[rows], form.kind == "pose")
-    for array in (q, real, valid, singular, residuals):
+        parts.append(_block(robot, form, poses[rows], None if hints is None else hints[rows], slack, check))
+    joined = parts[0] if len(parts) == 1 else [np.concatenate(each, axis=-1) for each in zip(*parts, strict=True)]
+    for array in joined:
         array.setflags(write=False)
+    q, real, valid, singular, residuals = joined
     return ClosedForm(q.T, real.T, valid.T, singular, residuals.T if check else None)
+
+
+def _block(
+    robot: Robot, form: ClosedFormSolver, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool
+) -> list[NDArray[Any]]:
+    """What `ClosedForm` holds, the targets in the last axis, for as many as the cache has room for."""
+    found = form(_placed(robot, form, poses), hints, slack)
+    q, real = np.array(found.q.T, order="C"), np.array(found.real.T)
+    valid = real & _turn_inside(robot, q, hints)
+    residuals = tip_residuals(robot, q, poses, form.kind == "pose") if check else np.zeros((2, 0, len(poses)))
+    return [q, real, valid, np.array(found.singular), residuals]
 
 
 def family(robot: Robot, target: ArrayLike, *, samples: int = SWEEP, slack: float = 0.0) -> Matrix:
@@ -142,17 +155,20 @@ def _poses(robot: Robot, form: ClosedFormSolver, targets: ArrayLike) -> NDArray[
         poses[:, :3, 3] = points
         return poses
     poses = finite_array(targets, (None, 4, 4), "targets")
-    if form.kind == "pose" and len(poses):
-        check_rotations(poses[:, :3, :3], "targets")
+    if form.kind == "pose":
+        check_poses(poses, "targets")
     return poses
 
 
-def check_rotations(rotations: NDArray[np.float64], what: str) -> None:
-    """Refuse matrices, shape (m, 3, 3), that are no rotations.
+def check_poses(poses: NDArray[np.float64], what: str) -> None:
+    """Refuse matrices, shape (m, 4, 4), that are no poses.
 
     Raises:
         InputError: It says which one and how far it is from orthonormal.
     """
+    if len(poses) == 0:
+        return
+    rotations = poses[:, :3, :3]
     off = np.abs(np.swapaxes(rotations, 1, 2) @ rotations - np.eye(3)).max(axis=(1, 2))
     worst = int(np.argmax(off))
     if off[worst] > NOT_RIGID:
@@ -163,6 +179,9 @@ def check_rotations(rotations: NDArray[np.float64], what: str) -> None:
     mirrored = np.flatnonzero(np.linalg.det(rotations) < 0.0)
     if len(mirrored):
         raise InputError(f"{what}: entry {mirrored[0]} mirrors (determinant -1); a rotation is right-handed")
+    odd = np.flatnonzero((np.abs(poses[:, 3] - LAST_ROW) > LAST_ROW_TOLERANCE).any(axis=1))
+    if len(odd):
+        raise InputError(f"{what}: the last row of entry {odd[0]} must be 0 0 0 1, got {poses[odd[0], 3].tolist()}")
 
 
 def _hints(robot: Robot, near: ArrayLike, count: int) -> Matrix:
@@ -177,13 +196,20 @@ def _placed(robot: Robot, form: ClosedFormSolver, poses: NDArray[np.float64]) ->
     fault = tip_fault(robot, form)
     if fault:
         raise InputError(f"robot '{robot.name}': {fault}; method 'numeric' fits every tip")
+    T_base_world, T_tip_frame = _mountings(robot, form)
+    if T_base_world is not None:
+        poses = T_base_world @ poses
+    return poses if T_tip_frame is None else poses @ T_tip_frame
+
+
+@lru_cache(maxsize=64)
+def _mountings(robot: Robot, form: ClosedFormSolver) -> tuple[Matrix | None, Matrix | None]:
+    """T_base_world and T_tip_frame, None where they are the identity."""
     frames = robot.model.frames
     base, tip, own = (frames[robot.model.getFrameId(name)] for name in (robot.link_names[0], robot.tip, form.frame))
-    T_base_world = base.placement.inverse().homogeneous
-    T_tip_frame = (tip.placement.inverse() * own.placement).homogeneous
-    if not np.array_equal(T_base_world, np.eye(4)):
-        poses = T_base_world @ poses
-    return poses if np.array_equal(T_tip_frame, np.eye(4)) else poses @ T_tip_frame
+    mountings = (base.placement.inverse().homogeneous, (tip.placement.inverse() * own.placement).homogeneous)
+    before, after = (None if np.array_equal(matrix, np.eye(4)) else matrix for matrix in mountings)
+    return before, after
 
 
 def _turn_inside(robot: Robot, q: NDArray[np.float64], near: Matrix | None) -> NDArray[np.bool_]:
@@ -214,8 +240,29 @@ def _full_turns(
     return inside
 
 
-def _residuals(tips: NDArray[np.float64], poses: NDArray[np.float64], oriented: bool) -> NDArray[np.float64]:
-    """Distance and angle between tips, shape (4, 3, b, m), and poses, shape (m, 4, 4). Shape (2, b, m)."""
+def _tips(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Columns x, y, z and position of the tip for q of shape (dof, b, m), shape (4, 3, b, m)."""
+    rows = q.reshape(robot.dof, -1).T
+    if len(rows) > FEW:
+        return tip_columns(robot).poses(q)
+    return robot.fk_batch(rows)[:, :3].T.reshape(4, 3, *q.shape[1:])
+
+
+def tip_residuals(
+    robot: Robot, q: NDArray[np.float64], poses: NDArray[np.float64], oriented: bool = True
+) -> NDArray[np.float64]:
+    """By forward kinematics how far configurations are from poses.
+
+    Args:
+        robot: The arm.
+        q: Shape (dof, b, m): b configurations for each of m poses.
+        poses: T_world_tip, shape (m, 4, 4).
+        oriented: Whether the orientation counts; the angle is 0 if not.
+
+    Returns:
+        Distance [m] and angle [rad], shape (2, b, m).
+    """
+    tips = _tips(robot, q)
     off = tips - poses[:, :3].transpose(2, 1, 0)[:, :, None]
     off *= off
     residuals = np.zeros((2, *tips.shape[2:]))

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError, UnknownNameError, require
-from rrtik_ompl.goal import TipGoal, has_task_regions, joint_difference, tip_errors
+from rrtik_ompl.goal import PoseGoal, PositionGoal, TipGoal, has_task_regions, joint_difference, tip_errors
+from rrtik_ompl.ik.descent import load_kernels
 from rrtik_ompl.ik.methods import METHODS
-from rrtik_ompl.ik.question import Answer, Question, Target, errors
+from rrtik_ompl.ik.question import Answer, Question, Target, errors, tolerances
 from rrtik_ompl.ik.targets import targets
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
@@ -85,15 +87,16 @@ def solve_ik(
         UnknownNameError: If there is no such method.
         InputError: If the method does not fit the robot and the goal, or an argument makes no sense.
     """
+    load_kernels()
     begin = time.monotonic()
     require(goal, TipGoal, "goal", "inverse kinematics needs a goal of the tip")
     if world is not None and world.robot is not robot:
         raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
     limit = float(finite_array(seconds, (), "seconds"))
     rng = np.random.default_rng(seed)
-    posture = 0.5 * np.sum(robot.finite_range(), axis=0) if near is None else robot.configuration(near, "near")
+    posture = usual_posture(robot) if near is None else robot.configuration(near, "near")
     drawn = tuple(targets(goal, DRAWS, rng))
-    name = _chosen(robot, drawn, method)
+    name = chosen_method(robot, drawn, method)
     if method == "auto" and name == "numeric" and has_task_regions(goal):
         name = "projection"
 
@@ -101,14 +104,13 @@ def solve_ik(
         return free_of_collision(world, Q)
 
     answer = METHODS[name].run(Question(robot, goal, drawn, posture, accept, all, begin + limit, rng, world))
-    q = answer.q[robot.within_limits(answer.q) & goal.satisfied(robot, answer.q)] if len(answer.q) else answer.q
-    q = robot.clamp(q)
-    free = q[accept(q)]
-    kept = _different(robot, free, posture)[: None if all else 1]
+    q, residuals = _at_goal(robot, goal, answer.q)
+    free = accept(q)
+    kept = _different(robot, q, posture, np.flatnonzero(free), None if all else 1)
     reason, detail = ("", "") if len(kept) else _why(robot, answer, world, q)
     return IkResult(
-        solutions=frozen(kept),
-        residuals=frozen(np.column_stack(tip_errors(goal, robot, kept)) if len(kept) else np.zeros((0, 2))),
+        solutions=frozen(np.where(robot.continuous, posture + joint_difference(robot, q[kept], posture), q[kept])),
+        residuals=frozen(residuals[kept]),
         reason=reason,
         detail=detail,
         iterations=answer.iterations,
@@ -117,19 +119,32 @@ def solve_ik(
     )
 
 
-def _chosen(robot: Robot, drawn: tuple[Target, ...], method: str) -> str:
-    misfits = {
-        name: next((m for m in (each.misfit(robot, t) for t in drawn) if m), "") for name, each in METHODS.items()
-    }
-    fitting = [name for name, misfit in misfits.items() if not misfit]
+@lru_cache(maxsize=64)
+def usual_posture(robot: Robot) -> Vector:
+    """Where a search begins if nobody says: the middle of the limits, shape (dof,)."""
+    return frozen(0.5 * np.sum(robot.finite_range(), axis=0))
+
+
+def chosen_method(robot: Robot, drawn: tuple[Target, ...], method: str) -> str:
+    """The name of the method for targets: the first that fits if it is "auto".
+
+    Raises:
+        UnknownNameError: If there is no such method.
+        InputError: If it does not fit.
+    """
+
+    def misfit(name: str) -> str:
+        return next((m for m in (METHODS[name].misfit(robot, target) for target in drawn) if m), "")
+
     if method == "auto":
-        return fitting[0]
+        return next(name for name in METHODS if not misfit(name))
     if method not in METHODS:
         raise UnknownNameError("inverse kinematics method", method, ("auto", *METHODS))
-    if misfits[method]:
+    fault = misfit(method)
+    if fault:
         raise InputError(
-            f"method '{method}' does not fit robot '{robot.name}' and this goal: {misfits[method]}; "
-            f"what fits: {', '.join(fitting)}"
+            f"method '{method}' does not fit robot '{robot.name}' and this goal: {fault}; "
+            f"what fits: {', '.join(name for name in METHODS if not misfit(name))}"
         )
     return method
 
@@ -146,14 +161,32 @@ def free_of_collision(world: World | None, Q: Matrix) -> Mask:
     return free
 
 
-def _different(robot: Robot, q: Matrix, near: Vector) -> Matrix:
-    """The rows without repetitions, nearest to a posture first; continuous joints turned towards it."""
+def _different(robot: Robot, q: Matrix, near: Vector, rows: NDArray[np.intp], most: int | None) -> list[int]:
+    """Some of the rows of q without repetitions, nearest to a posture first, at most so many if not all."""
     difference = joint_difference(robot, q, near)
     kept: list[int] = []
-    for k in np.argsort(np.linalg.norm(difference, axis=1), kind="stable"):
+    for k in rows[np.argsort(np.linalg.norm(difference[rows], axis=1), kind="stable")]:
+        if len(kept) == most:
+            break
         if not kept or np.abs(difference[k] - difference[kept]).max(axis=1).min() > SAME_POSTURE:
             kept.append(int(k))
-    return np.where(robot.continuous, near + difference[kept], q[kept])
+    return kept
+
+
+def _at_goal(robot: Robot, goal: TipGoal, q: Matrix) -> tuple[Matrix, Matrix]:
+    """The rows of q at the goal and inside the limits, and their residuals, shape (k, 2).
+
+    Of a region those from the part that a row is nearest to.
+    """
+    q = robot.clamp(q[robot.within_limits(q)])
+    if len(q) == 0:
+        return q, np.zeros((0, 2))
+    if isinstance(goal, PoseGoal | PositionGoal):
+        residuals = errors(robot, goal, q)
+        at = (residuals <= tolerances(goal)).all(axis=1)
+    else:
+        residuals, at = np.column_stack(tip_errors(goal, robot, q)), goal.satisfied(robot, q)
+    return q[at], residuals[at]
 
 
 def _why(robot: Robot, answer: Answer, world: World | None, q: Matrix) -> tuple[str, str]:

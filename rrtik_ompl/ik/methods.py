@@ -8,19 +8,19 @@ from types import MappingProxyType
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix
+from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.ik.ccd import ccd
-from rrtik_ompl.ik.closed_form import family, form_of, has_closed_form, solutions, tip_fault
+from rrtik_ompl.ik.closed_form import branches_of, family, form_of, has_closed_form, tip_fault
 from rrtik_ompl.ik.damped import damped_least_squares, pinocchio_iteration
 from rrtik_ompl.ik.fabrik import fabrik, fabrik_misfit
 from rrtik_ompl.ik.genetic.method import genetic
 from rrtik_ompl.ik.hinges import coupled_fault
 from rrtik_ompl.ik.mb_rrt.method import mb_rrt, mb_rrt_misfit
-from rrtik_ompl.ik.numeric import descend
+from rrtik_ompl.ik.numeric import numeric
 from rrtik_ompl.ik.projection import projection
 from rrtik_ompl.ik.pso import PARTICLES, pso, resampled_pso
-from rrtik_ompl.ik.question import Answer, Method, Question, Target
+from rrtik_ompl.ik.question import Answer, Method, Question, Target, tolerances
 from rrtik_ompl.ik.restarts import ROUNDS, STARTS, Walk, restarted
 from rrtik_ompl.robot import Robot
 
@@ -38,13 +38,19 @@ def _closed_form_misfit(robot: Robot, target: Target) -> str:
 def _closed_form(question: Question) -> Answer:
     """All branches of all targets; if none will do, the curves of those that are singular within their tolerances."""
     robot, targets = question.robot, question.targets
-    found = solutions(robot, np.array([_matrix(target) for target in targets]), near=question.near)
+    poses = np.array([_matrix(target) for target in targets])
+    hints = np.broadcast_to(question.near, (len(targets), robot.dof))
+    found = branches_of(robot, poses, hints, check=False)
+    q = found.branches[found.valid]
+    if len(q) and question.accept(q).any():  # the usual case; forward kinematics judges what is returned
+        return Answer(q, question.near, targets[0])
+    found = branches_of(robot, poses, hints)
     rows, owner = found.branches.reshape(-1, robot.dof), np.repeat(np.arange(len(targets)), found.real.shape[1])
-    fits = robot.within_limits(rows) & _at_targets(question, rows, owner)
-    q = rows[fits]
+    residuals = np.asarray(found.residuals).reshape(-1, 2)
+    near_enough = residuals <= np.array([tolerances(target) for target in targets])[owner]
+    q = rows[robot.within_limits(rows) & near_enough.all(axis=1)]
     if not question.accept(q).any():
         q = np.vstack([q, *(family(robot, _matrix(target), slack=_slack(target)) for target in targets)])
-    residuals = np.asarray(found.residuals).reshape(-1, 2)
     best = int(np.argmin(residuals.sum(axis=1)))
     return Answer(q, rows[best], targets[int(owner[best])])
 
@@ -54,14 +60,6 @@ def _slack(target: Target) -> float:
     if isinstance(target, PositionGoal):
         return 0.0
     return 0.4 * min(target.position_tolerance, target.orientation_tolerance)
-
-
-def _at_targets(question: Question, rows: Matrix, owner: np.ndarray) -> Mask:
-    satisfied = np.zeros(len(rows), dtype=bool)
-    for k, target in enumerate(question.targets):
-        mine = owner == k
-        satisfied[mine] = target.satisfied(question.robot, rows[mine])
-    return satisfied
 
 
 def _matrix(target: Target) -> Matrix:
@@ -89,7 +87,7 @@ def _stands_alone(robot: Robot, target: Target) -> str:
 METHODS: Mapping[str, Method] = MappingProxyType(
     {
         "closed-form": Method(_closed_form_misfit, _closed_form),
-        "numeric": Method(_fits_all, _walks(descend)),
+        "numeric": Method(_fits_all, numeric),
         "genetic": Method(_fits_all, genetic),
         "mb-rrt": Method(mb_rrt_misfit, mb_rrt),
         "projection": Method(_fits_all, projection),

@@ -1,65 +1,86 @@
-"""Numeric inverse kinematics of any arm, many starts at once: Levenberg-Marquardt with a damping that needs no tuning.
-
-Source: T. Sugihara, "Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method", IEEE Transactions
-on Robotics 27 (2011), 984-991: the damping is the residual itself plus a small constant, so that steps are short far
-from the target and in singular postures, and Newton's near the solution.
-"""
+"""Numeric inverse kinematics of any arm: Levenberg-Marquardt from a posture and then from seeds near the goal."""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+import time
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.goal import PoseGoal, PositionGoal
-from rrtik_ompl.ik.residual import twist, well_inside
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.goal import TipGoal, has_task_regions
+from rrtik_ompl.ik.descent import PATIENCE, STEPS, Search, walk
+from rrtik_ompl.ik.goal_rows import goal_rows
+from rrtik_ompl.ik.question import Answer, Question
+from rrtik_ompl.ik.restarts import ROUNDS, STARTS, nearest_posture
 from rrtik_ompl.robot import Robot
 
-ITERATIONS = 60
-DAMPING = 1e-6  # the constant part, in units of the squared residual (1 is the reach)
-LARGEST_STEP = 0.5  # [rad] or [m] of any joint in one iteration
+AT_ONCE = 32  # members of a goal, before the clock is looked at and others have their turn
 
 
-def numeric_ik(robot: Robot, goal: PoseGoal | PositionGoal, starts: Matrix, *, iterations: int = ITERATIONS) -> Matrix:
+def numeric_ik(robot: Robot, goal: TipGoal, starts: Matrix, *, iterations: int = STEPS) -> Matrix:
     """Move configurations towards a goal, each from its own start, inside the joint limits.
 
     Args:
         robot: The arm.
-        goal: A pose, or a position with any orientation.
+        goal: A pose, a position with any orientation, or a region of these; its members take turns.
         starts: Shape (m, dof).
         iterations: Steps at most.
 
     Returns:
         The rows that satisfy the goal, in the order of their starts, shape (k, dof), k <= m.
+
+    Raises:
+        InputError: If the goal is a task-space region or has one: `rrtik_ompl.ik.projection` is for these.
     """
-    Q, _ = descend(robot, goal, starts, iterations=iterations)
+    aims = goal_rows(goal)
+    if len(aims) > 1:
+        aims = aims[np.arange(len(starts)) % len(aims)]
+    Q, _, _ = walk(robot, aims, starts, steps=iterations, patience=PATIENCE)
     return Q[goal.satisfied(robot, Q)]
 
 
-def descend(
-    robot: Robot, goal: PoseGoal | PositionGoal, starts: Matrix, *, iterations: int = ITERATIONS
-) -> tuple[Matrix, int]:
-    """As `numeric_ik`, but where every start has led to, at the goal or not: shape (m, dof), and the steps taken."""
-    Q = np.clip(starts, robot.lower, robot.upper)
-    reach = float(np.linalg.norm(robot.chain.placement[:, :3, 3], axis=1).sum()) or 1.0
-    scale = np.array([1.0 / reach] * 3 + [0.5] * 3)  # a full turn of orientation counts as much as the whole reach
-    for step in range(iterations):
-        open_rows = np.flatnonzero(~well_inside(robot, goal, Q))
-        if len(open_rows) == 0:
-            return Q, step
-        q = Q[open_rows]
-        residual, jacobian = twist(goal, robot.fk_batch(q)), robot.jacobian_batch(q)
-        rows = slice(0, 3) if isinstance(goal, PositionGoal) else slice(0, 6)
-        e, J = (residual * scale)[:, rows], (jacobian * scale[:, None])[:, rows]
-        Q[open_rows] = np.clip(q + bounded_step(J, e), robot.lower, robot.upper)
-    return Q, iterations
+def numeric(question: Question) -> Answer:
+    """The method of `solve_ik`: solutions of many members of the goal side by side until one will do."""
+    if question.all:
+        return _many(question)
+    aims, timed_out = _aims(question), False
+    search, waiting = Search(question.robot, aims, question.near), np.arange(len(aims))
+    found = np.zeros((0, question.robot.dof))
+    while len(waiting):
+        going, waiting = waiting[:AT_ONCE], waiting[AT_ONCE:]
+        going = going[search.advance(going)]
+        found, waiting = np.vstack([found, search.q[going]]), np.append(waiting, going)
+        timed_out = time.monotonic() > question.deadline
+        if timed_out or question.accept(search.q[going]).any():
+            break
+    return _answered(question, found, search.steps, timed_out)
 
 
-def bounded_step(J: NDArray[np.float64], e: Matrix) -> Matrix:
-    """Solve (J^T J + (e^T e / 2 + DAMPING) I) dq = J^T e for every row; shapes (m, k, n), (m, k) -> (m, n)."""
-    damping: Vector = 0.5 * np.einsum("mi,mi->m", e, e) + DAMPING
-    normal = np.einsum("mki,mkj->mij", J, J) + damping[:, None, None] * np.eye(J.shape[2])
-    step: Matrix = np.linalg.solve(normal, np.einsum("mki,mk->mi", J, e)[..., None])[..., 0]
-    largest = np.abs(step).max(axis=1, keepdims=True)
-    bounded: Matrix = step * np.minimum(1.0, LARGEST_STEP / np.maximum(largest, 1e-12))
-    return bounded
+def _aims(question: Question) -> Matrix:
+    """Rows of the goal; of the targets drawn from it if it has task-space regions."""
+    if has_task_regions(question.goal):
+        return np.vstack([goal_rows(target) for target in question.targets])
+    return goal_rows(question.goal)
+
+
+def _many(question: Question) -> Answer:
+    """Solutions from many random starts, as different as they come."""
+    robot, steps, timed_out = question.robot, 0, False
+    found = [np.zeros((0, robot.dof))]
+    aims = _aims(question)
+    for number in range(ROUNDS):
+        Q = question.rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
+        if number == 0:
+            Q[0] = question.near
+        Q, reached, taken = walk(robot, aims[(number * STARTS + np.arange(STARTS)) % len(aims)], Q, patience=PATIENCE)
+        found.append(Q[reached])
+        steps, timed_out = steps + taken, time.monotonic() > question.deadline
+        if timed_out:
+            break
+    return _answered(question, np.vstack(found), steps, timed_out)
+
+
+def _answered(question: Question, found: Matrix, steps: int, timed_out: bool) -> Answer:
+    if len(found):
+        return Answer(found, question.near, question.targets[0], steps, timed_out)
+    return Answer(found, *nearest_posture(question, steps), timed_out=timed_out)

@@ -4,7 +4,7 @@ What the region leaves free asks nothing of the joints, so that arms of fewer jo
 
 Sources: M. Stilman, "Global manipulation planning in robot joint space with task constraints", IEEE Transactions on
 Robotics 26 (2010), 576-584, for steps that leave free directions out; damping after Sugihara, as in
-`rrtik_ompl.ik.numeric`.
+`rrtik_ompl.ik.plain_descent`.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.goal import PoseGoal, as_task_region, parts_of
+from rrtik_ompl.ik.plain_descent import reach_of
 from rrtik_ompl.ik.question import Answer, Question
 from rrtik_ompl.ik.residual import SHARE, rotation_vectors
 from rrtik_ompl.poses import rpy_matrices
@@ -101,11 +102,6 @@ def projection(question: Question) -> Answer:
     coordinates = target.nearest(robot.fk_batch(nearest[None]))
     aim = PoseGoal(target.poses(coordinates)[0], target.position_tolerance, target.orientation_tolerance)
     return Answer(found, nearest, aim, number + 1, timed_out)
-
-
-def reach_of(robot: Robot) -> float:
-    """Length of the arm stretched out [m], joint by joint; 1 for an arm without length."""
-    return float(np.linalg.norm(robot.chain.placement[:, :3, 3], axis=1).sum()) or 1.0
 
 
 def _twist(tips: NDArray[np.float64], aims: NDArray[np.float64]) -> Matrix:

@@ -75,3 +75,10 @@ def errors(robot: Robot, target: Target, Q: Matrix) -> Matrix:
     if isinstance(target, PositionGoal):
         return np.column_stack([target.distance(robot, Q), np.zeros(len(Q))])
     return np.column_stack(target.errors(robot, Q))
+
+
+def tolerances(target: Target) -> tuple[float, float]:
+    """What `errors` may be at most."""
+    if isinstance(target, PositionGoal):
+        return target.tolerance, 0.0
+    return target.position_tolerance, target.orientation_tolerance

@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.ik.numeric import descend
+from rrtik_ompl.ik.descent import descend
 from rrtik_ompl.ik.question import Answer, Question, Target, errors
 from rrtik_ompl.robot import Robot
 

@@ -15,12 +15,12 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.goal import PoseGoal, PositionGoal, joint_difference, pose_errors
 from rrtik_ompl.ik.branch_choice import JUMP, follow
-from rrtik_ompl.ik.closed_form import check_rotations, form_of
+from rrtik_ompl.ik.closed_form import check_poses, form_of
+from rrtik_ompl.ik.descent import descend, load_kernels
 from rrtik_ompl.ik.face import free_of_collision, solve_ik
 from rrtik_ompl.ik.genetic.options import PRESETS, GeneticOptions
 from rrtik_ompl.ik.genetic.search import follow_targets
 from rrtik_ompl.ik.methods import METHODS
-from rrtik_ompl.ik.numeric import descend
 from rrtik_ompl.ik.numeric_track import Tracker
 from rrtik_ompl.ik.question import Target
 from rrtik_ompl.ik.restarts import Walk
@@ -122,6 +122,7 @@ def solve_ik_trajectory(
         UnknownNameError: If there is no such method or preset.
         InputError: If the method does not fit the robot, a pose is none, or an argument makes no sense.
     """
+    load_kernels()
     begin = time.monotonic()
     if world is not None and world.robot is not robot:
         raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
@@ -160,7 +161,7 @@ def _checked(poses: ArrayLike) -> Matrix:
     if len(rows) == 0:
         raise InputError("poses: a trajectory needs at least one point")
     if rows.ndim == 3:
-        check_rotations(rows[:, :3, :3], "poses")
+        check_poses(rows, "poses")
     return rows
 
 

@@ -11,7 +11,8 @@ from rrtik_ompl.arrays import Mask, Matrix, frozen
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import JointGoal, tip_errors
 from rrtik_ompl.goal_configurations import LARGEST, GoalSearch
-from rrtik_ompl.ik.projection import PER_RADIAN, reach_of
+from rrtik_ompl.ik.plain_descent import reach_of
+from rrtik_ompl.ik.projection import PER_RADIAN
 from rrtik_ompl.ompl_bridge.setup import Judge, space_information
 from rrtik_ompl.ompl_bridge.states import StateIO, space_bounds
 from rrtik_ompl.problem import Problem

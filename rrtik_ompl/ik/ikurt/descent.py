@@ -1,7 +1,8 @@
 """Steps by the Jacobian down the metric of IKURT: Levenberg-Marquardt for many configurations at once, inside bounds.
 
-Source: T. Sugihara, as in :mod:`rrtik_ompl.ik.numeric`, whose damping it shares. Joints that a step would push through
-a bound are held and the step is solved for again, so that goals on a limit are reached.
+Source: T. Sugihara, as in :mod:`rrtik_ompl.ik.plain_descent`: the damping is half the squared residual plus a small
+constant. Joints that a step would push through a bound are held and the step is solved for again, so that goals on a
+limit are reached.
 """
 
 from __future__ import annotations
@@ -13,9 +14,10 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.ik.ikurt.metric import TipMetric, reach
-from rrtik_ompl.ik.numeric import bounded_step
 
 ITERATIONS = 24
+DAMPING = 1e-6  # the constant part, in units of the squared residual
+LARGEST_STEP = 0.5  # [rad] or [m] of any joint in one iteration
 ACCURACY = 1e-9  # of the reach; less where the goal wants that
 SHARE = 0.1  # of the distance within which the goal counts as reached
 STALE = 4  # iterations in which the distance has to fall to FALLS of what it was, or the row is given up
@@ -61,3 +63,13 @@ def _stepped(q: Matrix, J: NDArray[np.float64], e: Matrix, lower: Vector, upper:
         dq[again] = bounded_step(J[again] * ~held[again][:, None], e[again])
     stepped: Matrix = np.clip(q + dq, lower, upper)
     return stepped
+
+
+def bounded_step(J: NDArray[np.float64], e: Matrix) -> Matrix:
+    """Solve (J^T J + (e^T e / 2 + DAMPING) I) dq = J^T e for every row; shapes (m, k, n), (m, k) -> (m, n)."""
+    damping: Vector = 0.5 * np.einsum("mi,mi->m", e, e) + DAMPING
+    normal = np.einsum("mki,mkj->mij", J, J) + damping[:, None, None] * np.eye(J.shape[2])
+    step: Matrix = np.linalg.solve(normal, np.einsum("mki,mk->mi", J, e)[..., None])[..., 0]
+    largest = np.abs(step).max(axis=1, keepdims=True)
+    bounded: Matrix = step * np.minimum(1.0, LARGEST_STEP / np.maximum(largest, 1e-12))
+    return bounded

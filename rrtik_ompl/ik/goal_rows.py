@@ -1,0 +1,54 @@
+"""Goals of the tip as rows of numbers, for methods that walk to many of them at once."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.fast.ik_layout import AIM_FLOATS, ANY_TURN, BOX, CHORD_TOLERANCE, FREE_TURN, NO_TURN, POSITION_TOLERANCE
+from rrtik_ompl.goal import GoalPart, GoalRegion, PoseGoal, PositionGoal, TipGoal
+from rrtik_ompl.ik.residual import SHARE
+from rrtik_ompl.task_region import TaskRegion
+
+POSE = PoseGoal(np.eye(4))  # for its tolerances
+
+
+def goal_rows(goal: TipGoal) -> Matrix:
+    """A goal as rows that `rrtik_ompl.fast.ik_layout` describes, one for each member of a region, shape (k, 18).
+
+    Tolerances are a hundredth of the goal's: a solution on their rim would not survive rounding.
+
+    Raises:
+        InputError: If the goal is a task-space region or has one, whose freedom no row can hold.
+    """
+    if not isinstance(goal, GoalRegion):
+        return _row(goal)[None]
+    rows = np.array([_row(member) for member in goal.members])
+    posed = rows[:, FREE_TURN] == NO_TURN
+    rows[posed, BOX : BOX + 3] = 0.5 * goal.box
+    if goal.free_rotation_axis is not None:
+        rows[posed, FREE_TURN] = "xyz".index(goal.free_rotation_axis)
+    return rows
+
+
+def pose_rows(poses: NDArray[np.float64]) -> Matrix:
+    """Poses with the tolerances of a `PoseGoal`, shape (k, 4, 4), as rows, shape (k, 18); see `goal_rows`."""
+    rows = np.tile(_row(POSE), (len(poses), 1))
+    rows[:, :9], rows[:, 9:12] = poses[:, :3, :3].reshape(-1, 9), poses[:, :3, 3]
+    return rows
+
+
+def _row(goal: GoalPart) -> NDArray[np.float64]:
+    if isinstance(goal, TaskRegion):
+        raise InputError("goal: no row holds a task-space region; use projection, or targets drawn from it")
+    row = np.zeros(AIM_FLOATS)
+    if isinstance(goal, PositionGoal):
+        row[[0, 4, 8]], row[9:12] = 1.0, goal.position
+        row[POSITION_TOLERANCE], row[CHORD_TOLERANCE], row[FREE_TURN] = SHARE * goal.tolerance, 1.0, ANY_TURN
+        return row
+    row[:9], row[9:12] = np.ravel(goal.T_world_tip.rotation), goal.T_world_tip.translation
+    row[POSITION_TOLERANCE] = SHARE * goal.position_tolerance
+    row[CHORD_TOLERANCE], row[FREE_TURN] = SHARE * goal.orientation_tolerance, NO_TURN
+    return row
