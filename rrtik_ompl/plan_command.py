@@ -17,7 +17,7 @@ from rrtik_ompl.text_file import check_target
 
 
 class Shorten(str, Enum):
-    """What `rrtik plan` does to the raw path; `auto` is axis for a path of single-joint moves, if that is better."""
+    """What `rrtik plan` does to the raw path; `auto` is fewest-moves for a path of single-joint moves."""
 
     auto = "auto"
     axis = "axis"
@@ -83,13 +83,9 @@ def _shortened(path: Any, problem: Any, method: Shorten, seed: int) -> tuple[Any
 
     if path is None or method is Shorten.none or len(path.waypoints) < 2:
         return path, 0.0
-    wanted = Shorten.axis if method is Shorten.auto and path.one_joint_at_a_time else method
     begin = time.perf_counter()
-    shorter = shorten(path, problem, method=wanted.value, seed=seed)
-    measures = [(p.transitions, p.length) for p in (shorter, path)]
-    if method is Shorten.auto and wanted is Shorten.axis and measures[0] > measures[1]:
-        shorter = path
-    return shorter, time.perf_counter() - begin
+    wanted = Shorten.fewest_moves if method is Shorten.auto and path.one_joint_at_a_time else method
+    return shorten(path, problem, method=wanted.value, seed=seed), time.perf_counter() - begin
 
 
 def _parameters(pairs: list[str]) -> dict[str, Any]:
