@@ -1,0 +1,1 @@
+"""Campaigns of benchmarks: suites, guarded runs, records, reports."""
