@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pinocchio as pin
 
@@ -19,9 +21,10 @@ BEND = np.pi / 2.0  # [rad] by which all joints of the chain together bend to ei
 WAY = np.array([[2.1, 0.0]])  # [m] where the disc stands that keeps the straight motion from being free
 DISC, SMALL_DISC = 0.35, 0.12  # [m] radii
 SHELL = (0.25, 1.1)  # where the obstacles about an arm are, in reaches
-SHARE = 0.35  # of the shell that a crowd's balls would fill if they did not shrink by number
-POSTURES, DRAWS = 512, 50
-APART = 1.5  # [rad] least distance of start and goal, each joint counted
+GATE, LARGEST = 0.1, 0.12  # radii in reaches: of the ball on the straight way, of a crowd of one
+ROOM = 1.4  # times their size obstacles leave to the known way
+POSTURES, DRAWS, STOPS = 512, 200, 40
+APART = 0.6  # of the tip between start and goal, in reaches
 
 
 def planar_chain(joints: int, seed: int = 0) -> Problem:
@@ -50,27 +53,71 @@ def planar_chain(joints: int, seed: int = 0) -> Problem:
 
 
 def crowded_arm(robot: Robot, count: int, seed: int = 0) -> Problem:
-    """An arm between ``count`` boxes and balls that shrink as they grow in number, so that they fill the same room.
+    """An arm between ``count`` boxes and balls; a way of two straight motions is known to be free.
 
-    Start and goal are two free postures far from each other, the same for every ``count`` of a seed where both are
-    free.
+    The first is a ball on the straight way. The others shrink as they grow in number, so that they fill the same share
+    of the room; those beside the known way are left out. Start and goal depend on the seed alone.
 
     Raises:
-        InputError: If nothing turned up in which start and goal are free.
+        InputError: If ``count`` is below 1, or no such way turned up for the robot.
     """
     if count < 1:
         raise InputError(f"obstacles about an arm must be 1 or more, got {count}")
     rng = np.random.default_rng(seed)
     alone = World(robot)
-    rows = _postures(alone, rng)
-    reach = float(np.linalg.norm(robot.fk_batch(rows)[:, :3, 3], axis=1).max())
-    for number in range(DRAWS):
-        world = World(robot, Scene(_crowd(count, reach, np.random.default_rng([seed, count, number]))))
-        free = rows[world.valid_batch(rows) & world.certify(rows)]
-        for start, goal in zip(free[::2], free[1::2], strict=False):
-            if np.abs(goal - start).max() > APART and not world.motion_valid(start, goal):
-                return Problem(world, start, goal, name=f"{robot.name}/obstacles/{count}")
-    raise InputError(f"robot '{robot.name}' between {count} obstacles: none of {DRAWS} scenes leaves it room")
+    reach = float(np.linalg.norm(robot.fk_batch(_postures(alone, rng))[:, :3, 3], axis=1).max())
+    start, via, goal, gate = _detour(alone, reach, rng)
+    shares = np.linspace(0.0, 1.0, STOPS)[:, None]
+    stops = np.vstack([(1.0 - shares) * a + shares * b for a, b in ((start, via), (via, goal))])
+    scene = Scene((gate, *_beside(robot, stops, count - 1, reach, rng)))
+    return Problem(World(robot, scene), start, goal, name=f"{robot.name}/obstacles/{count}")
+
+
+def _detour(alone: World, reach: float, rng: np.random.Generator) -> tuple[Vector, Vector, Vector, Obstacle]:
+    """Start, another posture, goal, and a ball on the straight way that the way by the other posture does not touch."""
+    robot = alone.robot
+    for _ in range(DRAWS):
+        rows = _postures(alone, rng)[:60]
+        starts, vias, goals = (rows[k::3][: len(rows) // 3] for k in range(3))
+        ends = np.vstack([starts, vias]), np.vstack([vias, goals])
+        free = alone.motion_valid_batch(*ends).reshape(2, -1).all(axis=0) & alone.motion_valid_batch(starts, goals)
+        tips = [robot.fk_batch(each)[:, :3, 3] for each in (starts, goals, 0.5 * (starts + goals))]
+        free &= np.linalg.norm(tips[0] - tips[1], axis=1) > APART * reach
+        for k in np.flatnonzero(free):
+            gate = _ball(0, tips[2][k], GATE * reach)
+            world = World(robot, Scene((gate,)))
+            blocked = not world.motion_valid(starts[k], goals[k])
+            if blocked and world.motion_valid(starts[k], vias[k]) and world.motion_valid(vias[k], goals[k]):
+                return starts[k], vias[k], goals[k], gate
+    raise InputError(f"robot '{robot.name}': no way round a ball turned up; take another seed")
+
+
+def _beside(robot: Robot, stops: Matrix, count: int, reach: float, rng: np.random.Generator) -> list[Obstacle]:
+    """Obstacles that leave room to the arm at all stops."""
+    kept: list[Obstacle] = []
+    size = LARGEST * reach / (count + 1) ** (1.0 / 3.0)
+    while len(kept) < count:
+        places = _places(count, reach, rng)
+        wide = World(robot, Scene(tuple(_solid(k, place, ROOM * size) for k, place in enumerate(places))))
+        touched = {name for q in stops for contact in wide.contacts(q) for name in (contact.first, contact.second)}
+        free = [place for k, place in enumerate(places) if _solid(k, place, size).name not in touched]
+        kept += [_solid(len(kept) + k, place, size) for k, place in enumerate(free)]
+    return kept[:count]
+
+
+def _places(count: int, reach: float, rng: np.random.Generator) -> list[Any]:
+    """Random poses, evenly in the shell."""
+    ways = rng.normal(size=(count, 3))
+    far = reach * rng.uniform(SHELL[0] ** 3, SHELL[1] ** 3, (count, 1)) ** (1.0 / 3.0)
+    centres = far * ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    return [pin.SE3(pin.exp3(turn), centre) for turn, centre in zip(rng.normal(size=(count, 3)), centres, strict=True)]
+
+
+def _solid(number: int, place: Any, size: float) -> Obstacle:
+    """Balls and boxes in turns."""
+    if number % 2:
+        return Obstacle(f"box{number}", Box([1.6 * size] * 3), place)
+    return Obstacle(f"sphere{number}", Sphere(size), place)
 
 
 def _bent(joints: int, angle: float) -> Vector:
@@ -88,20 +135,6 @@ def _postures(alone: World, rng: np.random.Generator) -> Matrix:
     rows = rng.uniform(lower, upper, (POSTURES, alone.robot.dof))
     free: Matrix = rows[alone.valid_batch(rows)]
     return free
-
-
-def _crowd(count: int, reach: float, rng: np.random.Generator) -> tuple[Obstacle, ...]:
-    inner, outer = SHELL
-    size = 0.5 * reach * (SHARE * (outer**3 - inner**3) / (count + 5)) ** (1.0 / 3.0)
-    found = []
-    for k in range(count):
-        way = rng.normal(size=3)
-        centre = way / np.linalg.norm(way) * reach * rng.uniform(inner**3, outer**3) ** (1.0 / 3.0)
-        if k % 2:
-            found.append(Obstacle(f"box{k}", Box([1.6 * size] * 3), pin.SE3(pin.exp3(rng.normal(size=3)), centre)))
-        else:
-            found.append(_ball(k, centre, size))
-    return tuple(found)
 
 
 def _ball(number: int, centre: object, radius: float) -> Obstacle:

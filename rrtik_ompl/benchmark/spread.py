@@ -54,7 +54,7 @@ def cluster(jobs: Iterable[Job], address: str) -> Generator[Done, None, None]:
     from joblib import Parallel, delayed, parallel_config
 
     try:
-        client: Any = distributed.Client(address, timeout=CONNECT)  # type: ignore[no-untyped-call]
+        client: Any = distributed.Client(address, timeout=CONNECT)
     except (OSError, ValueError, TypeError) as error:
         said = str(error) or type(error).__name__
         raise InputError(f"--scheduler {address}: no Dask scheduler answers: {said}") from None

@@ -229,7 +229,7 @@ def _sources(document: YamlDocument, place: Location, item: Any) -> list[Source]
 
 
 def _entrant(document: YamlDocument, place: Location, item: Any, shorten: str) -> Entrant:
-    group = PlannerGroup(name=item, shorten=None) if isinstance(item, str) else item
+    group = PlannerGroup.model_validate({"name": item}) if isinstance(item, str) else item
     at = place if isinstance(item, str) else (*place, "name")
     with document.at(at):
         factory = _planner(group.name)
