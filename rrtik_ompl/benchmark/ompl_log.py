@@ -14,7 +14,7 @@ from typing import Any
 from rrtik_ompl.benchmark.run import INVALID, NOT_FOUND, SOLVED, STATUSES
 from rrtik_ompl.benchmark.statistics import Result, by_label, measured
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.text_file import write_text
+from rrtik_ompl.text_file import make_folder, write_text
 
 DATABASE = "benchmark.db"
 OMPL_STATUSES = ("Unknown status", "Invalid start", "Invalid goal", "Unrecognized goal type", "Timeout",
@@ -50,7 +50,7 @@ def write_logs(found: Sequence[Result], head: Mapping[str, Any], folder: Path) -
     Raises:
         InputError: If a file cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     files = []
     for label, results in by_label(found).items():
         files.append(folder / f"{re.sub(r'[^A-Za-z0-9_.-]+', '_', label)}.log")

@@ -14,6 +14,7 @@ from rrtik_ompl.benchmark.statistics import Result
 from rrtik_ompl.benchmark.tables import OVERVIEW, conditions, failures, overview
 from rrtik_ompl.errors import RrtikError
 from rrtik_ompl.path import JointPath
+from rrtik_ompl.text_file import make_folder
 
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #1d2733; max-width: 82rem; margin: 2rem auto; padding: 0 1rem }
@@ -57,7 +58,7 @@ def draw_views(chosen: Iterable[Mapping[str, Any]], head: Mapping[str, Any], fol
             problem = build(from_plain(sources[record["problem"]]))
         except RrtikError:
             continue
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
         file = folder / f"{record['problem'].replace('/', '_')}.html"
         view(problem, JointPath.of(problem.world.robot, record["waypoints"]), html=file)
         found[f"{record['problem']} by {record['planner']}, run {record['run']}, length {record['length']:.2f}"] = file
@@ -76,7 +77,7 @@ def html(
         views: 3-D pages in a folder beside the page, by what their links say.
     """
     title = escape(head["suite"]["title"])
-    said = escape(conditions(head)).replace("`", "")
+    said = escape(conditions(results, head)).replace("`", "")
     parts = [f"<h1>{title}</h1>", f"<p>{said}</p>", _table(OVERVIEW, overview(results))]
     parts += ["<p>Figures are over the runs with a valid path; single figures are medians.</p>"]
     broken = failures(results)

@@ -14,6 +14,7 @@ from typing import Any, TypeAlias
 
 from rrtik_ompl.benchmark.run import STATUSES
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.text_file import make_folder
 
 Record: TypeAlias = dict[str, Any]
 Key: TypeAlias = tuple[str, str, int]  # problem, planner's label, number of the run
@@ -70,9 +71,9 @@ class RecordFile:
 
     def __init__(self, file: Path, head: Mapping[str, Any]) -> None:
         self._name = file
+        make_folder(file.parent)
         try:
-            file.parent.mkdir(parents=True, exist_ok=True)
-            self._file = open(file, "ab")  # noqa: SIM115 - closed by __exit__
+            self._file = open(file, "ab", buffering=0)  # noqa: SIM115 - closed by __exit__
             self._cut_half_line()
         except OSError as error:
             raise self._failed(error) from error
@@ -86,11 +87,12 @@ class RecordFile:
             InputError: If it cannot be written.
         """
         line = (json.dumps(record) + "\n").encode()
+        written = 0
         try:
-            self._file.write(line)
-            self._file.flush()
+            while written < len(line):
+                written += self._file.write(line[written:])
         except OSError as error:
-            self._take_back()
+            os.truncate(self._name, self._end)
             raise self._failed(error) from error
         self._end += len(line)
 
@@ -100,19 +102,13 @@ class RecordFile:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        try:
-            self._file.close()
-        except OSError:  # of a line that was refused before
-            self._take_back()
+        self._file.close()
 
     def _cut_half_line(self) -> None:
         data = self._name.read_bytes()
         self._end = data.rfind(b"\n") + 1
         if self._end < len(data):
             os.truncate(self._name, self._end)
-
-    def _take_back(self) -> None:
-        os.truncate(self._name, self._end)
 
     def _failed(self, error: OSError) -> InputError:
         return InputError(

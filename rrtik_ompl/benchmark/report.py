@@ -29,7 +29,7 @@ def write_report(file: Path, *, views: int = VIEWS) -> tuple[list[Result], list[
     found = results(records.read_records(file))
     if not found:
         raise InputError(f"{file}: holds no runs yet")
-    found = _in_order(found, head)
+    found = _in_order(file, found, head)
     total = sum(result.total for result in found)
     ompl_log.write_database(ompl_log.write_logs(found, head, folder / "logs"), folder / ompl_log.DATABASE, total)
     write_text(folder / "summary.md", tables.markdown(found, head))
@@ -41,9 +41,15 @@ def write_report(file: Path, *, views: int = VIEWS) -> tuple[list[Result], list[
     return found, [folder / name for name in ("index.html", "summary.md", "summary.csv", ompl_log.DATABASE)]
 
 
-def _in_order(found: list[Result], head: records.Record) -> list[Result]:
+def _in_order(file: Path, found: list[Result], head: records.Record) -> list[Result]:
     """As the suite names them: records come in the order in which runs were finished."""
     suite = head["suite"]
     labels = list(dict.fromkeys(s["name"] if s["axis"] else s["group"] for s in suite["sources"]))
     planners = [entrant["label"] for entrant in suite["entrants"]]
+    for result in found:
+        if result.label not in labels or result.planner not in planners:
+            raise InputError(
+                f"{file}: holds runs of '{result.planner}' on '{result.label}', of which its first line says nothing; "
+                "delete their lines"
+            )
     return sorted(found, key=lambda result: (labels.index(result.label), planners.index(result.planner)))

@@ -50,7 +50,7 @@ def terminal_table(results: Iterable[Result]) -> Any:
 def markdown(results: Sequence[Result], head: Mapping[str, Any]) -> str:
     """A page: what was run where, the overview, what failed and why, and one table for each quantity."""
     suite = head["suite"]
-    lines = [f"# {suite['title']}", "", conditions(head), "", *_markdown_table(OVERVIEW, overview(results))]
+    lines = [f"# {suite['title']}", "", conditions(results, head), "", *_markdown_table(OVERVIEW, overview(results))]
     lines += ["", "Figures are over the runs with a valid path; of iterations, length and transitions the medians."]
     broken = failures(results)
     if broken:
@@ -63,12 +63,13 @@ def markdown(results: Sequence[Result], head: Mapping[str, Any]) -> str:
     return "\n".join([*lines, ""])
 
 
-def conditions(head: Mapping[str, Any]) -> str:
+def conditions(results: Iterable[Result], head: Mapping[str, Any]) -> str:
     """What a reader must know, in a paragraph."""
     suite, machine = head["suite"], head["machine"]
+    runs = 1 + max(run["run"] for result in results for run in result.runs)
     versions = ", ".join(f"{name} {machine[name]}" for name in ("rrtik-ompl", "ompl", "pin", "coal", "numpy", "python"))
     return (
-        f"Written by `rrtik bench {suite['name']}`: {suite['runs']} runs of each planner on each problem, "
+        f"Written by `rrtik bench {suite['name']}`: {runs} runs of each planner on each problem, "
         f"{suite['seconds']:g} s each, {suite['memory_mb']:g} MB, seed {suite['seed']}. {machine['processor']}, "
         f"{machine['cores']} cores, {machine['at a time']} at a time, {machine['system']}; {versions}; "
         f"begun {machine['begun']}."
