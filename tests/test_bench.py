@@ -13,13 +13,14 @@ import sys
 import time
 import urllib.request
 from contextlib import closing
-from importlib.metadata import EntryPoint
+from importlib.metadata import EntryPoint, version
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rrtik_ompl import catalog, load_robot, plan
+from rrtik_ompl.benchmark.campaign import run_campaign
 from rrtik_ompl.benchmark.records import NAME, RecordFile, key_of, read_head, read_records
 from rrtik_ompl.benchmark.scaling import crowded_arm, planar_chain
 from rrtik_ompl.benchmark.sources import build
@@ -145,7 +146,7 @@ def test_a_campaign_is_not_continued_with_another_suite(campaign, suite, tmp_pat
 
 def test_more_runs_can_be_added_to_a_campaign(campaign, suite, tmp_path):
     (tmp_path / NAME).write_bytes((campaign / NAME).read_bytes())
-    assert run(["bench", str(suite), "--runs", "4", "--out", str(tmp_path), "--views", "0", "--resume"]) == 0
+    run_campaign(load_suite(suite, runs=4), tmp_path, resume=True)
     more = found(tmp_path)
     assert len(more) == 24
     assert {key: more[key] for key in found(campaign)} == found(campaign)
@@ -175,14 +176,8 @@ def test_ompls_own_planners_are_logged_like_ompl_logs_them(campaign):
     assert "range = 0.3\n" in text
 
 
-def test_planner_arena_serves_its_page_and_reads_the_database(campaign):
-    database = pytest.importorskip(
-        "plannerarena.database", reason="needs plannerarena: pip install 'rrtik-ompl[arena]'"
-    )
-    read = database.load_database(campaign / "benchmark.db")
-    assert read["problem_names"] == ["planar3_a", "planar/joints"]
-    assert read["planner_configs"]["planner"].to_list() == ["bicrdt", "RRTConnect", "short_steps"]
-    assert len(read["runs"]) == TOTAL
+def test_planner_arena_shows_our_planners_next_to_ompls(campaign):
+    pytest.importorskip("plannerarena", reason="needs plannerarena: pip install 'rrtik-ompl[arena]'")
     with closing(socket.create_server(("127.0.0.1", 0))) as free:
         port = free.getsockname()[1]
     arena = subprocess.Popen(
@@ -193,9 +188,39 @@ def test_planner_arena_serves_its_page_and_reads_the_database(campaign):
     )
     try:
         assert "Planner Arena" in _page(f"http://127.0.0.1:{port}/")
+        shown = _what_arena_shows(port, "planar3_a")
     finally:
         arena.kill()
         arena.wait()
+    for planner in ("bicrdt", "RRTConnect", "short_steps"):
+        assert f'value=\\"{planner}\\" checked' in shown
+    assert "data:image/png" in shown
+
+
+def _what_arena_shows(port, problem):
+    """What the page is sent when a person looks at the times of a problem, up to the plot."""
+    from websockets.sync.client import connect
+
+    outputs = ("problem_ui", "attribute_ui", "version_ui", "planner_ui", "plot")
+    inputs = {
+        "problem": problem,
+        "attribute": "time",
+        "version": f"OMPL {version('ompl')}",
+        "planners": ["bicrdt", "RRTConnect"],
+    }
+    inputs |= dict.fromkeys(
+        ("advanced_options", "show_as_cdf", "hide_outliers", "show_simplified", "y_log_scale"), False
+    )
+    data = {"navbar": "performance", "database": None, ".clientdata_pixelratio": 1}
+    data |= {f"performance-{name}": value for name, value in inputs.items()}
+    data |= {f".clientdata_output_performance-{name}_hidden": False for name in outputs}
+    data |= {f".clientdata_output_performance-plot_{side}": 500 for side in ("width", "height")}
+    seen = ""
+    with connect(f"ws://127.0.0.1:{port}/websocket/", max_size=None) as page:
+        page.send(json.dumps({"method": "init", "data": data}))
+        while "data:image/png" not in seen:
+            seen += str(page.recv(timeout=30))
+    return seen
 
 
 def _page(address, patience=60.0):
@@ -400,8 +425,6 @@ def test_a_scheduler_that_does_not_answer_is_one_line(suite, tmp_path, capsys, m
 
 def test_a_worker_of_a_cluster_is_killed_and_no_run_is_lost(campaign, suite, tmp_path):
     pytest.importorskip("distributed", reason="needs Dask: pip install 'rrtik-ompl[cluster]'")
-    from rrtik_ompl.benchmark.campaign import run_campaign
-
     with closing(socket.create_server(("127.0.0.1", 0))) as free:
         port = free.getsockname()[1]
     address = f"tcp://127.0.0.1:{port}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -16,7 +17,7 @@ from rrtik_ompl.errors import RrtikError
 
 COMMAND = (sys.executable, "-m", "rrtik_ompl.benchmark.child")
 MEMORY_WORDS = ("bad_alloc", "MemoryError", "Cannot allocate memory")
-TAIL = 4000  # characters of what a lost process has said
+TAIL = 4000  # bytes of what a lost process has said
 
 
 class Closed(RrtikError):
@@ -28,7 +29,7 @@ class Guard:
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[str] | None = None
-        self._errors: IO[str] | None = None
+        self._errors: IO[bytes] | None = None
         self._closed = False
 
     def run(self, job: Mapping[str, Any]) -> dict[str, Any]:
@@ -38,6 +39,7 @@ class Guard:
             Closed: If the guard was closed.
         """
         process = self._started()
+        self._forget_words()
         answer = _asked(process, json.dumps(job) + "\n")
         if self._closed:
             raise Closed("the guard was closed")
@@ -59,7 +61,7 @@ class Guard:
         if self._closed:
             raise Closed("the guard was closed")
         if self._process is None:
-            self._errors = tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace")  # noqa: SIM115 - kept open
+            self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - kept open
             self._process = subprocess.Popen(
                 COMMAND,
                 stdin=subprocess.PIPE,
@@ -87,12 +89,18 @@ class Guard:
         process.kill()
         return process.wait()
 
+    def _forget_words(self) -> None:
+        """Empty the file of what was said in earlier runs; its place is shared with the process."""
+        if self._errors is not None:
+            self._errors.seek(0)
+            self._errors.truncate()
+
     def _last_words(self) -> str:
         if self._errors is None:
             return ""
         with self._errors as file:
-            file.seek(0)
-            return file.read()[-TAIL:]
+            file.seek(max(0, file.seek(0, os.SEEK_END) - TAIL))
+            return file.read().decode(errors="replace")
 
 
 def _asked(process: subprocess.Popen[str], question: str) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.benchmark.sources import build, from_plain
-from rrtik_ompl.benchmark.suite import BY_KIND, NONE
+from rrtik_ompl.benchmark.suite_file import BY_KIND, NONE
 from rrtik_ompl.errors import RrtikError
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning import plan
