@@ -24,8 +24,9 @@ from rrtik_ompl.benchmark.campaign import run_campaign
 from rrtik_ompl.benchmark.records import NAME, RecordFile, key_of, read_head, read_records
 from rrtik_ompl.benchmark.scaling import crowded_arm, planar_chain
 from rrtik_ompl.benchmark.sources import build
-from rrtik_ompl.benchmark.statistics import QUANTITIES, spread
+from rrtik_ompl.benchmark.statistics import QUANTITIES, results, spread
 from rrtik_ompl.benchmark.suite import load_suite
+from rrtik_ompl.benchmark.tables import remark
 from rrtik_ompl.cli import run
 from rrtik_ompl.errors import InputError
 from rrtik_planners.suites import FOLDER
@@ -259,6 +260,14 @@ def test_the_page_needs_no_other_file_but_the_views_that_it_links_to(campaign):
     for name in ("solved", "scaling", "box_length"):
         assert (campaign / f"{name}.png").read_bytes().startswith(b"\x89PNG")
         assert "<svg" in (campaign / f"{name}.svg").read_text()
+
+
+def test_paths_that_came_after_the_time_limit_are_counted(campaign):
+    done, head = results(read_records(campaign / NAME)), read_head(campaign / NAME)
+    assert "after the limit" not in remark(done, head)
+    slowest = max(value for result in done for value in result.values("plan_seconds"))
+    head["suite"]["seconds"] = 0.999 * slowest
+    assert "1 path(s) came after the limit" in remark(done, head)
 
 
 def test_a_spread_is_numpys():

@@ -11,7 +11,7 @@ from typing import Any
 from rrtik_ompl.benchmark.run import SOLVED
 from rrtik_ompl.benchmark.sources import build, from_plain
 from rrtik_ompl.benchmark.statistics import Result
-from rrtik_ompl.benchmark.tables import OVERVIEW, conditions, failures, overview
+from rrtik_ompl.benchmark.tables import OVERVIEW, conditions, failures, overview, remark
 from rrtik_ompl.errors import RrtikError
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.text_file import make_folder
@@ -79,7 +79,7 @@ def html(
     title = escape(head["suite"]["title"])
     said = escape(conditions(results, head)).replace("`", "")
     parts = [f"<h1>{title}</h1>", f"<p>{said}</p>", _table(OVERVIEW, overview(results))]
-    parts += ["<p>Figures are over the runs with a valid path; single figures are medians.</p>"]
+    parts += [f"<p>{escape(remark(results, head))}</p>"]
     broken = failures(results)
     if broken:
         parts += ["<h2>Runs that broke</h2>", _table(("problem", "planner", "runs", "why"), broken)]

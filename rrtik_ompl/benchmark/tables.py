@@ -51,7 +51,7 @@ def markdown(results: Sequence[Result], head: Mapping[str, Any]) -> str:
     """A page: what was run where, the overview, what failed and why, and one table for each quantity."""
     suite = head["suite"]
     lines = [f"# {suite['title']}", "", conditions(results, head), "", *_markdown_table(OVERVIEW, overview(results))]
-    lines += ["", "Figures are over the runs with a valid path; of iterations, length and transitions the medians."]
+    lines += ["", remark(results, head)]
     broken = failures(results)
     if broken:
         lines += ["", "## Runs that broke", "", *_markdown_table(("problem", "planner", "runs", "why"), broken)]
@@ -74,6 +74,16 @@ def conditions(results: Iterable[Result], head: Mapping[str, Any]) -> str:
         f"{machine['cores']} cores, {machine['at a time']} at a time, {machine['system']}; {versions}; "
         f"begun {machine['begun']}."
     )
+
+
+def remark(results: Iterable[Result], head: Mapping[str, Any]) -> str:
+    """What the figures are of, and how many paths came after the time limit."""
+    limit = head["suite"]["seconds"]
+    late = sum(seconds > limit for result in results for seconds in result.values("plan_seconds"))
+    text = "Figures are over the runs with a valid path; single figures are medians."
+    if late:
+        text += f" {late} path(s) came after the limit of {limit:g} s: the last check of a path is not cut short."
+    return text
 
 
 def failures(results: Iterable[Result]) -> list[tuple[str, str, str, str]]:
