@@ -78,7 +78,9 @@ def write_database(logs: Sequence[Path], file: Path, runs: int) -> None:
                 raise InputError(f"{file}: holds {held} runs instead of {runs} ({sound}); the records are kept")
         os.replace(fresh, file)
     except (OSError, sqlite3.Error) as error:
-        raise InputError(f"{file}: cannot be written: {error}; the records are kept") from error
+        raise InputError(
+            f"{file}: cannot be written: {error}; the records are kept: make room, then repeat with --resume"
+        ) from error
     except (ValueError, IndexError, TypeError) as error:
         raise InputError(f"{file}: OMPL's reader does not understand a log: {error}; the records are kept") from error
     finally:
