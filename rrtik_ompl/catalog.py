@@ -2,8 +2,9 @@
 
 Another package adds its own by entry points in the groups ``rrtik_ompl.robots`` (name -> a function that takes keyword
 options and returns a `Robot`), ``rrtik_ompl.planners`` (name -> a class), ``rrtik_ompl.problems`` (any name -> the
-``Path`` of a folder of problem files) and ``rrtik_ompl.workspaces`` (name of a robot -> a function that returns slices
-of its effective workspace, see `rrtik_ompl.reach.grid_map.Slice`).
+``Path`` of a folder of problem files), ``rrtik_ompl.suites`` (the same of suites for ``rrtik bench``) and
+``rrtik_ompl.workspaces`` (name of a robot -> a function that returns slices of its effective workspace, see
+`rrtik_ompl.reach.grid_map.Slice`).
 """
 
 from __future__ import annotations
@@ -75,6 +76,23 @@ def find_problem(name: str) -> Path:
     files = _problem_files()
     if name not in files:
         raise UnknownNameError("problem", name, files)
+    return files[name]
+
+
+def list_suites() -> tuple[str, ...]:
+    """Names of the suites of benchmarks that packages ship."""
+    return tuple(sorted(_shipped("suite", "suites")))
+
+
+def find_suite(name: str) -> Path:
+    """File of a shipped suite.
+
+    Raises:
+        UnknownNameError: If no package ships it.
+    """
+    files = _shipped("suite", "suites")
+    if name not in files:
+        raise UnknownNameError("suite", name, files)
     return files[name]
 
 
@@ -190,7 +208,12 @@ def _load(what: str, group: str, name: str) -> Any:
 
 
 def _problem_files() -> dict[str, Path]:
-    folders = [Path(_load("problem folder", "problems", name)) for name in _offers("problems")]
+    return _shipped("problem", "problems")
+
+
+def _shipped(what: str, group: str) -> dict[str, Path]:
+    """YAML files by name in the folders that packages offer."""
+    folders = [Path(_load(f"{what} folder", group, name)) for name in _offers(group)]
     return {file.stem: file for folder in folders for file in sorted(folder.glob("*.yaml"))}
 
 

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
+from rrtik_ompl.bench_commands import bench
 from rrtik_ompl.errors import RrtikError
 from rrtik_ompl.fast import announce
 from rrtik_ompl.ik_commands import inverse_kinematics
@@ -46,6 +47,7 @@ class Kind(str, Enum):
     planners = "planners"
     problems = "problems"
     ik = "ik"
+    suites = "suites"
 
 
 def _print_version(asked: bool) -> None:
@@ -125,12 +127,14 @@ def show(
 def list_names(kind: Annotated[Kind | None, typer.Argument(help="All kinds if left out.")] = None) -> int:
     """List what is there by name."""
     from rrtik_ompl import list_ik_methods, list_planners, list_problems, list_robots
+    from rrtik_ompl.catalog import list_suites
 
     sources = {
         Kind.robots: list_robots,
         Kind.planners: list_planners,
         Kind.problems: list_problems,
         Kind.ik: list_ik_methods,
+        Kind.suites: list_suites,
     }
     for each in Kind if kind is None else (kind,):
         if kind is None:
@@ -169,6 +173,7 @@ def warmup() -> int:
 app.command("ik")(inverse_kinematics)
 app.command("reach")(reach)
 app.command("reproduce")(reproduce)
+app.command("bench")(bench)
 app.command("moves")(list_moves)
 app.command("time")(time_path)
 app.command("replan")(replan_scenario)

@@ -87,6 +87,18 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
         raise InputError(f"{path}: cannot be written: {getattr(error, 'strerror', None) or error}") from error
 
 
+def make_folder(path: str | os.PathLike[str]) -> None:
+    """Make a folder and those above it, unless it is there.
+
+    Raises:
+        InputError: If it cannot be made.
+    """
+    try:
+        file_name(path).mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: no folder can be made: {getattr(error, 'strerror', None) or error}") from error
+
+
 def check_target(path: Path | None, endings: tuple[str, ...]) -> None:
     """Refuse a file that cannot be written before the work is done, not after; None is no file.
 

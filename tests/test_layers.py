@@ -14,8 +14,8 @@ RUNGS = (
     "checks world moving_world path moves_text problem one_joint ik goal_configurations reach",
     "moveit_messages motion_bench_maker run_section problem_file pose_file ompl_bridge planning shortening scenarios",
     "trajectory replanning scenario plot plot_tree plot_genetic plot_reach",
-    "viewer report ik_report sensing overlay reproduce terminal",
-    "motion_commands plan_command ik_commands reach_commands replan_commands reproduce_commands marker_commands",
+    "viewer report ik_report sensing overlay reproduce benchmark terminal",
+    "motion_commands plan_command ik_commands reach_commands replan_commands reproduce_commands bench_commands marker_commands",
     "pilot cli command",
 )
 LADDER = [name for rung in RUNGS for name in rung.split()]

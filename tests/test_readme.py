@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from rrtik_ompl.benchmark import load_suite
 from rrtik_ompl.cli import run
 from rrtik_ompl.ik.face import solve_ik
 from rrtik_ompl.path import load_path
@@ -42,7 +43,7 @@ def test_the_python_example_runs_from_top_to_bottom(tmp_path, monkeypatch):
 
 
 def test_the_problem_file_loads_and_its_other_goals_can_be_reached(tmp_path):
-    text, goal = blocks("yaml")
+    text, goal = (block for block in blocks("yaml") if "\nplanners:" not in block)
     file = tmp_path / "task.yaml"
     file.write_text(text)
     assert load_problem(file).world.scene.names == ("panel", "seabed")
@@ -52,8 +53,17 @@ def test_the_problem_file_loads_and_its_other_goals_can_be_reached(tmp_path):
         assert solve_ik(problem.robot, member, near=problem.start, world=problem.world).found
 
 
+def test_the_suite_of_benchmarks_loads(tmp_path):
+    (text,) = (block for block in blocks("yaml") if "\nplanners:" in block)
+    file = tmp_path / "three.yaml"
+    file.write_text(text)
+    suite = load_suite(file)
+    assert len(suite.sources) == 14
+    assert [entrant.label for entrant in suite.entrants] == ["bicrdt", "RRTConnect", "short steps"]
+
+
 @pytest.mark.parametrize(
-    "verb", ["plan", "check", "show", "list", "convert", "moves", "time", "ik", "reach", "reproduce"]
+    "verb", ["plan", "check", "show", "list", "convert", "moves", "time", "ik", "reach", "reproduce", "bench"]
 )
 def test_every_option_that_the_readme_names_is_there(verb, capsys):
     (usage,) = re.findall(rf"^rrtik {verb} [^\n]*(?:\n  [^\n]*)*", README, re.MULTILINE)

@@ -131,6 +131,15 @@ def can_be_brief(factory: PlannerFactory) -> bool:
     return getattr(factory, "__name__", "") not in ANYTIME_PLANNERS
 
 
+def planner_options(factory: PlannerFactory) -> tuple[str, ...]:
+    """Names of the options that a planner takes, sorted; those of OMPL's planners in snake case."""
+    if isinstance(factory, type) and issubclass(factory, SafePlanner):
+        names = tuple(inspect.signature(factory).parameters)[1:]  # the first one is the space information
+        return tuple(sorted(set(names).difference(GIVEN_OPTIONS)))
+    setters = {s for s in dir(factory) if s.startswith("set") and not hasattr(ob.Planner, s)}
+    return tuple(sorted(map(_snake, setters)))
+
+
 def _straight_motion(problem: Problem, goals: Matrix) -> Matrix | None:
     """The first free straight motion from the start to a goal, shape (2, n), or None."""
     ends = (np.stack([problem.start, goal]) for goal in goals)
@@ -140,11 +149,11 @@ def _straight_motion(problem: Problem, goals: Matrix) -> Matrix | None:
 def _own_planner(
     factory: PlannerFactory, name: str, si: Any, problem: Problem, seed: int, parameters: Mapping[str, Any]
 ) -> Any:
-    options = tuple(inspect.signature(factory).parameters)[1:]  # the first one is the space information
+    options = planner_options(factory)
     for key in parameters:
-        if key not in options or key in GIVEN_OPTIONS:
-            raise UnknownNameError(f"parameter of planner {name}", key, set(options).difference(GIVEN_OPTIONS))
-    goal = {"goal": problem.goal} if "goal" in options else {}
+        if key not in options:
+            raise UnknownNameError(f"parameter of planner {name}", key, options)
+    goal = {"goal": problem.goal} if "goal" in inspect.signature(factory).parameters else {}
     try:
         return factory(si, world=problem.world, seed=seed, **goal, **parameters)
     except TypeError as error:
@@ -165,10 +174,10 @@ def _wheel_planner(factory: PlannerFactory, name: str, si: Any, definition: Any,
 
 def _set(planner: Any, name: str, key: str, value: Any) -> None:
     """Set ``goal_bias`` through ``setGoalBias`` and so on."""
-    setters = {s for s in dir(planner) if s.startswith("set") and not hasattr(ob.Planner, s)}
-    setter = "set" + "".join(part[:1].upper() + part[1:] for part in key.split("_"))
-    if setter not in setters:
-        raise UnknownNameError(f"parameter of planner {name}", key, (_snake(s) for s in setters))
+    options = planner_options(type(planner))
+    if key not in options:
+        raise UnknownNameError(f"parameter of planner {name}", key, options)
+    setter = next(s for s in dir(planner) if s.startswith("set") and _snake(s) == key)
     if isinstance(value, float):
         finite_array(value, (), f"planner {name}: parameter {key}")
     try:

@@ -1,0 +1,140 @@
+"""A campaign: every planner of a suite on every problem, run after run, whatever becomes of any of them."""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from importlib.metadata import version as installed
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.benchmark import records, spread
+from rrtik_ompl.benchmark.suite import Suite
+from rrtik_ompl.errors import InputError
+
+LIBRARIES = ("ompl", "pin", "coal", "numpy", "numba")
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a campaign is: runs that are done, and all."""
+
+    done: int
+    total: int
+
+
+def run_campaign(
+    suite: Suite,
+    folder: Path,
+    *,
+    jobs: int = 1,
+    scheduler: str | None = None,
+    resume: bool = False,
+    on_run: Callable[[Progress, Mapping[str, Any] | None], object] = lambda *_: None,
+) -> Path:
+    """Do all runs of a suite that the folder does not hold yet.
+
+    Every run has its seed by its number alone, so it does not matter how runs are spread or how often the campaign
+    was interrupted. (Where the time limit ends a run, what it finds depends on the machine.)
+
+    Args:
+        suite: What to run.
+        folder: Gets the file of records.
+        jobs: Runs at a time on this machine.
+        scheduler: Address of a Dask scheduler whose workers do the runs instead.
+        resume: Go on where a campaign of the same suite was interrupted.
+        on_run: Called at the beginning and after every run.
+
+    Returns:
+        The file of records.
+
+    Raises:
+        InputError: If there are records and ``resume`` is not set, they are of another suite, or cannot be read or
+            written; if the scheduler cannot be used.
+    """
+    file = folder / records.NAME
+    done = _held(file, suite, resume)
+    total = len(suite.sources) * len(suite.entrants) * suite.runs
+    left = (job for job in all_jobs(suite) if records.key_of(job["run"]) not in done)
+    on_run(Progress(len(done), total), None)
+    with records.RecordFile(file, {"version": 1, "suite": suite.plain(), "machine": machine(jobs, scheduler)}) as out:
+        if len(done) == total:
+            return file
+        finished = spread.local(left, jobs) if scheduler is None else spread.cluster(left, scheduler)
+        try:
+            for number, record in enumerate(finished, start=len(done) + 1):
+                out.append(record)
+                on_run(Progress(number, total), record)
+        finally:
+            finished.close()
+    return file
+
+
+def all_jobs(suite: Suite) -> Iterator[dict[str, Any]]:
+    """Every run as plain values; planners take turns, so that what slows the machine slows them alike."""
+    for source in suite.sources:
+        for number in range(suite.runs):
+            seed = int(np.random.SeedSequence([suite.seed, number]).generate_state(1, np.uint32)[0])
+            for entrant in suite.entrants:
+                yield {
+                    "run": {
+                        "problem": source.name,
+                        "group": source.group,
+                        "axis": source.axis,
+                        "value": source.value,
+                        "planner": entrant.label,
+                        "run": number,
+                        "seed": seed,
+                    },
+                    "source": source.plain(),
+                    "planner": entrant.name,
+                    "parameters": entrant.parameters,
+                    "shorten": entrant.shorten,
+                    "seconds": suite.seconds,
+                    "patience": suite.patience,
+                    "memory_mb": suite.memory_mb,
+                    "seed": seed,
+                }
+
+
+def machine(jobs: int, scheduler: str | None) -> dict[str, Any]:
+    """What a reader must know to compare times."""
+    from rrtik_ompl import __version__
+
+    return {
+        "rrtik-ompl": __version__,
+        **{name: installed(name) for name in LIBRARIES},
+        "python": platform.python_version(),
+        "system": f"{platform.system()} {platform.machine()}",
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "at a time": "a cluster" if scheduler else jobs,
+        "begun": time.strftime("%Y-%m-%d %H:%M:%S"),
+    }
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor() or "unknown"
+    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), "unknown")
+
+
+def _held(file: Path, suite: Suite, resume: bool) -> set[records.Key]:
+    """Which runs are done already."""
+    if not file.is_file() or file.stat().st_size == 0:
+        return set()
+    if not resume:
+        count = sum(1 for _ in records.read_records(file))
+        raise InputError(f"{file}: holds {count} runs already; continue with --resume, or choose another --out")
+    before, now = records.read_head(file)["suite"], records.json_like(suite.plain())
+    changed = [key for key in now if before.get(key) != now[key] and key not in ("runs", "title")]
+    if changed:
+        raise InputError(f"{file}: was begun with another suite ({', '.join(changed)} differ); choose another --out")
+    return {records.key_of(record) for record in records.read_records(file)}

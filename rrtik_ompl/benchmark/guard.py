@@ -1,0 +1,143 @@
+"""Runs in processes that may be lost: a crash, a hang, too much memory become records of failed runs."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Mapping
+from typing import IO, Any
+
+from rrtik_ompl.benchmark.run import CRASH, HANG, OUT_OF_MEMORY
+from rrtik_ompl.errors import RrtikError
+
+COMMAND = (sys.executable, "-m", "rrtik_ompl.benchmark.child")
+MEMORY_WORDS = ("bad_alloc", "MemoryError", "Cannot allocate memory")
+TAIL = 4000  # bytes of what a lost process has said
+
+
+class Closed(RrtikError):
+    """Asked to run after it was closed."""
+
+
+class Guard:
+    """A process that is started when it is needed, kept from run to run, and replaced when it is lost."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[str] | None = None
+        self._errors: IO[bytes] | None = None
+        self._closed = False
+
+    def run(self, job: Mapping[str, Any]) -> dict[str, Any]:
+        """The record of a job, whatever becomes of its process.
+
+        Raises:
+            Closed: If the guard was closed.
+        """
+        process = self._started()
+        self._forget_words()
+        answer = _asked(process, json.dumps(job) + "\n")
+        if self._closed:
+            raise Closed("the guard was closed")
+        if answer.endswith("\n"):
+            record: dict[str, Any] = json.loads(answer)
+            if record["status"] == OUT_OF_MEMORY:  # what is left of it may be spoilt
+                self._end(process)
+            return record
+        return self._lost(process, job)
+
+    def close(self) -> None:
+        """End the process, also in the middle of a run."""
+        self._closed = True
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+
+    def _started(self) -> subprocess.Popen[str]:
+        if self._closed:
+            raise Closed("the guard was closed")
+        if self._process is None:
+            self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - kept open
+            self._process = subprocess.Popen(
+                COMMAND,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._errors,
+                text=True,
+                start_new_session=True,  # Ctrl-C is for whoever keeps the books
+            )
+        return self._process
+
+    def _lost(self, process: subprocess.Popen[str], job: Mapping[str, Any]) -> dict[str, Any]:
+        code = self._end(process)
+        said = self._last_words()
+        if code == -signal.SIGALRM:
+            return {"status": HANG, "reason": f"killed after {job['patience']:g} s"}
+        if any(word in said for word in MEMORY_WORDS):
+            return {"status": OUT_OF_MEMORY, "reason": f"more than {job['memory_mb']:g} MB"}
+        ended = f"exit code {code}" if code >= 0 else signal.Signals(-code).name
+        last = next((line.strip() for line in reversed(said.splitlines()) if line.strip()), "")
+        return {"status": CRASH, "reason": f"{ended}: {last}".rstrip(": ")}
+
+    def _end(self, process: subprocess.Popen[str]) -> int:
+        """Its exit code; where it has only closed its mouth it is killed."""
+        self._process = None
+        process.kill()
+        return process.wait()
+
+    def _forget_words(self) -> None:
+        """Empty the file of what was said in earlier runs; its place is shared with the process."""
+        if self._errors is not None:
+            self._errors.seek(0)
+            self._errors.truncate()
+
+    def _last_words(self) -> str:
+        if self._errors is None:
+            return ""
+        with self._errors as file:
+            file.seek(max(0, file.seek(0, os.SEEK_END) - TAIL))
+            return file.read().decode(errors="replace")
+
+
+def _asked(process: subprocess.Popen[str], question: str) -> str:
+    """The line that a process answers; empty if it is lost."""
+    if process.stdin is None or process.stdout is None:
+        return ""
+    try:
+        process.stdin.write(question)
+        process.stdin.flush()
+        return process.stdout.readline()
+    except OSError:
+        return ""
+
+
+class Guards:
+    """One guard for each thread that asks."""
+
+    def __init__(self) -> None:
+        self._mine = threading.local()
+        self._all: list[Guard] = []
+        self._lock = threading.Lock()
+        self._closed = False
+
+    def run(self, job: Mapping[str, Any]) -> dict[str, Any]:
+        """See :meth:`Guard.run`."""
+        if not hasattr(self._mine, "guard"):
+            with self._lock:
+                if self._closed:
+                    raise Closed("the guards were closed")
+                self._mine.guard = Guard()
+                self._all.append(self._mine.guard)
+        record: dict[str, Any] = self._mine.guard.run(job)
+        return record
+
+    def close(self) -> None:
+        """End all processes."""
+        with self._lock:
+            self._closed = True
+        for guard in self._all:
+            guard.close()

@@ -1,0 +1,95 @@
+"""One run: build the problem, plan, shorten, measure; what comes out is plain and fits on one line of a file."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.benchmark.sources import build, from_plain
+from rrtik_ompl.benchmark.suite_file import BY_KIND, NONE
+from rrtik_ompl.errors import RrtikError
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.planning import plan
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.shortening import shorten
+
+SOLVED, NOT_FOUND, INVALID, ERROR = "solved", "not found", "invalid", "error"
+OUT_OF_MEMORY, CRASH, HANG = "out of memory", "crash", "hang"
+STATUSES = (SOLVED, NOT_FOUND, INVALID, ERROR, OUT_OF_MEMORY, CRASH, HANG)
+
+
+def prepare(job: Mapping[str, Any]) -> Problem | None:
+    """Build the problem of a job, which is not part of the run; None if it cannot be built: the run will say why."""
+    try:
+        return build(from_plain(job["source"]))
+    except (RrtikError, MemoryError):
+        return None
+
+
+def execute(job: Mapping[str, Any]) -> dict[str, Any]:
+    """Do a job; whatever goes wrong in Python is an outcome.
+
+    Args:
+        job: As :func:`rrtik_ompl.benchmark.campaign.jobs` writes it.
+
+    Returns:
+        status, reason, and what was measured: seconds, lengths [rad, m], moves, counts of the planner, waypoints.
+    """
+    try:
+        return _measured(job, build(from_plain(job["source"])))
+    except RrtikError as error:
+        return {"status": ERROR, "reason": str(error)}
+    except MemoryError as error:
+        return {"status": OUT_OF_MEMORY, "reason": f"more than {job['memory_mb']:g} MB: {error}".rstrip(": ")}
+    except Exception as error:  # a campaign goes on, whatever a planner of another package does
+        return {"status": ERROR, "reason": f"{type(error).__name__}: {error}"}
+
+
+def _measured(job: Mapping[str, Any], problem: Problem) -> dict[str, Any]:
+    found = plan(problem, job["planner"], seconds=job["seconds"], seed=job["seed"], parameters=job["parameters"])
+    record: dict[str, Any] = {
+        "status": SOLVED if found.found else NOT_FOUND,
+        "reason": found.reason,
+        "plan_seconds": found.seconds,
+        "counts": dict(found.statistics),
+    }
+    if found.path is None:
+        return record
+    begin = time.perf_counter()
+    path = _shortened(found.path, problem, job["shorten"], found.seed)
+    record |= {"shorten_seconds": time.perf_counter() - begin}
+    faults = path.violations(problem.world)
+    if faults or not problem.reached(path.end) or not (path.start == problem.start).all():
+        reason = faults[0].reason if faults else "the path does not lead from the start to the goal"
+        record |= {"status": INVALID, "reason": reason}
+    return record | _sizes("initial_", found.path) | _sizes("", path) | {"waypoints": path.waypoints.tolist()}
+
+
+def _shortened(path: JointPath, problem: Problem, method: str, seed: int) -> JointPath:
+    if method == NONE or len(path.waypoints) < 2:
+        return path
+    chosen = ("axis" if path.one_joint_at_a_time else "auto") if method == BY_KIND else method
+    return shorten(path, problem, method=chosen, seed=seed)
+
+
+def _sizes(prefix: str, path: JointPath) -> dict[str, float]:
+    return {
+        f"{prefix}length": path.length,
+        f"{prefix}transitions": path.transitions,
+        f"{prefix}segments": len(path.waypoints) - 1,
+        f"{prefix}smoothness": smoothness(path),
+    }
+
+
+def smoothness(path: JointPath) -> float:
+    """OMPL's measure, 0 for a straight line: the squares of the turns, each over the mean length of its two edges."""
+    rows = path.waypoints
+    sides = np.linalg.norm(np.diff(rows, axis=0), axis=1)
+    before, after, across = sides[:-1], sides[1:], np.linalg.norm(rows[2:] - rows[:-2], axis=1)
+    some = (before > 0.0) & (after > 0.0)
+    before, after, across = before[some], after[some], across[some]
+    cosines = np.clip((before**2 + after**2 - across**2) / (2.0 * before * after), -1.0, 1.0)
+    return float((((np.pi - np.arccos(cosines)) * 2.0 / (before + after)) ** 2).sum())

@@ -1,0 +1,145 @@
+"""Where the problems of a suite come from: small plain descriptions that any process can turn into the problem."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from rrtik_ompl.benchmark.scaling import crowded_arm, planar_chain
+from rrtik_ompl.catalog import find_problem, load_robot
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.problem_file import load_problem
+from rrtik_ompl.scenarios import generated_problem
+from rrtik_ompl.world import World
+
+KEPT = 4  # problems that a process remembers; runs of one problem follow each other
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A problem that is not built yet.
+
+    Attributes:
+        kind: One of KINDS.
+        name: Of the problem.
+        group: Of problems that are reported together.
+        arguments: Of the kind, plain values.
+        axis: What grows in a family that measures scaling, or "".
+        value: How much of it there is.
+    """
+
+    kind: str
+    name: str
+    group: str
+    arguments: tuple[Any, ...]
+    axis: str = ""
+    value: float = 0.0
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+
+def from_plain(data: Mapping[str, Any]) -> Source:
+    """A source as :meth:`Source.plain` writes it."""
+    return Source(**{**data, "arguments": tuple(data["arguments"])})
+
+
+@lru_cache(maxsize=KEPT)
+def build(source: Source) -> Problem:
+    """The problem of a source.
+
+    Raises:
+        RrtikError: If it cannot be built, in the words of whoever builds it.
+    """
+    return KINDS[source.kind](*source.arguments)
+
+
+def file_source(name: str, folder: Path) -> Source:
+    """A shipped problem by its name, or a file as seen from ``folder``.
+
+    Raises:
+        UnknownNameError: If there is no shipped problem of that name.
+        InputError: If there is no such file.
+    """
+    path = Path(name)
+    if not path.suffix and len(path.parts) == 1:
+        find_problem(name)
+        return Source("file", name, name, (name, None))  # which other machines keep in other folders
+    file = (folder / path).resolve()
+    if not file.is_file():
+        raise InputError(f"no such problem file '{name}' as seen from {folder}; check the path")
+    return Source("file", file.stem, file.stem, (str(file), None))
+
+
+def folder_sources(folder: Path, robot: str | None) -> list[Source]:
+    """All problems in a folder and below: problem files, and MotionBenchMaker's pairs by their scenes.
+
+    Args:
+        folder: Where to look; problems of one folder are reported together.
+        robot: In place of the one that the files name.
+
+    Raises:
+        InputError: If there is none.
+    """
+    found = sorted(file for ending in ("yaml", "yml") for file in folder.rglob(f"*.{ending}"))
+    found = [file for file in found if not file.name.startswith("request")]
+    pairs = {file.parent for file in found if file.name.startswith("scene")}
+    found = [file for file in found if file.parent not in pairs or file.name.startswith("scene")]
+    if not found:
+        raise InputError(f"{folder}: holds no problem files (.yaml) and no pairs sceneN.yaml, requestN.yaml")
+    sources, whole = [], folder.resolve()
+    for file in map(Path.resolve, found):
+        group = (Path(whole.name) / file.parent.relative_to(whole)).as_posix()
+        sources.append(Source("file", f"{group}/{file.stem}", group, (str(file), robot)))
+    return sources
+
+
+def generated_sources(robot: str, family: str, first: int, count: int) -> list[Source]:
+    """Problems of ``rrtik_ompl.scenarios`` with the seeds first, first + 1, ..."""
+    group = f"{robot}/{family}"
+    seeds = range(first, first + count)
+    return [Source("generated", f"{group}/{seed}", group, (robot, family, seed)) for seed in seeds]
+
+
+def scaling_sources(axis: str, values: list[Any], *arguments: Any, group: str) -> list[Source]:
+    """One problem for each value of what grows: ``joints``, ``obstacles`` or ``resolution``."""
+    return [Source(axis, f"{group}/{value:g}", group, (*arguments, value), axis, float(value)) for value in values]
+
+
+def _from_file(file: str, robot: str | None) -> Problem:
+    return load_problem(file, robot=robot)
+
+
+def _generated(robot: str, family: str, seed: int) -> Problem:
+    return generated_problem(load_robot(robot), family, seed)
+
+
+def _resolved(name: str, resolution: float) -> Problem:
+    problem = load_problem(name)
+    world = World(problem.world.robot, problem.world.scene, motion_resolution=resolution)
+    return Problem(world, problem.start, problem.goal, name=problem.name)
+
+
+def _crowded(robot: str, seed: int, count: int) -> Problem:
+    return crowded_arm(load_robot(robot), int(count), seed)
+
+
+def _chain(seed: int, joints: int) -> Problem:
+    return planar_chain(int(joints), seed)
+
+
+KINDS: Mapping[str, Callable[..., Problem]] = MappingProxyType(
+    {
+        "file": _from_file,
+        "generated": _generated,
+        "joints": _chain,
+        "obstacles": _crowded,
+        "resolution": _resolved,
+    }
+)

@@ -1,0 +1,96 @@
+"""Spreading jobs through joblib: over processes of this machine, or over the workers of a Dask cluster."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from rrtik_ompl.benchmark.guard import Closed, Guards
+from rrtik_ompl.errors import InputError, RrtikError
+
+CONNECT = 10  # [s] to reach a scheduler
+_here = Guards()  # of a worker of a cluster, which has no other place to keep them
+
+Job = Mapping[str, Any]
+Done = dict[str, Any]
+
+
+def local(jobs: Iterable[Job], count: int) -> Generator[Done, None, None]:
+    """Do jobs ``count`` at a time on this machine; records come as they are finished.
+
+    Threads do nothing but wait for the guarded processes in which the work is done.
+    """
+    from joblib import Parallel, delayed
+
+    guards = Guards()
+
+    def one(job: Job) -> Done | None:
+        try:
+            return {**job["run"], **guards.run(job)}
+        except Closed:
+            return None
+
+    try:
+        # one job ahead at most, so that a long list does not fill the memory
+        done = Parallel(n_jobs=count, backend="threading", return_as="generator_unordered", pre_dispatch="2*n_jobs",
+                        batch_size=1)(delayed(one)(job) for job in jobs)  # fmt: skip
+        yield from (record for record in done if record is not None)
+    finally:
+        guards.close()
+
+
+def cluster(jobs: Iterable[Job], address: str) -> Generator[Done, None, None]:
+    """Do jobs on the workers of a Dask scheduler; what a lost worker had in hand, others do again.
+
+    Raises:
+        InputError: If Dask is not installed, the scheduler does not answer or has no workers, or a worker cannot run
+            this version.
+    """
+    try:
+        import distributed
+    except ImportError:
+        raise InputError("--scheduler needs Dask, which is not installed: pip install 'rrtik-ompl[cluster]'") from None
+    from joblib import Parallel, delayed, parallel_config
+
+    try:
+        client: Any = distributed.Client(address, timeout=CONNECT)
+    except (OSError, ValueError, TypeError) as error:
+        said = str(error) or type(error).__name__
+        raise InputError(f"--scheduler {address}: no Dask scheduler answers: {said}") from None
+    with client, _one_line(address):
+        _check_workers(client, address)
+        with parallel_config(backend="dask", client=client):
+            yield from Parallel(return_as="generator_unordered", batch_size=1)(delayed(_remote)(job) for job in jobs)
+
+
+def _remote(job: Job) -> Done:
+    return {**job["run"], **_here.run(job)}
+
+
+def _version() -> str:
+    from rrtik_ompl import __version__
+
+    return __version__
+
+
+def _check_workers(client: Any, address: str) -> None:
+    from rrtik_ompl import __version__
+
+    versions = client.run(_version)
+    if not versions:
+        raise InputError(f"--scheduler {address}: the scheduler has no workers; start some with: dask worker {address}")
+    for worker, version in versions.items():
+        if version != __version__:
+            raise InputError(f"--scheduler {address}: worker {worker} has rrtik-ompl {version}, here is {__version__}")
+
+
+@contextmanager
+def _one_line(address: str) -> Iterator[None]:
+    """What Dask raises of its own, as one line of ours."""
+    try:
+        yield
+    except RrtikError:
+        raise
+    except Exception as error:
+        raise InputError(f"--scheduler {address}: {type(error).__name__}: {error}") from error

@@ -1,0 +1,159 @@
+"""A suite: which problems, which planners, how many runs, how long, how much memory; every name in it is looked up."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from rrtik_ompl.benchmark.sources import (
+    Source,
+    file_source,
+    folder_sources,
+    generated_sources,
+    scaling_sources,
+)
+from rrtik_ompl.benchmark.suite_file import BY_KIND, NONE, Generated, Joints, Obstacles, PlannerGroup, SuiteFile
+from rrtik_ompl.catalog import find_suite, load_robot
+from rrtik_ompl.errors import UnknownNameError
+from rrtik_ompl.file_format import parse
+from rrtik_ompl.ompl_bridge.attempt import planner_options
+from rrtik_ompl.planning import find_planner
+from rrtik_ompl.scenarios import FAMILIES
+from rrtik_ompl.shortening import METHODS
+from rrtik_ompl.text_file import file_name
+from rrtik_ompl.yaml_file import Location, YamlDocument, read_yaml
+
+# What OMPL itself has and its wheel does not offer (OMPL 2.0.1).
+NOT_IN_WHEEL = (
+    "ABITstar, AITstar, ATRRT, AnytimePathShortening, BiEST, BiRLRT, BiTRRT, BLITstar, CForest, EIRMstar, EITstar, "
+    "EST, LBTRRT, LazyLBTRRT, LazyPRM, LazyPRMstar, LazyRRT, PDST, ProjEST, QMP, QRRT, RLRT, RRTsharp, RRTXstatic, "
+    "SBL, SPARS, SPARStwo, SST, STRIDE, STRRTstar, TRRT, TSRRT, VFRRT, XXL, pRRT, pSBL"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Entrant:
+    """A planner with its options under a label."""
+
+    label: str
+    name: str
+    parameters: dict[str, Any]
+    shorten: str
+
+
+@dataclass(frozen=True, slots=True)
+class Suite:
+    """A campaign that has been checked: every name in it exists.
+
+    Attributes:
+        name: Of the file.
+        sources: The problems.
+        entrants: The planners.
+        runs: Of each planner on each problem.
+        seconds: For planning in each run.
+        patience: Seconds after which a run is killed.
+        memory_mb: That a run may take beside robot, scene and library.
+        seed: Of the whole campaign.
+    """
+
+    name: str
+    title: str
+    sources: tuple[Source, ...]
+    entrants: tuple[Entrant, ...]
+    runs: int
+    seconds: float
+    patience: float
+    memory_mb: float
+    seed: int
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+
+def load_suite(name_or_file: str | os.PathLike[str], *, folder: Path | None = None, runs: int | None = None) -> Suite:
+    """Read a suite and look up everything that it names.
+
+    Args:
+        name_or_file: A shipped name (see ``rrtik list suites``) or a YAML file.
+        folder: Further problems: all problem files and MotionBenchMaker pairs in this folder and below.
+        runs: In place of the suite's.
+
+    Raises:
+        InputError: One line with file, line, key and remedy.
+    """
+    path = file_name(name_or_file)
+    if not path.suffix and len(path.parts) == 1 and not path.is_file():
+        path = find_suite(str(name_or_file))
+    document = read_yaml(path)
+    entry = parse(document, SuiteFile)
+    sources = [each for k, item in enumerate(entry.problems) for each in _sources(document, ("problems", k), item)]
+    sources = [replace(s, arguments=(s.arguments[0], entry.robot)) if s.kind == "file" else s for s in sources]
+    sources += [] if folder is None else folder_sources(folder, entry.robot)
+    if not sources:
+        raise document.error(("problems",), "no problems; list some, or give a folder of them with --problems FOLDER")
+    entrants = [_entrant(document, ("planners", k), item, entry.shorten) for k, item in enumerate(entry.planners)]
+    _refuse_twins(document, "problems", [source.name for source in sources])
+    _refuse_twins(document, "planners", [entrant.label for entrant in entrants])
+    patience = entry.patience or 3.0 * entry.seconds + 30.0
+    return Suite(
+        path.stem, entry.title, tuple(sources), tuple(entrants), runs or entry.runs, entry.seconds, patience,
+        entry.memory_mb, entry.seed,
+    )  # fmt: skip
+
+
+def _sources(document: YamlDocument, place: Location, item: Any) -> list[Source]:
+    with document.at(place):
+        if isinstance(item, str):
+            return [file_source(item, document.path.parent)]
+        if isinstance(item, Generated):
+            given = item.generated
+            load_robot(given.robot)
+            if given.family not in FAMILIES:
+                raise UnknownNameError("family of generated problems", given.family, FAMILIES)
+            return generated_sources(given.robot, given.family, given.first, given.count)
+        if isinstance(item, Obstacles):
+            load_robot(item.obstacles.robot)
+            arguments = (item.obstacles.robot, item.obstacles.seed)
+            return scaling_sources("obstacles", item.obstacles.counts, *arguments, group=f"{arguments[0]}/obstacles")
+        if isinstance(item, Joints):
+            return scaling_sources("joints", item.joints.counts, item.joints.seed, group="planar/joints")
+        base = file_source(item.resolution.problem, document.path.parent)
+        group = f"{base.name}/resolution"
+        return scaling_sources("resolution", item.resolution.metres, base.arguments[0], group=group)
+
+
+def _entrant(document: YamlDocument, place: Location, item: Any, shorten: str) -> Entrant:
+    group = PlannerGroup.model_validate({"name": item}) if isinstance(item, str) else item
+    at = place if isinstance(item, str) else (*place, "name")
+    with document.at(at):
+        factory = _planner(group.name)
+    options = planner_options(factory)
+    for key in group.parameters:
+        with document.at((*place, "parameters", key)):
+            if key not in options:
+                raise UnknownNameError(f"parameter of planner {group.name}", key, options)
+    method = group.shorten or shorten
+    if method not in (*METHODS, BY_KIND, NONE):
+        raise document.error(
+            (*place, "shorten") if group.shorten else ("shorten",),
+            str(UnknownNameError("shortening method", method, (*METHODS, BY_KIND, NONE))),
+        )
+    return Entrant(group.label or group.name, group.name, dict(group.parameters), method)
+
+
+def _planner(name: str) -> Any:
+    try:
+        return find_planner(name)
+    except UnknownNameError as error:
+        error.args = (f"{error}; OMPL's wheel lacks {NOT_IN_WHEEL}",)
+        raise
+
+
+def _refuse_twins(document: YamlDocument, key: str, names: list[str]) -> None:
+    name, number = Counter(names).most_common(1)[0]
+    if number > 1:
+        raise document.error((key,), f"'{name}' stands there {number} times; delete one, or give labels to planners")
