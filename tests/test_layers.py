@@ -15,8 +15,8 @@ RUNGS = (
     "moveit_messages motion_bench_maker run_section problem_file pose_file ompl_bridge planning shortening scenarios",
     "trajectory replanning scenario plot plot_tree plot_genetic plot_reach",
     "viewer report ik_report sensing overlay reproduce benchmark terminal",
-    "motion_commands plan_command ik_commands reach_commands replan_commands reproduce_commands bench_commands marker_commands",
-    "pilot cli command",
+    "motion_commands plan_command ik_commands reach_commands replan_commands reproduce_commands bench_commands",
+    "marker_commands pilot cli command",
 )
 LADDER = [name for rung in RUNGS for name in rung.split()]
 
