@@ -7,7 +7,7 @@ answer never waits for coal. When the scene changes, only the obstacles that mov
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,10 +15,11 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Mask, Vector, finite_array
 from rrtik_ompl.checks import fast_world
 from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast import FREE, FastWorld
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Scene
+from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.shapes import Shape
 from rrtik_ompl.world import World
 
 
@@ -53,7 +54,7 @@ class MovingWorld:
         self.scene, self.checked = world.scene, 0
         names = {o.name for o in self.scene.obstacles} if moving is None else set(moving)
         self._bodies, pairs, self._copy = _with_copies(world, names, copies)
-        self._known = frozenset(o.name for o in self.scene.obstacles)
+        self._known = {o.name: o for o in self.scene.obstacles}
         kept = tuple(p for p in pairs if any(self._bodies[i].joint > 0 for i in p))
         if not self_collision:
             kept = tuple(p for p in kept if any(self._bodies[i].kind == "obstacle" for i in p))
@@ -78,12 +79,17 @@ class MovingWorld:
             rooms: How far the arm has to stay from obstacles [m]; what is not named keeps its room.
 
         Raises:
-            InputError: If a scene has other obstacles than the world began with.
+            InputError: If a scene has other obstacles than the world began with, or a room is not 0 or more.
+            UnknownNameError: If a room is given for what is no obstacle.
         """
         poses = [{o.name: o.pose for o in scene.obstacles} for scene in scenes]
-        for scene, found in zip(scenes, poses, strict=True):
-            if found.keys() != self._known:
-                raise InputError(f"scene: expected the obstacles {', '.join(sorted(self._known))}, got {scene}")
+        for scene in scenes:
+            _check_obstacles(scene, self._known)
+        for name, room in (rooms or {}).items():
+            if name not in self._known:
+                raise UnknownNameError("obstacle", name, self._known, where="rooms")
+            if not room >= 0.0:
+                raise InputError(f"rooms: that of '{name}' must be 0 metres or more, got {room}")
         for k, body in enumerate(self._bodies):
             if body.kind == "obstacle":
                 pose = poses[min(self._copy[k], len(poses) - 1)][body.name]
@@ -123,6 +129,22 @@ class MovingWorld:
         sides = self.robot.joint_values(starts), self.robot.joint_values(ends)
         free: Mask = self._fast.classify_edges(*sides, steps, prove=False) == FREE
         return free & self.robot.within_limits(starts) & self.robot.within_limits(ends)
+
+
+def _check_obstacles(scene: Scene, known: Mapping[str, Obstacle]) -> None:
+    """Raise unless a scene has the obstacles that are known: their names and shapes."""
+    if {o.name for o in scene.obstacles} != known.keys():
+        raise InputError(f"scene: expected the obstacles {', '.join(sorted(known))}, got {scene}")
+    for obstacle in scene.obstacles:
+        if not _same_shape(obstacle.shape, known[obstacle.name].shape):
+            raise InputError(f"scene: '{obstacle.name}' has another shape than before; make a new world")
+
+
+def _same_shape(first: Shape, second: Shape) -> bool:
+    return first is second or (
+        type(first) is type(second)
+        and all(np.array_equal(getattr(first, f.name), getattr(second, f.name)) for f in fields(first))
+    )
 
 
 def _with_copies(

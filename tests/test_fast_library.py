@@ -320,3 +320,42 @@ def test_a_damaged_cache_of_numba_is_not_trusted(tmp_path):
         assert files
         for file in files:
             file.write_bytes(b"nonsense")
+
+
+KINDS = """
+import sys
+import numba
+from rrtik_ompl.fast.compiled import kernel
+@kernel
+def marked(x, mark):
+    return x + 1 if mark == 0 else x * mark
+@numba.njit
+def without(x):
+    return marked(x, 0)
+@numba.njit
+def within(x, mark):
+    return marked(x, mark)
+calls = {"without": lambda: without(5), "with": lambda: within(5, 7)}
+print(*[calls[name]() for name in sys.argv[1:]])
+"""
+
+
+def test_code_for_other_kinds_of_arguments_is_not_taken_from_numbas_cache(tmp_path):
+    """Two processes that fill it at once can leave each other's code under a name."""
+    source, folder = tmp_path / "kinds.py", tmp_path / "numba"
+    source.write_text(KINDS)
+
+    def answers(*names):
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
+        command = [sys.executable, source, *names]
+        done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+        assert done.stderr == ""
+        return done.stdout.split()
+
+    assert answers("without", "with") == ["6", "35"]
+    first, second = sorted(folder.rglob("*marked*.nbc"))
+    first_code, second_code = first.read_bytes(), second.read_bytes()
+    for order in (["without", "with"], ["with", "without"], ["with"]):
+        first.write_bytes(second_code)
+        second.write_bytes(first_code)
+        assert answers(*order) == [{"without": "6", "with": "35"}[name] for name in order]

@@ -197,6 +197,20 @@ def test_free_with_room_means_that_far_away():
     assert (near.clearance(rows[moving.valid_batch(rows)]) >= 0.15 - 1e-4).all()
 
 
+def test_a_moved_scene_must_have_the_same_obstacles():
+    moving = MovingWorld(plane(box("a", 5.0, 10.0)).world)
+    moving.move(Scene([box("a", 6.0, 10.0)]), rooms={"a": 0.0})  # made anew, but alike
+    with pytest.raises(InputError, match="expected the obstacles a"):
+        moving.move(Scene([box("b", 5.0, 10.0)]))
+    with pytest.raises(InputError, match="'a' has another shape"):
+        moving.move(Scene([Obstacle("a", Sphere(3.0))]))
+    with pytest.raises(InputError, match="no obstacle 'c'"):
+        moving.move(moving.scene, rooms={"c": 0.1})
+    for room in (-0.1, float("nan")):
+        with pytest.raises(InputError, match="'a' must be 0 metres or more"):
+            moving.move(moving.scene, rooms={"a": room})
+
+
 def test_copies_of_an_obstacle_count_as_well():
     problem = plane(box("a", 5.0, 10.0))
     moving = MovingWorld(problem.world, copies=2)

@@ -133,6 +133,14 @@ def test_what_is_proven_of_meshes_is_what_coal_says(meshes, kind, joint):
     assert (seen == UNDECIDED).mean() < {"angle": 0.2, "two shells": 0.2}.get(kind, 0.7)
 
 
+def test_of_unknown_kinds_nothing_is_proven():
+    robot, rng = load_robot("panda"), np.random.default_rng(6)
+    floor = swept(coal.Halfspace(np.array([0.0, 0.0, 1.0]), -0.3))
+    for other in (coal.Cone(0.1, 0.2), coal.Ellipsoid(0.1, 0.2, 0.05), floor):
+        assert (compared(robot, CONVEX["box"](rng), other, 0, rng)[0] == UNDECIDED).any()
+        assert convex_solids(other) is NO_SOLIDS
+
+
 def test_motions_are_judged_as_their_configurations_are():
     robot, rng = load_robot("panda"), np.random.default_rng(2)
     _, world, rows = compared(robot, CONVEX["hull"](rng), CONVEX["cylinder"](rng), 0, rng)
@@ -193,3 +201,20 @@ def test_pieces_of_a_mesh_contain_it_and_those_inside_are_inside(meshes, kind):
     if kind in ("angle", "two shells"):
         assert len(around) > 1
         assert holding(inside, cloud[held]).mean() > 0.95
+
+
+def test_no_point_of_a_mesh_lies_in_its_hollow(dented_cube):
+    """Cells that a ragged shell is cut into have corners in the middle, where the hollow is."""
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(30, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    faces = ConvexHull(points).simplices
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    inward = np.einsum("ij,ij->i", a, np.cross(b, c)) < 0.0
+    faces[inward] = faces[inward][:, ::-1]
+    hollow = dented_cube(0.2, 0.2)
+    vertices = np.vstack([points * rng.uniform(0.4, 1.0, (30, 1)), hollow.vertices])
+    triangles = np.vstack([faces, np.array(hollow.triangles)[:, ::-1] + 30])
+    _, _, found = convex_pieces(bvh(vertices, triangles))
+    assert len(found) > 4
+    assert (np.abs(np.concatenate(found)).max(axis=1) > 0.2 - 1e-9).all()

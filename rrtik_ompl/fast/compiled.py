@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 from numba import njit
 from numba.core.caching import FunctionCache
+from numba.core.sigutils import normalize_signature
 
 from rrtik_ompl.fast.code_files import sources_digest
 from rrtik_ompl.fast.processor import WIDTH
@@ -27,11 +28,15 @@ _entries: dict[str, dict[str, Any]] = {}
 
 
 class _ForgivingCache(FunctionCache):  # type: ignore[misc]
-    """Numba's cache on disk; one that is damaged or cannot be written costs time, nothing else."""
+    """Numba's cache on disk; one that is damaged or cannot be written costs time, nothing else.
+
+    Processes that fill it at once give different overloads of a function the same file, and the last one is kept.
+    """
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
-            return super().load_overload(sig, target_context)
+            found = super().load_overload(sig, target_context)
+            return found if found is None or found.signature.args == normalize_signature(sig)[0] else None
         except Exception:  # what a damaged pickle raises can be anything
             with suppress(OSError):
                 self.flush()

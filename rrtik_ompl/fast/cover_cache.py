@@ -20,6 +20,7 @@ from rrtik_ompl.fast.cache_files import cache_folder, write_whole
 
 LAYOUT = 1
 ALGORITHM = 3  # counts up when rrtik_ompl.fast.covers makes other spheres of the same geometry
+PIECES = 2  # counts up when rrtik_ompl.fast.mesh_pieces makes other pieces of the same mesh
 
 
 def cached_outer_cover(geometry: Any, *, protrusion: float | None = None) -> Matrix:
@@ -55,7 +56,7 @@ def cached_convex_pieces(mesh: Any) -> tuple[list[Matrix], ...]:
         rows = [np.column_stack([corners, np.full(len(corners), float(number))]) for number, corners in numbered]
         return np.concatenate([np.empty((0, 4)), *rows])
 
-    rows = _cached(mesh, "convex pieces", make)
+    rows = _cached(mesh, f"convex pieces {PIECES}", make)
     numbers = np.unique(rows[:, 3])
     return tuple([rows[rows[:, 3] == k, :3] for k in numbers if k % 3 == kind] for kind in range(3))
 

@@ -112,7 +112,7 @@ class FastWorld:
     def move(self, bodies: Sequence[Any], rooms: Sequence[float]) -> None:
         """Put what stands still elsewhere, in place: the arm, the pairs and addresses stay as they are.
 
-        From then on nothing is proven to be COLLIDING: what is not FREE is UNDECIDED.
+        From then on no contact with them is proven, only freedom from it.
 
         Args:
             bodies: As at the beginning, those that stand still with other placements. One that is the same object

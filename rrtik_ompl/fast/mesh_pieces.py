@@ -126,7 +126,7 @@ def _closed_pieces(shells: list[Triangles]) -> tuple[list[Matrix], list[Matrix],
     """Pieces of closed surfaces: what is in one of them, and not in one turned inside out, is inside the mesh."""
     volumes = np.array([_signed_volume(shell) for shell in shells])
     inverted = [shell for shell, turned in zip(shells, volumes * volumes.sum() < 0.0, strict=True) if turned]
-    around, inside = [], []
+    around, inside, points = [], [], []
     for part in _parts([_start(shell, NO_BOXES, number) for number, shell in enumerate(shells)]):
         shell = shells[part.shell]
         corners = np.where(OCTANTS, part.high, part.low)
@@ -134,14 +134,14 @@ def _closed_pieces(shells: list[Triangles]) -> tuple[list[Matrix], list[Matrix],
         whole = _whole(part, shell)
         planes, span = _hull(np.concatenate([whole.points, corners[held]]))
         around.append(span)
+        points.append(_outermost(whole.surface.reshape(-1, 3)))  # a corner of a cell may lie in another shell's hollow
         if len(planes) and volumes[part.shell] * volumes.sum() > 0.0:
             obstacles = np.concatenate([whole.surface, *(_within(other, part.low, part.high) for other in inverted)])
             kernel = _kernel(planes, replace(part, surface=obstacles))
             if kernel is not None and _holds(shell, kernel.mean(axis=0)):
                 centre = kernel.mean(axis=0)
                 inside += [] if any(_holds(other, centre) for other in inverted) else [kernel]
-    around = _not_empty(around)
-    return around, inside, list(map(_outermost, around))
+    return _not_empty(around), inside, _not_empty(points)
 
 
 def _shells(vertices: Matrix, triangles: NDArray[np.int64]) -> list[Triangles]:

@@ -119,6 +119,8 @@ def _convex_solids(key: SameObject) -> Solids:
 def _own_solid(solid: Any) -> ConvexSolid | None:
     """A convex geometry itself."""
     if isinstance(solid, coal.Halfspace):
+        if solid.getSweptSphereRadius() != 0.0:
+            return None
         return ConvexSolid(np.zeros((1, 3)), disc=float(solid.d), axis=np.array(solid.n), kind=HALF_SPACE_SOLID)
     if not isinstance(solid, (coal.Box, coal.Sphere, coal.Capsule, coal.Cylinder, coal.ConvexBase)):
         return None
