@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import zipfile
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -102,7 +103,7 @@ def _read(file: Path, key: str) -> Matrix | None:
     try:
         with np.load(file, allow_pickle=False) as stored:
             spheres, name, check = stored["spheres"], str(stored["key"]), str(stored["check"])
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, NotImplementedError, MemoryError):
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError, MemoryError):
         return None
     whole = spheres.dtype == np.float64 and spheres.ndim == 2 and spheres.shape[1] == 4
     if not whole or name != key or check != _check(spheres):
