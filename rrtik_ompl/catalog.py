@@ -78,6 +78,11 @@ def find_problem(name: str) -> Path:
     return files[name]
 
 
+def problem_folders() -> tuple[Path, ...]:
+    """Folders of the problems that packages ship."""
+    return tuple(Path(_load("problem folder", "problems", name)) for name in _offers("problems"))
+
+
 def load_robot(name: str | os.PathLike[str], **options: Any) -> Robot:
     """Load a robot by name or from a file; the same call gives the same object, unless a file of it has changed.
 
@@ -190,8 +195,7 @@ def _load(what: str, group: str, name: str) -> Any:
 
 
 def _problem_files() -> dict[str, Path]:
-    folders = [Path(_load("problem folder", "problems", name)) for name in _offers("problems")]
-    return {file.stem: file for folder in folders for file in sorted(folder.glob("*.yaml"))}
+    return {file.stem: file for folder in problem_folders() for file in sorted(folder.glob("*.yaml"))}
 
 
 def _beside(path: str, folder: str | os.PathLike[str]) -> Path:

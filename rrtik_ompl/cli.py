@@ -19,6 +19,7 @@ from rrtik_ompl.ik_commands import inverse_kinematics
 from rrtik_ompl.marker_commands import markers
 from rrtik_ompl.motion_commands import list_moves, time_path
 from rrtik_ompl.path_text import FORMATS as PATH_FORMATS
+from rrtik_ompl.pilot_commands import pilot
 from rrtik_ompl.reach_commands import reach
 from rrtik_ompl.reproduce_commands import reproduce
 from rrtik_ompl.terminal import drop_output, note, prepare_streams, progress, say, warn
@@ -231,6 +232,7 @@ app.command("reproduce")(reproduce)
 app.command("moves")(list_moves)
 app.command("time")(time_path)
 app.add_typer(markers, name="markers")
+app.command("pilot")(pilot)
 
 
 def main() -> None:

@@ -54,6 +54,7 @@ LADDER = [
         "reproduce_commands",
         "marker_commands",
         "pilot",
+        "pilot_commands",
         "cli",
         "command",
     ),

@@ -14,13 +14,14 @@ from rrtik_ompl.arrays import Vector
 from rrtik_ompl.errors import ProblemError
 from rrtik_ompl.ik.batch import solve_ik_batch
 from rrtik_ompl.path import JointPath
+from rrtik_ompl.pilot.clearance import tightest
 from rrtik_ompl.planning import plan
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.shortening import shorten
 from rrtik_ompl.world import World
 
 SECONDS = 2.0
-LOOKS = 40  # along a route, for its clearance
+LOOKS = 100  # along a route, for its clearance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +99,8 @@ def _moves(world: World, q: Vector, goal: Vector, seed: int) -> JointPath | str:
 def _route(world: World, path: JointPath, grasp_from: int, rates: Vector) -> Route:
     moves, names = path.moves(), list(path.joint_names)
     looks = path.resample(max(path.length / LOOKS, 1e-3)).waypoints
-    clearance = min((world.clearance(row) for row in looks), default=np.inf)
+    nearest = tightest(world, looks)
+    clearance = np.inf if nearest is None else nearest.distance
     seconds = sum(abs(move.change) / rates[names.index(move.joint)] for move in moves)
     used = tuple(name for name in names if any(move.joint == name for move in moves))
     return Route(path, grasp_from, sum(abs(m.change) for m in moves), float(seconds), float(clearance), used)
