@@ -52,6 +52,7 @@ class Augmenter:
         self._arm = figure_of(robot_surfaces(robot, triangles))
         self._ghost = figure_of(robot_surfaces(robot, min(triangles, GHOST_TRIANGLES)))
         self._figures: dict[tuple[Any, ...], tuple[tuple[Obstacle, ...], Figure]] = {}
+        self._hiding: tuple[Any, Any, Any] = (None, None, None)
 
     def draw(
         self,
@@ -132,9 +133,14 @@ class Augmenter:
     def _depths(self, real: Sequence[Obstacle], T_camera_base: NDArray[np.float64]) -> NDArray[np.float32] | None:
         if not real:
             return None
-        self._canvas.clear()
-        self._canvas.draw(placed(self._figure(real), T_camera_base[None]))
-        return self._canvas.depths.copy()
+        figure = self._figure(real)
+        before, pose, depths = self._hiding
+        if figure is not before or not np.array_equal(pose, T_camera_base):
+            self._canvas.clear()
+            self._canvas.draw(placed(figure, T_camera_base[None]))
+            depths = self._canvas.depths.copy()
+            self._hiding = (figure, T_camera_base, depths)
+        return depths
 
     def _figure(self, obstacles: Sequence[Obstacle]) -> Figure:
         """Triangles of obstacles, kept from picture to picture while they are where they were."""

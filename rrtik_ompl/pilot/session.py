@@ -217,10 +217,7 @@ class Session:
         self.route, self.mode = found, PROPOSED
         self.follower, self.progress = Follower(found.path, self.rates), None
         self.desired = frozen(found.path.end)
-        moves = len(found.path.moves())
-        return (
-            f"{moves} moves, {found.seconds:.0f} s, at least {1e3 * found.clearance:.0f} mm away; 'accept' or 'reject'"
-        )
+        return found.summary() + "; 'accept' or 'reject'"
 
     def _route(self) -> Route | str:
         seen = None if self.target is None or self.choice is None else self.surroundings.named(self.target)

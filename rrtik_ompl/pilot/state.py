@@ -108,6 +108,7 @@ def _route(session: Session) -> dict[str, Any] | None:
         "travel": round(reading(route.travel, "rad")[0], 1),
         "clearance_mm": None if not np.isfinite(route.clearance) else round(1e3 * route.clearance, 1),
         "joints": list(route.joints),
+        "steady": round(route.steady, 2),
         "share": 0.0 if progress is None else progress.share,
         "advice": "" if progress is None else progress.advice,
         "fault": "" if progress is None else progress.fault,

@@ -83,8 +83,8 @@ class OutsideView:
         self._arm = Augmenter(session.robot, self._camera, OUTSIDE_TRIANGLES)
         self._sky = sky(self._camera)
         reach = float(np.linalg.norm(session.robot.fk(session.q).translation))
-        self.centre: Vector = np.array([0.5 * reach, 0.0, 0.15 * reach])
-        self.distance, self.azimuth, self.elevation = 2.2 * max(reach, 0.3), *np.radians(PRESETS["corner"])
+        self.centre: Vector = np.array([0.6 * reach, 0.0, 0.0])
+        self.distance, self.azimuth, self.elevation = 1.9 * max(reach, 0.3), *np.radians(PRESETS["corner"])
         self.share: float | None = None  # of the route that is played, None to show the arm as it is
 
     def turn(self, right: float, up: float) -> None:

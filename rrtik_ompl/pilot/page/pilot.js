@@ -136,7 +136,7 @@ function showJoints() {
   if (body.children.length !== state.joints.length) body.replaceChildren(...state.joints.map(jointRow));
   state.joints.forEach((joint, k) => showJoint(body.children[k], joint, k));
   const unit = state.joints[state.selected].unit;
-  set(byId("step_size"), `${state.joints[state.selected].name} · step ${unit === "m" ? fixed(1000 * stepOf(unit)) + " mm" : stepOf(unit) + "°"}`);
+  set(byId("step_size"), `${state.joints[state.selected].name.replaceAll("_", " ")} · step ${unit === "m" ? fixed(1000 * stepOf(unit)) + " mm" : stepOf(unit) + "°"}`);
 }
 
 function jointRow(joint, k) {
@@ -228,9 +228,9 @@ function showRoute() {
   byId("current").hidden = !route || state.mode !== "following";
   if (!route) { if (list.children.length) list.replaceChildren(); list.dataset.key = ""; set(byId("route_numbers"), ""); return; }
   const clear = route.clearance_mm === null ? "" : ` · ${fixed(route.clearance_mm, 0)} mm clear`;
-  set(byId("route_numbers"), `${route.moves.length} · ${fixed(route.travel, 0)}° · ${fixed(route.seconds, 0)} s${clear} · ${route.joints.length} joints`);
+  set(byId("route_numbers"), `${route.moves.length} · ${fixed(route.travel, 0)}° · ${fixed(route.seconds, 0)} s${clear} · ${fixed(100 * route.steady, 0)} % free at ±1°`);
   const key = JSON.stringify(route.moves.map((move) => move.text));
-  if (list.dataset.key !== key) { list.dataset.key = key; list.replaceChildren(...route.moves.map((move) => make("li", {}, move.text))); }
+  if (list.dataset.key !== key) { list.dataset.key = key; list.replaceChildren(...route.moves.map((move) => make("li", {}, move.text))); list.scrollTop = 0; }
   route.moves.forEach((move, k) => {
     const item = list.children[k], now = state.mode === "following" && move.status === "current";
     const name = `${now ? "current" : move.status === "done" ? "done" : ""}${k >= route.grasp_from ? " grasp" : ""}`.trim();
@@ -245,9 +245,9 @@ function showRoute() {
 }
 
 function showAim() {
-  const aim = state.aim, rows = [["tip x y z", aim.tip.map((value) => fixed(value, 3)).join("  ") + " m"]];
+  const aim = state.aim, rows = [["tip xyz", aim.tip.map((value) => fixed(value, 3)).join("  ")]];
   if (aim.to) rows.push([`to ${aim.to}`, `${fixed(aim.distance, 3)} m`], ["ahead of the tool", `${fixed(aim.ahead, 3)} m`],
-    ["aside of it", `${fixed(aim.aside, 3)} m`], ["turn left", `${fixed(aim.turn_deg)}°`], ["below / above", `${fixed(aim.xyz[2], 3)} m`]);
+    ["aside of it", `${fixed(aim.aside, 3)} m`], ["turn to go", `${fixed(aim.turn_deg)}°`], ["below / above", `${fixed(aim.xyz[2], 3)} m`]);
   for (const seen of state.objects) rows.push([`${seen.name} known to`, `± ${fixed(seen.sigma_mm, 2)} mm`]);
   const list = byId("depth"), key = rows.map((row) => row[0]).join();
   if (list.dataset.key !== key) { list.dataset.key = key; list.replaceChildren(...rows.flatMap(([name]) => [make("dt", {}, name), make("dd")])); }
