@@ -17,6 +17,7 @@ import tornado.websocket
 from rrtik_ompl.pilot.run import Loop
 from rrtik_ompl.pilot.server import PilotServer
 from rrtik_ompl.pilot.setup import Wanted, open_session
+from rrtik_ompl.sensing.pictures import CameraLostError
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 OPTIONS = ("--headless=new", "--no-sandbox", "--hide-scrollbars", "--remote-debugging-port=0", "--disable-gpu")
@@ -194,3 +195,66 @@ def follow(browser, running):
             return
         browser.wait(f"state.mode !== 'following' || state.route.moves[{before}].status === 'done'", 20.0)
     raise AssertionError("too many moves")
+
+
+def test_a_second_page_watches_and_a_lost_camera_and_a_lost_server_are_said(browser):
+    with Running(Wanted("titan4_sdu")) as running:
+        browser.open(running.server.url)
+        browser.wait("state && state.lamps.length === 6 && role.role === 'pilot'")
+        other = "new WebSocket('ws://' + location.host + '/ws?page=other&token=')"
+        browser.ask(f"window.other = {other}; other.onmessage = (e) => {{ window.heard = e.data }}; 0")
+        browser.wait("role.pages === 2 && document.getElementById('role').textContent.includes('1 watching')")
+        assert browser.ask("document.getElementById('hand_over').hidden") is False
+        browser.press("h")
+        browser.wait("role.role === 'watching' && !document.getElementById('take').hidden")
+        browser.press("p")
+        browser.wait("document.getElementById('message').textContent.includes('you are watching')")
+        browser.wait("document.getElementById('plan').disabled")
+        browser.press("t")
+        browser.wait("role.role === 'pilot'")
+        source = running.opened.engine.eyes._source
+        latest, source.latest = source.latest, gone
+        browser.wait("!document.getElementById('camera_banner').hidden")
+        assert "Camera lost: unplugged" in browser.text("camera_banner")
+        assert "Camera lost" in browser.text("alerts")
+        browser.wait("document.body.classList.contains('stale')")
+        assert "STALE" in browser.text("age")
+        assert browser.ask("document.querySelectorAll('.lamp').length") == 6
+        source.latest = latest
+        browser.wait("document.getElementById('camera_banner').hidden")
+        browser.ask("socket.close()")
+        browser.wait("document.getElementById('role').textContent.includes('Not connected')")
+        browser.wait("role.role === 'pilot' && socket.readyState === 1 && !document.body.classList.contains('stale')")
+    browser.wait("document.getElementById('role').textContent.includes('Not connected')")
+    browser.wait("document.body.classList.contains('stale')")
+
+
+def gone():
+    raise CameraLostError("unplugged")
+
+
+NAMELESS = """
+[...document.querySelectorAll("button, input, select, canvas, progress, table, section, [role]")].filter((each) =>
+  each.offsetParent !== null && each.id !== "alerts" &&
+  !(each.getAttribute("aria-label") || each.textContent.trim() || each.labels?.length)).map((each) => each.outerHTML)
+"""
+
+
+def test_everything_has_a_name_and_the_keys_are_listed(browser):
+    with Running(Wanted("titan4_sdu")) as running:
+        browser.open(running.server.url)
+        browser.wait("state && state.lamps.length === 6")
+        assert browser.ask(NAMELESS) == []
+        tree = browser.call("Accessibility.getFullAXTree")["nodes"]
+        named = {node["name"]["value"] for node in tree if node.get("name", {}).get("value")}
+        assert {"camera picture with the arm, the chosen grasp and distances drawn over it", "messages"} <= named
+        assert any(name.startswith("straight level 1: no reach") for name in named)
+        assert any(name.startswith("azimuth, limits") for name in named)
+        browser.press("?")
+        browser.wait("document.getElementById('help').open")
+        keys = browser.text("key_list")
+        for what in ("stop at once", "make the next move", "take over", "turn the outside view"):
+            assert what in keys
+        before = browser.ask("sequence")
+        browser.press("p")
+        assert browser.ask("sequence") == before  # under the overlay keys command nothing

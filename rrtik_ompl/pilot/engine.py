@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.pilot.arguments import number
+from rrtik_ompl.pilot.arguments import LONGEST, number
 from rrtik_ompl.pilot.arm import SimulatedArm
 from rrtik_ompl.pilot.eyes import Eyes
 from rrtik_ompl.pilot.session import Session
@@ -97,9 +97,10 @@ class Engine:
         elif name == "zoom":
             self.outside.zoom(number(given["factor"], "factor"))
         elif name == "preset":
-            if given["view"] not in PRESETS:
-                raise UnknownNameError("view", str(given["view"])[:20], PRESETS)
-            self.outside.preset(given["view"])
+            view = str(given["view"])[:LONGEST]
+            if view not in PRESETS:
+                raise UnknownNameError("view", view, PRESETS)
+            self.outside.preset(view)
         else:
             self.outside.share = None if given["share"] is None else number(given["share"], "share")
 

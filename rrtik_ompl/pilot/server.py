@@ -37,6 +37,7 @@ LARGEST_MESSAGE = 16 * 1024  # bytes, from a page
 MOST_WAITING = 200  # commands that were not obeyed yet
 SHORTEST_TOKEN = 16
 LONGEST_NAME = 40
+GOING_AWAY, FAREWELL_SECONDS = 1001, 0.1  # code of a WebSocket that is closed, and time for it to arrive
 PING_SECONDS, PONG_SECONDS = 5.0, 5.0
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; "
@@ -77,6 +78,7 @@ class PilotServer:
         self.commands: queue.Queue[tuple[int, dict[str, Any]]] = queue.Queue()
         self.clients = Clients(self._pilot_left)
         self.numbers = itertools.count(1)
+        self.open_sockets: set[Any] = set()
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._run, daemon=True)
 
@@ -90,7 +92,7 @@ class PilotServer:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._loop.call_soon_threadsafe(self._end)
         self._thread.join(timeout=10.0)
 
     def show_state(self, state: dict[str, Any], answered: dict[int, int]) -> None:
@@ -146,6 +148,11 @@ class PilotServer:
 
     def _pilot_left(self) -> None:
         self.commands.put((0, {"name": "halt"}))
+
+    def _end(self) -> None:
+        for each in self.open_sockets:
+            each.close(GOING_AWAY)
+        self._loop.call_later(FAREWELL_SECONDS, self._loop.stop)
 
     def _call(self, act: Callable[[], None]) -> None:
         if len(self.clients):
@@ -223,6 +230,7 @@ class _SocketHandler(_Guarded, tornado.websocket.WebSocketHandler):
         name = self.get_argument("page", "")[:LONGEST_NAME]
         self._client = Client(next(self.server.numbers), name, self._send)
         self._client.tell(kind="title", title=self.server.title)
+        self.server.open_sockets.add(self)
         self.server.clients.join(self._client)
 
     def on_message(self, message: Message) -> None:
@@ -230,6 +238,7 @@ class _SocketHandler(_Guarded, tornado.websocket.WebSocketHandler):
             self.server.receive(self._client, message)
 
     def on_close(self) -> None:
+        self.server.open_sockets.discard(self)
         if self._client is not None:
             self.server.clients.leave(self._client)
 

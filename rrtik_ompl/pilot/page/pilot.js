@@ -4,9 +4,10 @@
 const STEPS = [0.2, 1, 2, 5, 10, 20];  // degrees, or 5 mm for one
 const PRESETS = ["corner", "side", "top", "behind"];
 const COLOR_WORDS = { green: "reach", amber: "blocked", red: "no reach" };
-const MM_PER_DEGREE = 2, NEAR_LIMIT = 0.04;
+const MM_PER_DEGREE = 2, NEAR_LIMIT = 0.04, HOLD_MS = 3000;
+const WORRYING = /refused|no route|must|cannot|not where|off the route|blocked|lost|takes|first|there is no|narrow|left;/;
 let state = null, role = { role: "watching", free: false, pages: 1 }, step = 3, preset = 0, receivedAt = 0, playing = null;
-let previousAlert = "";
+let previousAlert = "", heldUntil = 0;
 
 const byId = (id) => document.getElementById(id);
 const set = (element, text) => { if (element.textContent !== text) element.textContent = text; };
@@ -93,16 +94,18 @@ function onDisconnected() {
 
 function showState(said) {
   const newRoute = Boolean(said.route) && said.mode === "proposed" && (!state || state.mode !== "proposed");
+  const newMessage = !state || state.message !== said.message;
   state = said;
   receivedAt = performance.now();
   for (const item of byId("modes").children)
     item.dataset.mode === said.mode ? item.setAttribute("aria-current", "step") : item.removeAttribute("aria-current");
-  say(said.message, /refused|no route|must|cannot|not where|off the route|blocked|lost|takes|first|there is no/.test(said.message));
+  if (newMessage || performance.now() > heldUntil) say(said.message, WORRYING.test(said.message), 0);
   showJoints(); showTarget(); showLamps(); showRoute(); showAim(); showButtons(); showPreview(); showAge();
   if (newRoute && role.role === "pilot" && !said.replay && !playing) togglePlay();
 }
 
-function say(text, bad = false) {
+function say(text, bad = false, hold = HOLD_MS) {
+  heldUntil = performance.now() + hold;
   set(byId("message"), text);
   byId("message").className = bad ? "bad" : "";
 }
