@@ -163,7 +163,7 @@ def test_a_record_is_played_again_to_the_same_end(tmp_path):
     ("line", "word"),
     [
         ({"kind": "joints", "q": [1, 2]}, "joints"),
-        ({"kind": "seen", "objects": [{"name": "ship", "xyz": [0, 0, 0], "quat_xyzw": [0, 0, 0, 1]}]}, "ship"),
+        ({"kind": "seen", "objects": [{"name": "ship", "xyz": [0, 0, 0], "rotation": np.eye(3).tolist()}]}, "ship"),
         ({"kind": "command", "name": "plan"}, "arguments"),
         ({"kind": "begin", "problem": "env_e", "q": [0] * 6}, "env_e"),
     ],

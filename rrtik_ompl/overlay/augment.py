@@ -52,7 +52,8 @@ class Augmenter:
         self._arm = figure_of(robot_surfaces(robot, triangles))
         self._ghost = figure_of(robot_surfaces(robot, min(triangles, GHOST_TRIANGLES)))
         self._figures: dict[tuple[Any, ...], tuple[tuple[Obstacle, ...], Figure]] = {}
-        self._hiding: tuple[Any, Any, Any] = (None, None, None)
+        self._hidden_for: tuple[Any, Any] = (None, None)
+        self._hidden_by: NDArray[np.float32] | None = None
 
     def draw(
         self,
@@ -131,16 +132,16 @@ class Augmenter:
         return np.asarray(self.robot.joint_frames(self.robot.configuration(q)[None])[0])
 
     def _depths(self, real: Sequence[Obstacle], T_camera_base: NDArray[np.float64]) -> NDArray[np.float32] | None:
+        """Depths of solids that hide what is behind them; kept while neither they nor the camera move."""
         if not real:
             return None
         figure = self._figure(real)
-        before, pose, depths = self._hiding
+        before, pose = self._hidden_for
         if figure is not before or not np.array_equal(pose, T_camera_base):
             self._canvas.clear()
             self._canvas.draw(placed(figure, T_camera_base[None]))
-            depths = self._canvas.depths.copy()
-            self._hiding = (figure, T_camera_base, depths)
-        return depths
+            self._hidden_for, self._hidden_by = (figure, T_camera_base), self._canvas.depths.copy()
+        return self._hidden_by
 
     def _figure(self, obstacles: Sequence[Obstacle]) -> Figure:
         """Triangles of obstacles, kept from picture to picture while they are where they were."""

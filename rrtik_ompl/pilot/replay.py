@@ -6,14 +6,14 @@ import os
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.arrays import Vector, finite_array
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.pilot.record import read_record
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.simulation import SimulatedCamera
-from rrtik_ompl.poses import pose
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.sensing.marker_map import MarkerMap
 from rrtik_ompl.sensing.scene_from_view import SeenObject
@@ -119,4 +119,7 @@ def _check(entry: Entry, robot: Robot, marker_map: MarkerMap) -> None:
 
 def _seen(marker_map: MarkerMap, entry: Entry) -> SeenObject:
     thing = marker_map.named(entry["name"])
-    return SeenObject(thing, pose(entry["xyz"], entry["quat_xyzw"]), np.zeros((3, 3)), None)
+    xyz, turn = finite_array(entry["xyz"], (3,), "xyz"), finite_array(entry["rotation"], (3, 3), "rotation")
+    if not np.allclose(turn @ turn.T, np.eye(3), atol=1e-6):
+        raise InputError(f"rotation of {thing.name} is none")
+    return SeenObject(thing, pin.SE3(turn, xyz), np.zeros((3, 3)), None)

@@ -15,7 +15,7 @@ from rrtik_ompl.errors import ProblemError
 from rrtik_ompl.ik.batch import solve_ik_batch
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.pilot.clearance import executions, free_rows, tightest
-from rrtik_ompl.pilot.follower import SLIDING_TOLERANCE, TOLERANCE
+from rrtik_ompl.pilot.follower import slack
 from rrtik_ompl.planning import plan
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.shortening import shorten
@@ -23,7 +23,7 @@ from rrtik_ompl.world import World
 
 SECONDS = 2.0
 LOOKS = 100  # along a route, for its clearance
-ATTEMPTS = 2  # of which the route with fewer moves is taken
+ATTEMPTS = 2  # of which the route is taken that forgives most errors, then the one of fewest moves
 STEADY = 0.99
 EXECUTIONS = 100  # with errors, of which the share that touches nothing is told
 
@@ -104,12 +104,15 @@ def _moves(world: World, q: Vector, goal: Vector, seed: int) -> JointPath | str:
     if np.abs(goal - q).max() < 1e-9:
         return JointPath.of(world.robot, np.vstack([q, q]))
     problem, paths = Problem(world, q, goal), []
+    rng = np.random.default_rng(seed)
     for attempt in range(ATTEMPTS):
         found = plan(problem, "bicrdt", seconds=SECONDS, seed=seed + attempt)
         if found.path is None:
             return found.reason
-        paths.append(shorten(found.path, problem, method="axis-rounds", seed=seed))
-    return min(paths, key=lambda path: (path.transitions, path.length))
+        path = shorten(found.path, problem, method="axis-rounds", seed=seed)
+        touching = 1.0 - float(free_rows(world, executions(path, slack(path), EXECUTIONS, rng)).mean())
+        paths.append((round(10.0 * touching), path.transitions, path.length, attempt, path))
+    return min(paths)[-1]
 
 
 def _route(world: World, holding: World, path: JointPath, grasp_from: int, rates: Vector, seed: int) -> Route:
@@ -125,7 +128,6 @@ def _route(world: World, holding: World, path: JointPath, grasp_from: int, rates
 
 
 def _steady(world: World, holding: World, path: JointPath, grasp_from: int, seed: int) -> float:
-    slack = np.where(path.prismatic, SLIDING_TOLERANCE, TOLERANCE)
-    made = executions(path, slack, EXECUTIONS, np.random.default_rng(seed))
+    made = executions(path, slack(path), EXECUTIONS, np.random.default_rng(seed))
     free = free_rows(world, made[:, : grasp_from + 1]) & free_rows(holding, made[:, grasp_from:])
     return float(free.mean())

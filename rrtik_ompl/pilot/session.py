@@ -22,7 +22,6 @@ from rrtik_ompl.pilot.manoeuvre import Verdict, free_range, free_until, judge_mo
 from rrtik_ompl.pilot.record import Record
 from rrtik_ompl.pilot.route import Route, route_to, route_to_grasp
 from rrtik_ompl.pilot.surroundings import Surroundings
-from rrtik_ompl.poses import quaternion_xyzw
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 
@@ -292,4 +291,5 @@ class Session:
 
 def _placed(each: SeenObject) -> dict[str, Any]:
     pose = each.T_base_object
-    return {"name": each.object.name, "xyz": pose.translation.tolist(), "quat_xyzw": quaternion_xyzw(pose).tolist()}
+    # The matrix and not a quaternion: a replay has to find the same routes, to the last bit.
+    return {"name": each.object.name, "xyz": pose.translation.tolist(), "rotation": pose.rotation.tolist()}
