@@ -217,10 +217,10 @@ def simulated_pilot(report: Report, count: int) -> None:
                tool_hits <= 0.1 * naive_hits)  # fmt: skip
     report.note(
         "Simulated pilot",
-        f"From the bay to the button. Reaction {REACTION} s a move, overshoot N(0, 1 deg) at its end, usual rates. With "
-        "the tool the pilot makes the next move of the list, corrects it while it is short of its end, and plans anew "
-        f"where the tool says that the arm is off the route or the rest of it blocked: {plans:.1f} times on the mean, "
-        f"{REPLANNING:g} s each. The bare list, never checked on the way, takes {list_time:.0f} s, and "
+        f"From the bay to the button. Reaction {REACTION} s a move, overshoot N(0, 1 deg) at its end, usual rates. "
+        "With the tool the pilot makes the next move of the list, corrects it while it is short of its end, and plans "
+        f"anew where the tool says that the arm is off the route or the rest of it blocked: {plans:.1f} times "
+        f"on the mean, {REPLANNING:g} s each. The bare list, never checked on the way, takes {list_time:.0f} s, and "
         f"{100 * list_hits:.0f} % of its executions touch something.",
     )
 

@@ -29,7 +29,7 @@ class Loop:
         self._answered: dict[int, int] = {}
         self._begin = clock.monotonic()
         self._paused_at: float | None = None
-        self._audience = 0
+        self._audience, self._outside_too = 0, False
 
     @property
     def time(self) -> float:
@@ -54,6 +54,9 @@ class Loop:
             return
         server.show_frame(CAMERA, self.time, engine.camera_picture())
         self._obey_all()
+        self._outside_too = not self._outside_too
+        if not self._outside_too and self._audience == audience:
+            return  # every second time is enough for what nobody steers by
         outside = engine.outside_picture(anew=self._audience != audience)
         if outside is not None:
             server.show_frame(OUTSIDE, self.time, outside)
@@ -70,7 +73,7 @@ class Loop:
     def _obey_one(self, patience: float) -> None:
         """Obey the next command and show at once what became of it, or wait for one so long [s]."""
         try:
-            client, command = self._server.commands.get(timeout=patience) if patience else self._next_command()
+            client, command = self._server.commands.get(block=patience > 0.0, timeout=patience or None)
         except queue.Empty:
             return
         sequence = command.pop("seq", None)
@@ -78,9 +81,6 @@ class Loop:
         if isinstance(sequence, int) and not isinstance(sequence, bool):
             self._answered[client] = sequence
         self._show_state()
-
-    def _next_command(self) -> tuple[int, dict[str, Any]]:
-        return self._server.commands.get_nowait()
 
     def _obey(self, command: dict[str, Any]) -> None:
         name = command.get("name")

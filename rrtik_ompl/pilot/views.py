@@ -24,7 +24,7 @@ LAMP_COLORS = {GREEN: "#1b9e3a", AMBER: "#e6a100", RED: "#c62828"}
 NEXT_MOVE = "#56b4e9"
 LOOKS = 60  # points of a trail
 OUTSIDE_TRIANGLES = 8_000
-PRESETS = {"side": (-90.0, 10.0), "top": (-90.0, 89.0), "behind": (180.0, 25.0), "corner": (-50.0, 25.0)}  # degrees
+PRESETS = {"side": (90.0, 10.0), "top": (-90.0, 89.0), "behind": (180.0, 25.0), "corner": (125.0, 30.0)}  # degrees
 
 
 class CameraView:
