@@ -21,6 +21,9 @@ from rrtik_ompl.sensing.pictures import CameraLostError, Picture
 FOLDER = find_problem("titan4_sdu").parent / "pilot"
 
 
+CAMERA, MAP = (str(FOLDER / name) for name in ("camera_640.yaml", "titan4_panel_markers.yaml"))
+
+
 def grey(number=0):
     return Picture(np.full((480, 640, 3), 128, dtype=np.uint8), str(number), float(number))
 
@@ -187,6 +190,7 @@ def test_a_record_that_does_not_fit_is_refused_before_anything_is_shown(tmp_path
         (["--replay", "missing.jsonl"], "missing.jsonl"),
         (["--simulated", "--replay", "x", "--record", "y"], "--record"),
         (["--video", "missing.mp4"], "--camera-file"),
+        (["--camera", "99", "--camera-file", CAMERA, "--map", MAP], "camera 99 cannot be opened"),
         (["--simulated", "--record", "/nowhere/r.jsonl"], "cannot be written"),
         (["--scenario", "missing.yaml"], "missing.yaml"),
     ],
