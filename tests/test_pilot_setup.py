@@ -9,11 +9,14 @@ import cv2
 import numpy as np
 import pytest
 
+from rrtik_ompl import load_problem
 from rrtik_ompl.catalog import find_problem
 from rrtik_ompl.cli import run
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.pilot.arm import SimulatedArm
 from rrtik_ompl.pilot.feed import Feed
 from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED
+from rrtik_ompl.pilot.line_arm import LineServer
 from rrtik_ompl.pilot.scenario import find_scenario, load_scenario
 from rrtik_ompl.pilot.setup import Wanted, open_session
 from rrtik_ompl.sensing.pictures import CameraLostError, Picture
@@ -212,3 +215,20 @@ def test_a_problem_without_a_scenario_is_named(tmp_path, capsys):
     file.write_text(text)
     with pytest.raises(InputError, match=r"s\.yaml:\d+.*ship"):
         load_scenario(file)
+
+
+def test_an_arm_whose_line_is_cut_is_said_on_the_page_and_its_joints_stay():
+    problem = load_problem("titan4_sdu")
+    with LineServer(SimulatedArm(problem.robot, problem.start)) as server:
+        opened = open_session(Wanted("titan4_sdu", arm=f"127.0.0.1:{server.port}"))
+        engine = opened.engine
+        engine.look(0.0)
+        before = engine.state()
+        assert before["arm_lost"] == ""
+    until(lambda: engine.session.arm.lost)
+    engine.look(1.0)
+    state = engine.state()
+    assert "connection to the arm is lost" in state["arm_lost"]
+    assert [joint["value"] for joint in state["joints"]] == [joint["value"] for joint in before["joints"]]
+    assert not state["stale"]
+    opened.close()
