@@ -96,6 +96,11 @@ def find_suite(name: str) -> Path:
     return files[name]
 
 
+def problem_folders() -> tuple[Path, ...]:
+    """Folders of the problems that packages ship."""
+    return _folders("problem", "problems")
+
+
 def load_robot(name: str | os.PathLike[str], **options: Any) -> Robot:
     """Load a robot by name or from a file; the same call gives the same object, unless a file of it has changed.
 
@@ -213,8 +218,11 @@ def _problem_files() -> dict[str, Path]:
 
 def _shipped(what: str, group: str) -> dict[str, Path]:
     """YAML files by name in the folders that packages offer."""
-    folders = [Path(_load(f"{what} folder", group, name)) for name in _offers(group)]
-    return {file.stem: file for folder in folders for file in sorted(folder.glob("*.yaml"))}
+    return {file.stem: file for folder in _folders(what, group) for file in sorted(folder.glob("*.yaml"))}
+
+
+def _folders(what: str, group: str) -> tuple[Path, ...]:
+    return tuple(Path(_load(f"{what} folder", group, name)) for name in _offers(group))
 
 
 def _beside(path: str, folder: str | os.PathLike[str]) -> Path:

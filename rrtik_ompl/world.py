@@ -170,9 +170,12 @@ class World:
             found = [_inside(*names) for names in self._certificate.first_pairs(rows) if names is not None]
         return tuple(sorted(found, key=lambda c: c.distance))
 
-    def closest(self, q: ArrayLike) -> Contact | None:
-        """The pair of bodies that is nearest to contact at q (or deepest in it); None if nothing can collide."""
-        touching = self.contacts(q)
+    def closest(self, q: ArrayLike, *, known_free: bool = False) -> Contact | None:
+        """The pair of bodies that is nearest to contact at q (or deepest in it); None if nothing can collide.
+
+        ``known_free`` leaves out the look for contacts, where they were ruled out before.
+        """
+        touching = () if known_free else self.contacts(q)
         if touching:
             return touching[0]
         return min(self._distances(self._rows(q, 1), near_only=False), key=lambda c: c.distance, default=None)

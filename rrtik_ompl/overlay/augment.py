@@ -24,6 +24,7 @@ from rrtik_ompl.sensing.camera import Camera
 from rrtik_ompl.viewer import palette
 
 GHOST_TRIANGLES = 5_000
+FIGURES_KEPT = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,6 +51,9 @@ class Augmenter:
         self._canvas = Canvas(camera)
         self._arm = figure_of(robot_surfaces(robot, triangles))
         self._ghost = figure_of(robot_surfaces(robot, min(triangles, GHOST_TRIANGLES)))
+        self._figures: dict[tuple[Any, ...], tuple[tuple[Obstacle, ...], Figure]] = {}
+        self._hidden_for: tuple[Any, Any] = (None, None)
+        self._hidden_by: NDArray[np.float32] | None = None
 
     def draw(
         self,
@@ -90,7 +94,7 @@ class Augmenter:
         hidden_by = self._depths(real, T_camera_base)
         for ghost in ghosts:
             self._draw_arm(drawn, self._ghost, ghost.q, T_camera_base, hidden_by, ghost.opacity, ghost.color)
-        solids = figure_of(obstacle_surfaces(obstacles))
+        solids = self._figure(obstacles)
         self._draw_arm(drawn, self._arm, q, T_camera_base, hidden_by, opacity, color, solids)
         if trail is not None:
             self._draw_line(drawn, trail, T_camera_base, palette.TRAIL)
@@ -128,11 +132,26 @@ class Augmenter:
         return np.asarray(self.robot.joint_frames(self.robot.configuration(q)[None])[0])
 
     def _depths(self, real: Sequence[Obstacle], T_camera_base: NDArray[np.float64]) -> NDArray[np.float32] | None:
+        """Depths of solids that hide what is behind them; kept while neither they nor the camera move."""
         if not real:
             return None
-        self._canvas.clear()
-        self._canvas.draw(placed(figure_of(obstacle_surfaces(real)), T_camera_base[None]))
-        return self._canvas.depths.copy()
+        figure = self._figure(real)
+        before, pose = self._hidden_for
+        if figure is not before or not np.array_equal(pose, T_camera_base):
+            self._canvas.clear()
+            self._canvas.draw(placed(figure, T_camera_base[None]))
+            self._hidden_for, self._hidden_by = (figure, T_camera_base), self._canvas.depths.copy()
+        return self._hidden_by
+
+    def _figure(self, obstacles: Sequence[Obstacle]) -> Figure:
+        """Triangles of obstacles, kept from picture to picture while they are where they were."""
+        key = tuple((id(each.shape), each.pose.homogeneous.tobytes()) for each in obstacles)
+        if key not in self._figures:
+            if len(self._figures) >= FIGURES_KEPT:
+                self._figures.pop(next(iter(self._figures)))
+            kept = tuple(obstacles)  # so that no other shape gets the identity of one that is gone
+            self._figures[key] = (kept, figure_of(obstacle_surfaces(kept)))
+        return self._figures[key][1]
 
     def _pixels(self, points: Matrix, T_camera_base: NDArray[np.float64]) -> tuple[NDArray[np.int64], Any]:
         """Sixteenths of pixels of points in the base's frame, and which of them are before the camera."""

@@ -21,7 +21,7 @@ class Canvas:
     """A picture in the making, as a camera would take it.
 
     Attributes:
-        colors: Red, green, blue from 0 to 1. Shape (height, width, 3).
+        colors: Red, green, blue from 0 to 1, of something else where nothing was drawn. Shape (height, width, 3).
         depths: Along the optical axis [m]; `FAR` where nothing was drawn. Shape (height, width).
     """
 
@@ -34,7 +34,6 @@ class Canvas:
 
     def clear(self) -> None:
         """Empty it again."""
-        self.colors.fill(0.0)
         self.depths.fill(FAR)
 
     @property

@@ -16,7 +16,13 @@ SLIDING_RATE = 0.02  # [m/s]
 
 
 class Arm(Protocol):
-    """What the tool needs to know of an arm."""
+    """What the tool needs to know of an arm.
+
+    Attributes:
+        lost: Why nothing is known of it any more; "" if all is well.
+    """
+
+    lost: str
 
     def read(self) -> Vector:
         """Where the joints are. Shape (dof,), rad or m."""
@@ -53,6 +59,7 @@ class SimulatedArm:
             InputError: If the configuration does not fit the robot.
         """
         self.robot = robot
+        self.lost = ""
         self._q = robot.configuration(start, "start")
         self._rates = joint_rates(robot, rates)
         self._goal: tuple[int, float] | None = None

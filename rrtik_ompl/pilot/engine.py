@@ -1,126 +1,108 @@
-"""The loop behind the page: a picture comes, the session learns from it, two pictures and a state go out."""
+"""The loop behind the page: a picture comes, the session learns from it, two pictures and a state go out.
+
+A step is cut in stages, so that a command never waits for more than one of them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.errors import InputError, RrtikError
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.pilot.arguments import LONGEST, number
 from rrtik_ompl.pilot.arm import SimulatedArm
+from rrtik_ompl.pilot.eyes import Eyes
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.state import state_document
-from rrtik_ompl.pilot.views import CameraView, OutsideView
-from rrtik_ompl.sensing.frames import base_from_camera
-from rrtik_ompl.sensing.pictures import Picture
-from rrtik_ompl.sensing.sensor import Sensor
+from rrtik_ompl.pilot.views import PRESETS, CameraView, OutsideView
 
 JPEG_QUALITY = 80
-VIEW_COMMANDS = ("turn", "zoom", "preset", "play")  # they concern the picture from outside, not the session
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Output:
-    """What goes to the page: two JPEG pictures and the state."""
-
-    camera: bytes
-    outside: bytes
-    state: dict[str, Any]
+VIEW_COMMANDS = {"turn": ("right", "up"), "zoom": ("factor",), "preset": ("view",), "play": ("share",)}
 
 
 class Engine:
-    """Ties camera, session and pictures together; one step a picture."""
+    """Ties session, eyes and pictures together. For one thread."""
 
-    def __init__(
-        self,
-        session: Session,
-        sensor: Sensor,
-        pictures: Iterator[Picture],
-        *,
-        simulated: SimulatedArm | None = None,
-        arm_in_picture: bool = False,
-    ) -> None:
+    def __init__(self, session: Session, eyes: Eyes, *, simulated: SimulatedArm | None = None) -> None:
         """Take the parts.
 
         Args:
             session: Who decides.
-            sensor: Who looks.
-            pictures: Where pictures come from.
+            eyes: Who looks.
             simulated: An arm that has to be told that time passes.
-            arm_in_picture: The arm itself is to be seen.
         """
-        self.session, self.sensor, self._pictures = session, sensor, pictures
-        self._simulated, self._arm_in_picture = simulated, arm_in_picture
-        self._camera_view = CameraView(sensor.camera, session)
+        self.session, self.eyes, self._simulated = session, eyes, simulated
+        self._camera_view = CameraView(eyes.camera, session)
         self.outside = OutsideView(session)
-        self._picture: NDArray[np.uint8] = np.zeros((sensor.camera.height, sensor.camera.width, 3), dtype=np.uint8)
-        self._T_base_camera: Any | None = sensor.marker_map.T_base_camera
-        self.camera_lost = ""
+        self._advanced = 0.0
+        self._drawn: tuple[Any, ...] = ()
 
-    def step(self, time: float, commands: list[dict[str, Any]]) -> Output:
-        """Do what the pilot wants, look once, and draw.
+    def obey(self, command: dict[str, Any], time: float) -> None:
+        """Do what the pilot wants.
 
         Args:
+            command: A ``name`` and its arguments; those of `VIEW_COMMANDS` concern the outside view alone.
             time: Now [s].
-            commands: Each has a ``name`` and arguments.
         """
-        for command in commands:
-            self._command(dict(command), time)
-        if self._simulated is not None:
-            self._simulated.advance(max(time - self.session.time, 0.0))
-        self._look(time)
-        self.session.tick(time)
-        return self.output()
-
-    def output(self) -> Output:
-        """Both pictures and the state as they are now."""
-        shown = self._picture
-        if self._T_base_camera is not None:
-            shown = self._camera_view.draw(self._picture, self._T_base_camera, self._arm_in_picture)
-        state = state_document(self.session) | {"camera_lost": self.camera_lost}
-        return Output(_jpeg(shown), _jpeg(self.outside.draw()), state)
-
-    def _look(self, time: float) -> None:
-        if self.camera_lost:
-            return
-        try:
-            picture = next(self._pictures, None)
-            if picture is None:
-                self.camera_lost = "no more pictures"
-                return
-            view = self.sensor.view(Picture(picture.pixels, picture.name, time))
-        except RrtikError as error:
-            self.camera_lost = str(error)
-            return
-        self._picture = picture.pixels
-        self.session.see(view.placed, time)
-        if not view.why_not_placed:
-            self._T_base_camera, _ = base_from_camera(self.sensor.marker_map, view.seen)
-
-    def _command(self, command: dict[str, Any], time: float) -> None:
-        name = command.pop("name", "")
+        self._advance(time)
+        arguments = dict(command)
+        name = str(arguments.pop("name", ""))
         if name not in VIEW_COMMANDS:
-            self.session.command(str(name), time, **command)
+            self.session.command(name, time, **arguments)
             return
         try:
-            self._view_command(name, command)
-        except (InputError, KeyError, TypeError, ValueError):
-            self.session.message = f"{name}: wrong arguments {sorted(command)}"
+            self._look_from_elsewhere(name, arguments)
+        except InputError as error:
+            self.session.message = str(error)
 
-    def _view_command(self, name: str, command: dict[str, Any]) -> None:
+    def look(self, time: float) -> None:
+        """Let time pass and look once."""
+        self._advance(time)
+        self.eyes.look(self.session, time)
+
+    def state(self) -> dict[str, Any]:
+        """What there is to be shown beside the pictures."""
+        shown = {"camera_lost": self.eyes.lost, "playing": self.outside.share}
+        return state_document(self.session) | shown
+
+    def camera_picture(self) -> bytes:
+        """What the camera sees, with what is known drawn over it; JPEG."""
+        if self.eyes.T_base_camera is None:
+            return _jpeg(self.eyes.picture)
+        return _jpeg(self._camera_view.draw(self.eyes.picture, self.eyes.T_base_camera, self.eyes.arm_in_picture))
+
+    def outside_picture(self, anew: bool = False) -> bytes | None:
+        """The view from outside, JPEG; None if it would be the same as last time, unless wanted ``anew``."""
+        key = self.outside.key()
+        if key == self._drawn and not anew:
+            return None
+        self._drawn = key
+        return _jpeg(self.outside.draw())
+
+    def _advance(self, time: float) -> None:
+        if self._simulated is not None:
+            self._simulated.advance(max(time - self._advanced, 0.0))
+        self._advanced = max(time, self._advanced)
+        self.session.tick(time)
+
+    def _look_from_elsewhere(self, name: str, given: dict[str, Any]) -> None:
+        wanted = VIEW_COMMANDS[name]
+        if set(given) != set(wanted):
+            raise InputError(f"{name} takes {', '.join(wanted)}")
         if name == "turn":
-            self.outside.turn(float(command["right"]), float(command["up"]))
+            self.outside.turn(number(given["right"], "right"), number(given["up"], "up"))
         elif name == "zoom":
-            self.outside.zoom(float(command["factor"]))
+            self.outside.zoom(number(given["factor"], "factor"))
         elif name == "preset":
-            self.outside.preset(str(command["view"]))
+            view = str(given["view"])[:LONGEST]
+            if view not in PRESETS:
+                raise UnknownNameError("view", view, PRESETS)
+            self.outside.preset(view)
         else:
-            share = command["share"]
-            self.outside.share = None if share is None else float(share)
+            self.outside.share = None if given["share"] is None else number(given["share"], "share")
 
 
 def _jpeg(picture: NDArray[np.uint8]) -> bytes:

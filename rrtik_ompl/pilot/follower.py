@@ -54,7 +54,7 @@ class Follower:
         self.path, self.moves = path, path.moves()
         self._corners = _corners(path, self.moves)
         self._rates = rates
-        self._slack: Vector = np.where(path.prismatic, SLIDING_TOLERANCE, tolerance)
+        self._slack = slack(path, tolerance)
         self._names = list(path.joint_names)
         self.current = 0
 
@@ -112,6 +112,11 @@ class Follower:
         factor, unit = (1.0, "m") if self.path.prismatic[joint] else (float(np.rad2deg(1.0)), "deg")
         fault = f"{self._names[joint]} is at {factor * value:.2f} {unit} instead of {factor * planned:.2f}"
         return Progress(self.current, 0.0, 0.0, "lost", fault)
+
+
+def slack(path: JointPath, tolerance: float = TOLERANCE) -> Vector:
+    """How far beside its place each joint may be [rad or m]. Shape (dof,)."""
+    return np.where(path.prismatic, SLIDING_TOLERANCE, tolerance)
 
 
 def still_free(world: World, path: JointPath) -> str:

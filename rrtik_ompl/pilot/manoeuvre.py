@@ -12,11 +12,12 @@ import numpy as np
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.ik.singularity import singularity_report
+from rrtik_ompl.pilot.clearance import tightest
 from rrtik_ompl.world import World
 
 NEAR_SINGULAR = 0.05  # sines of the angles that vanish in a singular posture, metres of a lever
 LITTLE_ROOM = 0.02  # [m]
-LOOKS = 5  # along the move, for the clearance
+LOOKS = 20  # along the move, for the clearance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,8 +64,7 @@ def judge_move(world: World, q: Vector, joint: int, target: float) -> Verdict:
         return Verdict(False, _obstruction(world, start, end, joint), (), -np.inf)
     share = np.linspace(0.0, 1.0, LOOKS)[:, None]
     looks = start + share * (end - start)
-    rooms = [world.closest(row) for row in looks]
-    tight = min((c for c in rooms if c is not None), key=lambda c: c.distance, default=None)
+    tight = tightest(world, looks)
     room = np.inf if tight is None else tight.distance
     warnings = [*_singular(world, end)]
     if tight is not None and room < LITTLE_ROOM:
@@ -90,6 +90,18 @@ def free_until(world: World, q: Vector, joint: int, target: float) -> float:
         else:
             high = middle
     return float(start[joint] + low * (end[joint] - start[joint]))
+
+
+def free_range(world: World, q: Vector, joint: int) -> tuple[float, float]:
+    """From where to where a joint can be driven without touching anything [rad or m]; a full turn if it is endless."""
+    robot = world.robot
+    here = float(q[joint])
+    if not world.valid(q):
+        return here, here
+    ends = [end if np.isfinite(end) else here + turn for end, turn in
+            ((robot.lower[joint], -2.0 * np.pi), (robot.upper[joint], 2.0 * np.pi))]  # fmt: skip
+    low, high = (free_until(world, q, joint, float(end)) for end in ends)
+    return low, high
 
 
 def _obstruction(world: World, start: Vector, end: Vector, joint: int) -> str:

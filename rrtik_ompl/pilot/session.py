@@ -6,7 +6,6 @@ what must not be; assisted teleoperation chooses a grasp, plans a route, and lea
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -15,19 +14,18 @@ import numpy as np
 from rrtik_ompl.arrays import Vector, frozen
 from rrtik_ompl.errors import InputError, RrtikError, UnknownNameError
 from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.pilot.arguments import LONGEST, fitting
 from rrtik_ompl.pilot.arm import Arm, joint_rates
 from rrtik_ompl.pilot.follower import Follower, Progress, still_free
 from rrtik_ompl.pilot.lamps import Lamp, lamps, stage_poses
-from rrtik_ompl.pilot.manoeuvre import Verdict, free_until, judge_move
+from rrtik_ompl.pilot.manoeuvre import Verdict, free_range, free_until, judge_move
 from rrtik_ompl.pilot.record import Record
 from rrtik_ompl.pilot.route import Route, route_to, route_to_grasp
 from rrtik_ompl.pilot.surroundings import Surroundings
-from rrtik_ompl.poses import quaternion_xyzw
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 
 MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING = "manoeuvre", "choosing", "proposed", "following"
-NUMBERS = ("joint", "target", "change", "level")  # arguments of commands; all others are words
 STALE = 0.5  # [s]; a picture older than that is not what is there now
 
 
@@ -63,10 +61,12 @@ class Session:
         self.picture_time = -np.inf
         self._record = record or Record(None)
         self._lamps: tuple[tuple[Any, ...], tuple[Lamp, ...]] = ((), ())
+        self._room: tuple[tuple[Any, ...], tuple[float, float]] = ((), (0.0, 0.0))
         self._commands: dict[str, Callable[..., str]] = {
             "select": self._select, "move": self._move, "nudge": self._nudge, "stop": self._stop,
             "object": self._object, "grasp": self._grasp, "plan": self._plan, "accept": self._accept,
             "reject": self._reject, "next": self._next, "back": self._back, "replan": self._replan,
+            "halt": self._halt,
         }  # fmt: skip
 
     # --- what comes in -------------------------------------------------------------------------------------------
@@ -85,6 +85,8 @@ class Session:
         """Read the arm and see how far it is on its way."""
         self.time = max(self.time, time)
         q = frozen(self.arm.read())
+        if self.arm.lost and self.arm.lost != self.message:
+            self.message = self.arm.lost
         if not np.array_equal(q, self.q):
             self._record.write("joints", time, q=q.tolist())
         self.q = q
@@ -97,18 +99,19 @@ class Session:
         elif self.progress.advice == "done":
             self.mode, self.message = MANOEUVRE, "all moves are done"
 
-    def command(self, verb: str, time: float, **arguments: Any) -> str:
+    def command(self, verb: str, time: float, /, **arguments: Any) -> str:
         """Do what the pilot wants; the answer is a line for a person, and `message` from then on.
 
         A command that makes no sense here says so and changes nothing.
         """
         self.time = max(self.time, time)
-        self._record.write("command", time, name=verb, arguments=arguments)
         try:
             if verb not in self._commands:
-                raise UnknownNameError("command", verb, self._commands)
+                raise UnknownNameError("command", verb[:LONGEST], self._commands)
             act = self._commands[verb]
-            self.message = act(**_fitting(act, verb, arguments))
+            given = fitting(act, verb, arguments)
+            self._record.write("command", time, name=verb, arguments=given)
+            self.message = act(**given)
         except RrtikError as error:
             self.message = str(error)
         self._record.write("answer", time, text=self.message, mode=self.mode)
@@ -131,6 +134,15 @@ class Session:
     def lamp(self) -> Lamp | None:
         """The lamp of the grasp that is chosen."""
         return next((lamp for lamp in self.lamps() if (lamp.type, lamp.level) == self.choice), None)
+
+    def room(self) -> tuple[float, float]:
+        """From where to where the selected joint can be driven now [rad or m]; the same while it alone moves."""
+        others = np.delete(self.q, self.selected).tobytes()
+        key = (self.selected, others, self.surroundings.version)
+        low, high = self._room[1]
+        if key != self._room[0] or not low <= self.q[self.selected] <= high:
+            self._room = (key, free_range(self.surroundings.world, self.q, self.selected))
+        return self._room[1]
 
     # --- commands ------------------------------------------------------------------------------------------------
 
@@ -168,6 +180,11 @@ class Session:
             return "stopped; 'accept' goes on with the route, 'reject' leaves it"
         return "stopped"
 
+    def _halt(self) -> str:
+        """Nobody is at the keys any more."""
+        self.arm.stop()
+        return "the pilot has left; the arm stands still"
+
     def _object(self, name: str) -> str:
         seen = self.surroundings.named(name)
         if seen is None:
@@ -199,10 +216,7 @@ class Session:
         self.route, self.mode = found, PROPOSED
         self.follower, self.progress = Follower(found.path, self.rates), None
         self.desired = frozen(found.path.end)
-        moves = len(found.path.moves())
-        return (
-            f"{moves} moves, {found.seconds:.0f} s, at least {1e3 * found.clearance:.0f} mm away; 'accept' or 'reject'"
-        )
+        return found.summary() + "; 'accept' or 'reject'"
 
     def _route(self) -> Route | str:
         seen = None if self.target is None or self.choice is None else self.surroundings.named(self.target)
@@ -241,7 +255,7 @@ class Session:
         fault = self._fault_of_rest()
         if fault:
             raise InputError(f"the route is blocked now: {fault}; 'replan' looks for another")
-        self.desired = frozen(self.follower.target)
+        self.desired, self.selected = frozen(self.follower.target), joint
         self.arm.move(joint, float(self.desired[joint]))
         move = self.follower.moves[self.follower.current]
         return f"move {self.follower.current + 1} of {len(self.follower.moves)}: {move.joint}"
@@ -275,21 +289,7 @@ class Session:
         return still_free(world, self.follower.rest(self.q))
 
 
-def _fitting(command: Callable[..., str], name: str, arguments: dict[str, Any]) -> dict[str, Any]:
-    """The arguments, if they are those that a command takes."""
-    wanted = tuple(inspect.signature(command).parameters)
-    if set(arguments) != set(wanted):
-        raise InputError(f"{name} takes {', '.join(wanted) or 'no arguments'}, got {', '.join(arguments) or 'none'}")
-    for word, value in arguments.items():
-        if word in NUMBERS and (
-            isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value)
-        ):
-            raise InputError(f"{name}: {word} must be a finite number, got {value!r}")
-        if word not in NUMBERS and not isinstance(value, str):
-            raise InputError(f"{name}: {word} must be a word, got {value!r}")
-    return arguments
-
-
 def _placed(each: SeenObject) -> dict[str, Any]:
     pose = each.T_base_object
-    return {"name": each.object.name, "xyz": pose.translation.tolist(), "quat_xyzw": quaternion_xyzw(pose).tolist()}
+    # The matrix and not a quaternion: a replay has to find the same routes, to the last bit.
+    return {"name": each.object.name, "xyz": pose.translation.tolist(), "rotation": pose.rotation.tolist()}

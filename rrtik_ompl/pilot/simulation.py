@@ -26,6 +26,7 @@ FINE = 24  # pixels a cell of a marker's picture
 WATER = ((96, 84, 60), (60, 52, 40))  # blue, green, red above and below
 NOISE = 2.0  # grey levels
 RATE = 30.0  # pictures a second
+TRIANGLES = 8_000  # of the arm
 
 
 class SimulatedCamera:
@@ -54,7 +55,7 @@ class SimulatedCamera:
         """
         self.camera, self.marker_map, self.T_base_camera = camera, marker_map, T_base_camera
         self.places = dict(places)
-        self._scene, self._arm = scene, Augmenter(robot, camera)
+        self._scene, self._arm = scene, Augmenter(robot, camera, TRIANGLES)
         rng = np.random.default_rng(seed)
         self._noise = [rng.normal(0.0, NOISE, (camera.height, camera.width, 1)).astype(np.float32) for _ in range(4)]
         self._kept: Any = (None, None, None)

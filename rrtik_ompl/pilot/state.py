@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from rrtik_ompl.moves_text import reading, spoken_moves
 from rrtik_ompl.pilot.session import STALE, Session
@@ -27,7 +28,9 @@ def state_document(session: Session) -> dict[str, Any]:
             {"type": la.type, "level": la.level, "color": la.color, "reason": la.reason} for la in session.lamps()
         ],
         "route": _route(session),
-        "tip": _tip(session),
+        "room": _room(session),
+        "aim": _aim(session),
+        "arm_lost": session.arm.lost,
     }
 
 
@@ -51,8 +54,36 @@ def _object(session: Session, seen: Any) -> dict[str, Any]:
     return {
         "name": seen.object.name,
         "role": seen.object.role,
+        "graspable": bool(seen.object.grasps),
         "distance": round(float(np.linalg.norm(seen.T_base_object.translation - tip)), 4),
         "sigma_mm": round(1e3 * seen.margin / 3.0, 2),
+    }
+
+
+def _room(session: Session) -> list[float | None]:
+    """From where to where the selected joint can be driven."""
+    unit = "m" if session.robot.prismatic[session.selected] else "rad"
+    return [reading(end, unit)[0] for end in session.room()]
+
+
+def _aim(session: Session) -> dict[str, Any]:
+    """From the tip to the chosen grasp, or else to the chosen object: ahead along the tool, and in the world [m]."""
+    tip = session.robot.fk(session.q)
+    found: dict[str, Any] = {"tip": np.round(tip.translation, 4).tolist(), "to": ""}
+    seen = None if session.target is None else session.surroundings.named(session.target)
+    if seen is None:
+        return found
+    goal = seen.T_base_object if session.choice is None else seen.grasp_pose(*session.choice)
+    way = goal.translation - tip.translation
+    ahead = float(way @ tip.rotation[:, 2])
+    aside = float(np.linalg.norm(way - ahead * tip.rotation[:, 2]))
+    return found | {
+        "to": seen.object.name if session.choice is None else f"{session.choice[0]} {session.choice[1] + 1}",
+        "distance": round(float(np.linalg.norm(way)), 4),
+        "xyz": np.round(way, 4).tolist(),
+        "ahead": round(ahead, 4),
+        "aside": round(aside, 4),
+        "turn_deg": round(float(np.rad2deg(np.linalg.norm(pin.log3(tip.rotation.T @ goal.rotation)))), 1),
     }
 
 
@@ -61,11 +92,13 @@ def _route(session: Session) -> dict[str, Any] | None:
     if route is None or follower is None:
         return None
     words = spoken_moves(follower.path)
-    moves = []
+    ends = np.cumsum([abs(move.change) for move in follower.moves])
+    moves: list[dict[str, Any]] = []
     for number, (move, text) in enumerate(zip(follower.moves, words, strict=True)):
         (start, unit), (end, _) = reading(move.start, move.unit), reading(move.end, move.unit)
         status = "done" if number < follower.current else "current" if number == follower.current else "ahead"
-        moves.append({"joint": move.joint, "from": start, "to": end, "unit": unit, "text": text, "status": status})
+        moves.append({"joint": move.joint, "from": start, "to": end, "unit": unit, "text": text, "status": status,
+                      "at": float(ends[number] / ends[-1])})  # fmt: skip
     progress = session.progress
     return {
         "moves": moves,
@@ -74,12 +107,8 @@ def _route(session: Session) -> dict[str, Any] | None:
         "travel": round(reading(route.travel, "rad")[0], 1),
         "clearance_mm": None if not np.isfinite(route.clearance) else round(1e3 * route.clearance, 1),
         "joints": list(route.joints),
+        "steady": round(route.steady, 2),
         "share": 0.0 if progress is None else progress.share,
         "advice": "" if progress is None else progress.advice,
         "fault": "" if progress is None else progress.fault,
     }
-
-
-def _tip(session: Session) -> dict[str, Any]:
-    pose = session.robot.fk(session.q)
-    return {"xyz": np.round(pose.translation, 4).tolist()}

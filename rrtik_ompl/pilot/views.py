@@ -19,12 +19,12 @@ from rrtik_ompl.overlay.gods_eye import eye_at, imagined_camera, sky
 from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED
 from rrtik_ompl.pilot.session import FOLLOWING, PROPOSED, Session
 from rrtik_ompl.sensing.camera import Camera
-from rrtik_ompl.viewer import palette
 
 LAMP_COLORS = {GREEN: "#1b9e3a", AMBER: "#e6a100", RED: "#c62828"}
 NEXT_MOVE = "#56b4e9"
 LOOKS = 60  # points of a trail
-PRESETS = {"side": (-90.0, 10.0), "top": (-90.0, 89.0), "behind": (180.0, 25.0), "corner": (-50.0, 25.0)}  # degrees
+OUTSIDE_TRIANGLES = 8_000
+PRESETS = {"side": (90.0, 10.0), "top": (-90.0, 89.0), "behind": (180.0, 25.0), "corner": (125.0, 30.0)}  # degrees
 
 
 class CameraView:
@@ -48,7 +48,8 @@ class CameraView:
         real = [solid for seen in session.surroundings.seen for solid in seen.solids()]
         drawn = self._arm.draw(
             picture, T_base_camera, None if arm_in_picture else session.q,
-            ghosts=ghosts(session), real=real, trail=trail(session), frames=[session.robot.fk(session.q)],
+            ghosts=ghosts(session), real=real, trail=trail(session),
+            frames=[session.robot.fk(session.q), *_chosen(session)],
         )  # fmt: skip
         self._depth_aids(drawn, T_base_camera)
         return drawn
@@ -79,11 +80,11 @@ class OutsideView:
     def __init__(self, session: Session, width: int = 640, height: int = 480) -> None:
         """Look at the arm's base from a corner."""
         self._session, self._camera = session, imagined_camera(width, height)
-        self._arm = Augmenter(session.robot, self._camera)
+        self._arm = Augmenter(session.robot, self._camera, OUTSIDE_TRIANGLES)
         self._sky = sky(self._camera)
         reach = float(np.linalg.norm(session.robot.fk(session.q).translation))
-        self.centre: Vector = np.array([0.5 * reach, 0.0, 0.15 * reach])
-        self.distance, self.azimuth, self.elevation = 2.2 * max(reach, 0.3), *np.radians(PRESETS["corner"])
+        self.centre: Vector = np.array([0.6 * reach, 0.0, 0.0])
+        self.distance, self.azimuth, self.elevation = 1.9 * max(reach, 0.3), *np.radians(PRESETS["corner"])
         self.share: float | None = None  # of the route that is played, None to show the arm as it is
 
     def turn(self, right: float, up: float) -> None:
@@ -100,11 +101,19 @@ class OutsideView:
         if name in PRESETS:
             self.azimuth, self.elevation = np.radians(PRESETS[name])
 
+    def key(self) -> tuple[Any, ...]:
+        """Equal if the picture would be."""
+        session = self._session
+        shown = session.q.tobytes() if self.share is None else along(session, self.share).tobytes()
+        moves = None if session.follower is None else (id(session.follower), session.follower.current)
+        chosen = (session.mode, session.target, session.choice, session.surroundings.version)
+        return shown, moves, chosen, self.distance, self.azimuth, self.elevation
+
     def draw(self) -> NDArray[np.uint8]:
         """The picture. Shape (height, width, 3), blue, green, red."""
         session = self._session
         eye = eye_at(self.centre, self.distance, self.azimuth, self.elevation)
-        shown = session.q if self.share is None or session.route is None else along(session, self.share)
+        shown = session.q if self.share is None else along(session, self.share)
         return self._arm.draw(
             self._sky, eye, shown, ghosts=ghosts(session), obstacles=session.surroundings.world.scene.obstacles,
             trail=trail(session), frames=[session.robot.fk(shown), *_objects(session)], opacity=1.0,
@@ -124,25 +133,30 @@ def ghosts(session: Session) -> list[Ghost]:
 
 def trail(session: Session) -> Matrix | None:
     """The way of the tip along the route, shape (k, 3), None without one."""
-    if session.route is None:
+    if session.follower is None:
         return None
-    path = session.route.path
+    path = session.follower.path
     rows = path.resample(max(path.length / LOOKS, 1e-3)).waypoints
     return np.asarray(session.robot.fk_batch(rows)[:, :3, 3])
 
 
 def along(session: Session, share: float) -> Vector:
     """The configuration at a share of a route's travel. Shape (dof,)."""
-    if session.route is None:
+    if session.follower is None:
         return session.q
-    rows = session.route.path.waypoints
+    rows = session.follower.path.waypoints
     lengths = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(rows, axis=0)).sum(axis=1))])
     at = float(np.clip(share, 0.0, 1.0)) * lengths[-1]
     return np.array([np.interp(at, lengths, column) for column in rows.T])
 
 
+def _chosen(session: Session) -> list[Any]:
+    """``T_base_tip`` of the grasp that is chosen: where the tip would have to be, in reach or not."""
+    seen = None if session.target is None else session.surroundings.named(session.target)
+    if seen is None or session.choice is None:
+        return []
+    return [seen.grasp_pose(*session.choice)]
+
+
 def _objects(session: Session) -> Sequence[Any]:
     return [pin.SE3(seen.T_base_object) for seen in session.surroundings.seen]
-
-
-COLORS = {"arm": palette.ROBOT, "next": NEXT_MOVE, **LAMP_COLORS}

@@ -112,7 +112,10 @@ def _device(number: int) -> Iterator[Picture]:
 
 @contextmanager
 def _opened(source: str | int) -> Iterator[Any]:
+    log: Any = cv2.utils.logging
+    before = log.setLogLevel(log.LOG_LEVEL_ERROR)  # why a source cannot be opened is said in one line, not in three
     capture = cv2.VideoCapture(source)
+    log.setLogLevel(before)
     try:
         yield capture
     finally:

@@ -26,13 +26,13 @@ class SeenObject:
         object: Which one.
         T_base_object: Where it is.
         covariance: Of its position, in the axes of the base [m^2]. Shape (3, 3).
-        sighting: What was seen of it.
+        sighting: What was seen of it; None if the pose was written down earlier.
     """
 
     object: MarkedObject
     T_base_object: Any
     covariance: Matrix
-    sighting: Sighting
+    sighting: Sighting | None
 
     @property
     def margin(self) -> float:

@@ -1,0 +1,57 @@
+// Every key with what it does. The help overlay is made of this list, so that it never says anything else.
+"use strict";
+
+const KEYS = [
+  ["Space", [" "], "stop at once", () => send("stop")],
+  ["1 … 9", [..."123456789"], "select a joint", (key) => selectJoint(Number(key) - 1)],
+  ["↑ ↓", ["ArrowUp", "ArrowDown"], "previous, next joint", (key) => neighbourJoint(key === "ArrowUp" ? -1 : 1)],
+  ["← →", ["ArrowLeft", "ArrowRight"], "drive the joint by a step", (key) => nudge(key === "ArrowLeft" ? -1 : 1)],
+  [", .", [",", "."], "smaller, larger step", (key) => changeStep(key === "," ? -1 : 1)],
+  ["O", ["o"], "next object", () => nextObject()],
+  ["G", ["g"], "next grasp type", () => chooseGrasp(1, 0)],
+  ["L", ["l"], "next grasp level", () => chooseGrasp(0, 1)],
+  ["P", ["p"], "plan a route", () => send("plan")],
+  ["A", ["a"], "accept the route", () => send("accept")],
+  ["R", ["r"], "reject the route", () => send("reject")],
+  ["N", ["n"], "make the next move", () => send("next")],
+  ["B", ["b"], "plan the way back", () => send("back")],
+  ["Y", ["y"], "plan anew from where the arm is", () => send("replan")],
+  ["X", ["x"], "play the route in the outside view", () => togglePlay()],
+  ["[ ]", ["[", "]"], "scrub back, on", (key) => scrub(key === "[" ? -0.02 : 0.02)],
+  ["PgUp PgDn", ["PageUp", "PageDown"], "preview one move back, on", (key) => stepPreview(key === "PageUp" ? -1 : 1)],
+  ["0", ["0"], "show the arm as it is now", () => showNow()],
+  ["Shift ← → ↑ ↓", [], "turn the outside view", null],
+  ["+ −", ["+", "=", "-"], "nearer, farther", (key) => send("zoom", { factor: key === "-" ? 1.1 : 0.91 })],
+  ["V", ["v"], "look from the next side", () => nextPreset()],
+  ["T", ["t"], "take over, when no pilot is there", () => send("take")],
+  ["H", ["h"], "hand over to a page that watches", () => send("hand_over")],
+  ["Z", ["z"], "pause a record", () => send("pause")],
+  ["?", ["?"], "these keys", () => openHelp()],
+];
+const ACTIONS = new Map(KEYS.flatMap(([, keys, , act]) => keys.map((key) => [key, act])));
+const TURNS = { ArrowLeft: [-0.12, 0], ArrowRight: [0.12, 0], ArrowUp: [0, 0.08], ArrowDown: [0, -0.08] };
+const REPEATED = new Set(["ArrowLeft", "ArrowRight", "[", "]", "+", "=", "-"]);
+
+function openHelp() { document.getElementById("help").showModal(); }
+
+function onKey(event) {
+  if (event.ctrlKey || event.altKey || event.metaKey || document.getElementById("help").open) return;
+  if (event.target.matches("select, input") && event.key !== " ") return;
+  const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+  const turn = event.shiftKey && TURNS[key];
+  const act = turn ? () => send("turn", { right: turn[0], up: turn[1] }) : ACTIONS.get(key);
+  if (!act || (event.repeat && !turn && !REPEATED.has(key))) return;
+  event.preventDefault();
+  act(key);
+}
+
+addEventListener("keydown", onKey);
+addEventListener("keyup", (event) => { if (event.key === " ") event.preventDefault(); });
+document.getElementById("key_list").replaceChildren(...KEYS.map(([shown, , what]) => {
+  const line = document.createElement("div"), key = document.createElement("kbd");
+  key.textContent = shown;
+  line.append(what, key);
+  return line;
+}));
+document.getElementById("help_open").onclick = openHelp;
+document.getElementById("help_close").onclick = () => document.getElementById("help").close();

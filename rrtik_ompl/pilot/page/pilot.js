@@ -1,0 +1,301 @@
+// What is shown, and what the buttons do. All state is the server's; the page keeps only what it looks at.
+"use strict";
+
+const STEPS = [0.2, 1, 2, 5, 10, 20];  // degrees, or 5 mm for one
+const PRESETS = ["corner", "side", "top", "behind"];
+const COLOR_WORDS = { green: "reach", amber: "blocked", red: "no reach" };
+const MM_PER_DEGREE = 2, NEAR_LIMIT = 0.04, HOLD_MS = 3000;
+const WORRYING = /refused|no route|must|cannot|not where|off the route|blocked|lost|takes|first|there is no|narrow|left;/;
+let state = null, role = { role: "watching", free: false, pages: 1 }, step = 3, preset = 0, receivedAt = 0, playing = null;
+let previousAlert = "", heldUntil = 0;
+
+const byId = (id) => document.getElementById(id);
+const set = (element, text) => { if (element.textContent !== text) element.textContent = text; };
+const make = (tag, attributes = {}, ...children) => {
+  const element = Object.assign(document.createElement(tag), attributes);
+  element.append(...children);
+  return element;
+};
+const fixed = (value, digits = 1) => value.toFixed(digits).replace("-", "\u2212");
+
+// --- commands ---------------------------------------------------------------------------------------------------
+
+const inRadians = (value, unit) => unit === "m" ? value : value * Math.PI / 180;
+function selectJoint(number) { if (state && number < state.joints.length) send("select", { joint: number }); }
+function neighbourJoint(by) { selectJoint((state.selected + by + state.joints.length) % state.joints.length); }
+function stepOf(unit) { return unit === "m" ? STEPS[step] * MM_PER_DEGREE / 1000 : STEPS[step]; }
+function nudge(sign) {
+  if (!state) return;
+  const unit = state.joints[state.selected].unit;
+  send("nudge", { change: sign * inRadians(stepOf(unit), unit) });
+}
+function changeStep(by) { step = Math.min(Math.max(step + by, 0), STEPS.length - 1); showJoints(); }
+function nextObject() {
+  const names = state.objects.filter((each) => each.graspable).map((each) => each.name);
+  if (names.length) send("object", { name: names[(names.indexOf(state.target) + 1) % names.length] });
+}
+function chooseGrasp(byType, byLevel) {
+  const types = [...new Set(state.lamps.map((lamp) => lamp.type))];
+  if (!types.length) return;
+  const now = state.choice ? types.indexOf(state.choice.type) : byType ? -1 : 0;
+  const type = types[(now + byType + types.length) % types.length];
+  const levels = state.lamps.filter((lamp) => lamp.type === type).length;
+  const level = state.choice ? state.choice.level + byLevel : byLevel ? 0 : 0;
+  send("grasp", { type, level: level % levels });
+}
+function nextPreset() { preset = (preset + 1) % PRESETS.length; send("preset", { view: PRESETS[preset] }); }
+
+// --- preview of the route ---------------------------------------------------------------------------------------
+
+function showNow() { pausePlay(); send("play", { share: null }); }
+function scrub(by) { preview((state.playing ?? 0) + by); }
+function preview(share) {
+  if (!state.route) { say("no route to preview; P plans one", true); return; }
+  pausePlay();
+  send("play", { share: Math.min(Math.max(share, 0), 1) });
+}
+function stepPreview(by) {
+  if (!state.route) { preview(0); return; }
+  const ends = [0, ...state.route.moves.map((move) => move.at)], now = state.playing ?? 0;
+  const there = by > 0 ? ends.find((end) => end > now + 1e-6) : ends.findLast((end) => end < now - 1e-6);
+  preview(there ?? (by > 0 ? 1 : 0));
+}
+function pausePlay() { clearInterval(playing); playing = null; byId("play").setAttribute("aria-pressed", "false"); }
+function togglePlay() {
+  if (playing) { pausePlay(); return; }
+  if (!state.route) { preview(0); return; }
+  let share = (state.playing ?? 1) >= 1 ? 0 : state.playing;
+  const by = 0.06 / Math.min(Math.max(state.route.moves.length, 3), 20);
+  byId("play").setAttribute("aria-pressed", "true");
+  playing = setInterval(() => {
+    share = Math.min(share + by, 1);
+    if (!state.route || share >= 1) pausePlay();
+    send("play", { share });
+  }, 66);
+}
+
+// --- what the server says ---------------------------------------------------------------------------------------
+
+function showRole(said) {
+  role = said;
+  const chip = byId("role"), pilot = said.role === "pilot";
+  chip.className = `chip ${said.role}`;
+  set(chip, pilot ? "You are the pilot" + (said.pages > 1 ? ` · ${said.pages - 1} watching` : "")
+    : said.free ? "Watching · no pilot" : "Watching · another page is the pilot");
+  byId("take").hidden = pilot || !said.free;
+  byId("hand_over").hidden = !pilot || said.pages < 2;
+}
+
+function onDisconnected() {
+  const chip = byId("role");
+  chip.className = "chip bad";
+  set(chip, "Not connected · trying again");
+}
+
+function showState(said) {
+  const newRoute = Boolean(said.route) && said.mode === "proposed" && (!state || state.mode !== "proposed");
+  const newMessage = !state || state.message !== said.message;
+  state = said;
+  receivedAt = performance.now();
+  for (const item of byId("modes").children)
+    item.dataset.mode === said.mode ? item.setAttribute("aria-current", "step") : item.removeAttribute("aria-current");
+  if (newMessage || performance.now() > heldUntil) say(said.message, WORRYING.test(said.message), 0);
+  showJoints(); showTarget(); showLamps(); showRoute(); showAim(); showButtons(); showPreview(); showAge();
+  if (newRoute && role.role === "pilot" && !said.replay && !playing) togglePlay();
+}
+
+function say(text, bad = false, hold = HOLD_MS) {
+  heldUntil = performance.now() + hold;
+  set(byId("message"), text);
+  byId("message").className = bad ? "bad" : "";
+}
+
+function alertOnce(text) {
+  if (text !== previousAlert) set(byId("alerts"), text);
+  previousAlert = text;
+}
+
+function showAge() {
+  if (!state) return;
+  const chip = byId("age"), waited = (performance.now() - receivedAt) / 1000;
+  const age = state.picture_age === null ? null : state.picture_age + waited;
+  const stale = age === null || age > STALE_S;
+  document.body.classList.toggle("stale", stale && !state.replay);
+  chip.classList.toggle("bad", stale);
+  set(chip, age === null ? "no picture yet" : stale ? `STALE picture: ${fixed(age)} s old` : `picture ${Math.round(1000 * age)} ms old`);
+  const reasons = [];
+  if (state.camera_lost) reasons.push(state.replay ? state.camera_lost : `Camera lost: ${state.camera_lost}. What is shown is the last known state.`);
+  if (state.arm_lost) reasons.push(`${state.arm_lost}`);
+  if (state.paused) reasons.push("paused: Z goes on");
+  if (!reasons.length && stale && age !== null) reasons.push("The picture is stale. Do not trust it.");
+  byId("camera_banner").hidden = !reasons.length;
+  set(byId("camera_banner"), reasons.join(" "));
+  alertOnce(reasons.join(" "));
+}
+setInterval(showAge, 100);
+
+function showJoints() {
+  const body = byId("joints").tBodies[0];
+  if (body.children.length !== state.joints.length) body.replaceChildren(...state.joints.map(jointRow));
+  state.joints.forEach((joint, k) => showJoint(body.children[k], joint, k));
+  const unit = state.joints[state.selected].unit;
+  set(byId("step_size"), `${state.joints[state.selected].name.replaceAll("_", " ")} · step ${unit === "m" ? fixed(1000 * stepOf(unit)) + " mm" : stepOf(unit) + "°"}`);
+}
+
+function jointRow(joint, k) {
+  const bar = make("div", { className: "bar" }, ...["free", "way", "wanted", "is"].map((name) => make("i", { className: name })));
+  bar.setAttribute("role", "meter");
+  bar.onclick = (event) => driveTo(k, event);
+  bar.title = "click: select and drive there";
+  const row = make("tr", { onclick: () => selectJoint(k) },
+    make("th", { scope: "row" }, `${k + 1} ${joint.name.replaceAll("_", " ")}`),
+    make("td", {}, bar), make("td"), make("td"), make("td"));
+  return row;
+}
+
+function driveTo(k, event) {
+  const joint = state.joints[k], box = event.currentTarget.getBoundingClientRect();
+  event.stopPropagation();
+  selectJoint(k);
+  if (joint.lower === null) return;
+  const value = joint.lower + (event.clientX - box.left) / box.width * (joint.upper - joint.lower);
+  send("move", { target: inRadians(value, joint.unit) });
+}
+
+function showJoint(row, joint, k) {
+  const bar = row.cells[1].firstChild, [free, way, wanted, is] = bar.children, digits = joint.unit === "m" ? 3 : 1;
+  row.setAttribute("aria-selected", String(k === state.selected));
+  const share = (value) => joint.lower === null ? 0.5 + (((value % 360) + 540) % 360 - 180) / 360
+    : Math.min(Math.max((value - joint.lower) / (joint.upper - joint.lower), 0), 1);
+  const now = share(joint.value), goal = share(joint.desired), percent = (part) => `${100 * part}%`;
+  is.style.left = percent(now);
+  wanted.style.left = percent(goal);
+  way.style.left = percent(Math.min(now, goal));
+  way.style.width = percent(Math.abs(goal - now));
+  free.hidden = k !== state.selected || joint.lower === null;
+  if (!free.hidden) {
+    free.style.left = percent(share(state.room[0]));
+    free.style.width = percent(share(state.room[1]) - share(state.room[0]));
+  }
+  bar.classList.toggle("near", joint.lower !== null && (now < NEAR_LIMIT || now > 1 - NEAR_LIMIT));
+  const difference = joint.desired - joint.value, small = Math.abs(difference) < (joint.unit === "m" ? 0.002 : 1);
+  set(row.cells[2], `${fixed(joint.value, digits)} ${joint.unit === "m" ? "m" : "°"}`);
+  set(row.cells[3], fixed(joint.desired, digits));
+  set(row.cells[4], (small ? "✓ " : "") + fixed(difference, digits));
+  row.cells[4].className = small ? "there" : "off";
+  const limits = joint.lower === null ? "endless" : `limits ${fixed(joint.lower)} to ${fixed(joint.upper)}`;
+  bar.setAttribute("aria-label", `${joint.name}, ${limits}`);
+  for (const [name, value] of [["valuenow", joint.value], ["valuemin", joint.lower ?? -180], ["valuemax", joint.upper ?? 180]])
+    bar.setAttribute(`aria-${name}`, value.toFixed(digits));
+}
+
+function showTarget() {
+  const list = byId("target"), names = state.objects.filter((each) => each.graspable).map((each) => each.name);
+  if ([...list.options].map((option) => option.value).join() !== names.join())
+    list.replaceChildren(...names.map((name) => make("option", { value: name }, name)));
+  if (state.target && list.value !== state.target) list.value = state.target;
+}
+
+function showLamps() {
+  const table = byId("lamps"), types = [...new Set(state.lamps.map((lamp) => lamp.type))];
+  const most = Math.max(0, ...types.map((type) => state.lamps.filter((lamp) => lamp.type === type).length));
+  const key = JSON.stringify(state.lamps.map((lamp) => [lamp.type, lamp.level]));
+  if (table.dataset.key !== key) {
+    table.dataset.key = key;
+    const head = make("tr", {}, make("th", { scope: "col" }, "type"), ...Array.from({ length: most }, (_, k) => make("th", { scope: "col" }, `level ${k + 1}`)));
+    table.replaceChildren(head, ...types.map((type) => make("tr", {}, make("th", { scope: "row" }, type),
+      ...state.lamps.filter((lamp) => lamp.type === type).map((lamp) => make("td", {}, lampButton(lamp))))));
+  }
+  for (const lamp of state.lamps) {
+    const button = byId(`lamp_${lamp.type}_${lamp.level}`);
+    const chosen = Boolean(state.choice) && state.choice.type === lamp.type && state.choice.level === lamp.level;
+    button.dataset.color = lamp.color;
+    button.setAttribute("aria-pressed", String(chosen));
+    button.setAttribute("aria-label", `${lamp.type} level ${lamp.level + 1}: ${COLOR_WORDS[lamp.color]}${lamp.reason ? ", " + lamp.reason : ""}`);
+    button.title = lamp.reason || "approach, grasp and lift can be reached";
+    set(button.lastChild, COLOR_WORDS[lamp.color]);
+  }
+  const lamp = state.choice && state.lamps.find((each) => each.type === state.choice.type && each.level === state.choice.level);
+  set(byId("reason"), !state.lamps.length ? "No object with grasps in view."
+    : !lamp ? "Choose with G (type) and L (level)."
+    : `${lamp.type} level ${lamp.level + 1}: ${lamp.reason || "approach, grasp and lift can be reached"}`);
+}
+
+function lampButton(lamp) {
+  return make("button", { className: "lamp", id: `lamp_${lamp.type}_${lamp.level}`, onclick: () => send("grasp", { type: lamp.type, level: lamp.level }) },
+    make("span", { className: "shape" }), make("span"));
+}
+
+function showRoute() {
+  const list = byId("moves"), route = state.route;
+  byId("current").hidden = !route || state.mode !== "following";
+  if (!route) { if (list.children.length) list.replaceChildren(); list.dataset.key = ""; set(byId("route_numbers"), ""); return; }
+  const clear = route.clearance_mm === null ? "" : ` · ${fixed(route.clearance_mm, 0)} mm clear`;
+  set(byId("route_numbers"), `${route.moves.length} · ${fixed(route.travel, 0)}° · ${fixed(route.seconds, 0)} s${clear} · ${fixed(100 * route.steady, 0)} % free at ±1°`);
+  const key = JSON.stringify(route.moves.map((move) => move.text));
+  if (list.dataset.key !== key) { list.dataset.key = key; list.replaceChildren(...route.moves.map((move) => make("li", {}, move.text))); list.scrollTop = 0; }
+  route.moves.forEach((move, k) => {
+    const item = list.children[k], now = state.mode === "following" && move.status === "current";
+    const name = `${now ? "current" : move.status === "done" ? "done" : ""}${k >= route.grasp_from ? " grasp" : ""}`.trim();
+    if (item.className === name) return;
+    item.className = name;
+    if (now) { item.setAttribute("aria-current", "step"); item.scrollIntoView({ block: "nearest" }); } else item.removeAttribute("aria-current");
+  });
+  const words = { move: "MOVE", stop: "LET GO", lost: "OFF ROUTE", done: "DONE" };
+  byId("advice").className = route.advice;
+  set(byId("advice"), words[route.advice] ?? "");
+  byId("progress").value = route.share;
+}
+
+function showAim() {
+  const aim = state.aim, rows = [["tip xyz", aim.tip.map((value) => fixed(value, 3)).join("  ")]];
+  if (aim.to) rows.push([`to ${aim.to}`, `${fixed(aim.distance, 3)} m`], ["ahead of the tool", `${fixed(aim.ahead, 3)} m`],
+    ["aside of it", `${fixed(aim.aside, 3)} m`], ["turn to go", `${fixed(aim.turn_deg)}°`], ["below / above", `${fixed(aim.xyz[2], 3)} m`]);
+  for (const seen of state.objects) rows.push([`${seen.name} known to`, `± ${fixed(seen.sigma_mm, 2)} mm`]);
+  const list = byId("depth"), key = rows.map((row) => row[0]).join();
+  if (list.dataset.key !== key) { list.dataset.key = key; list.replaceChildren(...rows.flatMap(([name]) => [make("dt", {}, name), make("dd")])); }
+  rows.forEach(([, value], k) => set(list.children[2 * k + 1], value));
+  set(byId("numbers"), aim.to ? `${aim.to}\n${fixed(aim.distance, 3)} m away\n${fixed(aim.ahead, 3)} m ahead\n${fixed(aim.aside, 3)} m aside` : "");
+}
+
+function showButtons() {
+  const mine = role.role === "pilot" && !state.replay, at = (...modes) => mine && modes.includes(state.mode);
+  for (const [id, good] of [["accept", at("proposed")], ["reject", at("proposed")], ["next", at("following")], ["plan", mine],
+    ["replan", mine && Boolean(state.route)], ["back", mine && Boolean(state.route)], ["stop", mine]]) byId(id).disabled = !good;
+  for (const id of ["play", "step_back", "step_on", "scrub", "live"]) byId(id).disabled = role.role !== "pilot" || !state.route;
+}
+
+function showPreview() {
+  byId("preview_tag").hidden = state.playing === null || !state.route;
+  if (document.activeElement !== byId("scrub")) byId("scrub").value = state.playing ?? 0;
+}
+
+// --- buttons, mouse ---------------------------------------------------------------------------------------------
+
+for (const name of ["plan", "replan", "accept", "reject", "next", "back", "stop", "take", "hand_over"]) byId(name).onclick = () => send(name);
+byId("target").onchange = (event) => { send("object", { name: event.target.value }); event.target.blur(); };
+byId("play").onclick = togglePlay;
+byId("live").onclick = showNow;
+byId("step_back").onclick = () => stepPreview(-1);
+byId("step_on").onclick = () => stepPreview(1);
+byId("scrub").oninput = (event) => preview(Number(event.target.value));
+byId("presets").replaceChildren(...PRESETS.map((name, k) => make("button", { onclick: () => { preset = k; send("preset", { view: name }); } }, name)));
+
+const dragged = { right: 0, up: 0 };
+byId("outside").onpointerdown = (event) => event.target.setPointerCapture(event.pointerId);
+byId("outside").onpointermove = (event) => {
+  if (!event.buttons) return;
+  dragged.right += 0.008 * event.movementX;
+  dragged.up += 0.008 * event.movementY;
+};
+byId("outside").addEventListener("wheel", (event) => {
+  event.preventDefault();
+  send("zoom", { factor: event.deltaY > 0 ? 1.1 : 0.91 });
+}, { passive: false });
+setInterval(() => {
+  if (!dragged.right && !dragged.up) return;
+  send("turn", { ...dragged });
+  dragged.right = dragged.up = 0;
+}, 40);
+
+connect();

@@ -1,0 +1,125 @@
+"""A record played again: the same session over again, seen with a simulated camera, for no pictures are recorded."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Vector, finite_array
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.pilot.record import read_record
+from rrtik_ompl.pilot.session import Session
+from rrtik_ompl.pilot.simulation import SimulatedCamera
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.sensing.marker_map import MarkerMap
+from rrtik_ompl.sensing.scene_from_view import SeenObject
+
+Entry = dict[str, Any]
+
+
+class RecordedArm:
+    """Stands where the record says; nothing moves it."""
+
+    def __init__(self, robot: Robot, start: Vector) -> None:
+        """Stand at a configuration, shape (dof,)."""
+        self.robot, self.lost = robot, ""
+        self.q = robot.configuration(start, "start")
+
+    def read(self) -> Vector:
+        """Where the joints are. Shape (dof,), rad or m."""
+        return self.q.copy()
+
+    def move(self, joint: int, target: float) -> None:
+        """What became of it the record says."""
+
+    def stop(self) -> None:
+        """What became of it the record says."""
+
+
+class RecordedEyes:
+    """Brings the entries of a record to a session when their time has come."""
+
+    def __init__(self, entries: list[Entry], arm: RecordedArm, world: SimulatedCamera) -> None:
+        """Begin at the beginning.
+
+        Args:
+            entries: Of a record; see `entries_for`.
+            arm: What the session takes for its arm.
+            world: Makes the pictures; its places follow the record.
+        """
+        self._entries, self._arm, self._world, self._next = entries, arm, world, 0
+        self.camera, self.T_base_camera, self.arm_in_picture = world.camera, world.T_base_camera, True
+        self.picture: NDArray[np.uint8] = np.zeros((self.camera.height, self.camera.width, 3), dtype=np.uint8)
+        self.lost = ""
+
+    def look(self, session: Session, time: float) -> None:
+        """Let happen what has happened until a time of the record [s]."""
+        while self._next < len(self._entries) and self._entries[self._next]["time"] <= time:
+            self._happen(self._entries[self._next], session)
+            self._next += 1
+        session.see((), time)
+        self.picture = self._world.picture(self._arm.q, time).pixels
+        self.lost = "the record ends here" if self._next == len(self._entries) else ""
+
+    def close(self) -> None:
+        """Nothing to let go."""
+
+    def _happen(self, entry: Entry, session: Session) -> None:
+        time = entry["time"]
+        if entry["kind"] == "joints":
+            self._arm.q = self._arm.robot.configuration(entry["q"], "q")
+            session.tick(time)
+        elif entry["kind"] == "command":
+            session.command(entry["name"], time, **entry["arguments"])
+        elif entry["kind"] == "seen":
+            seen = [_seen(self._world.marker_map, each) for each in entry["objects"]]
+            self._world.places = {each.object.name: each.T_base_object for each in seen}
+            session.see(seen, time)
+
+
+def entries_for(path: str | os.PathLike[str], problem: str, robot: Robot, marker_map: MarkerMap) -> list[Entry]:
+    """The entries of a record, made sure to fit.
+
+    Raises:
+        InputError: If the file cannot be read, belongs to another problem, or an entry does not fit.
+    """
+    entries = list(read_record(path))
+    begin = next((entry for entry in entries if entry["kind"] == "begin"), {})
+    if begin.get("problem", problem) != problem:
+        raise InputError(f"{path}: is a record of the problem '{begin['problem']}', not of '{problem}'")
+    for count, entry in enumerate(entries, start=1):
+        try:
+            _check(entry, robot, marker_map)
+        except (KeyError, TypeError, ValueError, InputError) as error:
+            why = f"lacks {error}" if isinstance(error, KeyError) else str(error)
+            raise InputError(f"{path}:{count}: a line '{str(entry['kind'])[:20]}' that does not fit: {why}") from None
+    return entries
+
+
+def start_of(entries: list[Entry], usual: Vector) -> tuple[Vector, int]:
+    """Where the arm stood when a record began, and the seed of its random numbers."""
+    begin = next((entry for entry in entries if entry["kind"] == "begin"), {})
+    return np.asarray(begin.get("q", usual)), int(begin.get("seed", 0))
+
+
+def _check(entry: Entry, robot: Robot, marker_map: MarkerMap) -> None:
+    float(entry["time"])
+    if entry["kind"] in ("begin", "joints"):
+        robot.configuration(entry["q"], "q")
+    elif entry["kind"] == "command":
+        str(entry["name"]) + "", dict(**entry["arguments"])
+    elif entry["kind"] == "seen":
+        for each in entry["objects"]:
+            _seen(marker_map, each)
+
+
+def _seen(marker_map: MarkerMap, entry: Entry) -> SeenObject:
+    thing = marker_map.named(entry["name"])
+    xyz, turn = finite_array(entry["xyz"], (3,), "xyz"), finite_array(entry["rotation"], (3, 3), "rotation")
+    if not np.allclose(turn @ turn.T, np.eye(3), atol=1e-6):
+        raise InputError(f"rotation of {thing.name} is none")
+    return SeenObject(thing, pin.SE3(turn, xyz), np.zeros((3, 3)), None)

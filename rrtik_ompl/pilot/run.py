@@ -1,0 +1,99 @@
+"""A session at its server: pictures come, commands are obeyed between any two of them, and everything is shown."""
+
+from __future__ import annotations
+
+import queue
+import time as clock
+from collections.abc import Callable
+from typing import Any
+
+from rrtik_ompl.pilot.engine import VIEW_COMMANDS, Engine
+from rrtik_ompl.pilot.server import PilotServer
+
+PERIOD = 1.0 / 32.0  # [s]; a little less than a camera's, so that none of its pictures is left out
+CAMERA, OUTSIDE = "C", "O"
+
+
+class Loop:
+    """Runs in the thread that made the engine."""
+
+    def __init__(self, engine: Engine, server: PilotServer, *, watch_only: bool = False) -> None:
+        """Take both.
+
+        Args:
+            engine: What is shown.
+            server: Where.
+            watch_only: Obey only commands that concern the view, and "pause": what is shown has happened already.
+        """
+        self._engine, self._server, self._watch_only = engine, server, watch_only
+        self._answered: dict[int, int] = {}
+        self._begin = clock.monotonic()
+        self._paused_at: float | None = None
+        self._audience, self._outside_too = 0, False
+
+    @property
+    def time(self) -> float:
+        """Of the session [s]; stands still in a pause."""
+        return clock.monotonic() - self._begin if self._paused_at is None else self._paused_at
+
+    def run(self, until: Callable[[], bool] = lambda: False) -> None:
+        """Go on until Ctrl-C, or until asked to end."""
+        while not until():
+            begin = clock.monotonic()
+            self._step()
+            while not until() and (left := begin + PERIOD - clock.monotonic()) > 0.0:
+                self._obey_one(left)
+
+    def _step(self) -> None:
+        engine, server = self._engine, self._server
+        engine.look(self.time)
+        self._show_state()
+        self._obey_all()
+        audience, self._audience = self._audience, len(server.clients)
+        if not self._audience:
+            return
+        server.show_frame(CAMERA, self.time, engine.camera_picture())
+        self._obey_all()
+        self._outside_too = not self._outside_too
+        if not self._outside_too and self._audience == audience:
+            return  # every second time is enough for what nobody steers by
+        outside = engine.outside_picture(anew=self._audience != audience)
+        if outside is not None:
+            server.show_frame(OUTSIDE, self.time, outside)
+
+    def _show_state(self) -> None:
+        if len(self._server.clients):
+            state = self._engine.state() | {"paused": self._paused_at is not None, "replay": self._watch_only}
+            self._server.show_state(state, self._answered)
+
+    def _obey_all(self) -> None:
+        while not self._server.commands.empty():
+            self._obey_one(0.0)
+
+    def _obey_one(self, patience: float) -> None:
+        """Obey the next command and show at once what became of it, or wait for one so long [s]."""
+        try:
+            client, command = self._server.commands.get(block=patience > 0.0, timeout=patience or None)
+        except queue.Empty:
+            return
+        sequence = command.pop("seq", None)
+        self._obey(command)
+        if isinstance(sequence, int) and not isinstance(sequence, bool):
+            self._answered[client] = sequence
+        self._show_state()
+
+    def _obey(self, command: dict[str, Any]) -> None:
+        name = command.get("name")
+        if not self._watch_only or name in VIEW_COMMANDS:
+            self._engine.obey(command, self.time)
+        elif name == "pause":
+            self._pause()
+        elif name != "halt":
+            self._engine.session.message = "this is a record: it can be watched, paused and looked at from all sides"
+
+    def _pause(self) -> None:
+        now = self.time
+        if self._paused_at is None:
+            self._paused_at = now
+        else:
+            self._begin, self._paused_at = clock.monotonic() - now, None

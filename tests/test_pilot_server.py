@@ -1,0 +1,275 @@
+"""Who may reach the page, who is the pilot, and that a slow page holds nobody up."""
+
+import asyncio
+import http.client
+import json
+import socket
+from functools import partial
+
+import pytest
+import tornado.httpclient
+import tornado.websocket
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.pilot.clients import Client, Clients, Lane
+from rrtik_ompl.pilot.run import Loop
+from rrtik_ompl.pilot.server import LARGEST_MESSAGE, MOST_WAITING, PilotServer
+from rrtik_ompl.pilot.setup import Wanted, open_session
+
+TOKEN = "a-secret-of-many-letters"
+
+
+@pytest.fixture
+def server():
+    with PilotServer(title="test") as made:
+        yield made
+
+
+class Page:
+    """What a page's script does, without a browser."""
+
+    def __init__(self, server, name="one", **headers):
+        self.heard, self.closed = [], False
+        self._loop = asyncio.new_event_loop()
+        url = f"ws://127.0.0.1:{server.port}/ws?page={name}&token={server.token}"
+        request = tornado.httpclient.HTTPRequest(url, headers=headers, request_timeout=10)
+        self._socket = self._do(partial(tornado.websocket.websocket_connect, request))
+
+    def _do(self, call):
+        async def wait():
+            return await asyncio.wait_for(asyncio.ensure_future(call()), 10)
+
+        return self._loop.run_until_complete(wait())
+
+    def say(self, /, **words):
+        self._do(partial(self._socket.write_message, json.dumps(words)))
+
+    def say_raw(self, text):
+        self._do(partial(self._socket.write_message, text))
+
+    def hear(self):
+        message = self._do(self._socket.read_message)
+        if message is None:
+            self.closed = True
+            raise ConnectionError("closed")
+        return json.loads(message) if isinstance(message, str) else message
+
+    def hear_until(self, good):
+        """The first message that is good; frames and states before it are acknowledged."""
+        while True:
+            message = self.hear()
+            if good(message):
+                return message
+            if isinstance(message, bytes) or message["kind"] == "state":
+                self.say(shown="frame" if isinstance(message, bytes) else "state")
+
+    def role(self):
+        return self.hear_until(lambda m: isinstance(m, dict) and m["kind"] == "role")["role"]
+
+    def leave(self):
+        self._socket.close()
+        self._loop.run_until_complete(asyncio.sleep(0.05))
+
+
+def answer(server, path="/", **headers):
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)
+    given = {"Host": f"127.0.0.1:{server.port}"} | {name.replace("_", "-"): value for name, value in headers.items()}
+    connection.request("GET", path, headers=given)
+    return connection.getresponse()
+
+
+UPGRADE = {
+    "Upgrade": "websocket",
+    "Connection": "Upgrade",
+    "Sec_WebSocket_Version": "13",
+    "Sec_WebSocket_Key": "x" * 22 + "==",
+}
+
+
+# --- who may come ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", ["/", "/pilot.js", "/ws"])
+def test_a_foreign_host_or_origin_is_refused(server, path):
+    more = UPGRADE if path == "/ws" else {}
+    assert answer(server, path, **more).status == (101 if path == "/ws" else 200)
+    for headers in (
+        {"Host": f"evil.example:{server.port}"},
+        {"Host": "127.0.0.1:1"},
+        {"Origin": "http://evil.example"},
+        {"Origin": f"https://127.0.0.1:{server.port}"},
+        {"Origin": "null"},
+    ):
+        assert answer(server, path, **(more | headers)).status == 403, headers
+
+
+def test_the_page_may_load_nothing_from_elsewhere(server):
+    headers = answer(server).headers
+    policy = headers["Content-Security-Policy"]
+    assert "default-src 'none'" in policy
+    assert "frame-ancestors 'none'" in policy
+    assert "http" not in policy
+    assert headers["X-Content-Type-Options"] == "nosniff"
+    for path in ("/", "/pilot.js", "/link.js", "/keys.js", "/pilot.css"):
+        text = answer(server, path).read().decode()
+        assert "http://" not in text
+        assert "https://" not in text
+    assert answer(server, "/../server.py").status == 404
+
+
+def test_without_the_token_there_is_neither_page_nor_socket():
+    with PilotServer(token=TOKEN) as server:
+        assert server.url.endswith(f"/?token={TOKEN}")
+        for path in ("/", "/ws"):
+            more = UPGRADE if path == "/ws" else {}
+            for query in ("", "?token=", "?token=wrong", f"?token={TOKEN[:-1]}", "?token=%C3%A9"):
+                assert answer(server, path + query, **more).status == 403, query
+            assert answer(server, f"{path}?token={TOKEN}", **more).status in (101, 200)
+
+
+def test_other_machines_need_a_token_and_an_address():
+    with pytest.raises(InputError, match="--token"):
+        PilotServer(host="localhost")
+    with pytest.raises(InputError, match="at least 16"):
+        PilotServer(host="localhost", token="short")
+    for anywhere in ("0.0.0.0", "::", ""):
+        with pytest.raises(InputError, match="one address"):
+            PilotServer(host=anywhere, token=TOKEN)
+
+
+def test_a_port_in_use_is_said_in_one_line():
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(InputError, match=f"port {port} .* cannot be used: .*choose another") as caught:
+            PilotServer(port)
+    assert "\n" not in str(caught.value)
+
+
+# --- who is the pilot --------------------------------------------------------------------------------------------
+
+
+def test_the_first_is_the_pilot_the_others_watch_and_may_not_command(server):
+    first, second = Page(server, "one"), Page(server, "two")
+    assert first.role() == "pilot"
+    assert second.role() == "watching"
+    second.say(name="plan", seq=1)
+    assert "watching" in second.hear()["text"]
+    second.say(name="take")
+    assert "another page is the pilot" in second.hear()["text"]
+    first.say(name="stop", seq=1)
+    assert server.commands.get(timeout=5)[1] == {"name": "stop", "seq": 1}
+    assert server.commands.empty()
+
+
+def test_a_watcher_takes_over_when_the_pilot_hands_over(server):
+    first, second = Page(server, "one"), Page(server, "two")
+    assert second.role() == "watching"
+    first.say(name="hand_over")
+    assert server.commands.get(timeout=5)[1]["name"] == "halt"  # the arm stands still meanwhile
+    assert second.role() == "watching"
+    second.say(name="take")
+    assert second.role() == "pilot"
+    first.say(name="plan")
+    first.hear_until(lambda m: m["kind"] == "refused")
+
+
+def test_a_pilot_that_returns_is_the_pilot_again_and_the_arm_stands_still_meanwhile(server):
+    first, second = Page(server, "one"), Page(server, "two")
+    assert (first.role(), second.role()) == ("pilot", "watching")
+    first.leave()
+    assert server.commands.get(timeout=5)[1]["name"] == "halt"
+    assert second.role() == "watching"
+    assert Page(server, "one").role() == "pilot"
+
+
+def test_a_pilot_that_returns_too_late_watches(server):
+    first, second = Page(server, "one"), Page(server, "two")
+    assert (first.role(), second.role()) == ("pilot", "watching")
+    first.leave()
+    assert second.role() == "watching"
+    second.say(name="take")
+    assert second.role() == "pilot"
+    assert Page(server, "one").role() == "watching"
+
+
+def test_what_makes_no_sense_is_left_out_and_a_flood_is_cut(server):
+    page = Page(server)
+    for text in ("{", "[1]", '"stop"', "1e999", "\x00"):
+        page.say_raw(text)
+    for _ in range(MOST_WAITING + 50):
+        page.say(name="stop")
+    page.say(name="take")
+    page.role()
+    page.role()
+    assert server.commands.qsize() == MOST_WAITING
+    page.say_raw("x" * (LARGEST_MESSAGE + 1))
+    with pytest.raises((ConnectionError, tornado.websocket.WebSocketClosedError)):
+        page.hear()
+
+
+# --- a slow page -------------------------------------------------------------------------------------------------
+
+
+def test_at_most_two_are_under_way_and_the_newest_of_each_kind_waits():
+    sent = []
+    lane = Lane(sent.append, 2)
+    for number in range(10):
+        lane.offer("C", f"C{number}")
+        lane.offer("O", f"O{number}")
+    assert sent == ["C0", "O0"]
+    lane.arrived()
+    lane.arrived()
+    assert sent == ["C0", "O0", "C9", "O9"]
+    assert lane.dropped == 16
+    lane.arrived()
+    lane.arrived()
+    lane.arrived()
+    assert lane.under_way == 0
+
+
+def test_a_page_that_shows_nothing_holds_nobody_up():
+    sent = {1: [], 2: []}
+    clients = Clients(lambda: None)
+    pages = [Client(number, str(number), sent[number].append) for number in sent]
+    for page in pages:
+        clients.join(page)
+    for number in range(20):
+        clients.show_frame("C", b"C%d" % number)
+        pages[1].frames.arrived()
+    frames = [[m for m in sent[number] if isinstance(m, bytes)] for number in sent]
+    assert frames[0] == [b"C0", b"C1"]
+    assert len(frames[1]) == 20
+
+
+# --- with a session ----------------------------------------------------------------------------------------------
+
+
+def test_a_command_makes_the_round_and_what_is_nonsense_ends_nothing():
+    opened = open_session(Wanted("titan4_sdu"))
+    with PilotServer() as server:
+        loop = Loop(opened.engine, server)
+        page = Page(server)
+        for count, words in enumerate(
+            [
+                {"name": "turn", "right": float("nan"), "up": 1},
+                {"name": "turn", "right": 10**400, "up": 1},
+                {"name": "zoom", "factor": "far"},
+                {"name": "preset", "view": ["top"]},
+                {"name": "play", "share": float("inf")},
+                {"name": "select", "joint": 10**400},
+                {"name": "select", "time": 1, "verb": 2, "self": 3},
+                {"name": ["stop"]},
+                {"name": "grasp", "type": {"a": 1}, "level": 1},
+                {},
+                {"name": "select", "joint": 3},
+            ]
+        ):
+            page.say(seq=count, **words)
+        rounds = iter(range(40))
+        loop.run(lambda: next(rounds, None) is None)
+        state = page.hear_until(lambda m: isinstance(m, dict) and m.get("answered") == {"1": 10})
+        assert state["selected"] == 3
+        assert "selected" in state["message"]
+        assert len(state["lamps"]) == 6
+        assert page.hear_until(lambda m: isinstance(m, bytes))[9:11] == b"\xff\xd8"
+    opened.close()
