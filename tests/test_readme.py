@@ -21,7 +21,7 @@ def blocks(language):
 def test_there_are_two_commands_to_set_up_and_the_second_runs_the_tests():
     commands = [line for block in blocks("") for line in block.splitlines() if "pip install" in line]
     assert [command.rpartition("&& ")[2].split()[0] for command in commands] == [".venv/bin/rrtik", ".venv/bin/python"]
-    assert commands[1].endswith("-m pytest")
+    assert "-m pytest" in commands[1]
 
 
 def test_the_main_job_writes_what_it_says(tmp_path, monkeypatch):
