@@ -116,6 +116,11 @@ def checked(body):
     return sha256(body).digest() + body
 
 
+def described(data):
+    """What a file says of itself: its key, its functions."""
+    return data[32:].partition(b"\n")[0]
+
+
 def swapped(data, place):
     return data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :]
 
@@ -141,7 +146,8 @@ def test_a_damaged_file_is_made_anew(cached, damage, capfd, monkeypatch):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert library.library(KERNELS) is not None
-    assert cached.read_bytes() == whole
+    assert described(cached.read_bytes()) == described(whole)  # the code may differ by what else is in the process
+    assert library._kept(KERNELS) is not None
     assert capfd.readouterr() == ("", "")
 
 
@@ -221,7 +227,8 @@ def test_warming_up_makes_all_kernels(cached, capsys):
     cached.unlink()
     assert run(["warmup"]) == 0
     assert capsys.readouterr().out.splitlines() == [f"{name}: ready" for name in code_files.kernel_modules()]
-    assert cached.read_bytes() == before
+    assert described(cached.read_bytes()) == described(before)
+    assert library._kept(KERNELS) is not None
 
 
 def test_compiling_is_told_in_one_line(monkeypatch, capsys):
