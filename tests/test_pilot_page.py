@@ -207,6 +207,7 @@ def test_a_second_page_watches_and_a_lost_camera_and_a_lost_server_are_said(brow
         assert browser.ask("document.getElementById('hand_over').hidden") is False
         browser.press("h")
         browser.wait("role.role === 'watching' && !document.getElementById('take').hidden")
+        browser.wait("document.getElementById('message').textContent.includes('the pilot has left')")
         browser.press("p")
         browser.wait("document.getElementById('message').textContent.includes('you are watching')")
         browser.wait("document.getElementById('plan').disabled")
