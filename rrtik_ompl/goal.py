@@ -14,7 +14,7 @@ from rrtik_ompl.arrays import Mask, Vector, finite_array, frozen, positive
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.poses import rigid, rotation_angles
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.task_region import TaskRegion
+from rrtik_ompl.task_region import TaskRegion, WithinTolerances
 
 JOINT_TOLERANCE = 1e-6  # [rad] or [m]
 NO_BOX = frozen([0.0, 0.0, 0.0])
@@ -77,7 +77,7 @@ class PositionGoal:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PoseGoal:
+class PoseGoal(WithinTolerances):
     """Bring the tip frame to T_world_tip, within ``position_tolerance`` [m] and ``orientation_tolerance`` [rad]."""
 
     T_world_tip: Any
@@ -93,17 +93,6 @@ class PoseGoal:
         """Position error [m] and rotation angle [rad] of each row of Q, shapes (m,)."""
         tips = robot.fk_batch(np.atleast_2d(Q))
         return pose_errors(tips, self.T_world_tip)
-
-    def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
-        """Errors in units of their tolerances, added; at most 1 each at the goal. Shape (m,)."""
-        position, angle = self.errors(robot, Q)
-        scaled: Vector = position / self.position_tolerance + angle / self.orientation_tolerance
-        return scaled
-
-    def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
-        """Which rows of Q are at the goal, shape (m,)."""
-        position, angle = self.errors(robot, Q)
-        return (position <= self.position_tolerance) & (angle <= self.orientation_tolerance)
 
 
 GoalPart: TypeAlias = PoseGoal | PositionGoal | TaskRegion

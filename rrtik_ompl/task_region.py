@@ -8,6 +8,7 @@ of the tip from the nearest pose of the region, in metres and radians.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -25,8 +26,31 @@ SWEEPS = 3  # over roll, pitch and yaw; one is exact where a single one of them 
 TURN = 2.0 * np.pi
 
 
+class WithinTolerances(ABC):
+    """What has an error in position and one in orientation, and a tolerance for each."""
+
+    __slots__ = ()
+    position_tolerance: float
+    orientation_tolerance: float
+
+    @abstractmethod
+    def errors(self, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
+        """Distance [m] and angle [rad] of the tip from the goal, for each row of Q, shapes (m,)."""
+
+    def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
+        """Errors in units of their tolerances, added; at most 1 each at the goal. Shape (m,)."""
+        position, angle = self.errors(robot, Q)
+        scaled: Vector = position / self.position_tolerance + angle / self.orientation_tolerance
+        return scaled
+
+    def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
+        """Which rows of Q are at the goal, shape (m,)."""
+        position, angle = self.errors(robot, Q)
+        return (position <= self.position_tolerance) & (angle <= self.orientation_tolerance)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class TaskRegion:
+class TaskRegion(WithinTolerances):
     """Bring the tip to any pose ``T_world_w @ D @ T_w_tip`` whose displacement D lies within bounds.
 
     Attributes:
@@ -122,17 +146,6 @@ class TaskRegion:
         poses = self.poses(self.nearest(tips))
         position: Vector = np.linalg.norm(tips[:, :3, 3] - poses[:, :3, 3], axis=1)
         return position, rotation_angles(np.swapaxes(poses[:, :3, :3], 1, 2) @ tips[:, :3, :3])
-
-    def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
-        """Errors in units of their tolerances, added; at most 1 each at the goal. Shape (m,)."""
-        position, angle = self.errors(robot, Q)
-        scaled: Vector = position / self.position_tolerance + angle / self.orientation_tolerance
-        return scaled
-
-    def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
-        """Which rows of Q are at the goal, shape (m,)."""
-        position, angle = self.errors(robot, Q)
-        return (position <= self.position_tolerance) & (angle <= self.orientation_tolerance)
 
 
 def _range(values: ArrayLike, what: str) -> Vector:

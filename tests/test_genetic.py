@@ -13,9 +13,10 @@ from rrtik_ompl.ik.closed_form import solutions
 from rrtik_ompl.ik.form import wrapped
 from rrtik_ompl.ik.genetic.breeding import children
 from rrtik_ompl.ik.genetic.genes import LARGEST, Window, around, from_gray, random_genes, to_gray, whole_range
-from rrtik_ompl.ik.genetic.objective import manipulability, reach, score
+from rrtik_ompl.ik.genetic.objective import manipulability, score
 from rrtik_ompl.ik.genetic.options import HISTORICAL, STANDARD, GeneticOptions
 from rrtik_ompl.ik.genetic.search import follow_targets
+from rrtik_ompl.ik.plain_descent import reach_of
 from rrtik_ompl.reproduce.ga_published import INCH, curve
 
 TOLERANCE = 0.002 * INCH
@@ -155,7 +156,7 @@ def test_manipulability_counts_in_favour_of_a_posture():
     Q = np.random.default_rng(0).uniform(robot.lower, robot.upper, (50, 5))
     goal, weighted = rrtik.PositionGoal([0.5, 0.1, 0.2]), replace(STANDARD, singularity_weight=0.7)
     plain, counted = (score(robot, goal, Q, None, each, everything).cost for each in (STANDARD, weighted))
-    J = robot.jacobian_batch(Q)[:, :3] / reach(robot)
+    J = robot.jacobian_batch(Q)[:, :3] / reach_of(robot)
     wanted = np.sqrt(np.linalg.det(J @ J.transpose(0, 2, 1)))
     np.testing.assert_allclose(plain - counted, 0.7 * wanted, atol=1e-9)
     np.testing.assert_allclose(manipulability(robot, Q, True), wanted, atol=1e-9)
@@ -167,7 +168,7 @@ def test_who_will_not_do_costs_the_reach_more_and_is_not_there():
     goal = rrtik.PositionGoal(robot.fk(q[0]).translation)
     good, bad = (score(robot, goal, q, None, STANDARD, lambda Q, v=v: np.full(len(Q), v)) for v in (True, False))
     assert (good.reached[0], bad.reached[0]) == (True, False)
-    assert bad.cost[0] - good.cost[0] == pytest.approx(reach(robot))
+    assert bad.cost[0] - good.cost[0] == pytest.approx(reach_of(robot))
 
 
 def test_the_same_seed_gives_the_same_run_and_another_one_another():

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.goal import PositionGoal
-from rrtik_ompl.ik.genetic.objective import reach
 from rrtik_ompl.ik.hinges import Joint, Swing, joints_to_tip, room
+from rrtik_ompl.ik.plain_descent import reach_of
 from rrtik_ompl.ik.question import Target
-from rrtik_ompl.ik.residual import well_inside
+from rrtik_ompl.ik.residual import walked
 from rrtik_ompl.robot import Robot
 
 SWEEPS = 300
@@ -37,14 +37,8 @@ def ccd(
     Returns:
         Where each start has led to, shape (m, dof), and the sweeps taken.
     """
-    Q = np.clip(starts, robot.lower, robot.upper)
-    joints, length = joints_to_tip(robot)[::-1], AXIS_LENGTH * reach(robot)
-    for sweep in range(sweeps):
-        rows = np.flatnonzero(~well_inside(robot, goal, Q))
-        if len(Q) - len(rows) >= min(len(Q), enough or len(Q)):
-            return Q, sweep
-        Q[rows] = _sweep(robot, goal, Q[rows], joints, length)
-    return Q, sweeps
+    joints, length = joints_to_tip(robot)[::-1], AXIS_LENGTH * reach_of(robot)
+    return walked(robot, goal, starts, lambda Q: _sweep(robot, goal, Q, joints, length), sweeps, enough)
 
 
 def _sweep(robot: Robot, goal: Target, Q: Matrix, joints: tuple[Joint, ...], length: float) -> Matrix:

@@ -13,7 +13,7 @@ import pinocchio as pin
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.ik.question import Target
-from rrtik_ompl.ik.residual import twist, well_inside
+from rrtik_ompl.ik.residual import twist, walked
 from rrtik_ompl.robot import Robot
 
 ITERATIONS = 200
@@ -38,19 +38,17 @@ def damped_least_squares(
     Returns:
         Where each start has led to, shape (m, dof), and the steps taken.
     """
-    Q = np.clip(starts, robot.lower, robot.upper)
     rows = slice(0, 3) if isinstance(goal, PositionGoal) else slice(0, 6)
-    for step in range(iterations):
-        left = np.flatnonzero(~well_inside(robot, goal, Q))
-        if len(Q) - len(left) >= min(len(Q), enough or len(Q)):
-            return Q, step
-        e = twist(goal, robot.fk_batch(Q[left]))[:, rows, None]
-        J = robot.jacobian_batch(Q[left])[:, rows]
+
+    def step(Q: Matrix) -> Matrix:
+        e = twist(goal, robot.fk_batch(Q))[:, rows, None]
+        J = robot.jacobian_batch(Q)[:, rows]
         square = J @ J.transpose(0, 2, 1) + DAMPING**2 * np.eye(J.shape[1])
         dq = (J.transpose(0, 2, 1) @ np.linalg.solve(square, e))[..., 0]
         largest = np.abs(dq).max(axis=1, keepdims=True)
-        Q[left] = robot.clamp(Q[left] + dq * np.minimum(1.0, LARGEST_STEP / np.maximum(largest, 1e-12)))
-    return Q, iterations
+        return robot.clamp(Q + dq * np.minimum(1.0, LARGEST_STEP / np.maximum(largest, 1e-12)))
+
+    return walked(robot, goal, starts, step, iterations, enough)
 
 
 def pinocchio_iteration(robot: Robot, goal: Target, starts: Matrix) -> tuple[Matrix, int]:

@@ -15,7 +15,7 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.ik.hinges import Joint, Swing, coupled_fault, joints_to_tip, room
 from rrtik_ompl.ik.question import Target
-from rrtik_ompl.ik.residual import well_inside
+from rrtik_ompl.ik.residual import walked
 from rrtik_ompl.robot import Robot
 
 ITERATIONS = 200
@@ -46,14 +46,8 @@ def fabrik(
     Returns:
         Where each start has led to, shape (m, dof), and the iterations taken.
     """
-    Q = np.clip(starts, robot.lower, robot.upper)
     joints = joints_to_tip(robot)
-    for iteration in range(iterations):
-        rows = np.flatnonzero(~well_inside(robot, goal, Q))
-        if len(Q) - len(rows) >= min(len(Q), enough or len(Q)):
-            return Q, iteration
-        Q[rows] = _pass(robot, goal, Q[rows], joints)
-    return Q, iterations
+    return walked(robot, goal, starts, lambda Q: _pass(robot, goal, Q, joints), iterations, enough)
 
 
 def _pass(robot: Robot, goal: Target, Q: Matrix, joints: tuple[Joint, ...]) -> Matrix:

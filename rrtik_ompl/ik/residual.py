@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -21,6 +23,31 @@ def well_inside(robot: Robot, goal: Target, Q: Matrix) -> Mask:
         return goal.distance(robot, Q) <= SHARE * goal.tolerance
     position, angle = goal.errors(robot, Q)
     return (position <= SHARE * goal.position_tolerance) & (angle <= SHARE * goal.orientation_tolerance)
+
+
+def walked(
+    robot: Robot, goal: Target, starts: Matrix, step: Callable[[Matrix], Matrix], most: int, enough: int | None
+) -> tuple[Matrix, int]:
+    """Take steps from many starts, inside the limits, until enough of them have arrived.
+
+    Args:
+        robot: The arm.
+        goal: Where to.
+        starts: Shape (m, dof).
+        step: From rows that have not arrived, shape (k, dof), to the next ones.
+        most: Steps at most.
+        enough: So many starts are enough; all of them if None.
+
+    Returns:
+        Where each start has led to, shape (m, dof), and the steps taken.
+    """
+    Q = np.clip(starts, robot.lower, robot.upper)
+    for number in range(most):
+        left = np.flatnonzero(~well_inside(robot, goal, Q))
+        if len(Q) - len(left) >= min(len(Q), enough or len(Q)):
+            return Q, number
+        Q[left] = step(Q[left])
+    return Q, most
 
 
 def twist(goal: Target, tips: NDArray[np.float64]) -> Matrix:

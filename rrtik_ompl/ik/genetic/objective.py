@@ -10,6 +10,7 @@ import numpy as np
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.goal import PositionGoal, joint_difference, pose_errors
 from rrtik_ompl.ik.genetic.options import GeneticOptions
+from rrtik_ompl.ik.plain_descent import reach_of
 from rrtik_ompl.ik.question import Target
 from rrtik_ompl.robot import Robot
 
@@ -59,7 +60,7 @@ def score(
     good = accept(Q)
     if not good.all():
         reached &= good
-        cost += reach(robot) * ~good
+        cost += reach_of(robot) * ~good
     return Score(cost, distance, angle, reached)
 
 
@@ -75,13 +76,8 @@ def manipulability(robot: Robot, Q: Matrix, position_only: bool) -> Vector:
         Shape (m,).
     """
     J = robot.jacobian_batch(Q)
-    J[:, :3] /= reach(robot)
+    J[:, :3] /= reach_of(robot)
     if position_only:
         J = J[:, :3]
     values: Vector = np.linalg.svd(J, compute_uv=False).prod(axis=1)
     return values
-
-
-def reach(robot: Robot) -> float:
-    """Sum of the lengths of the links [m]."""
-    return float(np.linalg.norm(robot.chain.placement[:, :3, 3], axis=1).sum()) or 1.0
