@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.moves_text import joint_unit, reading
 from rrtik_ompl.path import JointPath, Move
 from rrtik_ompl.world import World
 
@@ -109,8 +110,8 @@ class Follower:
         return self._off(int(off[0]), float(q[off[0]]), float(planned[off[0]])) if len(off) else None
 
     def _off(self, joint: int, value: float, planned: float) -> Progress:
-        factor, unit = (1.0, "m") if self.path.prismatic[joint] else (float(np.rad2deg(1.0)), "deg")
-        fault = f"{self._names[joint]} is at {factor * value:.2f} {unit} instead of {factor * planned:.2f}"
+        (here, unit), (there, _) = (reading(v, joint_unit(self.path.prismatic[joint])) for v in (value, planned))
+        fault = f"{self._names[joint]} is at {here:.2f} {unit} instead of {there:.2f}"
         return Progress(self.current, 0.0, 0.0, "lost", fault)
 
 

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.goal import joint_difference
+from rrtik_ompl.goal import PoseGoal, joint_difference
 from rrtik_ompl.ik.batch import solve_ik_batch
-from rrtik_ompl.ik.closed_form import form_of, has_closed_form, solutions, tip_fault
+from rrtik_ompl.ik.closed_form import solutions
+from rrtik_ompl.ik.face import chosen_method
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.sensing.marker_map import GraspType, MarkedObject
 from rrtik_ompl.world import World
@@ -82,7 +83,7 @@ def lamps(world: World, thing: MarkedObject, T_base_object: Any, near: Vector, *
 
 def _postures(robot: Robot, poses: NDArray[np.float64], near: Vector) -> tuple[NDArray[np.float64], list[str]]:
     """For each pose the postures inside the limits, NaN for the others, shape (m, b, dof); and why there is none."""
-    if has_closed_form(robot) and form_of(robot).kind == "pose" and not tip_fault(robot, form_of(robot)):
+    if chosen_method(robot, (PoseGoal(poses[0]),), "auto") == "closed-form":
         found = solutions(robot, poses, near=near, check=False)
         postures = np.where(found.valid[..., None], found.branches, np.nan)
         reasons = np.where(found.real.any(axis=1), LIMITS, UNREACHABLE)

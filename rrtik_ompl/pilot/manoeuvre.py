@@ -12,6 +12,7 @@ import numpy as np
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.ik.singularity import singularity_report
+from rrtik_ompl.moves_text import joint_unit, reading
 from rrtik_ompl.pilot.clearance import tightest
 from rrtik_ompl.world import World
 
@@ -109,7 +110,7 @@ def _obstruction(world: World, start: Vector, end: Vector, joint: int) -> str:
     rows = start + np.linspace(0.0, 1.0, world.steps(start, end) + 1)[:, None] * (end - start)
     stuck = np.flatnonzero(~world.valid_batch(rows))
     first = rows[stuck[0]] if len(stuck) else end
-    value, unit = (first[joint], "m") if world.robot.prismatic[joint] else (np.rad2deg(first[joint]), "deg")
+    value, unit = reading(float(first[joint]), joint_unit(world.robot.prismatic[joint]))
     why = world.explain(first) or "too close to tell"
     return f"{world.robot.joint_names[joint]} at {value:.3g} {unit}: {why}"
 

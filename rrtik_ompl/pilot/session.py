@@ -14,6 +14,7 @@ import numpy as np
 from rrtik_ompl.arrays import Vector, frozen
 from rrtik_ompl.errors import InputError, RrtikError, UnknownNameError
 from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.moves_text import joint_unit, reading
 from rrtik_ompl.pilot.arguments import LONGEST, fitting
 from rrtik_ompl.pilot.arm import Arm, joint_rates
 from rrtik_ompl.pilot.follower import Follower, Progress, still_free
@@ -164,8 +165,8 @@ class Session:
         self.verdict = judge_move(self.surroundings.world, self.q, joint, target)
         if not self.verdict.allowed:
             room = free_until(self.surroundings.world, self.q, joint, target)
-            factor, unit = (1.0, "m") if self.robot.prismatic[joint] else (float(np.rad2deg(1.0)), "deg")
-            return f"refused: {self.verdict.reason}; free until {factor * room:.4g} {unit}"
+            value, unit = reading(room, joint_unit(self.robot.prismatic[joint]))
+            return f"refused: {self.verdict.reason}; free until {value:.4g} {unit}"
         desired = self.q.copy()
         desired[joint] = target
         self.desired = frozen(desired)

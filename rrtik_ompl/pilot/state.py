@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.moves_text import reading, spoken_moves
+from rrtik_ompl.moves_text import joint_unit, reading, spoken_moves
 from rrtik_ompl.pilot.session import STALE, Session
 
 
@@ -37,7 +37,7 @@ def state_document(session: Session) -> dict[str, Any]:
 def _joints(session: Session) -> list[dict[str, Any]]:
     robot, found = session.robot, []
     for k, name in enumerate(robot.joint_names):
-        unit = "m" if robot.prismatic[k] else "rad"
+        unit = joint_unit(robot.prismatic[k])
         value, shown = reading(float(session.q[k]), unit)
         low, high = float(robot.lower[k]), float(robot.upper[k])
         endless = not np.isfinite(low) or not np.isfinite(high)
@@ -62,7 +62,7 @@ def _object(session: Session, seen: Any) -> dict[str, Any]:
 
 def _room(session: Session) -> list[float | None]:
     """From where to where the selected joint can be driven."""
-    unit = "m" if session.robot.prismatic[session.selected] else "rad"
+    unit = joint_unit(session.robot.prismatic[session.selected])
     return [reading(end, unit)[0] for end in session.room()]
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
@@ -46,6 +47,6 @@ def position_in_base(T_base_camera: Any, base_covariance: Matrix, sight: Sightin
     turn = T_base_camera.rotation
     T_camera_base = T_base_camera.inverse()
     arm = sight.pose.T_camera_object.translation - T_camera_base.translation
-    lever = np.hstack([np.eye(3), -np.array([[0, -arm[2], arm[1]], [arm[2], 0, -arm[0]], [-arm[1], arm[0], 0]])])
+    lever = np.hstack([np.eye(3), -pin.skew(arm)])
     spread = sight.pose.covariance[:3, :3] + lever @ base_covariance @ lever.T
     return pose, turn @ spread @ turn.T

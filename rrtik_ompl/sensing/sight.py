@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.errors import InputError
@@ -109,7 +110,7 @@ def _of_one(camera: Camera, marker: SeenMarker, mounted: Any, sigma: float) -> C
     first, second = found.T_camera_object * T_marker_object, found.other * T_marker_object
     arm = first.translation - found.T_camera_object.translation  # a rotation at the marker moves the object's origin
     lever = np.eye(6)
-    lever[:3, 3:] = -np.array([[0, -arm[2], arm[1]], [arm[2], 0, -arm[0]], [-arm[1], arm[0], 0]])
+    lever[:3, 3:] = -pin.skew(arm)
     return CornerPose(first, second, found.error, found.other_error, lever @ found.covariance @ lever.T)
 
 
