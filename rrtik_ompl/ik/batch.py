@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
 from rrtik_ompl.goal import PoseGoal, joint_difference
-from rrtik_ompl.ik.closed_form import check_poses, form_of, solutions, tip_residuals
+from rrtik_ompl.ik.closed_form import check_poses, form_of, solutions
 from rrtik_ompl.ik.descent import Search, load_kernels
 from rrtik_ompl.ik.face import SECONDS, chosen_method, free_of_collision, solve_ik, usual_posture
 from rrtik_ompl.ik.goal_rows import pose_rows
+from rrtik_ompl.ik.plain_branches import tip_residuals
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 

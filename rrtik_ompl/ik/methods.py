@@ -11,13 +11,14 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.ik.ccd import ccd
-from rrtik_ompl.ik.closed_form import branches_of, family, form_of, has_closed_form, tip_fault
+from rrtik_ompl.ik.closed_form import branches_of, family, form_of, has_closed_form
 from rrtik_ompl.ik.damped import damped_least_squares, pinocchio_iteration
 from rrtik_ompl.ik.fabrik import fabrik, fabrik_misfit
 from rrtik_ompl.ik.genetic.method import genetic
 from rrtik_ompl.ik.hinges import coupled_fault
 from rrtik_ompl.ik.mb_rrt.method import mb_rrt, mb_rrt_misfit
 from rrtik_ompl.ik.numeric import numeric
+from rrtik_ompl.ik.plain_branches import tip_fault
 from rrtik_ompl.ik.projection import projection
 from rrtik_ompl.ik.pso import PARTICLES, pso, resampled_pso
 from rrtik_ompl.ik.question import Answer, Method, Question, Target, tolerances
@@ -39,7 +40,7 @@ def _closed_form(question: Question) -> Answer:
     """All branches of all targets; if none will do, the curves of those that are singular within their tolerances."""
     robot, targets = question.robot, question.targets
     poses = np.array([_matrix(target) for target in targets])
-    hints = np.broadcast_to(question.near, (len(targets), robot.dof))
+    hints = np.array([question.near] * len(targets))
     found = branches_of(robot, poses, hints, check=False)
     q = found.branches[found.valid]
     if len(q) and question.accept(q).any():  # the usual case; forward kinematics judges what is returned
