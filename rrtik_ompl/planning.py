@@ -29,6 +29,7 @@ from rrtik_ompl.ompl_bridge.attempt import (
 )
 from rrtik_ompl.path import SECOND_CHECK, JointPath, Violation
 from rrtik_ompl.problem import Problem
+from rrtik_ompl.random_stream import checked_seed
 
 DEFAULT_PLANNER = "bicrdt"
 RESTARTS = 20
@@ -265,6 +266,4 @@ def _judged(problem: Problem, outcome: Attempt, name: str) -> tuple[JointPath | 
 def _seed(seed: int | None) -> int:
     if seed is None:
         return int(np.random.default_rng().integers(2**31))
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise InputError(f"seed must be a whole number of at least 0, got {seed!r}")
-    return int(seed)
+    return checked_seed(seed)

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, finite_number, frozen
 from rrtik_ompl.goal import PoseGoal, joint_difference
 from rrtik_ompl.ik.closed_form import check_poses, form_of, solutions
 from rrtik_ompl.ik.descent import Search, load_kernels
 from rrtik_ompl.ik.face import SECONDS, chosen_method, free_of_collision, solve_ik, usual_posture
 from rrtik_ompl.ik.goal_rows import pose_rows
 from rrtik_ompl.ik.plain_branches import tip_residuals
+from rrtik_ompl.random_stream import checked_seed
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 
@@ -68,7 +69,7 @@ def solve_ik_batch(
     begin = time.monotonic()
     targets = finite_array(poses, (None, 4, 4), "poses")
     posture = usual_posture(robot) if near is None else robot.configuration(near, "near")
-    limit = float(finite_array(seconds, (), "seconds"))
+    limit, seed = finite_number(seconds, "seconds"), checked_seed(seed)
     q, residuals = np.full((len(targets), robot.dof), np.nan), np.full((len(targets), 2), np.nan)
     reasons, details = [""] * len(targets), [""] * len(targets)
     check_poses(targets, "poses")

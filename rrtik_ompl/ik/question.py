@@ -10,6 +10,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.goal import PoseGoal, PositionGoal, TipGoal
+from rrtik_ompl.random_stream import RandomStream
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 
@@ -28,7 +29,7 @@ class Question:
         accept: Which of some configurations, shape (k, dof), inside the limits and at the goal, will do.
         all: Whether every solution is wanted that the method can find, not just one.
         deadline: Time of ``time.monotonic`` at which to stop.
-        rng: Random numbers.
+        random: Random numbers.
         world: What ``accept`` asks about collisions, for methods that place the arm link by link.
     """
 
@@ -39,8 +40,13 @@ class Question:
     accept: Callable[[Matrix], Mask]
     all: bool
     deadline: float
-    rng: np.random.Generator
+    random: RandomStream
     world: World | None = None
+
+    @property
+    def rng(self) -> np.random.Generator:
+        """Where random numbers come from."""
+        return self.random.rng
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,8 +79,8 @@ class Method:
 def errors(robot: Robot, target: Target, Q: Matrix) -> Matrix:
     """Distance [m] and angle [rad] (0 for a position) of configurations from a target, shape (k, 2)."""
     if isinstance(target, PositionGoal):
-        return np.column_stack([target.distance(robot, Q), np.zeros(len(Q))])
-    return np.column_stack(target.errors(robot, Q))
+        return np.array([target.distance(robot, Q), np.zeros(len(Q))]).T
+    return np.array(target.errors(robot, Q)).T
 
 
 def tolerances(target: Target) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, finite_number, frozen
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.goal import PoseGoal, PositionGoal, joint_difference, pose_errors
 from rrtik_ompl.ik.branch_choice import JUMP, follow
@@ -24,6 +24,7 @@ from rrtik_ompl.ik.methods import METHODS
 from rrtik_ompl.ik.numeric_track import Tracker
 from rrtik_ompl.ik.question import Target
 from rrtik_ompl.ik.restarts import Walk
+from rrtik_ompl.random_stream import RandomStream
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 
@@ -133,10 +134,10 @@ def solve_ik_trajectory(
         targets=tuple(_target(row, position_tolerance, orientation_tolerance) for row in rows),
         near=None if near is None else robot.configuration(near, "near"),
         world=world,
-        jump=float(finite_array(jump, (), "jump")),
+        jump=finite_number(jump, "jump"),
         options=_options(options),
-        rng=np.random.default_rng(seed),
-        deadline=begin + float(finite_array(seconds, (), "seconds")),
+        rng=RandomStream(seed).rng,
+        deadline=begin + finite_number(seconds, "seconds"),
     )
     name = _chosen(task, method)
     q, iterations = FOLLOWERS[name](task)
