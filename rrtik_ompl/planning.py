@@ -16,7 +16,7 @@ from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast.library import library
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.goal_configurations import GoalSearch
-from rrtik_ompl.ik.descent import load_kernels
+from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ompl_bridge.attempt import (
     ANYTIME_PLANNERS,
     ONE_GOAL_PLANNERS,
@@ -128,7 +128,7 @@ def plan(
 def _load_kernels(problem: Problem, factory: PlannerFactory) -> None:
     """Load what the search will ask for: compiling it for the first time is no part of planning."""
     if not isinstance(problem.goal, JointGoal):
-        load_kernels()
+        load_kernels(problem.robot)
     if problem.world.fast is not None:
         for name in getattr(factory, "kernels", ()):
             library(name)

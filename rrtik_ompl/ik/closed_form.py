@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations_with_replacement
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -147,15 +148,18 @@ def check_poses(poses: NDArray[np.float64], what: str) -> None:
     """
     if len(poses) == 0:
         return
-    rotations = poses[:, :3, :3]
-    off = np.abs(np.swapaxes(rotations, 1, 2) @ rotations - np.eye(3)).max(axis=(1, 2))
+    columns = np.ascontiguousarray(poses[:, :3, :3].transpose(2, 1, 0))  # products of these beat small matrices
+    off = np.zeros(len(poses))
+    with np.errstate(over="ignore", invalid="ignore"):
+        for j, k in combinations_with_replacement(range(3), 2):
+            np.maximum(off, np.abs((columns[j] * columns[k]).sum(axis=0) - (j == k)), out=off)
     worst = int(np.argmax(off))
-    if off[worst] > NOT_RIGID:
+    if not off[worst] <= NOT_RIGID:
         raise InputError(
             f"{what}: entry {worst} is no rotation: its columns are {off[worst]:.3g} away from orthonormal "
             f"(at most {NOT_RIGID:g}); make it orthonormal"
         )
-    mirrored = np.flatnonzero(np.linalg.det(rotations) < 0.0)
+    mirrored = np.flatnonzero((np.cross(columns[0], columns[1], axis=0) * columns[2]).sum(axis=0) < 0.0)
     if len(mirrored):
         raise InputError(f"{what}: entry {mirrored[0]} mirrors (determinant -1); a rotation is right-handed")
     odd = np.flatnonzero((np.abs(poses[:, 3] - LAST_ROW) > LAST_ROW_TOLERANCE).any(axis=1))

@@ -20,11 +20,6 @@ AT_A_TIME = 4096  # goals in one call of a kernel, which nothing can interrupt
 PATIENCE = 5  # steps after which a start that has not come nearer is given up
 
 
-def load_kernels() -> None:
-    """Load the kernels before the clock starts: compiling them for the first time is no part of a search."""
-    library(KERNELS)
-
-
 def walk(
     robot: Robot, aims: Matrix, starts: Matrix, *, steps: int = STEPS, patience: int | None = None
 ) -> tuple[Matrix, Mask, int]:

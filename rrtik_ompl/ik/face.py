@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_number, frozen
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.goal import TipGoal, has_task_regions, joint_difference, tip_errors
-from rrtik_ompl.ik.descent import load_kernels
-from rrtik_ompl.ik.methods import METHODS
+from rrtik_ompl.ik.methods import METHODS, load_kernels
 from rrtik_ompl.ik.question import Answer, Question, Target, errors, tolerances
 from rrtik_ompl.ik.targets import targets
 from rrtik_ompl.random_stream import RandomStream
@@ -88,7 +87,7 @@ def solve_ik(
         UnknownNameError: If there is no such method.
         InputError: If the method does not fit the robot and the goal, or an argument makes no sense.
     """
-    load_kernels()
+    load_kernels(robot)
     begin = time.monotonic()
     require(goal, TipGoal, "goal", "inverse kinematics needs a goal of the tip")
     if world is not None and world.robot is not robot:

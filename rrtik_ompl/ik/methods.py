@@ -9,6 +9,8 @@ from types import MappingProxyType
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.fast import branch_layout, ik_layout
+from rrtik_ompl.fast.library import library
 from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.ik.ccd import ccd
 from rrtik_ompl.ik.closed_form import branches_of, family, form_of, has_closed_form
@@ -26,6 +28,13 @@ from rrtik_ompl.ik.restarts import ROUNDS, STARTS, Walk, restarted
 from rrtik_ompl.robot import Robot
 
 ENOUGH = 4  # starts that arrive before the others of a round are given up
+
+
+def load_kernels(robot: Robot) -> None:
+    """Load what the methods may ask before the clock starts: compiling it for the first time is no part of a search."""
+    library(ik_layout.KERNELS)
+    if has_closed_form(robot) and form_of(robot).kernel:
+        library(branch_layout.KERNELS)
 
 
 def _closed_form_misfit(robot: Robot, target: Target) -> str:

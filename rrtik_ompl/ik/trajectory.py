@@ -16,11 +16,11 @@ from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.goal import PoseGoal, PositionGoal, joint_difference, pose_errors
 from rrtik_ompl.ik.branch_choice import JUMP, follow
 from rrtik_ompl.ik.closed_form import check_poses, form_of
-from rrtik_ompl.ik.descent import descend, load_kernels
+from rrtik_ompl.ik.descent import descend
 from rrtik_ompl.ik.face import free_of_collision, solve_ik
 from rrtik_ompl.ik.genetic.options import PRESETS, GeneticOptions
 from rrtik_ompl.ik.genetic.search import follow_targets
-from rrtik_ompl.ik.methods import METHODS
+from rrtik_ompl.ik.methods import METHODS, load_kernels
 from rrtik_ompl.ik.numeric_track import Tracker
 from rrtik_ompl.ik.question import Target
 from rrtik_ompl.ik.restarts import Walk
@@ -123,7 +123,7 @@ def solve_ik_trajectory(
         UnknownNameError: If there is no such method or preset.
         InputError: If the method does not fit the robot, a pose is none, or an argument makes no sense.
     """
-    load_kernels()
+    load_kernels(robot)
     begin = time.monotonic()
     if world is not None and world.robot is not robot:
         raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
