@@ -9,11 +9,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_number, frozen
+from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.goal import TipGoal, has_task_regions, joint_difference, tip_errors
 from rrtik_ompl.ik.methods import METHODS, load_kernels
-from rrtik_ompl.ik.question import Answer, Question, Target, errors, tolerances
+from rrtik_ompl.ik.question import Answer, Question, Target, check_arm, errors, time_limit, tolerances
 from rrtik_ompl.ik.targets import targets
 from rrtik_ompl.random_stream import RandomStream
 from rrtik_ompl.robot import Robot
@@ -87,12 +87,11 @@ def solve_ik(
         UnknownNameError: If there is no such method.
         InputError: If the method does not fit the robot and the goal, or an argument makes no sense.
     """
+    check_arm(robot, world)
     load_kernels(robot)
     begin = time.monotonic()
     require(goal, TipGoal, "goal", "inverse kinematics needs a goal of the tip")
-    if world is not None and world.robot is not robot:
-        raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
-    limit, random = finite_number(seconds, "seconds"), RandomStream(seed)
+    limit, random = time_limit(seconds), RandomStream(seed)
     posture = usual_posture(robot) if near is None else robot.configuration(near, "near")
     drawn = (goal,) if isinstance(goal, Target) else tuple(targets(goal, DRAWS, random.rng))
     name = chosen_method(robot, drawn, method)

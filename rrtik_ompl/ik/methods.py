@@ -58,10 +58,12 @@ def _closed_form(question: Question) -> Answer:
     rows, owner = found.branches.reshape(-1, robot.dof), np.repeat(np.arange(len(targets)), found.real.shape[1])
     residuals = np.asarray(found.residuals).reshape(-1, 2)
     near_enough = residuals <= np.array([tolerances(target) for target in targets])[owner]
-    q = rows[robot.within_limits(rows) & near_enough.all(axis=1)]
+    reaching = near_enough.all(axis=1)
+    q = rows[robot.within_limits(rows) & reaching]
     if not question.accept(q).any():
         q = np.vstack([q, *(family(robot, _matrix(target), slack=_slack(target)) for target in targets)])
-    best = int(np.argmin(residuals.sum(axis=1)))
+    outside = np.maximum(robot.lower - rows, rows - robot.upper).max(axis=1)
+    best = int(np.argmin(np.where(reaching, outside, np.inf) if reaching.any() else residuals.sum(axis=1)))
     return Answer(q, rows[best], targets[int(owner[best])])
 
 

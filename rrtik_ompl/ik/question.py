@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_number
+from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import PoseGoal, PositionGoal, TipGoal
 from rrtik_ompl.random_stream import RandomStream
 from rrtik_ompl.robot import Robot
@@ -74,6 +76,30 @@ class Method:
 
     misfit: Callable[[Robot, Target], str]
     run: Callable[[Question], Answer]
+
+
+def check_arm(robot: Robot, world: World | None) -> None:
+    """Refuse what is no robot, or a world that holds another one.
+
+    Raises:
+        InputError: It says which.
+    """
+    require(robot, Robot, "robot", "use load_robot(name or file)")
+    require(world, World | None, "world", "make it with World(robot, scene)")
+    if world is not None and world.robot is not robot:
+        raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
+
+
+def time_limit(seconds: ArrayLike) -> float:
+    """Time [s] that a method may take.
+
+    Raises:
+        InputError: If it is no number of at least 0.
+    """
+    limit = finite_number(seconds, "seconds")
+    if limit < 0.0:
+        raise InputError(f"seconds must be at least 0, got {limit:g}")
+    return limit
 
 
 def errors(robot: Robot, target: Target, Q: Matrix) -> Matrix:

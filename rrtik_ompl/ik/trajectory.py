@@ -22,7 +22,7 @@ from rrtik_ompl.ik.genetic.options import PRESETS, GeneticOptions
 from rrtik_ompl.ik.genetic.search import follow_targets
 from rrtik_ompl.ik.methods import METHODS, load_kernels
 from rrtik_ompl.ik.numeric_track import Tracker
-from rrtik_ompl.ik.question import Target
+from rrtik_ompl.ik.question import Target, check_arm, time_limit
 from rrtik_ompl.ik.restarts import Walk
 from rrtik_ompl.random_stream import RandomStream
 from rrtik_ompl.robot import Robot
@@ -123,10 +123,9 @@ def solve_ik_trajectory(
         UnknownNameError: If there is no such method or preset.
         InputError: If the method does not fit the robot, a pose is none, or an argument makes no sense.
     """
+    check_arm(robot, world)
     load_kernels(robot)
     begin = time.monotonic()
-    if world is not None and world.robot is not robot:
-        raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
     rows = _checked(poses)
     task = Task(
         robot=robot,
@@ -137,7 +136,7 @@ def solve_ik_trajectory(
         jump=finite_number(jump, "jump"),
         options=_options(options),
         rng=RandomStream(seed).rng,
-        deadline=begin + finite_number(seconds, "seconds"),
+        deadline=begin + time_limit(seconds),
     )
     name = _chosen(task, method)
     q, iterations = FOLLOWERS[name](task)
