@@ -24,8 +24,9 @@ import numpy as np
 from ik_peers import eaik_robot
 
 from rrtik_ompl import load_robot
-from rrtik_ompl.ik.closed_form import solutions
+from rrtik_ompl.ik.closed_form import form_of, solutions
 from rrtik_ompl.ik.form import wrapped
+from rrtik_ompl.ik.plain_branches import plain_branches
 from rrtik_ompl.robot import Robot
 from rrtik_robots.puma560 import singular_samples as puma_samples
 from rrtik_robots.titan4 import singular_samples as titan_samples
@@ -93,6 +94,7 @@ def speeds(robot: Robot, repeats: int, rng: np.random.Generator) -> dict[str, fl
     work: dict[str, Callable[[], Any]] = {
         "all branches, limits": partial(solutions, robot, poses, check=False),
         "and residuals of all": partial(solutions, robot, poses),
+        "in numpy": partial(plain_branches, robot, form_of(robot), poses, None, 0.0, True),
     }
     if find_spec("eaik") is not None and robot.dof == 6:
         other, at_zero = eaik_robot(robot)
@@ -156,12 +158,19 @@ def report(quick: bool) -> list[str]:
             f"{done.flagged:.3%} | {done.asked_near:.3%} | {done.position:.1e} | {done.angle:.1e} |"
         )
     lines += ["", "## Speed", "", f"Poses per second of CPU time, one thread, batches of {BATCH}.", ""]
-    lines += ["| robot | branches | all branches, limits | and residuals of all | EAIK |", "|---|---|---|---|---|"]
+    lines += [
+        "Of arms with six joints kernels do the work; beside them the same in numpy, which arms without a kernel use.",
+        "",
+    ]
+    lines += [
+        "| robot | branches | all branches, limits | and residuals of all | this in numpy | EAIK |",
+        "|---|---|---|---|---|---|",
+    ]
     for name, branches in (("titan4", 8), ("puma560", 8), ("puma560_3dof", 4), ("planar3", 2)):
         got = speeds(load_robot(name), 3 if quick else 9, rng)
         other = f"{got['EAIK']:,.0f}" if "EAIK" in got else "-"
-        bare, checked = got["all branches, limits"], got["and residuals of all"]
-        lines.append(f"| {name} | {branches} | {bare:,.0f} | {checked:,.0f} | {other} |")
+        bare, checked, plain = got["all branches, limits"], got["and residuals of all"], got["in numpy"]
+        lines.append(f"| {name} | {branches} | {bare:,.0f} | {checked:,.0f} | {plain:,.0f} | {other} |")
     if find_spec("eaik") is not None:
         lines += ["", "## The same solutions as EAIK", ""]
         for name in ("titan4", "puma560"):

@@ -49,15 +49,24 @@ def finite_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) ->
     return array
 
 
+def finite_number(value: ArrayLike, what: str) -> float:
+    """A number given by a user.
+
+    Raises:
+        InputError: If it is none, or not finite.
+    """
+    if type(value) is float and -np.inf < value < np.inf:
+        return value
+    return float(finite_array(value, (), what))
+
+
 def positive(value: ArrayLike, what: str) -> float:
     """A number greater than 0 given by a user.
 
     Raises:
         InputError: If it is none.
     """
-    if type(value) is float and 0.0 < value < np.inf:
-        return value
-    number = float(finite_array(value, (), what))
+    number = finite_number(value, what)
     if number <= 0.0:
         raise InputError(f"{what} must be greater than 0, got {number:g}")
     return number

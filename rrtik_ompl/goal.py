@@ -22,7 +22,9 @@ NO_BOX = frozen([0.0, 0.0, 0.0])
 
 def joint_difference(robot: Robot, Q: ArrayLike, q: ArrayLike) -> NDArray[np.float64]:
     """``Q - q`` per joint, continuous joints the short way round (into [-pi, pi]). Shape of Q."""
-    difference = np.asarray(Q, dtype=np.float64) - np.asarray(q, dtype=np.float64)
+    difference: NDArray[np.float64] = np.asarray(Q, dtype=np.float64) - np.asarray(q, dtype=np.float64)
+    if not robot.continuous.any():
+        return difference
     turned = (difference + np.pi) % (2.0 * np.pi) - np.pi
     shortest: NDArray[np.float64] = np.where(robot.continuous, turned, difference)
     return shortest
@@ -194,7 +196,7 @@ def tip_errors(goal: TipGoal, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vecto
 def pose_errors(tips: NDArray[np.float64], target: Any) -> tuple[Vector, Vector]:
     """Distance [m] and rotation angle [rad] between poses, shape (m, 4, 4), and one target pose."""
     away = tips[:, :3, 3] - target.translation
-    position: Vector = np.sqrt(np.einsum("mi,mi->m", away, away))
+    position: Vector = np.hypot(np.hypot(away[:, 0], away[:, 1]), away[:, 2])
     return position, rotation_angles(target.rotation.T @ tips[:, :3, :3])
 
 

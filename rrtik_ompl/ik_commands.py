@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -131,7 +132,11 @@ def _goal(asked: Asked, position: Any, quaternion: Any, rpy_deg: Any, tolerances
     if position is None:
         if quaternion or rpy_deg or asked.goal is None:
             raise InputError("where to? give --position X Y Z, --problem NAME with a goal, or --poses FILE")
-        return PoseGoal(asked.robot.fk(asked.goal.q), **tolerances) if isinstance(asked.goal, JointGoal) else asked.goal
+        if isinstance(asked.goal, JointGoal):
+            return PoseGoal(asked.robot.fk(asked.goal.q), **tolerances)
+        if tolerances:
+            raise InputError("the problem's goal brings its tolerances: leave out --tolerance-mm and --tolerance-deg")
+        return asked.goal
     if quaternion:
         return PoseGoal(pose(position, quaternion, "--position, --quaternion"), **tolerances)
     if rpy_deg:
@@ -142,7 +147,13 @@ def _goal(asked: Asked, position: Any, quaternion: Any, rpy_deg: Any, tolerances
 def _point(position: Any, tolerances: dict[str, float]) -> Any:
     from rrtik_ompl import PositionGoal
 
+    _no_angle(tolerances)
     return PositionGoal(position, tolerances.get("position_tolerance", 1e-3))
+
+
+def _no_angle(tolerances: dict[str, float]) -> None:
+    if "orientation_tolerance" in tolerances:
+        raise InputError("--tolerance-deg: a point has no orientation; leave it out, or ask for a pose")
 
 
 def _one(asked: Asked, goal: Any, everything: bool, common: dict[str, Any], output: Output) -> int:
@@ -185,12 +196,14 @@ def _many(
     from rrtik_ompl.pose_file import load_poses
 
     robot, rows = asked.robot, load_poses(file)
+    if rows.ndim == 2:
+        _no_angle(tolerances)
     with progress(f"inverse kinematics of {_count(len(rows), 'pose')}"):
         if trajectory:
             q, residuals, reasons, notes, line = _followed(robot, rows, tolerances, common)
         else:
-            q, residuals, reasons = _each(robot, rows, tolerances, common)
-            notes, line = [""] * len(rows), ""
+            q, residuals, reasons, line = _each(robot, rows, tolerances, common)
+            notes = [""] * len(rows)
     found = sum(not reason for reason in reasons)
     if output.as_json:
         more = {"jumps": [k for k, note in enumerate(notes) if "jump" in note]} if trajectory else {}
@@ -209,22 +222,29 @@ def _many(
 
 
 def _each(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[str, Any]) -> Any:
-    """Joint values, residuals and reasons: poses as one batch where that takes the options, else one by one."""
+    """Joint values, residuals, reasons and a line of the first failure: as one batch unless tolerances are given."""
     import numpy as np
 
     from rrtik_ompl import PoseGoal, solve_ik, solve_ik_batch
 
-    if rows.ndim == 3 and common["method"] == "auto" and not tolerances:
-        batch = solve_ik_batch(robot, rows, **{name: value for name, value in common.items() if name != "method"})
-        return batch.q, batch.residuals, list(batch.reasons)
-    q, residuals, reasons = np.full((len(rows), robot.dof), np.nan), np.full((len(rows), 2), np.nan), []
+    if rows.ndim == 3 and not tolerances:
+        batch = solve_ik_batch(robot, rows, **common)
+        return batch.q, batch.residuals, list(batch.reasons), _first_fault(batch.reasons, batch.details)
+    q, residuals = np.full((len(rows), robot.dof), np.nan), np.full((len(rows), 2), np.nan)
+    reasons, details = [], []
     for k, row in enumerate(rows):
         goal = _point(row, tolerances) if rows.ndim == 2 else PoseGoal(row, **tolerances)
         result = solve_ik(robot, goal, **{**common, "seed": common["seed"] + k})
         reasons.append(result.reason)
+        details.append(result.detail)
         if result.found:
             q[k], residuals[k] = result.solutions[0], result.residuals[0]
-    return q, residuals, reasons
+    return q, residuals, reasons, _first_fault(reasons, details)
+
+
+def _first_fault(reasons: Sequence[str], details: Sequence[str]) -> str:
+    """The number of the first row without a solution and its detail, to be hung on a line; "" if all have one."""
+    return next((f"; no. {k + 1}: {details[k]}" for k, reason in enumerate(reasons) if reason), "")
 
 
 def _followed(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[str, Any]) -> Any:
@@ -239,8 +259,7 @@ def _followed(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[
             notes[k] = f"{notes[k]}, {text}" if notes[k] else text
     line = f", {_count(len(done.jumps), 'jump')}, {done.method}, {_time(done)}"
     if done.detail:  # which counts its points from 0
-        first = next(k for k, reason in enumerate(done.reasons) if reason)
-        line += f"; no. {first + 1}: {done.detail.partition(': ')[2]}"
+        line += _first_fault(done.reasons, [done.detail.partition(": ")[2]] * len(rows))
     return done.q, done.residuals, list(done.reasons), notes, line
 
 

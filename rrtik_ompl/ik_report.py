@@ -14,8 +14,9 @@ from rich.table import Table
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.goal import PoseGoal, PositionGoal, joint_difference
-from rrtik_ompl.ik.closed_form import form_of, has_closed_form, solutions, tip_fault
+from rrtik_ompl.ik.closed_form import form_of, has_closed_form, solutions
 from rrtik_ompl.ik.face import IkResult
+from rrtik_ompl.ik.plain_branches import tip_fault
 from rrtik_ompl.robot import Robot
 
 SAME = 1e-5  # [rad] or [m]; a double root is known to the square root of the rounding

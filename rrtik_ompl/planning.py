@@ -16,7 +16,7 @@ from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast.library import library
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.goal_configurations import GoalSearch
-from rrtik_ompl.ik.descent import load_kernels
+from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ompl_bridge.attempt import (
     ANYTIME_PLANNERS,
     ONE_GOAL_PLANNERS,
@@ -29,6 +29,7 @@ from rrtik_ompl.ompl_bridge.attempt import (
 )
 from rrtik_ompl.path import SECOND_CHECK, JointPath, Violation
 from rrtik_ompl.problem import Problem
+from rrtik_ompl.random_stream import checked_seed
 
 DEFAULT_PLANNER = "bicrdt"
 RESTARTS = 20
@@ -127,7 +128,7 @@ def plan(
 def _load_kernels(problem: Problem, factory: PlannerFactory) -> None:
     """Load what the search will ask for: compiling it for the first time is no part of planning."""
     if not isinstance(problem.goal, JointGoal):
-        load_kernels()
+        load_kernels(problem.robot)
     if problem.world.fast is not None:
         for name in getattr(factory, "kernels", ()):
             library(name)
@@ -265,6 +266,4 @@ def _judged(problem: Problem, outcome: Attempt, name: str) -> tuple[JointPath | 
 def _seed(seed: int | None) -> int:
     if seed is None:
         return int(np.random.default_rng().integers(2**31))
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise InputError(f"seed must be a whole number of at least 0, got {seed!r}")
-    return int(seed)
+    return checked_seed(seed)

@@ -83,8 +83,8 @@ def unit_vector(values: ArrayLike, what: str) -> Vector:
 
 def rotation_angles(rotations: NDArray[np.float64]) -> Vector:
     """Angle of rotations, shape (m, 3, 3): atan2(|R - R^T| / (2 sqrt 2), (tr R - 1) / 2), accurate near 0 and pi."""
-    skew = rotations - np.swapaxes(rotations, 1, 2)
-    sine = np.sqrt(np.einsum("mij,mij->m", skew, skew) / 8.0)
+    skew = (rotations - np.swapaxes(rotations, 1, 2)).reshape(len(rotations), 9)
+    sine = np.sqrt(np.vecdot(skew, skew) / 8.0)
     angle: Vector = np.arctan2(sine, 0.5 * (np.einsum("mii->m", rotations) - 1.0))
     return angle
 

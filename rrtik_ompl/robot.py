@@ -127,8 +127,9 @@ class Robot:
     def within_limits(self, Q: ArrayLike, tolerance: float = LIMIT_TOLERANCE) -> Mask:
         """Which of the configurations Q, shape (m, dof), lie inside the limits. Shape (m,)."""
         rows = self._rows(Q)
-        inside: Mask = np.all((rows >= self.lower - tolerance) & (rows <= self.upper + tolerance), axis=1)
-        return inside
+        inside: Mask = (rows >= self.lower - tolerance) & (rows <= self.upper + tolerance)
+        fits: Mask = np.logical_and.reduce(inside, axis=1)
+        return fits
 
     def finite_range(self) -> tuple[Vector, Vector]:
         """Bounds to draw configurations in, shapes (dof,): the limits, half a turn (or 3.14 m) where there is none."""
@@ -149,7 +150,7 @@ class Robot:
 
     def clamp(self, q: Vector) -> Vector:
         """Move values that lie up to any distance outside onto the limits. Shape as given."""
-        clamped: Vector = np.clip(q, self.lower, self.upper)
+        clamped: Vector = np.minimum(np.maximum(q, self.lower), self.upper)
         return clamped
 
     def joint_values(self, Q: ArrayLike) -> Matrix:

@@ -98,6 +98,10 @@ def test_an_arm_whose_axes_are_not_parallel_is_no_planar_arm():
     [
         (lambda T: T.__setitem__((1, 0, 0), np.nan), r"targets: every number must be finite, but entry \[1, 0, 0\]"),
         (lambda T: T.__setitem__((2, slice(3), slice(3)), 1.1 * np.eye(3)), "entry 2 is no rotation: .* 0.21 away"),
+        (
+            lambda T: T.__setitem__((1, slice(3), slice(3)), [[1e200, 1e200, 0], [1e200, -1e200, 0], [0, 0, 1]]),
+            "entry 1",
+        ),
         (lambda T: T.__setitem__((2, slice(3), 0), -T[2, :3, 0]), "entry 2 mirrors"),
     ],
 )

@@ -51,7 +51,13 @@ def functions(first, second, out):
 def comparisons(first, second):
     x, y = lanes.lanes_at(first, 0), lanes.lanes_at(second, 0)
     both = lanes.bits((x < y) & (x > np.float32(0.0)))
-    return lanes.bits(x < y), lanes.bits(x <= y), lanes.bits(x > y), lanes.bits(x >= y), both
+    either = lanes.bits((x < y) | (x > np.float32(0.0)))
+    return lanes.bits(x < y), lanes.bits(x <= y), lanes.bits(x > y), lanes.bits(x >= y), both, either
+
+
+@kernel
+def truths(first, out):
+    lanes.set_truths(out, 1, lanes.lanes_at(first, 0) > np.float32(0.0))
 
 
 @kernel
@@ -109,8 +115,15 @@ def test_comparisons_give_one_bit_a_lane(seed):
     x, y = numbers(seed), numbers(seed + 100)
     y[::3] = x[::3]
     found = comparisons(address(x), address(y))
-    masks = [sign(x, y) for sign in (operator.lt, operator.le, operator.gt, operator.ge)] + [(x < y) & (x > 0)]
+    masks = [sign(x, y) for sign in (operator.lt, operator.le, operator.gt, operator.ge)]
+    masks += [(x < y) & (x > 0), (x < y) | (x > 0)]
     assert list(found) == [sum(1 << k for k in np.flatnonzero(mask).tolist()) for mask in masks]
+
+
+def test_masks_are_written_as_truth_values_of_numpy():
+    x, out = numbers(3), np.ones(WIDTH + 2, dtype=np.bool_)
+    truths(address(x), address(out))
+    assert out.tolist() == [True, *(x > 0).tolist(), True]
 
 
 def test_wide_lanes_compute_in_float64():

@@ -114,7 +114,8 @@ def test_a_file_of_poses_is_answered_row_by_row_and_one_without_solution_is_exit
     assert [row["no solution"] for row in rows] == ["", "", "unreachable"]
     assert float(rows[0]["off [mm]"]) < 1e-6
     assert rows[2]["joint1 [deg]"] == ""
-    assert "2 of 3 poses solved" in rrtik(capsys, "ik", "puma560", "--poses", file)[1]
+    out = rrtik(capsys, "ik", "puma560", "--poses", file)[1]
+    assert "2 of 3 poses solved; no. 3: the nearest posture is 8." in out
 
 
 def test_a_trajectory_is_followed_without_jumps_and_played_in_a_page(capsys, tmp_path):
@@ -168,6 +169,10 @@ def test_a_page_shows_every_solution_as_a_ghost(capsys, tmp_path):
         (["puma560", "--position", 1, 0, 0, "--json", "--csv"], "not both"),
         (["puma560", "--poses", "none.csv"], "none.csv: no such file"),
         (["puma560", "--position", 1, 0, 0, "--html", "page.pdf"], "unknown ending '.pdf'"),
+        (["puma560", "--position", 1, 0, 0, "--seed", -1], "seed must be a whole number of at least 0, got -1"),
+        (["puma560", "--position", 1, 0, 0, "--seconds", -1], "seconds must be at least 0, got -1"),
+        (["puma560", "--position", 1, 0, 0, "--tolerance-deg", 1], "--tolerance-deg: a point has no orientation"),
+        (["--problem", "puma_position", "--tolerance-mm", 2], "goal brings its tolerances: leave out --tolerance-mm"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_2(capsys, arguments, said):

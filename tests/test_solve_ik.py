@@ -172,6 +172,36 @@ def test_bad_arguments_are_refused_in_one_line():
         solve_ik(titan, rrtik.JointGoal(np.zeros(6)))
 
 
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"seed": -1}, "seed must be a whole number of at least 0, got -1"),
+        ({"seed": 1.5}, "seed must be a whole number of at least 0, got 1.5"),
+        ({"seed": None}, "seed must be a whole number of at least 0, got None"),
+        ({"seconds": -1.0}, "seconds must be at least 0, got -1"),
+        ({"seconds": np.inf}, "seconds: must be a finite number, got inf"),
+        ({"world": "empty"}, "world must be of type World or NoneType, got str; make it with World"),
+        ({"robot": "titan4"}, r"robot must be of type Robot, got str; use load_robot\(name or file\)"),
+    ],
+)
+def test_every_face_refuses_the_same_arguments(arguments, said):
+    titan = rrtik.load_robot("titan4")
+    asked = {"robot": titan} | arguments
+    tip = titan.fk(Q_TITAN)
+    for face, goal in ((solve_ik, "goal"), (rrtik.solve_ik_batch, "poses"), (rrtik.solve_ik_trajectory, "poses")):
+        with pytest.raises(InputError, match=said):
+            face(**asked, **{goal: rrtik.PoseGoal(tip) if goal == "goal" else tip.homogeneous[None]})
+
+
+def test_the_joint_that_forbids_a_pose_is_of_the_branch_that_breaks_the_limits_least():
+    titan = rrtik.load_robot("titan4")
+    q = np.radians([30.0, 80.0, -130.0, -20.0, 40.0, 124.0])
+    result = solve_ik(titan, pose_goal(titan, q), method="closed-form")
+    assert result.detail == (
+        "the arm could reach the goal, but joint 'wrist_rotate' is at 124 deg, outside its limits -120 .. 120 deg"
+    )
+
+
 def test_with_a_tip_that_the_last_joint_does_not_carry_auto_is_numeric():
     robot = rrtik.load_robot("titan4", tip="wrist")
     goal = rrtik.PoseGoal(robot.fk(Q_TITAN))

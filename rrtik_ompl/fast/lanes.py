@@ -124,12 +124,14 @@ for _symbol, _name in ((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">
 
 
 @infer_global(operator.and_)
-class _Both(AbstractTemplate):  # type: ignore[misc]
+@infer_global(operator.or_)
+class _Joined(AbstractTemplate):  # type: ignore[misc]
     def generic(self, args: Any, kws: Any) -> Any:
         return signature(LANE_MASK, *args) if args == (LANE_MASK, LANE_MASK) else None
 
 
 lower_builtin(operator.and_, MaskType, MaskType)(lambda context, builder, sig, args: builder.and_(*args))
+lower_builtin(operator.or_, MaskType, MaskType)(lambda context, builder, sig, args: builder.or_(*args))
 
 
 def _lane_function(name: str, count: int) -> Any:
@@ -265,6 +267,19 @@ def _writer(element: Any, value_type: Any, align: int) -> Any:
         return context.get_dummy_value()
 
     return intrinsic(lambda typingctx, address, index, value: (types.void(types.int64, types.int64, value_type), emit))
+
+
+@_lowered
+def set_truths(typingctx: Any, address: Any, index: Any, mask: Any) -> Any:
+    """Write a mask as ``WIDTH`` bytes of 0 or 1, the first at an index of an array of numpy's truth values."""
+
+    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        place = builder.add(args[0], args[1])
+        kind = ir.VectorType(ir.IntType(8), WIDTH)
+        builder.store(builder.zext(args[2], kind), builder.inttoptr(place, kind.as_pointer()), align=1)
+        return context.get_dummy_value()
+
+    return types.void(types.int64, types.int64, mask), emit
 
 
 lanes_at = _reader(_vector(LANES), LANES, ALIGNMENT // 2)

@@ -10,10 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
 from rrtik_ompl.goal import PoseGoal, joint_difference
-from rrtik_ompl.ik.closed_form import check_poses, form_of, solutions, tip_residuals
-from rrtik_ompl.ik.descent import Search, load_kernels
+from rrtik_ompl.ik.closed_form import check_poses, form_of, solutions
+from rrtik_ompl.ik.descent import Search
 from rrtik_ompl.ik.face import SECONDS, chosen_method, free_of_collision, solve_ik, usual_posture
 from rrtik_ompl.ik.goal_rows import pose_rows
+from rrtik_ompl.ik.methods import load_kernels
+from rrtik_ompl.ik.plain_branches import tip_residuals
+from rrtik_ompl.ik.question import check_arm, time_limit
+from rrtik_ompl.random_stream import checked_seed
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 
@@ -63,11 +67,12 @@ def solve_ik_batch(
         UnknownNameError: If there is no such method.
         InputError: If a pose is none, the method does not fit the robot, or an argument makes no sense.
     """
-    load_kernels()
+    check_arm(robot, world)
+    load_kernels(robot)
     begin = time.monotonic()
     targets = finite_array(poses, (None, 4, 4), "poses")
     posture = usual_posture(robot) if near is None else robot.configuration(near, "near")
-    limit = float(finite_array(seconds, (), "seconds"))
+    limit, seed = time_limit(seconds), checked_seed(seed)
     q, residuals = np.full((len(targets), robot.dof), np.nan), np.full((len(targets), 2), np.nan)
     reasons, details = [""] * len(targets), [""] * len(targets)
     check_poses(targets, "poses")

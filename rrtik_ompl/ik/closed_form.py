@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any
+from itertools import combinations_with_replacement
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix, finite_array
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.ik.form import ClosedFormSolver, wrapped
+from rrtik_ompl.ik.form import ClosedFormSolver
+from rrtik_ompl.ik.kernel_branches import kernel_branches
+from rrtik_ompl.ik.plain_branches import plain_branches, tip_fault
 from rrtik_ompl.ik.planar import planar_form
-from rrtik_ompl.ik.tip_columns import tip_columns
 from rrtik_ompl.poses import LAST_ROW, LAST_ROW_TOLERANCE, NOT_RIGID
-from rrtik_ompl.robot import FEW, LIMIT_TOLERANCE, Robot
+from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
 
-BLOCK = 2048  # targets at a time: their arrays stay in the cache
 SWEEP = 72  # samples of a singular pose's curve of solutions
-TURN = 2.0 * np.pi
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,14 +64,6 @@ def has_closed_form(robot: Robot) -> bool:
     return isinstance(robot.closed_form, ClosedFormSolver) or planar_form(robot) is not None
 
 
-def tip_fault(robot: Robot, form: ClosedFormSolver) -> str:
-    """A line if the robot's tip is carried by another joint than the frame that the form places; else ""."""
-    tip, own = (robot.model.frames[robot.model.getFrameId(name)] for name in (robot.tip, form.frame))
-    if tip.parentJoint == own.parentJoint:
-        return ""
-    return f"its closed form places '{form.frame}', and the tip '{robot.tip}' does not move with that frame"
-
-
 def solutions(
     robot: Robot, targets: ArrayLike, *, near: ArrayLike | None = None, slack: float = 0.0, check: bool = True
 ) -> ClosedForm:
@@ -100,26 +90,16 @@ def branches_of(
 ) -> ClosedForm:
     """As `solutions`, for poses and configurations near them, one for each, that need no check any more."""
     form = form_of(robot)
-    parts = []
-    for begin in range(0, max(len(poses), 1), BLOCK):
-        rows = slice(begin, begin + BLOCK)
-        parts.append(_block(robot, form, poses[rows], None if hints is None else hints[rows], slack, check))
-    joined = parts[0] if len(parts) == 1 else [np.concatenate(each, axis=-1) for each in zip(*parts, strict=True)]
-    for array in joined:
+    fault = tip_fault(robot, form)
+    if fault:
+        raise InputError(f"robot '{robot.name}': {fault}; method 'numeric' fits every tip")
+    answers = kernel_branches(robot, form, poses, hints, slack, check)
+    if answers is None:
+        answers = plain_branches(robot, form, poses, hints, slack, check)
+    for array in answers:
         array.setflags(write=False)
-    q, real, valid, singular, residuals = joined
+    q, real, valid, singular, residuals = answers
     return ClosedForm(q.T, real.T, valid.T, singular, residuals.T if check else None)
-
-
-def _block(
-    robot: Robot, form: ClosedFormSolver, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool
-) -> list[NDArray[Any]]:
-    """What `ClosedForm` holds, the targets in the last axis, for as many as the cache has room for."""
-    found = form(_placed(robot, form, poses), hints, slack)
-    q, real = np.array(found.q.T, order="C"), np.array(found.real.T)
-    valid = real & _turn_inside(robot, q, hints)
-    residuals = tip_residuals(robot, q, poses, form.kind == "pose") if check else np.zeros((2, 0, len(poses)))
-    return [q, real, valid, np.array(found.singular), residuals]
 
 
 def family(robot: Robot, target: ArrayLike, *, samples: int = SWEEP, slack: float = 0.0) -> Matrix:
@@ -168,15 +148,18 @@ def check_poses(poses: NDArray[np.float64], what: str) -> None:
     """
     if len(poses) == 0:
         return
-    rotations = poses[:, :3, :3]
-    off = np.abs(np.swapaxes(rotations, 1, 2) @ rotations - np.eye(3)).max(axis=(1, 2))
+    columns = np.ascontiguousarray(poses[:, :3, :3].transpose(2, 1, 0))  # products of these beat small matrices
+    off = np.zeros(len(poses))
+    with np.errstate(over="ignore", invalid="ignore"):
+        for j, k in combinations_with_replacement(range(3), 2):
+            np.maximum(off, np.abs((columns[j] * columns[k]).sum(axis=0) - (j == k)), out=off)
     worst = int(np.argmax(off))
-    if off[worst] > NOT_RIGID:
+    if not off[worst] <= NOT_RIGID:
         raise InputError(
             f"{what}: entry {worst} is no rotation: its columns are {off[worst]:.3g} away from orthonormal "
             f"(at most {NOT_RIGID:g}); make it orthonormal"
         )
-    mirrored = np.flatnonzero(np.linalg.det(rotations) < 0.0)
+    mirrored = np.flatnonzero((np.cross(columns[0], columns[1], axis=0) * columns[2]).sum(axis=0) < 0.0)
     if len(mirrored):
         raise InputError(f"{what}: entry {mirrored[0]} mirrors (determinant -1); a rotation is right-handed")
     odd = np.flatnonzero((np.abs(poses[:, 3] - LAST_ROW) > LAST_ROW_TOLERANCE).any(axis=1))
@@ -189,85 +172,3 @@ def _hints(robot: Robot, near: ArrayLike, count: int) -> Matrix:
     if np.ndim(near) < 2:
         return np.broadcast_to(robot.configuration(near, "near"), (count, robot.dof))
     return finite_array(near, (count, robot.dof), "near")
-
-
-def _placed(robot: Robot, form: ClosedFormSolver, poses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """T_base_frame for T_world_tip: the base may stand anywhere, and the tip may be another frame of the last link."""
-    fault = tip_fault(robot, form)
-    if fault:
-        raise InputError(f"robot '{robot.name}': {fault}; method 'numeric' fits every tip")
-    T_base_world, T_tip_frame = _mountings(robot, form)
-    if T_base_world is not None:
-        poses = T_base_world @ poses
-    return poses if T_tip_frame is None else poses @ T_tip_frame
-
-
-@lru_cache(maxsize=64)
-def _mountings(robot: Robot, form: ClosedFormSolver) -> tuple[Matrix | None, Matrix | None]:
-    """T_base_world and T_tip_frame, None where they are the identity."""
-    frames = robot.model.frames
-    base, tip, own = (frames[robot.model.getFrameId(name)] for name in (robot.link_names[0], robot.tip, form.frame))
-    mountings = (base.placement.inverse().homogeneous, (tip.placement.inverse() * own.placement).homogeneous)
-    before, after = (None if np.array_equal(matrix, np.eye(4)) else matrix for matrix in mountings)
-    return before, after
-
-
-def _turn_inside(robot: Robot, q: NDArray[np.float64], near: Matrix | None) -> NDArray[np.bool_]:
-    """Turn joints by full turns into their limits, towards ``near`` if there is room; which configurations fit.
-
-    Args:
-        robot: The arm.
-        q: Shape (dof, b, m), changed in place.
-        near: Shape (m, dof) or None.
-    """
-    inside = np.ones(q.shape[1:], dtype=bool)
-    for joint in np.flatnonzero(~robot.prismatic):
-        low, high, values = robot.lower[joint], robot.upper[joint], q[joint]
-        if low < -np.pi or high > np.pi:
-            centre = 0.0 if near is None else near[:, joint]
-            values[:] = _full_turns(values, low - LIMIT_TOLERANCE, high + LIMIT_TOLERANCE, centre)
-        inside &= (values >= low - LIMIT_TOLERANCE) & (values <= high + LIMIT_TOLERANCE)
-    return inside
-
-
-def _full_turns(
-    values: NDArray[np.float64], low: float, high: float, near: NDArray[np.float64] | float
-) -> NDArray[np.float64]:
-    """Equal angles: the one nearest to ``near``, or else the nearest to that inside low .. high if there is one."""
-    nearest = near + wrapped(values - near)
-    nearest = nearest - TURN * np.ceil(np.maximum(nearest - high, 0.0) / TURN)
-    inside: NDArray[np.float64] = nearest + TURN * np.ceil(np.maximum(low - nearest, 0.0) / TURN)
-    return inside
-
-
-def _tips(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Columns x, y, z and position of the tip for q of shape (dof, b, m), shape (4, 3, b, m)."""
-    rows = q.reshape(robot.dof, -1).T
-    if len(rows) > FEW:
-        return tip_columns(robot).poses(q)
-    return robot.fk_batch(rows)[:, :3].T.reshape(4, 3, *q.shape[1:])
-
-
-def tip_residuals(
-    robot: Robot, q: NDArray[np.float64], poses: NDArray[np.float64], oriented: bool = True
-) -> NDArray[np.float64]:
-    """By forward kinematics how far configurations are from poses.
-
-    Args:
-        robot: The arm.
-        q: Shape (dof, b, m): b configurations for each of m poses.
-        poses: T_world_tip, shape (m, 4, 4).
-        oriented: Whether the orientation counts; the angle is 0 if not.
-
-    Returns:
-        Distance [m] and angle [rad], shape (2, b, m).
-    """
-    tips = _tips(robot, q)
-    off = tips - poses[:, :3].transpose(2, 1, 0)[:, :, None]
-    off *= off
-    residuals = np.zeros((2, *tips.shape[2:]))
-    residuals[0] = np.sqrt(off[3].sum(axis=0))
-    if oriented:  # |R1 - R2| = 2 sqrt(2) sin(angle / 2), accurate for small angles
-        chord = np.sqrt(off[:3].sum(axis=(0, 1)) / 8.0)
-        residuals[1] = 2.0 * np.arcsin(np.minimum(chord, 1.0))
-    return residuals

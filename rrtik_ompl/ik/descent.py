@@ -20,11 +20,6 @@ AT_A_TIME = 4096  # goals in one call of a kernel, which nothing can interrupt
 PATIENCE = 5  # steps after which a start that has not come nearer is given up
 
 
-def load_kernels() -> None:
-    """Load the kernels before the clock starts: compiling them for the first time is no part of a search."""
-    library(KERNELS)
-
-
 def walk(
     robot: Robot, aims: Matrix, starts: Matrix, *, steps: int = STEPS, patience: int | None = None
 ) -> tuple[Matrix, Mask, int]:
@@ -74,9 +69,10 @@ class Search:
 
     def __init__(self, robot: Robot, aims: Matrix, near: ArrayLike) -> None:
         self._robot, self._aims = robot, aims
-        self._near = np.clip(np.broadcast_to(near, (len(aims), robot.dof)), robot.lower, robot.upper)
+        self._near = np.empty((len(aims), robot.dof))
+        self._near[:] = robot.clamp(np.asarray(near))
         self._next = np.zeros(len(aims), dtype=np.int64)
-        self.q: Matrix = np.array(self._near)
+        self.q: Matrix = self._near.copy()
         self.steps = 0
 
     def advance(self, rows: NDArray[np.int64]) -> Mask:
@@ -84,8 +80,9 @@ class Search:
 
         A goal without one has come to the end of its starts, 513 of them.
         """
-        parts = [self._advance(rows[k : k + AT_A_TIME]) for k in range(0, len(rows), AT_A_TIME)]
-        return parts[0] if len(parts) == 1 else np.concatenate([np.zeros(0, dtype=bool), *parts])
+        if len(rows) <= AT_A_TIME:
+            return self._advance(rows)
+        return np.concatenate([self._advance(rows[k : k + AT_A_TIME]) for k in range(0, len(rows), AT_A_TIME)])
 
     def _advance(self, rows: NDArray[np.int64]) -> Mask:
         kernels, limb = library(KERNELS), seeded_limb_of(self._robot)

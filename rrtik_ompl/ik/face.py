@@ -9,13 +9,13 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
+from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen
 from rrtik_ompl.errors import InputError, UnknownNameError, require
-from rrtik_ompl.goal import PoseGoal, PositionGoal, TipGoal, has_task_regions, joint_difference, tip_errors
-from rrtik_ompl.ik.descent import load_kernels
-from rrtik_ompl.ik.methods import METHODS
-from rrtik_ompl.ik.question import Answer, Question, Target, errors, tolerances
+from rrtik_ompl.goal import TipGoal, has_task_regions, joint_difference, tip_errors
+from rrtik_ompl.ik.methods import METHODS, load_kernels
+from rrtik_ompl.ik.question import Answer, Question, Target, check_arm, errors, time_limit, tolerances
 from rrtik_ompl.ik.targets import targets
+from rrtik_ompl.random_stream import RandomStream
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 
@@ -87,15 +87,13 @@ def solve_ik(
         UnknownNameError: If there is no such method.
         InputError: If the method does not fit the robot and the goal, or an argument makes no sense.
     """
-    load_kernels()
+    check_arm(robot, world)
+    load_kernels(robot)
     begin = time.monotonic()
     require(goal, TipGoal, "goal", "inverse kinematics needs a goal of the tip")
-    if world is not None and world.robot is not robot:
-        raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
-    limit = float(finite_array(seconds, (), "seconds"))
-    rng = np.random.default_rng(seed)
+    limit, random = time_limit(seconds), RandomStream(seed)
     posture = usual_posture(robot) if near is None else robot.configuration(near, "near")
-    drawn = tuple(targets(goal, DRAWS, rng))
+    drawn = (goal,) if isinstance(goal, Target) else tuple(targets(goal, DRAWS, random.rng))
     name = chosen_method(robot, drawn, method)
     if method == "auto" and name == "numeric" and has_task_regions(goal):
         name = "projection"
@@ -103,13 +101,14 @@ def solve_ik(
     def accept(Q: Matrix) -> Mask:
         return free_of_collision(world, Q)
 
-    answer = METHODS[name].run(Question(robot, goal, drawn, posture, accept, all, begin + limit, rng, world))
+    answer = METHODS[name].run(Question(robot, goal, drawn, posture, accept, all, begin + limit, random, world))
     q, residuals = _at_goal(robot, goal, answer.q)
     free = accept(q)
-    kept = _different(robot, q, posture, np.flatnonzero(free), None if all else 1)
+    turned = joint_difference(robot, q, posture)
+    kept = _different(turned, np.flatnonzero(free), None if all else 1)
     reason, detail = ("", "") if len(kept) else _why(robot, answer, world, q)
     return IkResult(
-        solutions=frozen(np.where(robot.continuous, posture + joint_difference(robot, q[kept], posture), q[kept])),
+        solutions=frozen(np.where(robot.continuous, posture + turned[kept], q[kept])),
         residuals=frozen(residuals[kept]),
         reason=reason,
         detail=detail,
@@ -161,11 +160,10 @@ def free_of_collision(world: World | None, Q: Matrix) -> Mask:
     return free
 
 
-def _different(robot: Robot, q: Matrix, near: Vector, rows: NDArray[np.intp], most: int | None) -> list[int]:
-    """Some of the rows of q without repetitions, nearest to a posture first, at most so many if not all."""
-    difference = joint_difference(robot, q, near)
+def _different(difference: Matrix, rows: NDArray[np.intp], most: int | None) -> list[int]:
+    """Some of the rows without repetitions, by their differences from a posture: the nearest first, at most so many."""
     kept: list[int] = []
-    for k in rows[np.argsort(np.linalg.norm(difference[rows], axis=1), kind="stable")]:
+    for k in rows[np.vecdot(difference, difference)[rows].argsort(kind="stable")]:
         if len(kept) == most:
             break
         if not kept or np.abs(difference[k] - difference[kept]).max(axis=1).min() > SAME_POSTURE:
@@ -181,11 +179,11 @@ def _at_goal(robot: Robot, goal: TipGoal, q: Matrix) -> tuple[Matrix, Matrix]:
     q = robot.clamp(q[robot.within_limits(q)])
     if len(q) == 0:
         return q, np.zeros((0, 2))
-    if isinstance(goal, PoseGoal | PositionGoal):
+    if isinstance(goal, Target):
         residuals = errors(robot, goal, q)
         at = (residuals <= tolerances(goal)).all(axis=1)
     else:
-        residuals, at = np.column_stack(tip_errors(goal, robot, q)), goal.satisfied(robot, q)
+        residuals, at = np.array(tip_errors(goal, robot, q)).T, goal.satisfied(robot, q)
     return q[at], residuals[at]
 
 

@@ -13,10 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
-
-SINGULAR = 1e-10  # [m] or sine; nearer than this a pose counts as singular, and its answer is still good to 1e-9
-DOUBLE_ROOT = 4e-14  # of a squared sine: less is rounding, whose square root would spoil a stretched arm by 1e-8
-REACH_TOLERANCE = 1e-10  # in the cosine of an elbow: what rounding may add at a stretched arm
+from rrtik_ompl.fast.branch_layout import DOUBLE_ROOT, REACH_TOLERANCE
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +33,7 @@ class Branches:
     singular: NDArray[np.uint8]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ClosedFormSolver:
     """The inverse kinematics of one arm in formulas.
 
@@ -51,6 +48,8 @@ class ClosedFormSolver:
             have in ``near`` (0 if None), and to these values turned by half a turn. The number is the slack [m, sine]:
             a pose that near to a singular one is answered as if it were singular, off by at most about that.
         nearness: From Q, shape (m, dof), to the named singular cases: 0 at the singularity, in [0, 1] or metres.
+        kernel: The function of `rrtik_ompl.fast.branch_kernels` that gives the same for poses that are not singular,
+            "" if there is none; and the ``numbers`` that it takes.
     """
 
     frame: str
@@ -60,6 +59,8 @@ class ClosedFormSolver:
     free: tuple[int, ...]
     solve: Callable[[NDArray[np.float64], Matrix | None, float], Branches]
     nearness: Callable[[Matrix], Mapping[str, Vector]]
+    kernel: str = ""
+    numbers: tuple[float, ...] = ()
 
     def __call__(self, poses: NDArray[np.float64], near: Matrix | None = None, slack: float = 0.0) -> Branches:
         """All branches for T_base_frame, shape (m, 4, 4); see ``solve``."""

@@ -9,15 +9,18 @@ from types import MappingProxyType
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.fast import branch_layout, ik_layout
+from rrtik_ompl.fast.library import library
 from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.ik.ccd import ccd
-from rrtik_ompl.ik.closed_form import branches_of, family, form_of, has_closed_form, tip_fault
+from rrtik_ompl.ik.closed_form import branches_of, family, form_of, has_closed_form
 from rrtik_ompl.ik.damped import damped_least_squares, pinocchio_iteration
 from rrtik_ompl.ik.fabrik import fabrik, fabrik_misfit
 from rrtik_ompl.ik.genetic.method import genetic
 from rrtik_ompl.ik.hinges import coupled_fault
 from rrtik_ompl.ik.mb_rrt.method import mb_rrt, mb_rrt_misfit
 from rrtik_ompl.ik.numeric import numeric
+from rrtik_ompl.ik.plain_branches import tip_fault
 from rrtik_ompl.ik.projection import projection
 from rrtik_ompl.ik.pso import PARTICLES, pso, resampled_pso
 from rrtik_ompl.ik.question import Answer, Method, Question, Target, tolerances
@@ -25,6 +28,13 @@ from rrtik_ompl.ik.restarts import ROUNDS, STARTS, Walk, restarted
 from rrtik_ompl.robot import Robot
 
 ENOUGH = 4  # starts that arrive before the others of a round are given up
+
+
+def load_kernels(robot: Robot) -> None:
+    """Load what the methods may ask before the clock starts: compiling it for the first time is no part of a search."""
+    library(ik_layout.KERNELS)
+    if has_closed_form(robot) and form_of(robot).kernel:
+        library(branch_layout.KERNELS)
 
 
 def _closed_form_misfit(robot: Robot, target: Target) -> str:
@@ -39,7 +49,7 @@ def _closed_form(question: Question) -> Answer:
     """All branches of all targets; if none will do, the curves of those that are singular within their tolerances."""
     robot, targets = question.robot, question.targets
     poses = np.array([_matrix(target) for target in targets])
-    hints = np.broadcast_to(question.near, (len(targets), robot.dof))
+    hints = np.array([question.near] * len(targets))
     found = branches_of(robot, poses, hints, check=False)
     q = found.branches[found.valid]
     if len(q) and question.accept(q).any():  # the usual case; forward kinematics judges what is returned
@@ -48,10 +58,12 @@ def _closed_form(question: Question) -> Answer:
     rows, owner = found.branches.reshape(-1, robot.dof), np.repeat(np.arange(len(targets)), found.real.shape[1])
     residuals = np.asarray(found.residuals).reshape(-1, 2)
     near_enough = residuals <= np.array([tolerances(target) for target in targets])[owner]
-    q = rows[robot.within_limits(rows) & near_enough.all(axis=1)]
+    reaching = near_enough.all(axis=1)
+    q = rows[robot.within_limits(rows) & reaching]
     if not question.accept(q).any():
         q = np.vstack([q, *(family(robot, _matrix(target), slack=_slack(target)) for target in targets)])
-    best = int(np.argmin(residuals.sum(axis=1)))
+    outside = np.maximum(robot.lower - rows, rows - robot.upper).max(axis=1)
+    best = int(np.argmin(np.where(reaching, outside, np.inf) if reaching.any() else residuals.sum(axis=1)))
     return Answer(q, rows[best], targets[int(owner[best])])
 
 

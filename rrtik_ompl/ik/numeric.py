@@ -49,7 +49,7 @@ def numeric(question: Question) -> Answer:
     while len(waiting):
         going, waiting = waiting[:AT_ONCE], waiting[AT_ONCE:]
         going = going[search.advance(going)]
-        found, waiting = np.vstack([found, search.q[going]]), np.append(waiting, going)
+        found, waiting = np.concatenate([found, search.q[going]]), np.concatenate([waiting, going])
         timed_out = time.monotonic() > question.deadline
         if timed_out or question.accept(search.q[going]).any():
             break

@@ -7,9 +7,12 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_number
+from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import PoseGoal, PositionGoal, TipGoal
+from rrtik_ompl.random_stream import RandomStream
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 
@@ -28,7 +31,7 @@ class Question:
         accept: Which of some configurations, shape (k, dof), inside the limits and at the goal, will do.
         all: Whether every solution is wanted that the method can find, not just one.
         deadline: Time of ``time.monotonic`` at which to stop.
-        rng: Random numbers.
+        random: Random numbers.
         world: What ``accept`` asks about collisions, for methods that place the arm link by link.
     """
 
@@ -39,8 +42,13 @@ class Question:
     accept: Callable[[Matrix], Mask]
     all: bool
     deadline: float
-    rng: np.random.Generator
+    random: RandomStream
     world: World | None = None
+
+    @property
+    def rng(self) -> np.random.Generator:
+        """Where random numbers come from."""
+        return self.random.rng
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,11 +78,35 @@ class Method:
     run: Callable[[Question], Answer]
 
 
+def check_arm(robot: Robot, world: World | None) -> None:
+    """Refuse what is no robot, or a world that holds another one.
+
+    Raises:
+        InputError: It says which.
+    """
+    require(robot, Robot, "robot", "use load_robot(name or file)")
+    require(world, World | None, "world", "make it with World(robot, scene)")
+    if world is not None and world.robot is not robot:
+        raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
+
+
+def time_limit(seconds: ArrayLike) -> float:
+    """Time [s] that a method may take.
+
+    Raises:
+        InputError: If it is no number of at least 0.
+    """
+    limit = finite_number(seconds, "seconds")
+    if limit < 0.0:
+        raise InputError(f"seconds must be at least 0, got {limit:g}")
+    return limit
+
+
 def errors(robot: Robot, target: Target, Q: Matrix) -> Matrix:
     """Distance [m] and angle [rad] (0 for a position) of configurations from a target, shape (k, 2)."""
     if isinstance(target, PositionGoal):
-        return np.column_stack([target.distance(robot, Q), np.zeros(len(Q))])
-    return np.column_stack(target.errors(robot, Q))
+        return np.array([target.distance(robot, Q), np.zeros(len(Q))]).T
+    return np.array(target.errors(robot, Q)).T
 
 
 def tolerances(target: Target) -> tuple[float, float]:

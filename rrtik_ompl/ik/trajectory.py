@@ -11,19 +11,20 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, finite_number, frozen
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.goal import PoseGoal, PositionGoal, joint_difference, pose_errors
 from rrtik_ompl.ik.branch_choice import JUMP, follow
 from rrtik_ompl.ik.closed_form import check_poses, form_of
-from rrtik_ompl.ik.descent import descend, load_kernels
+from rrtik_ompl.ik.descent import descend
 from rrtik_ompl.ik.face import free_of_collision, solve_ik
 from rrtik_ompl.ik.genetic.options import PRESETS, GeneticOptions
 from rrtik_ompl.ik.genetic.search import follow_targets
-from rrtik_ompl.ik.methods import METHODS
+from rrtik_ompl.ik.methods import METHODS, load_kernels
 from rrtik_ompl.ik.numeric_track import Tracker
-from rrtik_ompl.ik.question import Target
+from rrtik_ompl.ik.question import Target, check_arm, time_limit
 from rrtik_ompl.ik.restarts import Walk
+from rrtik_ompl.random_stream import RandomStream
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 
@@ -122,10 +123,9 @@ def solve_ik_trajectory(
         UnknownNameError: If there is no such method or preset.
         InputError: If the method does not fit the robot, a pose is none, or an argument makes no sense.
     """
-    load_kernels()
+    check_arm(robot, world)
+    load_kernels(robot)
     begin = time.monotonic()
-    if world is not None and world.robot is not robot:
-        raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
     rows = _checked(poses)
     task = Task(
         robot=robot,
@@ -133,10 +133,10 @@ def solve_ik_trajectory(
         targets=tuple(_target(row, position_tolerance, orientation_tolerance) for row in rows),
         near=None if near is None else robot.configuration(near, "near"),
         world=world,
-        jump=float(finite_array(jump, (), "jump")),
+        jump=finite_number(jump, "jump"),
         options=_options(options),
-        rng=np.random.default_rng(seed),
-        deadline=begin + float(finite_array(seconds, (), "seconds")),
+        rng=RandomStream(seed).rng,
+        deadline=begin + time_limit(seconds),
     )
     name = _chosen(task, method)
     q, iterations = FOLLOWERS[name](task)

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.ik.form import REACH_TOLERANCE, SINGULAR, Branches, ClosedFormSolver, two_links, wrapped
+from rrtik_ompl.fast.branch_layout import REACH_TOLERANCE, SHOULDER_ROOT, SINGULAR
+from rrtik_ompl.ik.form import Branches, ClosedFormSolver, two_links, wrapped
 
 Numbers = NDArray[np.float64]
 MISFIT = 1e-9  # sine of the angle between axis 5 and where a pose wants it; more is out of reach for five joints
-SHOULDER_ROOT = 1e-15  # [m^2] of a squared radius: less is rounding, which moves the wrist centre by less than 1e-14 m
 ARM_BRANCHES = tuple(" ".join(tag) for tag in product(("front", "back"), ("up", "down")))
 BRANCHES = tuple(" ".join(tag) for tag in product(("front", "back"), ("up", "down"), ("near", "flip")))
 
@@ -49,9 +49,9 @@ class PumaGeometry:
 
 def pose_form(geometry: PumaGeometry) -> ClosedFormSolver:
     """The six-joint arm. With the wrist straight (family ``wrist``) theta4 is free, and theta6 follows it."""
-    return ClosedFormSolver(
-        "tip", "pose", BRANCHES, ("wrist",), (3,), partial(puma_branches, geometry), partial(nearness, geometry)
-    )
+    solve, near = partial(puma_branches, geometry), partial(nearness, geometry)
+    numbers = (geometry.base, geometry.a2, geometry.d3, geometry.forearm, float(np.arctan2(geometry.d4, geometry.a3)))
+    return ClosedFormSolver("tip", "pose", BRANCHES, ("wrist",), (3,), solve, near, kernel="ball_arm", numbers=numbers)
 
 
 def position_form(geometry: PumaGeometry) -> ClosedFormSolver:

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.ik.form import REACH_TOLERANCE, SINGULAR, wrapped
+from rrtik_ompl.fast.branch_layout import REACH_TOLERANCE, SINGULAR
+from rrtik_ompl.ik.form import wrapped
 from rrtik_robots.titan4.geometry import TitanGeometry
 
 Numbers = NDArray[np.float64]

@@ -15,16 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.ik.form import SINGULAR, Branches, ClosedFormSolver, two_links, wrapped
+from rrtik_ompl.fast.branch_layout import NORMAL, ROUNDING, SINGULAR, UNSURE
+from rrtik_ompl.ik.form import Branches, ClosedFormSolver, two_links, wrapped
 from rrtik_robots.titan4.families import nearest_azimuth, nearest_psi, psi_within_rounding
 from rrtik_robots.titan4.geometry import TitanGeometry
 from rrtik_robots.titan4.singularities import nearness
 
 FAMILIES = ("wrist", "shoulder")
 BRANCHES = tuple(" ".join(tag) for tag in product(("front", "back"), ("near", "far"), ("up", "down")))
-ROUNDING = 3e-16  # [m] of the wrist point: divided by its distance from the azimuth axis, of theta1 and so of h
-NORMAL = 4e-10  # sine; largest deviation of the gripper axis from the arm plane's normal that counts as none
-UNSURE = 1e-3  # sine; nearer to normal, rounding in psi can open a triangle that closes
 MOST_ROOM = 0.5  # of the part of the gripper axis in the arm plane: how far rounding may move it at most
 SIGMA = np.array([1.0, -1.0])[:, None]  # the two ways of the wrist: theta5 and pi - theta5
 
@@ -48,8 +46,11 @@ def closed_form(geometry: TitanGeometry) -> ClosedFormSolver:
     Where the gripper axis is normal to the arm plane (family ``wrist``) psi is free, and where P lies on the azimuth
     axis (family ``shoulder``) theta1 is: the representatives have the nearest values that the arm can reach.
     """
-    solve = partial(titan_branches, geometry)
-    return ClosedFormSolver("grip_point", "pose", BRANCHES, FAMILIES, (0, 1), solve, partial(nearness, geometry))
+    solve, near = partial(titan_branches, geometry), partial(nearness, geometry)
+    numbers = (geometry.a1, geometry.a2, geometry.a3, geometry.a4, geometry.d6)
+    return ClosedFormSolver(
+        "grip_point", "pose", BRANCHES, FAMILIES, (0, 1), solve, near, kernel="parallel_axes", numbers=numbers
+    )
 
 
 def titan_branches(
