@@ -27,7 +27,7 @@ class MovingWorld:
     """Checks of a robot among obstacles that may be moved; stands in for a conservative ``World``.
 
     A configuration is free if it is within the limits, proven free of self-collision, and proven to be farther than
-    ``rooms`` from every obstacle. Motions are looked at as a ``World`` does.
+    margin and ``rooms`` from every obstacle. Motions are looked at as a ``World`` does.
 
     Attributes:
         robot, weights, motion_resolution: Those of the world.
@@ -76,13 +76,14 @@ class MovingWorld:
 
         Args:
             *scenes: The scene now, then one for each further copy; the last one stands for those that are missing.
-            rooms: How far the arm has to stay from obstacles [m]; what is not named keeps its room.
+            rooms: How far the arm has to stay from obstacles beyond their margins [m]; what is not named keeps its
+                room.
 
         Raises:
             InputError: If a scene has other obstacles than the world began with, or a room is not 0 or more.
             UnknownNameError: If a room is given for what is no obstacle.
         """
-        poses = [{o.name: o.pose for o in scene.obstacles} for scene in scenes]
+        places = [{o.name: (o.pose, o.margin) for o in scene.obstacles} for scene in scenes]
         for scene in scenes:
             _check_obstacles(scene, self._known)
         for name, room in (rooms or {}).items():
@@ -92,16 +93,16 @@ class MovingWorld:
                 raise InputError(f"rooms: that of '{name}' must be 0 metres or more, got {room}")
         for k, body in enumerate(self._bodies):
             if body.kind == "obstacle":
-                pose = poses[min(self._copy[k], len(poses) - 1)][body.name]
-                if not np.array_equal(pose.homogeneous, body.placement.homogeneous):
-                    self._bodies[k] = replace(body, placement=pose.copy())
+                pose, margin = places[min(self._copy[k], len(places) - 1)][body.name]
+                if margin != body.margin or not np.array_equal(pose.homogeneous, body.placement.homogeneous):
+                    self._bodies[k] = replace(body, placement=pose.copy(), margin=margin)
                 if rooms is not None and body.name in rooms:
                     self._rooms[k] = float(rooms[body.name])
         self.scene = scenes[0]
         self._fast.move(self._bodies, self._rooms)
 
     def clearance(self, Q: ArrayLike) -> Vector:
-        """Lower bounds of the distance to contact of rows of Q, shape (m, dof), less the rooms [m]. Shape (m,)."""
+        """Lower bounds of the distance to contact of rows of Q, less margins and rooms [m]. (m, dof) -> (m,)."""
         return self._fast.clearance(self.robot.joint_values(Q)).lower
 
     def valid(self, q: ArrayLike) -> bool:

@@ -12,6 +12,7 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.collision.contacts import measured
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.moving_world import MovingWorld
@@ -191,7 +192,9 @@ def test_free_with_room_means_that_far_away():
     near = MovingWorld(exact, self_collision=False)
     names = set(moving.names)
     for row in rows[moving.valid_batch(rows)][:40]:
-        gaps = [c.distance for c in exact._distances(row[None], near_only=False) if {c.first, c.second} & names]
+        frames = exact.robot.joint_frames(row[None])[0]
+        found = measured(exact.bodies, exact.pairs, frames, near_only=False)
+        gaps = [c.distance for c in found if {c.first, c.second} & names]
         assert min(gaps) >= 0.15
     near.move(scenes[1])
     assert (near.clearance(rows[moving.valid_batch(rows)]) >= 0.15 - 1e-4).all()

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.containment import Containment
+from rrtik_ompl.collision.margins import kept_apart, request
 from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.robot import Robot
 
@@ -36,6 +37,7 @@ class Certificate:
         self._centres, self._halves = _local_boxes(bodies)
         self._approach = approach_weights(robot, bodies, pairs).T  # [m per rad or m], shape (dof, pairs)
         self._half_spaces = list(_half_space_pairs(bodies, pairs))
+        self._margins = np.array([kept_apart(bodies[i], bodies[j]) for i, j in pairs])
         self._containment = Containment(bodies, pairs)
         hollow = {frozenset(pair) for pair in self._containment.pairs}
         self._hollow = np.array([frozenset(pair) in hollow for pair in pairs], dtype=bool)
@@ -83,7 +85,8 @@ class Certificate:
         open_: NDArray[np.bool_] = asked & (self._gaps(*self._boxes(poses)) <= approach)
         for run, pair in zip(*(k.tolist() for k in np.nonzero(open_)), strict=True):
             i, j = self._pairs[pair].tolist()
-            gap = distance(self._bodies[i].geometry, poses[run, i], self._bodies[j].geometry, poses[run, j])
+            sides = (self._bodies[i].geometry, poses[run, i], self._bodies[j].geometry, poses[run, j])
+            gap = distance(*sides, margin=float(self._margins[pair]))
             open_[run, pair] = gap is None or gap <= approach[run, pair]
             if gap is None:
                 found[middles[run]] = (i, j)
@@ -104,22 +107,23 @@ class Certificate:
         return centres, np.einsum("mgij,gj->mgi", np.abs(rotations), self._halves)
 
     def _gaps(self, centres: NDArray[np.float64], halves: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Lower bounds of the distances [m] between the pairs' boxes, shape (m, pairs)."""
+        """Lower bounds of the distances between the pairs' boxes less their margins [m], shape (m, pairs)."""
         a, b = self._pairs[:, 0], self._pairs[:, 1]
         gaps: NDArray[np.float64] = (np.abs(centres[:, a] - centres[:, b]) - halves[:, a] - halves[:, b]).max(axis=2)
         for pair, other, normal, offset in self._half_spaces:
             gaps[:, pair] = centres[:, other] @ normal - offset - halves[:, other] @ np.abs(normal)
+        gaps -= self._margins
         return gaps
 
 
-def distance(first: Any, first_pose: Matrix, second: Any, second_pose: Matrix) -> float | None:
-    """A lower bound of the distance [m] of two coal geometries at poses, shape (4, 4); None if they touch.
+def distance(first: Any, first_pose: Matrix, second: Any, second_pose: Matrix, margin: float = 0.0) -> float | None:
+    """A lower bound of the distance of two coal geometries at poses, shape (4, 4), less a margin [m].
 
-    Asked with fresh request and result.
+    None if the margin is not kept. Asked with fresh request and result.
     """
     transforms = [coal.Transform3s(pose[:3, :3], pose[:3, 3]) for pose in (first_pose, second_pose)]
     result = coal.CollisionResult()
-    if coal.collide(first, transforms[0], second, transforms[1], coal.CollisionRequest(), result):
+    if coal.collide(first, transforms[0], second, transforms[1], request(margin), result):
         return None
     return float(result.distance_lower_bound)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -107,8 +108,8 @@ class Watch:
         }
         if not guessed:
             return ahead
-        moved = (Obstacle(o.name, o.shape, guessed.get(o.name, o.pose), o.motion) for o in ahead.obstacles)
-        return Scene(tuple(moved), ahead.attached, ahead.allowed_collisions)
+        moved = tuple(replace(o, pose=guessed.get(o.name, o.pose)) for o in ahead.obstacles)
+        return replace(ahead, obstacles=moved)
 
     def _measure(self, obstacle: Obstacle, old: Any, seconds: float, time: float) -> None:
         name = obstacle.name
@@ -133,11 +134,11 @@ def too_fast(name: str, speed: float, time: float, bound: float) -> str:
 def rooms(
     scene: Scene, margin: float, seconds: float, bound: float | None, seen: Mapping[str, float]
 ) -> dict[str, float]:
-    """How far the arm keeps from each obstacle [m]: the margin, and how far what moves can come within a tick.
+    """How far the arm keeps from each obstacle, beyond its own margin: what is given, and what it can come in a tick.
 
     Args:
         scene: The obstacles.
-        margin: Distance that must be left [m].
+        margin: Distance that must be left to every obstacle [m].
         seconds: Length of a tick [s].
         bound: Largest speed of what moves [m/s]; what was seen to be faster counts as that fast. None: no room for it.
         seen: Speeds that were seen [m/s].
