@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
@@ -12,10 +11,9 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.collision.solids import pieces
+from rrtik_ompl.collision.extent import farthest
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import HalfSpace
 
 Feed: TypeAlias = Callable[[float], Scene]
 Source: TypeAlias = Scene | Feed | Iterable[tuple[float, Scene]]
@@ -79,23 +77,26 @@ class Watch:
     """
 
     def __init__(self, scene: Scene, bound: float | None) -> None:
-        self._radii = {o.name: _radius(o) for o in scene.obstacles}
+        # a point's distance from its obstacle's origin counts where the obstacle turns
+        self._radii = {o.name: farthest(o.shape, pin.SE3.Identity()) for o in scene.obstacles}
         self._bound, self._warned = bound, set[str]()
         self._last: tuple[float, Scene] | None = None
         self._velocities: dict[str, tuple[Vector, Vector]] = {}
         self.speeds: dict[str, float] = {}
 
     def see(self, time: float, scene: Scene) -> bool:
-        """Take in the scene at a time [s]; whether any obstacle has moved since the last look (True at the first)."""
+        """Take in the scene at a time [s]; whether an obstacle or a margin has changed (at the first look: True)."""
         before, self._last = self._last, (time, scene)
         if before is None or time <= before[0]:
             return True
         seconds, old, moved = time - before[0], {o.name: o.pose for o in before[1].obstacles}, False
+        margins = {o.name: o.margin for o in before[1].obstacles}
         self._velocities = {}
         for obstacle in scene.obstacles:
             if obstacle.name in old and not np.array_equal(old[obstacle.name].homogeneous, obstacle.pose.homogeneous):
                 moved = True
                 self._measure(obstacle, old[obstacle.name], seconds, time)
+            moved |= obstacle.margin != margins.get(obstacle.name)
         return moved
 
     def later(self, scene: Scene, seconds: float) -> Scene:
@@ -149,16 +150,6 @@ def rooms(
         speed = max(bound or 0.0, seen.get(obstacle.name, 0.0)) if moves else 0.0
         found[obstacle.name] = margin + speed * seconds
     return found
-
-
-def _radius(obstacle: Obstacle) -> float:
-    """Distance of the farthest point of an obstacle from its own origin [m]; it counts where the obstacle turns."""
-    if isinstance(obstacle.shape, HalfSpace):
-        return math.inf
-    solids = [piece.geometry for piece in pieces(obstacle.shape)]
-    for solid in solids:
-        solid.computeLocalAABB()
-    return max(float(np.linalg.norm(s.aabb_center) + s.aabb_radius) for s in solids)
 
 
 def _extrapolated(pose: Any, velocity: tuple[Vector, Vector], seconds: float) -> tuple[Matrix, Vector]:
