@@ -47,7 +47,7 @@ def touching(world, Q):
     return found
 
 
-@pytest.mark.parametrize(("name", "seed"), [("panda", 0), ("panda_primitives", 1), ("ur5", 2)])
+@pytest.mark.parametrize(("name", "seed"), [("panda_primitives", 1), ("ur5", 2)])
 def test_no_pair_in_contact_is_passed_over(name, seed):
     world = crowded(name, 30, seed)
     Q = path_rows(world.robot, seed, RUNS[0] + 12)

@@ -39,8 +39,9 @@ class Certificate:
         self._planes = _half_space_pairs(bodies, pairs)
         self._margins = np.array([kept_apart(bodies[i], bodies[j]) for i, j in pairs])
         self._containment = Containment(bodies, pairs)
-        hollow = {frozenset(pair) for pair in self._containment.pairs}
-        self._hollow = np.array([frozenset(pair) in hollow for pair in pairs], dtype=bool)
+        places = {pair: k for k, pair in enumerate(self._containment.pairs)}
+        ways = [(places.get((i, j), -1), places.get((j, i), -1)) for i, j in pairs]
+        self._hollow = np.array(ways, dtype=np.int64).reshape(-1, 2)
 
     def free(self, Q: Matrix) -> Mask:
         """Which rows of Q, shape (m, dof), are collision-free. Shape (m,). Quickest where rows follow a path."""
@@ -86,14 +87,15 @@ class Certificate:
         open_: Mask = self._gaps(placed, run, pair) <= ROOM + self._approached(near, run, pair)
         kept = np.flatnonzero(open_)
         approach = ROOM + self._approached(near, run[kept], pair[kept])
-        for entry, r, p, most in zip(*(k.tolist() for k in (kept, run[kept], pair[kept], approach)), strict=True):
+        columns = (kept, run[kept], pair[kept], approach, self._reached(frames, run[kept], pair[kept]))
+        for entry, r, p, most, reached in zip(*(k.tolist() for k in columns), strict=True):
             i, j = self._pairs[p].tolist()
             first, second = ((self._bodies[k].geometry, placed.pose(r, k)) for k in (i, j))
             gap = distance(*first, *second, margin=float(self._margins[p]))
             open_[entry] = gap is None or gap <= most
             if gap is None:
                 found[middles[r]] = (i, j)
-            elif self._hollow[p] and self._containment.holds((i, j), frames[r]):
+            elif reached and self._containment.holds((i, j), frames[r]):
                 rows = slice(middles[r], middles[r] + 1) if open_[entry] else slice(begins[r], ends[r])
                 found[rows] = [(i, j)] * (rows.stop - rows.start)  # where surfaces stay apart, what is held stays held
         return open_
@@ -101,6 +103,14 @@ class Certificate:
     def _approached(self, near: Matrix, run: Numbers, pair: Numbers) -> Vector:
         """How much nearer the pairs can come in their runs than at the middle [m], shape (k,)."""
         return np.asarray(sum(near[run, joint] * self._approach[pair, joint] for joint in range(near.shape[1])))
+
+    def _reached(self, frames: NDArray[np.float64], run: Numbers, pair: Numbers) -> Mask:
+        """Which of the pairs may be of a body inside a hollow one, in the middle of their runs, shape (k,)."""
+        reached = np.zeros(len(pair), dtype=bool)
+        for places in self._hollow[pair].T:
+            asked = np.flatnonzero(places >= 0)
+            reached[asked] |= self._containment.reached(places[asked], frames[run[asked]])
+        return reached
 
     def _gaps(self, placed: PlacedBoxes, run: Numbers, pair: Numbers) -> Vector:
         """Lower bounds of the distances between the pairs' boxes less their margins [m], shape (k,)."""
