@@ -51,7 +51,7 @@ REACTION, OVERSHOOT, REPLANNING = 0.3, np.deg2rad(1.0), 2.0
 
 
 def seen_at(T: Any) -> SeenObject:
-    return SeenObject(VALVE, T, 1e-8 * np.eye(3), None)
+    return SeenObject(VALVE, T, 1e-8 * np.eye(6), None)
 
 
 # --- the session -------------------------------------------------------------------------------------------------

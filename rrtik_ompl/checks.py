@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body, link_bodies
 from rrtik_ompl.collision.containment import Containment
+from rrtik_ompl.collision.margins import kept_apart, request
 from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.collision.solids import around
 from rrtik_ompl.fast import FREE, UNDECIDED, FastWorld, needs_covers
@@ -108,7 +109,9 @@ class CollisionChecks:
         return True
 
     def _gaps(self, full: Vector, pairs: list[tuple[int, int]]) -> list[float] | None:
-        """Lower bounds of the distances [m] between pairs of bodies, or None if two of them touch, by coal.
+        """Lower bounds of how far pairs of bodies are from touching [m], or None if two of them touch, by coal.
+
+        Bodies touch that do not keep their margin.
 
         Args:
             full: Pinocchio's configuration vector.
@@ -121,7 +124,8 @@ class CollisionChecks:
             for k in (i, j):
                 if k not in transforms:
                     transforms[k] = self._standing.get(k) or self._transform(k)
-            gap = distance(self._bodies[i].geometry, transforms[i], self._bodies[j].geometry, transforms[j])
+            ends = (self._bodies[i].geometry, transforms[i], self._bodies[j].geometry, transforms[j])
+            gap = distance(*ends, kept_apart(self._bodies[i], self._bodies[j]))
             if gap is None:
                 return None
             gaps.append(gap)
@@ -134,20 +138,20 @@ class CollisionChecks:
         return coal.Transform3s(pose.rotation, pose.translation)
 
 
-def distance(first: Any, first_pose: Any, second: Any, second_pose: Any) -> float | None:
-    """A lower bound of the distance [m] of two coal geometries at coal's poses, None if they touch.
+def distance(first: Any, first_pose: Any, second: Any, second_pose: Any, margin: float = 0.0) -> float | None:
+    """A lower bound of the distance of two coal geometries at coal's poses less a margin [m], None if it is not kept.
 
     For solids coal's answer to "do they touch" comes with the distance. Meshes take much longer, so their hulls are
     asked first: where those are apart, the meshes are.
     """
     result = coal.CollisionResult()
     hulls = around(first), around(second)
-    if not coal.collide(hulls[0], first_pose, hulls[1], second_pose, coal.CollisionRequest(), result):
+    if not coal.collide(hulls[0], first_pose, hulls[1], second_pose, request(margin), result):
         return float(result.distance_lower_bound)
     if hulls[0] is first and hulls[1] is second:
         return None
     result = coal.CollisionResult()
-    if coal.collide(first, first_pose, second, second_pose, coal.CollisionRequest(), result):
+    if coal.collide(first, first_pose, second, second_pose, request(margin), result):
         return None
     return float(result.distance_lower_bound)
 

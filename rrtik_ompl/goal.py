@@ -140,7 +140,10 @@ class GoalRegion:
         object.__setattr__(self, "parts", tuple(parts))
 
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
-        """Distance to the nearest part in its own units, shape (m,)."""
+        """Distance to the nearest part, shape (m,) [m]: the way of the tip, and its turn at half the arm's reach.
+
+        Positions and poses are measured alike; of a position the turn is free. Tolerances do not count.
+        """
         nearest: Vector = np.min([part.distance(robot, Q) for part in self.parts], axis=0)
         return nearest
 

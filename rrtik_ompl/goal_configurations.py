@@ -20,8 +20,7 @@ from rrtik_ompl.goal import (
 from rrtik_ompl.ik.face import DRAWS, solve_ik
 from rrtik_ompl.ik.methods import METHODS
 from rrtik_ompl.ik.numeric import numeric_ik
-from rrtik_ompl.ik.plain_descent import reach_of
-from rrtik_ompl.ik.projection import PER_RADIAN, project, projected
+from rrtik_ompl.ik.projection import project, projected
 from rrtik_ompl.ik.question import Target
 from rrtik_ompl.ik.targets import leaves_freedom, targets
 from rrtik_ompl.problem import TURN, Problem
@@ -142,7 +141,7 @@ def nearest_miss(robot: Robot, goal: TipGoal) -> tuple[float, float]:
     starts = np.random.default_rng(0).uniform(*robot.finite_range(), (count, robot.dof))
     ends = np.vstack([project(robot, as_task_region(part), starts) for part in parts])
     distance, angle = tip_errors(goal, robot, ends)
-    best = np.argmin(distance + PER_RADIAN * reach_of(robot) * angle)
+    best = np.argmin(goal.distance(robot, ends))
     return float(distance[best]), float(angle[best])
 
 

@@ -93,6 +93,7 @@ def sense(
     frames: Annotated[int, typer.Option(help="Look at so many pictures at most; a camera device: 1 unless given.")] = 0,
     scene: Annotated[Path | None, typer.Option(help="Write the scene in the frame of the base: .yaml.")] = None,
     picture: Annotated[Path | None, typer.Option(help="Write the last picture with what was seen: .png, .jpg.")] = None,
+    sigmas: Annotated[float, typer.Option(help="Margins of the scene's obstacles: so many deviations; 0: none.")] = 3.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object a picture.")] = False,
 ) -> int:
     """Say where the marked objects are, from pictures."""
@@ -102,7 +103,7 @@ def sense(
     from rrtik_ompl.sensing.marker_map_file import load_marker_map
     from rrtik_ompl.sensing.sensor import Sensor
 
-    sensor = Sensor(load_camera(camera), load_marker_map(marker_map))
+    sensor = Sensor(load_camera(camera), load_marker_map(marker_map), sigmas=sigmas)
     view = None
     for view in _views(sensor, source, frames):
         say(json.dumps(view.document())) if as_json else say(*view.lines())

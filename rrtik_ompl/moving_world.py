@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Mask, Vector, finite_array
 from rrtik_ompl.checks import fast_world
 from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.certificate import Certificate
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast import FREE, FastWorld
 from rrtik_ompl.robot import Robot
@@ -27,13 +28,16 @@ class MovingWorld:
     """Checks of a robot among obstacles that may be moved; stands in for a conservative ``World``.
 
     A configuration is free if it is within the limits, proven free of self-collision, and proven to be farther than
-    ``rooms`` from every obstacle. Motions are looked at as a ``World`` does.
+    margin and ``rooms`` from every obstacle. Motions are looked at as a ``World`` does. While an obstacle stands in the
+    arm's fixed base nothing is free.
 
     Attributes:
         robot, weights, motion_resolution: Those of the world.
         accuracy: "conservative".
         scene: Where the obstacles are now.
-        fast: The tables, for searches in kernels; None without kernels. Moved in place, their address stays.
+        fast: The tables, for searches in kernels; None without kernels or while ``blocked``. Moved in place, their
+            address stays.
+        blocked: Which obstacle stands in which fixed part of the arm, as a line for a person; "" if none does.
         checked: Configurations looked at so far, counted as if no motion had been refused early.
 
     Args:
@@ -60,11 +64,13 @@ class MovingWorld:
             kept = tuple(p for p in kept if any(self._bodies[i].kind == "obstacle" for i in p))
         self._fast = fast_world(self.robot, self._bodies, kept, share=self_collision)
         self._rooms = [0.0] * len(self._bodies)
+        self._fixed = tuple(p for p in world.pairs if all(self._bodies[i].joint == 0 for i in p))
+        self.blocked = self._contact_of_base()
 
     @property
     def fast(self) -> FastWorld | None:
         """See the class."""
-        return self._fast if self._fast.address else None
+        return self._fast if self._fast.address and not self.blocked else None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -76,13 +82,14 @@ class MovingWorld:
 
         Args:
             *scenes: The scene now, then one for each further copy; the last one stands for those that are missing.
-            rooms: How far the arm has to stay from obstacles [m]; what is not named keeps its room.
+            rooms: How far the arm has to stay from obstacles beyond their margins [m]; what is not named keeps its
+                room.
 
         Raises:
             InputError: If a scene has other obstacles than the world began with, or a room is not 0 or more.
             UnknownNameError: If a room is given for what is no obstacle.
         """
-        poses = [{o.name: o.pose for o in scene.obstacles} for scene in scenes]
+        places = [{o.name: (o.pose, o.margin) for o in scene.obstacles} for scene in scenes]
         for scene in scenes:
             _check_obstacles(scene, self._known)
         for name, room in (rooms or {}).items():
@@ -92,16 +99,17 @@ class MovingWorld:
                 raise InputError(f"rooms: that of '{name}' must be 0 metres or more, got {room}")
         for k, body in enumerate(self._bodies):
             if body.kind == "obstacle":
-                pose = poses[min(self._copy[k], len(poses) - 1)][body.name]
-                if not np.array_equal(pose.homogeneous, body.placement.homogeneous):
-                    self._bodies[k] = replace(body, placement=pose.copy())
+                pose, margin = places[min(self._copy[k], len(places) - 1)][body.name]
+                if margin != body.margin or not np.array_equal(pose.homogeneous, body.placement.homogeneous):
+                    self._bodies[k] = replace(body, placement=pose.copy(), margin=margin)
                 if rooms is not None and body.name in rooms:
                     self._rooms[k] = float(rooms[body.name])
         self.scene = scenes[0]
+        self.blocked = self._contact_of_base()
         self._fast.move(self._bodies, self._rooms)
 
     def clearance(self, Q: ArrayLike) -> Vector:
-        """Lower bounds of the distance to contact of rows of Q, shape (m, dof), less the rooms [m]. Shape (m,)."""
+        """Lower bounds of the distance to contact of rows of Q, less margins and rooms [m]. (m, dof) -> (m,)."""
         return self._fast.clearance(self.robot.joint_values(Q)).lower
 
     def valid(self, q: ArrayLike) -> bool:
@@ -113,7 +121,7 @@ class MovingWorld:
         rows = finite_array(Q, (None, self.robot.dof), "configurations")
         self.checked += len(rows)
         free: Mask = self._fast.classify(self.robot.joint_values(rows), prove=False) == FREE
-        return free & self.robot.within_limits(rows)
+        return free & self.robot.within_limits(rows) & (not self.blocked)
 
     def motion_valid(self, a: ArrayLike, b: ArrayLike) -> bool:
         """Whether the straight motion from a to b, shapes (dof,), is free."""
@@ -128,7 +136,15 @@ class MovingWorld:
         self.checked += int(steps.sum()) + len(steps)
         sides = self.robot.joint_values(starts), self.robot.joint_values(ends)
         free: Mask = self._fast.classify_edges(*sides, steps, prove=False) == FREE
-        return free & self.robot.within_limits(starts) & self.robot.within_limits(ends)
+        return free & self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self.blocked)
+
+    def _contact_of_base(self) -> str:
+        """See ``blocked``; predicted places do not count, for nothing can be done about them."""
+        if not self._fixed:
+            return ""
+        certificate = Certificate(self.robot, tuple(self._bodies), self._fixed)
+        (found,) = certificate.first_pairs(np.zeros((1, self.robot.dof)))
+        return "" if found is None else f"'{found[0]}' and '{found[1]}' overlap, and the base cannot give way"
 
 
 def _check_obstacles(scene: Scene, known: Mapping[str, Obstacle]) -> None:

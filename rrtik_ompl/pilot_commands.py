@@ -28,6 +28,7 @@ def pilot(
     port: Annotated[int, typer.Option(help="Of the page; 0 takes a free one.", min=0, max=65535)] = 0,
     host: Annotated[str, typer.Option(help="Address for other machines; needs --token.")] = "127.0.0.1",
     token: Annotated[str, typer.Option(help="Secret word, at least 16 letters.")] = "",
+    sigmas: Annotated[float, typer.Option(help="Margins of what is seen: so many deviations; 0: none.")] = 3.0,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open a browser.")] = False,
     seed: Annotated[int, typer.Option(help="The same commands give the same routes.")] = 0,
 ) -> int:
@@ -42,7 +43,7 @@ def pilot(
     from rrtik_ompl.pilot.setup import Wanted, open_session
 
     source = next((each for each in (camera, video, images) if each is not None), None)
-    wanted = Wanted(problem, source, scenario, camera_file, map_file, record, replay, arm, seed)
+    wanted = Wanted(problem, source, scenario, camera_file, map_file, record, replay, arm, seed, sigmas)
     server = PilotServer(port, host, token, f"rrtik pilot · {problem}")
     with progress("preparing"):
         opened = open_session(wanted)

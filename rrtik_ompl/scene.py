@@ -79,16 +79,29 @@ def _check_solid(name: object, shape: object, pose: object) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Obstacle:
-    """A named solid in the world. ``pose`` is T_world_obstacle; ``motion`` moves it over time, if given."""
+    """A named solid in the world.
+
+    Attributes:
+        name: Its name.
+        shape: What it is.
+        pose: T_world_obstacle.
+        motion: Moves it over time, if given.
+        margin: How far from it the moving parts of the arm must stay [m].
+    """
 
     name: str
     shape: Shape
     pose: Any = field(default_factory=pin.SE3.Identity)
     motion: Motion | None = None
+    margin: float = 0.0
 
     def __post_init__(self) -> None:
         _check_solid(self.name, self.shape, self.pose)
         require(self.motion, Motion | None, f"motion of '{self.name}'")
+        margin = float(finite_array(self.margin, (), f"margin of '{self.name}'"))
+        if margin < 0.0:
+            raise InputError(f"margin of '{self.name}' must be 0 metres or more, got {margin:g}")
+        object.__setattr__(self, "margin", margin)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

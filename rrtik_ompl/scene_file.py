@@ -15,6 +15,7 @@ from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.file_format import (
     Length,
     Name,
+    NotNegative,
     Number,
     Positive,
     Section,
@@ -147,14 +148,21 @@ class ObstacleEntry(SolidEntry, json_schema_extra=_ONE_SHAPE):
     """An obstacle in the world."""
 
     motion: MotionEntry | None = None
+    margin: NotNegative | None = Field(None, description="[m] that the arm keeps from it; that of the scene if absent")
 
-    def build(self, folder: Path) -> Obstacle:
-        """The obstacle. One that moves through waypoints and has no pose of its own stands where it is at time 0."""
+    def build(self, folder: Path, margin: float = 0.0) -> Obstacle:
+        """The obstacle. One that moves through waypoints and has no pose of its own stands where it is at time 0.
+
+        Args:
+            folder: Where meshes are looked for.
+            margin: That of an obstacle that states none [m].
+        """
         motion = None if self.motion is None else self.motion.build()
         place = self.build_pose()
         if self.pose is None and motion is not None:
             place = motion.pose_at(place, 0.0)
-        return Obstacle(self.name, self.build_shape(folder), place, motion)
+        own = margin if self.margin is None else self.margin
+        return Obstacle(self.name, self.build_shape(folder), place, motion, own)
 
 
 class AttachedEntry(SolidEntry, json_schema_extra=_ONE_SHAPE):
@@ -171,6 +179,7 @@ class AttachedEntry(SolidEntry, json_schema_extra=_ONE_SHAPE):
 class SceneEntry(Section):
     """What surrounds the arm."""
 
+    margin: NotNegative = Field(default=0.0, description="[m] kept from obstacles that state none of their own")
     obstacles: list[ObstacleEntry] = Field(default=[])
     attached: list[AttachedEntry] = Field(default=[])
     allowed_collisions: list[Annotated[list[Name], Field(min_length=2, max_length=2)]] = Field(
@@ -187,7 +196,7 @@ class SceneEntry(Section):
         obstacles, attached = [], []
         for k, entry in enumerate(self.obstacles):
             with document.at((*location, "obstacles", k)):
-                obstacles.append(entry.build(folder))
+                obstacles.append(entry.build(folder, self.margin))
         for k, held in enumerate(self.attached):
             with document.at((*location, "attached", k)):
                 attached.append(held.build(folder))
@@ -254,7 +263,7 @@ def _obstacle_data(obstacle: Obstacle, folder: Path) -> dict[str, Any]:
     elif obstacle.motion is not None:
         stations = zip(obstacle.motion.times.tolist(), obstacle.motion.poses, strict=True)
         data["motion"] = {"waypoints": [{"time": time, "pose": pose_data(T)} for time, T in stations]}
-    return data
+    return data | ({"margin": obstacle.margin} if obstacle.margin else {})
 
 
 def _attached_data(held: AttachedObject, folder: Path) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positi
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.poses import rigid, rotation_angles, rpy_matrices, unit_vector
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.tip_distance import metres_per_radian
 
 COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 SWEEPS = 3  # over roll, pitch and yaw; one is exact where a single one of them is free
@@ -38,10 +39,12 @@ class WithinTolerances(ABC):
         """Distance [m] and angle [rad] of the tip from the goal, for each row of Q, shapes (m,)."""
 
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
-        """Errors in units of their tolerances, added; at most 1 each at the goal. Shape (m,)."""
+        """How far the tip is from the goal, shape (m,) [m]: its way, and its turn at the lever of half the arm's reach.
+
+        Small enough means at the goal only where the tolerances say so: ask :meth:`satisfied`.
+        """
         position, angle = self.errors(robot, Q)
-        scaled: Vector = position / self.position_tolerance + angle / self.orientation_tolerance
-        return scaled
+        return position + metres_per_radian(robot) * angle
 
     def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
         """Which rows of Q are at the goal, shape (m,)."""

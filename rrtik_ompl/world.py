@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import copy
 import warnings
-from dataclasses import dataclass
 
-import coal
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
+from rrtik_ompl.arrays import Mask, Matrix, finite_array
 from rrtik_ompl.checks import CollisionChecks
 from rrtik_ompl.collision.bodies import Body, colliding_pairs, link_bodies, scene_bodies
 from rrtik_ompl.collision.certificate import Certificate
+from rrtik_ompl.collision.contacts import Contact as Contact
+from rrtik_ompl.collision.contacts import inside, measured
 from rrtik_ompl.collision.motion_bound import displacement_weights
-from rrtik_ompl.collision.solids import is_mesh
 from rrtik_ompl.errors import InputError, MeshWarning, UnknownNameError, require
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.robot import Robot
@@ -25,23 +23,6 @@ from rrtik_ompl.scene import Scene
 MOTION_RESOLUTION = 0.01  # [m]
 ACCURACIES = ("exact", "conservative")
 FINEST_RESOLUTION = 1e-5  # [m]; a motion across an arm's reach is then some hundred thousand checks
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Contact:
-    """Two bodies that touch, or the two that are nearest to touching.
-
-    Attributes:
-        first, second: Names of link, obstacle or attached object.
-        distance: Signed distance [m]: positive is a gap, negative a penetration depth.
-        point_first, point_second: Witness points in the world [m], shape (3,).
-    """
-
-    first: str
-    second: str
-    distance: float
-    point_first: Vector
-    point_second: Vector
 
 
 class World:
@@ -53,6 +34,9 @@ class World:
     Motions are straight lines in configuration space, checked at both ends and at equal steps in between, so many that
     no point of the arm moves more than ``motion_resolution`` between two checks. The same configurations are checked
     in both directions.
+
+    What moves of the arm has to stay farther from an obstacle than its margin; the base, which no posture moves, must
+    only not touch it.
 
     A world is meant for one thread at a time.
 
@@ -163,27 +147,29 @@ class World:
         return max(1, int(np.ceil(travel / (self.motion_resolution if resolution is None else resolution) - 1e-9)))
 
     def contacts(self, q: ArrayLike) -> tuple[Contact, ...]:
-        """Every pair of bodies that touches at q, deepest first; empty if there is no collision."""
+        """Every pair of bodies that touches or is within its margin at q, deepest first; empty if q is free."""
         rows = self._rows(q, 1)
-        found = [c for c in self._distances(rows, near_only=True) if c.distance <= 0.0]
+        found = list(measured(self.bodies, self.pairs, self.robot.joint_frames(rows)[0], near_only=True))
         if not found:
-            found = [_inside(*names) for names in self._certificate.first_pairs(rows) if names is not None]
-        return tuple(sorted(found, key=lambda c: c.distance))
+            found = [inside(*names) for names in self._certificate.first_pairs(rows) if names is not None]
+        return tuple(sorted(found, key=lambda c: c.clearance))
 
     def closest(self, q: ArrayLike, *, known_free: bool = False) -> Contact | None:
-        """The pair of bodies that is nearest to contact at q (or deepest in it); None if nothing can collide.
+        """The pair of bodies that is nearest to contact or to its margin at q, or deepest in it; None if there is none.
 
         ``known_free`` leaves out the look for contacts, where they were ruled out before.
         """
         touching = () if known_free else self.contacts(q)
         if touching:
             return touching[0]
-        return min(self._distances(self._rows(q, 1), near_only=False), key=lambda c: c.distance, default=None)
+        frames = self.robot.joint_frames(self._rows(q, 1))[0]
+        found = measured(self.bodies, self.pairs, frames, near_only=False)
+        return min(found, key=lambda c: c.clearance, default=None)
 
     def clearance(self, q: ArrayLike) -> float:
-        """Smallest signed distance at q [m]: negative in collision, +inf if nothing can collide."""
+        """Smallest signed distance less its margin at q [m]: negative in collision, +inf if nothing can collide."""
         nearest = self.closest(q)
-        return float("inf") if nearest is None else nearest.distance
+        return float("inf") if nearest is None else nearest.clearance
 
     def explain(self, q: ArrayLike) -> str:
         """A line that says why q is not valid: the joint outside its limit, or the pair in collision; "" if it is."""
@@ -194,10 +180,7 @@ class World:
         touching = self.contacts(row)
         if not touching:
             return ""
-        deepest = touching[0]
-        more = f" (and {len(touching) - 1} more pairs)" if len(touching) > 1 else ""
-        depth = f" by {-1e3 * deepest.distance:.3g} mm" if np.isfinite(deepest.point_first).all() else ""
-        return f"'{deepest.first}' and '{deepest.second}' overlap{depth}{more}"
+        return f"{touching[0]}" + (f" (and {len(touching) - 1} more pairs)" if len(touching) > 1 else "")
 
     def certify(self, Q: ArrayLike) -> Mask:
         """A second opinion on the rows of Q, independent of the checks that planners use. Shape (m,)."""
@@ -234,27 +217,6 @@ class World:
         counts: NDArray[np.int64] = np.maximum(1, np.ceil(travel / self.motion_resolution - 1e-9)).astype(np.int64)
         return counts
 
-    def _distances(self, rows: Matrix, *, near_only: bool) -> list[Contact]:
-        frames = self.robot.joint_frames(rows)[0]
-        poses = [pin.SE3(frames[b.joint]) * b.placement for b in self.bodies]
-        transforms = [coal.Transform3s(p.rotation, p.translation) for p in poses]
-        request = coal.DistanceRequest()
-        found = []
-        for i, j in self.pairs:
-            first, second = self.bodies[i], self.bodies[j]
-            ends = (first.geometry, transforms[i], second.geometry, transforms[j])
-            touching, result = coal.CollisionResult(), coal.DistanceResult()
-            if near_only and not coal.collide(*ends, coal.CollisionRequest(), touching):
-                continue
-            if near_only and is_mesh(first.geometry) and is_mesh(second.geometry):
-                result = touching.getContact(0)  # between two meshes that touch coal knows no distance
-                distance = float(result.penetration_depth)
-            else:
-                distance = float(coal.distance(*ends, request, result))
-            points = (np.array(result.getNearestPoint1()), np.array(result.getNearestPoint2()))
-            found.append(Contact(first.name, second.name, min(distance, 0.0) if near_only else distance, *points))
-        return found
-
 
 def _standing_free(robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> bool:
     """Whether bodies that never move (the base and the obstacles) are clear of each other."""
@@ -272,9 +234,3 @@ def _accuracy(name: str) -> str:
     if name not in ACCURACIES:
         raise UnknownNameError("accuracy", str(name), ACCURACIES)
     return name
-
-
-def _inside(first: str, second: str) -> Contact:
-    """A body wholly inside another: there are no witness points and no meaningful depth."""
-    nowhere = np.full(3, np.nan)
-    return Contact(first, second, 0.0, nowhere, nowhere)

@@ -16,8 +16,8 @@ from rrtik_ompl.ik.genetic.genes import LARGEST, Window, around, from_gray, rand
 from rrtik_ompl.ik.genetic.objective import manipulability, score
 from rrtik_ompl.ik.genetic.options import HISTORICAL, STANDARD, GeneticOptions
 from rrtik_ompl.ik.genetic.search import follow_targets
-from rrtik_ompl.ik.plain_descent import reach_of
 from rrtik_ompl.reproduce.ga_published import INCH, curve
+from rrtik_ompl.tip_distance import reach_of
 
 TOLERANCE = 0.002 * INCH
 EVERY_NUMBER = np.arange(LARGEST + 1, dtype=np.uint16)

@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 RUNGS = (
     "errors arrays random_stream text_file path_text yaml_file file_format shapes poses transitions robot",
-    "task_region scene goal collision fast mesh_file description catalog scene_file goal_file robot_entry",
+    "tip_distance task_region scene goal collision fast mesh_file description catalog scene_file goal_file robot_entry",
     "checks world moving_world path moves_text problem one_joint ik goal_configurations reach",
     "moveit_messages motion_bench_maker run_section problem_file pose_file ompl_bridge planning shortening scenarios",
     "trajectory replanning scenario plot plot_tree plot_genetic plot_reach",

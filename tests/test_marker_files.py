@@ -191,8 +191,18 @@ def test_sensing_writes_scene_and_picture(capsys, folder, taken):
     assert body.pose.translation == pytest.approx(
         (taken[1] * pin.SE3(np.eye(3), np.array([0, 0, -0.01]))).translation, abs=2e-3
     )
+    assert body.margin > 3.0 * valve["position_sigma"]
+    assert body.margin < 0.01
     drawn = cv2.imread(str(folder / "p.png"))
     assert (drawn != taken[0]).any()
+
+
+def test_margins_of_what_is_sensed_can_be_switched_off(capsys, folder):
+    for sigmas, code in ((0, 0), (-1, 2), ("nan", 2)):
+        ended, _, err = sense(capsys, folder, folder / "view.png", "--scene", folder / "s.yaml", "--sigmas", sigmas)
+        assert ended == code
+        assert err.count("sigmas") == err.count("\n") == (code == 2)
+    assert load_scene(folder / "s.yaml").obstacles[0].margin == 0.0
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ PLACE = pin.SE3(ROBOT.fk(PROBLEM.goal.q).rotation, np.array([1.30, 0.17, 0.09]))
 
 
 def seen_at(T):
-    return SeenObject(VALVE, T, 1e-8 * np.eye(3), None)
+    return SeenObject(VALVE, T, 1e-8 * np.eye(6), None)
 
 
 def session(record=None):
@@ -283,7 +283,7 @@ def test_an_object_that_comes_into_the_way_blocks_the_next_move():
     made.command("accept", 0.3)
     middle = made.route.path.waypoints[len(made.route.path.waypoints) // 2]
     blocker = MarkedObject("crate", "obstacle", (MountedMarker(9, 0.08),), (Obstacle("crate", Box([0.1, 0.1, 0.1])),))
-    made.see([SeenObject(blocker, pose(ROBOT.fk(middle).translation), 1e-8 * np.eye(3), None)], 0.4)
+    made.see([SeenObject(blocker, pose(ROBOT.fk(middle).translation), 1e-8 * np.eye(6), None)], 0.4)
     assert "blocked" in made.message
     assert "blocked" in made.command("next", 0.5)
     assert arm.moving is None

@@ -12,6 +12,7 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.collision.contacts import measured
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.moving_world import MovingWorld
@@ -191,7 +192,9 @@ def test_free_with_room_means_that_far_away():
     near = MovingWorld(exact, self_collision=False)
     names = set(moving.names)
     for row in rows[moving.valid_batch(rows)][:40]:
-        gaps = [c.distance for c in exact._distances(row[None], near_only=False) if {c.first, c.second} & names]
+        frames = exact.robot.joint_frames(row[None])[0]
+        found = measured(exact.bodies, exact.pairs, frames, near_only=False)
+        gaps = [c.distance for c in found if {c.first, c.second} & names]
         assert min(gaps) >= 0.15
     near.move(scenes[1])
     assert (near.clearance(rows[moving.valid_batch(rows)]) >= 0.15 - 1e-4).all()
@@ -428,3 +431,53 @@ def test_replanning_needs_no_ompl():
     code = "import sys, rrtik_ompl.replanning; print('ompl' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
+
+
+def base_and_ball(*, moves=False):
+    """UR5 and a ball that stands in its base, or gets there after half a second."""
+    robot = load_robot("ur5")
+    far, near = (pin.SE3(np.eye(3), np.array([x, 0.0, 0.03])) for x in (-1.2, -0.08))
+    motion = Waypoints([0.4, 0.5, 0.9, 1.0], [far, near, near, far]) if moves else None
+    return robot, Scene([Obstacle("ball", Sphere(0.06), far if moves else near, motion)])
+
+
+def test_nothing_is_free_while_an_obstacle_stands_in_the_base():
+    robot, scene = base_and_ball(moves=True)
+    world = World(robot, scene)
+    moving = MovingWorld(world, copies=2)
+    rows = np.random.default_rng(0).uniform(-1.5, 1.5, (50, robot.dof))
+    before = moving.valid_batch(rows)
+    assert before.any()
+    assert moving.blocked == ""
+    moving.move(scene.at(0.6), scene.at(0.6))
+    assert "'ball'" in moving.blocked
+    assert "base" in moving.blocked
+    assert not moving.valid_batch(rows).any()
+    assert not moving.motion_valid_batch(rows, rows).any()
+    assert moving.fast is None
+    assert not World(robot, scene.at(0.6)).valid_batch(rows).any()
+    moving.move(scene.at(0.0), scene.at(0.6))
+    assert moving.blocked == ""  # that place is only foreseen
+    moving.move(scene.at(0.0))
+    assert (moving.valid_batch(rows) == before).all()
+
+
+@pytest.mark.parametrize("predict", [0, 10])
+def test_a_run_waits_while_an_obstacle_stands_in_the_base_and_says_so(predict):
+    robot, scene = base_and_ball(moves=True)
+    q = robot.clamp([0.0, -1.2, 0.9, -1.2, -1.5, 0.0])
+    problem = Problem(World(robot, scene), q, q + np.array([1.5, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    run = replan(problem, step=0.01, rate=50, predict=predict, seconds=10.0)
+    waits = [t for t in run.ticks if t.event == "wait"]
+    assert run.arrived
+    assert waits
+    assert all("'ball'" in t.reason and "base" in t.reason and 0.4 < t.time < 1.0 for t in waits)
+
+
+def test_a_run_that_begins_with_an_obstacle_in_the_base_is_refused_in_one_line():
+    robot, scene = base_and_ball()
+    q = robot.clamp([0.0, -1.2, 0.9, -1.2, -1.5, 0.0])
+    problem = Problem(World(robot), q, q + 0.3)
+    with pytest.raises(InputError, match=r"in collision: .*'ball'") as error:
+        replan(problem, scene, step=0.01, rate=50)
+    assert "\n" not in str(error.value)

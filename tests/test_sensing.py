@@ -1,5 +1,7 @@
 """Markers seen by a synthetic camera whose truth is known: corners, poses, objects, frames, tracking."""
 
+import itertools
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -11,14 +13,15 @@ from rrtik_ompl.poses import pose
 from rrtik_ompl.scene import Obstacle
 from rrtik_ompl.sensing.camera import Camera
 from rrtik_ompl.sensing.corner_pose import pose_of_points, pose_of_square, square_corners
-from rrtik_ompl.sensing.frames import NoBaseError, base_from_camera, position_in_base
+from rrtik_ompl.sensing.frames import NoBaseError, base_from_camera, place_in_base
 from rrtik_ompl.sensing.marker_map import GraspType, MarkedObject, MarkerMap, MountedMarker
 from rrtik_ompl.sensing.markers import DICTIONARIES, dictionaries_seen, find_markers, marker_cells
-from rrtik_ompl.sensing.scene_from_view import objects_in_base, scene_from_image
+from rrtik_ompl.sensing.scene_from_view import SeenObject, objects_in_base, scene_from_image
+from rrtik_ompl.sensing.sensor import Sensor
 from rrtik_ompl.sensing.sight import look
 from rrtik_ompl.sensing.synthetic_camera import clean_picture, marker_print, photograph, published_camera
 from rrtik_ompl.sensing.tracker import PATIENCE, PoseTracker
-from rrtik_ompl.shapes import Box
+from rrtik_ompl.shapes import Box, HalfSpace
 
 CAMERA = published_camera((0.05, -0.12, 0.0005, -0.0007, 0.03))
 SIDE = 0.08
@@ -175,12 +178,45 @@ def test_an_object_is_placed_in_the_frame_of_a_base_that_is_seen():
     truth = T_camera_base.inverse() * T_camera_box
     away = np.linalg.norm(placed.T_base_object.translation - truth.translation)
     assert away < 2.5e-3
-    assert away < 2.0 * placed.margin
+    assert away < 6.0 * placed.position_sigma
     (solid,) = scene_from_image(gray, CAMERA, marker_map).obstacles
     assert solid.name == "box"
     assert solid.pose.homogeneous == pytest.approx(placed.T_base_object.homogeneous)
+    assert solid.margin == pytest.approx(placed.margin(BOX.solids[0]))
+    assert scene_from_image(gray, CAMERA, marker_map, sigmas=0.0).obstacles[0].margin == 0.0
     tip = placed.grasp_pose("top", 1)
     assert (placed.T_base_object.inverse() * tip).translation == pytest.approx([0.05, 0.0, 0.1])
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_no_point_of_a_solid_deviates_by_more_than_its_margin_says(seed):
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(6, 6)) * np.repeat(rng.uniform(1e-4, 1e-2, 2), 3)[:, None]
+    place = pin.SE3(pin.exp3(rng.normal(size=3)), rng.uniform(-1.0, 1.0, 3))
+    size = rng.uniform(0.05, 0.5, 3)
+    thing = MarkedObject("it", "obstacle", STAND.markers, (Obstacle("box", Box(size), place),))
+    seen = SeenObject(thing, pin.SE3.Identity(), root @ root.T, None, sigmas=2.0)
+    (solid,) = seen.solids()
+    worst = 0.0
+    for corner in itertools.product((-0.5, 0.5), repeat=3):
+        lever = np.hstack([np.eye(3), -pin.skew(place.act(size * np.array(corner)))])
+        worst = max(worst, float(np.linalg.norm(lever @ root, 2)))
+    assert 2.0 * worst <= solid.margin * (1.0 + 1e-9)
+    assert solid.margin <= 2.0 * (seen.position_sigma + (1.8 + 0.5) * seen.rotation_sigma)
+
+
+def test_a_ground_that_is_seen_has_a_margin_that_ends():
+    ground = Obstacle("ground", HalfSpace([0, 0, 1], -0.2), pose([0.0, 3.0, -0.1]), margin=0.01)
+    thing = MarkedObject("it", "obstacle", STAND.markers, (ground,))
+    spread = np.diag([1e-6, 0.0, 0.0, 4e-6, 0.0, 0.0])
+    (solid,) = SeenObject(thing, pin.SE3.Identity(), spread, None).solids()
+    assert solid.margin == pytest.approx(0.01 + 3.0 * (1e-3 + 0.3 * 2e-3))
+
+
+@pytest.mark.parametrize("sigmas", [-1.0, float("nan"), float("inf"), "many"])
+def test_sigmas_that_make_no_sense_are_refused_before_anything_is_seen(sigmas):
+    with pytest.raises(InputError, match="sigmas"):
+        Sensor(CAMERA, MarkerMap("4x4_50", (STAND, BOX)), sigmas=sigmas)
 
 
 def test_a_mounted_camera_needs_no_base_and_leaves_no_doubt_about_it():
@@ -204,8 +240,8 @@ def test_the_error_of_the_base_grows_with_its_lever_arm():
         pixels = CAMERA.project(square_corners(SIDE) @ T.rotation.T + T.translation)
         found = pose_of_square(CAMERA, pixels, SIDE, sigma=1e-9)
         sight = type("Sight", (), {"pose": found})()
-        _, covariance = position_in_base(T_camera_base.inverse(), turned, sight)
-        spreads.append(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
+        _, covariance = place_in_base(T_camera_base.inverse(), turned, sight)
+        spreads.append(np.sqrt(np.linalg.eigvalsh(covariance[:3, :3])[-1]))
     assert spreads[0] == pytest.approx(0.2e-3, rel=1e-3)
     assert spreads[1] == pytest.approx(0.8e-3, rel=1e-3)
 

@@ -14,6 +14,7 @@ from rrtik_ompl.ik.projection import project
 from rrtik_ompl.ik.targets import targets
 from rrtik_ompl.poses import pose, pose_from_rpy, rotation_angles, rpy_matrices
 from rrtik_ompl.task_region import TaskRegion, nearest_angles
+from rrtik_ompl.tip_distance import metres_per_radian
 
 FREE = [-np.pi, np.pi]
 angles = st.floats(-4.0, 4.0)
@@ -79,6 +80,28 @@ def test_a_pose_with_a_box_and_a_free_axis_and_the_same_task_region_agree():
     tips = np.linalg.inv(place.homogeneous) @ robot.fk_batch(Q)
     tilt = np.arccos(np.clip(tips[:, 1, 1], -1.0, 1.0))  # what no turn about y removes
     np.testing.assert_allclose(same.errors(robot, Q)[1], tilt, atol=1e-7)
+
+
+def test_positions_poses_and_regions_are_measured_in_the_same_metres():
+    robot = load_robot("ur5")
+    q = np.full((1, 6), 0.4)
+    tip = robot.fk(q[0])
+    lever = metres_per_radian(robot)
+    aside = tip * pose([0.003, 0.0, 0.0])
+    turned = PoseGoal(tip * pose_from_rpy([0, 0, 0], [0, 0, 0.2]), 1e-6, 1e-6)
+    parts = {
+        "position": (PositionGoal(tip.act(np.array([0.0, 0.5, 0.0]))), 0.5, (0.5, 0.0)),
+        "pose": (PoseGoal(aside, 1e-6, 1e-6), 0.003, (0.003, 0.0)),
+        "turned": (turned, 0.2 * lever, (0.0, 0.2)),
+        "region": (TaskRegion(tip * pose([0.0, 0.0, 0.1]), np.zeros((6, 2))), 0.1, (0.1, 0.0)),
+    }
+    for part, distance, _ in parts.values():
+        assert part.distance(robot, q) == pytest.approx([distance])
+    for names in (("position", "pose"), ("position", "turned"), ("pose", "turned", "region"), ("region", "position")):
+        _, distance, errors = min((parts[name] for name in names), key=lambda part: part[1])
+        goal = GoalRegion([parts[name][0] for name in names])
+        assert goal.distance(robot, q) == pytest.approx([distance])
+        assert np.ravel(tip_errors(goal, robot, q)) == pytest.approx(errors, abs=1e-7)
 
 
 def test_a_grasp_of_a_bar_turns_about_the_bar_and_slides_along_it():

@@ -29,6 +29,7 @@ class Body:
         placement: ``pinocchio.SE3`` in the joint's frame.
         geometry: The coal geometry.
         kind: "link", "attached" or "obstacle".
+        margin: How far what moves must stay from it [m].
     """
 
     name: str
@@ -36,6 +37,7 @@ class Body:
     placement: Any
     geometry: Any
     kind: str
+    margin: float = 0.0
 
 
 @lru_cache(maxsize=16)
@@ -61,7 +63,7 @@ def scene_bodies(robot: Robot, scene: Scene) -> tuple[Body, ...]:
     found = []
     for obstacle in scene.obstacles:
         poses = ((obstacle.pose * piece.placement, piece.geometry) for piece in _pieces(obstacle))
-        found += [Body(obstacle.name, 0, placement, geometry, "obstacle") for placement, geometry in poses]
+        found += [Body(obstacle.name, 0, *pose, "obstacle", obstacle.margin) for pose in poses]
     for item in scene.attached:
         for link in (item.link, *item.allow):
             if link not in links:

@@ -7,8 +7,7 @@ support points as a first guess and have been seen to miss about 3 overlaps in 1
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from typing import Any, TypeAlias
 
 import coal
 import numpy as np
@@ -16,13 +15,17 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.boxes import Boxes, PlacedBoxes
 from rrtik_ompl.collision.containment import Containment
+from rrtik_ompl.collision.margins import kept_apart, request
 from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.robot import Robot
 
-CHUNK = 256  # configurations at a time, to bound memory
+MOST = 1 << 16  # runs of rows times pairs that are looked at together, to bound memory
 RUNS = (64, 8, 1)  # rows that are looked at together
 ROOM = 1e-5  # [m] for rounding, in our arithmetic and in coal's distances
+
+Numbers: TypeAlias = NDArray[np.int64]
 
 
 class Certificate:
@@ -31,14 +34,14 @@ class Certificate:
     def __init__(self, robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> None:
         self._robot, self._bodies = robot, bodies
         self._pairs = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-        self._joints = np.array([b.joint for b in bodies], dtype=np.int64)
-        self._placements = np.array([b.placement.homogeneous for b in bodies]).reshape(-1, 4, 4)
-        self._centres, self._halves = _local_boxes(bodies)
-        self._approach = approach_weights(robot, bodies, pairs).T  # [m per rad or m], shape (dof, pairs)
-        self._half_spaces = list(_half_space_pairs(bodies, pairs))
+        self._boxes = Boxes(bodies)
+        self._approach = approach_weights(robot, bodies, pairs)  # [m per rad or m], shape (pairs, dof)
+        self._planes = _half_space_pairs(bodies, pairs)
+        self._margins = np.array([kept_apart(bodies[i], bodies[j]) for i, j in pairs])
         self._containment = Containment(bodies, pairs)
-        hollow = {frozenset(pair) for pair in self._containment.pairs}
-        self._hollow = np.array([frozenset(pair) in hollow for pair in pairs], dtype=bool)
+        places = {pair: k for k, pair in enumerate(self._containment.pairs)}
+        ways = [(places.get((i, j), -1), places.get((j, i), -1)) for i, j in pairs]
+        self._hollow = np.array(ways, dtype=np.int64).reshape(-1, 2)
 
     def free(self, Q: Matrix) -> Mask:
         """Which rows of Q, shape (m, dof), are collision-free. Shape (m,). Quickest where rows follow a path."""
@@ -58,89 +61,107 @@ class Certificate:
         come nearer within the run of rows, they are apart in all of it. What is left open is looked at in shorter runs.
         """
         found: list[tuple[int, ...]] = [()] * len(Q)
-        begins, open_ = np.arange(0, len(Q), RUNS[0]), np.ones((-(-len(Q) // RUNS[0]), len(self._pairs)), dtype=bool)
-        for size, shorter in zip(RUNS, (*RUNS[1:], 0), strict=True):
-            for start in range(0, len(begins), CHUNK):
-                part = slice(start, start + CHUNK)
-                open_[part] = self._open(Q, begins[part], size, open_[part], found)
-            if shorter:
-                left = open_.any(axis=1)
-                begins = (begins[left, None] + np.arange(0, size, shorter)).ravel()
-                open_ = np.repeat(open_[left], size // shorter, axis=0)[begins < len(Q)]
-                begins = begins[begins < len(Q)]
+        together = RUNS[0] * max(1, MOST // max(1, len(self._pairs)))
+        for start in range(0, len(Q), together):
+            begins = np.arange(start, min(start + together, len(Q)), RUNS[0])
+            run, pair = (k.ravel() for k in np.indices((len(begins), len(self._pairs))))
+            for size, shorter in zip(RUNS, (*RUNS[1:], 0), strict=True):
+                open_ = self._open(Q, begins, size, run, pair, found)
+                if not open_.any():
+                    break
+                if shorter:
+                    begins, run, pair = _shorter(begins, run[open_], pair[open_], size, shorter, len(Q))
         return found
 
     def _open(
-        self, Q: Matrix, begins: NDArray[np.int64], size: int, asked: NDArray[np.bool_], found: list[tuple[int, ...]]
-    ) -> NDArray[np.bool_]:
-        """Which of the pairs ``asked`` for, shape (runs, pairs), may touch somewhere in runs of rows. Adds to found."""
-        middles = np.minimum(begins + size // 2, len(Q) - 1)
-        ends = np.minimum(begins + size, len(Q))
+        self, Q: Matrix, begins: Numbers, size: int, run: Numbers, pair: Numbers, found: list[tuple[int, ...]]
+    ) -> Mask:
+        """Which of some pairs, shape (k,), may touch somewhere in the runs of rows asked for, shape (k,).
+
+        Adds to found.
+        """
+        middles, ends = np.minimum(begins + size // 2, len(Q) - 1), np.minimum(begins + size, len(Q))
         near = np.array([np.abs(Q[a:b] - Q[m]).max(axis=0) for a, b, m in zip(begins, ends, middles, strict=True)])
-        approach = near @ self._approach + ROOM
         frames = self._robot.joint_frames(Q[middles])
-        poses = self._poses(frames)
-        open_: NDArray[np.bool_] = asked & (self._gaps(*self._boxes(poses)) <= approach)
-        for run, pair in zip(*(k.tolist() for k in np.nonzero(open_)), strict=True):
-            i, j = self._pairs[pair].tolist()
-            gap = distance(self._bodies[i].geometry, poses[run, i], self._bodies[j].geometry, poses[run, j])
-            open_[run, pair] = gap is None or gap <= approach[run, pair]
+        placed = self._boxes.placed(frames)
+        open_: Mask = self._gaps(placed, run, pair) <= ROOM + self._approached(near, run, pair)
+        kept = np.flatnonzero(open_)
+        approach = ROOM + self._approached(near, run[kept], pair[kept])
+        columns = (kept, run[kept], pair[kept], approach, self._reached(frames, run[kept], pair[kept]))
+        for entry, r, p, most, reached in zip(*(k.tolist() for k in columns), strict=True):
+            i, j = self._pairs[p].tolist()
+            first, second = ((self._bodies[k].geometry, placed.pose(r, k)) for k in (i, j))
+            gap = distance(*first, *second, margin=float(self._margins[p]))
+            open_[entry] = gap is None or gap <= most
             if gap is None:
-                found[middles[run]] = (i, j)
-            elif self._hollow[pair] and self._containment.holds((i, j), frames[run]):
-                rows = slice(middles[run], middles[run] + 1) if open_[run, pair] else slice(begins[run], ends[run])
+                found[middles[r]] = (i, j)
+            elif reached and self._containment.holds((i, j), frames[r]):
+                rows = slice(middles[r], middles[r] + 1) if open_[entry] else slice(begins[r], ends[r])
                 found[rows] = [(i, j)] * (rows.stop - rows.start)  # where surfaces stay apart, what is held stays held
         return open_
 
-    def _poses(self, frames: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Poses of the bodies, shape (m, bodies, 4, 4), from those of the joints."""
-        poses: NDArray[np.float64] = frames[:, self._joints] @ self._placements
-        return poses
+    def _approached(self, near: Matrix, run: Numbers, pair: Numbers) -> Vector:
+        """How much nearer the pairs can come in their runs than at the middle [m], shape (k,)."""
+        return np.asarray(sum(near[run, joint] * self._approach[pair, joint] for joint in range(near.shape[1])))
 
-    def _boxes(self, poses: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Centres and half extents of the bodies' bounding boxes in the world, shape (m, bodies, 3) each."""
-        rotations = poses[..., :3, :3]
-        centres = np.einsum("mgij,gj->mgi", rotations, self._centres) + poses[..., :3, 3]
-        return centres, np.einsum("mgij,gj->mgi", np.abs(rotations), self._halves)
+    def _reached(self, frames: NDArray[np.float64], run: Numbers, pair: Numbers) -> Mask:
+        """Which of the pairs may be of a body inside a hollow one, in the middle of their runs, shape (k,)."""
+        reached = np.zeros(len(pair), dtype=bool)
+        for places in self._hollow[pair].T:
+            asked = np.flatnonzero(places >= 0)
+            reached[asked] |= self._containment.reached(places[asked], frames[run[asked]])
+        return reached
 
-    def _gaps(self, centres: NDArray[np.float64], halves: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Lower bounds of the distances [m] between the pairs' boxes, shape (m, pairs)."""
-        a, b = self._pairs[:, 0], self._pairs[:, 1]
-        gaps: NDArray[np.float64] = (np.abs(centres[:, a] - centres[:, b]) - halves[:, a] - halves[:, b]).max(axis=2)
-        for pair, other, normal, offset in self._half_spaces:
-            gaps[:, pair] = centres[:, other] @ normal - offset - halves[:, other] @ np.abs(normal)
+    def _gaps(self, placed: PlacedBoxes, run: Numbers, pair: Numbers) -> Vector:
+        """Lower bounds of the distances between the pairs' boxes less their margins [m], shape (k,)."""
+        sides = [placed.rows(run, self._pairs[pair, k]) for k in (0, 1)]
+        gaps = np.full(len(pair), -np.inf)
+        for axis in range(3):
+            centres, halves = placed.centres[:, axis], placed.halves[:, axis]
+            apart = np.abs(centres[sides[0]] - centres[sides[1]]) - (halves[sides[0]] + halves[sides[1]])
+            np.maximum(gaps, apart, out=gaps)
+        for number, (side, normal, offset) in self._planes.items():
+            mine = np.flatnonzero(pair == number)
+            rows = sides[side][mine]
+            gaps[mine] = placed.centres[rows] @ normal - offset - placed.halves[rows] @ np.abs(normal)
+        gaps -= self._margins[pair]
         return gaps
 
 
-def distance(first: Any, first_pose: Matrix, second: Any, second_pose: Matrix) -> float | None:
-    """A lower bound of the distance [m] of two coal geometries at poses, shape (4, 4); None if they touch.
+def _shorter(
+    begins: Numbers, run: Numbers, pair: Numbers, size: int, shorter: int, end: int
+) -> tuple[Numbers, Numbers, Numbers]:
+    """Begins of shorter runs in the place of those named by ``run``, and what is to be asked about them."""
+    named, place = np.unique(run, return_inverse=True)
+    parts = size // shorter
+    starts = (begins[named, None] + np.arange(0, size, shorter)).ravel()
+    runs = (parts * np.asarray(place).reshape(-1, 1) + np.arange(parts)).ravel()
+    pairs = np.repeat(pair, parts)
+    inside = starts[runs] < end
+    return starts[: int((starts < end).sum())], runs[inside], pairs[inside]
 
-    Asked with fresh request and result.
+
+def distance(first: Any, first_pose: Matrix, second: Any, second_pose: Matrix, margin: float = 0.0) -> float | None:
+    """A lower bound of the distance of two coal geometries at poses, shape (4, 4), less a margin [m].
+
+    None if the margin is not kept. Asked with fresh request and result.
     """
     transforms = [coal.Transform3s(pose[:3, :3], pose[:3, 3]) for pose in (first_pose, second_pose)]
     result = coal.CollisionResult()
-    if coal.collide(first, transforms[0], second, transforms[1], coal.CollisionRequest(), result):
+    if coal.collide(first, transforms[0], second, transforms[1], request(margin), result):
         return None
     return float(result.distance_lower_bound)
 
 
 def _half_space_pairs(
     bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]
-) -> Iterator[tuple[int, int, Vector, float]]:
-    """Pairs with a half-space that stands still: number of the pair, of the other body, outward normal and offset."""
+) -> dict[int, tuple[int, Vector, float]]:
+    """Pairs with a half-space that stands still, by number: side of the other body, outward normal and offset."""
+    found = {}
     for k, pair in enumerate(pairs):
-        for first, other in (pair, pair[::-1]):
-            body = bodies[first]
+        for side in (0, 1):
+            body = bodies[pair[side]]
             if isinstance(body.geometry, coal.Halfspace) and body.joint == 0:
                 normal = np.array(body.placement.rotation @ body.geometry.n)
-                yield k, other, normal, float(body.geometry.d + normal @ body.placement.translation)
-
-
-def _local_boxes(bodies: tuple[Body, ...]) -> tuple[Matrix, Matrix]:
-    """Centres and half extents of the bodies' own bounding boxes, shapes (g, 3); a half-space has an endless one."""
-    centres, halves = np.zeros((len(bodies), 3)), np.full((len(bodies), 3), 1e9)
-    for k, body in enumerate(bodies):
-        if not isinstance(body.geometry, coal.Halfspace):
-            box = body.geometry.aabb_local
-            centres[k], halves[k] = box.center(), 0.5 * np.array([box.width(), box.height(), box.depth()])
-    return centres, halves
+                found[k] = 1 - side, normal, float(body.geometry.d + normal @ body.placement.translation)
+    return found

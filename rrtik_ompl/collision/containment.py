@@ -9,7 +9,7 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.enclosure import enclosure
 from rrtik_ompl.collision.solids import inside_mesh, is_closed, is_mesh, mesh_arrays
@@ -61,6 +61,22 @@ class Containment:
             frames: Pose of every joint frame in the world, world first, shape (joints + 1, 4, 4).
         """
         return any(self._holds(self._places[p], frames) for p in (pair, pair[::-1]) if p in self._places)
+
+    def reached(self, places: NDArray[np.int64], frames: NDArray[np.float64]) -> Mask:
+        """Which of some pairs may be such: the ends of the inner body are in the bounding box of the outer one.
+
+        Args:
+            places: Places in ``pairs``, shape (k,).
+            frames: Poses of all joint frames for each of them, shape (k, joints + 1, 4, 4).
+        """
+        every = np.arange(len(places))
+        inner, outer = frames[every, self._inner_joint[places]], frames[every, self._outer_joint[places]]
+        to_outer = self._to_outer[places]
+        turn = to_outer[:, :3, :3] @ outer[:, :3, :3].transpose(0, 2, 1)
+        world = self._points[places] @ inner[:, :3, :3].transpose(0, 2, 1) + inner[:, None, :3, 3]
+        local = (world - outer[:, None, :3, 3]) @ turn.transpose(0, 2, 1) + to_outer[:, None, :3, 3]
+        inside: Mask = (np.abs(local - self._centres[places, None]) <= self._halves[places, None]).all(axis=(1, 2))
+        return inside
 
     def _holds(self, k: int, frames: NDArray[np.float64]) -> bool:
         inner, outer = frames[self._inner_joint[k]], frames[self._outer_joint[k]]

@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.margins import kept_apart, request
 from rrtik_ompl.collision.solids import is_mesh
 from rrtik_ompl.robot import Robot
 
@@ -19,9 +20,9 @@ ROOM = 1e-5  # [m] taken off coal's depths
 class OverlapDepth:
     """Depths of overlap between the solids of a world.
 
-    The depth of two convex solids is the shortest translation that parts them. A motion in which no point moves that
-    far does not part them either: along no direction do their extents then cease to overlap. Pairs with a mesh, for
-    which coal knows no depth, are left out.
+    The depth of two convex solids is the shortest translation that parts them, by their margin if they have one. A
+    motion in which no point moves that far does not part them either: along no direction do their extents then cease to
+    overlap. Pairs with a mesh, for which coal knows no depth, are left out.
 
     Args:
         robot: The arm.
@@ -45,9 +46,10 @@ class OverlapDepth:
     def _pair_travel(self, i: int, j: int) -> float:
         first, second = self._bodies[i], self._bodies[j]
         ends = (first.geometry, self._transform(first), second.geometry, self._transform(second))
-        if not coal.collide(*ends, coal.CollisionRequest(), coal.CollisionResult()):
+        margin = kept_apart(first, second)
+        if not coal.collide(*ends, request(margin), coal.CollisionResult()):
             return 0.0
-        depth = -float(coal.distance(*ends, coal.DistanceRequest(), coal.DistanceResult())) - ROOM
+        depth = margin - float(coal.distance(*ends, coal.DistanceRequest(), coal.DistanceResult())) - ROOM
         both_move = first.joint > 0 and second.joint > 0
         return max(0.5 * depth if both_move else depth, 0.0)
 

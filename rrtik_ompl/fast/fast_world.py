@@ -55,7 +55,8 @@ class FastWorld:
 
     Args:
         chain: The tree of joints.
-        bodies: Things with ``joint`` (0 stands still), ``placement`` in the joint's frame and coal ``geometry``.
+        bodies: Things with ``joint`` (0 stands still), ``placement`` in the joint's frame, coal ``geometry``, and the
+            ``margin`` [m] that is to be kept from what stands still.
         pairs: Numbers of the bodies that must not touch; pairs that both stand still are left out.
         outer: For each body spheres (x, y, z, r) in its own frame whose union contains it, shape (n, 4); none stand
             for the bounding ball.
@@ -117,7 +118,8 @@ class FastWorld:
         Args:
             bodies: As at the beginning, those that stand still with other placements. One that is the same object
                 as before is not packed again.
-            rooms: For each body how far from it the arm must stay to be FREE [m]; read for those that stand still.
+            rooms: For each body how far from it, beyond its margin, the arm must stay to be FREE [m]; read for those
+                that stand still.
         """
         around = self._placed.rows(bodies, self._standing, self._outer, rooms)
         self._rows = rows_table(around, self._checked), rows_table([], self._checked)

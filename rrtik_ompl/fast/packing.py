@@ -152,7 +152,7 @@ class PlacedRows:
     def rows(
         self, bodies: Sequence[Any], standing: Sequence[int], outer: Sequence[Spheres], rooms: Sequence[float]
     ) -> list[tuple[int, Row]]:
-        """Rows that contain all points within ``rooms`` [m] of the bodies, with their places in ``standing``."""
+        """Rows that contain all points within margin and ``rooms`` [m] of bodies, with their places in ``standing``."""
         for k in standing:
             known = self._known.get(k)
             if known is None or known[0] is not bodies[k] or known[1] != rooms[k]:
@@ -161,9 +161,10 @@ class PlacedRows:
 
 
 def standing_solids(bodies: Sequence[Any], standing: Sequence[int], solids: Sequence[Solids]) -> Table:
-    """Solids of what stands still."""
+    """Solids of what stands still, each with its margin around it."""
     poses = [(np.array(bodies[k].placement.rotation), np.array(bodies[k].placement.translation)) for k in standing]
-    return solid_table([(0, [solids[k].placed(*pose, 0.0)]) for k, pose in zip(standing, poses, strict=True)])
+    grown = [solids[k].grown(bodies[k].margin) for k in standing]
+    return solid_table([(0, [each.placed(*pose, 0.0)]) for each, pose in zip(grown, poses, strict=True)])
 
 
 def flag_places(

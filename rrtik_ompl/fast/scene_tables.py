@@ -107,8 +107,9 @@ def rows_table(rows: Sequence[tuple[int, Row]], checked: NDArray[np.bool_]) -> T
 def outer_rows(body: Any, cover: Spheres, room: float = 0.0) -> list[Row]:
     """Rows whose union contains a standing body: its own formula if it has one, the balls of its cover otherwise.
 
-    With ``room`` [m] they contain every point that is no farther from the body.
+    They contain every point that is no farther from the body than its margin and ``room`` [m].
     """
+    room += body.margin
     exact = _exact(body, grow=1.0, room=room)
     rows = _balls(body, usable_cover(body.geometry, cover), grow=1.0, room=room) if exact is None else exact
     everything = Row(BALL, np.array([0.0, 0.0, 0.0, HUGE]), np.full(3, -HUGE), np.full(3, HUGE))
@@ -116,10 +117,12 @@ def outer_rows(body: Any, cover: Spheres, room: float = 0.0) -> list[Row]:
 
 
 def inner_rows(body: Any, inner: Spheres) -> list[Row]:
-    """Rows that lie inside a standing body."""
-    rows = _exact(body, grow=-1.0)
+    """Rows that lie within the margin around a standing body, or inside it."""
+    stays_round = isinstance(body.geometry, (coal.Sphere, coal.Capsule, coal.Halfspace))
+    rows = _exact(body, grow=-1.0, room=body.margin if stays_round else 0.0)
     if rows is None or isinstance(body.geometry, coal.ConvexBase):
-        rows = (rows or []) + _balls(body, np.asarray(inner, dtype=np.float64).reshape(-1, 4), grow=-1.0)
+        balls = np.asarray(inner, dtype=np.float64).reshape(-1, 4)
+        rows = (rows or []) + _balls(body, balls, grow=-1.0, room=body.margin)
     return [row for row in rows if _fits(row)]
 
 

@@ -60,6 +60,12 @@ class ConvexSolid:
     slack: float = 0.0
     kind: int = CONVEX_SOLID
 
+    def grown(self, margin: float) -> ConvexSolid:
+        """All that is no farther than ``margin`` [m] from the solid."""
+        if self.kind == HALF_SPACE_SOLID:
+            return replace(self, disc=self.disc + margin)
+        return replace(self, radius=self.radius + margin)
+
     def placed(self, rotation: Matrix, origin: Vector, slack: float) -> ConvexSolid:
         """The solid moved into another frame, its points misplaced by ``slack`` more."""
         axis = rotation @ self.axis
@@ -89,6 +95,14 @@ class Solids:
 
     around: tuple[ConvexSolid, ...] = ()
     inside: tuple[ConvexSolid, ...] = ()
+
+    def grown(self, margin: float) -> Solids:
+        """See :meth:`ConvexSolid.grown`."""
+        if margin == 0.0:
+            return self
+        around = tuple(solid.grown(margin) for solid in self.around)
+        same = self.inside == self.around
+        return Solids(around, around if same else tuple(solid.grown(margin) for solid in self.inside))
 
     def placed(self, rotation: Matrix, origin: Vector, slack: float) -> Solids:
         """See :meth:`ConvexSolid.placed`."""

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix, frozen
 from rrtik_ompl.fast import ik_layout as layout
 from rrtik_ompl.fast.robot_tables import Table, table
-from rrtik_ompl.ik.plain_descent import DAMPING, DAMPING_SHARE, LARGEST_STEP, PER_CHORD, SHARE_GROWTH, STALLED, reach_of
+from rrtik_ompl.ik.plain_descent import DAMPING, DAMPING_SHARE, LARGEST_STEP, PER_CHORD, SHARE_GROWTH, STALLED
 from rrtik_ompl.ik.tip_columns import tip_columns
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.tip_distance import reach_of
 
 SEEDS = 512
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.fast.ik_layout import ANY_TURN, BOX, CHORD_TOLERANCE, FREE_TURN, NO_TURN, POSITION_TOLERANCE
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.tip_distance import reach_of
 
 PER_CHORD = 0.3  # weight of a turn (its chord 2 sin(angle / 2)) where the position counts in reaches
 DAMPING = 1e-9  # the constant part, in units of the squared residual
@@ -23,11 +24,6 @@ SHARE_GROWTH = (
 LARGEST_STEP = 0.5  # [rad] or [m] of any joint in one step
 STALLED = 0.5  # a start whose squared residual has not fallen to this share in some steps is given up
 TINY = 1e-12
-
-
-def reach_of(robot: Robot) -> float:
-    """Unit of length of an arm [m]: all offsets between its joints in a row."""
-    return float(np.linalg.norm(robot.chain.placement[:, :3, 3], axis=1).sum()) or 1.0
 
 
 def walk_plainly(robot: Robot, aims: Matrix, Q: Matrix, steps: int, patience: int) -> tuple[Matrix, Mask, int]:

@@ -16,14 +16,13 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.goal import PoseGoal, as_task_region, parts_of
-from rrtik_ompl.ik.plain_descent import reach_of
 from rrtik_ompl.ik.question import Answer, Question
 from rrtik_ompl.ik.residual import SHARE, rotation_vectors
 from rrtik_ompl.poses import rpy_matrices
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.task_region import TURN, TaskRegion
+from rrtik_ompl.tip_distance import PER_RADIAN, reach_of
 
-PER_RADIAN = 0.5  # [reach/rad]: two radians count as much as the whole reach
 ITERATIONS = 60
 PATIENCE, STALLED = 10, 0.5  # a walk is given up whose squared residual is not down to this share in so many steps
 DAMPING = 1e-6  # the constant part, in units of the squared residual (1 is the reach)

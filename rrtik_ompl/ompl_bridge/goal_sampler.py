@@ -9,10 +9,7 @@ from ompl import base as ob
 
 from rrtik_ompl.arrays import Mask, Matrix, frozen
 from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.goal import JointGoal, tip_errors
 from rrtik_ompl.goal_configurations import LARGEST, GoalSearch
-from rrtik_ompl.ik.plain_descent import reach_of
-from rrtik_ompl.ik.projection import PER_RADIAN
 from rrtik_ompl.ompl_bridge.setup import Judge, space_information
 from rrtik_ompl.ompl_bridge.states import StateIO, space_bounds
 from rrtik_ompl.problem import Problem
@@ -115,18 +112,9 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
         return len(self.rows) > 0
 
     def distanceGoal(self, state: Any) -> float:
-        """0 at the goal, else how far the tip is away [m]; called by OMPL.
-
-        An angle of two radians counts as much as the arm's reach. For a goal in joint values it is the largest joint
-        error [rad or m].
-        """
+        """0 at the goal, else its distance [m; rad or m for a goal in joint values]; called by OMPL."""
         robot, goal, q = self._problem.world.robot, self._problem.goal, self._io.read(state)[None]
-        if goal.satisfied(robot, q)[0]:
-            return 0.0
-        if isinstance(goal, JointGoal):
-            return float(goal.distance(robot, q)[0])
-        distance, angle = tip_errors(goal, robot, q)
-        return float(distance[0] + PER_RADIAN * reach_of(robot) * angle[0])
+        return 0.0 if goal.satisfied(robot, q)[0] else float(goal.distance(robot, q)[0])
 
     def _usable(self, rows: Matrix) -> Mask:
         """Which rows lie inside the bounds and are valid to the checker of the space information, if it has one."""

@@ -13,7 +13,7 @@ CLOSE_ENOUGH = 0.002  # [m]; the least distance found is at most that much too l
 
 
 def tightest(world: World, rows: Matrix) -> Contact | None:
-    """The pair that is nearest to contact at any of some free configurations; None if nothing can collide.
+    """The pair that is nearest to its margin or to contact at some free configuration; None if nothing can collide.
 
     Few looks are enough, for between two of them a distance changes little.
     Looks first where the bound from earlier looks is lowest: two bodies approach each other by no more than twice the
@@ -26,14 +26,14 @@ def tightest(world: World, rows: Matrix) -> Contact | None:
     bound, best = np.full(len(rows), -np.inf), None
     while True:
         row = int(np.argmin(bound))
-        if best is not None and bound[row] >= best.distance - CLOSE_ENOUGH:
+        if best is not None and bound[row] >= best.clearance - CLOSE_ENOUGH:
             return best
         found = world.closest(rows[row], known_free=True)
         if found is None:
             return None
-        if best is None or found.distance < best.distance:
+        if best is None or found.clearance < best.clearance:
             best = found
-        bound = np.maximum(bound, found.distance - 2.0 * np.abs(rows - rows[row]) @ world.weights)
+        bound = np.maximum(bound, found.clearance - 2.0 * np.abs(rows - rows[row]) @ world.weights)
         bound[row] = np.inf
 
 

@@ -16,7 +16,7 @@ from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.simulation import SimulatedCamera
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.sensing.marker_map import MarkerMap
-from rrtik_ompl.sensing.scene_from_view import SeenObject
+from rrtik_ompl.sensing.scene_from_view import SIGMAS, SeenObject
 
 Entry = dict[str, Any]
 
@@ -122,4 +122,5 @@ def _seen(marker_map: MarkerMap, entry: Entry) -> SeenObject:
     xyz, turn = finite_array(entry["xyz"], (3,), "xyz"), finite_array(entry["rotation"], (3, 3), "rotation")
     if not np.allclose(turn @ turn.T, np.eye(3), atol=1e-6):
         raise InputError(f"rotation of {thing.name} is none")
-    return SeenObject(thing, pin.SE3(turn, xyz), np.zeros((3, 3)), None)
+    spread = finite_array(entry.get("covariance", np.zeros((6, 6))), (6, 6), "covariance")
+    return SeenObject(thing, pin.SE3(turn, xyz), spread, None, entry.get("sigmas", SIGMAS))

@@ -293,4 +293,5 @@ class Session:
 def _placed(each: SeenObject) -> dict[str, Any]:
     pose = each.T_base_object
     # The matrix and not a quaternion: a replay has to find the same routes, to the last bit.
-    return {"name": each.object.name, "xyz": pose.translation.tolist(), "rotation": pose.rotation.tolist()}
+    place = {"name": each.object.name, "xyz": pose.translation.tolist(), "rotation": pose.rotation.tolist()}
+    return place | {"covariance": each.covariance.tolist(), "sigmas": each.sigmas}

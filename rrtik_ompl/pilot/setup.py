@@ -22,6 +22,7 @@ from rrtik_ompl.problem_file import load_problem
 from rrtik_ompl.sensing.camera_file import load_camera
 from rrtik_ompl.sensing.marker_map_file import load_marker_map
 from rrtik_ompl.sensing.pictures import pictures_from
+from rrtik_ompl.sensing.scene_from_view import SIGMAS
 from rrtik_ompl.sensing.sensor import Sensor
 
 
@@ -38,6 +39,7 @@ class Wanted:
     replay: Path | None = None
     arm: str | None = None
     seed: int = 0
+    sigmas: float = SIGMAS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,12 +80,13 @@ def open_session(wanted: Wanted) -> Opened:
 def _eyes(wanted: Wanted, problem: Problem, arm: Arm) -> LiveEyes:
     if wanted.source is None:
         scenario = _scenario(wanted, problem)
-        sensor = Sensor(scenario.camera, scenario.marker_map)
+        sensor = Sensor(scenario.camera, scenario.marker_map, sigmas=wanted.sigmas)
         return LiveEyes(sensor, SimulatedSource(_simulated(scenario, problem), arm), arm_in_picture=True)
     for name, file in (("--camera-file", wanted.camera_file), ("--map", wanted.map_file)):
         if file is None:
             raise InputError(f"pictures need {name} FILE (see: rrtik markers --help)")
-    sensor = Sensor(load_camera(str(wanted.camera_file)), load_marker_map(str(wanted.map_file)))
+    camera, marker_map = load_camera(str(wanted.camera_file)), load_marker_map(str(wanted.map_file))
+    sensor = Sensor(camera, marker_map, sigmas=wanted.sigmas)
     source = wanted.source
     return LiveEyes(sensor, Feed(lambda: pictures_from(source), paced=not isinstance(source, int)))
 

@@ -56,7 +56,7 @@ def _object(session: Session, seen: Any) -> dict[str, Any]:
         "role": seen.object.role,
         "graspable": bool(seen.object.grasps),
         "distance": round(float(np.linalg.norm(seen.T_base_object.translation - tip)), 4),
-        "sigma_mm": round(1e3 * seen.margin / 3.0, 2),
+        "sigma_mm": round(1e3 * seen.position_sigma, 2),
     }
 
 

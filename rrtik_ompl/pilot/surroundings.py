@@ -67,7 +67,9 @@ class Surroundings:
             return True
         change = old.T_base_object.inverse() * new.T_base_object
         turned = float(np.linalg.norm(pin.log3(change.rotation)))
-        return float(np.linalg.norm(change.translation)) > SAME_PLACE or turned > SAME_TURN
+        shifted = float(np.linalg.norm(change.translation))
+        wider = max(_margins(new), default=0.0) - max(_margins(old), default=0.0)
+        return shifted > SAME_PLACE or turned > SAME_TURN or abs(wider) > SAME_PLACE
 
     def _with(self, allowed: Sequence[tuple[str, str]]) -> World:
         scene = self._given.scene
@@ -76,6 +78,10 @@ class Surroundings:
         pairs = (*scene.allowed_collisions, *allowed)
         changed: Scene = replace(scene, obstacles=(*kept, *more), allowed_collisions=pairs)
         return World(self._given.robot, changed, motion_resolution=self._given.motion_resolution)
+
+
+def _margins(seen: SeenObject) -> list[float]:
+    return [solid.margin for solid in seen.solids()]
 
 
 def gripper_links(robot: Robot) -> tuple[str, ...]:

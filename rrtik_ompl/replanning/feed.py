@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.collision.solids import pieces
+from rrtik_ompl.collision.extent import farthest
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import HalfSpace
 
 Feed: TypeAlias = Callable[[float], Scene]
 Source: TypeAlias = Scene | Feed | Iterable[tuple[float, Scene]]
@@ -78,23 +77,26 @@ class Watch:
     """
 
     def __init__(self, scene: Scene, bound: float | None) -> None:
-        self._radii = {o.name: _radius(o) for o in scene.obstacles}
+        # a point's distance from its obstacle's origin counts where the obstacle turns
+        self._radii = {o.name: farthest(o.shape, pin.SE3.Identity()) for o in scene.obstacles}
         self._bound, self._warned = bound, set[str]()
         self._last: tuple[float, Scene] | None = None
         self._velocities: dict[str, tuple[Vector, Vector]] = {}
         self.speeds: dict[str, float] = {}
 
     def see(self, time: float, scene: Scene) -> bool:
-        """Take in the scene at a time [s]; whether any obstacle has moved since the last look (True at the first)."""
+        """Take in the scene at a time [s]; whether an obstacle or a margin has changed (at the first look: True)."""
         before, self._last = self._last, (time, scene)
         if before is None or time <= before[0]:
             return True
         seconds, old, moved = time - before[0], {o.name: o.pose for o in before[1].obstacles}, False
+        margins = {o.name: o.margin for o in before[1].obstacles}
         self._velocities = {}
         for obstacle in scene.obstacles:
             if obstacle.name in old and not np.array_equal(old[obstacle.name].homogeneous, obstacle.pose.homogeneous):
                 moved = True
                 self._measure(obstacle, old[obstacle.name], seconds, time)
+            moved |= obstacle.margin != margins.get(obstacle.name)
         return moved
 
     def later(self, scene: Scene, seconds: float) -> Scene:
@@ -107,8 +109,8 @@ class Watch:
         }
         if not guessed:
             return ahead
-        moved = (Obstacle(o.name, o.shape, guessed.get(o.name, o.pose), o.motion) for o in ahead.obstacles)
-        return Scene(tuple(moved), ahead.attached, ahead.allowed_collisions)
+        moved = tuple(replace(o, pose=guessed.get(o.name, o.pose)) for o in ahead.obstacles)
+        return replace(ahead, obstacles=moved)
 
     def _measure(self, obstacle: Obstacle, old: Any, seconds: float, time: float) -> None:
         name = obstacle.name
@@ -133,11 +135,11 @@ def too_fast(name: str, speed: float, time: float, bound: float) -> str:
 def rooms(
     scene: Scene, margin: float, seconds: float, bound: float | None, seen: Mapping[str, float]
 ) -> dict[str, float]:
-    """How far the arm keeps from each obstacle [m]: the margin, and how far what moves can come within a tick.
+    """How far the arm keeps from each obstacle, beyond its own margin: what is given, and what it can come in a tick.
 
     Args:
         scene: The obstacles.
-        margin: Distance that must be left [m].
+        margin: Distance that must be left to every obstacle [m].
         seconds: Length of a tick [s].
         bound: Largest speed of what moves [m/s]; what was seen to be faster counts as that fast. None: no room for it.
         seen: Speeds that were seen [m/s].
@@ -148,16 +150,6 @@ def rooms(
         speed = max(bound or 0.0, seen.get(obstacle.name, 0.0)) if moves else 0.0
         found[obstacle.name] = margin + speed * seconds
     return found
-
-
-def _radius(obstacle: Obstacle) -> float:
-    """Distance of the farthest point of an obstacle from its own origin [m]; it counts where the obstacle turns."""
-    if isinstance(obstacle.shape, HalfSpace):
-        return math.inf
-    solids = [piece.geometry for piece in pieces(obstacle.shape)]
-    for solid in solids:
-        solid.computeLocalAABB()
-    return max(float(np.linalg.norm(s.aabb_center) + s.aabb_radius) for s in solids)
 
 
 def _extrapolated(pose: Any, velocity: tuple[Vector, Vector], seconds: float) -> tuple[Matrix, Vector]:

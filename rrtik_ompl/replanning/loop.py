@@ -73,7 +73,7 @@ class Loop:
         checked = self._world.checked
         free = self._timed(spent, "look", self._look) if changed or not self._planner.free else True
         checked, event, reason = self._world.checked - checked, "walk", ""
-        if not free:
+        if not free and not self._world.blocked:
             event = "repair" if self._planner.path is not None else "plan"
             free = self._timed(spent, event, self._repair)
         here = self.q
@@ -102,7 +102,7 @@ class Loop:
     def _follow_goal(self) -> bool:
         """Where the goal has moved away from the end of the path, reconnect it, as far as that is free."""
         path = self._planner.path
-        if self._goal_feed is None or path is None or (path[-1] == self._goals[0]).all():
+        if self._goal_feed is None or path is None or self._world.blocked or (path[-1] == self._goals[0]).all():
             return False
         return self._planner.retarget(self._goals, self._world, _until(self._chosen.slot))
 
@@ -140,6 +140,8 @@ class Loop:
 
     def _stand_by(self) -> tuple[str, str, Vector]:
         """No path: wait, or go out of the way of what comes too near. Event, reason, place."""
+        if self._world.blocked:
+            return "wait", self._world.blocked, self.q
         if self._world.valid(self.q):
             path = self._planner.path
             blocked = path is not None and not self._world.valid(path[-1])

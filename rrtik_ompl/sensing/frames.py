@@ -38,8 +38,8 @@ def base_from_camera(marker_map: MarkerMap, sightings: tuple[Sighting, ...]) -> 
     raise NoBaseError(f"no marker of the base '{name}' is in view; turn the camera, or say camera_pose in the map")
 
 
-def position_in_base(T_base_camera: Any, base_covariance: Matrix, sight: Sighting) -> tuple[Any, Matrix]:
-    """``T_base_object`` and the covariance of its position in the axes of the base [m^2]. Shape (3, 3).
+def place_in_base(T_base_camera: Any, base_covariance: Matrix, sight: Sighting) -> tuple[Any, Matrix]:
+    """``T_base_object`` and its covariance: position [m] and small rotation [rad] in the axes of the base, (6, 6).
 
     The error of the base's rotation counts with the distance between base and object as its lever arm.
     """
@@ -47,6 +47,8 @@ def position_in_base(T_base_camera: Any, base_covariance: Matrix, sight: Sightin
     turn = T_base_camera.rotation
     T_camera_base = T_base_camera.inverse()
     arm = sight.pose.T_camera_object.translation - T_camera_base.translation
-    lever = np.hstack([np.eye(3), -pin.skew(arm)])
-    spread = sight.pose.covariance[:3, :3] + lever @ base_covariance @ lever.T
-    return pose, turn @ spread @ turn.T
+    lever = np.eye(6)
+    lever[:3, 3:] = -pin.skew(arm)
+    spread = sight.pose.covariance + lever @ base_covariance @ lever.T
+    axes = np.kron(np.eye(2), turn)
+    return pose, axes @ spread @ axes.T

@@ -8,14 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.arrays import Matrix, finite_array
+from rrtik_ompl.collision.extent import farthest
+from rrtik_ompl.errors import InputError
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.sensing.camera import Camera
-from rrtik_ompl.sensing.frames import base_from_camera, position_in_base
+from rrtik_ompl.sensing.frames import base_from_camera, place_in_base
 from rrtik_ompl.sensing.marker_map import MarkedObject, MarkerMap
 from rrtik_ompl.sensing.sight import Sighting, look
+from rrtik_ompl.shapes import HalfSpace
 
-SIGMAS = 3.0  # of an obstacle's position, by which it may be larger than it looks
+SIGMAS = 3.0  # of an obstacle's place, that its margin covers
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,26 +28,48 @@ class SeenObject:
     Attributes:
         object: Which one.
         T_base_object: Where it is.
-        covariance: Of its position, in the axes of the base [m^2]. Shape (3, 3).
+        covariance: Of (position [m], small rotation about the axes of the base [rad]). Shape (6, 6).
         sighting: What was seen of it; None if the pose was written down earlier.
+        sigmas: How many standard deviations of its place the margins of its solids cover; 0 for no margins.
     """
 
     object: MarkedObject
     T_base_object: Any
     covariance: Matrix
     sighting: Sighting | None
+    sigmas: float = SIGMAS
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sigmas", checked_sigmas(self.sigmas))
 
     @property
-    def margin(self) -> float:
-        """How far from its place it may be: three standard deviations along the worst direction [m]."""
-        return SIGMAS * float(np.sqrt(max(np.linalg.eigvalsh(self.covariance)[-1], 0.0)))
+    def position_sigma(self) -> float:
+        """Standard deviation of its position along the worst direction [m]."""
+        return _largest_sigma(self.covariance[:3, :3])
+
+    @property
+    def rotation_sigma(self) -> float:
+        """Standard deviation of its rotation about the worst axis [rad]."""
+        return _largest_sigma(self.covariance[3:, 3:])
+
+    def margin(self, solid: Obstacle) -> float:
+        """How far a point of one of its solids may be from where it seems to be [m].
+
+        ``sigmas`` times the deviation of the position and that of the rotation at the lever arm of the solid's farthest
+        point, which is no less than that of any point along any direction, however the two are correlated. Only small
+        errors are covered: not the second pose of a single marker, nor a map that is wrong. Of a half-space the point
+        that is nearest to the object counts, for it has no farthest one.
+        """
+        return self.sigmas * (self.position_sigma + _lever(solid) * self.rotation_sigma)
 
     def solids(self) -> tuple[Obstacle, ...]:
-        """Its solids as obstacles in the frame of the base, named after it."""
+        """Its solids as obstacles in the frame of the base, named after it, with what is uncertain as their margins."""
         several = len(self.object.solids) > 1
         return tuple(
-            Obstacle(f"{self.object.name}.{each.name}" if several else self.object.name, each.shape,
-                     self.T_base_object * each.pose)
+            Obstacle(
+                f"{self.object.name}.{each.name}" if several else self.object.name, each.shape,
+                self.T_base_object * each.pose, margin=each.margin + self.margin(each),
+            )
             for each in self.object.solids
         )  # fmt: skip
 
@@ -58,26 +83,62 @@ class SeenObject:
         return self.T_base_object * self.object.grasp(kind).levels[level]
 
 
-def objects_in_base(sightings: tuple[Sighting, ...], marker_map: MarkerMap) -> tuple[SeenObject, ...]:
+def objects_in_base(
+    sightings: tuple[Sighting, ...], marker_map: MarkerMap, *, sigmas: float = SIGMAS
+) -> tuple[SeenObject, ...]:
     """All objects with a pose that can be used, in the frame of the arm's base; the base itself is left out.
+
+    Args:
+        sightings: What was seen.
+        marker_map: What it may be.
+        sigmas: See :class:`SeenObject`.
 
     Raises:
         NoBaseError: If nothing says where the base is.
+        InputError: If ``sigmas`` is not 0 or more.
     """
     T_base_camera, spread = base_from_camera(marker_map, sightings)
     return tuple(
-        SeenObject(each.object, *position_in_base(T_base_camera, spread, each), each)
+        SeenObject(each.object, *place_in_base(T_base_camera, spread, each), each, sigmas)
         for each in sightings
         if each.object.role != "base" and not each.refused
     )
 
 
-def scene_from_image(picture: NDArray[np.uint8], camera: Camera, marker_map: MarkerMap) -> Scene:
+def scene_from_image(
+    picture: NDArray[np.uint8], camera: Camera, marker_map: MarkerMap, *, sigmas: float = SIGMAS
+) -> Scene:
     """The scene that a picture shows: the solids of every target and obstacle in view, in the frame of the base.
+
+    Their margins cover ``sigmas`` standard deviations of where they are.
 
     Raises:
         NoBaseError: If nothing says where the base is.
-        InputError: If the picture cannot be used.
+        InputError: If the picture cannot be used, or ``sigmas`` is not 0 or more.
     """
-    seen = objects_in_base(look(picture, camera, marker_map), marker_map)
+    seen = objects_in_base(look(picture, camera, marker_map), marker_map, sigmas=sigmas)
     return Scene(tuple(solid for each in seen for solid in each.solids()))
+
+
+def checked_sigmas(value: float) -> float:
+    """A number of standard deviations.
+
+    Raises:
+        InputError: If it is not finite, or negative.
+    """
+    number = float(finite_array(value, (), "sigmas"))
+    if number < 0.0:
+        raise InputError(f"sigmas must be 0 (no margins) or more, got {number:g}")
+    return number
+
+
+def _lever(solid: Obstacle) -> float:
+    """How far from the origin of the object the point of a solid is that moves most when it turns [m]."""
+    if isinstance(solid.shape, HalfSpace):
+        normal = solid.pose.rotation @ solid.shape.normal
+        return abs(float(solid.shape.offset + normal @ solid.pose.translation))
+    return farthest(solid.shape, solid.pose)
+
+
+def _largest_sigma(covariance: Matrix) -> float:
+    return float(np.sqrt(max(np.linalg.eigvalsh(covariance)[-1], 0.0)))

@@ -19,7 +19,7 @@ from rrtik_ompl.sensing.frames import NoBaseError
 from rrtik_ompl.sensing.marker_map import MarkerMap
 from rrtik_ompl.sensing.markers import dictionaries_seen
 from rrtik_ompl.sensing.pictures import Picture
-from rrtik_ompl.sensing.scene_from_view import SeenObject, objects_in_base
+from rrtik_ompl.sensing.scene_from_view import SIGMAS, SeenObject, checked_sigmas, objects_in_base
 from rrtik_ompl.sensing.sight import Sighting, as_gray, look
 from rrtik_ompl.sensing.tracker import PoseTracker
 
@@ -83,15 +83,19 @@ class View:
 class Sensor:
     """Looks at pictures one after the other, and remembers what it saw."""
 
-    def __init__(self, camera: Camera, marker_map: MarkerMap, *, smooth: bool = True) -> None:
+    def __init__(self, camera: Camera, marker_map: MarkerMap, *, smooth: bool = True, sigmas: float = SIGMAS) -> None:
         """Start with nothing seen.
 
         Args:
             camera: Who takes the pictures.
             marker_map: What may be seen.
             smooth: Smooth poses over time and leave out outliers.
+            sigmas: How many standard deviations of their places the margins of obstacles cover; 0 for no margins.
+
+        Raises:
+            InputError: If ``sigmas`` is not 0 or more.
         """
-        self.camera, self.marker_map = camera, marker_map
+        self.camera, self.marker_map, self._sigmas = camera, marker_map, checked_sigmas(sigmas)
         self._trackers = {each.name: PoseTracker() for each in marker_map.objects} if smooth else {}
         self._dictionaries_seen: set[str] = set()
 
@@ -105,7 +109,8 @@ class Sensor:
         if not seen and not self._dictionaries_seen:
             self._dictionaries_seen.update(dictionaries_seen(as_gray(picture.pixels)))
         try:
-            return View(picture, self.camera, seen, objects_in_base(seen, self.marker_map))
+            placed = objects_in_base(seen, self.marker_map, sigmas=self._sigmas)
+            return View(picture, self.camera, seen, placed)
         except NoBaseError as error:
             return View(picture, self.camera, seen, (), str(error))
 
@@ -136,7 +141,7 @@ def _line(sight: Sighting, place: SeenObject | None) -> str:
     pose, frame = _pose_and_frame(sight, place)
     xyz = " ".join(f"{value:.4f}" for value in pose.translation)
     rpy = " ".join(f"{value:.2f}" for value in np.degrees(pin.rpy.matrixToRpy(pose.rotation)))
-    sigma = sight.pose.position_sigma if place is None else place.margin / 3.0
+    sigma = (sight.pose if place is None else place).position_sigma
     doubt = "; two poses fit: tilt the marker or add another" if sight.pose.ambiguous else ""
     return (
         f"{sight.object.name} in the frame of the {frame}: xyz {xyz} m, rpy {rpy} deg, "
@@ -152,8 +157,8 @@ def _data(sight: Sighting, place: SeenObject | None) -> dict[str, Any]:
         "frame": frame,
         "xyz": pose.translation.tolist(),
         "quat_xyzw": quaternion_xyzw(pose).tolist(),
-        "position_sigma": sight.pose.position_sigma if place is None else place.margin / 3.0,
-        "rotation_sigma": sight.pose.rotation_sigma,
+        "position_sigma": (sight.pose if place is None else place).position_sigma,
+        "rotation_sigma": (sight.pose if place is None else place).rotation_sigma,
         "quality": sight.quality,
         "ambiguous": sight.pose.ambiguous,
         "refused": sight.refused,

@@ -1,0 +1,23 @@
+"""How far a shape reaches."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.collision.solids import pieces
+from rrtik_ompl.shapes import HalfSpace, Shape
+
+
+def farthest(shape: Shape, pose: Any) -> float:
+    """An upper bound of the distance of a shape's points from the origin [m]; of a half-space that is infinite.
+
+    Args:
+        shape: What it is.
+        pose: Where it is, ``pinocchio.SE3``.
+    """
+    if isinstance(shape, HalfSpace):
+        return float("inf")
+    solids = [(piece.geometry, pose * piece.placement) for piece in pieces(shape)]
+    return max(float(np.linalg.norm(place.act(s.aabb_center)) + s.aabb_radius) for s, place in solids)
