@@ -369,12 +369,12 @@ def test_a_long_route_is_cut_before_anything_takes_long() -> None:
     assert sampled is not None
     route, asked = one_joint_moves(sampled, problem).waypoints, count()
 
-    def free(a: np.ndarray, b: np.ndarray) -> bool:
+    def free(tails: np.ndarray, heads: np.ndarray) -> np.ndarray:
         next(asked)
-        return bool(problem.world.motion_valid(a, b))
+        return problem.world.motion_valid_batch(tails, heads)
 
     cut = double_axis_cut(route, free)
-    most, looks = next(asked) + 100, count()  # looks at the clock: one at least for every motion of the cut
+    most, looks = 6 * next(asked) + 100, count()  # looks at the clock: some for every question of the cut
     found = fewest_moves(route, problem.world, stop=lambda: next(looks) > most)
     assert found.moves <= transitions(cut) < 0.5 * transitions(route)
     half = count()

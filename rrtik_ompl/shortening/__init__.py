@@ -51,6 +51,14 @@ def _ompl(route: Matrix, task: Task, problem: Problem) -> Matrix:
     return rows
 
 
+def _axis(route: Matrix, task: Task, _: Problem) -> Matrix:
+    return double_axis_cut(route, task.free_batch, stop=task.expired)
+
+
+def _axis_rounds(route: Matrix, task: Task, _: Problem) -> Matrix:
+    return axis_cut_rounds(route, task.free_batch, seed=task.seed, stop=task.expired)
+
+
 def _fewest_moves(route: Matrix, task: Task, problem: Problem) -> Matrix:
     """What travels little touches what it goes round, so it is judged as densely as by the second check."""
     return fewest_moves(route, problem.world.refined(SECOND_CHECK), seed=task.seed, stop=task.expired).route
@@ -58,10 +66,8 @@ def _fewest_moves(route: Matrix, task: Task, problem: Problem) -> Matrix:
 
 METHODS: Mapping[str, Method] = MappingProxyType(
     {
-        "axis": Method(lambda route, task, _: double_axis_cut(route, task.free), keeps_moves=True),
-        "axis-rounds": Method(
-            lambda route, task, _: axis_cut_rounds(route, task.free, seed=task.seed), keeps_moves=True
-        ),
+        "axis": Method(_axis, keeps_moves=True),
+        "axis-rounds": Method(_axis_rounds, keeps_moves=True),
         "fewest-moves": Method(_fewest_moves, keeps_moves=True, moves_only=True),
         "sequential": Method(lambda route, task, _: sequential_cut(route, task)),
         "random": Method(lambda route, task, _: random_cut(route, task)),
