@@ -112,7 +112,6 @@ class FewestMoves(SafePlanner):
                 route = self._converted(seed, starts, goals, checker, ptc)
                 if route is not None:
                     moves.offer(route)
-                    return iterations  # better spent on this route than on further trees
         if moves.route is None:
             found = self._bicrdt(seeds[0], None).search(starts, goals, checker, ptc)
             iterations += int(found.statistics.get("iterations", 0))

@@ -154,7 +154,7 @@ def _checked(
         raise InputError("path to shorten: it has one waypoint, so there is nothing to shorten")
     faults = path.violations(problem.world)
     if faults:
-        raise InputError(f"path to shorten: edge {faults[0].edge} is not valid: {faults[0].reason}")
+        raise InputError(f"path to shorten: edge {faults[0].edge + 1} is not valid: {faults[0].reason}")
     if one_joint and not path.one_joint_at_a_time:
         raise InputError("path to shorten: it moves several joints at once, so one_joint cannot be kept")
     if one_joint and not METHODS[method].can_keep_moves:
