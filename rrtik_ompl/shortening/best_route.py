@@ -10,6 +10,7 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.shortening.axis import cut_parts, double_axis_cut
 from rrtik_ompl.shortening.move_lattice import MoveLattice
+from rrtik_ompl.shortening.move_rules import long_enough
 from rrtik_ompl.shortening.move_values import Values, lattice_size
 from rrtik_ompl.shortening.questions import Questions, never
 from rrtik_ompl.transitions import merge_moves, transitions
@@ -28,10 +29,11 @@ class BestRoute:
         ask: Judges motions.
         costs: Cost of each joint's travel, shape (n,).
         order: All joints; among equal routes on a lattice the one whose last moves come first here.
+        smallest_move: A route with a shorter move is not kept, shape (n,).
     """
 
-    def __init__(self, ask: Questions, costs: Vector, order: Sequence[int]) -> None:
-        self._ask, self._costs, self._order = ask, costs, order
+    def __init__(self, ask: Questions, costs: Vector, order: Sequence[int], smallest_move: Vector) -> None:
+        self._ask, self._costs, self._order, self._smallest_move = ask, costs, order, smallest_move
         self.route: Matrix | None = None
 
     @property
@@ -41,7 +43,7 @@ class BestRoute:
 
     def take(self, route: Matrix) -> None:
         """Take in a free route, shape (k, n); it is kept if it is better."""
-        if self.rank(route) < self.rank(self.route):
+        if self._gains(route):
             self.route = route
 
     def rank(self, route: Matrix | None) -> tuple[int, float]:
@@ -82,8 +84,11 @@ class BestRoute:
         part = self._lattice_route(values, route[first], route[last])
         if part is not None:
             whole = merge_moves(np.vstack([route[:first], part, route[last + 1 :]]), tolerance=0.0)
-            if self.rank(whole) < self.rank(self.route) and self._confirmed(whole, route):
+            if self._gains(whole) and self._confirmed(whole, route):
                 self.route = whole
+
+    def _gains(self, route: Matrix) -> bool:
+        return self.rank(route) < self.rank(self.route) and long_enough(route, self._smallest_move)
 
     def _confirmed_cut(self, found: Matrix, route: Matrix) -> Matrix:
         """The cut of a route if it is free, else the route. That is found out even when it is time to stop."""

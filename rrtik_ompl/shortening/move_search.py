@@ -46,6 +46,7 @@ class MoveSearch:
         seed: Of all random choices.
         costs: Cost of each joint's travel, shape (n,); all 1 if None.
         frozen: Joints that must not move.
+        smallest_move: No move is shorter, shape (n,); any may be if None.
         most_nodes: Size of the lattices.
         prove: Sharpens the bound between a start and a goal; asked once, when one move more than it remains.
     """
@@ -61,6 +62,7 @@ class MoveSearch:
         seed: int = 0,
         costs: Vector | None = None,
         frozen: Sequence[int] = (),
+        smallest_move: Vector | None = None,
         most_nodes: int = MOST_NODES,
         prove: Proof | None = None,
     ) -> None:
@@ -72,7 +74,8 @@ class MoveSearch:
         self._rng = np.random.default_rng(seed)
         count = starts.shape[1]
         order = self._rng.permutation(count).tolist()
-        self._best = BestRoute(self._ask, np.ones(count) if costs is None else costs, order)
+        shortest = np.zeros(count) if smallest_move is None else smallest_move
+        self._best = BestRoute(self._ask, np.ones(count) if costs is None else costs, order, shortest)
         self._movable = [j for j in range(count) if j not in frozen and lower[j] < upper[j]]
         self._most_nodes = most_nodes
         self._prove = prove
