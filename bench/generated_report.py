@@ -158,6 +158,8 @@ def tables(report: Report, arm: str, found: list[Scene]) -> None:
     rows = []
     for family in FAMILIES:
         own = [scene for scene in found if scene.family == family]
+        if not own:
+            continue
         cells = [_of_family(own, name) for name in METHODS]
         making = np.mean([scene.making for scene in own])
         rows.append([family, f"{making:.2f}", f"{np.mean([scene.bound for scene in own]):.1f}", *cells])

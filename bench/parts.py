@@ -29,10 +29,12 @@ def in_parts(work: Callable[..., Any], parts: Sequence[Part], *, jobs: int, kept
         print(f"{kept} has {len(parts) - len(left)} of {len(parts)} parts; delete it to begin anew", file=sys.stderr)
     kept.parent.mkdir(parents=True, exist_ok=True)
     begin = perf_counter()
-    with kept.open("a", encoding="utf-8") as file:
+    with kept.open("w", encoding="utf-8") as file:
+        file.writelines(_line(key, result) for key, result in known.items())
+        file.flush()
         for count, (part, result) in enumerate(_spread(work, left, jobs), start=1):
             known[_key(part)] = result
-            file.write(json.dumps([_key(part), result]) + "\n")
+            file.write(_line(_key(part), result))
             file.flush()
             seconds = perf_counter() - begin
             text = f"{len(known)} of {len(parts)}, {seconds:.0f} s, {seconds / count * (len(left) - count):.0f} s to go"
@@ -43,6 +45,10 @@ def in_parts(work: Callable[..., Any], parts: Sequence[Part], *, jobs: int, kept
 
 def _key(part: Part) -> str:
     return " ".join(str(member) for member in part)
+
+
+def _line(key: str, result: Any) -> str:
+    return json.dumps([key, result]) + "\n"
 
 
 def _read(kept: Path) -> Iterator[tuple[str, Any]]:

@@ -24,6 +24,7 @@ from rrtik_ompl.world import World
 MotionsValid: TypeAlias = Callable[[Matrix, Matrix], Mask]  # as World.motion_valid_batch
 Order: TypeAlias = tuple[int, ...]  # the joints of a piece, the first to move first
 
+FINER = (1.0, SECOND_CHECK, 2.0 * SECOND_CHECK)  # judges, one after the other as long as the second check objects
 FINEST = 1.0 / 64.0  # of the world's motion resolution: no point of the arm moves less in a piece that is still cut
 WIDEST = 64  # corners followed per step; a piece of up to seven joints has no more, so its search is exact
 
@@ -58,7 +59,8 @@ def one_joint_moves(path: JointPath, problem: Problem | World, *, finest: float 
     least = FINEST * world.motion_resolution if finest is None else float(finest)
     if not least > 0.0:
         raise InputError(f"finest must be greater than 0 metres, got {least:g}")
-    for judge in (world, world.refined(SECOND_CHECK)):  # the finer one if the second check objects
+    for finer in FINER:
+        judge = world.refined(finer)
         converted = path.with_waypoints(_converted(path.waypoints, judge, least))
         if not converted.violations(world):
             return converted

@@ -21,7 +21,7 @@ from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.robot import Robot
 
 CHUNK = 256  # configurations at a time, to bound memory
-RUNS = (64, 8, 1)  # rows that are looked at together
+RUNS = (64, 16, 4, 1)  # rows that are looked at together
 ROOM = 1e-5  # [m] for rounding, in our arithmetic and in coal's distances
 
 
