@@ -21,7 +21,6 @@ import drrt_con_scenes as scenes
 import numpy as np
 from acceptance import Report
 from ompl import util as ou
-from plane_worlds import Plane
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.moving_world import MovingWorld
@@ -29,6 +28,7 @@ from rrtik_ompl.replanning import Run, replan
 from rrtik_ompl.replanning.connecting import PlainConnect
 from rrtik_ompl.replanning.drrt_con import DrrtCon
 from rrtik_ompl.replanning.judge import judge
+from rrtik_ompl.reproduce.plane_worlds import Plane
 
 PLANNERS = ("drrt-con", "rrt-connect", "drrt")
 HEAD = ["arrived", "length", "repairs", "waits", "evasions", "repair median / p95 [ms]", "tick p95 [ms]"]

@@ -1,27 +1,27 @@
 """Measure single-joint planning on generated scenes of two arms, beside RRT-Connect with shortening and conversion.
 
 Usage: ``python bench/generated_report.py [--scenes 100] [--jobs 1] [--out bench/reports/generated.md]``; scenes
-of each arm, some seconds each.
+of each arm, up to some ten seconds each. An interrupted run goes on where it was.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field
-from multiprocessing import get_context
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from acceptance import Report
-from crdt_runs import histogram, sound
+from parts import in_parts
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
+from rrtik_ompl.reproduce.crdt_runs import histogram, sound
 from rrtik_ompl.scenarios import FAMILIES, generated_problem
 from rrtik_ompl.transitions import lower_bound
 
@@ -109,15 +109,20 @@ def _chain(
     return path
 
 
-def scenes(arm: str, count: int, jobs: int) -> list[Scene]:
-    """Families in turns, spread over processes; in order."""
+def as_written(arm: str, family: str, seed: int) -> dict[str, Any]:
+    """One scene in plain words and numbers."""
+    return asdict(measured(arm, family, seed))
+
+
+def scenes(count: int, jobs: int, kept: Path) -> dict[str, list[Scene]]:
+    """By arm, families in turns, spread over processes."""
     names = list(FAMILIES)
-    numbers = range(count)
-    families, seeds = [names[k % len(names)] for k in numbers], [k // len(names) for k in numbers]
-    if jobs == 1:
-        return list(map(measured, [arm] * count, families, seeds))
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        return list(pool.map(measured, [arm] * count, families, seeds))
+    parts = [(arm, names[k % len(names)], k // len(names)) for arm in ARMS for k in range(count)]
+    results: dict[str, list[Scene]] = {arm: [] for arm in ARMS}
+    for (arm, *_), text in zip(parts, in_parts(as_written, parts, jobs=jobs, kept=kept), strict=True):
+        found = {name: Outcome(**outcome) for name, outcome in text["found"].items()}
+        results[arm].append(Scene(**{**text, "found": found}))
+    return results
 
 
 def bars(report: Report, everything: list[Scene]) -> None:
@@ -153,6 +158,8 @@ def tables(report: Report, arm: str, found: list[Scene]) -> None:
     rows = []
     for family in FAMILIES:
         own = [scene for scene in found if scene.family == family]
+        if not own:
+            continue
         cells = [_of_family(own, name) for name in METHODS]
         making = np.mean([scene.making for scene in own])
         rows.append([family, f"{making:.2f}", f"{np.mean([scene.bound for scene in own]):.1f}", *cells])
@@ -177,8 +184,8 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1, help="processes; more than one make the times longer")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "reports" / "generated.md")
     options = parser.parse_args()
-    report = Report("Single-joint moves in generated scenes", "python bench/generated_report.py")
-    results = {arm: scenes(arm, options.scenes, options.jobs) for arm in ARMS}
+    report = Report("Single-joint moves in generated scenes", "python bench/generated_report.py", options.jobs)
+    results = scenes(options.scenes, options.jobs, options.out.with_suffix(".parts.jsonl"))
     bars(report, [scene for found in results.values() for scene in found])
     for arm, found in results.items():
         tables(report, arm, found)

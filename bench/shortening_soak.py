@@ -1,7 +1,7 @@
 """Shorten many random paths and put each through the dense check that shares nothing with the shortening.
 
-Usage: ``python bench/shortening_soak.py [--paths 10000] [--out bench/reports/shortening_soak.md]``. Exit code 0 if none
-is rejected, else 1.
+Usage: ``python bench/shortening_soak.py [--paths 10000] [--jobs 1] [--out bench/reports/shortening_soak.md]``. An
+interrupted run goes on where it was. Exit code 0 if none is rejected, else 1.
 
 A path leads through random free configurations of a scene, in turns of a plane arm, the TITAN-4, a UR5 and generated
 scenes; every method shortens in turns. The check asks ``World.certify`` at twice the density of the planner's checks,
@@ -12,11 +12,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
-from time import perf_counter
 
 import numpy as np
 from acceptance import Report
+from parts import in_parts
 
 from rrtik_ompl import load_problem, load_robot, one_joint_moves, shorten
 from rrtik_ompl.errors import InputError
@@ -29,10 +30,12 @@ SHIPPED = ("planar3_boxes", "titan4_sdu", "titan4_prisms")
 ARMS = ("titan4", "ur5")
 DENSER = 4.0  # than the motion resolution: more than is promised
 WAYPOINTS = 6
+PART = 150  # paths that are done together, each part with a seed of its own
 POOL, TRIES = 400, 50  # configurations drawn for a path, and tried for a waypoint
 SECONDS = {"fewest-moves": 0.2}  # of methods that otherwise take long
 
 
+@cache
 def problems() -> list[Problem]:
     """Shipped ones and one generated of each family and arm."""
     generated = [generated_problem(load_robot(arm), family, 0) for arm in ARMS for family in FAMILIES]
@@ -66,12 +69,12 @@ def shortened(path: JointPath, problem: Problem, method: str, seed: int) -> Join
     return shorten(path, problem, method=method, seconds=SECONDS.get(method), seed=seed)
 
 
-def soak(paths: int) -> dict[str, np.ndarray]:
+def soak(part: int, paths: int) -> dict[str, list[float]]:
     """By method: paths, rejected, rejected at four times the density, not converted, sum of the ratios of length."""
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(part)
     streams = [(problem, random_paths(problem, rng)) for problem in problems()]
     counts = {method: np.zeros(5) for method in METHODS}
-    for number in range(paths):
+    for number in range(part * PART, part * PART + paths):
         problem, stream = streams[number % len(streams)]
         method = list(METHODS)[number // len(streams) % len(METHODS)]
         path = next(stream)
@@ -84,12 +87,19 @@ def soak(paths: int) -> dict[str, np.ndarray]:
         rejected = not same or bool(found.violations(problem.world))
         grazing = bool(found.violations(problem.world, resolution=problem.world.motion_resolution / DENSER))
         counts[method] += (1, rejected, grazing, 0, found.length / path.length)
-    return counts
+    return {method: count.tolist() for method, count in counts.items()}
 
 
-def page(counts: dict[str, np.ndarray], seconds: float) -> Report:
+def all_parts(paths: int, jobs: int, kept: Path) -> dict[str, np.ndarray]:
+    """The sums of all parts, see :func:`soak`."""
+    parts = [(number, min(PART, paths - number * PART)) for number in range(-(-paths // PART))]
+    found = in_parts(soak, parts, jobs=jobs, kept=kept)
+    return {method: np.sum([counts[method] for counts in found], axis=0) for method in METHODS}
+
+
+def page(counts: dict[str, np.ndarray], jobs: int) -> Report:
     """The report."""
-    report = Report("Soak test of shortening", "python bench/shortening_soak.py")
+    report = Report("Soak test of shortening", "python bench/shortening_soak.py", jobs)
     total = sum(counts.values())
     text = f"{total[1]:.0f} of {total[0]:.0f}"
     report.bar("shortened paths rejected by the dense check, or with other ends", "none", text, total[1] == 0)
@@ -97,7 +107,9 @@ def page(counts: dict[str, np.ndarray], seconds: float) -> Report:
     head = ["method", "paths", "rejected", "rejected at four times the density", "not convertible", "length, of before"]
     report.table("Methods", head, rows)
     how = " ".join(__doc__.split("else 1.")[1].replace("``", "`").split())
-    report.note("What was done", f"{total[0] + total[3]:.0f} random paths, {seconds:.0f} s; seed 0. {how}")
+    report.note(
+        "What was done", f"{total[0] + total[3]:.0f} random paths; seeds 0, 1, ..., one for {PART} paths. {how}"
+    )
     return report
 
 
@@ -105,10 +117,11 @@ def main() -> int:
     """Shorten, check, write the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--paths", type=int, default=10_000)
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "reports" / "shortening_soak.md")
     options = parser.parse_args()
-    begin = perf_counter()
-    report = page(soak(options.paths), perf_counter() - begin)
+    kept = options.out.with_suffix(".parts.jsonl")
+    report = page(all_parts(options.paths, options.jobs, kept), options.jobs)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     options.out.write_text(report.markdown(), encoding="utf-8")
     print(report.markdown())

@@ -67,17 +67,16 @@ def time_path(
     check_target(out, TRAJECTORY_FORMATS)
     check_target(plot, PLOT_FORMATS)
     texts = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
-    given = {name: None if text is None else comma_numbers(text, f"--{name}") for name, text in texts.items()}
+    given = {name: None if text is None else _rates(text, f"--{name}") for name, text in texts.items()}
+    if not blend >= 0.0:
+        raise InputError(f"--blend: expected 0 degrees or more, got {blend:g}")
     import numpy as np
 
-    from rrtik_ompl import RateLimits, load_path, load_problem, plot_joints, report, timed
+    from rrtik_ompl import RateLimits, load_problem, plot_joints, report, timed
 
     question = load_problem(problem)
     robot = question.robot
-    route = load_path(path, robot)
-    faults = route.violations(question.world)
-    if faults:
-        raise InputError(f"{path}: not valid for {question.name}: edge {faults[0].edge + 1}: {faults[0].reason}")
+    route = _valid_path(path, question)
     factors = np.where(robot.prismatic, 1.0, np.pi / 180.0)
     limits = RateLimits.of(
         robot, share=share, **{name: None if row is None else _scaled(row, factors) for name, row in given.items()}
@@ -103,19 +102,45 @@ def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> Any:
 
     if problem is None:
         route = load_path(path)
+        _check_waypoints(path, route)
         if shorten is not None:
             raise InputError("--shorten needs to know what stands in the way: give --problem too")
         if not route.one_joint_at_a_time:
             raise InputError(f"{path}: moves several joints at once; give --problem NAME, and it is converted")
         return route
     question = load_problem(problem)
-    route = load_path(path, question.robot)
+    route = _valid_path(path, question)
+    _check_waypoints(path, route)
     with progress("converting"):
         if not route.one_joint_at_a_time:
             route = one_joint_moves(route, question)
         if shorten is not None:
             route = shortened(route, question, method=shorten)
     return route
+
+
+def _valid_path(path: Path, question: Any) -> Any:
+    """A path of a file, checked against its problem."""
+    from rrtik_ompl import load_path
+
+    route = load_path(path, question.robot)
+    faults = route.violations(question.world)
+    if faults:
+        raise InputError(f"{path}: not valid for {question.name}: edge {faults[0].edge + 1}: {faults[0].reason}")
+    return route
+
+
+def _check_waypoints(path: Path, route: Any) -> None:
+    if len(route.waypoints) < 2:
+        raise InputError(f"{path}: it has one waypoint, so there are no moves to list")
+
+
+def _rates(text: str, option: str) -> list[float]:
+    """Numbers greater than 0."""
+    row = comma_numbers(text, option)
+    if not all(number > 0.0 for number in row):
+        raise InputError(f"{option}: expected numbers greater than 0, got {text}")
+    return row
 
 
 def _scaled(row: list[float], factors: Any) -> Any:

@@ -24,6 +24,7 @@ from rrtik_ompl.world import World
 MotionsValid: TypeAlias = Callable[[Matrix, Matrix], Mask]  # as World.motion_valid_batch
 Order: TypeAlias = tuple[int, ...]  # the joints of a piece, the first to move first
 
+FINER = (1.0, SECOND_CHECK, 2.0 * SECOND_CHECK)  # judges, one after the other as long as the second check objects
 FINEST = 1.0 / 64.0  # of the world's motion resolution: no point of the arm moves less in a piece that is still cut
 WIDEST = 64  # corners followed per step; a piece of up to seven joints has no more, so its search is exact
 
@@ -50,13 +51,16 @@ def one_joint_moves(path: JointPath, problem: Problem | World, *, finest: float 
     world = problem.world if isinstance(problem, Problem) else problem
     require(path, JointPath, "path to convert", "a plan has one if plan.found")
     require(world, World, "world of a path to convert")
+    if len(path.waypoints) < 2:
+        raise InputError("path to convert: it has one waypoint, so there is nothing to convert")
     faults = path.violations(world)
     if faults:
-        raise InputError(f"path to convert: edge {faults[0].edge} is not valid: {faults[0].reason}")
+        raise InputError(f"path to convert: edge {faults[0].edge + 1} is not valid: {faults[0].reason}")
     least = FINEST * world.motion_resolution if finest is None else float(finest)
     if not least > 0.0:
         raise InputError(f"finest must be greater than 0 metres, got {least:g}")
-    for judge in (world, world.refined(SECOND_CHECK)):  # the finer one if the second check objects
+    for finer in FINER:
+        judge = world.refined(finer)
         converted = path.with_waypoints(_converted(path.waypoints, judge, least))
         if not converted.violations(world):
             return converted
@@ -161,7 +165,7 @@ def _free_orders(pieces: list[_Piece], world: World) -> list[list[Order]]:
 def _halves(piece: _Piece, world: World, finest: float) -> list[_Piece]:
     if world.weights @ np.abs(piece.b - piece.a) <= finest:
         raise InputError(
-            f"path to convert: edge {piece.edge} passes too close to something to be walked one joint at a time in "
+            f"path to convert: edge {piece.edge + 1} passes too close to something to be walked one joint at a time in "
             f"steps of {1e3 * finest:.3g} mm; plan with 'bicrdt' instead"
         )
     middle = 0.5 * (piece.a + piece.b)

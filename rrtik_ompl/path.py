@@ -170,8 +170,9 @@ class JointPath:
         several = np.flatnonzero(changes.sum(axis=1) != 1)
         if len(several) and len(rows) > 1:
             together = ", ".join(np.array(self.joint_names)[changes[several[0]]])
+            edge = int((moved(self.waypoints[:-1], self.waypoints[1:]).sum(axis=1) > 1).argmax())
             raise InputError(
-                f"path: edge {int(several[0])} moves several joints at once ({together}); it is no list of moves: "
+                f"path: edge {edge + 1} moves several joints at once ({together}); it is no list of moves: "
                 "convert it with one_joint_moves(path, world)"
             )
         units = ["m" if sliding else "rad" for sliding in self.prismatic]

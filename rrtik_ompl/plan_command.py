@@ -15,6 +15,8 @@ from rrtik_ompl.path_text import FORMATS as PATH_FORMATS
 from rrtik_ompl.terminal import progress, say
 from rrtik_ompl.text_file import check_target
 
+RULES = ("joint_costs", "frozen_joints", "last_joints", "smallest_move")  # of single-joint moves, see MoveRules
+
 
 class Shorten(str, Enum):
     """What `rrtik plan` does to the raw path; `auto` is fewest-moves for a path of single-joint moves."""
@@ -54,13 +56,13 @@ def plan(
     from rrtik_ompl.planning import plan as find_path
 
     find_planner(planner)
+    options = _parameters(parameter or [])
     question = load_problem(problem)
     with progress(f"planning {question.name} with {planner}"):
-        found = find_path(
-            question, planner, seconds=seconds, seed=seed, restarts=restarts, parameters=_parameters(parameter or [])
-        )
+        found = find_path(question, planner, seconds=seconds, seed=seed, restarts=restarts, parameters=options)
     with progress("shortening"):
-        path, shorten_seconds = _shortened(found.path, question, shorten, found.seed)
+        rules = {name: value for name, value in options.items() if name in RULES}
+        path, shorten_seconds = _shortened(found.path, question, shorten, found.seed, rules)
     if path is not None and out is not None:
         path.save(out)
     if path is not None and html is not None:
@@ -78,14 +80,16 @@ def plan(
     return 0 if found.found else 1
 
 
-def _shortened(path: Any, problem: Any, method: Shorten, seed: int) -> tuple[Any, float]:
-    from rrtik_ompl.shortening import shorten
+def _shortened(path: Any, problem: Any, method: Shorten, seed: int, rules: dict[str, Any]) -> tuple[Any, float]:
+    """The path made shorter, keeping to what the planner was told of single-joint moves; and the time [s]."""
+    from rrtik_ompl.shortening import MoveRules, shorten
 
     if path is None or method is Shorten.none or len(path.waypoints) < 2:
         return path, 0.0
     begin = time.perf_counter()
     wanted = Shorten.fewest_moves if method is Shorten.auto and path.one_joint_at_a_time else method
-    return shorten(path, problem, method=wanted.value, seed=seed), time.perf_counter() - begin
+    kept = MoveRules(problem.robot.joint_names, **rules) if rules and path.one_joint_at_a_time else None
+    return shorten(path, problem, method=wanted.value, seed=seed, rules=kept), time.perf_counter() - begin
 
 
 def _parameters(pairs: list[str]) -> dict[str, Any]:

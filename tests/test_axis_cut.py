@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import count, pairwise
 
 import numpy as np
 import pytest
@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.shortening.axis import axis_cut, axis_moves, double_axis_cut
+from rrtik_ompl.shortening.axis import axis_cut, axis_moves, cut_parts, double_axis_cut
 from rrtik_ompl.shortening.axis_rounds import axis_cut_rounds, best_of
-from rrtik_ompl.transitions import lower_bound, route_length, single_joint, transitions
+from rrtik_ompl.transitions import lower_bound, merge_moves, route_length, single_joint, transitions
 
 GRID = 6
 
@@ -21,14 +21,21 @@ class GridWorld:
     def __init__(self, blocked: set[tuple[int, ...]]) -> None:
         self.blocked = blocked
 
-    def motion_valid(self, a: np.ndarray, b: np.ndarray) -> bool:
+    def motion_valid_batch(self, tails: np.ndarray, heads: np.ndarray) -> np.ndarray:
+        return np.array([self._free(a, b) for a, b in zip(tails, heads, strict=True)], dtype=bool)
+
+    def _free(self, a: np.ndarray, b: np.ndarray) -> bool:
         steps = int(np.abs(b - a).max())
         cells = np.rint(a + np.linspace(0, 1, steps + 1)[:, None] * (b - a)).astype(int)
         return not any(tuple(cell) in self.blocked for cell in cells.tolist())
 
 
-def free(_a: np.ndarray, _b: np.ndarray) -> bool:
-    return True
+def free(tails: np.ndarray, _heads: np.ndarray) -> np.ndarray:
+    return np.ones(len(tails), dtype=bool)
+
+
+def blocked(tails: np.ndarray, _heads: np.ndarray) -> np.ndarray:
+    return np.zeros(len(tails), dtype=bool)
 
 
 @st.composite
@@ -48,15 +55,15 @@ def walks(draw: st.DrawFn) -> tuple[GridWorld, np.ndarray]:
 
 
 def all_free(route: np.ndarray, world: GridWorld) -> bool:
-    return all(world.motion_valid(a, b) for a, b in pairwise(route))
+    return bool(world.motion_valid_batch(route[:-1], route[1:]).all())
 
 
 @settings(deadline=None)
 @given(walks())
 def test_a_pass_keeps_ends_validity_and_single_joint_moves_and_adds_no_move(case: tuple[GridWorld, np.ndarray]) -> None:
     world, route = case
-    once, twice = axis_cut(route, world.motion_valid), double_axis_cut(route, world.motion_valid)
-    for result in (once, twice, axis_cut_rounds(route, world.motion_valid, rounds=3)):
+    once, twice = axis_cut(route, world.motion_valid_batch), double_axis_cut(route, world.motion_valid_batch)
+    for result in (once, twice, axis_cut_rounds(route, world.motion_valid_batch, rounds=3)):
         np.testing.assert_array_equal(result[[0, -1]], route[[0, -1]])
         assert single_joint(result)
         assert all_free(result, world)
@@ -75,7 +82,7 @@ def test_without_obstacles_one_pass_reaches_the_lower_bound(case: tuple[GridWorl
 def test_a_test_that_is_never_sure_ends_all_the_same(case: tuple[GridWorld, np.ndarray], seed: int) -> None:
     _, route = case
     rng = np.random.default_rng(seed)
-    result = double_axis_cut(route, lambda a, b: bool(rng.random() < 0.3))
+    result = double_axis_cut(route, lambda a, b: rng.random(len(a)) < 0.3)
     np.testing.assert_array_equal(result[[0, -1]], route[[0, -1]])
     assert single_joint(result)
 
@@ -91,27 +98,58 @@ def test_the_second_pass_cuts_what_the_first_one_cannot() -> None:
     world = GridWorld({(2, 1), (1, 2), (4, 3)})
     route = np.array([[0.0, 0], [0, 1], [1, 1], [1, 0], [3, 0], [3, 2], [2, 2], [2, 4], [4, 4]])
     assert all_free(route, world)
-    once, twice = axis_cut(route, world.motion_valid), double_axis_cut(route, world.motion_valid)
+    once, twice = axis_cut(route, world.motion_valid_batch), double_axis_cut(route, world.motion_valid_batch)
     assert transitions(twice) < transitions(once) < transitions(route)
+
+
+@settings(deadline=None)
+@given(walks(), st.integers(0, 4))
+def test_parts_of_a_long_route_are_cut_as_the_whole_is_and_a_stop_leaves_the_rest(
+    case: tuple[GridWorld, np.ndarray], most: int
+) -> None:
+    world, walk = case
+    route = np.vstack([walk, walk[-2::-1]] * 3 + [walk])  # to and fro, so long that there are several parts
+    looks = count()
+    stopped = double_axis_cut(route, world.motion_valid_batch, stop=lambda: next(looks) >= most)
+    for result in (cut_parts(route, world.motion_valid_batch), stopped):
+        np.testing.assert_array_equal(result[[0, -1]], route[[0, -1]])
+        assert len(result) == 1 or single_joint(result)
+        assert all_free(result, world)
+        assert transitions(result) <= transitions(route)
+    if most == 0:
+        assert transitions(stopped) == transitions(route)
+
+
+@settings(deadline=None)
+@given(walks())
+def test_the_earliest_waypoint_in_reach_is_the_one_that_is_found_one_by_one(case: tuple[GridWorld, np.ndarray]) -> None:
+    world, walk = case
+    route = merge_moves(walk, tolerance=0.0)
+    pivot, new = len(route) - 1, [route[-1:]]
+    while pivot > 0:
+        ways = ((test, axis_moves(route[pivot], route[test], range(route.shape[1])[::-1])) for test in range(pivot))
+        pivot, way = next((t, w) for t, w in ways if all_free(np.vstack([route[pivot], w]), world))
+        new.append(way)
+    np.testing.assert_array_equal(axis_cut(walk, world.motion_valid_batch), merge_moves(np.vstack(new), 0.0)[::-1])
 
 
 def test_a_doubtful_original_edge_is_kept() -> None:
     route = np.array([[0.0, 0], [0, 3], [3, 3]])
-    np.testing.assert_array_equal(axis_cut(route, lambda a, b: False), route)
+    np.testing.assert_array_equal(axis_cut(route, blocked), route)
 
 
 def test_an_edge_of_several_joints_is_replaced_by_single_moves_where_they_are_free() -> None:
     assert single_joint(axis_cut([[0.0, 0], [1, 2], [3, 3]], free))
     diagonal = np.array([[0.0, 0], [3, 3]])
-    np.testing.assert_array_equal(axis_cut(diagonal, lambda a, b: False), diagonal)
+    np.testing.assert_array_equal(axis_cut(diagonal, blocked), diagonal)
 
 
 def test_every_motion_is_asked_once_and_in_one_direction() -> None:
     asked: list[tuple[tuple[float, ...], tuple[float, ...]]] = []
 
-    def remember(a: np.ndarray, b: np.ndarray) -> bool:
-        asked.append((tuple(a.tolist()), tuple(b.tolist())))
-        return False
+    def remember(tails: np.ndarray, heads: np.ndarray) -> np.ndarray:
+        asked.extend((tuple(a), tuple(b)) for a, b in zip(tails.tolist(), heads.tolist(), strict=True))
+        return blocked(tails, heads)
 
     axis_cut_rounds([[0.0, 0], [0, 3], [3, 3], [3, 1], [5, 1]], remember)
     assert asked
@@ -146,9 +184,9 @@ def test_further_rounds_are_never_worse_and_repeat_with_their_seed(
     case: tuple[GridWorld, np.ndarray], seed: int
 ) -> None:
     world, route = case
-    results = [axis_cut_rounds(route, world.motion_valid, rounds=4, seed=seed) for _ in range(2)]
+    results = [axis_cut_rounds(route, world.motion_valid_batch, rounds=4, seed=seed) for _ in range(2)]
     np.testing.assert_array_equal(results[0], results[1])
-    double = double_axis_cut(route, world.motion_valid)
+    double = double_axis_cut(route, world.motion_valid_batch)
     assert (transitions(results[0]), route_length(results[0])) <= (transitions(double), route_length(double) + 1e-12)
 
 

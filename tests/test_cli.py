@@ -144,12 +144,12 @@ def test_time_writes_a_trajectory_and_a_picture(capsys, tmp_path, several):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--velocity", "0"), "velocity limits"),
-        (("--velocity", "nan"), "velocity limits"),
+        (("--velocity", "0"), "--velocity: expected numbers greater than 0, got 0"),
+        (("--velocity", "nan"), "--velocity: expected numbers greater than 0, got nan"),
         (("--acceleration", "1,2"), "6 joints"),
         (("--jerk", "fast"), "expected a number"),
         (("--share", "0"), "share"),
-        (("--blend", "-1"), "blend"),
+        (("--blend", "-1"), "0 degrees or more, got -1"),
         (("--out", "motion.txt"), "unknown ending"),
         (("--plot", "joints.pdf"), "unknown ending"),
     ],
@@ -159,6 +159,20 @@ def test_limits_and_files_that_are_none_are_refused_in_one_line(capsys, several,
     assert (code, out) == (2, "")
     assert words in err
     assert err.count("\n") == 1
+
+
+def test_a_plan_and_its_shortening_move_the_last_joint_last(capsys):
+    last = ("--set", 'last_joints=["azimuth"]', "--seed", "2", "--json")
+    found = json.loads(rrtik(capsys, "plan", "titan4_sdu", *last)[1])
+    assert [move["joint"] for move in found["moves"]].index("azimuth") == found["transitions"] - 1
+
+
+def test_a_path_of_one_waypoint_has_no_moves_to_list(capsys, tmp_path):
+    file = tmp_path / "one.csv"
+    file.write_text("a,b\n0,0\n")
+    code, out, err = rrtik(capsys, "moves", str(file))
+    assert (code, out) == (2, "")
+    assert "one waypoint" in err
 
 
 def test_a_path_that_is_not_valid_is_neither_timed_nor_converted(capsys, tmp_path):

@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,7 @@ RUNGS = (
     "motion_commands plan_command ik_commands reach_commands replan_commands reproduce_commands bench_commands",
     "marker_commands pilot pilot_commands cli command",
 )
+PEERS = {"vamp", "roboplan", "pytracik", "trac_ik", "ikpy", "eaik"}  # measured where they are installed
 LADDER = [name for rung in RUNGS for name in rung.split()]
 
 
@@ -57,6 +59,15 @@ def test_robots_and_planners_do_not_know_each_other():
     for folder, other in (("planners", "rrtik_robots"), ("robots", "rrtik_planners")):
         for file in (ROOT / folder).rglob("*.py"):
             assert other not in {name.split(".")[0] for name in _imports(file)}, file
+
+
+@pytest.mark.parametrize("script", sorted((ROOT / "bench").glob("*.py")), ids=lambda file: file.stem)
+def test_a_script_of_bench_imports_what_there_is(script):
+    nodes = list(ast.walk(ast.parse(script.read_text())))
+    modules = {node.module for node in nodes if isinstance(node, ast.ImportFrom)}
+    modules |= {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    known = {file.stem for file in script.parent.glob("*.py")} | PEERS
+    assert not {name for name in modules if name.split(".")[0] not in known and find_spec(name) is None}
 
 
 def test_importing_the_package_imports_nothing_heavy():

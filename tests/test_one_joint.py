@@ -22,7 +22,7 @@ from rrtik_ompl.shapes import Box
 from rrtik_ompl.world import World
 
 values = st.one_of(st.floats(-3.0, 3.0), st.integers(-2, 2).map(float))
-routes = st.integers(1, 4).flatmap(lambda n: st.lists(st.lists(values, min_size=n, max_size=n), min_size=1, max_size=6))
+routes = st.integers(1, 4).flatmap(lambda n: st.lists(st.lists(values, min_size=n, max_size=n), min_size=2, max_size=6))
 FREE = {n: World(load_robot("planar", lengths=[1.0] * n)) for n in (1, 2, 3, 4)}
 
 
@@ -104,7 +104,7 @@ def test_where_no_staircase_passes_one_line_names_the_edge_and_the_remedy():
     world = corridor(0.05)
     path = JointPath.of(world.robot, [[3.5, 3.5], [3.51, 3.51], [9.0, 9.0]])
     assert path.violations(world) == ()
-    with pytest.raises(InputError, match=r"edge 1 passes too close.*bicrdt"):
+    with pytest.raises(InputError, match=r"edge 2 passes too close.*bicrdt"):
         one_joint_moves(path, world, finest=0.5)
 
 
@@ -139,9 +139,20 @@ def test_an_order_is_found_if_and_only_if_one_of_all_is_free(blocked):
     assert {order[0] for order in found} == {order[0] for order in permutations(range(3)) if passes(order)}
 
 
+def test_a_path_of_one_waypoint_is_refused():
+    with pytest.raises(InputError, match="one waypoint"):
+        one_joint_moves(JointPath.of(FREE[2].robot, [[0, 0]]), FREE[2])
+
+
+def test_the_edge_of_several_joints_is_named_as_it_stands_in_the_path():
+    path = JointPath([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 1.0]])
+    with pytest.raises(InputError, match="edge 3 moves several joints"):
+        path.moves()
+
+
 def test_a_path_that_is_not_valid_is_not_converted():
     problem = load_problem("titan4_sdu")
-    with pytest.raises(InputError, match="edge 0 is not valid"):
+    with pytest.raises(InputError, match="edge 1 is not valid"):
         one_joint_moves(JointPath.of(problem.robot, [problem.start, problem.goal.q]), problem)
 
 

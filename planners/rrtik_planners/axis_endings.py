@@ -8,6 +8,9 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.ompl_bridge import MotionChecker
+from rrtik_ompl.shortening.move_rules import long_enough
+
+NO_ENDING = "last_joints: they cannot go straight to the goal after all others, or would have to move too little"
 
 
 class Endings:
@@ -30,7 +33,7 @@ class Endings:
     ) -> None:
         ways = [_last_moves(start, goal, joints) for goal in goals]
         if joints:
-            ways = [way for way in ways if _long_enough(way, smallest_move) and _free(way, checker)]
+            ways = [way for way in ways if long_enough(way, smallest_move) and _free(way, checker)]
         self._ways = ways
         self.aims: Matrix = np.array([way[0] for way in ways]).reshape(-1, goals.shape[1])
 
@@ -51,11 +54,6 @@ def _last_moves(start: Vector, goal: Vector, joints: Sequence[int]) -> Matrix:
             row[joint] = goal[joint]
             rows.append(row)
     return np.array(rows)
-
-
-def _long_enough(way: Matrix, smallest_move: Vector) -> bool:
-    moves = np.abs(np.diff(way, axis=0))
-    return bool(((moves == 0.0) | (moves >= smallest_move)).all())
 
 
 def _free(way: Matrix, checker: MotionChecker) -> bool:

@@ -8,13 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector, finite_array
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.axis_rules import AxisRules
-from rrtik_ompl.transitions import merge_moves
-
-Joints = Sequence[int | str]
-PerJoint = float | Sequence[float]
+from rrtik_ompl.shortening.move_rules import (
+    Joints,
+    PerJoint,
+    costs_of_joints,
+    joint_numbers,
+    long_enough,
+    smallest_moves,
+)
 
 
 class AxisOptions:
@@ -49,12 +53,8 @@ class AxisOptions:
         dof: int,
     ) -> None:
         self.scale_by_range = scale_by_range
-        self.joint_costs = _per_joint(1.0 if joint_costs is None else joint_costs, dof, "joint_costs")
-        if not (self.joint_costs > 0.0).all():
-            raise InputError(f"joint_costs: expected numbers greater than 0, got {joint_costs!r}")
-        self.smallest_move = _per_joint(smallest_move, dof, "smallest_move")
-        if not (self.smallest_move >= 0.0).all():
-            raise InputError(f"smallest_move: expected 0 or more, got {smallest_move!r}")
+        self.joint_costs = costs_of_joints(joint_costs, dof)
+        self.smallest_move = smallest_moves(smallest_move, dof)
         self.frozen_joints = joint_numbers(frozen_joints, names, dof, "frozen_joints")
         self.max_iterations = iteration_limit(max_iterations)
         self._names = names or [str(k) for k in range(dof)]
@@ -88,10 +88,7 @@ class AxisOptions:
 
     def accepts(self, path: Matrix) -> bool:
         """Whether no move of a path, shape (k, n), is too short, once those of the same joint in a row are joined."""
-        if not self.smallest_move.any():
-            return True
-        moves = np.abs(np.diff(merge_moves(path, tolerance=0.0), axis=0))
-        return bool(((moves == 0.0) | (moves >= self.smallest_move)).all())
+        return long_enough(path, self.smallest_move)
 
 
 def joint_names(world: Any) -> Sequence[str]:
@@ -111,30 +108,3 @@ def iteration_limit(limit: int | None) -> int | None:
     if isinstance(limit, bool) or not isinstance(limit, int | float) or not limit >= 1:
         raise InputError(f"max_iterations: expected at least 1, got {limit!r}")
     return ceil(limit)
-
-
-def _per_joint(value: PerJoint, dof: int, what: str) -> Vector:
-    shape = () if isinstance(value, int | float) else (dof,)
-    return np.broadcast_to(finite_array(value, shape, what), dof).astype(np.float64)
-
-
-def joint_numbers(joints: Joints, names: Sequence[str], dof: int, option: str) -> list[int]:
-    """Numbers of joints that are given by number or name, each once.
-
-    Raises:
-        InputError: If they are not a list of joint numbers.
-        UnknownNameError: If there is no joint of a name.
-    """
-    if isinstance(joints, str) or not isinstance(joints, Sequence):
-        raise InputError(f"{option}: expected a list of joints, got {joints!r}")
-    numbers = {}
-    for joint in joints:
-        if isinstance(joint, str):
-            if joint not in names:
-                raise UnknownNameError(f"{option}: joint", joint, names)
-            numbers[list(names).index(joint)] = True
-        elif isinstance(joint, bool) or not isinstance(joint, int) or not 0 <= joint < dof:
-            raise InputError(f"{option}: expected joint numbers from 0 to {dof - 1}, got {joint!r}")
-        else:
-            numbers[joint] = True
-    return list(numbers)

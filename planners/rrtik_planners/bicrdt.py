@@ -11,8 +11,9 @@ from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.fast.axis_rules import KERNELS, AxisRules, runs_in_kernels
 from rrtik_ompl.fast.axis_search import AxisSearch
 from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
-from rrtik_planners.axis_endings import Endings
-from rrtik_planners.axis_options import AxisOptions, Joints, PerJoint, joint_names, joint_numbers
+from rrtik_ompl.shortening.move_rules import Joints, PerJoint, joint_numbers
+from rrtik_planners.axis_endings import NO_ENDING, Endings
+from rrtik_planners.axis_options import AxisOptions, joint_names
 from rrtik_planners.axis_stream import AxisStream
 from rrtik_planners.axis_tree import AxisTree, Outcome
 
@@ -77,7 +78,7 @@ class BiCRDT(SafePlanner):
         starts = starts[(starts[:, last] == starts[0, last]).all(axis=1)]
         endings = Endings(starts[0], goals, last, smallest, checker)
         if len(endings.aims) == 0:
-            return SearchResult(None)
+            return SearchResult(None, reason=NO_ENDING)
         result = self._between(starts, endings.aims, checker, ptc)
         path = None if result.path is None else endings.completed(result.path)
         return SearchResult(path, result.statistics)

@@ -12,7 +12,8 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.axis_rules import KERNELS, AxisRules, runs_in_kernels
 from rrtik_ompl.fast.axis_search import AxisSearch
 from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
-from rrtik_planners.axis_options import AxisOptions, Joints, PerJoint, joint_names
+from rrtik_ompl.shortening.move_rules import Joints, PerJoint
+from rrtik_planners.axis_options import AxisOptions, joint_names
 from rrtik_planners.axis_stream import AxisStream
 from rrtik_planners.axis_tree import AxisTree, Outcome
 

@@ -14,10 +14,13 @@ from rrtik_ompl.one_joint import one_joint_moves
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.shortening import Task
 from rrtik_ompl.shortening.move_proof import sharper_bound
+from rrtik_ompl.shortening.move_rules import Joints, PerJoint, joint_numbers
 from rrtik_ompl.shortening.move_search import MOST_NODES, MoveSearch
 from rrtik_ompl.shortening.random_cut import shortcut
+from rrtik_ompl.transitions import transitions
 from rrtik_ompl.world import World
-from rrtik_planners.axis_options import AxisOptions, Joints, PerJoint, joint_names
+from rrtik_planners.axis_endings import NO_ENDING, Endings
+from rrtik_planners.axis_options import AxisOptions, joint_names
 from rrtik_planners.bicrdt import BiCRDT
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
 
@@ -45,6 +48,8 @@ class FewestMoves(SafePlanner):
         rounds: int = ROUNDS,
         joint_costs: PerJoint | None = None,
         frozen_joints: Joints = (),
+        smallest_move: PerJoint = 0.0,
+        last_joints: Joints = (),
     ) -> None:
         """Make a planner.
 
@@ -57,6 +62,8 @@ class FewestMoves(SafePlanner):
             rounds: Of improvement, at least 0, after the first. With time enough they alone decide what comes out.
             joint_costs: Cost of a joint's travel; see :class:`rrtik_planners.axis_options.AxisOptions`.
             frozen_joints: See there.
+            smallest_move: See there.
+            last_joints: See :class:`rrtik_planners.bicrdt.BiCRDT`. The bound counts their moves too.
 
         Raises:
             InputError: If an option is out of range or the space is of another kind.
@@ -68,16 +75,32 @@ class FewestMoves(SafePlanner):
             scale_by_range=False,
             joint_costs=joint_costs,
             frozen_joints=frozen_joints,
-            smallest_move=0.0,
+            smallest_move=smallest_move,
             max_iterations=None,
             names=joint_names(world),
             dof=si.getStateDimension(),
         )
+        self.last_joints = joint_numbers(last_joints, joint_names(world), si.getStateDimension(), "last_joints")
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         starts, goals = self.options.agreeing(starts, goals)
-        frozen, world = self.options.frozen_joints, self._world
+        last, smallest = self.last_joints, self.options.smallest_move
+        starts = starts[(starts[:, last] == starts[0, last]).all(axis=1)]
+        endings = Endings(starts[0], goals, last, smallest, checker)
+        if len(endings.aims) == 0:
+            return SearchResult(None, reason=NO_ENDING)
+        found = self._between(starts, endings.aims, checker, ptc)
+        if found.path is None:
+            return found
+        path = endings.completed(found.path)
+        ending = transitions(path) - transitions(found.path)
+        counts = {**found.statistics, "lower_bound": found.statistics["lower_bound"] + ending}
+        return SearchResult(path, counts)
+
+    def _between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+        """The search between starts and goals that agree in the joints that stay where they are."""
+        frozen, world = self._staying, self._world
         movable = [joint for joint in range(starts.shape[1]) if joint not in frozen]
         moves = MoveSearch(
             starts,
@@ -87,6 +110,7 @@ class FewestMoves(SafePlanner):
             seed=int(self.rng.integers(2**63)),
             costs=self.options.joint_costs,
             frozen=frozen,
+            smallest_move=self.options.smallest_move,
             most_nodes=FEW_NODES if world is None else MOST_NODES,
             prove=partial(sharper_bound, world, movable) if isinstance(world, World) else None,
         )
@@ -112,7 +136,6 @@ class FewestMoves(SafePlanner):
                 route = self._converted(seed, starts, goals, checker, ptc)
                 if route is not None:
                     moves.offer(route)
-                    return iterations  # better spent on this route than on further trees
         if moves.route is None:
             found = self._bicrdt(seeds[0], None).search(starts, goals, checker, ptc)
             iterations += int(found.statistics.get("iterations", 0))
@@ -126,14 +149,20 @@ class FewestMoves(SafePlanner):
             world=self._world,
             seed=seed,
             joint_costs=self.options.joint_costs.tolist(),
-            frozen_joints=self.options.frozen_joints,
+            frozen_joints=self._staying,
+            smallest_move=self.options.smallest_move.tolist(),
             max_iterations=iterations,
         )
+
+    @property
+    def _staying(self) -> list[int]:
+        """Joints that rest until the last moves."""
+        return [*self.options.frozen_joints, *self.last_joints]
 
     def _converted(self, seed: int, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> Matrix | None:
         """RRT-Connect's route, made shorter and turned into single-joint moves; None if there is none."""
         world = self._world
-        if not isinstance(world, World) or self.options.frozen_joints:
+        if not isinstance(world, World) or self._staying:
             return None
         sampled = FastRRTConnect(
             self.getSpaceInformation(), world=world, seed=seed, max_iterations=SAMPLED_ITERATIONS

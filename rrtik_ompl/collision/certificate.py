@@ -22,7 +22,7 @@ from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.robot import Robot
 
 MOST = 1 << 16  # runs of rows times pairs that are looked at together, to bound memory
-RUNS = (64, 8, 1)  # rows that are looked at together
+RUNS = (64, 16, 4, 1)  # rows that are looked at together
 ROOM = 1e-5  # [m] for rounding, in our arithmetic and in coal's distances
 
 Numbers: TypeAlias = NDArray[np.int64]

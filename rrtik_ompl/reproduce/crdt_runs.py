@@ -51,10 +51,11 @@ class CountedMotions:
         self.world = world
         self.count = 0
 
-    def __call__(self, a: np.ndarray, b: np.ndarray) -> bool:
-        """Whether the motion is free."""
-        self.count += 1
-        return bool(self.world.motion_valid(a, b))
+    def __call__(self, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+        """Which motions are free."""
+        self.count += len(starts)
+        free: np.ndarray = self.world.motion_valid_batch(starts, ends)
+        return free
 
 
 def route_run(problem: Problem, seed: int) -> RouteRun:
@@ -65,7 +66,7 @@ def route_run(problem: Problem, seed: int) -> RouteRun:
     motions, raw, begin = CountedMotions(problem.world), plan.path.waypoints, perf_counter()
     twice = double_axis_cut(raw, motions)
     post_seconds = perf_counter() - begin
-    test = problem.world.motion_valid
+    test = problem.world.motion_valid_batch
     stages = [raw, axis_cut(raw, test), twice, axis_cut_rounds(raw, test, seed=seed)]
     passed = [sound(problem, route) for route in stages]
     routes = [route if ok else raw for route, ok in zip(stages, passed, strict=True)]

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -19,12 +20,13 @@ from rrtik_ompl.shortening.axis_rounds import axis_cut_rounds
 from rrtik_ompl.shortening.best import best_in_time
 from rrtik_ompl.shortening.corners import snap_corners
 from rrtik_ompl.shortening.fewest_moves import fewest_moves
+from rrtik_ompl.shortening.move_rules import MoveRules
 from rrtik_ompl.shortening.random_cut import random_cut, shortcut
 from rrtik_ompl.shortening.retraction import retract
 from rrtik_ompl.shortening.sequential import sequential_cut
 from rrtik_ompl.shortening.task import Task
 
-__all__ = ["METHODS", "Method", "Task", "shorten"]
+__all__ = ["METHODS", "Method", "MoveRules", "Task", "shorten"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,17 +53,24 @@ def _ompl(route: Matrix, task: Task, problem: Problem) -> Matrix:
     return rows
 
 
+def _axis(route: Matrix, task: Task, _: Problem) -> Matrix:
+    return double_axis_cut(route, task.free_batch, stop=task.expired)
+
+
+def _axis_rounds(route: Matrix, task: Task, _: Problem) -> Matrix:
+    return axis_cut_rounds(route, task.free_batch, seed=task.seed, stop=task.expired)
+
+
 def _fewest_moves(route: Matrix, task: Task, problem: Problem) -> Matrix:
     """What travels little touches what it goes round, so it is judged as densely as by the second check."""
-    return fewest_moves(route, problem.world.refined(SECOND_CHECK), seed=task.seed, stop=task.expired).route
+    judge = problem.world.refined(SECOND_CHECK)
+    return fewest_moves(route, judge, seed=task.seed, stop=task.expired, rules=task.rules).route
 
 
 METHODS: Mapping[str, Method] = MappingProxyType(
     {
-        "axis": Method(lambda route, task, _: double_axis_cut(route, task.free), keeps_moves=True),
-        "axis-rounds": Method(
-            lambda route, task, _: axis_cut_rounds(route, task.free, seed=task.seed), keeps_moves=True
-        ),
+        "axis": Method(_axis, keeps_moves=True),
+        "axis-rounds": Method(_axis_rounds, keeps_moves=True),
         "fewest-moves": Method(_fewest_moves, keeps_moves=True, moves_only=True),
         "sequential": Method(lambda route, task, _: sequential_cut(route, task)),
         "random": Method(lambda route, task, _: random_cut(route, task)),
@@ -82,6 +91,7 @@ def shorten(
     seconds: float | None = None,
     seed: int = 0,
     one_joint: bool = False,
+    rules: MoveRules | None = None,
     on_better: Callable[[JointPath], object] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> JointPath:
@@ -102,6 +112,8 @@ def shorten(
             make a fixed number of tries, so that a seed always gives the same path.
         seed: Of the random methods.
         one_joint: Keep a path of single-joint moves one: fewer moves first, length second.
+        rules: What the path, of single-joint moves, keeps to and has to keep to: joints that must not move or move
+            last, the smallest move, costs. Its last moves, of the joints that move last, stay as they are.
         on_better: Called with every better path on the way; these have not yet passed the second check.
         stop: Asked from time to time; True ends the work, and the best so far is returned.
 
@@ -112,24 +124,39 @@ def shorten(
 
     Raises:
         UnknownNameError: If there is no such method.
-        InputError: If the path is not valid for the problem or has one waypoint, the time is not positive, the seed
-            is negative, or the method cannot do what is asked.
+        InputError: If the path is not valid for the problem, does not keep to the rules or has one waypoint, the time
+            is not positive, the seed is negative, or the method cannot do what is asked.
     """
+    one_joint = one_joint or rules is not None
     chosen = _checked(path, problem, method, seconds, seed, one_joint)
+    head, tail = _parts(path.waypoints, rules)
+    if len(head) < 2:
+        return path
     end = time.monotonic() + (np.inf if seconds is None else float(seconds))
-    listener = None if on_better is None else lambda rows: on_better(path.with_waypoints(rows))
+    listener = None if on_better is None else lambda rows: on_better(path.with_waypoints(np.vstack([rows, tail])))
     # What is as short as can be touches what it goes round, so most methods check as densely as the second check.
     refined = problem.refined(SECOND_CHECK)
     for asked in (problem, refined) if chosen.keeps_moves else (refined,):
         left = end - time.monotonic()
-        task = Task(asked.world, seconds=left, seed=seed, one_joint=one_joint, on_better=listener, stop=stop)
-        rows = chosen.run(path.waypoints, task, asked)
+        limits: dict[str, Any] = {"seconds": left, "on_better": listener, "stop": stop}
+        task = Task(asked.world, seed=seed, one_joint=one_joint, rules=rules, **limits)
+        rows = np.vstack([chosen.run(head, task, asked), tail])
         worse = not chosen.keeps_moves and task.rank(rows) > task.rank(path.waypoints)
         same_ends = (rows[[0, -1]] == path.waypoints[[0, -1]]).all()
         shorter = path.with_waypoints(rows)
-        if same_ends and not worse and not shorter.violations(problem.world):
+        kept = rules is None or rules.kept_by(rows)
+        if same_ends and kept and not worse and not shorter.violations(problem.world):
             return shorter
     return path
+
+
+def _parts(route: Matrix, rules: MoveRules | None) -> tuple[Matrix, Matrix]:
+    """A route up to where the joints that move last begin, and the rest."""
+    if rules is None:
+        return route, route[:0]
+    if not rules.kept_by(route):
+        raise InputError("path to shorten: it does not keep to the rules that it is to keep to")
+    return route[: rules.head(route)], route[rules.head(route) :]
 
 
 def _checked(
@@ -148,7 +175,7 @@ def _checked(
         raise InputError("path to shorten: it has one waypoint, so there is nothing to shorten")
     faults = path.violations(problem.world)
     if faults:
-        raise InputError(f"path to shorten: edge {faults[0].edge} is not valid: {faults[0].reason}")
+        raise InputError(f"path to shorten: edge {faults[0].edge + 1} is not valid: {faults[0].reason}")
     if one_joint and not path.one_joint_at_a_time:
         raise InputError("path to shorten: it moves several joints at once, so one_joint cannot be kept")
     if one_joint and not METHODS[method].can_keep_moves:

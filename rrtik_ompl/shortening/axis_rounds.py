@@ -9,13 +9,16 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.shortening.axis import MotionValid, ask_once, axis_cut, double_axis_cut
+from rrtik_ompl.shortening.axis import ask_once, axis_cut, double_axis_cut
+from rrtik_ompl.shortening.questions import MotionsFree, Stop, never
 from rrtik_ompl.transitions import lower_bound, route_length, transitions
 
 ROUNDS = 20
 
 
-def axis_cut_rounds(waypoints: ArrayLike, motion_valid: MotionValid, *, rounds: int = ROUNDS, seed: int = 0) -> Matrix:
+def axis_cut_rounds(
+    waypoints: ArrayLike, motions_free: MotionsFree, *, rounds: int = ROUNDS, seed: int = 0, stop: Stop = never
+) -> Matrix:
     """The double pass, then ``rounds`` passes with random joint orders in alternating direction; keeps the best.
 
     A pass never adds a move, but may end in another route with as many. Each round goes on from the last one, so the
@@ -23,9 +26,10 @@ def axis_cut_rounds(waypoints: ArrayLike, motion_valid: MotionValid, *, rounds: 
 
     Args:
         waypoints: Shape (k, n), start first.
-        motion_valid: Whether a straight motion is free.
+        motions_free: Which straight motions are free, for batches of shape (m, n).
         rounds: Number of further passes, at least 0.
         seed: Of the random orders.
+        stop: Asked often; true ends the work, and the best so far is returned.
 
     Returns:
         Shape (m, n), start first: the route with the fewest transitions seen, the shortest among those.
@@ -35,13 +39,13 @@ def axis_cut_rounds(waypoints: ArrayLike, motion_valid: MotionValid, *, rounds: 
     """
     if rounds < 0:
         raise InputError(f"rounds: expected at least 0, got {rounds}")
-    rng, test = np.random.default_rng(seed), ask_once(motion_valid)
-    route = best = double_axis_cut(waypoints, test)
+    rng, ask = np.random.default_rng(seed), ask_once(motions_free)
+    route = best = double_axis_cut(waypoints, ask, stop=stop)
     fewest = lower_bound(best[0], best[-1])
     for k in range(rounds):
-        if transitions(best) == fewest:
+        if transitions(best) == fewest or stop():
             break
-        route = axis_cut(route[::-1], test, axes=rng.permutation(route.shape[1]).tolist())
+        route = axis_cut(route[::-1], ask, axes=rng.permutation(route.shape[1]).tolist(), stop=stop)
         best = min(best, route[::-1] if k % 2 == 0 else route, key=route_rank)
     return best
 

@@ -22,7 +22,7 @@ IDLE_ROUNDS = 3  # without gain end the work
 def best_in_time(route: Matrix, task: Task) -> Matrix:
     """Shorten a route, shape (k, n), by whatever helps: shortcuts from several seeds, then retraction and shortcuts."""
     if task.one_joint:
-        return task.better(route, axis_cut_rounds(route, task.free, seed=task.seed))
+        return task.better(route, axis_cut_rounds(route, task.free_batch, seed=task.seed, stop=task.expired))
     if not has_kernels(task) or len(route) < 3:
         return _without_kernels(route, task)
     best = _several_starts(route, task)

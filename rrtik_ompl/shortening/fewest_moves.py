@@ -14,6 +14,7 @@ from rrtik_ompl.problem import TURN, Problem
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.shortening.move_lattice import MoveLattice
 from rrtik_ompl.shortening.move_proof import sharper_bound
+from rrtik_ompl.shortening.move_rules import MoveRules
 from rrtik_ompl.shortening.move_search import MoveSearch
 from rrtik_ompl.shortening.questions import Stop, never
 from rrtik_ompl.transitions import lower_bound, single_joint
@@ -44,7 +45,13 @@ class MovesFound:
 
 
 def fewest_moves(
-    waypoints: Matrix, world: World, *, rounds: int = ROUNDS, seed: int = 0, stop: Stop = never
+    waypoints: Matrix,
+    world: World,
+    *,
+    rounds: int = ROUNDS,
+    seed: int = 0,
+    stop: Stop = never,
+    rules: MoveRules | None = None,
 ) -> MovesFound:
     """Look for a route with fewer moves, or with as many and less travel.
 
@@ -55,6 +62,7 @@ def fewest_moves(
             moves. The same number and seed give the same route.
         seed: Of all random choices.
         stop: Asked often; True ends the work, and the best so far is returned.
+        rules: Kept by the route and by what comes out. Joints that move last stay where they are.
 
     Returns:
         A route with the same ends, bit for bit, that is no worse. Its bound is the number of joints that differ, and
@@ -70,13 +78,18 @@ def fewest_moves(
         )
     if rounds < 0:
         raise InputError(f"rounds: expected at least 0, got {rounds}")
+    kept = MoveRules(world.robot.joint_names) if rules is None else rules
+    frozen = [*kept.frozen_joints, *kept.last_joints]
     search = MoveSearch(
         rows[:1],
         rows[-1:],
         *turning_limits(world.robot, rows),
         world.motion_valid_batch,
         seed=seed,
-        prove=partial(sharper_bound, world, range(world.robot.dof)),
+        costs=kept.joint_costs,
+        frozen=frozen,
+        smallest_move=kept.smallest_move,
+        prove=partial(sharper_bound, world, [j for j in range(world.robot.dof) if j not in frozen]),
     )
     search.offer(rows)
     search.settle_corners(stop)

@@ -9,27 +9,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from itertools import combinations, islice, pairwise, product
+from itertools import combinations, islice, product
 from typing import TypeAlias
 
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.shortening.move_lattice import MoveLattice
+from rrtik_ompl.shortening.best_route import BestRoute
 from rrtik_ompl.shortening.move_values import Values, lattice_size, near_values, values_of, with_spread
 from rrtik_ompl.shortening.questions import MotionsFree, OutOfTime, Questions, Stop, never
-from rrtik_ompl.shortening.timely_cut import timely_cut
 from rrtik_ompl.transitions import lower_bound, merge_moves, transitions
 
 MOST_NODES = 4096  # of a lattice: some milliseconds in the kernels
-DIGITS = 9  # of the travel after the point; the rest is rounding
 MOST_FREE = 3  # joints with free values in one lattice
 WIDTHS = 0.1 * 0.5 ** np.arange(0, 16, 3)  # of the search for less travel, shares of a joint's range
 NEAR_NODES = 512  # of a lattice close to a route
 CUTS = 3  # in random orders, without gain, in every round
 SPARE = 8  # configurations for each of a known part when further values come in
 REPEATS = 8  # of a search for less travel at the same width
-NONE = 2**31  # moves, if there is no route
 
 Proof: TypeAlias = Callable[[Vector, Vector, Stop], int]  # a lower bound between a start and a goal
 
@@ -38,7 +35,6 @@ class MoveSearch:
     """Routes from starts to goals, better and better.
 
     Attributes:
-        route: The best so far, shape (k, n), or None.
         pairs: Each start with each goal.
         rounds: Rounds of improvement so far.
 
@@ -50,6 +46,7 @@ class MoveSearch:
         seed: Of all random choices.
         costs: Cost of each joint's travel, shape (n,); all 1 if None.
         frozen: Joints that must not move.
+        smallest_move: No move is shorter, shape (n,); any may be if None.
         most_nodes: Size of the lattices.
         prove: Sharpens the bound between a start and a goal; asked once, when one move more than it remains.
     """
@@ -65,6 +62,7 @@ class MoveSearch:
         seed: int = 0,
         costs: Vector | None = None,
         frozen: Sequence[int] = (),
+        smallest_move: Vector | None = None,
         most_nodes: int = MOST_NODES,
         prove: Proof | None = None,
     ) -> None:
@@ -74,19 +72,25 @@ class MoveSearch:
         self._lower, self._upper = lower, upper
         self._ask = Questions(motions_free)
         self._rng = np.random.default_rng(seed)
-        self._order = self._rng.permutation(starts.shape[1]).tolist()
-        self._costs = np.ones(starts.shape[1]) if costs is None else costs
-        self._movable = [j for j in range(starts.shape[1]) if j not in frozen and lower[j] < upper[j]]
+        count = starts.shape[1]
+        order = self._rng.permutation(count).tolist()
+        shortest = np.zeros(count) if smallest_move is None else smallest_move
+        self._best = BestRoute(self._ask, np.ones(count) if costs is None else costs, order, shortest)
+        self._movable = [j for j in range(count) if j not in frozen and lower[j] < upper[j]]
         self._most_nodes = most_nodes
         self._prove = prove
         self._offers: list[Matrix] = []
-        self.route: Matrix | None = None
         self.rounds = 0
+
+    @property
+    def route(self) -> Matrix | None:
+        """The best so far, shape (k, n), or None."""
+        return self._best.route
 
     @property
     def moves(self) -> int:
         """Of the best route; more than any number if there is none."""
-        return NONE if self.route is None else transitions(self.route)
+        return self._best.moves
 
     @property
     def bound(self) -> int:
@@ -116,8 +120,7 @@ class MoveSearch:
         """Take in a free route of single-joint moves, shape (k, n), ends as given."""
         merged = merge_moves(route, tolerance=0.0)
         self._offers.append(merged)
-        if self._rank(merged) < self._rank(self.route):
-            self.route = merged
+        self._best.take(merged)
 
     def settle_corners(self, stop: Stop = never) -> None:
         """Find out for each start and goal whether they are joined without a detour of any joint; sharpens the bound.
@@ -132,7 +135,7 @@ class MoveSearch:
                 least = self._bounds[number]
                 if not 0 < least <= self.moves or lattice_size(values) > self._most_nodes:
                     continue
-                found = self._search(values, start, goal)
+                found = self._best.search(values, start, goal)
                 if found is None or transitions(found) > least:
                     self.raise_bound(number, 3 if least == 1 else least + 1)
 
@@ -165,17 +168,9 @@ class MoveSearch:
             self._other_orders()
             self._less_travel()
 
-    def _cut(self, route: Matrix, axes: Sequence[int] | None = None) -> Matrix:
-        """The published double axis cut of a route: on long ones it gains much more in a second than a lattice does."""
-        found = timely_cut(route, self._ask, axes)
-        stop, self._ask.stop = self._ask.stop, never
-        confirmed = self._confirmed(found, route)
-        self._ask.stop = stop
-        if not confirmed:
-            return route
-        if self._rank(found) < self._rank(self.route):
-            self.route = found
-        return found
+    def _cut(self, offered: Matrix) -> Matrix:
+        """A free route cut in both ways, whichever is better."""
+        return min(self._best.cut_parts(offered), self._best.cut(offered), key=self._best.rank)
 
     def _cut_again(self) -> None:
         """Further cuts of the best route, joints in random orders, until several in a row gain no move."""
@@ -184,7 +179,7 @@ class MoveSearch:
             if self._ask.stop():
                 raise OutOfTime
             before = self.moves
-            self._cut(self.route, self._rng.permutation(self.route.shape[1]).tolist())
+            self._best.cut(self.route, self._rng.permutation(self.route.shape[1]).tolist())
             idle = idle + 1 if self.moves == before else 0
 
     def _rearrange(self, route: Matrix) -> None:
@@ -192,7 +187,7 @@ class MoveSearch:
         first = 0
         while first < len(route) - 1:
             last = self._window(route, first)
-            self._replace(route, first, last, values_of(route[first : last + 1]))
+            self._best.replace(route, first, last, values_of(route[first : last + 1]))
             first = last
 
     def _window(self, route: Matrix, first: int) -> int:
@@ -216,7 +211,7 @@ class MoveSearch:
         promising = [k for k, bound in enumerate(self._bounds) if bound <= self.moves]
         if promising:
             start, goal = self.pairs[int(self._rng.choice(promising))]
-            self._search(self._with_spread(np.array([start, goal]), joints), start, goal)
+            self._best.search(self._with_spread(np.array([start, goal]), joints), start, goal)
 
     def _around(self, route: Matrix) -> None:
         """The values of a part of a route and further ones of some joints."""
@@ -225,7 +220,7 @@ class MoveSearch:
         while first > 0 and lattice_size(values_of(route[first - 1 : last + 1])) <= self._most_nodes // SPARE:
             first -= 1
         joints = self._some_joints(MOST_FREE)
-        self._replace(route, first, last, self._with_spread(route[first : last + 1], joints))
+        self._best.replace(route, first, last, self._with_spread(route[first : last + 1], joints))
 
     def _less_travel(self) -> None:
         """Move the free values of the best route by less and less, as long as its travel gets less."""
@@ -237,7 +232,7 @@ class MoveSearch:
                 last = self._window(before, 0)
                 part = before[: last + 1]
                 near = near_values(part, float(width), self._lower, self._upper, NEAR_NODES)
-                self._replace(before, 0, last, near)
+                self._best.replace(before, 0, last, near)
                 if self.route is before:
                     break
 
@@ -270,44 +265,3 @@ class MoveSearch:
                     if size <= max(self.moves - 1 - self._differing, 1):
                         yield list(sets[k])
             alone = True
-
-    def _search(self, values: Values, start: Vector, goal: Vector) -> Matrix | None:
-        """The best route on a lattice between a start and a goal; kept if it is better."""
-        found = self._lattice_route(values, start, goal)
-        if found is not None and self._rank(found) < self._rank(self.route):
-            self.route = found
-        return found
-
-    def _replace(self, route: Matrix, first: int, last: int, values: Values) -> None:
-        """Replace a part of a route by the best on a lattice; kept if the whole is better than the best so far."""
-        part = self._lattice_route(values, route[first], route[last])
-        if part is None:
-            return
-        whole = merge_moves(np.vstack([route[:first], part, route[last + 1 :]]), tolerance=0.0)
-        if self._rank(whole) < self._rank(self.route) and self._confirmed(whole, route):
-            self.route = whole
-
-    def _lattice_route(self, values: Values, start: Vector, goal: Vector) -> Matrix | None:
-        if lattice_size(values) < 2:
-            return None
-        lattice = MoveLattice(values, self._ask, self._costs)
-        found = lattice.best_route(start, goal, self._order)
-        return found if found is not None and self._confirmed(found, start[None]) else None
-
-    def _confirmed(self, route: Matrix, known: Matrix) -> bool:
-        """Whether every edge of a route is free; those of the known one are. A run is asked about in pieces before."""
-        old = set(_edges(known))
-        fresh = [k for k, edge in enumerate(_edges(route)) if edge not in old]
-        return not fresh or bool(self._ask(route[fresh], route[np.add(fresh, 1)]).all())
-
-    def _rank(self, route: Matrix | None) -> tuple[int, float]:
-        """What is to be made small: moves, then travel; a gain of rounding is none."""
-        if route is None:
-            return NONE, np.inf
-        travel = float((np.abs(np.diff(route, axis=0)) @ self._costs).sum())
-        return transitions(route), round(travel, DIGITS)
-
-
-def _edges(route: Matrix) -> list[tuple[bytes, bytes]]:
-    """The edges of a route as keys."""
-    return list(pairwise(row.tobytes() for row in route))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TypeAlias
 
 import numpy as np
@@ -59,3 +60,9 @@ class Questions:
                 self._at_once = min(2 * self._at_once, MOST_AT_ONCE)
         self.asked += len(tails)
         return np.concatenate(parts)
+
+    def in_time(self, tails: Matrix, heads: Matrix) -> Mask:
+        """Which motions are free, shapes (m, n) and (m,); none when it is time to stop."""
+        with suppress(OutOfTime):
+            return self(tails, heads)
+        return np.zeros(len(tails), dtype=bool)

@@ -11,6 +11,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.shortening.axis import axis_moves
+from rrtik_ompl.shortening.move_rules import MoveRules
 from rrtik_ompl.transitions import route_length, transitions
 
 
@@ -31,6 +32,7 @@ class Task:
         motions: Who judges, as given.
         seed: Of all random choices.
         one_joint: Whether every edge of the answer must move one joint, as the edges of the question do.
+        rules: What single-joint moves have to keep to, or None.
         bounded: Whether there is an end to the time.
         asked: How many straight motions have been asked about.
         confirmed_again: How many of an answer's motions have been checked on top of that, as parts of free ones.
@@ -40,6 +42,7 @@ class Task:
         seconds: Time limit [s].
         seed: See above.
         one_joint: See above.
+        rules: See above.
         on_better: Called with every better route, shape (k, n).
         stop: Asked between two questions; True ends the time.
     """
@@ -51,11 +54,12 @@ class Task:
         seconds: float = np.inf,
         seed: int = 0,
         one_joint: bool = False,
+        rules: MoveRules | None = None,
         on_better: Callable[[Matrix], object] | None = None,
         stop: Callable[[], bool] | None = None,
     ) -> None:
         self.motions: Any = motions
-        self.seed, self.one_joint = seed, one_joint
+        self.seed, self.one_joint, self.rules = seed, one_joint, rules
         self.asked = self.confirmed_again = 0
         self.bounded = bool(np.isfinite(seconds))
         self._deadline = time.monotonic() + seconds
