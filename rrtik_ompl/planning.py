@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl import catalog
-from rrtik_ompl.arrays import Matrix, finite_array
+from rrtik_ompl.arrays import Matrix, finite_array, whole_number
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast.library import library
 from rrtik_ompl.goal import JointGoal
@@ -263,8 +263,4 @@ def _judged(problem: Problem, outcome: Attempt, name: str) -> tuple[JointPath | 
 
 
 def _seed(seed: int | None) -> int:
-    if seed is None:
-        return int(np.random.default_rng().integers(2**31))
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise InputError(f"seed must be a whole number of at least 0, got {seed!r}")
-    return int(seed)
+    return int(np.random.default_rng().integers(2**31)) if seed is None else whole_number(seed, "seed")

@@ -44,6 +44,20 @@ class Contact:
     point_second: Vector
 
 
+def check_world(world: World | None, robot: Robot) -> None:
+    """Refuse what is no robot, no world, or the world of another robot.
+
+    Raises:
+        InputError: It says how to make what is needed.
+    """
+    require(robot, Robot, "robot", "use load_robot(name or file)")
+    if world is None:
+        return
+    require(world, World, "world", "make it with World(robot, scene)")
+    if world.robot is not robot:
+        raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
+
+
 class World:
     """Exact collision checks of a robot in a scene.
 

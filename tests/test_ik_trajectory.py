@@ -142,6 +142,8 @@ def test_bad_input_is_refused_in_a_line():
         rrtik.solve_ik_trajectory(robot, np.full((2, 3), np.nan))
     with pytest.raises(InputError, match="orthonormal"):
         rrtik.solve_ik_trajectory(robot, 2.0 * poses)
+    with pytest.raises(InputError, match="jump must be greater than 0"):
+        rrtik.solve_ik_trajectory(robot, poses, jump=0.0)
     with pytest.raises(InputError, match="another robot"):
         rrtik.solve_ik_trajectory(robot, poses, world=rrtik.World(rrtik.load_robot("ur5")))
     assert set(list_ik_trajectory_methods()) == {"closed-form", "numeric", "genetic"}

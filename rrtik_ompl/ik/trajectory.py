@@ -11,7 +11,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, not_negative, positive, whole_number
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.goal import PoseGoal, PositionGoal, joint_difference, pose_errors
 from rrtik_ompl.ik.branch_choice import JUMP, follow
@@ -25,7 +25,7 @@ from rrtik_ompl.ik.numeric_track import Tracker
 from rrtik_ompl.ik.question import Target
 from rrtik_ompl.ik.restarts import Walk
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World
+from rrtik_ompl.world import World, check_world
 
 SECONDS = 60.0
 SECONDS_A_POINT = 5.0  # to say why a point has no configuration
@@ -122,10 +122,9 @@ def solve_ik_trajectory(
         UnknownNameError: If there is no such method or preset.
         InputError: If the method does not fit the robot, a pose is none, or an argument makes no sense.
     """
+    check_world(world, robot)
     load_kernels()
     begin = time.monotonic()
-    if world is not None and world.robot is not robot:
-        raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
     rows = _checked(poses)
     task = Task(
         robot=robot,
@@ -133,10 +132,10 @@ def solve_ik_trajectory(
         targets=tuple(_target(row, position_tolerance, orientation_tolerance) for row in rows),
         near=None if near is None else robot.configuration(near, "near"),
         world=world,
-        jump=float(finite_array(jump, (), "jump")),
+        jump=positive(jump, "jump"),
         options=_options(options),
-        rng=np.random.default_rng(seed),
-        deadline=begin + float(finite_array(seconds, (), "seconds")),
+        rng=np.random.default_rng(whole_number(seed, "seed")),
+        deadline=begin + not_negative(seconds, "seconds"),
     )
     name = _chosen(task, method)
     q, iterations = FOLLOWERS[name](task)
