@@ -131,7 +131,11 @@ def _goal(asked: Asked, position: Any, quaternion: Any, rpy_deg: Any, tolerances
     if position is None:
         if quaternion or rpy_deg or asked.goal is None:
             raise InputError("where to? give --position X Y Z, --problem NAME with a goal, or --poses FILE")
-        return PoseGoal(asked.robot.fk(asked.goal.q), **tolerances) if isinstance(asked.goal, JointGoal) else asked.goal
+        if isinstance(asked.goal, JointGoal):
+            return PoseGoal(asked.robot.fk(asked.goal.q), **tolerances)
+        if tolerances:
+            raise InputError("the goal of --problem has tolerances of its own: leave out --tolerance-mm and -deg")
+        return asked.goal
     if quaternion:
         return PoseGoal(pose(position, quaternion, "--position, --quaternion"), **tolerances)
     if rpy_deg:
@@ -142,6 +146,10 @@ def _goal(asked: Asked, position: Any, quaternion: Any, rpy_deg: Any, tolerances
 def _point(position: Any, tolerances: dict[str, float]) -> Any:
     from rrtik_ompl import PositionGoal
 
+    if "orientation_tolerance" in tolerances:
+        raise InputError(
+            "--tolerance-deg is of an orientation: give one with --quaternion or --rpy-deg, or leave it out"
+        )
     return PositionGoal(position, tolerances.get("position_tolerance", 1e-3))
 
 
