@@ -49,15 +49,13 @@ class Answer:
 
     Attributes:
         q: Configurations at one of the targets, inside the limits, in collision or not, shape (k, dof).
-        nearest: If there is none: the posture that came nearest to a target with no regard to limits, shape (dof,).
-        target: The target that it came near to.
+        nearest: If there is none: the posture that came nearest to the goal with no regard to limits, shape (dof,).
         iterations: Steps, 0 for a closed form.
         timed_out: Whether the time was up before the method was through.
     """
 
     q: Matrix
     nearest: Vector
-    target: Target
     iterations: int = 0
     timed_out: bool = False
 
