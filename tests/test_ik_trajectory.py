@@ -8,6 +8,7 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.ik.genetic.options import GeneticOptions
 from rrtik_ompl.ik.trajectory import list_ik_trajectory_methods
+from rrtik_ompl.poses import pose_from_rpy
 from rrtik_ompl.shapes import Sphere
 
 METHODS_OF = {
@@ -107,6 +108,19 @@ def test_a_population_that_meets_a_point_out_of_reach_says_so_and_keeps_what_it_
     assert answer.reasons == ("",) * 20 + ("unreachable",) + ("time",) * 9
     assert answer.iterations == 500
     assert not np.isnan(answer.q[:20]).any()
+
+
+@pytest.mark.parametrize("method", ["closed-form", "numeric"])
+def test_points_that_only_their_tolerance_brings_into_reach_are_followed(method):
+    robot = rrtik.load_robot("planar3")
+    reach = robot.fk(np.zeros(3)).translation[0]
+    headings = np.linspace(0.0, 0.3, 20)
+    poses = np.array([pose_from_rpy([0, 0, 0], [0, 0, a]).homogeneous for a in headings])
+    poses[:, :3, 3] = (reach + 5e-4 * np.sin(20.0 * headings))[:, None] * poses[:, :3, 0]
+    answer = rrtik.solve_ik_trajectory(robot, poses, method=method)
+    assert (answer.found, answer.jumps) == (True, ())
+    assert answer.residuals[:, 0].max() > 4e-4
+    assert not rrtik.solve_ik_trajectory(robot, poses, method=method, position_tolerance=1e-4).found
 
 
 def test_no_time_is_the_reason():

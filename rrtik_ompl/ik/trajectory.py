@@ -194,7 +194,14 @@ def _chosen(task: Task, method: str) -> str:
 
 
 def _closed_form(task: Task) -> tuple[Matrix, int]:
-    return np.array(follow(task.robot, task.poses, task.near, jump=task.jump, accept=task.accept).q), 0
+    """The branches that lead on, and where no branch is exactly there, a posture within the tolerances."""
+    q = np.array(follow(task.robot, task.poses, task.near, jump=task.jump, accept=task.accept).q)
+    for k in np.flatnonzero(np.isnan(q[:, 0])):
+        before = task.near if k == 0 or np.isnan(q[k - 1, 0]) else q[k - 1]
+        alone = solve_ik(task.robot, task.targets[k], method="closed-form", near=before, world=task.world)
+        if alone.found:
+            q[k] = alone.solutions[0]
+    return q, 0
 
 
 def _genetic(task: Task) -> tuple[Matrix, int]:
