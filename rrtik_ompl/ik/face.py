@@ -30,6 +30,7 @@ from rrtik_ompl.world import World, check_world
 
 SECONDS = 1.0
 DRAWS = 32  # targets drawn from a goal that leaves freedom; one for each part if it has more parts
+DIGITS = 9  # of metres and degrees in a message: less is rounding
 SAME_POSTURE = 1e-3  # [rad] or [m]; solutions of a numeric method this near are one
 
 
@@ -116,7 +117,7 @@ def solve_ik(
 
     question = Question(robot, goal, drawn, posture, accept, all, begin + limit, rng, world)
     answer, q, residuals, free = _tried(question, name)
-    if method == "auto" and _draws(name, goal) and not free.any():
+    if method == "auto" and not free.any() and _draws(name, goal):
         name = _walker(goal)
         answer, q, residuals, free = _tried(question, name)
     kept = _different(robot, q, posture, np.flatnonzero(free), None if all else 1)
@@ -241,5 +242,5 @@ def _draws(name: str, goal: TipGoal) -> bool:
 def _away(robot: Robot, goal: TipGoal, q: Vector) -> str:
     """How far a posture is from a goal, in metres and, unless it is a position, degrees."""
     ((distance,), (angle,)) = tip_errors(goal, robot, q[None])
-    turned = "" if isinstance(goal, PositionGoal) else f" and {np.degrees(angle):.4g} deg"
-    return f"{distance:.4g} m{turned} away"
+    turned = "" if isinstance(goal, PositionGoal) else f" and {round(np.degrees(angle), DIGITS):.4g} deg"
+    return f"{round(distance, DIGITS):.4g} m{turned} away"
