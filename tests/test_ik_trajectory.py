@@ -61,6 +61,21 @@ def test_a_population_makes_no_jumps_at_the_end_of_the_reach_either(name):
         assert (answer.found, answer.jumps) == (True, ())
 
 
+def test_poses_that_may_be_turned_about_an_axis_are_followed_by_an_arm_of_five_joints():
+    robot = rrtik.load_robot("so100")
+    poses, q = line(robot)
+    spin = np.array(
+        [pin.SE3(pin.exp3(np.array([0.0, 0.0, a])), np.zeros(3)).homogeneous for a in np.arange(len(poses))]
+    )
+    assert not rrtik.solve_ik_trajectory(robot, poses @ spin, near=q[0]).found
+    answer = rrtik.solve_ik_trajectory(robot, poses @ spin, near=q[0], free_rotation_axis="z")
+    assert (answer.found, answer.jumps, answer.method) == (True, (), "numeric")
+    assert (answer.residuals <= [1e-3, 1e-2]).all()
+    tips = robot.fk_batch(answer.q)
+    np.testing.assert_allclose(tips[:, :3, 3], poses[:, :3, 3], atol=1e-3)
+    assert np.einsum("ki,ki->k", tips[:, :3, 2], poses[:, :3, 2]).min() > np.cos(1e-2)
+
+
 def test_a_closed_form_of_positions_is_not_asked_for_poses():
     robot = rrtik.load_robot("puma560_3dof")
     poses, _ = line(robot, seed=1)
@@ -156,6 +171,13 @@ def test_bad_input_is_refused_in_a_line():
         rrtik.solve_ik_trajectory(robot, np.full((2, 3), np.nan))
     with pytest.raises(InputError, match="orthonormal"):
         rrtik.solve_ik_trajectory(robot, 2.0 * poses)
+    for method in ("closed-form", "genetic"):
+        with pytest.raises(InputError, match=r"knows no free axis; .* what fits: numeric"):
+            rrtik.solve_ik_trajectory(rrtik.load_robot("titan4"), poses, method=method, free_rotation_axis="z")
+    with pytest.raises(InputError, match="points leave every turn free"):
+        rrtik.solve_ik_trajectory(robot, poses[:, :3, 3], free_rotation_axis="z")
+    with pytest.raises(InputError, match="must be x, y or z, got 'w'"):
+        rrtik.solve_ik_trajectory(robot, poses, free_rotation_axis="w")
     with pytest.raises(InputError, match="jump must be greater than 0"):
         rrtik.solve_ik_trajectory(robot, poses, jump=0.0)
     with pytest.raises(InputError, match="another robot"):
