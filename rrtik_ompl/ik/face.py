@@ -94,7 +94,7 @@ def solve_ik(
             pose representatives), a numeric one those it comes across, full turns of a joint counted apart.
         world: If given, solutions in collision are left out. Its robot must be this one.
         seconds: Time that a numeric method may take; it is looked at between rounds, of which the first is done.
-        seed: Of the random numbers.
+        seed: Of the random numbers; the same seed gives the same answer as long as the time does not cut in.
 
     Raises:
         UnknownNameError: If there is no such method.
