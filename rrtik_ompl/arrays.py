@@ -72,6 +72,29 @@ def positive(value: ArrayLike, what: str) -> float:
     return number
 
 
+def not_negative(value: ArrayLike, what: str) -> float:
+    """A number of at least 0 given by a user.
+
+    Raises:
+        InputError: If it is none.
+    """
+    number = finite_number(value, what)
+    if number < 0.0:
+        raise InputError(f"{what} must not be negative, got {number:g}")
+    return number
+
+
+def whole_number(value: object, what: str, least: int = 0) -> int:
+    """A whole number given by a user, such as a seed.
+
+    Raises:
+        InputError: If it is none, or less than ``least``.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise InputError(f"{what} must be a whole number of at least {least}, got {value!r}")
+    return int(value)
+
+
 def _short(value: object) -> str:
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."

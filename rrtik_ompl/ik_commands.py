@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -135,7 +134,7 @@ def _goal(asked: Asked, position: Any, quaternion: Any, rpy_deg: Any, tolerances
         if isinstance(asked.goal, JointGoal):
             return PoseGoal(asked.robot.fk(asked.goal.q), **tolerances)
         if tolerances:
-            raise InputError("the problem's goal brings its tolerances: leave out --tolerance-mm and --tolerance-deg")
+            raise InputError("the goal of --problem has tolerances of its own: leave out --tolerance-mm and -deg")
         return asked.goal
     if quaternion:
         return PoseGoal(pose(position, quaternion, "--position, --quaternion"), **tolerances)
@@ -147,13 +146,13 @@ def _goal(asked: Asked, position: Any, quaternion: Any, rpy_deg: Any, tolerances
 def _point(position: Any, tolerances: dict[str, float]) -> Any:
     from rrtik_ompl import PositionGoal
 
-    _no_angle(tolerances)
+    _refuse_orientation(tolerances, "give --quaternion or --rpy-deg, or leave it out")
     return PositionGoal(position, tolerances.get("position_tolerance", 1e-3))
 
 
-def _no_angle(tolerances: dict[str, float]) -> None:
+def _refuse_orientation(tolerances: dict[str, float], remedy: str) -> None:
     if "orientation_tolerance" in tolerances:
-        raise InputError("--tolerance-deg: a point has no orientation; leave it out, or ask for a pose")
+        raise InputError(f"--tolerance-deg is of an orientation, and a point has none: {remedy}")
 
 
 def _one(asked: Asked, goal: Any, everything: bool, common: dict[str, Any], output: Output) -> int:
@@ -197,17 +196,18 @@ def _many(
 
     robot, rows = asked.robot, load_poses(file)
     if rows.ndim == 2:
-        _no_angle(tolerances)
+        _refuse_orientation(tolerances, "leave it out")
     with progress(f"inverse kinematics of {_count(len(rows), 'pose')}"):
         if trajectory:
-            q, residuals, reasons, notes, line = _followed(robot, rows, tolerances, common)
+            q, residuals, reasons, details, notes, line = _followed(robot, rows, tolerances, common)
         else:
-            q, residuals, reasons, line = _each(robot, rows, tolerances, common)
-            notes = [""] * len(rows)
+            q, residuals, reasons, details = _each(robot, rows, tolerances, common)
+            notes, line = [""] * len(rows), ""
     found = sum(not reason for reason in reasons)
+    line += next((f"; no. {k + 1}: {detail}" for k, detail in enumerate(details) if detail), "")
     if output.as_json:
         more = {"jumps": [k for k, note in enumerate(notes) if "jump" in note]} if trajectory else {}
-        print(json.dumps({**ik_report.rows_document(robot, q, residuals, reasons), **more}))
+        print(json.dumps({**ik_report.rows_document(robot, q, residuals, reasons, details), **more}))
     elif output.as_csv:
         print(ik_report.rows_csv(robot, q, residuals, reasons, notes), end="")
     else:
@@ -222,14 +222,14 @@ def _many(
 
 
 def _each(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[str, Any]) -> Any:
-    """Joint values, residuals, reasons and a line of the first failure: as one batch unless tolerances are given."""
+    """Joint values, residuals, reasons and details: poses as one batch unless tolerances are given, else singly."""
     import numpy as np
 
     from rrtik_ompl import PoseGoal, solve_ik, solve_ik_batch
 
     if rows.ndim == 3 and not tolerances:
         batch = solve_ik_batch(robot, rows, **common)
-        return batch.q, batch.residuals, list(batch.reasons), _first_fault(batch.reasons, batch.details)
+        return batch.q, batch.residuals, list(batch.reasons), list(batch.details)
     q, residuals = np.full((len(rows), robot.dof), np.nan), np.full((len(rows), 2), np.nan)
     reasons, details = [], []
     for k, row in enumerate(rows):
@@ -239,28 +239,24 @@ def _each(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[str,
         details.append(result.detail)
         if result.found:
             q[k], residuals[k] = result.solutions[0], result.residuals[0]
-    return q, residuals, reasons, _first_fault(reasons, details)
-
-
-def _first_fault(reasons: Sequence[str], details: Sequence[str]) -> str:
-    """The number of the first row without a solution and its detail, to be hung on a line; "" if all have one."""
-    return next((f"; no. {k + 1}: {details[k]}" for k, reason in enumerate(reasons) if reason), "")
+    return q, residuals, reasons, details
 
 
 def _followed(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[str, Any]) -> Any:
-    """The same with a note for each point: after a jump, or where the way there collides."""
+    """The same, details of the first point without a solution alone, with a note for each: a jump, a collision."""
     from rrtik_ompl import solve_ik_trajectory
 
     options: dict[str, Any] = dict(tolerances)
     done = solve_ik_trajectory(robot, rows, **common, **options)
-    notes = [""] * len(rows)
+    notes, details = [""] * len(rows), [""] * len(rows)
     for text, where in (("jump", done.jumps), ("collision on the way", done.blocked)):
         for k in where:
             notes[k] = f"{notes[k]}, {text}" if notes[k] else text
     line = f", {_count(len(done.jumps), 'jump')}, {done.method}, {_time(done)}"
-    if done.detail:  # which counts its points from 0
-        line += _first_fault(done.reasons, [done.detail.partition(": ")[2]] * len(rows))
-    return done.q, done.residuals, list(done.reasons), notes, line
+    if done.detail:  # which names its point, counted from 0
+        first = next(k for k, reason in enumerate(done.reasons) if reason)
+        details[first] = done.detail.partition(": ")[2]
+    return done.q, done.residuals, list(done.reasons), details, notes, line
 
 
 def _draw(asked: Asked, goal: Any, q: Any, output: Output, *, moving: bool = False) -> None:

@@ -123,13 +123,16 @@ def document(robot: Robot, result: IkResult, names: Sequence[str]) -> dict[str, 
     }
 
 
-def rows_document(robot: Robot, q: Matrix, residuals: Matrix, reasons: Sequence[str]) -> dict[str, Any]:
+def rows_document(
+    robot: Robot, q: Matrix, residuals: Matrix, reasons: Sequence[str], details: Sequence[str]
+) -> dict[str, Any]:
     """Answers for many poses for machines: rad and m; null where there is none."""
     return {
         "robot": robot.name,
         "joint_names": list(robot.joint_names),
         "found": [not reason for reason in reasons],
         "reasons": list(reasons),
+        "details": list(details),
         "solutions": [None if reason else row.tolist() for row, reason in zip(q, reasons, strict=True)],
         "residuals": [None if reason else row.tolist() for row, reason in zip(residuals, reasons, strict=True)],
     }

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl import catalog
-from rrtik_ompl.arrays import Matrix, finite_array
+from rrtik_ompl.arrays import Matrix, finite_array, whole_number
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast.library import library
 from rrtik_ompl.goal import JointGoal
@@ -29,7 +29,6 @@ from rrtik_ompl.ompl_bridge.attempt import (
 )
 from rrtik_ompl.path import SECOND_CHECK, JointPath, Violation
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.random_stream import checked_seed
 
 DEFAULT_PLANNER = "bicrdt"
 RESTARTS = 20
@@ -264,6 +263,4 @@ def _judged(problem: Problem, outcome: Attempt, name: str) -> tuple[JointPath | 
 
 
 def _seed(seed: int | None) -> int:
-    if seed is None:
-        return int(np.random.default_rng().integers(2**31))
-    return checked_seed(seed)
+    return int(np.random.default_rng().integers(2**31)) if seed is None else whole_number(seed, "seed")

@@ -6,18 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rrtik_ompl.errors import InputError
-
-
-def checked_seed(seed: int) -> int:
-    """A seed given by a user.
-
-    Raises:
-        InputError: If it is no whole number of at least 0.
-    """
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise InputError(f"seed must be a whole number of at least 0, got {seed!r}")
-    return int(seed)
+from rrtik_ompl.arrays import whole_number
 
 
 class RandomStream:
@@ -31,7 +20,7 @@ class RandomStream:
     """
 
     def __init__(self, seed: int) -> None:
-        self._seed = checked_seed(seed)
+        self._seed = whole_number(seed, "seed")
 
     @cached_property
     def rng(self) -> np.random.Generator:

@@ -96,6 +96,7 @@ def _document(found: Any) -> dict[str, Any]:
         "cell": found.size,
         "cells": int(found.reached.sum()),
         "volume": found.volume,
+        "area": found.area,
         "samples": found.samples,
         "mean": float(values.mean()) if len(values) else 0.0,
         "most": float(values.max(initial=0.0)),
@@ -107,9 +108,10 @@ def _summary(found: Any) -> list[str]:
     told = _document(found)
     if told["cells"] == 0:
         return [f"{found.robot}: no posture counted: all of them collide"]
+    size = f"{found.area:.3g} m2" if found.flat else f"{found.volume:.3g} m3"
     place = ", ".join(f"{value:.2f}" for value in told["best"])
     return [
-        f"{found.robot}: {told['cells']} cells of {1e3 * found.size:.0f} mm reached, {found.volume:.3g} m3, "
+        f"{found.robot}: {told['cells']} cells of {1e3 * found.size:.0f} mm reached, {size}, "
         f"by {found.samples} samples",
         f"{LABELS[found.measure]}: mean {told['mean']:.3g}, most {told['most']:.3g} at ({place}) m",
     ]

@@ -25,6 +25,20 @@ ACCURACIES = ("exact", "conservative")
 FINEST_RESOLUTION = 1e-5  # [m]; a motion across an arm's reach is then some hundred thousand checks
 
 
+def check_world(world: World | None, robot: Robot) -> None:
+    """Refuse what is no robot, no world, or the world of another robot.
+
+    Raises:
+        InputError: It says how to make what is needed.
+    """
+    require(robot, Robot, "robot", "use load_robot(name or file)")
+    if world is None:
+        return
+    require(world, World, "world", "make it with World(robot, scene)")
+    if world.robot is not robot:
+        raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
+
+
 class World:
     """Exact collision checks of a robot in a scene.
 

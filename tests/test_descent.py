@@ -145,6 +145,18 @@ def test_an_arm_of_five_joints_reaches_poses_whose_turn_about_an_axis_is_free():
         assert (result.residuals <= [1e-3, 1e-2]).all()
 
 
+@pytest.mark.parametrize("kernels", [library, lambda name: None])
+def test_an_arm_of_three_joints_moves_inside_a_box_to_point_where_it_is_asked_to(kernels, monkeypatch):
+    monkeypatch.setattr(descent, "library", kernels)
+    robot, found = rrtik.load_robot("puma560_3dof"), []
+    for q in random_rows(robot, 12, seed=5):
+        goal = GoalRegion([PoseGoal(robot.fk(q), 1e-4, 1e-4)], free_rotation_axis="z", box=[0.05, 0.05, 0.05])
+        result = rrtik.solve_ik(robot, goal, method="numeric", seconds=20.0)
+        found.append(result.found)
+        assert goal.satisfied(robot, result.solutions).all()
+    assert all(found)
+
+
 def test_residuals_of_a_region_count_what_its_freedom_does_not_cover():
     robot = rrtik.load_robot("ur5")
     q = np.radians([20.0, -70.0, 80.0, -60.0, 40.0, 30.0])

@@ -207,7 +207,18 @@ def test_the_generations_end_where_the_options_say():
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("population", 7), ("population", 0), ("tournament", 0), ("bit_mutation", 1.5), ("window", -1.0), ("stall", 0)],
+    [
+        ("population", 7),
+        ("population", 0),
+        ("tournament", 0),
+        ("bit_mutation", 1.5),
+        ("window", -1.0),
+        ("stall", 0),
+        ("population", 10.0),
+        ("generations", 1.5),
+        ("stall", np.inf),
+        ("refined", 2.5),
+    ],
 )
 def test_settings_that_make_no_sense_are_refused(field, value):
     with pytest.raises(InputError, match=field):

@@ -116,6 +116,10 @@ def test_a_file_of_poses_is_answered_row_by_row_and_one_without_solution_is_exit
     assert rows[2]["joint1 [deg]"] == ""
     out = rrtik(capsys, "ik", "puma560", "--poses", file)[1]
     assert "2 of 3 poses solved; no. 3: the nearest posture is 8." in out
+    told = json.loads(rrtik(capsys, "ik", "puma560", "--poses", file, "--json")[1])
+    assert [bool(detail) for detail in told["details"]] == [False, False, True]
+    followed = json.loads(rrtik(capsys, "ik", "puma560", "--poses", file, "--trajectory", "--json")[1])
+    assert followed["details"][2].startswith("the nearest posture is 8.")
 
 
 def test_a_trajectory_is_followed_without_jumps_and_played_in_a_page(capsys, tmp_path):
@@ -163,19 +167,22 @@ def test_a_page_shows_every_solution_as_a_ghost(capsys, tmp_path):
         (["puma560", "--position", 1, 0, 0, "--near", "reddy"], "did you mean 'ready'"),
         (["puma560", "--position", 1, 0, 0, "--method", "fabrick"], "did you mean 'fabrik'"),
         (["ur5", "--position", 0.4, 0, 0.4, "--method", "closed-form"], "brings no closed form; what fits: numeric"),
+        (["puma560", "--position", 1, 0, 0, "--seed", -1], "seed must be a whole number"),
+        (["puma560", "--position", 1, 0, 0, "--seconds", -1], "seconds must not be negative"),
+        (["puma560", "--position", 1, 0, 0, "--tolerance-deg", 1], "--tolerance-deg is of an orientation"),
+        (["puma560", "--poses", "points.csv", "--tolerance-deg", 1], "a point has none: leave it out"),
+        (["--problem", "puma_pose", "--tolerance-mm", 1], "has tolerances of its own"),
         (["puma560", "--position", 1, 0, 0, "--trajectory"], "give --poses FILE too"),
         (["puma560", "--position", 1, 0, 0, "--poses", "x.csv"], "brings its own poses"),
         (["puma560", "--problem", "titan4_sdu"], "one of the two"),
         (["puma560", "--position", 1, 0, 0, "--json", "--csv"], "not both"),
         (["puma560", "--poses", "none.csv"], "none.csv: no such file"),
         (["puma560", "--position", 1, 0, 0, "--html", "page.pdf"], "unknown ending '.pdf'"),
-        (["puma560", "--position", 1, 0, 0, "--seed", -1], "seed must be a whole number of at least 0, got -1"),
-        (["puma560", "--position", 1, 0, 0, "--seconds", -1], "seconds must be at least 0, got -1"),
-        (["puma560", "--position", 1, 0, 0, "--tolerance-deg", 1], "--tolerance-deg: a point has no orientation"),
-        (["--problem", "puma_position", "--tolerance-mm", 2], "goal brings its tolerances: leave out --tolerance-mm"),
     ],
 )
-def test_bad_input_is_one_line_and_exit_2(capsys, arguments, said):
+def test_bad_input_is_one_line_and_exit_2(capsys, tmp_path, monkeypatch, arguments, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "points.csv").write_text("x,y,z\n0.4,0.2,0.9\n")
     code, out, err = rrtik(capsys, "ik", *arguments)
     assert (code, out) == (2, "")
     assert said in err

@@ -8,6 +8,7 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.ik.genetic.options import GeneticOptions
 from rrtik_ompl.ik.trajectory import list_ik_trajectory_methods
+from rrtik_ompl.poses import pose_from_rpy
 from rrtik_ompl.shapes import Sphere
 
 METHODS_OF = {
@@ -60,6 +61,21 @@ def test_a_population_makes_no_jumps_at_the_end_of_the_reach_either(name):
         assert (answer.found, answer.jumps) == (True, ())
 
 
+def test_poses_that_may_be_turned_about_an_axis_are_followed_by_an_arm_of_five_joints():
+    robot = rrtik.load_robot("so100")
+    poses, q = line(robot)
+    spin = np.array(
+        [pin.SE3(pin.exp3(np.array([0.0, 0.0, a])), np.zeros(3)).homogeneous for a in np.arange(len(poses))]
+    )
+    assert not rrtik.solve_ik_trajectory(robot, poses @ spin, near=q[0]).found
+    answer = rrtik.solve_ik_trajectory(robot, poses @ spin, near=q[0], free_rotation_axis="z")
+    assert (answer.found, answer.jumps, answer.method) == (True, (), "numeric")
+    assert (answer.residuals <= [1e-3, 1e-2]).all()
+    tips = robot.fk_batch(answer.q)
+    np.testing.assert_allclose(tips[:, :3, 3], poses[:, :3, 3], atol=1e-3)
+    assert np.einsum("ki,ki->k", tips[:, :3, 2], poses[:, :3, 2]).min() > np.cos(1e-2)
+
+
 def test_a_closed_form_of_positions_is_not_asked_for_poses():
     robot = rrtik.load_robot("puma560_3dof")
     poses, _ = line(robot, seed=1)
@@ -109,6 +125,19 @@ def test_a_population_that_meets_a_point_out_of_reach_says_so_and_keeps_what_it_
     assert not np.isnan(answer.q[:20]).any()
 
 
+@pytest.mark.parametrize("method", ["closed-form", "numeric"])
+def test_points_that_only_their_tolerance_brings_into_reach_are_followed(method):
+    robot = rrtik.load_robot("planar3")
+    reach = robot.fk(np.zeros(3)).translation[0]
+    headings = np.linspace(0.0, 0.3, 20)
+    poses = np.array([pose_from_rpy([0, 0, 0], [0, 0, a]).homogeneous for a in headings])
+    poses[:, :3, 3] = (reach + 5e-4 * np.sin(20.0 * headings))[:, None] * poses[:, :3, 0]
+    answer = rrtik.solve_ik_trajectory(robot, poses, method=method)
+    assert (answer.found, answer.jumps) == (True, ())
+    assert answer.residuals[:, 0].max() > 4e-4
+    assert not rrtik.solve_ik_trajectory(robot, poses, method=method, position_tolerance=1e-4).found
+
+
 def test_no_time_is_the_reason():
     robot = rrtik.load_robot("panda")
     answer = rrtik.solve_ik_trajectory(robot, line(robot)[0], seconds=0.0)
@@ -142,6 +171,15 @@ def test_bad_input_is_refused_in_a_line():
         rrtik.solve_ik_trajectory(robot, np.full((2, 3), np.nan))
     with pytest.raises(InputError, match="orthonormal"):
         rrtik.solve_ik_trajectory(robot, 2.0 * poses)
+    for method in ("closed-form", "genetic"):
+        with pytest.raises(InputError, match=r"knows no free axis; .* what fits: numeric"):
+            rrtik.solve_ik_trajectory(rrtik.load_robot("titan4"), poses, method=method, free_rotation_axis="z")
+    with pytest.raises(InputError, match="points leave every turn free"):
+        rrtik.solve_ik_trajectory(robot, poses[:, :3, 3], free_rotation_axis="z")
+    with pytest.raises(InputError, match="must be x, y or z, got 'w'"):
+        rrtik.solve_ik_trajectory(robot, poses, free_rotation_axis="w")
+    with pytest.raises(InputError, match="jump must be greater than 0"):
+        rrtik.solve_ik_trajectory(robot, poses, jump=0.0)
     with pytest.raises(InputError, match="another robot"):
         rrtik.solve_ik_trajectory(robot, poses, world=rrtik.World(rrtik.load_robot("ur5")))
     assert set(list_ik_trajectory_methods()) == {"closed-form", "numeric", "genetic"}

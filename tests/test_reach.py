@@ -48,6 +48,8 @@ def test_a_reached_cell_really_holds_a_tip(titan, found):
 def test_planar_arms_point_everywhere_near_their_base_and_outwards_at_full_stretch():
     found = reach_map(load_robot("planar3"), samples=20_000, cell=0.2)
     assert found.values.shape[2] == 1
+    assert found.volume == 0.0
+    assert 0.8 * np.pi * 9.0 < found.area < 1.1 * np.pi * 9.0  # three links of 1 m
     assert found.value([[0.5, 0.5, found.centres(2)[0]]])[0] > 0.95
     assert 0.0 < found.value([[2.75, 0.0, found.centres(2)[0]]])[0] < 0.4
     assert len(found.slices()) == 1
@@ -100,7 +102,8 @@ def test_a_map_is_the_same_for_the_same_seed_and_survives_its_file(titan, found,
     [
         ({"cell": 0.0}, "cell must be greater than 0"),
         ({"cell": 1e-3}, "at most 4000000"),
-        ({"samples": 0}, "samples must be at least 1"),
+        ({"samples": 0}, "samples must be a whole number of at least 1"),
+        ({"samples": 1e4}, "samples must be a whole number"),
         ({"axis": "w"}, "axis must be x, y or z"),
     ],
 )
@@ -160,6 +163,7 @@ def test_the_command_writes_a_map_a_picture_and_a_page(capsys, tmp_path):
     assert run(["reach", "planar3", "--cell", "0.2", *options]) == 0
     out = capsys.readouterr().out
     assert "share of 64 directions" in out
+    assert " m2, by " in out
     assert "planar3: orientations in reach" in (tmp_path / "reach.html").read_text()
     assert (tmp_path / "reach.png").read_bytes().startswith(b"\x89PNG")
     assert run(["reach", "titan4", "--free", "--samples", "500", "--json"]) == 0

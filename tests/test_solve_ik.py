@@ -7,7 +7,10 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.ik.face import list_ik_methods, solve_ik
+from rrtik_ompl.ik.question import Question
+from rrtik_ompl.ik.restarts import ROUNDS, restarted
 from rrtik_ompl.poses import pose_from_rpy
+from rrtik_ompl.random_stream import RandomStream
 from rrtik_ompl.shapes import Box, Sphere
 
 Q_TITAN = np.radians([20, 30, -70, 20, 30, 40])
@@ -142,17 +145,92 @@ def test_a_singular_pose_that_is_known_to_six_digits_is_solved_within_its_tolera
         assert goal.satisfied(robot, result.solutions).all()
 
 
+def turned_goal_of_five_joints():
+    """A place that the arm reaches, in a direction that it cannot point in."""
+    robot = rrtik.load_robot("so100")
+    q = np.random.default_rng(6).uniform(*robot.finite_range())
+    return robot, rrtik.PoseGoal(robot.fk(q) * pin.SE3(pin.exp3(np.array([0.0, 0.0, 1.0])), np.zeros(3)))
+
+
 def test_no_time_is_a_reason_of_its_own():
-    robot = rrtik.load_robot("panda")
-    far = rrtik.PoseGoal(pose_from_rpy([5, 0, 0], [0, 0, 0]))
-    assert solve_ik(robot, far, seconds=0.0).reason == "time"
+    robot, goal = turned_goal_of_five_joints()
+    assert solve_ik(robot, goal, method="pso", seconds=0.0).reason == "time"
+    assert solve_ik(robot, goal, seconds=20.0).reason == "unreachable"
 
 
-def test_the_same_seed_gives_the_same_answer():
+@pytest.mark.parametrize("method", ["genetic", "damped", "pinocchio", "ccd", "pso", "projection"])
+def test_what_is_too_far_for_the_arms_lengths_is_unreachable_however_short_the_time(method):
     robot = rrtik.load_robot("panda")
-    goal = pose_goal(robot, robot.posture("default"))
-    first, second = (solve_ik(robot, goal, seed=3).solutions for _ in range(2))
-    np.testing.assert_array_equal(first, second)
+    result = solve_ik(robot, rrtik.PositionGoal([5.0, 0.0, 0.3]), method=method, seconds=0.0)
+    assert (result.reason, result.solutions.shape) == ("unreachable", (0, 7))
+    assert "4.05" in result.detail
+
+
+def test_how_far_away_is_told_in_metres_and_for_poses_in_degrees():
+    robot, goal = turned_goal_of_five_joints()
+    detail = solve_ik(robot, goal, seconds=20.0).detail
+    assert " m and " in detail
+    assert detail.endswith(" deg away from the goal")
+    point = solve_ik(robot, rrtik.PositionGoal([3.0, 0.0, 0.0])).detail
+    assert point.endswith(" m away from the goal")
+    assert "and" not in point
+
+
+def bars(robot, count):
+    """Regions around postures inside the limits, of which a small part is in reach."""
+    for q in np.random.default_rng(0).uniform(*robot.finite_range(), (count, robot.dof)):
+        yield rrtik.TaskRegion.about_axis(robot.fk(q), [0.0, 0.0, 1.0], turn=[-0.5, 0.5], slide=[-0.05, 0.05])
+
+
+def test_auto_walks_onto_a_region_of_which_no_drawn_target_is_in_reach():
+    robot, methods = rrtik.load_robot("titan4"), set()
+    for region in bars(robot, 60):
+        result = solve_ik(robot, region, seconds=20.0)
+        assert result.found
+        assert region.satisfied(robot, result.solutions).all()
+        methods.add(result.method)
+    assert methods == {"closed-form", "projection"}
+
+
+def test_targets_drawn_from_a_region_prove_nothing_about_the_region():
+    robot = rrtik.load_robot("titan4")
+    missed = [solve_ik(robot, region, method="closed-form") for region in bars(robot, 60)]
+    missed = [result for result in missed if not result.found]
+    assert missed
+    assert {result.reason for result in missed} == {"time"}
+    assert "none of 32 targets drawn from the goal" in missed[0].detail
+
+
+def test_a_closed_form_looks_at_every_grasp_of_a_large_set():
+    robot = rrtik.load_robot("titan4")
+    far = [rrtik.PoseGoal(pose_from_rpy([5.0 + k, 0.0, 0.0], [0.0, 0.0, 0.0])) for k in range(200)]
+    near = pose_goal(robot, Q_TITAN)
+    for place in (0, 100, 200):
+        result = solve_ik(robot, rrtik.GoalRegion([*far[:place], near, *far[place:]]))
+        assert (result.method, near.satisfied(robot, result.solutions).tolist()) == ("closed-form", [True])
+
+
+def test_methods_that_walk_from_random_starts_give_every_target_a_round():
+    robot = rrtik.load_robot("ur5")
+    goals = tuple(rrtik.PositionGoal([5.0 + k, 0.0, 0.0]) for k in range(2 * ROUNDS))
+    asked = []
+
+    def stay(robot, target, Q):
+        asked.append(target)
+        return Q, 1
+
+    rest = {"near": np.zeros(6), "accept": lambda Q: np.ones(len(Q), dtype=bool), "all": False, "deadline": np.inf}
+    restarted(stay, Question(robot, rrtik.GoalRegion(goals), goals, random=RandomStream(0), **rest))
+    assert asked == list(goals)
+
+
+@pytest.mark.parametrize("method", ["numeric", "genetic", "mb-rrt"])
+def test_the_same_seed_gives_the_same_solutions_and_another_seed_others(method):
+    robot = rrtik.load_robot("panda")
+    goal = rrtik.PositionGoal([0.4, 0.2, 0.5])
+    one, two, other = (solve_ik(robot, goal, method=method, all=True, seed=k, seconds=60.0) for k in (3, 3, 4))
+    np.testing.assert_array_equal(one.solutions, two.solutions)
+    assert not np.array_equal(one.solutions, other.solutions)
 
 
 def test_bad_arguments_are_refused_in_one_line():
@@ -170,6 +248,35 @@ def test_bad_arguments_are_refused_in_one_line():
         solve_ik(titan, goal, near=[0.0])
     with pytest.raises(InputError, match="goal must be of type PoseGoal"):
         solve_ik(titan, rrtik.JointGoal(np.zeros(6)))
+    with pytest.raises(InputError, match=r"got SE3; .* such as PoseGoal\(T_world_tip\)"):
+        solve_ik(titan, goal.T_world_tip)
+
+
+POSES = np.tile(np.eye(4), (2, 1, 1))
+CALLS = {
+    "one": lambda robot, **options: solve_ik(robot, rrtik.PoseGoal(POSES[0]), **options),
+    "batch": lambda robot, **options: rrtik.solve_ik_batch(robot, POSES, **options),
+    "trajectory": lambda robot, **options: rrtik.solve_ik_trajectory(robot, POSES, **options),
+    "map": lambda robot, **options: rrtik.reach_map(robot, **options),
+}
+
+
+@pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
+def test_arguments_that_all_calls_have_are_refused_in_one_line(call):
+    robot, twin = rrtik.load_robot("ur5"), rrtik.load_robot("ur10")  # as many joints, other lengths
+    assert robot.dof == twin.dof
+    for seed in (-1, 1.5, "a", None, True):
+        with pytest.raises(InputError, match="seed must be a whole number of at least 0"):
+            call(robot, seed=seed)
+    with pytest.raises(InputError, match="world: it holds another robot, 'ur10'"):
+        call(robot, world=rrtik.World(twin))
+    with pytest.raises(InputError, match="world must be of type World, got Scene; make it with World"):
+        call(robot, world=rrtik.Scene())
+    with pytest.raises(InputError, match="robot must be of type Robot, got str; use load_robot"):
+        call("ur5")
+    if call is not CALLS["map"]:
+        with pytest.raises(InputError, match="seconds must not be negative, got -1"):
+            call(robot, seconds=-1)
 
 
 @pytest.mark.parametrize(
@@ -178,9 +285,9 @@ def test_bad_arguments_are_refused_in_one_line():
         ({"seed": -1}, "seed must be a whole number of at least 0, got -1"),
         ({"seed": 1.5}, "seed must be a whole number of at least 0, got 1.5"),
         ({"seed": None}, "seed must be a whole number of at least 0, got None"),
-        ({"seconds": -1.0}, "seconds must be at least 0, got -1"),
+        ({"seconds": -1.0}, "seconds must not be negative, got -1"),
         ({"seconds": np.inf}, "seconds: must be a finite number, got inf"),
-        ({"world": "empty"}, "world must be of type World or NoneType, got str; make it with World"),
+        ({"world": "empty"}, "world must be of type World, got str; make it with World"),
         ({"robot": "titan4"}, r"robot must be of type Robot, got str; use load_robot\(name or file\)"),
     ],
 )

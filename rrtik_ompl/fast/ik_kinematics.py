@@ -128,21 +128,29 @@ def differentiate(limb: int, call: int, aim: int, tip: int) -> None:
     columns, weights, frame = field(call, table.COLUMNS), field(call, table.WEIGHTS), field(call, table.FRAMES)
     for k in range(6 * field(limb, table.DOF)):
         set_double(columns, k, 0.0)
-    metre, chord, free = double_at(weights, 0), double_at(weights, 3), int(double_at(aim, table.FREE_TURN))
+    u, v, w = held(call, aim, 0), held(call, aim, 1), held(call, aim, 2)
+    chord, free = double_at(weights, 3), int(double_at(aim, table.FREE_TURN))
     for joint in range(field(limb, table.JOINTS)):
         gain = double_at(field(limb, table.GAIN), joint)
         x, y, z = gain * double_at(frame, 2), gain * double_at(frame, 5), gain * double_at(frame, 8)
         column = columns + 48 * int_at(field(limb, table.COLUMN), joint)
         if int_at(field(limb, table.SLIDING), joint) != 0:
-            add(column, metre * x, metre * y, metre * z)
+            add(column, u * x, v * y, w * z)
         else:
             a = double_at(tip, 9) - double_at(frame, 9)
             b = double_at(tip, 10) - double_at(frame, 10)
             c = double_at(tip, 11) - double_at(frame, 11)
-            add(column, metre * (y * c - z * b), metre * (z * a - x * c), metre * (x * b - y * a))
+            add(column, u * (y * c - z * b), v * (z * a - x * c), w * (x * b - y * a))
             x, y, z = felt(free, tip, x, y, z)
             add(column + 24, chord * x, chord * y, chord * z)
         frame += FRAME_BYTES
+
+
+@inlined
+def held(call: int, aim: int, axis: int) -> Any:
+    """The weight of a coordinate of the position: 0 inside the box, where moving along it changes no residual."""
+    inside = double_at(aim, table.BOX + axis) > 0.0 and double_at(field(call, table.ERROR), axis) == 0.0
+    return 0.0 if inside else double_at(field(call, table.WEIGHTS), axis)
 
 
 @inlined

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, not_negative, whole_number
 from rrtik_ompl.goal import PoseGoal, joint_difference
 from rrtik_ompl.ik.closed_form import check_poses, form_of, solutions
 from rrtik_ompl.ik.descent import Search
@@ -16,10 +16,8 @@ from rrtik_ompl.ik.face import SECONDS, chosen_method, free_of_collision, solve_
 from rrtik_ompl.ik.goal_rows import pose_rows
 from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ik.plain_branches import tip_residuals
-from rrtik_ompl.ik.question import check_arm, time_limit
-from rrtik_ompl.random_stream import checked_seed
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World
+from rrtik_ompl.world import World, check_world
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +57,7 @@ def solve_ik_batch(
         poses: T_world_tip, shape (m, 4, 4).
         method: As for `solve_ik`; "closed-form" and "numeric" take all poses at once.
         near: Posture near which solutions are wanted, shape (dof,); the middle of the limits if None.
-        world: If given, solutions in collision are left out.
+        world: If given, solutions in collision are left out. Its robot must be this one.
         seconds: For each pose that has no closed-form solution.
         seed: Of the random numbers.
 
@@ -67,12 +65,12 @@ def solve_ik_batch(
         UnknownNameError: If there is no such method.
         InputError: If a pose is none, the method does not fit the robot, or an argument makes no sense.
     """
-    check_arm(robot, world)
+    check_world(world, robot)
     load_kernels(robot)
     begin = time.monotonic()
     targets = finite_array(poses, (None, 4, 4), "poses")
     posture = usual_posture(robot) if near is None else robot.configuration(near, "near")
-    limit, seed = time_limit(seconds), checked_seed(seed)
+    limit, first_seed = not_negative(seconds, "seconds"), whole_number(seed, "seed")
     q, residuals = np.full((len(targets), robot.dof), np.nan), np.full((len(targets), 2), np.nan)
     reasons, details = [""] * len(targets), [""] * len(targets)
     check_poses(targets, "poses")
@@ -84,7 +82,9 @@ def solve_ik_batch(
         _by_search(robot, targets, posture, world, begin + limit * len(targets), q, residuals)
     for k in np.flatnonzero(np.isnan(q[:, 0])):
         goal = PoseGoal(targets[k])
-        result = solve_ik(robot, goal, method=method, near=posture, world=world, seconds=limit, seed=seed + int(k))
+        result = solve_ik(
+            robot, goal, method=method, near=posture, world=world, seconds=limit, seed=first_seed + int(k)
+        )
         reasons[k], details[k] = result.reason, result.detail
         if result.found:
             q[k], residuals[k] = result.solutions[0], result.residuals[0]

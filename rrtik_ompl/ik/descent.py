@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.fast.ik_layout import DONE, KERNELS
 from rrtik_ompl.fast.library import library
-from rrtik_ompl.goal import PoseGoal, PositionGoal
+from rrtik_ompl.goal import TipGoal
 from rrtik_ompl.ik.goal_rows import goal_rows
 from rrtik_ompl.ik.kernel_call import KernelCall
 from rrtik_ompl.ik.limb import SEEDS, limb_of, seeded_limb_of, seeds_of
@@ -44,10 +44,11 @@ def walk(
     return call.q, call.reached.astype(bool), most
 
 
-def descend(
-    robot: Robot, goal: PoseGoal | PositionGoal, starts: Matrix, *, iterations: int = STEPS
-) -> tuple[Matrix, int]:
-    """Where every start leads to in at most so many steps, at the goal or not: shape (m, dof), and the steps taken."""
+def descend(robot: Robot, goal: TipGoal, starts: Matrix, *, iterations: int = STEPS) -> tuple[Matrix, int]:
+    """Where every start leads to in at most so many steps, at the goal or not: shape (m, dof), and the steps taken.
+
+    The goal has one member, such as a pose whose turn about an axis is free.
+    """
     Q, _, taken = walk(robot, goal_rows(goal), starts, steps=iterations)
     return Q, taken
 

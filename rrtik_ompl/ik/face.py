@@ -9,18 +9,20 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen
+from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen, not_negative
 from rrtik_ompl.errors import InputError, UnknownNameError, require
-from rrtik_ompl.goal import TipGoal, has_task_regions, joint_difference, tip_errors
+from rrtik_ompl.goal import PositionGoal, TipGoal, has_task_regions, joint_difference, parts_of, tip_errors
+from rrtik_ompl.ik.mb_rrt.search import out_of_reach
 from rrtik_ompl.ik.methods import METHODS, load_kernels
-from rrtik_ompl.ik.question import Answer, Question, Target, check_arm, errors, time_limit, tolerances
-from rrtik_ompl.ik.targets import targets
+from rrtik_ompl.ik.question import Answer, Question, Target, errors, tolerances
+from rrtik_ompl.ik.targets import leaves_freedom, targets
 from rrtik_ompl.random_stream import RandomStream
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World
+from rrtik_ompl.world import World, check_world
 
 SECONDS = 1.0
-DRAWS = 32  # targets drawn from a goal that leaves freedom
+DRAWS = 32  # targets drawn from a goal that leaves freedom; one for each part if it has more parts
+DIGITS = 9  # of metres and degrees in a message: less is rounding
 SAME_POSTURE = 1e-3  # [rad] or [m]; solutions of a numeric method this near are one
 
 
@@ -32,7 +34,8 @@ class IkResult:
         solutions: Configurations at the goal, inside the limits, free if a world was given, nearest first; shape
             (k, dof). At most one unless all were asked for.
         residuals: Distance [m] and angle [rad] of each from the goal by forward kinematics, shape (k, 2).
-        reason: "" or why there is none: ``unreachable``, ``limits``, ``collision``, ``time`` (or the method gave up).
+        reason: "" or why there is none: ``unreachable``, ``limits``, ``collision``, ``time`` (or the method gave up,
+            or tried a part of a region alone).
         detail: The same in a line: by how much, which joint, what touches.
         iterations: Steps of a numeric method.
         method: The method that answered.
@@ -74,39 +77,43 @@ def solve_ik(
     Args:
         robot: The arm.
         goal: A pose, a position, or a region with some freedom (of which targets are drawn).
-        method: A name from `list_ik_methods`; "auto" is the closed form where it fits, else numeric, or
-            projection onto task-space regions; the others are there to be compared.
-        near: Posture near which a solution is wanted, shape (dof,); the middle of the limits if None.
-        all: Every solution that the method finds, not just the nearest: a closed form gives all there are (of a
-            singular pose representatives), a numeric one those it comes across.
+        method: A name from `list_ik_methods`; "auto" is the closed form where it fits, else (and where the targets
+            drawn from a region bring none) numeric, or projection onto task-space regions; the others are there to
+            be compared.
+        near: Posture near which a solution is wanted, shape (dof,); the middle of the limits if None. A closed form
+            gives the nearest one there is, a numeric method the first that it finds on its way from there.
+        all: Every solution that the method finds, not just one: a closed form gives all there are (of a singular
+            pose representatives), a numeric one those it comes across, full turns of a joint counted apart.
         world: If given, solutions in collision are left out. Its robot must be this one.
-        seconds: Time that a numeric method may take.
-        seed: Of the random numbers.
+        seconds: Time that a numeric method may take; it is looked at between rounds, of which the first is done.
+        seed: Of the random numbers; the same seed gives the same answer as long as the time does not cut in.
 
     Raises:
         UnknownNameError: If there is no such method.
         InputError: If the method does not fit the robot and the goal, or an argument makes no sense.
     """
-    check_arm(robot, world)
+    check_world(world, robot)
     load_kernels(robot)
     begin = time.monotonic()
-    require(goal, TipGoal, "goal", "inverse kinematics needs a goal of the tip")
-    limit, random = time_limit(seconds), RandomStream(seed)
+    require(goal, TipGoal, "goal", "inverse kinematics needs a goal of the tip, such as PoseGoal(T_world_tip)")
+    limit, random = not_negative(seconds, "seconds"), RandomStream(seed)
     posture = usual_posture(robot) if near is None else robot.configuration(near, "near")
-    drawn = (goal,) if isinstance(goal, Target) else tuple(targets(goal, DRAWS, random.rng))
+    drawn = (goal,) if isinstance(goal, Target) else tuple(targets(goal, max(DRAWS, len(parts_of(goal))), random.rng))
     name = chosen_method(robot, drawn, method)
-    if method == "auto" and name == "numeric" and has_task_regions(goal):
-        name = "projection"
+    if method == "auto" and name == "numeric":
+        name = _walker(goal)
 
     def accept(Q: Matrix) -> Mask:
         return free_of_collision(world, Q)
 
-    answer = METHODS[name].run(Question(robot, goal, drawn, posture, accept, all, begin + limit, random, world))
-    q, residuals = _at_goal(robot, goal, answer.q)
-    free = accept(q)
+    question = Question(robot, goal, drawn, posture, accept, all, begin + limit, random, world)
+    answer, q, residuals, free = _tried(question, name)
+    if method == "auto" and not free.any() and _draws(name, goal):
+        name = _walker(goal)
+        answer, q, residuals, free = _tried(question, name)
     turned = joint_difference(robot, q, posture)
     kept = _different(turned, np.flatnonzero(free), None if all else 1)
-    reason, detail = ("", "") if len(kept) else _why(robot, answer, world, q)
+    reason, detail = ("", "") if len(kept) else _why(question, answer, name, q)
     return IkResult(
         solutions=frozen(np.where(robot.continuous, posture + turned[kept], q[kept])),
         residuals=frozen(residuals[kept]),
@@ -160,6 +167,13 @@ def free_of_collision(world: World | None, Q: Matrix) -> Mask:
     return free
 
 
+def _tried(question: Question, name: str) -> tuple[Answer, Matrix, Matrix, Mask]:
+    """What a method answers: of that the rows at the goal, shape (k, dof), their residuals, and which are accepted."""
+    answer = METHODS[name].run(question)
+    q, residuals = _at_goal(question.robot, question.goal, answer.q)
+    return answer, q, residuals, question.accept(q)
+
+
 def _different(difference: Matrix, rows: NDArray[np.intp], most: int | None) -> list[int]:
     """Some of the rows without repetitions, by their differences from a posture: the nearest first, at most so many."""
     kept: list[int] = []
@@ -187,16 +201,37 @@ def _at_goal(robot: Robot, goal: TipGoal, q: Matrix) -> tuple[Matrix, Matrix]:
     return q[at], residuals[at]
 
 
-def _why(robot: Robot, answer: Answer, world: World | None, q: Matrix) -> tuple[str, str]:
-    """Reason and detail of a failure."""
-    if len(q) and world is not None:
-        return "collision", f"{len(q)} configurations reach the goal, all in collision: {world.explain(q[0])}"
-    distance, angle = errors(robot, answer.target, answer.nearest[None])[0]
-    if bool(answer.target.satisfied(robot, answer.nearest[None])[0]):
-        fault = robot.limit_fault(answer.nearest)
-        if not fault:
-            return "time", f"the goal is in reach, but the method gave up after {answer.iterations} steps"
+def _why(question: Question, answer: Answer, name: str, q: Matrix) -> tuple[str, str]:
+    """Reason and detail of a failure of a method that found q, shape (k, dof), all in collision."""
+    robot, goal = question.robot, question.goal
+    if len(q) and question.world is not None:
+        return "collision", f"{len(q)} configurations reach the goal, all in collision: {question.world.explain(q[0])}"
+    fault = robot.limit_fault(answer.nearest)
+    reached = bool(goal.satisfied(robot, answer.nearest[None])[0])
+    if reached and not fault:
+        return "time", f"the goal is in reach, but the method gave up after {answer.iterations} steps"
+    if _draws(name, goal):
+        return "time", f"none of {len(question.targets)} targets drawn from the goal is reached inside the limits"
+    if reached:
         return "limits", f"the arm could reach the goal, but {fault}"
-    if answer.timed_out:
-        return "time", f"no solution in time; the nearest posture is {distance:.4g} m and {angle:.4g} rad away"
-    return "unreachable", f"the nearest posture is {distance:.4g} m and {angle:.4g} rad away from the goal"
+    away = f"the nearest posture is {_away(robot, goal, answer.nearest)}"
+    if answer.timed_out and not all(out_of_reach(robot, target) for target in question.targets):
+        return "time", f"no solution in time; {away}"
+    return "unreachable", f"{away} from the goal"
+
+
+def _walker(goal: TipGoal) -> str:
+    """The method for goals with freedom that walks to all of them, not to targets drawn from them."""
+    return "projection" if has_task_regions(goal) else "numeric"
+
+
+def _draws(name: str, goal: TipGoal) -> bool:
+    """Whether the targets that a method takes are not all there is of a goal."""
+    return name not in ("projection", _walker(goal)) and any(map(leaves_freedom, parts_of(goal)))
+
+
+def _away(robot: Robot, goal: TipGoal, q: Vector) -> str:
+    """How far a posture is from a goal, in metres and, unless it is a position, degrees."""
+    ((distance,), (angle,)) = tip_errors(goal, robot, q[None])
+    turned = "" if isinstance(goal, PositionGoal) else f" and {round(np.degrees(angle), DIGITS):.4g} deg"
+    return f"{round(distance, DIGITS):.4g} m{turned} away"

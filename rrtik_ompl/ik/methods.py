@@ -53,7 +53,7 @@ def _closed_form(question: Question) -> Answer:
     found = branches_of(robot, poses, hints, check=False)
     q = found.branches[found.valid]
     if len(q) and question.accept(q).any():  # the usual case; forward kinematics judges what is returned
-        return Answer(q, question.near, targets[0])
+        return Answer(q, question.near)
     found = branches_of(robot, poses, hints)
     rows, owner = found.branches.reshape(-1, robot.dof), np.repeat(np.arange(len(targets)), found.real.shape[1])
     residuals = np.asarray(found.residuals).reshape(-1, 2)
@@ -63,8 +63,8 @@ def _closed_form(question: Question) -> Answer:
     if not question.accept(q).any():
         q = np.vstack([q, *(family(robot, _matrix(target), slack=_slack(target)) for target in targets)])
     outside = np.maximum(robot.lower - rows, rows - robot.upper).max(axis=1)
-    best = int(np.argmin(np.where(reaching, outside, np.inf) if reaching.any() else residuals.sum(axis=1)))
-    return Answer(q, rows[best], targets[int(owner[best])])
+    best = np.argmin(np.where(reaching, outside, np.inf) if reaching.any() else residuals.sum(axis=1))
+    return Answer(q, rows[int(best)])
 
 
 def _slack(target: Target) -> float:

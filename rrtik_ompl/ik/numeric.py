@@ -7,11 +7,11 @@ import time
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.goal import TipGoal, has_task_regions
+from rrtik_ompl.goal import TipGoal
 from rrtik_ompl.ik.descent import PATIENCE, STEPS, Search, walk
 from rrtik_ompl.ik.goal_rows import goal_rows
 from rrtik_ompl.ik.question import Answer, Question
-from rrtik_ompl.ik.restarts import ROUNDS, STARTS, nearest_posture
+from rrtik_ompl.ik.restarts import ROUNDS, STARTS, aims_of, nearest_posture
 from rrtik_ompl.robot import Robot
 
 AT_ONCE = 32  # members of a goal, before the clock is looked at and others have their turn
@@ -43,7 +43,7 @@ def numeric(question: Question) -> Answer:
     """The method of `solve_ik`: solutions of many members of the goal side by side until one will do."""
     if question.all:
         return _many(question)
-    aims, timed_out = _aims(question), False
+    aims, timed_out = aims_of(question), False
     search, waiting = Search(question.robot, aims, question.near), np.arange(len(aims))
     found = np.zeros((0, question.robot.dof))
     while len(waiting):
@@ -56,18 +56,11 @@ def numeric(question: Question) -> Answer:
     return _answered(question, found, search.steps, timed_out)
 
 
-def _aims(question: Question) -> Matrix:
-    """Rows of the goal; of the targets drawn from it if it has task-space regions."""
-    if has_task_regions(question.goal):
-        return np.vstack([goal_rows(target) for target in question.targets])
-    return goal_rows(question.goal)
-
-
 def _many(question: Question) -> Answer:
     """Solutions from many random starts, as different as they come."""
     robot, steps, timed_out = question.robot, 0, False
     found = [np.zeros((0, robot.dof))]
-    aims = _aims(question)
+    aims = aims_of(question)
     for number in range(ROUNDS):
         Q = question.rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
         if number == 0:
@@ -82,5 +75,5 @@ def _many(question: Question) -> Answer:
 
 def _answered(question: Question, found: Matrix, steps: int, timed_out: bool) -> Answer:
     if len(found):
-        return Answer(found, question.near, question.targets[0], steps, timed_out)
-    return Answer(found, *nearest_posture(question, steps), timed_out=timed_out)
+        return Answer(found, question.near, steps, timed_out)
+    return Answer(found, nearest_posture(question, searched=not question.all and not timed_out), steps, timed_out)

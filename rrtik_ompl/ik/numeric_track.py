@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.goal import joint_difference
-from rrtik_ompl.ik.question import Target
-from rrtik_ompl.ik.restarts import STARTS, Walk
+from rrtik_ompl.goal import TipGoal, joint_difference
+from rrtik_ompl.ik.descent import descend
+from rrtik_ompl.ik.restarts import STARTS
 from rrtik_ompl.robot import Robot
 
 ROUNDS = 4  # of random starts at a point that no motion leads to
@@ -26,8 +26,7 @@ class Tracker:
 
     Attributes:
         robot: The arm.
-        targets: Of the points.
-        walk: The numeric method.
+        targets: Of the points: poses, positions, or poses whose turn about an axis is free.
         accept: Which of some configurations, shape (k, dof), will do.
         jump: Motion of one joint between two points [rad or m] from which on it counts as a jump.
         rng: Random numbers.
@@ -35,8 +34,7 @@ class Tracker:
     """
 
     robot: Robot
-    targets: Sequence[Target]
-    walk: Walk
+    targets: Sequence[TipGoal]
     accept: Callable[[Matrix], Mask]
     jump: float
     rng: np.random.Generator
@@ -66,14 +64,14 @@ class Tracker:
                 point += 1
         return q, steps
 
-    def fresh(self, target: Target, last: Vector | None) -> tuple[Matrix, int]:
+    def fresh(self, target: TipGoal, last: Vector | None) -> tuple[Matrix, int]:
         """Different solutions of one point, at most `CARRIED`, nearest to the posture before first, and the steps."""
         steps = 0
         for number in range(ROUNDS):
             starts = self.rng.uniform(*self.robot.finite_range(), (STARTS, self.robot.dof))
             if number == 0 and last is not None:
                 starts[0] = last
-            Q, taken = self.walk(self.robot, target, starts)
+            Q, taken = descend(self.robot, target, starts)
             steps += taken
             Q = self.good(target, Q)
             if len(Q) or time.monotonic() > self.deadline:
@@ -93,7 +91,7 @@ class Tracker:
                 break
             now = ways[-1]
             ahead = 2.0 * now - ways[-2] if len(ways) > 1 else now
-            Q, taken = self.walk(self.robot, target, ahead)
+            Q, taken = descend(self.robot, target, ahead)
             steps += taken
             moved = np.abs(joint_difference(self.robot, Q, now)).max(axis=1)
             alive = target.satisfied(self.robot, Q) & (moved <= self.jump)
@@ -103,7 +101,7 @@ class Tracker:
             ways = np.concatenate([ways[:, alive], Q[None, alive]])
         return ways, steps
 
-    def good(self, target: Target, Q: Matrix) -> Matrix:
+    def good(self, target: TipGoal, Q: Matrix) -> Matrix:
         """The rows that are at the target and will do."""
         Q = Q[target.satisfied(self.robot, Q)]
         good: Matrix = Q[self.accept(Q)]

@@ -51,6 +51,7 @@ def walk_plainly(robot: Robot, aims: Matrix, Q: Matrix, steps: int, patience: in
         share[going[square > before[going]]] *= SHARE_GROWTH
         before[going] = square
         J = _jacobians(robot, aims[going], felt, Q[going]) * weights[:, None]
+        J[:, :3][(aims[going, BOX : BOX + 3] > 0.0) & (error[:, :3] == 0.0)] = 0.0  # free to move inside the box
         Q[going] = np.clip(
             Q[going] + _changes(robot, J, error, DAMPING + share[going] * square, Q[going]), robot.lower, robot.upper
         )

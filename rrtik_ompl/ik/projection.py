@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.goal import PoseGoal, as_task_region, parts_of
+from rrtik_ompl.goal import as_task_region, parts_of
 from rrtik_ompl.ik.question import Answer, Question
 from rrtik_ompl.ik.residual import SHARE, rotation_vectors
 from rrtik_ompl.poses import rpy_matrices
@@ -91,16 +91,14 @@ def projection(question: Question) -> Answer:
         rows = projected(robot, region, starts, rng)
         distance = region.distance(robot, rows)
         if distance.min() < least:
-            nearest, least, target = rows[distance.argmin()], distance.min(), region
+            nearest, least = rows[distance.argmin()], distance.min()
         found = np.vstack([found, rows[region.satisfied(robot, rows)]])
         if question.accept(found).any() and not question.all:
             break
         timed_out = time.monotonic() > question.deadline
         if timed_out:
             break
-    coordinates = target.nearest(robot.fk_batch(nearest[None]))
-    aim = PoseGoal(target.poses(coordinates)[0], target.position_tolerance, target.orientation_tolerance)
-    return Answer(found, nearest, aim, number + 1, timed_out)
+    return Answer(found, nearest, number + 1, timed_out)
 
 
 def _twist(tips: NDArray[np.float64], aims: NDArray[np.float64]) -> Matrix:

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_number
-from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.goal import PoseGoal, PositionGoal, TipGoal
 from rrtik_ompl.random_stream import RandomStream
 from rrtik_ompl.robot import Robot
@@ -57,15 +55,13 @@ class Answer:
 
     Attributes:
         q: Configurations at one of the targets, inside the limits, in collision or not, shape (k, dof).
-        nearest: If there is none: the posture that came nearest to a target with no regard to limits, shape (dof,).
-        target: The target that it came near to.
+        nearest: If there is none: the posture that came nearest to the goal with no regard to limits, shape (dof,).
         iterations: Steps, 0 for a closed form.
         timed_out: Whether the time was up before the method was through.
     """
 
     q: Matrix
     nearest: Vector
-    target: Target
     iterations: int = 0
     timed_out: bool = False
 
@@ -76,30 +72,6 @@ class Method:
 
     misfit: Callable[[Robot, Target], str]
     run: Callable[[Question], Answer]
-
-
-def check_arm(robot: Robot, world: World | None) -> None:
-    """Refuse what is no robot, or a world that holds another one.
-
-    Raises:
-        InputError: It says which.
-    """
-    require(robot, Robot, "robot", "use load_robot(name or file)")
-    require(world, World | None, "world", "make it with World(robot, scene)")
-    if world is not None and world.robot is not robot:
-        raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
-
-
-def time_limit(seconds: ArrayLike) -> float:
-    """Time [s] that a method may take.
-
-    Raises:
-        InputError: If it is no number of at least 0.
-    """
-    limit = finite_number(seconds, "seconds")
-    if limit < 0.0:
-        raise InputError(f"seconds must be at least 0, got {limit:g}")
-    return limit
 
 
 def errors(robot: Robot, target: Target, Q: Matrix) -> Matrix:

@@ -5,28 +5,25 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, finite_number, frozen
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, not_negative, positive
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.goal import PoseGoal, PositionGoal, joint_difference, pose_errors
+from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal, TipGoal, joint_difference, tip_errors
 from rrtik_ompl.ik.branch_choice import JUMP, follow
 from rrtik_ompl.ik.closed_form import check_poses, form_of
-from rrtik_ompl.ik.descent import descend
 from rrtik_ompl.ik.face import free_of_collision, solve_ik
 from rrtik_ompl.ik.genetic.options import PRESETS, GeneticOptions
 from rrtik_ompl.ik.genetic.search import follow_targets
 from rrtik_ompl.ik.methods import METHODS, load_kernels
 from rrtik_ompl.ik.numeric_track import Tracker
-from rrtik_ompl.ik.question import Target, check_arm, time_limit
-from rrtik_ompl.ik.restarts import Walk
+from rrtik_ompl.ik.question import Target, tolerances
 from rrtik_ompl.random_stream import RandomStream
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World
+from rrtik_ompl.world import World, check_world
 
 SECONDS = 60.0
 SECONDS_A_POINT = 5.0  # to say why a point has no configuration
@@ -71,6 +68,7 @@ class Task:
     robot: Robot
     poses: Matrix
     targets: tuple[Target, ...]
+    goals: tuple[TipGoal, ...]  # the targets, with the freedom that is left to them
     near: Vector | None
     world: World | None
     jump: float
@@ -97,6 +95,7 @@ def solve_ik_trajectory(
     world: World | None = None,
     position_tolerance: float = 1e-3,
     orientation_tolerance: float = 1e-2,
+    free_rotation_axis: str | None = None,
     jump: float = JUMP,
     options: GeneticOptions | str = "refined",
     seconds: float = SECONDS,
@@ -113,6 +112,8 @@ def solve_ik_trajectory(
         world: If given, all configurations are free of collision. Its robot must be this one.
         position_tolerance: Of every point [m].
         orientation_tolerance: Of every pose [rad].
+        free_rotation_axis: "x", "y" or "z" of the tip about which every pose may be turned, as for a drill or a torch;
+            only "numeric" knows what to do with that.
         jump: Motion of one joint between two points [rad or m] from which on it counts as a jump; the genetic
             algorithm makes none.
         options: Of the genetic algorithm, or the name of a preset: "standard", "historical", "refined".
@@ -123,20 +124,22 @@ def solve_ik_trajectory(
         UnknownNameError: If there is no such method or preset.
         InputError: If the method does not fit the robot, a pose is none, or an argument makes no sense.
     """
-    check_arm(robot, world)
+    check_world(world, robot)
     load_kernels(robot)
     begin = time.monotonic()
     rows = _checked(poses)
+    targets = tuple(_target(row, position_tolerance, orientation_tolerance) for row in rows)
     task = Task(
         robot=robot,
         poses=rows,
-        targets=tuple(_target(row, position_tolerance, orientation_tolerance) for row in rows),
+        targets=targets,
+        goals=_freed(targets, free_rotation_axis),
         near=None if near is None else robot.configuration(near, "near"),
         world=world,
-        jump=finite_number(jump, "jump"),
+        jump=positive(jump, "jump"),
         options=_options(options),
         rng=RandomStream(seed).rng,
-        deadline=begin + time_limit(seconds),
+        deadline=begin + not_negative(seconds, "seconds"),
     )
     name = _chosen(task, method)
     q, iterations = FOLLOWERS[name](task)
@@ -171,6 +174,14 @@ def _target(row: Matrix, position_tolerance: float, orientation_tolerance: float
     return PoseGoal(row, position_tolerance, orientation_tolerance)
 
 
+def _freed(targets: tuple[Target, ...], axis: str | None) -> tuple[TipGoal, ...]:
+    if axis is None:
+        return targets
+    if isinstance(targets[0], PositionGoal):
+        raise InputError("free_rotation_axis: points leave every turn free; give poses, or leave it out")
+    return tuple(GoalRegion([target], free_rotation_axis=axis) for target in targets)
+
+
 def _options(options: GeneticOptions | str) -> GeneticOptions:
     if isinstance(options, GeneticOptions):
         return options
@@ -185,6 +196,8 @@ def _chosen(task: Task, method: str) -> str:
     misfits = {name: METHODS[name].misfit(task.robot, task.targets[0]) for name in FOLLOWERS}
     if not misfits["closed-form"] and form_of(task.robot).kind == "position" and task.poses.ndim == 3:
         misfits["closed-form"] = "its closed form knows positions alone; give points, shape (k, 3)"
+    if task.goals is not task.targets:
+        misfits |= dict.fromkeys(("closed-form", "genetic"), "it knows no free axis; leave out free_rotation_axis")
     fitting = [name for name, misfit in misfits.items() if not misfit]
     if method != "auto" and misfits[method]:
         raise InputError(
@@ -195,7 +208,14 @@ def _chosen(task: Task, method: str) -> str:
 
 
 def _closed_form(task: Task) -> tuple[Matrix, int]:
-    return np.array(follow(task.robot, task.poses, task.near, jump=task.jump, accept=task.accept).q), 0
+    """The branches that lead on, and where no branch is exactly there, a posture within the tolerances."""
+    q = np.array(follow(task.robot, task.poses, task.near, jump=task.jump, accept=task.accept).q)
+    for k in np.flatnonzero(np.isnan(q[:, 0])):
+        before = task.near if k == 0 or np.isnan(q[k - 1, 0]) else q[k - 1]
+        alone = solve_ik(task.robot, task.targets[k], method="closed-form", near=before, world=task.world)
+        if alone.found:
+            q[k] = alone.solutions[0]
+    return q, 0
 
 
 def _genetic(task: Task) -> tuple[Matrix, int]:
@@ -209,32 +229,21 @@ def _genetic(task: Task) -> tuple[Matrix, int]:
     return q, run.generations
 
 
-def _walked(walk: Walk, task: Task) -> tuple[Matrix, int]:
-    tracker = Tracker(task.robot, task.targets, walk, task.accept, task.jump, task.rng, task.deadline)
-    return tracker.follow(task.near)
+def _numeric(task: Task) -> tuple[Matrix, int]:
+    return Tracker(task.robot, task.goals, task.accept, task.jump, task.rng, task.deadline).follow(task.near)
 
 
 FOLLOWERS: Mapping[str, Callable[[Task], tuple[Matrix, int]]] = MappingProxyType(
-    {"closed-form": _closed_form, "numeric": partial(_walked, descend), "genetic": _genetic}
+    {"closed-form": _closed_form, "numeric": _numeric, "genetic": _genetic}
 )
 
 
 def _keep_only_checked(task: Task, q: Matrix) -> Matrix:
     """Residuals, shape (k, 2). Rows that are not at their target, inside the limits and free become NaN, in place."""
-    tips = task.robot.fk_batch(q)
-    residuals = np.zeros((len(q), 2))
-    for k, target in enumerate(task.targets):
-        if isinstance(target, PositionGoal):
-            residuals[k, 0] = np.linalg.norm(tips[k, :3, 3] - target.position)
-        else:
-            residuals[k] = np.ravel(pose_errors(tips[k : k + 1], target.T_world_tip))
-    first = task.targets[0]
-    limits = (
-        (first.tolerance, np.inf)
-        if isinstance(first, PositionGoal)
-        else (first.position_tolerance, first.orientation_tolerance)
-    )
-    good = (residuals <= limits).all(axis=1) & task.robot.within_limits(q)
+    residuals = np.full((len(q), 2), np.nan)
+    for k in np.flatnonzero(~np.isnan(q[:, 0])):
+        residuals[k] = np.ravel(tip_errors(task.goals[k], task.robot, q[k : k + 1]))
+    good = (residuals <= tolerances(task.targets[0])).all(axis=1) & task.robot.within_limits(q)
     good[good] = task.accept(q[good])
     q[~good], residuals[~good] = np.nan, np.nan
     q[:] = task.robot.clamp(q)
@@ -254,7 +263,7 @@ def _why(task: Task, name: str, q: Matrix) -> tuple[tuple[str, ...], str]:
         if left > 0.0 and (name != "genetic" or not detail):
             asked = "numeric" if name == "genetic" else name
             alone = solve_ik(
-                task.robot, task.targets[k], method=asked, world=task.world, seconds=min(left, SECONDS_A_POINT)
+                task.robot, task.goals[k], method=asked, world=task.world, seconds=min(left, SECONDS_A_POINT)
             )
             reasons[k], line = alone.reason or "time", alone.detail or line
         detail = detail or f"point {k}: {line}"

@@ -17,8 +17,8 @@ import numpy as np
 from ompl import base as ob
 from ompl import util as ou
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen
-from rrtik_ompl.errors import InputError, PlannerError
+from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen, whole_number
+from rrtik_ompl.errors import PlannerError
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker, WorldLike
 from rrtik_ompl.ompl_bridge.states import StateIO, real_vector_space, space_bounds
@@ -254,11 +254,7 @@ def _condition(ptc: Any) -> Any:
 
 
 def _seed(seed: int | None) -> int:
-    if seed is None:
-        return int(ou.RNG().uniformInt(0, 2**31 - 1))
-    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
-        raise InputError(f"seed: expected a whole number of at least 0, got {seed!r}")
-    return int(seed)
+    return int(ou.RNG().uniformInt(0, 2**31 - 1)) if seed is None else whole_number(seed, "seed")
 
 
 def _explain(error: BaseException) -> str:

@@ -48,9 +48,19 @@ class ReachMap:
         return inside
 
     @property
+    def flat(self) -> bool:
+        """Whether there is one layer of cells, as for a planar arm."""
+        return bool(self.values.shape[2] == 1)
+
+    @property
     def volume(self) -> float:
-        """Of these cells [m3]."""
-        return float(np.count_nonzero(self.reached)) * self.size**3
+        """Of these cells [m3]; 0 of a flat map."""
+        return 0.0 if self.flat else float(np.count_nonzero(self.reached)) * self.size**3
+
+    @property
+    def area(self) -> float:
+        """Of these cells seen from above [m2]."""
+        return float(np.count_nonzero(self.reached.any(axis=2))) * self.size**2
 
     @property
     def best(self) -> Vector:
@@ -87,7 +97,7 @@ class ReachMap:
             Slice(f"side, y = {y[ahead]:.2f} m", "x [m]", "z [m]", x, z, side, base=(bx, bz)),
             Slice(f"top, z = {height:.2f} m", "x [m]", "y [m]", x, y, top, base=(bx, by)),
         ]
-        return cuts[1:] if len(z) == 1 else cuts
+        return cuts[1:] if self.flat else cuts
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write everything as .npz, or one row per reached cell (its middle and value) as .csv, whole or not at all.

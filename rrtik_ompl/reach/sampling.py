@@ -9,12 +9,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
+from rrtik_ompl.arrays import Matrix, Vector, frozen, positive, whole_number
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.reach.grid_map import ReachMap
 from rrtik_ompl.reach.measures import MEASURES
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World
+from rrtik_ompl.world import World, check_world
 
 SAMPLES = 200_000
 BLOCK = 20_000  # postures at a time
@@ -41,7 +41,8 @@ def reach_map(
     Args:
         robot: The arm.
         measure: ``orientations``: share of 64 evenly spread directions (planar arms: of the plane) in which the tip's
-            axis was seen to point; ``manipulability``: the largest sqrt(det(J J^T)) seen (Yoshikawa 1985);
+            axis was seen to point; ``manipulability``: the largest product of the Jacobian's singular values
+            seen, sqrt(det(J J^T)) from six joints on (Yoshikawa 1985), metres and radians as they are;
             ``samples``: how many came.
         cell: Side of a cell [m]; about an 18th of the reach if None.
         samples: Postures to draw; where nothing but the arm is looked at, each in 16 turns of the first joint.
@@ -53,24 +54,22 @@ def reach_map(
         UnknownNameError: If there is no such measure.
         InputError: If an argument makes no sense, or the grid would be too large.
     """
+    check_world(world, robot)
     if measure not in MEASURES:
         raise UnknownNameError("measure of reach", measure, MEASURES)
     axis = axis or ("x" if robot.planar else "z")
     if axis not in ("x", "y", "z"):
         raise InputError(f"axis must be x, y or z, got {axis!r}")
-    if samples < 1:
-        raise InputError(f"samples must be at least 1, got {samples}")
-    if world is not None and world.robot is not robot:
-        raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
-    rng = np.random.default_rng(seed)
+    count = whole_number(samples, "samples", 1)
+    rng = np.random.default_rng(whole_number(seed, "seed"))
     base = robot.fk_batch(np.zeros((1, robot.dof)), robot.link_names[0])[0, :3, 3]
     corner, size, shape = _grid(robot, base, cell)
     counter = MEASURES[measure](int(np.prod(shape)), robot.planar)
     counted = 0
     low, high = robot.finite_range()
     turn = _first_turn(robot) if world is None else None
-    for begin in range(0, samples, BLOCK):
-        Q = rng.uniform(low, high, (min(BLOCK, samples - begin), robot.dof))
+    for begin in range(0, count, BLOCK):
+        Q = rng.uniform(low, high, (min(BLOCK, count - begin), robot.dof))
         if world is not None:
             Q = Q[world.valid_batch(Q)]
         tips, quality = robot.fk_batch(Q), counter.quality(robot, Q)
@@ -117,9 +116,7 @@ def _grid(robot: Robot, base: Vector, cell: float | None) -> tuple[Vector, float
     rng = np.random.default_rng(0)
     tips = robot.fk_batch(rng.uniform(*robot.finite_range(), (PROBE, robot.dof)))[:, :3, 3] - base
     reach = ROOM * float(np.linalg.norm(tips, axis=1).max())
-    size = reach / CELLS if cell is None else float(finite_array(cell, (), "cell"))
-    if size <= 0.0:
-        raise InputError(f"cell must be greater than 0, got {size}")
+    size = reach / CELLS if cell is None else positive(cell, "cell")
     margin = 0.5 * (ROOM - 1.0) * reach
     low, high = (np.floor if k == 0 else np.ceil for k in (0, 1))
     first, last = low((tips.min(axis=0) - margin) / size), high((tips.max(axis=0) + margin) / size)

@@ -13,7 +13,7 @@ TABLES: Mapping[str, Table] = MappingProxyType(
     {table.name: table for page in (titan4, mb_rrt, ga_reb, crdt, postprocessing, sensing) for table in page.TABLES}
 )
 NOT_HERE = (
-    "IKURT and DRRT-Con: published as figures without numbers; their methods are not in this version",
+    "IKURT and DRRT-Con: published as figures without numbers; bench/reports has their acceptance",
     "Marker sensing, sections 4 and 5: the measured series need the camera; what follows from them is here",
 )
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import Matrix, Vector, whole_number
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.one_joint import staircase_orders
 from rrtik_ompl.planning import plan
@@ -52,8 +52,7 @@ def generated_problem(robot: Robot, family: str, seed: int, *, motion_resolution
     require(robot, Robot, "robot of a generated problem", "use load_robot(name or file)")
     if family not in FAMILIES:
         raise UnknownNameError("family of generated problems", str(family), FAMILIES)
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise InputError(f"seed must be a whole number of at least 0, got {seed!r}")
+    whole_number(seed, "seed")
     rng = np.random.default_rng([list(FAMILIES).index(family), int(seed)])
     alone = World(robot)
     reach = _reach(robot)

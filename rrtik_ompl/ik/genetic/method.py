@@ -34,7 +34,7 @@ def genetic(question: Question) -> Answer:
         )
         found, generations = np.vstack([found, run.q]), generations + run.generations
         if len(found) and not question.all:
-            return Answer(found, question.near, target, generations)
+            return Answer(found, question.near, generations)
         if run.timed_out or time.monotonic() > question.deadline:
             return _given_up(question, found, generations, timed_out=True)
     return _given_up(question, found, generations, timed_out=False)
@@ -42,8 +42,7 @@ def genetic(question: Question) -> Answer:
 
 def _given_up(question: Question, found: Matrix, generations: int, *, timed_out: bool) -> Answer:
     """What there is, and a posture for the reason: if it is at the goal and will not do, that is the reason."""
-    robot = question.robot
-    nearest, target, steps = nearest_posture(question, generations)
+    robot, nearest = question.robot, nearest_posture(question)
     row = nearest[None]
-    at_goal = row[target.satisfied(robot, row) & robot.within_limits(row)]
-    return Answer(np.vstack([found, at_goal[~question.accept(at_goal)]]), nearest, target, steps, timed_out)
+    at_goal = row[question.goal.satisfied(robot, row) & robot.within_limits(row)]
+    return Answer(np.vstack([found, at_goal[~question.accept(at_goal)]]), nearest, generations, timed_out)

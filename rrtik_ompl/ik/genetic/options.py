@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from rrtik_ompl.arrays import whole_number
 from rrtik_ompl.errors import InputError
 
 DEGREE = float(np.pi / 180.0)
@@ -52,11 +53,14 @@ class GeneticOptions:
     singularity_weight: float = 0.0
 
     def __post_init__(self) -> None:
+        for name in ("population", "tournament", "generations", "stall", "start_over", "refined"):
+            if getattr(self, name) is not None:
+                whole_number(getattr(self, name), f"genetic: {name}", least=name != "refined")
         if self.population < 2 or self.population % 2:
             raise InputError(f"genetic: population must be an even number of at least 2, got {self.population}")
         if not 0 <= self.refined <= self.population:
             raise InputError(f"genetic: refined must lie between 0 and the population, got {self.refined}")
-        for name in ("tournament", "generations", "stall", "start_over", "window", "largest_step"):
+        for name in ("window", "largest_step"):
             value = getattr(self, name)
             if value is not None and not value > 0:
                 raise InputError(f"genetic: {name} must be greater than 0, got {value}")

@@ -38,5 +38,4 @@ def mb_rrt(question: Question) -> Answer:
         rows, passes = np.vstack([rows, found.q]), passes + found.passes
         if found.timed_out or (question.accept(found.q).any() and not question.all):
             break
-    nearest = (question.near, target) if len(rows) else nearest_posture(question)[:2]
-    return Answer(rows, *nearest, passes, found.timed_out)
+    return Answer(rows, question.near if len(rows) else nearest_posture(question), passes, found.timed_out)

@@ -16,7 +16,7 @@ import numpy as np
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.goal import PoseGoal, PositionGoal
 from rrtik_ompl.ik.descent import descend
-from rrtik_ompl.ik.mb_rrt.axes import Axes, axes_of
+from rrtik_ompl.ik.mb_rrt.axes import Axes, axes_of, misfit
 from rrtik_ompl.ik.mb_rrt.axis_tree import AxisTree
 from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
 from rrtik_ompl.robot import Robot
@@ -65,11 +65,11 @@ def search(
         width: Passes at a time.
         rounds: Limit.
     """
-    axes = axes_of(robot, isinstance(target, PoseGoal))
-    aim, found = aimed_point(axes, target), np.zeros((0, robot.dof))
-    if axes.shortfall(aim) > _tolerance(target):
+    found = np.zeros((0, robot.dof))
+    if out_of_reach(robot, target):
         return Found(found, 0)
-    tree = AxisTree(axes, axes.nearest_in_reach(aim), near, rng)
+    axes = axes_of(robot, isinstance(target, PoseGoal))
+    tree = AxisTree(axes, axes.nearest_in_reach(aimed_point(axes, target)), near, rng)
     for number in range(rounds):
         if number == BLIND_ROUNDS and world is not None and world.pairs:
             tree.check_links(LinkWorlds(world, axes).free)
@@ -80,6 +80,15 @@ def search(
         if time.monotonic() > deadline:
             return Found(found, tree.passes, True)
     return Found(found, tree.passes)
+
+
+def out_of_reach(robot: Robot, target: PoseGoal | PositionGoal) -> bool:
+    """Whether the lengths of an arm do not allow a target, for certain; nothing is known of arms with a `misfit`."""
+    if misfit(robot):
+        return False
+    axes = axes_of(robot, isinstance(target, PoseGoal))
+    tolerance = target.tolerance if isinstance(target, PositionGoal) else target.position_tolerance
+    return axes.shortfall(aimed_point(axes, target)) > tolerance
 
 
 def aimed_point(axes: Axes, target: PoseGoal | PositionGoal) -> Vector:
@@ -104,9 +113,8 @@ def polished(robot: Robot, axes: Axes, target: PoseGoal | PositionGoal, ends: Ma
         return ends
     if isinstance(target, PoseGoal):
         ends = _last_turned(robot, axes, target, ends)
-    at = target.satisfied(robot, ends)
     if axes.exact:
-        return ends[at & robot.within_limits(ends)]
+        return ends[target.satisfied(robot, ends) & robot.within_limits(ends)]
     if not all:
         ends, _ = descend(robot, target, ends, iterations=FIRST_STEPS)
         there = _tightened(target).satisfied(robot, ends)
@@ -114,10 +122,6 @@ def polished(robot: Robot, axes: Axes, target: PoseGoal | PositionGoal, ends: Ma
             return ends[there]
     ends, _ = descend(robot, target, ends)
     return ends[target.satisfied(robot, ends)]
-
-
-def _tolerance(target: PoseGoal | PositionGoal) -> float:
-    return target.tolerance if isinstance(target, PositionGoal) else target.position_tolerance
 
 
 def _tightened(target: PoseGoal | PositionGoal) -> PoseGoal | PositionGoal:
