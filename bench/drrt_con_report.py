@@ -227,19 +227,31 @@ def repair_rows(report: Report, count: int) -> None:
     for name in runs.ARMS:
         quick, slower = runs.paired(name, range(count))
         for moments in (m for m in (quick, slower) if m.ours):
-            times = [f"{1e3 * np.percentile(moments.ours, p):.2f}" for p in (50, 95)]
-            rows.append([name, "DRRT-Con", str(len(moments.ours)), *times, "1"])
-            for what, spent in moments.others.items():
-                times = [f"{1e3 * np.percentile(spent, p):.2f}" for p in (50, 95)]
-                rows.append([name, what, str(len(spent)), *times, f"{moments.ratio(what):.1f}"])
+            ways = {runs.OURS: moments.ours, **moments.others}
+            rows += [[name, what, *repair_cells(way), f"{moments.ratio(what):.1f}"] for what, way in ways.items()]
         for what, moments in (
-            ("from scratch, same kernels", quick),
+            (runs.SCRATCH, quick),
             *((w, slower) for w in slower.others if "World" in w),
         ):
             ratio = moments.ratio(what)
             report.bar(f"{name}: median repair against {what}", ">= 5 times faster", f"{ratio:.1f} times", ratio >= 5.0)
-    head = ["arm", "way to a new path", "repairs", "median [ms]", "p95 [ms]", "median of the ratios to DRRT-Con"]
+    head = [
+        "arm",
+        "way to a new path",
+        "repairs",
+        "median [ms]",
+        "p95 [ms]",
+        "length: new / blocked",
+        "seconds: median of ratios to DRRT-Con",
+    ]
     report.table("Repairs, each also done by the others at the same moment", head, rows)
+
+
+def repair_cells(way: list[tuple[float, float]]) -> list[str]:
+    """Number of repairs, median and p95 of their milliseconds, and the mean length of what they found."""
+    seconds, lengths = np.array(way).T
+    times = [f"{1e3 * np.percentile(seconds, p):.3f}" for p in (50, 95)]
+    return [str(len(way)), *times, f"{lengths.mean():.3f}"]
 
 
 def plane_part(report: Report, count: int) -> None:
