@@ -40,10 +40,40 @@ def arm_options(name: str) -> dict:
     return {"step": arm["step"], "rate": RATE, "slot": 0.5, **bound}
 
 
-def arm_run(name: str, seed: int, **changes: object) -> tuple[Run, Verdict]:
+@dataclass(frozen=True)
+class Outcome:
+    """What the tables need of a run; times [s] are of the processor.
+
+    Attributes:
+        counts: Ticks of each kind.
+        repairs, ticks: Seconds of each repair that found a path, and of each tick.
+        contacts: Kind of each tick with contact, by the judge; empty without one.
+        nearest: Smallest distance between arm and obstacles [m], 0 for a contact.
+    """
+
+    arrived: bool
+    length: float
+    counts: dict[str, int]
+    repairs: np.ndarray
+    ticks: np.ndarray
+    contacts: tuple[str, ...] = ()
+    nearest: float = np.inf
+
+
+def outcome(run: Run, verdict: Verdict | None = None) -> Outcome:
+    """A run in short, and what a judge says of it."""
+    seen = {} if verdict is None else {"contacts": tuple(c[1] for c in verdict.contacts), "nearest": verdict.nearest}
+    counts = {event: run.count(event) for event in ("repair", "wait", "evade")}
+    times = run.seconds("repair", "repair"), run.seconds("all")
+    return Outcome(run.arrived, run.length, counts, *times, **seen)
+
+
+def arm_outcome(name: str, seed: int, planner: str, slot: float, seconds: float) -> Outcome:
+    """A run of an arm among obstacles, judged."""
     problem = arm_problem(name, seed)
+    changes = {"planner": planner, "slot": slot, "seconds": seconds, "clock": time.process_time}
     run = replan(problem, seed=seed, **{**arm_options(name), **changes})
-    return run, judge(problem.robot, run, problem.world.scene, fine=5)
+    return outcome(run, judge(problem.robot, run, problem.world.scene, fine=5))
 
 
 def executed_valid(problem: rrtik.Problem, run: Run) -> bool:
@@ -126,9 +156,9 @@ def with_pairs(loop: Loop, quick: Moments, slow: Moments, slow_every: int) -> No
         if not often:
             found |= {f"from scratch: new World, {title}, shortcut": _by_plan(loop, kind) for kind, title in PLANS}
         planner.look(motions)  # once more: what a repair reads is as fresh in memory as for the others
-        begin = time.perf_counter()
+        begin = time.process_time()
         ours = repair(motions, stop)
-        found[OURS] = (time.perf_counter() - begin, _length(planner.path) / _length(path)) if ours else None
+        found[OURS] = (time.process_time() - begin, _length(planner.path) / _length(path)) if ours else None
         if None not in found.values():
             (quick if often else slow).add(found)
         return ours
@@ -140,9 +170,9 @@ def _repaired(other: DrrtCon, path: np.ndarray, motions: object) -> tuple[float,
     """Seconds of another's repair and the share of the path's length that the new one has."""
     other.path = path
     other.look(motions)
-    begin = time.perf_counter()
+    begin = time.process_time()
     found = other.repair(motions, _after(begin + 2.0))
-    return (time.perf_counter() - begin, _length(other.path) / _length(path)) if found else None
+    return (time.process_time() - begin, _length(other.path) / _length(path)) if found else None
 
 
 def _length(path: np.ndarray) -> float:
@@ -150,12 +180,12 @@ def _length(path: np.ndarray) -> float:
 
 
 def _after(deadline: float):
-    return lambda: time.perf_counter() > deadline
+    return lambda: time.process_time() > deadline
 
 
 def _by_plan(loop: Loop, planner: str) -> tuple[float, float] | None:
     """A new world and `plan()` from where the robot is, and as much shortening as a repair has."""
-    begin = time.perf_counter()
+    begin = time.process_time()
     world = rrtik.World(loop._problem.robot, still(loop._world.scene), accuracy="conservative")
     problem = rrtik.Problem(world, loop.q, loop._goals[0])
     found = plan(problem, planner, seconds=2.0, seed=1)
@@ -163,4 +193,4 @@ def _by_plan(loop: Loop, planner: str) -> tuple[float, float] | None:
         return None
     several = len(found.path.waypoints) > 2
     path = rrtik.shorten(found.path, problem, method="sequential", seed=1) if several else found.path
-    return time.perf_counter() - begin, path.length / _length(loop._planner.path)
+    return time.process_time() - begin, path.length / _length(loop._planner.path)

@@ -23,7 +23,7 @@ from rrtik_ompl.fast.motion_kernels import SLACK, copy_row, judge_motion, lift
 from rrtik_ompl.fast.shortcut_kernels import resume as resume_cuts
 from rrtik_ompl.fast.tree_kernels import parent_of
 
-FIRST_SPREAD = 0.125  # of the gap: half the side of the first sample's box; measured: shortest detours, no slower
+FIRST_SPREAD = 0.5  # of the gap: half the side of the first sample's box
 STRAIGHT = 1e-9  # change of direction that is none
 
 
