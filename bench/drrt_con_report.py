@@ -1,26 +1,24 @@
 """Measure the acceptance rows of DRRT-Con and the issue's targets for arms, and write them as Markdown.
 
-Usage: ``nice python bench/drrt_con_report.py [--repeats 30] [--seconds 240] [--out bench/reports/drrt_con.md]``
+Usage: ``nice python bench/drrt_con_report.py [--jobs 2] [--keep FILE] [--repeats 30] [--runs 1000]``
 
-``--seconds`` is the time for runs of six-joint arms among moving obstacles: as many as fit, of both arms in turn. All
-in all it takes twice that.
+Times are of the processor, so that runs beside each other are fair. With ``--keep`` a broken measurement goes on.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from itertools import groupby
-from multiprocessing import get_context
 from pathlib import Path
 
 import drrt_con_runs as runs
 import drrt_con_scenes as scenes
 import numpy as np
 from acceptance import Report
-from ompl import util as ou
+from drrt_con_arms import HEAD, arm_rows, figures, repair_rows
+from drrt_con_runs import outcome
+from parallel import Measuring
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.moving_world import MovingWorld
@@ -31,22 +29,16 @@ from rrtik_ompl.replanning.judge import judge
 from rrtik_ompl.reproduce.plane_worlds import Plane
 
 PLANNERS = ("drrt-con", "rrt-connect", "drrt")
-HEAD = ["arrived", "length", "repairs", "waits", "evasions", "repair median / p95 [ms]", "tick p95 [ms]"]
 
 
 def plane_run(problem: rrtik.Problem, seed: int, **changes: object) -> Run:
-    return replan(problem, limits=scenes.limits(), seed=seed, **{"seconds": 40.0, **scenes.OPTIONS, **changes})
-
-
-def figures(found: list[Run]) -> list[str]:
-    """Cells of a table, see HEAD."""
-    repairs = np.concatenate([r.seconds("repair", "repair") for r in found])
-    ticks = np.concatenate([r.seconds("all") for r in found])
-    times = "none" if len(repairs) == 0 else " / ".join(f"{1e3 * np.percentile(repairs, p):.2f}" for p in (50, 95))
-    counts = [f"{np.mean([r.count(event) for r in found]):.1f}" for event in ("repair", "wait", "evade")]
-    length = np.mean([r.length for r in found])
-    arrived = f"{sum(r.arrived for r in found)} of {len(found)}"
-    return [arrived, f"{length:.2f}", *counts, times, f"{1e3 * np.percentile(ticks, 95):.1f}"]
+    return replan(
+        problem,
+        limits=scenes.limits(),
+        seed=seed,
+        clock=time.process_time,
+        **{"seconds": 40.0, **scenes.OPTIONS, **changes},
+    )
 
 
 def static_rows(report: Report, count: int) -> None:
@@ -87,7 +79,7 @@ def triangle_rows(report: Report, count: int) -> None:
         for planner in PLANNERS:
             some = problems[: 5 if planner == "drrt" else count]
             found = [plane_run(p, seed, planner=planner) for seed, p in enumerate(some)]
-            rows.append([f"{ratio:g}", planner, *figures(found)])
+            rows.append([f"{ratio:g}", planner, *figures([outcome(r) for r in found])])
             if planner == "drrt-con":
                 arrived[ratio] = np.mean([r.arrived for r in found])
                 p95.append(np.percentile(np.concatenate([r.seconds("all") for r in found]), 95))
@@ -96,7 +88,7 @@ def triangle_rows(report: Report, count: int) -> None:
                 plain = found
         if ratio == 1.0:
             predictive = [plane_run(p, seed, predict=4) for seed, p in enumerate(problems)]
-            rows.append([f"{ratio:g}", "drrt-con, 4 ticks ahead", *figures(predictive)])
+            rows.append([f"{ratio:g}", "drrt-con, 4 ticks ahead", *figures([outcome(r) for r in predictive])])
     report.table(f"Six triangles, {count} runs each, 5 of drrt", ["speed ratio", "planner", *HEAD], rows)
     least = min(arrived[0.2], arrived[0.5])
     report.bar("six triangles, ratio 0.2 and 0.5: arrival in 400 ticks", ">= 95 %", f"{least:.0%}", least >= 0.95)
@@ -180,68 +172,6 @@ def slow(count: int) -> rrtik.RateLimits:
     return rrtik.RateLimits(np.full(count, 2.0), np.full(count, 10.0))
 
 
-def arm_rows(report: Report, seconds: float) -> None:
-    """Six joints, 20 obstacles: contact, arrival, repairs; as many runs as fit."""
-    rows = []
-    for name, arm in runs.ARMS.items():
-        found, begin = [], time.perf_counter()
-        while time.perf_counter() - begin < 0.5 * seconds:
-            found.append(runs.arm_run(name, len(found)))
-        for planner, most, slot in (("rrt-connect", max(int(seconds / 25), 2), 0.5), ("drrt", 2, 1.0 / runs.RATE)):
-            others = [runs.arm_run(name, seed, planner=planner, slot=slot, seconds=6.0) for seed in range(most)]
-            rows.append([name, planner, *figures([r for r, _ in others]), contacts(others)])
-        rows.append([name, "drrt-con", *figures([r for r, _ in found]), contacts(found)])
-        arm_bars(report, name, arm["count"], found)
-    report.table("Six-joint arms among 20 obstacles that wander", ["arm", "planner", *HEAD, "runs with contact"], rows)
-
-
-def contacts(found: list) -> str:
-    """How many runs had contact, and in what ticks it began."""
-    events = [v.contacts[0][1] for _, v in found if v.contacts]
-    return f"{len(events)}" + (f" ({', '.join(sorted(set(events)))})" if events else "")
-
-
-def arm_bars(report: Report, name: str, count: int, found: list) -> None:
-    touched = sum(bool(v.contacts) for _, v in found)
-    reached = np.mean([r.arrived and not v.contacts for r, v in found])
-    repairs = np.concatenate([r.seconds("repair", "repair") for r, _ in found])
-    ticks = np.concatenate([r.seconds("all") for r, _ in found])
-    nearest = min(v.nearest for _, v in found)
-    text = f"{touched} of {len(found)} runs; nearest {1e3 * nearest:.1f} mm"
-    what = f"{name}, {count} obstacles slower than the bound: runs with contact"
-    enough = len(found) >= 1000
-    report.bar(what, "0 of 1,000", text + ("" if enough else " (too few runs)"), touched == 0 and enough)
-    text = f"{reached:.1%} of {len(found)}"
-    report.bar(f"{name}: arrived without contact within {runs.LONGEST:g} s", ">= 95 %", text, reached >= 0.95)
-    p95 = 1e3 * np.percentile(repairs, 95) if len(repairs) else 0.0
-    report.bar(f"{name}: repair, p95 of {len(repairs)}", "< 20 ms", f"{p95:.1f} ms", p95 < 20.0)
-    p95 = 1e3 * np.percentile(ticks, 95)
-    report.bar(
-        f"{name}: whole tick (obstacles packed, look, repair, step), p95", "< 20 ms", f"{p95:.1f} ms", p95 < 20.0
-    )
-
-
-def repair_rows(report: Report, count: int) -> None:
-    """The same repair by other ways, at the same moments."""
-    rows = []
-    for name in runs.ARMS:
-        quick, slower = runs.paired(name, range(count))
-        for moments in (m for m in (quick, slower) if m.ours):
-            times = [f"{1e3 * np.percentile(moments.ours, p):.2f}" for p in (50, 95)]
-            rows.append([name, "DRRT-Con", str(len(moments.ours)), *times, "1"])
-            for what, spent in moments.others.items():
-                times = [f"{1e3 * np.percentile(spent, p):.2f}" for p in (50, 95)]
-                rows.append([name, what, str(len(spent)), *times, f"{moments.ratio(what):.1f}"])
-        for what, moments in (
-            ("from scratch, same kernels", quick),
-            *((w, slower) for w in slower.others if "World" in w),
-        ):
-            ratio = moments.ratio(what)
-            report.bar(f"{name}: median repair against {what}", ">= 5 times faster", f"{ratio:.1f} times", ratio >= 5.0)
-    head = ["arm", "way to a new path", "repairs", "median [ms]", "p95 [ms]", "median of the ratios to DRRT-Con"]
-    report.table("Repairs, each also done by the others at the same moment", head, rows)
-
-
 def plane_part(report: Report, count: int) -> None:
     """Everything in the plane."""
     static_rows(report, count)
@@ -250,26 +180,29 @@ def plane_part(report: Report, count: int) -> None:
     arm_order(report, count)
 
 
-def _part(section: Callable[[Report, float], None], amount: float) -> Report:
-    """A part of the report, in a process of its own."""
-    ou.setLogLevel(ou.LogLevel.LOG_NONE)
+def _part(section: str, amount: int) -> Report:
+    """A part of the report."""
     report = Report("", "")
-    section(report, amount)
+    {"plane": plane_part, "repairs": repair_rows}[section](report, amount)
     return report
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--repeats", type=int, default=30)
-    parser.add_argument("--seconds", type=float, default=240.0)
+    parser.add_argument("--repeats", type=int, default=30, help="runs of each scene in the plane")
+    parser.add_argument("--runs", type=int, default=1000, help="runs of DRRT-Con of each arm")
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
+    parser.add_argument("--keep", type=Path, help="results are kept in this file, and taken from it by the next call")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "reports" / "drrt_con.md")
     given = parser.parse_args()
     report = Report("DRRT-Con", "python bench/drrt_con_report.py")
-    work = [(plane_part, given.repeats), (repair_rows, max(given.repeats // 5, 2)), (arm_rows, given.seconds)]
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        for part in pool.map(_part, *zip(*work, strict=True)):
-            report.bars += part.bars
-            report.lines += part.lines
+    measure = Measuring(given.jobs, given.keep)
+    parts = [("plane", given.repeats), ("repairs", max(given.repeats // 5, 2))]
+    for part in measure(_part, parts):
+        report.bars += part.bars
+        report.lines += part.lines
+    given.out.write_text(report.markdown())
+    arm_rows(report, given.runs, measure)
     report.note("How it is read", READING)
     given.out.write_text(report.markdown())
 
@@ -280,8 +213,8 @@ READING = (
     "'From scratch, same kernels' is RRT-Connect and shortcuts in the same kernels and the same packed scene as "
     "DRRT-Con's own repair, so it shows what keeping the path is worth; a new World and plan() is what planning from "
     "scratch cost before there was replanning. A repair is one that found a path, with what is new of it shortened; a "
-    "whole tick also packs the moved obstacles, checks the path and steps. Times are of a shared machine under load: "
-    "compare ratios. Of the baselines fewer runs were made, of 6 s at most; drrt has one tick for a repair."
+    "whole tick also packs the moved obstacles, checks the path and steps. Times are of the "
+    "processor. Of the baselines fewer runs were made, of 6 s at most; drrt has one tick for a repair."
 )
 
 if __name__ == "__main__":

@@ -10,10 +10,11 @@ import numpy as np
 import rrtik_ompl as rrtik
 from rrtik_ompl.planning import plan
 from rrtik_ompl.replanning import Run, replan
-from rrtik_ompl.replanning.connecting import KernelConnect, KernelCuts, PlainConnect
+from rrtik_ompl.replanning.connecting import PlainConnect
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
 from rrtik_ompl.replanning.generate import moving_problem
 from rrtik_ompl.replanning.judge import Verdict, judge
+from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
 from rrtik_ompl.replanning.loop import Loop
 from rrtik_ompl.replanning.settings import settings
 from rrtik_ompl.scene import Scene
@@ -23,6 +24,8 @@ ARMS = {
     "titan4": {"count": 20, "speed": 0.1, "step": 0.02},
 }
 RATE, MARGIN, LONGEST = 50.0, 0.02, 20.0
+OURS, SCRATCH = "DRRT-Con", "from scratch, same kernels"
+PLANS = (("fastrrtconnect", "fastrrtconnect"), ("RRTConnect", "OMPL's RRT-Connect"))
 
 
 def arm_problem(name: str, seed: int) -> rrtik.Problem:
@@ -37,10 +40,40 @@ def arm_options(name: str) -> dict:
     return {"step": arm["step"], "rate": RATE, "slot": 0.5, **bound}
 
 
-def arm_run(name: str, seed: int, **changes: object) -> tuple[Run, Verdict]:
+@dataclass(frozen=True)
+class Outcome:
+    """What the tables need of a run; times [s] are of the processor.
+
+    Attributes:
+        counts: Ticks of each kind.
+        repairs, ticks: Seconds of each repair that found a path, and of each tick.
+        contacts: Kind of each tick with contact, by the judge; empty without one.
+        nearest: Smallest distance between arm and obstacles [m], 0 for a contact.
+    """
+
+    arrived: bool
+    length: float
+    counts: dict[str, int]
+    repairs: np.ndarray
+    ticks: np.ndarray
+    contacts: tuple[str, ...] = ()
+    nearest: float = np.inf
+
+
+def outcome(run: Run, verdict: Verdict | None = None) -> Outcome:
+    """A run in short, and what a judge says of it."""
+    seen = {} if verdict is None else {"contacts": tuple(c[1] for c in verdict.contacts), "nearest": verdict.nearest}
+    counts = {event: run.count(event) for event in ("repair", "wait", "evade")}
+    times = run.seconds("repair", "repair"), run.seconds("all")
+    return Outcome(run.arrived, run.length, counts, *times, **seen)
+
+
+def arm_outcome(name: str, seed: int, planner: str, slot: float, seconds: float) -> Outcome:
+    """A run of an arm among obstacles, judged."""
     problem = arm_problem(name, seed)
+    changes = {"planner": planner, "slot": slot, "seconds": seconds, "clock": time.process_time}
     run = replan(problem, seed=seed, **{**arm_options(name), **changes})
-    return run, judge(problem.robot, run, problem.world.scene, fine=5)
+    return outcome(run, judge(problem.robot, run, problem.world.scene, fine=5))
 
 
 def executed_valid(problem: rrtik.Problem, run: Run) -> bool:
@@ -64,18 +97,22 @@ def still(scene: Scene) -> Scene:
 
 @dataclass
 class Moments:
-    """Seconds that each way to a new path took at the same moments, and whether it found one."""
+    """What each way to a new path took at the same moments [s], and the new path's length over the blocked one's."""
 
-    ours: list[float] = field(default_factory=list)
-    others: dict[str, list[float]] = field(default_factory=dict)
+    ours: list[tuple[float, float]] = field(default_factory=list)
+    others: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
 
-    def add(self, name: str, seconds: float) -> None:
-        """Note what another way took."""
-        self.others.setdefault(name, []).append(seconds)
+    def add(self, found: dict[str, tuple[float, float]]) -> None:
+        """Note a moment at which all ways found a path."""
+        self.ours.append(found[OURS])
+        for name, measured in found.items():
+            if name != OURS:
+                self.others.setdefault(name, []).append(measured)
 
     def ratio(self, name: str) -> float:
-        """Median of another way's seconds over ours, pair by pair."""
-        return float(np.median(np.array(self.others[name]) / np.array(self.ours)))
+        """Median of a way's seconds over ours, pair by pair."""
+        way = self.ours if name == OURS else self.others[name]
+        return float(np.median([theirs[0] / mine[0] for theirs, mine in zip(way, self.ours, strict=True)]))
 
 
 def paired(name: str, seeds: range, slow_every: int = 8) -> tuple[Moments, Moments]:
@@ -102,51 +139,58 @@ def _loop(name: str, seed: int) -> Loop:
 
 def with_pairs(loop: Loop, quick: Moments, slow: Moments, slow_every: int) -> None:
     """Make a loop's planner time the others before each of its repairs."""
-    planner, repair, world, robot = loop._planner, loop._planner.repair, loop._world, loop._problem.robot
-    lower, upper = robot.finite_range()
+    planner, repair, world = loop._planner, loop._planner.repair, loop._world
+    lower, upper = loop._problem.robot.finite_range()
     eps, count = planner.eps, 0
-    scratch = FromScratch(KernelConnect(world, lower, upper, eps, 1), eps, post=KernelCuts(world, 1))
-    plain = [kind(PlainConnect(lower, upper, eps, 1), eps) for kind in (DrrtCon, FromScratch)]
+    scratch = {SCRATCH: KernelDrrtCon(world, lower, upper, eps, 1, forgetting=True)}
+    plain = {
+        "DRRT-Con as published, in Python": DrrtCon(PlainConnect(lower, upper, eps, 1), eps),
+        "from scratch as published, in Python": FromScratch(PlainConnect(lower, upper, eps, 1), eps),
+    }
 
     def timed(motions: object, stop: object) -> bool:
         nonlocal count
         count += 1
-        spent = [
-            _repair_seconds(other, planner, motions) for other in (scratch, *(plain if count % slow_every == 0 else ()))
-        ]
-        begin = time.perf_counter()
-        found = repair(motions, stop)
-        ours = time.perf_counter() - begin
-        if found and spent[0] is not None:
-            quick.ours.append(ours)
-            quick.add("from scratch, same kernels", spent[0])
-        if found and count % slow_every == 0 and None not in spent:
-            slow.ours.append(ours)
-            slow.add("DRRT-Con as published, in Python", spent[1])
-            slow.add("from scratch as published, in Python", spent[2])
-            slow.add("from scratch: new World, fastrrtconnect, shortcut", _by_plan(loop, "fastrrtconnect"))
-            slow.add("from scratch: new World, OMPL's RRT-Connect, shortcut", _by_plan(loop, "RRTConnect"))
-        return found
+        path, often = planner.path.copy(), count % slow_every != 0
+        found = {what: _repaired(other, path, motions) for what, other in (scratch if often else plain).items()}
+        if not often:
+            found |= {f"from scratch: new World, {title}, shortcut": _by_plan(loop, kind) for kind, title in PLANS}
+        planner.look(motions)  # once more: what a repair reads is as fresh in memory as for the others
+        begin = time.process_time()
+        ours = repair(motions, stop)
+        found[OURS] = (time.process_time() - begin, _length(planner.path) / _length(path)) if ours else None
+        if None not in found.values():
+            (quick if often else slow).add(found)
+        return ours
 
     planner.repair = timed
 
 
-def _repair_seconds(other: DrrtCon, planner: DrrtCon, motions: object) -> float | None:
-    other.path, other._dense, other._hits = planner.path.copy(), planner._dense, planner._hits
-    begin = time.perf_counter()
-    return time.perf_counter() - begin if other.repair(motions, _after(begin + 2.0)) else None
+def _repaired(other: DrrtCon, path: np.ndarray, motions: object) -> tuple[float, float] | None:
+    """Seconds of another's repair and the share of the path's length that the new one has."""
+    other.path = path
+    other.look(motions)
+    begin = time.process_time()
+    found = other.repair(motions, _after(begin + 2.0))
+    return (time.process_time() - begin, _length(other.path) / _length(path)) if found else None
+
+
+def _length(path: np.ndarray) -> float:
+    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
 def _after(deadline: float):
-    return lambda: time.perf_counter() > deadline
+    return lambda: time.process_time() > deadline
 
 
-def _by_plan(loop: Loop, planner: str) -> float:
+def _by_plan(loop: Loop, planner: str) -> tuple[float, float] | None:
     """A new world and `plan()` from where the robot is, and as much shortening as a repair has."""
-    begin = time.perf_counter()
+    begin = time.process_time()
     world = rrtik.World(loop._problem.robot, still(loop._world.scene), accuracy="conservative")
     problem = rrtik.Problem(world, loop.q, loop._goals[0])
     found = plan(problem, planner, seconds=2.0, seed=1)
-    if found.found and len(found.path.waypoints) > 2:
-        rrtik.shorten(found.path, problem, method="sequential", seed=1)
-    return time.perf_counter() - begin
+    if not found.found:
+        return None
+    several = len(found.path.waypoints) > 2
+    path = rrtik.shorten(found.path, problem, method="sequential", seed=1) if several else found.path
+    return time.process_time() - begin, path.length / _length(loop._planner.path)

@@ -11,14 +11,13 @@ import pinocchio as pin
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.errors import ProblemError
-from rrtik_ompl.goal import JointGoal, PoseGoal, PositionGoal
-from rrtik_ompl.ik.ikurt.metric import TipMetric, reach
+from rrtik_ompl.goal import JointGoal, PoseGoal
+from rrtik_ompl.ik.ikurt.metric import reach
 from rrtik_ompl.motion_bench_maker import load_motion_bench_maker
+from rrtik_ompl.reproduce.ikurt import EXAMPLES
 from rrtik_ompl.shapes import Sphere
 
 TITAN = ("titan4_regular", "titan4_wrist", "titan4_axis1", "titan4_p_axis1")  # the last three are singular
-EXAMPLES = ("planar3_boxes", "planar6_c", "planar6_c_pose", "puma_position", "puma_pose", *TITAN)
-METRIC = 1e-2  # accuracy of poses in the published metric
 ARMS = ("ur5", "panda", "titan4")
 OBSTACLES = 8
 TRIES = 1000
@@ -27,20 +26,6 @@ TRIES = 1000
 def examples() -> dict[str, Any]:
     """Every published example by its name, as shipped."""
     return {name: rrtik.load_problem(name) for name in EXAMPLES}
-
-
-def metric_of(problem: Any) -> TipMetric:
-    """The published metric of a problem with its default weight."""
-    return TipMetric.published(problem.robot, [problem.goal], problem.start)
-
-
-def as_published(problem: Any) -> Any:
-    """The problem with a goal as loose as acceptance allows: poses to 1e-2 in the metric."""
-    if isinstance(problem.goal, PositionGoal):
-        return problem
-    metric = metric_of(problem)
-    goal = PoseGoal(problem.goal.T_world_tip, METRIC / metric.unit, METRIC / (metric.unit * metric.metres_per_radian))
-    return rrtik.Problem(problem.world, problem.start, goal, name=problem.name)
 
 
 def blocked() -> Any:

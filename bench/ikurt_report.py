@@ -1,69 +1,40 @@
 """IKURT: every acceptance row for the published algorithm and the improved one, and both beside IK and RRT-Connect.
 
-Usage: ``python bench/ikurt_report.py [--mbm mbm_panda] [--literal N] [--problems N] [--panda N] [--quick]``; minutes.
+Usage: ``python bench/ikurt_report.py [--mbm mbm_panda] [--jobs 2] [--keep FILE] [--quick]``; half an hour of one core.
+With ``--keep`` a broken measurement goes on.
 """
 
 from __future__ import annotations
 
 import argparse
-import time
-from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import ikurt_cases as cases
 import numpy as np
 from acceptance import Report
-from ompl import geometric as og
+from ikurt_runs import (
+    BLOCKED_SECONDS,
+    IMPROVED,
+    LITERAL,
+    PANDA_SECONDS,
+    PLAIN,
+    POSE_SECONDS,
+    VARIANTS,
+    Run,
+    blocked_runs,
+    example_runs,
+    generated,
+    improved_falls,
+    literal_falls,
+    panda,
+)
+from parallel import Measuring
 
-import rrtik_ompl as rrtik
-from rrtik_ompl.ik.ikurt.metric import TipMetric
-from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
-from rrtik_ompl.ik.ikurt.search import BatchedSearch, Judge, Options
-from rrtik_planners import IKURT, FastRRTConnect, IKURTPublished
+from rrtik_ompl.reproduce.ikurt import EXAMPLES, METRIC
 
 SECONDS = 10.0  # of an acceptance run
 SOON = 5.0  # [s] for the hundred seeds
-POSE_SECONDS, PANDA_SECONDS, BLOCKED_SECONDS = 2.0, 1.0, 1.0
-STRETCH = [1.0]  # limits of wall time are so many times those of processor time
-VARIANTS = {"literal": IKURTPublished, "improved": IKURT}
-
-
-@dataclass
-class Run:
-    """One plan: its processor time, how far its end is from the goal in the published metric, whether it is sound."""
-
-    plan: Any
-    limit: float
-    seconds: float
-    away: float = np.inf
-    sound: bool = True
-
-    @property
-    def solved(self) -> bool:
-        """Whether there is a path, within the limit of processor time."""
-        return bool(self.plan.found) and self.seconds <= self.limit
-
-    @property
-    def metres(self) -> float:
-        """From the goal to the tip at the end of the path."""
-        return float(self.plan.statistics.get("position_error", np.inf))
-
-    def count(self, name: str) -> float:
-        """A count of the planner's, or its seconds."""
-        return self.seconds if name == "seconds" else float(self.plan.statistics.get(name, 0))
-
-
-def run(problem: Any, planner: Any, seed: int, limit: float, **parameters: Any) -> Run:
-    begin = time.process_time()
-    plan = rrtik.plan(problem, planner, seconds=limit * STRETCH[0], seed=seed, parameters=parameters)
-    seconds = time.process_time() - begin
-    if plan.path is None:
-        return Run(plan, limit, seconds)
-    sound = not plan.path.violations(problem.world) and bool((plan.path.start == problem.start).all())
-    away = float(cases.metric_of(problem).distance(plan.path.end[None])[0])
-    return Run(plan, limit, seconds, away, sound)
+AT_ONCE = 5  # runs of a process
 
 
 def solved(runs: list[Run]) -> float:
@@ -79,23 +50,30 @@ def worst(runs: list[Run]) -> float:
     return max((each.away for each in runs if each.solved), default=np.inf)
 
 
-def acceptance(report: Report, literal: int, improved: int) -> None:
-    done: dict[str, dict[str, list[Run]]] = {}
-    for name, problem in cases.examples().items():
-        run(problem, IKURT, 0, SECONDS)  # whatever is loaded at the first question is no part of planning
-        loose = cases.as_published(problem)
-        done[name] = {
-            "literal": [run(loose, IKURTPublished, seed, SECONDS) for seed in range(literal)],
-            "improved": [run(problem, IKURT, seed, SECONDS) for seed in range(improved)],
-            "no Jacobian": [run(loose, IKURT, seed, SECONDS, jacobian=False) for seed in range(literal)],
-        }
+def acceptance(report: Report, measure: Measuring, literal: int, improved: int, stretch: float) -> None:
+    wanted = [(name, which, improved if which == IMPROVED else literal)
+              for name in EXAMPLES for which in (LITERAL, IMPROVED, PLAIN)]  # fmt: skip
+    done: dict[str, dict[str, list[Run]]] = {name: {} for name in EXAMPLES}
+    for (name, which, _), runs in zip(wanted, seeds_of(measure, wanted, SECONDS, stretch), strict=True):
+        done[name][which] = runs
     for which in VARIANTS:
-        rows(report, which, {name: each[which] for name, each in done.items()})
+        rows(report, which, {name: each[which] for name, each in done.items()}, stretch)
     beat(report, done)
     table(report, done)
 
 
-def rows(report: Report, which: str, done: dict[str, list[Run]]) -> None:
+def seeds_of(measure: Measuring, wanted: list[tuple[str, str, int]], limit: float, stretch: float) -> list[list[Run]]:
+    """Runs of examples by variants, so many seeds each, a few in a process."""
+    pieces = [(name, which, first, min(first + AT_ONCE, count), limit, stretch)
+              for name, which, count in wanted for first in range(0, count, AT_ONCE)]  # fmt: skip
+    done = measure(example_runs, pieces)
+    return [
+        [run for piece, runs in zip(pieces, done, strict=True) if piece[:2] == (name, which) for run in runs]
+        for name, which, _ in wanted
+    ]
+
+
+def rows(report: Report, which: str, done: dict[str, list[Run]], stretch: float) -> None:
     """The rows that runs decide, for one variant."""
     what = f"{which} ({len(done['planar6_c'])} runs each): "
     for name in ("planar6_c", "planar6_c_pose"):
@@ -112,16 +90,15 @@ def rows(report: Report, which: str, done: dict[str, list[Run]]) -> None:
     report.bar(what + "PUMA pose", "100 %, metric <= 1e-2", f"{share:.0f} %, {away:.1e}", share == 100 and away <= 1e-2)
     for name in cases.TITAN:
         share, away = solved(done[name]), worst(done[name])
-        wanted = 1e-6 if which == "improved" else cases.METRIC
+        wanted = 1e-6 if which == "improved" else METRIC
         bar, bound = f"{what}{name}, planning limits", f">= 95 %, metric <= {wanted:g}"
         report.bar(bar, bound, f"{share:.0f} %, {away:.1e}", share >= 95 and away <= wanted)
     sound = all(each.sound for runs in done.values() for each in runs)
     shown = "all" if sound else "not all"
     report.bar(what + "paths valid at half the resolution, first vertex the start", "all", shown, sound)
-    problem = cases.blocked()
-    ends = [run(problem, VARIANTS[which], seed, BLOCKED_SECONDS) for seed in range(5)]
-    longest, false = max(each.plan.seconds for each in ends), sum(each.plan.found for each in ends)
-    allowed = BLOCKED_SECONDS * STRETCH[0]
+    ends = blocked_runs(which, stretch)
+    longest, false = max(each.elapsed for each in ends), sum(each.found for each in ends)
+    allowed = BLOCKED_SECONDS * stretch
     shown = f"{false} false; ends after {longest:.2f} s of {allowed:g}"
     report.bar(
         what + "goal blocked by a ball", "no false success, ends in time", shown, not false and longest < allowed + 0.5
@@ -152,10 +129,10 @@ def table(report: Report, done: dict[str, dict[str, list[Run]]]) -> None:
     report.table("The examples: medians of all runs, those that failed included", head, lines)
 
 
-def hundred(report: Report, seeds: int) -> None:
+def hundred(report: Report, measure: Measuring, seeds: int, stretch: float) -> None:
     lines, everything = [], True
-    for name, problem in cases.examples().items():
-        runs = [run(problem, IKURT, seed, SOON) for seed in range(seeds)]
+    wanted = [(name, IMPROVED, seeds) for name in EXAMPLES]
+    for name, runs in zip(EXAMPLES, seeds_of(measure, wanted, SOON, stretch), strict=True):
         everything &= solved(runs) == 100.0
         seconds = [each.seconds for each in runs]
         counts = (f"{middle(runs, c):.0f}" for c in ("vertices", "checked_states", "checked_motions"))
@@ -171,96 +148,13 @@ def hundred(report: Report, seeds: int) -> None:
     )
 
 
-def literal_falls() -> tuple[bool, int]:
-    """Whether every vertex that CONNECT has added is nearer than the one before it, and how many these are."""
-    problem = cases.as_published(rrtik.load_problem("planar6_c_pose"))
-    metric, until = cases.metric_of(problem), time.monotonic() + 2.0
-    bounds, rng = problem.robot.finite_range(), np.random.default_rng(0)
-    steps = Steps(0.15, 0.5, metric.radius)
-    search = PublishedSearch(
-        metric, steps, *bounds, problem.world.motion_valid, lambda: time.monotonic() > until, rng, problem.start
-    )
-    return falls(search)
-
-
-def improved_falls() -> tuple[bool, int]:
-    """The same of the improved one, without descents, which would need no CONNECT."""
-    problem = rrtik.load_problem("planar6_c_pose")
-    metric, until = TipMetric(problem.robot, [problem.goal]), time.monotonic() + 2.0
-    bounds, rng = problem.robot.finite_range(), np.random.default_rng(0)
-    judge = Judge(problem.world.valid_batch, problem.world.motion_valid_batch, lambda: time.monotonic() > until)
-    options = Options(0.15, 0.6, jacobian=False, most_vertices=10_000)
-    return falls(BatchedSearch(metric, options, *bounds, judge, rng, problem.start[None]))
-
-
-def falls(search: Any) -> tuple[bool, int]:
-    held, added, connect = [], [0], search._connect
-
-    def watched(vertex: int) -> Any:
-        before = search.tree.size
-        outcome = connect(vertex)
-        new = search.tree.distance[before:]
-        held.append(bool((np.diff(np.append(search.tree.distance[vertex], new)) < 0.0).all()))
-        added[0] += len(new)
-        return outcome
-
-    search._connect = watched
-    search.run()
-    return all(held), added[0]
-
-
-def two_steps(problem: Any, seconds: float, seed: int) -> bool:
-    """The nearest free solution of inverse kinematics, then RRT-Connect to that one alone."""
-    ik = rrtik.solve_ik(
-        problem.robot, problem.goal, near=problem.start, world=problem.world, seconds=seconds, seed=seed
-    )
-    if not ik.found:
-        return False
-    joints = rrtik.Problem(problem.world, problem.start, ik.solutions[0])
-    return rrtik.plan(joints, og.RRTConnect, seconds=seconds, seed=seed).found
-
-
-WAYS = {
-    "IKURT": IKURT,
-    "RRT-Connect to goals from IK (OMPL's)": og.RRTConnect,
-    "FastRRTConnect (kernel) to goals from IK": FastRRTConnect,
-    "two steps: IK, then RRT-Connect (OMPL's)": None,
-}
-
-
-def beside(problems: Iterable[Any], limit: float) -> tuple[int, list[list[str]]]:
-    """How many problems, and solved share and times of each way; one problem after the other, each by all."""
-    outcomes: dict[str, list[float]] = {name: [] for name in WAYS}
-    for number, problem in enumerate(problems):
-        for world in (problem.world, problem.world.with_accuracy("conservative")):
-            world.motion_valid(problem.start, problem.start + 1e-3)  # loads covers and kernels
-        for name, planner in WAYS.items():
-            begin = time.process_time()
-            if planner is None:
-                found = two_steps(problem, limit * STRETCH[0], number)
-            else:
-                found = rrtik.plan(problem, planner, seconds=limit * STRETCH[0], seed=number).found
-            taken = time.process_time() - begin
-            outcomes[name].append(taken if found and taken <= limit else np.inf)
-    rows = []
-    for name, each in outcomes.items():
-        taken = np.array(each)
-        found = int(np.isfinite(taken).sum())
-        share = f"{found} of {len(taken)} ({100 * found / len(taken):.1f} %)"
-        taken = np.minimum(taken, limit)
-        rows.append([name, share, f"{np.median(taken):.3f}", f"{taken.mean():.3f}"])
-    return len(next(iter(outcomes.values()))), rows
-
-
-def generated(report: Report, problems: int) -> None:
-    for arm in cases.ARMS:
-        count, rows = beside(cases.generated(arm, problems // len(cases.ARMS)), POSE_SECONDS)
-        report.table(f"{count} generated poses, {arm} among {cases.OBSTACLES} balls, {POSE_SECONDS:g} s", HEAD, rows)
-
-
-def panda(report: Report, folder: Path, problems: int) -> None:
-    count, rows = beside(cases.panda_problems(folder, problems), PANDA_SECONDS)
-    report.table(f"{count} problems of MotionBenchMaker, Panda, goals as poses, {PANDA_SECONDS:g} s", HEAD, rows)
+def poses(report: Report, measure: Measuring, problems: int, folder: Path | None, pandas: int, stretch: float) -> None:
+    """All ways on generated poses, and on those of MotionBenchMaker if its folder is given."""
+    pieces = [(arm, problems // len(cases.ARMS), stretch) for arm in cases.ARMS]
+    for (arm, *_), (count, found) in zip(pieces, measure(generated, pieces), strict=True):
+        report.table(f"{count} generated poses, {arm} among {cases.OBSTACLES} balls, {POSE_SECONDS:g} s", HEAD, found)
+    for count, found in measure(panda, [(folder, pandas, stretch)] if folder is not None else []):
+        report.table(f"{count} problems of MotionBenchMaker, Panda, goals as poses, {PANDA_SECONDS:g} s", HEAD, found)
 
 
 def main() -> None:
@@ -270,19 +164,20 @@ def main() -> None:
     parser.add_argument("--problems", type=int, default=500, help="generated pose problems, all arms together")
     parser.add_argument("--panda", type=int, default=140, help="problems of MotionBenchMaker")
     parser.add_argument("--stretch", type=float, default=1.0, help="wall time per processor time, on a busy machine")
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
+    parser.add_argument("--keep", type=Path, help="results are kept in this file, and taken from it by the next call")
     parser.add_argument("--quick", action="store_true", help="a look at everything")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "reports" / "ikurt.md")
     options = parser.parse_args()
     literal, improved, seeds = (2, 5, 10) if options.quick else (options.literal, 20, 100)
     problems, pandas = (12, 7) if options.quick else (options.problems, options.panda)
-    STRETCH[0] = options.stretch
+    measure, stretch = Measuring(options.jobs, options.keep), options.stretch
     report = Report("IKURT", "python bench/ikurt_report.py")
     report.note("What was run", INTRODUCTION)
     for section in (
-        lambda: hundred(report, seeds),
-        lambda: generated(report, problems),
-        lambda: panda(report, options.mbm, pandas) if options.mbm else None,
-        lambda: acceptance(report, literal, improved),
+        lambda: hundred(report, measure, seeds, stretch),
+        lambda: poses(report, measure, problems, options.mbm, pandas, stretch),
+        lambda: acceptance(report, measure, literal, improved, stretch),
     ):
         section()
         options.out.write_text(report.markdown())

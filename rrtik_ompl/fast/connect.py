@@ -18,7 +18,7 @@ from rrtik_ompl.fast.halton import inverse_bases
 from rrtik_ompl.fast.library import library
 from rrtik_ompl.fast.processor import WIDTH
 from rrtik_ompl.fast.robot_tables import Table, table
-from rrtik_ompl.fast.tree_layout import SIZE
+from rrtik_ompl.fast.tree_layout import CAPACITY, SIZE
 from rrtik_ompl.fast.tree_memory import grow, tree_table
 
 PATIENCE = 8  # rejected paths until undecided motions are asked for at once
@@ -83,7 +83,8 @@ class ConnectSearch:
         matrix, shift = _lifting(gain, offset, dof)
         _require_certain(fast, matrix, shift, np.maximum(np.abs(box[0]), np.abs(box[1])))
         self.range, self.domain = connect_lengths(*box, range_, domain)
-        self._numbers = np.array([self.range, self.domain, positive(resolution, "resolution"), steps_per_unit])
+        span = positive(resolution, "resolution")
+        self._numbers = np.array([self.range, self.domain, span, steps_per_unit, layout.EVERYWHERE])
         joints = 0 if _is_identity(matrix, shift) else len(shift)
         self._trees = [tree_table(dof, joints, FIRST_CAPACITY) for _ in range(2)]
         self._search = _search_table(
@@ -139,6 +140,19 @@ class ConnectSearch:
             what = f"start {outside}" if outside < len(starts) else f"goal {outside - len(starts)}"
             raise InputError(f"search: {what} is not in the box of configurations")
         return self._path() if self._run(ask, stop) == layout.SOLVED else None
+
+    def serve(self, roots: int, max_iterations: int) -> int:
+        """Let other kernels begin searches, with as many roots on a side; the address of the table.
+
+        Such a search asks nothing and draws ``max_iterations`` samples at most; :meth:`go_on` continues it.
+        """
+        self._fit_trees(roots)
+        self._search.header[layout.PROVING], self._search.header[layout.LIMIT] = 0, max_iterations
+        return self._address
+
+    def go_on(self, stop: Callable[[], Any]) -> bool:
+        """Search on, where another kernel has begun; whether there is a path."""
+        return self._run(None, stop) == layout.SOLVED
 
     def proven_free(self, rows: Matrix) -> bool:
         """Whether all configurations, shape (k, n), lie in the box and the covers prove them free."""
@@ -202,9 +216,12 @@ class ConnectSearch:
             raise InputError(f"search: expected starts and goals of shape (k, {self._dof}), got {rows.shape}")
         if len(rows) > len(self._roots[side]):
             self._make_room(side, 2 * len(rows))
-        while len(rows) >= FIRST_CAPACITY and len(rows) >= self._trees[side].header[0]:
-            grow(self._trees[side])
+        self._fit_trees(len(rows))
         self._roots[side][: len(rows)] = rows
+
+    def _fit_trees(self, roots: int) -> None:
+        while roots >= FIRST_CAPACITY and roots >= self._trees[0].header[CAPACITY]:
+            self._grow()  # both are as large
 
     def _make_room(self, side: int, count: int) -> None:
         self._roots[side] = np.zeros((count, self._dof))
@@ -233,7 +250,7 @@ def _search_table(
     fields |= {layout.TREES + side: tree.address for side, tree in enumerate(trees)}
     fields |= {layout.GAIN: gain, layout.OFFSET: offset, layout.LOWER: box[0], layout.UPPER: box[1]}
     fields |= {layout.WEIGHTS: weights, layout.NUMBERS: numbers, layout.INVERSES: np.array(inverse_bases(dof))}
-    fields |= {place: np.zeros(dof) for place in (layout.ROW, layout.POINT)}
+    fields |= {place: np.zeros(dof) for place in (layout.ROW, layout.POINT, layout.CENTRE)}
     fields |= {layout.ROW_VALUES: np.zeros(joints), layout.QUERY: np.zeros(dof, dtype=np.float32)}
     fields |= {place: np.zeros(asked * dof) for place in _QUESTIONS}
     whole = (layout.QUESTION_TREES, layout.QUESTION_VERTICES, layout.ANSWERS)

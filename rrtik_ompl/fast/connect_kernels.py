@@ -135,9 +135,9 @@ def rows_free(search: int, rows: int, count: int) -> int:
     return 1
 
 
-@entry
-def begin(search: int, starts: int, goals: int, seed: int) -> int:
-    """Start anew from the roots in the table; returns -1, or the number of a root that is outside the bounds."""
+@kernel
+def begin_between(search: int, start_rows: int, starts: int, goal_rows: int, goals: int, seed: int) -> int:
+    """Start anew from roots at two addresses; returns -1, or the number of a root that is outside the bounds."""
     for place in (
         table.ITERATIONS,
         table.REJECTED,
@@ -153,11 +153,18 @@ def begin(search: int, starts: int, goals: int, seed: int) -> int:
     set_field(search, table.RANDOM, seed)
     next_share(search, table.RANDOM)
     start_points(search, table.RANDOM, field(search, table.POINT), field(search, table.DOF))
-    outside = plant(search, 0, field(search, table.START_ROWS), starts)
+    outside = plant(search, 0, start_rows, starts)
     if outside >= 0:
         return outside
-    outside = plant(search, 1, field(search, table.GOAL_ROWS), goals)
+    outside = plant(search, 1, goal_rows, goals)
     return starts + outside if outside >= 0 else -1
+
+
+@entry
+def begin(search: int, starts: int, goals: int, seed: int) -> int:
+    """:func:`begin_between` the roots in the table."""
+    start_rows, goal_rows = field(search, table.START_ROWS), field(search, table.GOAL_ROWS)
+    return begin_between(search, start_rows, starts, goal_rows, goals, seed)
 
 
 @kernel

@@ -15,9 +15,12 @@ PHASE, GROWER, GROWING, FROM, TARGET, BRIDGE, ROW, ROW_VALUES, QUERY, POINT, RAN
 MEETINGS, _MEETING, MEETING_OPEN, ASKED, QUESTIONS, QUESTION_STARTS, QUESTION_ENDS = range(28, 35)
 QUESTION_TREES, QUESTION_VERTICES, ANSWERS = range(35, 38)
 # ... and counts.
-ITERATIONS, REJECTED, JUDGED, ROOTS, STRAIGHT_TRIED, FIELD_COUNT = range(38, 44)
+ITERATIONS, REJECTED, JUDGED, ROOTS, STRAIGHT_TRIED = range(38, 43)
+# Samples lie in the box around CENTRE whose sides are twice the number SPREAD, which grows with every sample.
+CENTRE, FIELD_COUNT = range(43, 45)
 
-RANGE, DOMAIN, RESOLUTION, STEPS_PER_UNIT = range(4)  # the numbers
+RANGE, DOMAIN, RESOLUTION, STEPS_PER_UNIT, SPREAD = range(5)  # the numbers
+EVERYWHERE = 1e30  # the spread of samples that lie in the whole box
 STRAIGHT, SAMPLE, CONNECT = range(3)  # phases
 NOTHING, MOTION, PATH = range(3)  # what is asked
 SOLVED, EXHAUSTED, RUNNING, ASKING, FULL = range(5)  # status

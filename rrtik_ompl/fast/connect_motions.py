@@ -16,6 +16,7 @@ from rrtik_ompl.fast.tree_kernels import nearest_vertex, row_of, values_of
 from rrtik_ompl.fast.tree_layout import LIVE, RADII
 
 MOST_STRAIGHT = 16
+WIDER = 1.1  # a sample's box than the one before, where samples begin near a place
 
 
 @inlined
@@ -137,6 +138,18 @@ def aim_straight(search: int) -> bool:
 
 
 @kernel
+def place_sample(search: int) -> None:
+    """Set ROW to where POINT, a point of the unit box, lies in the box of samples; the next one is wider."""
+    spread = number(search, table.SPREAD)
+    for k in range(field(search, table.DOF)):
+        middle = double_at(field(search, table.CENTRE), k)
+        low = max(double_at(field(search, table.LOWER), k), middle - spread)
+        high = min(double_at(field(search, table.UPPER), k), middle + spread)
+        set_double(field(search, table.ROW), k, low + (high - low) * double_at(field(search, table.POINT), k))
+    set_double(field(search, table.NUMBERS), table.SPREAD, min(WIDER * spread, table.EVERYWHERE))
+
+
+@kernel
 def aim_at_sample(search: int) -> bool:
     """The next motion: from the nearest vertex of a tree towards a sample. False if that is outside its domain."""
     count_up(search, table.ITERATIONS)
@@ -146,9 +159,7 @@ def aim_at_sample(search: int) -> bool:
     set_field(search, table.GROWER, side)
     dof, point, row = field(search, table.DOF), field(search, table.POINT), field(search, table.ROW)
     next_point(search, table.RANDOM, point, field(search, table.INVERSES), dof)
-    for k in range(dof):
-        low = double_at(field(search, table.LOWER), k)
-        set_double(row, k, low + (double_at(field(search, table.UPPER), k) - low) * double_at(point, k))
+    place_sample(search)
     tree = tree_of(search, side)
     near = nearest_to(search, side, row)
     begin = row_of(tree, near)

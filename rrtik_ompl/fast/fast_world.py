@@ -101,6 +101,7 @@ class FastWorld:
         self._plain = PlainChecks(self._arm.arm, self._arm.balls, self._rows)
         self._kernels = library("kernels") if compiled else None
         self._probe: Table | None = None
+        self._moved = False
         self.address = 0
         if self._kernels is not None:
             self._work = workspace(self._arm.arm, self._arm.balls, self._rows)
@@ -122,13 +123,16 @@ class FastWorld:
                 that stand still.
         """
         around = self._placed.rows(bodies, self._standing, self._outer, rooms)
-        self._rows = rows_table(around, self._checked), rows_table([], self._checked)
+        first = not self._moved
+        self._moved = True
+        self._rows = rows_table(around, self._checked), rows_table([], self._checked) if first else self._rows[1]
         self._plain = PlainChecks(self._arm.arm, self._arm.balls, self._rows)
         self._probe = None
         if self._kernels is not None:
             self._world.header[OUTER_ROWS : OUTER_ROWS + 2] = [rows.address for rows in self._rows]
-            self._solids = standing_solids(bodies, self._standing, [NO_SOLIDS] * len(bodies))
-            self._world.header[STANDING_SOLIDS] = self._solids.address  # the old ones stand where nothing is any more
+            if first:  # the solids stand where nothing is any more; that none is known holds wherever bodies go
+                self._solids = standing_solids(bodies, self._standing, [NO_SOLIDS] * len(bodies))
+                self._world.header[STANDING_SOLIDS] = self._solids.address
             self._work[INNER_LAST][:] = -1  # what met last is there no more
 
     @property

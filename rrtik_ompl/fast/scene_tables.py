@@ -76,13 +76,17 @@ def rows_table(rows: Sequence[tuple[int, Row]], checked: NDArray[np.bool_]) -> T
     padded = -(-len(ordered) // LANE_PADDING) * LANE_PADDING
     boxes = np.empty((6, padded), dtype=np.float32)
     boxes[0::2], boxes[1::2] = ENDLESS, -ENDLESS
+    if ordered:
+        lows, highs = (
+            np.array(ends, dtype=np.float32).T for ends in zip(*((r.low, r.high) for _, r in ordered), strict=True)
+        )
+        boxes[0::2, : len(ordered)] = np.nextafter(lows, np.float32(-np.inf))
+        boxes[1::2, : len(ordered)] = np.nextafter(highs, np.float32(np.inf))
     floats = np.zeros((len(ordered), ROW_FLOATS), dtype=np.float32)
     numbers = np.zeros((len(ordered), 4), dtype=np.int32)
     own = np.full(checked.shape[1], -1, dtype=np.int32)
     planes: list[Matrix] = [np.zeros((0, 4))]
     for k, (body, row) in enumerate(ordered):
-        boxes[0::2, k] = np.nextafter(row.low.astype(np.float32), np.float32(-np.inf))
-        boxes[1::2, k] = np.nextafter(row.high.astype(np.float32), np.float32(np.inf))
         floats[k, : len(row.numbers)] = row.numbers
         first = sum(len(p) for p in planes)
         own[body] = k

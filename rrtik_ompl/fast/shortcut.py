@@ -111,6 +111,16 @@ class ShortcutSearch:
         )
 
     @property
+    def address(self) -> int:
+        """Of the table, for other kernels; valid as long as this object lives."""
+        return self._table.address
+
+    @property
+    def capacity(self) -> int:
+        """Waypoints that there is room for."""
+        return self._number(layout.CAPACITY)
+
+    @property
     def waypoints(self) -> Matrix:
         """The route as it is now, shape (k, dof); a copy."""
         return self._rows(layout.ROUTE, self._number(layout.COUNT))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+import time
 
 from rrtik_ompl.errors import require
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning.feed import Source, SpeedWarning, feed_of
-from rrtik_ompl.replanning.loop import GoalFeed, Loop
+from rrtik_ompl.replanning.loop import Clock, GoalFeed, Loop
 from rrtik_ompl.replanning.run import Run, Tick, load_run
 from rrtik_ompl.replanning.settings import PLANNERS, settings
 from rrtik_ompl.trajectory.limits import RateLimits
@@ -32,6 +33,7 @@ def replan(
     seed: int = 0,
     goal_feed: GoalFeed | None = None,
     record: str | os.PathLike[str] | None = None,
+    clock: Clock = time.perf_counter,
 ) -> Run:
     """Move a robot to its goal while obstacles move: source DRRT-Con paper.
 
@@ -59,11 +61,13 @@ def replan(
         predict: Ticks ahead: obstacles are also where they will be then and half-way, by the motion that the scene
             states or else by their velocity. 0: not predictive, as published.
         seconds: Simulated time at most [s].
-        slot: Wall time that a repair may take [s]; one tick if None.
+        slot: Time that a repair may take [s]; one tick if None.
         seed: The same seed gives the same run, as long as no repair is cut short by its slot.
         goal_feed: A goal that moves: the configuration at a time [s], in place of the problem's goal.
             It is reached when the robot is where it was at the begin of the last tick.
         record: A JSON file for the record; it is written on Ctrl-C too.
+        clock: What the times of the ticks and the ``slot`` are taken with [s]; ``time.process_time`` counts the
+            processor's, on a machine that does other things too.
 
     Raises:
         InputError: If a number is out of range, times go backwards, an obstacle begins in contact with the robot, or
@@ -76,7 +80,7 @@ def replan(
         limits=limits, predict=predict, seconds=seconds, slot=slot, seed=seed,
     )  # fmt: skip
     feed = feed_of(problem.world.scene if scene_feed is None else scene_feed)
-    loop = Loop(problem, feed, chosen, goal_feed)
+    loop = Loop(problem, feed, chosen, goal_feed, clock)
     try:
         for number in range(int(chosen.seconds * chosen.rate) + 1):
             if not loop.tick(number):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,6 +25,7 @@ from rrtik_ompl.scene import Scene
 from rrtik_ompl.world import World
 
 GoalFeed = Callable[[float], ArrayLike]
+Clock = Callable[[], float]
 
 
 class Loop:
@@ -36,7 +36,15 @@ class Loop:
         run: The record so far.
     """
 
-    def __init__(self, problem: Problem, feed: Feed, chosen: Settings, goal_feed: GoalFeed | None) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        feed: Feed,
+        chosen: Settings,
+        goal_feed: GoalFeed | None,
+        clock: Clock = time.perf_counter,
+    ) -> None:
+        self._clock = clock
         robot, scene = problem.robot, feed(0.0)
         self._problem, self._feed, self._chosen, self._goal_feed = problem, feed, chosen, goal_feed
         first = World(robot, scene, motion_resolution=problem.world.motion_resolution)
@@ -61,7 +69,7 @@ class Loop:
 
     def tick(self, number: int) -> bool:
         """Do one tick and write it down; False when the goal is reached."""
-        now, begin = number * self._chosen.tick, time.perf_counter()
+        now, begin = number * self._chosen.tick, self._clock()
         if self._arrived():
             self._note(now, self.q, "arrive", {}, 0, "")
             return False
@@ -83,7 +91,7 @@ class Loop:
         else:
             event, reason, place = self._stand_by()
         path = self._planner.path
-        self._note(now, here, event, {**spent, "all": time.perf_counter() - begin}, checked, reason, path)
+        self._note(now, here, event, {**spent, "all": self._clock() - begin}, checked, reason, path)
         self.q = place
         return True
 
@@ -104,7 +112,7 @@ class Loop:
         path = self._planner.path
         if self._goal_feed is None or path is None or self._world.blocked or (path[-1] == self._goals[0]).all():
             return False
-        return self._planner.retarget(self._goals, self._world, _until(self._chosen.slot))
+        return self._planner.retarget(self._goals, self._world, self._slot_ends())
 
     def _look(self) -> bool:
         return self._planner.look(self._world)
@@ -119,7 +127,7 @@ class Loop:
         return self._planner.look(self._world) or self._new_path()
 
     def _new_path(self) -> bool:
-        stop, planner = _until(self._chosen.slot), self._planner
+        stop, planner = self._slot_ends(), self._planner
         if planner.path is None:
             return planner.begin(self.q, self._goals, self._world, stop)
         if self._world.valid(planner.path[-1]):
@@ -157,10 +165,15 @@ class Loop:
     def _arrived(self) -> bool:
         return bool((np.abs(self._goals - self.q).max(axis=1) <= JOINT_TOLERANCE).any())
 
+    def _slot_ends(self) -> Stop:
+        """When a search that begins now has to end."""
+        clock, end = self._clock, self._clock() + self._chosen.slot
+        return lambda: clock() > end
+
     def _timed(self, spent: dict[str, float], name: str, work: Callable[..., bool], *arguments: float) -> bool:
-        begin = time.perf_counter()
+        begin = self._clock()
         result = work(*arguments)
-        spent[name] = time.perf_counter() - begin
+        spent[name] = self._clock() - begin
         return result
 
     def _note(
@@ -211,8 +224,3 @@ def _held_pairs(scene: Scene) -> tuple[tuple[str, str], ...]:
     """Allowed collisions that do not concern obstacles."""
     gone = {o.name for o in scene.obstacles}
     return tuple(pair for pair in scene.allowed_collisions if not gone & set(pair))
-
-
-def _until(seconds: float) -> Stop:
-    end: Any = time.perf_counter() + seconds
-    return lambda: time.perf_counter() > end

@@ -9,8 +9,10 @@ import numpy as np
 from rrtik_ompl.arrays import Vector, finite_array
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.fast.connect_lengths import RANGE_SHARE
-from rrtik_ompl.replanning.connecting import KernelCuts, connector, has_kernels
+from rrtik_ompl.moving_world import MovingWorld
+from rrtik_ompl.replanning.connecting import KernelCuts, PlainConnect, has_kernels
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
+from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
 from rrtik_ompl.replanning.single_tree import SingleTree
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.trajectory.limits import RateLimits
@@ -97,13 +99,18 @@ def settings(
     )
 
 
-def planner_of(chosen: Settings, world: object, lower: Vector, upper: Vector) -> DrrtCon:
+def planner_of(chosen: Settings, world: MovingWorld, lower: Vector, upper: Vector) -> DrrtCon:
     """The replanner of the name, for a world and a box of configurations to sample in."""
-    post = KernelCuts(world, chosen.seed) if has_kernels(world) else None
+    kernels = has_kernels(world)
     if chosen.planner == SingleTree.name:
-        return SingleTree(lower, upper, chosen.eps, chosen.seed, post=post)
-    kind = DrrtCon if chosen.planner == DrrtCon.name else FromScratch
-    return kind(connector(world, lower, upper, chosen.eps, chosen.seed), chosen.eps, post=post)
+        return SingleTree(
+            lower, upper, chosen.eps, chosen.seed, post=KernelCuts(world, chosen.seed) if kernels else None
+        )
+    forgetting = chosen.planner == FromScratch.name
+    if kernels:
+        return KernelDrrtCon(world, lower, upper, chosen.eps, chosen.seed, forgetting=forgetting)
+    kind = FromScratch if forgetting else DrrtCon
+    return kind(PlainConnect(lower, upper, chosen.eps, chosen.seed), chosen.eps)
 
 
 def _above(value: float, name: str, what: str) -> float:

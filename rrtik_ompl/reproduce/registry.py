@@ -6,16 +6,12 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 from rrtik_ompl.errors import UnknownNameError
-from rrtik_ompl.reproduce import crdt, ga_reb, mb_rrt, postprocessing, sensing, titan4
+from rrtik_ompl.reproduce import crdt, drrt_con, ga_reb, ikurt, mb_rrt, postprocessing, sensing, titan4
 from rrtik_ompl.reproduce.rows import Table
 
-TABLES: Mapping[str, Table] = MappingProxyType(
-    {table.name: table for page in (titan4, mb_rrt, ga_reb, crdt, postprocessing, sensing) for table in page.TABLES}
-)
-NOT_HERE = (
-    "IKURT and DRRT-Con: published as figures without numbers; bench/reports has their acceptance",
-    "Marker sensing, sections 4 and 5: the measured series need the camera; what follows from them is here",
-)
+PAGES = (titan4, mb_rrt, ga_reb, crdt, ikurt, drrt_con, postprocessing, sensing)
+TABLES: Mapping[str, Table] = MappingProxyType({table.name: table for page in PAGES for table in page.TABLES})
+NOT_HERE = ("Marker sensing, sections 4 and 5: the measured series need the camera; what follows from them is here",)
 
 
 def chosen(names: Iterable[str]) -> list[Table]:

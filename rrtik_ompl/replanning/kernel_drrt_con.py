@@ -1,0 +1,65 @@
+"""DRRT-Con whose look at the path and whose repair are one call of a kernel each, for worlds that have kernels."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.fast.repair import PathRepair
+from rrtik_ompl.moving_world import MovingWorld
+from rrtik_ompl.replanning.connecting import CUTS, ITERATIONS, PATIENCE, KernelConnect, KernelCuts, Motions, Stop, never
+from rrtik_ompl.replanning.drrt_con import DrrtCon
+
+REPAIR_CUTS, REPAIR_PATIENCE = 24, 8  # as CUTS and PATIENCE, where only a detour is new
+
+
+class KernelDrrtCon(DrrtCon):
+    """As :class:`DrrtCon`, in one world: its path is kept free of what moves there.
+
+    What the kernels add to the paper stands in :mod:`rrtik_ompl.fast.repair_kernels`.
+
+    Args:
+        world: Who judges; the ``motions`` of all methods.
+        lower, upper: The box to sample in, shape (n,).
+        eps: See :class:`DrrtCon`.
+        seed: Of the samples and the shortcuts.
+        forgetting: Whether each repair plans from scratch, as :class:`FromScratch` does.
+
+    Raises:
+        InputError: If the world has no kernels.
+    """
+
+    def __init__(
+        self, world: MovingWorld, lower: Vector, upper: Vector, eps: float, seed: int, *, forgetting: bool = False
+    ) -> None:
+        if world.fast is None:
+            raise InputError("replanning in kernels: the world has none; install numba")
+        super().__init__(KernelConnect(world, lower, upper, eps, seed), eps, post=KernelCuts(world, seed))
+        tries, patience = (CUTS, PATIENCE) if forgetting else (REPAIR_CUTS, REPAIR_PATIENCE)
+        self._world, self._forgetting, self._rng = world, forgetting, np.random.default_rng([seed, 1])
+        self._kernels = PathRepair(
+            world.fast, world.robot.chain, lower, upper, weights=world.weights, resolution=world.motion_resolution,
+            eps=eps, iterations=ITERATIONS, tries=tries, patience=patience,
+        )  # fmt: skip
+
+    def look(self, motions: Motions) -> bool:
+        """See :meth:`DrrtCon.look`."""
+        if self.path is None:
+            return False
+        self.counts.looks += 1
+        self.free = self._kernels.look(self.path)
+        self._world.checked += self._kernels.checked
+        return self.free
+
+    def repair(self, motions: Motions, stop: Stop = never) -> bool:
+        """See :meth:`DrrtCon.repair`."""
+        self.counts.repairs += 1
+        seed = int(self._rng.integers(2**62))
+        found: Matrix | None = None
+        if self.path is not None:
+            found = self._kernels.repair(seed, stop, forgetting=self._forgetting)
+        self.counts.failures += found is None
+        self.free = found is not None
+        self.path = self.path if found is None else found
+        return self.free
