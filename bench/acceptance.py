@@ -12,6 +12,7 @@ class Report:
 
     title: str
     command: str
+    where: str = "one process"
     lines: list[str] = field(default_factory=list)
     bars: list[tuple[str, str, str, bool]] = field(default_factory=list)
 
@@ -32,7 +33,7 @@ class Report:
         """The whole page."""
         held = sum(bar[3] for bar in self.bars)
         rows = [f"| {a} | {b} | {c} | {'held' if ok else '**missed**'} |" for a, b, c, ok in self.bars]
-        head = [f"# {self.title}", "", f"Written by `{self.command}`, {platform.machine()}, one process.", ""]
+        head = [f"# {self.title}", "", f"Written by `{self.command}`, {platform.machine()}, {self.where}.", ""]
         bars = [f"## Acceptance: {held} of {len(self.bars)} held", ""]
-        bars += ["| bar | wanted | measured | |", "|---|---|---|---|"]
-        return "\n".join([*head, *bars, *rows, "", *self.lines])
+        bars += ["| bar | wanted | measured | |", "|---|---|---|---|", *rows, ""]
+        return "\n".join([*head, *(bars if rows else []), *self.lines])
