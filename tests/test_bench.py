@@ -160,14 +160,20 @@ def test_the_database_is_sound_and_has_ompls_columns_and_ours(campaign):
         columns = {row[1] for row in base.execute("PRAGMA table_info(runs)")}
         names = [row[0] for row in base.execute("SELECT name FROM plannerConfigs")]
         times = base.execute("SELECT time FROM runs ORDER BY time").fetchall()
+        (clear,) = base.execute("SELECT COUNT(*) FROM runs WHERE solution_clearance > 0").fetchone()
+        (strict,) = base.execute("SELECT SUM(correct_solution_strict) FROM runs").fetchone()
         (solved,) = base.execute("SELECT COUNT(*) FROM runs WHERE solved = 1 AND status = 6").fetchone()
     ompls = {"time", "memory", "solved", "status", "solution_length", "simplified_solution_length", "graph_states"}
+    ompls |= {
+        f"{first}solution_{name}" for first in ("", "simplified_") for name in ("clearance", "smoothness", "segments")
+    }
+    ompls |= {f"{first}correct_solution{last}" for first in ("", "simplified_") for last in ("", "_strict")}
     assert ompls | {"transitions", "simplified_transitions", "checked_motions", "iterations", "total_time"} <= columns
     assert names == ["geometric_bicrdt", "geometric_RRTConnect", "geometric_short_steps"]
     np.testing.assert_allclose(
         [time for (time,) in times], sorted(r["plan_seconds"] for r in read_records(campaign / NAME)), rtol=1e-8
     )
-    assert solved == TOTAL
+    assert solved == clear == strict == TOTAL
 
 
 def test_ompls_own_planners_are_logged_like_ompl_logs_them(campaign):

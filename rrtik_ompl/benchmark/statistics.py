@@ -25,6 +25,8 @@ QUANTITIES: Mapping[str, tuple[str, str]] = MappingProxyType(
         "length": ("final length", "rad, m"),
         "initial_transitions": ("initial transitions", ""),
         "transitions": ("final transitions", ""),
+        "initial_clearance": ("initial clearance", "m"),
+        "clearance": ("final clearance", "m"),
         "memory_mb": ("memory", "MB"),
     }
 )
