@@ -29,7 +29,7 @@ def bench(
     from rrtik_ompl.benchmark.campaign import Progress, run_campaign
     from rrtik_ompl.benchmark.report import write_report
     from rrtik_ompl.benchmark.suite import load_suite
-    from rrtik_ompl.benchmark.tables import terminal_table
+    from rrtik_ompl.benchmark.tables import failures, terminal_table
     from rrtik_ompl.fast import warm_up
 
     campaign = load_suite(suite, folder=problems, runs=runs)
@@ -59,5 +59,6 @@ def bench(
     else:
         counts = ", ".join(f"{number} {status}" for status, number in outcomes.items())
         say(terminal_table(results), f"this round: {counts or 'no runs were left'}")
+        say(*(f"{problem}, {planner}: {number} x {why}" for problem, planner, number, why in failures(results)))
         say(*(f"wrote {each}" for each in files))
     return 0

@@ -300,8 +300,9 @@ def test_planners_that_crash_hang_quit_or_eat_the_memory_do_not_end_a_campaign(t
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
     env = {**os.environ, "PYTHONPATH": path}
     process = command("bench", suite, "--out", tmp_path / "out", "--views", 0, "--jobs", 2, env=env)
-    _, errors = process.communicate(timeout=120)
+    said, errors = process.communicate(timeout=120)
     assert (process.returncode, errors) == (0, "")
+    assert "planar3_a, raiser: 1 x error: ValueError: no idea" in said.splitlines()
     outcomes = {
         record["planner"]: (record["status"], record["reason"]) for record in read_records(tmp_path / "out" / NAME)
     }
@@ -363,6 +364,12 @@ def test_where_the_disk_is_full_all_records_before_stay_whole(tmp_path):
     with RecordFile(file, head) as out:
         out.append({**record, "run": 99})
     assert [each["run"] for each in read_records(file)] == [*kept, 99]
+
+
+def test_two_campaigns_do_not_write_one_file(suite, tmp_path, capsys):
+    with RecordFile(tmp_path / NAME, {"version": 1, "suite": load_suite(suite).plain()}):
+        assert run(["bench", str(suite), "--out", str(tmp_path), "--resume"]) == 2
+    assert f"{NAME}: another campaign is writing it" in capsys.readouterr().err
 
 
 def _append(out, records):
