@@ -268,6 +268,24 @@ def test_the_page_needs_no_other_file_but_the_views_that_it_links_to(campaign):
         assert "<svg" in (campaign / f"{name}.svg").read_text()
 
 
+def test_the_results_of_the_readme_are_written_from_campaigns(campaign, tmp_path, monkeypatch, capsys):
+    monkeypatch.syspath_prepend(str(Path(__file__).parent.parent / "bench"))
+    import results_page
+
+    readme = tmp_path / "README.md"
+    readme.write_text(f"before\n{results_page.BEGIN}\nold\n{results_page.END}\nafter\n")
+    for _ in range(2):  # a second time it takes the place of the first
+        monkeypatch.setattr("sys.argv", ["results_page.py", str(campaign), "--readme", str(readme)])
+        results_page.main()
+    text = readme.read_text()
+    assert text.startswith("before\n<!--")
+    assert text.endswith("-->\nafter\n")
+    assert "old" not in text
+    assert text.count("| bicrdt | 3 / 3 / 3 |") == 1
+    assert text.count("Written by `rrtik bench two --runs 3 --jobs 2`") == 1
+    assert re.search(r"^\| planar/joints \| 4 \|$", text, re.M)
+
+
 def test_paths_that_came_after_the_time_limit_are_counted(campaign):
     done, head = results(read_records(campaign / NAME)), read_head(campaign / NAME)
     assert "after the limit" not in remark(done, head)
@@ -489,7 +507,8 @@ def test_shipped_suites_name_what_there_is(name):
             load_suite(file)
         return
     campaign = load_suite(file)
-    assert campaign.runs * len(campaign.sources) * len(campaign.entrants) >= 100
+    runs = campaign.runs * len(campaign.sources) * len(campaign.entrants)
+    assert f"# {runs:,} runs" in file.read_text()  # its head says what a person lets himself in for
 
 
 def test_suites_are_found_by_name_and_unknown_ones_listed(monkeypatch, capsys):
