@@ -34,7 +34,7 @@ import rrtik_ompl as rrtik
 from rrtik_ompl import JointPath, Problem
 from rrtik_ompl.scenarios import generated_problem
 
-OURS = "rrtik_ompl, fastrrtconnect"
+OURS, OWN_RULE = "rrtik_ompl, fastrrtconnect", "the same by its own, denser rule"
 PEERS = {
     "OMPL, Pinocchio + coal": "ompl_callback",
     "the same with a broadphase": "ompl_callback --broadphase",
@@ -114,22 +114,25 @@ def problems(options: argparse.Namespace) -> Iterator[tuple[str, Problem]]:
 
 def planning(options: argparse.Namespace, report: Report) -> None:
     """Everybody on every problem, in turns."""
-    interpreters = dict(pair.split("=", 1) for pair in options.python)
+    interpreters = dict(options.python)
     with ExitStack() as stack:
         hosts = {
             name: stack.enter_context(Host(module, interpreters.get(module.split()[0], sys.executable)))
             for name, module in PEERS.items()
         }
-        runs = {name: Runs() for name in (OURS, *(name for name, host in hosts.items() if not host.absent))}
+        runs = {name: Runs() for name in (OURS, OWN_RULE, *(name for name, host in hosts.items() if not host.absent))}
         for group, problem in problems(options):
             print(f"{problem.name} ...", file=sys.stderr, flush=True)
             warm_up(problem)
             with TemporaryDirectory() as folder:
                 task = task_of(problem, Path(folder), options.seconds)
-                ours = our_search(problem, seconds=task.seconds, per_radian=PER_RADIAN)
+                ours = {
+                    OURS: our_search(problem, seconds=task.seconds, per_radian=PER_RADIAN),
+                    OWN_RULE: our_search(problem, seconds=task.seconds),
+                }
                 for seed in range(1, options.seeds + 1):
                     for name, done in runs.items():
-                        answer = answered(timed(ours, seed)) if name == OURS else hosts[name].ask(task, seed)
+                        answer = answered(timed(ours[name], seed)) if name in ours else hosts[name].ask(task, seed)
                         done.add(group, problem, answer)
     _planning_tables(options, report, hosts, runs)
 
@@ -171,6 +174,15 @@ def inverse_kinematics(options: argparse.Namespace, report: Report) -> None:
         report.note("Not asked", "\n".join(f"- {line}" for line in missing))
 
 
+def interpreter(text: str) -> tuple[str, str]:
+    """A peer's module and its interpreter."""
+    name, equals, path = text.partition("=")
+    known = sorted({module.split()[0] for module in PEERS.values()})
+    if not equals or name not in known:
+        raise argparse.ArgumentTypeError(f"found '{text}', expected NAME=INTERPRETER, NAME being {', '.join(known)}")
+    return name, path
+
+
 def main() -> None:
     """Measure, print the page and write it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -178,7 +190,8 @@ def main() -> None:
     parser.add_argument("--problems", type=int, default=3, help="of each family")
     parser.add_argument("--seeds", type=int, default=3, help="runs of each candidate on each problem")
     parser.add_argument("--seconds", type=float, default=10.0, help="for each run")
-    parser.add_argument("--python", action="append", default=[], metavar="NAME=INTERPRETER", help="of one peer")
+    named = {"type": interpreter, "metavar": "NAME=INTERPRETER", "help": "of one peer; may be repeated"}
+    parser.add_argument("--python", action="append", default=[], **named)
     parser.add_argument("--poses", type=int, default=500)
     parser.add_argument("--budget", type=float, default=1.0, help="seconds for our method, seven times as many a peer")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "reports" / "peers.md")

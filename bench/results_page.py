@@ -17,8 +17,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rrtik_ompl.benchmark.records import NAME, read_head, read_records
-from rrtik_ompl.benchmark.statistics import Result, Spread, results
+from rrtik_ompl.benchmark.records import NAME, read_records
+from rrtik_ompl.benchmark.report import read_campaign
+from rrtik_ompl.benchmark.statistics import Result, Spread
 from rrtik_ompl.benchmark.tables import conditions, failures, figure, markdown_table
 
 BEGIN, END = "<!-- results: written by bench/results_page.py -->", "<!-- end of results -->"
@@ -36,7 +37,7 @@ def section(folder: Path) -> list[str]:
         InputError: If the folder holds no campaign that can be read.
     """
     file = folder / NAME
-    head, found = read_head(file), results(read_records(file))
+    head, found = read_campaign(file)
     lines = [f"**{head['suite']['title']}.** {conditions(found, head)}", ""]
     plain, growing = ([r for r in found if bool(r.axis) == grows] for grows in (False, True))
     if plain:
@@ -63,9 +64,7 @@ def memory(file: Path) -> str:
     held = [float(record["memory_mb"]) for record in read_records(file) if "memory_mb" in record]
     part = max(1, len(held) // TENTH)
     first, last = (float(np.median(values)) for values in (held[:part], held[-part:]))
-    return (
-        f"Memory of their processes, median of the first and the last tenth of {len(held)}: {first:.0f}, {last:.0f} MB."
-    )
+    return f"Memory of the processes, median over the first and the last tenth of the runs: {first:.0f}, {last:.0f} MB."
 
 
 def _row(result: Result) -> tuple[str, ...]:

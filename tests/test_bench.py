@@ -319,7 +319,7 @@ def test_planners_that_crash_hang_quit_or_eat_the_memory_do_not_end_a_campaign(t
     env = {**os.environ, "PYTHONPATH": path}
     process = command("bench", suite, "--out", tmp_path / "out", "--views", 0, "--jobs", 2, env=env)
     said, errors = process.communicate(timeout=120)
-    assert (process.returncode, errors) == (0, "")
+    assert (process.returncode, errors) == (1, "")  # for one of them never did anything but raise
     assert "planar3_a, raiser: 1 x error: ValueError: no idea" in said.splitlines()
     outcomes = {
         record["planner"]: (record["status"], record["reason"]) for record in read_records(tmp_path / "out" / NAME)
@@ -453,6 +453,15 @@ def test_a_typo_in_a_suite_is_one_line_that_names_its_place(tmp_path, capsys, ol
     assert re.search(words, message), message
     assert message.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_a_parameter_of_the_wrong_kind_is_told_and_the_other_planners_run(tmp_path, capsys):
+    file = tmp_path / "s.yaml"
+    file.write_text(SUITE.replace("range: 0.3", "range: soon").replace("runs: 3", "runs: 1"))
+    assert run(["bench", str(file), "--out", str(tmp_path / "out"), "--views", "0"]) == 1
+    said = capsys.readouterr().out
+    assert "planar3_a, short steps: 1 x error: planner RRTConnect: parameter range cannot be 'soon'" in said
+    assert "this round: 4 solved, 2 error" in said
 
 
 def test_a_scheduler_that_does_not_answer_is_one_line(suite, tmp_path, capsys, monkeypatch):
