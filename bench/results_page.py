@@ -3,7 +3,8 @@
     rrtik bench scenarios --jobs 2
     rrtik bench titan4_families --jobs 2
     rrtik bench scaling --jobs 2
-    python bench/results_page.py bench-scenarios bench-titan4_families bench-scaling
+    rrtik bench soak
+    python bench/results_page.py bench-scenarios bench-titan4_families bench-scaling bench-soak
 
 Each folder is one that ``rrtik bench`` has written. The section of README.md between its two marks is replaced, and
 nothing in it is typed by hand.
@@ -42,7 +43,8 @@ def section(folder: Path) -> list[str]:
     plain, growing = ([r for r in found if bool(r.axis) == grows] for grows in (False, True))
     if plain:
         labels = len({result.label for result in plain})
-        lines += [f"All {labels} groups of problems together; medians where nothing else is said:", ""]
+        which = f"All {labels} groups of problems together; medians" if labels > 1 else "Medians"
+        lines += [f"{which} where nothing else is said:", ""]
         lines += [*markdown_table(HEAD, (_row(each) for each in by_planner(plain))), ""]
     if growing:
         lines += ["Planning, median [ms], where one measure grows:", "", *_scaling(growing), ""]

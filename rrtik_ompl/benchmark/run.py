@@ -36,7 +36,7 @@ def execute(job: Mapping[str, Any]) -> dict[str, Any]:
     """Do a job; whatever goes wrong in Python is an outcome.
 
     Args:
-        job: As :func:`rrtik_ompl.benchmark.campaign.jobs` writes it.
+        job: As :func:`rrtik_ompl.benchmark.campaign.all_jobs` writes it.
 
     Returns:
         status, reason, and what was measured: seconds, lengths [rad, m], moves, clearance [m], counts of the planner,
