@@ -6,13 +6,18 @@ import platform
 from dataclasses import dataclass, field
 
 
+def processes(count: int) -> str:
+    """How many there were, as a page says it."""
+    return "one process" if count == 1 else f"{count} processes"
+
+
 @dataclass
 class Report:
     """Collects sections and bars."""
 
     title: str
     command: str
-    processes: int = 1
+    where: str = processes(1)
     lines: list[str] = field(default_factory=list)
     bars: list[tuple[str, str, str, bool]] = field(default_factory=list)
 
@@ -33,8 +38,7 @@ class Report:
         """The whole page."""
         held = sum(bar[3] for bar in self.bars)
         rows = [f"| {a} | {b} | {c} | {'held' if ok else '**missed**'} |" for a, b, c, ok in self.bars]
-        count = "one process" if self.processes == 1 else f"{self.processes} processes"
-        head = [f"# {self.title}", "", f"Written by `{self.command}`, {platform.machine()}, {count}.", ""]
+        head = [f"# {self.title}", "", f"Written by `{self.command}`, {platform.machine()}, {self.where}.", ""]
         bars = [f"## Acceptance: {held} of {len(self.bars)} held", ""]
-        bars += ["| bar | wanted | measured | |", "|---|---|---|---|"]
-        return "\n".join([*head, *bars, *rows, "", *self.lines])
+        bars += ["| bar | wanted | measured | |", "|---|---|---|---|", *rows, ""]
+        return "\n".join([*head, *(bars if rows else []), *self.lines])

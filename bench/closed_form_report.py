@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ik_peers import eaik_robot
+from peers.eaik import eaik_robot
 
 from rrtik_ompl import load_robot
 from rrtik_ompl.ik.closed_form import form_of, solutions

@@ -14,7 +14,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from acceptance import Report
+from acceptance import Report, processes
 from parts import in_parts
 
 import rrtik_ompl as rrtik
@@ -184,7 +184,9 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1, help="processes; more than one make the times longer")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "reports" / "generated.md")
     options = parser.parse_args()
-    report = Report("Single-joint moves in generated scenes", "python bench/generated_report.py", options.jobs)
+    report = Report(
+        "Single-joint moves in generated scenes", "python bench/generated_report.py", processes(options.jobs)
+    )
     results = scenes(options.scenes, options.jobs, options.out.with_suffix(".parts.jsonl"))
     bars(report, [scene for found in results.values() for scene in found])
     for arm, found in results.items():

@@ -1,4 +1,4 @@
-"""Inverse kinematics on the same reachable poses: every method of ours beside pytracik, ikpy and EAIK.
+"""Inverse kinematics on the same reachable poses: every method of ours beside those of other libraries.
 
     python bench/ik_comparison.py [--poses 1000] [--budget 1.2] [--out bench/reports/ik_comparison.md]
 
@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
@@ -21,7 +21,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 from acceptance import Report
-from ik_peers import Solver, eaik_robot, peers
+from peers.eaik import eaik_robot
+from peers.ik import Solver, solvers
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError
@@ -39,6 +40,8 @@ METRES, RADIANS = 1e-3, 1e-2  # a configuration this near to the pose and inside
 BLOCK = 50  # poses before the next method takes its turn
 PEER_BUDGET = 7  # times the budget of a method of ours
 KERNEL_BARS = {"ur5": 10.0, "panda": 40.0}  # [us]
+KERNEL = "kernel alone"
+OTHERS = ("pytracik", "ikpy", "roboticstoolbox", "damped", "pinocchio", "ccd")  # numeric methods not of ours
 HEAD = ["method", "poses", "solved", "median [us]", "p95 [us]", "median [m]", "worst [m]", "worst [rad]"]
 
 
@@ -105,18 +108,20 @@ def by_face(robot: Robot, method: str, pose: np.ndarray) -> np.ndarray | None:
     return found[0] if len(found) else None
 
 
-def single(robot: Robot, poses: np.ndarray, budget: float) -> tuple[dict[str, Runs], list[str]]:
-    """Every method on the poses, taking turns; and who is absent."""
+def single(robot: Robot, poses: np.ndarray, budget: float, methods: Sequence[str]) -> tuple[dict[str, Runs], list[str]]:
+    """Methods of ours and the peers' on the poses, taking turns; and who is absent."""
     runs, absent = {}, []
     start = usual_posture(robot)
-    runs["kernel alone"] = Runs(kernel_alone(robot, start), budget)
-    for method in ("auto", *list_ik_methods()):
+    for method in methods:
         try:
+            if method == KERNEL:
+                runs[method] = Runs(kernel_alone(robot, start), budget)
+                continue
             by_face(robot, method, poses[0])
             runs[method] = Runs(partial(by_face, robot, method), budget)
         except InputError as error:
             absent.append(f"{robot.name}, {method}: {str(error).split(';')[0]}")
-    for name, solver in peers(robot, start).items():
+    for name, solver in solvers(robot, start).items():
         if isinstance(solver, str):
             absent.append(f"{robot.name}, {name}: {solver}")
         else:
@@ -159,11 +164,15 @@ def _batch_share(robot: Robot, poses: np.ndarray, method: str) -> float:
 
 def judge(report: Report, name: str, runs: dict[str, Runs], batch: dict[str, tuple[float, float]]) -> None:
     """The acceptance rows of one arm."""
-    auto, kernel = runs["auto"], runs["kernel alone"]
+    auto, kernel = runs["auto"], runs[KERNEL]
     share = batch["solve_ik_batch, auto"][0]
     least = min(auto.share, share)
     report.bar(f"{name}: `auto` solves, one by one and in a batch", ">= 99.9 %", f"{least:.2%}", least >= 0.999)
-    others = {key: run for key, run in runs.items() if key in ("pytracik", "ikpy", "damped", "pinocchio", "ccd")}
+    others = {
+        key: run
+        for key, run in runs.items()
+        if key in ("pytracik", "ikpy", "roboticstoolbox", "damped", "pinocchio", "ccd")
+    }
     fastest = min(others, key=lambda key: others[key].median)
     text = f"{auto.median:.0f} us; {fastest} {others[fastest].median:.0f} us"
     report.bar(
@@ -191,7 +200,7 @@ def _percent(share: float) -> str:
 
 def versions() -> str:
     found = [f"Python {platform.python_version()}"]
-    for package in ("numpy", "pin", "numba", "pytracik", "ikpy", "eaik"):
+    for package in ("numpy", "pin", "numba", "pytracik", "ikpy", "eaik", "roboticstoolbox-python"):
         try:
             found.append(f"{package} {version(package)}")
         except PackageNotFoundError:
@@ -211,7 +220,7 @@ def main() -> None:
         robot = rrtik.load_robot(name)
         rng = np.random.default_rng(2)
         poses = robot.fk_batch(rng.uniform(*robot.finite_range(), (options.poses, robot.dof)))
-        runs, absent = single(robot, poses, options.budget)
+        runs, absent = single(robot, poses, options.budget, (KERNEL, "auto", *list_ik_methods()))
         batch = batches(robot, poses)
         missing += absent
         judge(report, name, runs, batch)

@@ -16,7 +16,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from acceptance import Report
+from acceptance import Report, processes
 from parts import in_parts
 
 from rrtik_ompl import load_problem, load_robot, one_joint_moves, shorten
@@ -99,7 +99,7 @@ def all_parts(paths: int, jobs: int, kept: Path) -> dict[str, np.ndarray]:
 
 def page(counts: dict[str, np.ndarray], jobs: int) -> Report:
     """The report."""
-    report = Report("Soak test of shortening", "python bench/shortening_soak.py", jobs)
+    report = Report("Soak test of shortening", "python bench/shortening_soak.py", processes(jobs))
     total = sum(counts.values())
     text = f"{total[1]:.0f} of {total[0]:.0f}"
     report.bar("shortened paths rejected by the dense check, or with other ends", "none", text, total[1] == 0)

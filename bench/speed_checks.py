@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+import pinocchio as pin
 from acceptance import Report
+from peers.ompl_callback import Checker
 from speed_cases import (
     REACHES,
     Options,
@@ -22,7 +24,6 @@ from speed_cases import (
     without_itself,
 )
 from speed_ours import joint_values, timed
-from speed_peers import PlainChecks
 
 from rrtik_ompl import World, load_robot
 from rrtik_ompl.arrays import Matrix
@@ -122,11 +123,14 @@ def near_obstacles(options: Options, report: Report) -> None:
 def _exact_batch(world: World, Q: Matrix) -> tuple[list[str], float, float]:
     """Cells of the table, the ratio to Pinocchio and coal on the same solids, the share left to coal."""
     some = Q[::PEER_SHARE]
-    peers = [PlainChecks(world, as_loaded=loaded, broadphase=True) for loaded in (False, True)]
+    peers = [plain_checks(world, as_loaded=loaded) for loaded in (False, True)]
     world.valid_batch(Q[:1])
     costs, answers = [], []
     for _ in range(3):
-        runs = [timed(lambda: world.valid_batch(Q)), *(timed(lambda p=p: p.valid_batch(some)) for p in peers)]
+        runs = [
+            timed(lambda: world.valid_batch(Q)),
+            *(timed(lambda p=p: [p(full) for full in world.robot.lift(some)]) for p in peers),
+        ]
         costs.append([1e6 * seconds / len(rows) for (seconds, _), rows in zip(runs, (Q, some, some), strict=True)])
         answers = [found for _, found in runs]
     ours, theirs, on_meshes = np.min(costs, axis=0)
@@ -135,6 +139,23 @@ def _exact_batch(world: World, Q: Matrix) -> tuple[list[str], float, float]:
     share = _undecided(world, Q)
     cells = [f"{len(Q)}", f"{answers[0].mean():.2f}", f"{ours:.2f}", f"{theirs:.1f}", f"{on_meshes:.1f}"]
     return [*cells, f"{theirs / ours:.3g}", *map(str, wrong), f"{100 * share:.1f}"], float(theirs / ours), share
+
+
+def plain_checks(world: World, *, as_loaded: bool) -> Checker:
+    """What a user of Pinocchio writes: one configuration, a tree of bounding boxes, stop at the first collision.
+
+    Args:
+        world: Robot, obstacles and the pairs to check.
+        as_loaded: Links keep their triangle meshes; otherwise they are the solids that a World checks.
+    """
+    robot, geometry = world.robot, pin.GeometryModel()
+    loaded = [item.geometry for item in robot.collision.geometryObjects] if as_loaded else []
+    solids = [*loaded, *(body.geometry for body in world.bodies[len(loaded) :])]
+    for number, (body, solid) in enumerate(zip(world.bodies, solids, strict=True)):
+        geometry.addGeometryObject(pin.GeometryObject(str(number), body.joint, body.placement, solid))
+    for first, second in world.pairs:
+        geometry.addCollisionPair(pin.CollisionPair(first, second))
+    return Checker(robot.model, geometry, broadphase=True)
 
 
 def _near(options: Options) -> Iterator[tuple[str, str, World, Matrix]]:

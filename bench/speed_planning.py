@@ -4,28 +4,27 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable
+from functools import partial
+from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from acceptance import Report
 from numpy.typing import ArrayLike
+from peers import ompl_callback, roboplan, vamp
+from peers.description import task_of
+from peers.task import PER_RADIAN, Search, Task
 from speed_cases import Options, exact_problem, family, panda_files, shipped_problems, sphere_problem
 from speed_ours import PLANNER, ompl_overhead, our_search, timed, warm_up
-from speed_peers import (
-    HAS_ROBOPLAN,
-    HAS_VAMP,
-    PER_RADIAN,
-    callback_search,
-    roboplan_search,
-    vamp_search,
-)
 
 from rrtik_ompl import JointPath, plan
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.problem import Problem
 
 REPEATS = 5
+HAS_ROBOPLAN, HAS_VAMP = (find_spec(name) is not None for name in ("roboplan", "vamp"))
 NO_FOLDER = "Not run: give the folder of the MotionBenchMaker set."
 NO_ROBOPLAN = "roboplan is not installed (`pip install rrtik-ompl[peers]`): its figures are missing."
 STORED = "VAMP 0.6.4, stored, inner time, indicative"
@@ -63,12 +62,12 @@ def spheres(options: Options, report: Report) -> None:
         as_checked += _verified_between(problem, rows, PER_RADIAN)
         as_certified += _verified(problem, rows)
         if HAS_ROBOPLAN:
-            peer = roboplan_search(problem, file.parents[2] / "panda_spherized.urdf", options.limit)
+            peer = _peer(problem, options.limit, roboplan.search)
             calls = [timed(lambda peer=peer: peer(options.seed))[0] for _ in range(REPEATS)]
             times["roboplan"].append(min(calls))
         if HAS_VAMP:
-            vamp = vamp_search(problem)
-            calls = [timed(vamp) for _ in range(REPEATS)]
+            theirs = vamp.search(problem)
+            calls = [timed(theirs) for _ in range(REPEATS)]
             times["VAMP, call"].append(min(seconds for seconds, _ in calls))
             times["VAMP, inner"].append(min(inner for _, (_, inner) in calls))
     table = _rows(times, "ours")
@@ -100,7 +99,7 @@ def exact(options: Options, report: Report) -> None:
         problem = exact_problem(options, file)
         if number == 0:
             warm_up(problem)
-        for name, search in _exact_searches(problem, file, options).items():
+        for name, search in _exact_searches(problem, options).items():
             begin = time.perf_counter()
             seconds, rows = timed(lambda search=search: search(options.seed))
             wall += [time.perf_counter() - begin] if name == "plan()" else []
@@ -130,15 +129,21 @@ def exact(options: Options, report: Report) -> None:
         report.note("roboplan", NO_ROBOPLAN)
 
 
-def _exact_searches(problem: Problem, file: Path, options: Options) -> dict[str, Callable[[int], Matrix | None]]:
+def _exact_searches(problem: Problem, options: Options) -> dict[str, Callable[[int], Matrix | None]]:
     searches = {
         "ours, 32 checks per radian": our_search(problem, seconds=options.limit, per_radian=PER_RADIAN),
         "ours, own rule": our_search(problem, seconds=options.limit),
         "plan()": _whole_plan(problem, options),
     }
     if HAS_ROBOPLAN:
-        searches["roboplan"] = roboplan_search(problem, file.parents[2] / "panda.urdf", options.limit)
+        searches["roboplan"] = _peer(problem, options.limit, roboplan.search)
     return searches
+
+
+def _peer(problem: Problem, seconds: float, search: Callable[[Task], Search]) -> Search:
+    """A peer's search, its files read."""
+    with TemporaryDirectory() as folder:
+        return search(task_of(problem, Path(folder), seconds))
 
 
 def _whole_plan(problem: Problem, options: Options) -> Callable[[int], Matrix | None]:
@@ -165,8 +170,8 @@ def callbacks(options: Options, report: Report) -> None:
             warm_up(problem)
         searches = {
             "ours": our_search(problem, seconds=CALLBACK_LIMIT, per_radian=PER_RADIAN),
-            "with broadphase": callback_search(problem, broadphase=True, seconds=CALLBACK_LIMIT),
-            "plain": callback_search(problem, broadphase=False, seconds=CALLBACK_LIMIT),
+            "with broadphase": _peer(problem, CALLBACK_LIMIT, partial(ompl_callback.search, broadphase=True)),
+            "plain": _peer(problem, CALLBACK_LIMIT, ompl_callback.search),
         }
         for name, search in searches.items():
             seconds, rows = timed(lambda search=search: search(options.seed))

@@ -25,11 +25,15 @@ def bench(
     views: Annotated[int, typer.Option(help="3-D views at most.", min=0)] = 12,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of a table.")] = False,
 ) -> int:
-    """Run a benchmark; a run that crashes, hangs or takes too much memory is a failed run and no more."""
+    """Run a benchmark; a run that crashes, hangs or takes too much memory is a failed run and no more.
+
+    Exit code 1 if every run of some planner ended with an error, as with a parameter that it cannot use.
+    """
     from rrtik_ompl.benchmark.campaign import Progress, run_campaign
     from rrtik_ompl.benchmark.report import write_report
+    from rrtik_ompl.benchmark.statistics import always_refused
     from rrtik_ompl.benchmark.suite import load_suite
-    from rrtik_ompl.benchmark.tables import terminal_table
+    from rrtik_ompl.benchmark.tables import failures, terminal_table
     from rrtik_ompl.fast import warm_up
 
     campaign = load_suite(suite, folder=problems, runs=runs)
@@ -59,5 +63,6 @@ def bench(
     else:
         counts = ", ".join(f"{number} {status}" for status, number in outcomes.items())
         say(terminal_table(results), f"this round: {counts or 'no runs were left'}")
+        say(*(f"{problem}, {planner}: {number} x {why}" for problem, planner, number, why in failures(results)))
         say(*(f"wrote {each}" for each in files))
-    return 0
+    return 1 if always_refused(results) else 0

@@ -160,14 +160,20 @@ def test_the_database_is_sound_and_has_ompls_columns_and_ours(campaign):
         columns = {row[1] for row in base.execute("PRAGMA table_info(runs)")}
         names = [row[0] for row in base.execute("SELECT name FROM plannerConfigs")]
         times = base.execute("SELECT time FROM runs ORDER BY time").fetchall()
+        (clear,) = base.execute("SELECT COUNT(*) FROM runs WHERE solution_clearance > 0").fetchone()
+        (strict,) = base.execute("SELECT SUM(correct_solution_strict) FROM runs").fetchone()
         (solved,) = base.execute("SELECT COUNT(*) FROM runs WHERE solved = 1 AND status = 6").fetchone()
     ompls = {"time", "memory", "solved", "status", "solution_length", "simplified_solution_length", "graph_states"}
+    ompls |= {
+        f"{first}solution_{name}" for first in ("", "simplified_") for name in ("clearance", "smoothness", "segments")
+    }
+    ompls |= {f"{first}correct_solution{last}" for first in ("", "simplified_") for last in ("", "_strict")}
     assert ompls | {"transitions", "simplified_transitions", "checked_motions", "iterations", "total_time"} <= columns
     assert names == ["geometric_bicrdt", "geometric_RRTConnect", "geometric_short_steps"]
     np.testing.assert_allclose(
         [time for (time,) in times], sorted(r["plan_seconds"] for r in read_records(campaign / NAME)), rtol=1e-8
     )
-    assert solved == TOTAL
+    assert solved == clear == strict == TOTAL
 
 
 def test_ompls_own_planners_are_logged_like_ompl_logs_them(campaign):
@@ -262,6 +268,24 @@ def test_the_page_needs_no_other_file_but_the_views_that_it_links_to(campaign):
         assert "<svg" in (campaign / f"{name}.svg").read_text()
 
 
+def test_the_results_of_the_readme_are_written_from_campaigns(campaign, tmp_path, monkeypatch, capsys):
+    monkeypatch.syspath_prepend(str(Path(__file__).parent.parent / "bench"))
+    import results_page
+
+    readme = tmp_path / "README.md"
+    readme.write_text(f"before\n{results_page.BEGIN}\nold\n{results_page.END}\nafter\n")
+    for _ in range(2):  # a second time it takes the place of the first
+        monkeypatch.setattr("sys.argv", ["results_page.py", str(campaign), "--readme", str(readme)])
+        results_page.main()
+    text = readme.read_text()
+    assert text.startswith("before\n<!--")
+    assert text.endswith("-->\nafter\n")
+    assert "old" not in text
+    assert text.count("| bicrdt | 3 / 3 / 3 |") == 1
+    assert text.count("Written by `rrtik bench two --runs 3 --jobs 2`") == 1
+    assert re.search(r"^\| planar/joints \| 4 \|$", text, re.M)
+
+
 def test_paths_that_came_after_the_time_limit_are_counted(campaign):
     done, head = results(read_records(campaign / NAME)), read_head(campaign / NAME)
     assert "after the limit" not in remark(done, head)
@@ -294,8 +318,9 @@ def test_planners_that_crash_hang_quit_or_eat_the_memory_do_not_end_a_campaign(t
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
     env = {**os.environ, "PYTHONPATH": path}
     process = command("bench", suite, "--out", tmp_path / "out", "--views", 0, "--jobs", 2, env=env)
-    _, errors = process.communicate(timeout=120)
-    assert (process.returncode, errors) == (0, "")
+    said, errors = process.communicate(timeout=120)
+    assert (process.returncode, errors) == (1, "")  # for one of them never did anything but raise
+    assert "planar3_a, raiser: 1 x error: ValueError: no idea" in said.splitlines()
     outcomes = {
         record["planner"]: (record["status"], record["reason"]) for record in read_records(tmp_path / "out" / NAME)
     }
@@ -357,6 +382,12 @@ def test_where_the_disk_is_full_all_records_before_stay_whole(tmp_path):
     with RecordFile(file, head) as out:
         out.append({**record, "run": 99})
     assert [each["run"] for each in read_records(file)] == [*kept, 99]
+
+
+def test_two_campaigns_do_not_write_one_file(suite, tmp_path, capsys):
+    with RecordFile(tmp_path / NAME, {"version": 1, "suite": load_suite(suite).plain()}):
+        assert run(["bench", str(suite), "--out", str(tmp_path), "--resume"]) == 2
+    assert f"{NAME}: another campaign is writing it" in capsys.readouterr().err
 
 
 def _append(out, records):
@@ -424,6 +455,15 @@ def test_a_typo_in_a_suite_is_one_line_that_names_its_place(tmp_path, capsys, ol
     assert not (tmp_path / "out").exists()
 
 
+def test_a_parameter_of_the_wrong_kind_is_told_and_the_other_planners_run(tmp_path, capsys):
+    file = tmp_path / "s.yaml"
+    file.write_text(SUITE.replace("range: 0.3", "range: soon").replace("runs: 3", "runs: 1"))
+    assert run(["bench", str(file), "--out", str(tmp_path / "out"), "--views", "0"]) == 1
+    said = capsys.readouterr().out
+    assert "planar3_a, short steps: 1 x error: planner RRTConnect: parameter range cannot be 'soon'" in said
+    assert "this round: 4 solved, 2 error" in said
+
+
 def test_a_scheduler_that_does_not_answer_is_one_line(suite, tmp_path, capsys, monkeypatch):
     pytest.importorskip("distributed", reason="needs Dask: pip install 'rrtik-ompl[cluster]'")
     monkeypatch.setattr("rrtik_ompl.benchmark.spread.CONNECT", 0.3)
@@ -476,7 +516,8 @@ def test_shipped_suites_name_what_there_is(name):
             load_suite(file)
         return
     campaign = load_suite(file)
-    assert campaign.runs * len(campaign.sources) * len(campaign.entrants) >= 100
+    runs = campaign.runs * len(campaign.sources) * len(campaign.entrants)
+    assert f"# {runs:,} runs" in file.read_text()  # its head says what a person lets himself in for
 
 
 def test_suites_are_found_by_name_and_unknown_ones_listed(monkeypatch, capsys):

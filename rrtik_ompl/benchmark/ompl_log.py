@@ -26,10 +26,12 @@ PROPERTIES = {
     "memory REAL": "memory_mb",
     "solution length REAL": "initial_length",
     "solution smoothness REAL": "initial_smoothness",
+    "solution clearance REAL": "initial_clearance",
     "solution segments INTEGER": "initial_segments",
     "simplification time REAL": "shorten_seconds",
     "simplified solution length REAL": "length",
     "simplified solution smoothness REAL": "smoothness",
+    "simplified solution clearance REAL": "clearance",
     "simplified solution segments INTEGER": "segments",
     "graph states INTEGER": "vertices",
     "total time REAL": "total_seconds",
@@ -37,6 +39,19 @@ PROPERTIES = {
     "simplified transitions INTEGER": "transitions",
     "seed INTEGER": "seed",
 }
+# Before them: what became of a run. `plan` returns no path that its second check refuses, so that the first path is
+# correct where there is one; strictly, if four times as many checks as the planner made find nothing either.
+FLAGS = (
+    "solved BOOLEAN",
+    "status ENUM",
+    "outcome ENUM",
+    "approximate solution BOOLEAN",
+    "solution difference REAL",
+    "correct solution BOOLEAN",
+    "correct solution strict BOOLEAN",
+    "simplified correct solution BOOLEAN",
+    "simplified correct solution strict BOOLEAN",
+)
 
 
 def write_logs(found: Sequence[Result], head: Mapping[str, Any], folder: Path) -> list[Path]:
@@ -123,8 +138,7 @@ def _planner(result: Result, entrant: Mapping[str, Any]) -> list[str]:
     taken = (*PROPERTIES.values(),)
     counts = sorted({key for run in result.runs for key in run.get("counts", {}) if key not in taken})
     extra = {f"{_column(key)} REAL": key for key in counts}
-    heads = ("solved BOOLEAN", "status ENUM", "outcome ENUM", "approximate solution BOOLEAN",
-             "correct solution BOOLEAN", "correct solution strict BOOLEAN", *PROPERTIES, *extra)  # fmt: skip
+    heads = (*FLAGS, *PROPERTIES, *extra)
     rows = [[*_flags(run), *(_number(measured(run, key)) for key in (*PROPERTIES.values(), *counts))]
             for run in result.runs]  # fmt: skip
     return [
@@ -140,9 +154,13 @@ def _planner(result: Result, entrant: Mapping[str, Any]) -> list[str]:
 
 
 def _flags(run: Mapping[str, Any]) -> list[str]:
+    """Values of ``FLAGS``; a run without a path has those of a solution empty, as OMPL does not write them then."""
     status = {SOLVED: EXACT, INVALID: EXACT, NOT_FOUND: TIMEOUT}.get(run["status"], CRASH)
     found, valid = run["status"] in (SOLVED, INVALID), run["status"] == SOLVED
-    return [*map(str, (int(found), status, STATUSES.index(run["status"]), 0, int(valid), int(valid)))]
+    strict = (run.get("initial_strict", False), valid and run.get("strict", False))
+    outcome = (int(found), status, STATUSES.index(run["status"]))
+    solution = (0, 0, 1, int(strict[0]), int(valid), int(strict[1])) if found else ("",) * 6
+    return [*map(str, (*outcome, *solution))]
 
 
 def _number(value: float | None) -> str:

@@ -5,6 +5,7 @@ An interruption can leave nothing worse than half a line at the end, which is cu
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 from collections.abc import Iterator, Mapping
@@ -66,7 +67,7 @@ class RecordFile:
         head: Its first line.
 
     Raises:
-        InputError: If it cannot be written.
+        InputError: If it cannot be written, or another process is writing it.
     """
 
     def __init__(self, file: Path, head: Mapping[str, Any]) -> None:
@@ -74,7 +75,13 @@ class RecordFile:
         make_folder(file.parent)
         try:
             self._file = open(file, "ab", buffering=0)  # noqa: SIM115 - closed by __exit__
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             self._cut_half_line()
+        except BlockingIOError:
+            self._file.close()
+            raise InputError(
+                f"{file}: another campaign is writing it; wait for its end, or choose another --out"
+            ) from None
         except OSError as error:
             raise self._failed(error) from error
         if self._end == 0:

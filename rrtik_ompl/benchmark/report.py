@@ -25,11 +25,7 @@ def write_report(file: Path, *, views: int = VIEWS) -> tuple[list[Result], list[
     Raises:
         InputError: If the records cannot be read, or there are none, or a file cannot be written.
     """
-    folder, head = file.parent, records.read_head(file)
-    found = results(records.read_records(file))
-    if not found:
-        raise InputError(f"{file}: holds no runs yet")
-    found = _in_order(file, found, head)
+    folder, (head, found) = file.parent, read_campaign(file)
     total = sum(result.total for result in found)
     ompl_log.write_database(ompl_log.write_logs(found, head, folder / "logs"), folder / ompl_log.DATABASE, total)
     write_text(folder / "summary.md", tables.markdown(found, head))
@@ -39,6 +35,18 @@ def write_report(file: Path, *, views: int = VIEWS) -> tuple[list[Result], list[
     shown = page.draw_views(chosen, head, folder / "views")
     write_text(folder / "index.html", page.html(found, head, pictures, shown))
     return found, [folder / name for name in ("index.html", "summary.md", "summary.csv", ompl_log.DATABASE)]
+
+
+def read_campaign(file: Path) -> tuple[records.Record, list[Result]]:
+    """The head of a file of records, and what was measured, in the order in which the suite names it.
+
+    Raises:
+        InputError: If the records cannot be read, or there are none.
+    """
+    head, found = records.read_head(file), results(records.read_records(file))
+    if not found:
+        raise InputError(f"{file}: holds no runs yet")
+    return head, _in_order(file, found, head)
 
 
 def _in_order(file: Path, found: list[Result], head: records.Record) -> list[Result]:

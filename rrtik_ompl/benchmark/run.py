@@ -15,9 +15,12 @@ from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning import plan
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.shortening import shorten
+from rrtik_ompl.world import World
 
 SOLVED, NOT_FOUND, INVALID, ERROR = "solved", "not found", "invalid", "error"
 OUT_OF_MEMORY, CRASH, HANG = "out of memory", "crash", "hang"
+STRICT = 4.0  # times as many checks as planners make; OMPL's own figure for "strictly correct"
+LOOKED_AT = 8  # waypoints at most for a path's clearance
 STATUSES = (SOLVED, NOT_FOUND, INVALID, ERROR, OUT_OF_MEMORY, CRASH, HANG)
 
 
@@ -33,10 +36,11 @@ def execute(job: Mapping[str, Any]) -> dict[str, Any]:
     """Do a job; whatever goes wrong in Python is an outcome.
 
     Args:
-        job: As :func:`rrtik_ompl.benchmark.campaign.jobs` writes it.
+        job: As :func:`rrtik_ompl.benchmark.campaign.all_jobs` writes it.
 
     Returns:
-        status, reason, and what was measured: seconds, lengths [rad, m], moves, counts of the planner, waypoints.
+        status, reason, and what was measured: seconds, lengths [rad, m], moves, clearance [m], counts of the planner,
+        waypoints.
     """
     try:
         return _measured(job, build(from_plain(job["source"])))
@@ -61,11 +65,14 @@ def _measured(job: Mapping[str, Any], problem: Problem) -> dict[str, Any]:
     begin = time.perf_counter()
     path = _shortened(found.path, problem, job["shorten"], found.seed)
     record |= {"shorten_seconds": time.perf_counter() - begin}
-    faults = path.violations(problem.world)
+    faults = () if path is found.path else path.violations(problem.world)  # plan() has checked what it returns
     if faults or not problem.reached(path.end) or not (path.start == problem.start).all():
         reason = faults[0].reason if faults else "the path does not lead from the start to the goal"
         record |= {"status": INVALID, "reason": reason}
-    return record | _sizes("initial_", found.path) | _sizes("", path) | {"waypoints": path.waypoints.tolist()}
+    final = _sizes(path, problem.world)
+    initial = final if path is found.path else _sizes(found.path, problem.world)
+    record |= {f"initial_{key}": value for key, value in initial.items()}
+    return record | final | {"waypoints": path.waypoints.tolist()}
 
 
 def _shortened(path: JointPath, problem: Problem, method: str, seed: int) -> JointPath:
@@ -75,13 +82,26 @@ def _shortened(path: JointPath, problem: Problem, method: str, seed: int) -> Joi
     return shorten(path, problem, method=chosen, seed=seed)
 
 
-def _sizes(prefix: str, path: JointPath) -> dict[str, float]:
+def _sizes(path: JointPath, world: World) -> dict[str, float | bool | None]:
     return {
-        f"{prefix}length": path.length,
-        f"{prefix}transitions": path.transitions,
-        f"{prefix}segments": len(path.waypoints) - 1,
-        f"{prefix}smoothness": smoothness(path),
+        "length": path.length,
+        "transitions": path.transitions,
+        "segments": len(path.waypoints) - 1,
+        "smoothness": smoothness(path),
+        "clearance": clearance(path, world),
+        "strict": bool(world.refined(STRICT).motion_valid_batch(path.waypoints[:-1], path.waypoints[1:]).all()),
     }
+
+
+def clearance(path: JointPath, world: World) -> float | None:
+    """OMPL's measure [m]: the mean over the waypoints of the distance to contact; None if nothing can collide.
+
+    Of a path with many waypoints some are looked at, evenly, for each takes a millisecond or many.
+    """
+    rows = path.waypoints
+    some = rows[np.unique(np.linspace(0, len(rows) - 1, LOOKED_AT).round().astype(int))]
+    mean = float(np.mean([world.clearance(q) for q in some]))
+    return mean if np.isfinite(mean) else None
 
 
 def smoothness(path: JointPath) -> float:

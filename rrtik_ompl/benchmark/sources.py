@@ -85,8 +85,10 @@ def folder_sources(folder: Path, robot: str | None) -> list[Source]:
         robot: In place of the one that the files name.
 
     Raises:
-        InputError: If there is none.
+        InputError: If there is none, or no such folder.
     """
+    if not folder.is_dir():
+        raise InputError(f"--problems {folder}: no such folder; check the path")
     found = sorted(file for ending in ("yaml", "yml") for file in folder.rglob(f"*.{ending}"))
     found = [file for file in found if not file.name.startswith("request")]
     pairs = {file.parent for file in found if file.name.startswith("scene")}

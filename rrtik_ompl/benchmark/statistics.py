@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rrtik_ompl.benchmark.run import INVALID, SOLVED
+from rrtik_ompl.benchmark.run import ERROR, INVALID, SOLVED
 
 # Name of each quantity, what to call it, its unit. Lengths are Euclidean in joint values; moves are transitions.
 QUANTITIES: Mapping[str, tuple[str, str]] = MappingProxyType(
@@ -25,6 +25,8 @@ QUANTITIES: Mapping[str, tuple[str, str]] = MappingProxyType(
         "length": ("final length", "rad, m"),
         "initial_transitions": ("initial transitions", ""),
         "transitions": ("final transitions", ""),
+        "initial_clearance": ("initial clearance", "m"),
+        "clearance": ("final clearance", "m"),
         "memory_mb": ("memory", "MB"),
     }
 )
@@ -114,6 +116,14 @@ def results(records: Iterable[Mapping[str, Any]]) -> list[Result]:
     for result in found.values():
         result.runs.sort(key=lambda run: (run["problem"], run["run"]))
     return list(found.values())
+
+
+def always_refused(found: Iterable[Result]) -> list[str]:
+    """Planners of which every run ended with an error, as one does that is given a parameter it cannot use."""
+    statuses: dict[str, set[str]] = {}
+    for result in found:
+        statuses.setdefault(result.planner, set()).update(run["status"] for run in result.runs)
+    return [planner for planner, each in statuses.items() if each == {ERROR}]
 
 
 def by_label(found: Iterable[Result]) -> dict[str, list[Result]]:

@@ -50,16 +50,16 @@ def terminal_table(results: Iterable[Result]) -> Any:
 def markdown(results: Sequence[Result], head: Mapping[str, Any]) -> str:
     """A page: what was run where, the overview, what failed and why, and one table for each quantity."""
     suite = head["suite"]
-    lines = [f"# {suite['title']}", "", conditions(results, head), "", *_markdown_table(OVERVIEW, overview(results))]
+    lines = [f"# {suite['title']}", "", conditions(results, head), "", *markdown_table(OVERVIEW, overview(results))]
     lines += ["", remark(results, head)]
     broken = failures(results)
     if broken:
-        lines += ["", "## Runs that broke", "", *_markdown_table(("problem", "planner", "runs", "why"), broken)]
+        lines += ["", "## Runs that broke", "", *markdown_table(("problem", "planner", "runs", "why"), broken)]
     for quantity, (name, unit) in QUANTITIES.items():
         rows = [(r.label, r.planner, *map(figure, s)) for r in results if (s := r.spread(quantity)) is not None]
         if rows:
             title = f"## {name}{f' [{unit}]' if unit else ''}"
-            lines += ["", title, "", *_markdown_table(("problem", "planner", *OF_A_SPREAD), rows)]
+            lines += ["", title, "", *markdown_table(("problem", "planner", *OF_A_SPREAD), rows)]
     return "\n".join([*lines, ""])
 
 
@@ -67,9 +67,11 @@ def conditions(results: Iterable[Result], head: Mapping[str, Any]) -> str:
     """What a reader must know, in a paragraph."""
     suite, machine = head["suite"], head["machine"]
     runs = 1 + max(run["run"] for result in results for run in result.runs)
+    spread = "--scheduler ADDRESS" if machine["at a time"] == "a cluster" else f"--jobs {machine['at a time']}"
+    command = f"rrtik bench {suite['name']} --runs {runs} {spread}"
     versions = ", ".join(f"{name} {machine[name]}" for name in ("rrtik-ompl", "ompl", "pin", "coal", "numpy", "python"))
     return (
-        f"Written by `rrtik bench {suite['name']}`: {runs} runs of each planner on each problem, "
+        f"Written by `{command}`: {runs} runs of each planner on each problem, "
         f"{suite['seconds']:g} s each, {suite['memory_mb']:g} MB, seed {suite['seed']}. {machine['processor']}, "
         f"{machine['cores']} cores, {machine['at a time']} at a time, {machine['system']}; {versions}; "
         f"begun {machine['begun']}."
@@ -123,6 +125,7 @@ def _two(spread: Spread | None) -> str:
     return "-" if spread is None else f"{figure(spread.median)} / {figure(spread.p95)}"
 
 
-def _markdown_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Lines of a table in Markdown."""
     cells = (" | ".join(text.replace("|", "\\|") for text in row) for row in rows)
     return ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads), *(f"| {row} |" for row in cells)]
