@@ -17,6 +17,7 @@ from rrtik_ompl.ik.batch import solve_ik_batch
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.pilot.approach import approaches
 from rrtik_ompl.pilot.clearance import tightest
+from rrtik_ompl.pilot.follower import slack
 from rrtik_ompl.pilot.moves import planned
 from rrtik_ompl.pilot.way_search import STEADY, Last, WaySearch
 from rrtik_ompl.transitions import SAME
@@ -59,7 +60,7 @@ class Route:
 
 def route_to(world: World, q: Vector, goal: Vector, rates: Vector, seed: int) -> Route | str:
     """A route to a configuration, or the reason why there is none."""
-    return _route(world, world, q, [[_settled(goal, q)[None]]], rates, seed)
+    return _route(world, world, q, [[_settled(world, goal, q)[None]]], rates, seed)
 
 
 def route_to_grasp(
@@ -90,7 +91,7 @@ def _last_parts(
     at = solve_ik_batch(world.robot, [stages[1].homogeneous], near=near, world=holding, seed=seed)
     if not at.found[0]:
         return f"the grasp: {at.reasons[0] or 'not to be reached'}"
-    grasp = _settled(at.q[0], q)
+    grasp = _settled(holding, at.q[0], q)
     short = approaches(world, holding, grasp, stages, BEGINNINGS)
     if short:
         return short
@@ -101,9 +102,14 @@ def _last_parts(
     return f"from before the object to it: {last}" if isinstance(last, str) else [[last]]
 
 
-def _settled(goal: Vector, q: Vector) -> Vector:
-    """A goal whose joints that need not move do not: inverse kinematics leaves traces of rounding."""
-    return np.where(np.abs(goal - q) <= SAME, q, goal)
+def _settled(world: World, goal: Vector, q: Vector) -> Vector:
+    """A goal whose joints that are near enough already need not move, if that is free; else nearly so.
+
+    Near enough is what the pilot is held to in following; inverse kinematics leaves traces of rounding.
+    """
+    small = slack(JointPath.of(world.robot, q[None]))
+    loose, exact = (np.where(np.abs(goal - q) <= near, q, goal) for near in (small, SAME))
+    return loose if world.valid(loose) else exact
 
 
 def _route(world: World, holding: World, q: Vector, lasts: Sequence[Last], rates: Vector, seed: int) -> Route | str:

@@ -19,7 +19,7 @@ from rrtik_ompl.pilot.arguments import LONGEST, fitting
 from rrtik_ompl.pilot.arm import Arm, joint_rates
 from rrtik_ompl.pilot.follower import Follower, Progress, still_free
 from rrtik_ompl.pilot.lamps import Lamp, lamps, stage_poses
-from rrtik_ompl.pilot.manoeuvre import Verdict, free_range, free_until, judge_move
+from rrtik_ompl.pilot.manoeuvre import Verdict, advice_to_get_free, free_range, free_until, judge_move
 from rrtik_ompl.pilot.record import Record
 from rrtik_ompl.pilot.route import Route, route_to, route_to_grasp
 from rrtik_ompl.pilot.surroundings import Surroundings
@@ -164,6 +164,8 @@ class Session:
     def _send(self, joint: int, target: float) -> str:
         self.verdict = judge_move(self.surroundings.world, self.q, joint, target)
         if not self.verdict.allowed:
+            if not self.surroundings.world.valid(self.q):
+                return f"refused: {self.verdict.reason}"
             room = free_until(self.surroundings.world, self.q, joint, target)
             value, unit = reading(room, joint_unit(self.robot.prismatic[joint]))
             return f"refused: {self.verdict.reason}; free until {value:.4g} {unit}"
@@ -213,7 +215,8 @@ class Session:
         if isinstance(found, str):
             self.route = self.follower = self.progress = None
             self.mode = CHOOSING if self.choice else MANOEUVRE
-            return f"no route: {found}" + ("; choose another grasp" if self.choice else "")
+            otherwise = "choose another grasp" if self.choice else "drive the arm elsewhere, or choose an object"
+            return f"no route: {found}; {advice_to_get_free(self.surroundings.world, self.q) or otherwise}"
         self.route, self.mode = found, PROPOSED
         self.follower, self.progress = Follower(found.path, self.rates), None
         self.desired = frozen(found.path.end)
