@@ -42,6 +42,14 @@ class Surroundings:
         """What is known of an object, None if it was never seen."""
         return self._seen.get(name)
 
+    def places(self) -> list[dict[str, Any]]:
+        """What is known to be there as plain values: names, positions and rotation matrices, for a record.
+
+        Matrices and not quaternions: a replay has to find the same routes, to the last bit.
+        """
+        poses = [(each.object.name, each.T_base_object) for each in self.seen]
+        return [{"name": name, "xyz": T.translation.tolist(), "rotation": T.rotation.tolist()} for name, T in poses]
+
     def see(self, objects: Sequence[SeenObject]) -> bool:
         """Take in what the camera sees; True if something moved or is new, so that the world is another one."""
         news = [each for each in objects if self._moved(each)]
