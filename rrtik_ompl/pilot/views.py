@@ -55,13 +55,13 @@ class CameraView:
         return drawn
 
     def _depth_aids(self, drawn: NDArray[np.uint8], T_base_camera: Any) -> None:
-        """A line from the tool to the chosen object with its length, and one straight down from the tool."""
+        """A line from the tool to the chosen grasp or object with its length, and one straight down from the tool."""
         session = self._session
         tip = session.robot.fk(session.q).translation
         seen = None if session.target is None else session.surroundings.named(session.target)
         if seen is None:
             return
-        goal = seen.T_base_object.translation
+        goal = (*_chosen(session), seen.T_base_object)[0].translation
         ends = np.stack([tip, goal, [tip[0], tip[1], goal[2]]])
         points = ends @ T_base_camera.rotation - T_base_camera.rotation.T @ T_base_camera.translation
         if (points[:, 2] < 0.05).any():

@@ -233,6 +233,7 @@ function showRoute() {
   if (!route) { if (list.children.length) list.replaceChildren(); list.dataset.key = ""; set(byId("route_numbers"), ""); return; }
   const clear = route.clearance_mm === null ? "" : ` · ${fixed(route.clearance_mm, 0)} mm clear`;
   set(byId("route_numbers"), `${route.moves.length} · ${fixed(route.travel, 0)}° · ${fixed(route.seconds, 0)} s${clear} · ${fixed(100 * route.steady, 0)} % safe at ±1°`);
+  byId("route_numbers").title = `joints: ${route.joints.join(", ").replaceAll("_", " ")}`;
   const key = JSON.stringify(route.moves.map((move) => move.text));
   if (list.dataset.key !== key) { list.dataset.key = key; list.replaceChildren(...route.moves.map((move) => make("li", { ariaLabel: move.text }, inShort(move)))); list.scrollTop = 0; }
   route.moves.forEach((move, k) => {
@@ -255,18 +256,16 @@ function inShort(move) {
   return `${move.joint.replaceAll("_", " ")} ${move.to > move.from ? "▲" : "▼"} ${fixed(Math.abs(move.to - move.from), digits)}${sign} to ${fixed(move.to, digits)}${sign}`;
 }
 
-const aheadOrBehind = (value) => value < 0 ? "behind" : "ahead";
-
 function showAim() {
   const aim = state.aim, metres = (value) => `${fixed(Math.abs(value), 3)} m`;
   const rows = [["tip x, y, z [m]", aim.tip.map((value) => fixed(value, 2)).join("  ")]];
-  if (aim.to) rows.push([`to ${aim.to}`, metres(aim.distance)], [`${aheadOrBehind(aim.ahead)} the tool`.replace("ahead", "ahead of"), metres(aim.ahead)],
+  if (aim.to) rows.push([`to ${aim.to}`, metres(aim.distance)], [aim.ahead < 0 ? "behind the tool" : "ahead of the tool", metres(aim.ahead)],
     ["aside of its axis", metres(aim.aside)], [aim.xyz[2] < 0 ? "lower" : "higher", metres(aim.xyz[2])], ["turned away by", `${fixed(aim.turn_deg)}°`]);
   for (const seen of state.objects) rows.push([`${seen.name} seen to within`, `± ${fixed(seen.sigma_mm, 2)} mm`]);
   const list = byId("depth"), key = rows.map((row) => row[0]).join();
   if (list.dataset.key !== key) { list.dataset.key = key; list.replaceChildren(...rows.flatMap(([name]) => [make("dt", {}, name), make("dd")])); }
   rows.forEach(([, value], k) => set(list.children[2 * k + 1], value));
-  set(byId("numbers"), aim.to ? `${aim.to}\n${metres(aim.distance)} away\n${metres(aim.ahead)} ${aheadOrBehind(aim.ahead)}\n${metres(aim.aside)} aside` : "");
+  set(byId("numbers"), aim.to ? `${aim.to}\n${metres(aim.distance)} away\n${metres(aim.ahead)} ${aim.ahead < 0 ? "behind" : "ahead"}\n${metres(aim.aside)} aside` : "");
 }
 
 function showButtons() {
