@@ -17,7 +17,6 @@ from rrtik_ompl.problem import Problem
 from rrtik_ompl.shortening.fewest_moves import turning_limits
 from rrtik_ompl.shortening.move_lattice import MoveLattice
 from rrtik_ompl.shortening.move_values import Values, lattice_size, spread_values, values_of
-from rrtik_ompl.transitions import transitions
 from rrtik_ompl.world import World
 
 SECONDS = 2.0
@@ -41,7 +40,7 @@ def direct_routes(world: World, start: Vector, goal: Vector, orders: Sequence[Se
 
 
 def detours(world: World, start: Vector, goal: Vector, order: Sequence[int], rng: np.random.Generator) -> list[Matrix]:
-    """Routes in which one joint takes further values on its way: those of the fewest moves; see `direct_routes`."""
+    """Routes in which one joint takes further values on its way, for each joint the best; see `direct_routes`."""
     ends = np.array([start, goal])
     if lattice_size(values_of(ends)) > MOST_CORNERS:
         return []
@@ -52,8 +51,7 @@ def detours(world: World, start: Vector, goal: Vector, order: Sequence[int], rng
         further = spread_values(float(lower[joint]), float(upper[joint]), FURTHER_VALUES, rng)
         values[joint] = np.union1d(values[joint], further)
         found += _routes(world, start, goal, values, [order])
-    fewest = min((transitions(route) for route in found), default=0)
-    return [route for route in found if transitions(route) == fewest]
+    return found
 
 
 def planned(world: World, start: Vector, goal: Vector, seed: int) -> Matrix | str:
