@@ -6,7 +6,7 @@ import pytest
 
 from rrtik_ompl import load_robot
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.overlay.augment import Augmenter, Ghost
+from rrtik_ompl.overlay.augment import LAYERS_KEPT, Augmenter, Ghost
 from rrtik_ompl.overlay.canvas import FAR, Canvas
 from rrtik_ompl.overlay.figure import figure_of, placed
 from rrtik_ompl.overlay.gods_eye import eye_at, imagined_camera, sky
@@ -130,6 +130,24 @@ def test_what_lies_behind_the_camera_is_not_drawn():
     robot, grey = load_robot("ur5"), np.full((480, 640, 3), 120, np.uint8)
     out = Augmenter(robot, CAMERA).draw(grey, away, np.zeros(6), trail=np.zeros((5, 3)), frames=[pose([0, 0, 0.1])])
     assert (out == 120).all()
+
+
+def test_what_is_kept_from_picture_to_picture_is_what_would_be_drawn_anew():
+    robot, grey = load_robot("titan4"), np.full((480, 640, 3), 120, np.uint8)
+    kept = Augmenter(robot, CAMERA)
+    with pytest.raises(InputError, match="draw a picture first"):
+        kept.depths()
+    postures = np.random.default_rng(0).uniform(-0.5, 0.5, (LAYERS_KEPT + 2, 6))
+    for q in postures:
+        kept.draw(grey, EYE, q)
+    aside = eye_at([0.8, 0.0, 0.2], 2.5, np.radians(-60.0), np.radians(25.0))
+    first, last = postures[0], postures[-1]
+    for q, eye, color in [(last, EYE, None), (first, EYE, None), (last, aside, None), (last, EYE, "#00ff00")]:
+        box = [Obstacle("box", Box([0.3, 0.3, 0.3]), pose([0.6, float(q[0]), 0.2]))]
+        new = Augmenter(robot, CAMERA)
+        pictures = [each.draw(grey, eye, q, obstacles=box, color=color) for each in (kept, new)]
+        assert np.array_equal(*pictures)
+        assert np.array_equal(kept.depths(), new.depths())
 
 
 def test_the_eye_looks_at_its_centre_with_the_world_upright():

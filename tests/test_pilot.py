@@ -13,7 +13,7 @@ from rrtik_ompl.path import JointPath
 from rrtik_ompl.pilot.arm import SimulatedArm, joint_rates
 from rrtik_ompl.pilot.follower import REACTION, Follower
 from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED, lamps, stage_poses
-from rrtik_ompl.pilot.manoeuvre import free_until, judge_move
+from rrtik_ompl.pilot.manoeuvre import free_until, judge_move, way_out
 from rrtik_ompl.pilot.record import Record, read_record
 from rrtik_ompl.pilot.session import CHOOSING, FOLLOWING, MANOEUVRE, PROPOSED, Session
 from rrtik_ompl.pilot.surroundings import Surroundings, gripper_links
@@ -109,6 +109,27 @@ def test_little_room_is_warned_of():
     assert 0.0 <= verdict.clearance < 0.02
 
 
+def test_an_arm_that_touches_something_may_go_out_of_it_and_no_deeper():
+    q = np.array(PROBLEM.goal.q)
+    q[2] = free_until(WORLD, q, 2, float(ROBOT.lower[2])) - np.radians(0.5)
+    assert not WORLD.valid(q)
+    joint, target = way_out(WORLD, q)
+    end = q.copy()
+    end[joint] = target
+    assert WORLD.valid(end)
+    assert judge_move(WORLD, q, joint, target).warnings == ("out of contact",)
+    deeper = judge_move(WORLD, q, 2, q[2] - np.radians(1.0))
+    assert not deeper.allowed
+    assert "does not get it free" in deeper.reason
+    made = Session(PROBLEM, SimulatedArm(ROBOT, q), seed=1)
+    assert f"{ROBOT.joint_names[joint]} to" in made.command("plan", 0.0)
+    made.command("select", 0.1, joint=joint)
+    assert "out of contact" in made.command("move", 0.2, target=target)
+    made.arm.advance(10.0)
+    made.tick(1.0)
+    assert "moves" in made.command("plan", 1.1)
+
+
 # --- lamps -------------------------------------------------------------------------------------------------------
 
 
@@ -184,6 +205,14 @@ def test_moves_are_followed_in_their_order_with_advice_in_time():
     assert following.update(CORNERS[2]).move == 2
     assert following.update(CORNERS[3]).advice == "done"
     assert following.done
+
+
+def test_a_move_shorter_than_the_tolerance_has_to_be_made_all_the_same():
+    rows = np.zeros((3, 6))
+    rows[1:, 0], rows[2:, 1] = np.radians(0.8), 0.5
+    following = Follower(JointPath.of(ROBOT, rows), joint_rates(ROBOT))
+    assert following.update(rows[0]).move == 0
+    assert following.update(rows[1]).move == 1
 
 
 def test_the_wrong_joint_or_the_wrong_way_is_lost_and_named():

@@ -123,7 +123,9 @@ def test_without_the_token_there_is_neither_page_nor_socket():
         for path in ("/", "/ws"):
             more = UPGRADE if path == "/ws" else {}
             for query in ("", "?token=", "?token=wrong", f"?token={TOKEN[:-1]}", "?token=%C3%A9"):
-                assert answer(server, path + query, **more).status == 403, query
+                refusal = answer(server, path + query, **more)
+                assert refusal.status == 403, query
+                assert "the token is missing or wrong" in refusal.read().decode()
             assert answer(server, f"{path}?token={TOKEN}", **more).status in (101, 200)
 
 

@@ -19,6 +19,7 @@ from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED
 from rrtik_ompl.pilot.line_arm import LineServer
 from rrtik_ompl.pilot.scenario import find_scenario, load_scenario
 from rrtik_ompl.pilot.setup import Wanted, open_session
+from rrtik_ompl.poses import pose
 from rrtik_ompl.sensing.pictures import CameraLostError, Picture
 
 FOLDER = find_problem("titan4_sdu").parent / "pilot"
@@ -125,6 +126,19 @@ def test_pictures_of_the_past_come_as_far_apart_as_they_were_taken():
     with pytest.raises(CameraLostError, match="the last one stays"):
         until(lambda: feed.latest() is not None, 2.0)
     feed.close()
+
+
+def test_a_simulated_picture_follows_the_arm_and_the_objects_and_is_never_without_noise():
+    engine = open_session(Wanted("titan4_sdu")).engine
+    camera, start = engine.eyes._source._camera, np.array(load_problem("titan4_sdu").start)
+    still = camera.picture(start, 0.0).pixels.astype(int)
+    assert 1.0 < np.abs(camera.picture(start, 1.0 / 30.0).pixels - still).mean() < 3.0
+    moved = start.copy()
+    moved[0] += 0.2
+    assert (np.abs(camera.picture(moved, 0.0).pixels - still) > 20).any(axis=2).sum() > 1000
+    assert np.array_equal(camera.picture(start, 0.0).pixels, still)
+    camera.places["valve"] = camera.places["valve"] * pose([0.0, 0.1, 0.0])
+    assert (np.abs(camera.picture(start, 0.0).pixels - still) > 20).any(axis=2).sum() > 1000
 
 
 def test_a_folder_of_images_drives_a_session(tmp_path):

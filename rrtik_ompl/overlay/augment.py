@@ -24,7 +24,7 @@ from rrtik_ompl.sensing.camera import Camera
 from rrtik_ompl.viewer import palette
 
 GHOST_TRIANGLES = 5_000
-FIGURES_KEPT = 4
+FIGURES_KEPT, LAYERS_KEPT = 4, 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,6 +34,44 @@ class Ghost:
     q: Vector
     color: str = palette.GOAL
     opacity: float = 0.35
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Layer:
+    """What was drawn on a canvas, ready to be laid over pictures.
+
+    Attributes:
+        depths: Along the optical axis [m], shape (height, width).
+        drawn: Where something was drawn, shape (height, width).
+        box: The part of the picture that holds all of it.
+        painted: Its colours there: blue, green, red, of something else where nothing was drawn.
+    """
+
+    depths: NDArray[np.float32]
+    drawn: NDArray[np.bool_]
+    box: tuple[slice, slice]
+    painted: NDArray[np.uint8]
+
+    @classmethod
+    def of(cls, canvas: Canvas, color: str | None = None) -> Layer:
+        """What is on a canvas, in its own colours or all in shades of one ('#rrggbb')."""
+        drawn = canvas.drawn
+        left, top, width, height = cv2.boundingRect(drawn.view(np.uint8))
+        box = np.s_[top : top + height, left : left + width]
+        piece = canvas.colors[box]
+        if color is not None and width > 0:
+            tint = np.array(palette.fractions(color), dtype=np.float32)
+            piece = (0.35 + 0.65 * piece.max(axis=2, keepdims=True)) * tint
+        painted = cv2.convertScaleAbs(np.ascontiguousarray(piece[..., ::-1]), alpha=255.0) if width > 0 else piece
+        return cls(canvas.depths.copy(), drawn, box, np.asarray(painted, dtype=np.uint8))
+
+    def blend(self, picture: NDArray[np.uint8], mask: NDArray[np.bool_], opacity: float) -> None:
+        """Lay it over a picture where a mask is, in place."""
+        if self.painted.size == 0:
+            return
+        piece = picture[self.box]
+        mixed = cv2.addWeighted(np.ascontiguousarray(piece), 1.0 - opacity, self.painted, opacity, 0.0)
+        cv2.copyTo(mixed, mask[self.box].view(np.uint8), piece)
 
 
 class Augmenter:
@@ -49,11 +87,11 @@ class Augmenter:
         """
         self.robot, self.camera = robot, camera
         self._canvas = Canvas(camera)
+        self._layers: dict[tuple[Any, ...], Layer] = {}
         self._arm = figure_of(robot_surfaces(robot, triangles))
         self._ghost = figure_of(robot_surfaces(robot, min(triangles, GHOST_TRIANGLES)))
         self._figures: dict[tuple[Any, ...], tuple[tuple[Obstacle, ...], Figure]] = {}
-        self._hidden_for: tuple[Any, Any] = (None, None)
-        self._hidden_by: NDArray[np.float32] | None = None
+        self._last: Layer | None = None
 
     def draw(
         self,
@@ -103,8 +141,14 @@ class Augmenter:
         return np.asarray(drawn, dtype=np.uint8)
 
     def depths(self) -> NDArray[np.float32]:
-        """Depths of the arm and obstacles drawn last, `canvas.FAR` where there was nothing. Shape (height, width)."""
-        return self._canvas.depths.copy()
+        """Depths of the arm and obstacles drawn last, `canvas.FAR` where there was nothing. Shape (height, width).
+
+        Raises:
+            InputError: If nothing was drawn yet.
+        """
+        if self._last is None:
+            raise InputError("depths: draw a picture first")
+        return self._last.depths.copy()
 
     def _draw_arm(
         self,
@@ -117,31 +161,34 @@ class Augmenter:
         color: str | None,
         solids: Figure | None = None,
     ) -> None:
-        self._canvas.clear()
-        if q is not None:
-            shown = placed(arm, T_camera_base @ self._joint_frames(q))
-            self._canvas.draw(shown, both_sides=False)
-        if solids is not None:
-            self._canvas.draw(placed(solids, T_camera_base[None]))
-        mask = self._canvas.drawn if hidden_by is None else self._canvas.drawn & (self._canvas.depths < hidden_by)
-        tint = None if color is None else np.array(palette.fractions(color), dtype=np.float32)
-        _blend(drawn, self._canvas.colors, mask, opacity, tint)
+        self._last = layer = self._layer(arm, q, solids, T_camera_base, color)
+        mask = layer.drawn if hidden_by is None else layer.drawn & (layer.depths < hidden_by)
+        layer.blend(drawn, mask, opacity)
+
+    def _layer(
+        self, arm: Figure | None, q: Vector | None, solids: Figure | None, T: NDArray[np.float64], color: str | None
+    ) -> Layer:
+        """An arm and solids before the camera; kept for some pictures, for most of what is drawn stands still."""
+        key = (arm, None if q is None else np.asarray(q).tobytes(), solids, T.tobytes(), color)
+        if key not in self._layers:
+            self._canvas.clear()
+            if arm is not None and q is not None:
+                self._canvas.draw(placed(arm, T @ self._joint_frames(q)))
+            if solids is not None:
+                self._canvas.draw(placed(solids, T[None]))
+            if len(self._layers) >= LAYERS_KEPT:
+                self._layers.pop(next(iter(self._layers)))
+            self._layers[key] = Layer.of(self._canvas, color)
+        layer = self._layers[key] = self._layers.pop(key)  # the one that was used last is the last to go
+        return layer
 
     def _joint_frames(self, q: Vector) -> NDArray[np.float64]:
         """``T_base_joint`` of all joints at a configuration. Shape (joints + 1, 4, 4)."""
         return np.asarray(self.robot.joint_frames(self.robot.configuration(q)[None])[0])
 
     def _depths(self, real: Sequence[Obstacle], T_camera_base: NDArray[np.float64]) -> NDArray[np.float32] | None:
-        """Depths of solids that hide what is behind them; kept while neither they nor the camera move."""
-        if not real:
-            return None
-        figure = self._figure(real)
-        before, pose = self._hidden_for
-        if figure is not before or not np.array_equal(pose, T_camera_base):
-            self._canvas.clear()
-            self._canvas.draw(placed(figure, T_camera_base[None]))
-            self._hidden_for, self._hidden_by = (figure, T_camera_base), self._canvas.depths.copy()
-        return self._hidden_by
+        """Depths of solids that hide what is behind them."""
+        return self._layer(None, None, self._figure(real), T_camera_base, None).depths if real else None
 
     def _figure(self, obstacles: Sequence[Obstacle]) -> Figure:
         """Triangles of obstacles, kept from picture to picture while they are where they were."""
@@ -174,22 +221,6 @@ class Augmenter:
         for axis, color in enumerate(palette.AXES):
             tip = pose.translation + length * pose.rotation[:, axis]
             self._draw_line(drawn, np.stack([pose.translation, tip]), T_camera_base, color)
-
-
-def _blend(
-    drawn: NDArray[np.uint8], colors: NDArray[np.float32], mask: Any, opacity: float, tint: NDArray[np.float32] | None
-) -> None:
-    """Lay red, green, blue colours over a blue, green, red picture where the mask is, in place."""
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if len(rows) == 0:
-        return
-    box = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    piece = colors[box]
-    if tint is not None:
-        piece = (0.35 + 0.65 * piece.max(axis=2, keepdims=True)) * tint
-    over = cv2.convertScaleAbs(np.ascontiguousarray(piece[..., ::-1]), alpha=255.0)
-    mixed = cv2.addWeighted(np.ascontiguousarray(drawn[box]), 1.0 - opacity, over, opacity, 0.0)
-    np.copyto(drawn[box], mixed, where=mask[box][..., None])
 
 
 def _bgr(color: str) -> tuple[int, int, int]:

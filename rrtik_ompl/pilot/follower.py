@@ -83,7 +83,7 @@ class Follower:
         if lost is not None:
             return lost
         remaining = float(end - q[joint])
-        if abs(remaining) <= self._slack[joint]:
+        if abs(remaining) <= min(self._slack[joint], 0.5 * abs(end - begin)):  # a short move has to be made, too
             self.current += 1
             return self.update(q)
         inside = min(begin, end) - self._slack[joint] <= q[joint] <= max(begin, end) + self._slack[joint]

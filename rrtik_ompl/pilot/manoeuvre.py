@@ -13,12 +13,15 @@ from rrtik_ompl.arrays import Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.ik.singularity import singularity_report
 from rrtik_ompl.moves_text import joint_unit, reading
+from rrtik_ompl.path import JointPath
 from rrtik_ompl.pilot.clearance import tightest
+from rrtik_ompl.pilot.follower import slack
 from rrtik_ompl.world import World
 
 NEAR_SINGULAR = 0.05  # sines of the angles that vanish in a singular posture, metres of a lever
 LITTLE_ROOM = 0.02  # [m]
 LOOKS = 20  # along the move, for the clearance
+WAYS_OUT = (1, 2, 3, 4, 6, 8)  # small errors, by which a joint is driven to get out of contact
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,6 +64,8 @@ def judge_move(world: World, q: Vector, joint: int, target: float) -> Verdict:
     if fault:
         return Verdict(False, fault, (), -np.inf)
     end = robot.clamp(end)
+    if not world.valid(start):
+        return _out_of_contact(world, start, end)
     if not world.motion_valid(start, end):
         return Verdict(False, _obstruction(world, start, end, joint), (), -np.inf)
     share = np.linspace(0.0, 1.0, LOOKS)[:, None]
@@ -103,6 +108,42 @@ def free_range(world: World, q: Vector, joint: int) -> tuple[float, float]:
             ((robot.lower[joint], -2.0 * np.pi), (robot.upper[joint], 2.0 * np.pi))]  # fmt: skip
     low, high = (free_until(world, q, joint, float(end)) for end in ends)
     return low, high
+
+
+def way_out(world: World, q: Vector) -> tuple[int, float] | None:
+    """The joint, and where to drive it [rad or m], that gets an arm that touches something free again; None if none.
+
+    Of all single joints the one that has to go least far, a few small errors' width at most.
+    """
+    small = slack(JointPath.of(world.robot, q[None]))
+    for far in WAYS_OUT:
+        for joint, step in enumerate(far * small):
+            for target in (q[joint] + step, q[joint] - step):
+                if judge_move(world, q, joint, float(target)).allowed:
+                    return joint, float(target)
+    return None
+
+
+def advice_to_get_free(world: World, q: Vector) -> str:
+    """What a pilot is told whose arm touches something; "" if it does not."""
+    if world.valid(q):
+        return ""
+    out = way_out(world, q)
+    if out is None:
+        return "drive the arm out of it first"
+    value, unit = reading(out[1], joint_unit(world.robot.prismatic[out[0]]))
+    return f"{world.robot.joint_names[out[0]]} to {value:.4g} {unit} gets it free"
+
+
+def _out_of_contact(world: World, start: Vector, end: Vector) -> Verdict:
+    """An arm that touches something may go where it touches ever less, and then nothing."""
+    rows = start + np.linspace(0.0, 1.0, LOOKS)[:, None] * (end - start)
+    room = np.array([world.clearance(row) for row in rows])
+    free = int(np.argmax(room > 0.0))
+    if room[-1] <= 0.0 or (np.diff(room[: free + 1]) <= 0.0).any() or not world.motion_valid(rows[free], end):
+        return Verdict(False, f"the arm touches something, and this does not get it free: {world.explain(start)}", (),
+                       -np.inf)  # fmt: skip
+    return Verdict(True, "", ("out of contact",), float(room[-1]))
 
 
 def _obstruction(world: World, start: Vector, end: Vector, joint: int) -> str:

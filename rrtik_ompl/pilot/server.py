@@ -39,6 +39,8 @@ SHORTEST_TOKEN = 16
 LONGEST_NAME = 40
 GOING_AWAY, FAREWELL_SECONDS = 1001, 0.1  # code of a WebSocket that is closed, and time for it to arrive
 PING_SECONDS, PONG_SECONDS = 5.0, 5.0
+NO_TOKEN = "the token is missing or wrong: open the address as rrtik pilot printed it"
+NOT_FROM_HERE = "asked for under another name, or from another page: open the address as rrtik pilot printed it"
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -184,7 +186,7 @@ class _Guarded(tornado.web.RequestHandler):
 
     def prepare(self) -> None:
         if not self.server.may(self.request):
-            raise tornado.web.HTTPError(403)
+            raise tornado.web.HTTPError(403, reason=NOT_FROM_HERE)
 
     def set_default_headers(self) -> None:
         for name, value in (
@@ -198,7 +200,8 @@ class _Guarded(tornado.web.RequestHandler):
             self.set_header(name, value)
 
     def write_error(self, status_code: int, **_: Any) -> None:
-        self.finish(f"{status_code}\n")
+        self.set_header("Content-Type", "text/plain; charset=utf-8")
+        self.finish(f"{status_code} {self._reason}\n")
 
 
 class _PageHandler(_Guarded):
@@ -207,7 +210,7 @@ class _PageHandler(_Guarded):
 
     def get(self) -> None:
         if self._file[0] == "index.html" and not self.server.knows_token(self.get_argument("token", "")):
-            raise tornado.web.HTTPError(403)
+            raise tornado.web.HTTPError(403, reason=NO_TOKEN)
         self.set_header("Content-Type", f"{self._file[1]}; charset=utf-8")
         self.finish((PAGE / self._file[0]).read_bytes())
 
@@ -220,7 +223,7 @@ class _SocketHandler(_Guarded, tornado.websocket.WebSocketHandler):
     def prepare(self) -> None:
         super().prepare()
         if not self.server.knows_token(self.get_argument("token", "")):
-            raise tornado.web.HTTPError(403)
+            raise tornado.web.HTTPError(403, reason=NO_TOKEN)
 
     def check_origin(self, origin: str) -> bool:
         return self.server.may(self.request)

@@ -19,7 +19,7 @@ from rrtik_ompl.pilot.arguments import LONGEST, fitting
 from rrtik_ompl.pilot.arm import Arm, joint_rates
 from rrtik_ompl.pilot.follower import Follower, Progress, still_free
 from rrtik_ompl.pilot.lamps import Lamp, lamps, stage_poses
-from rrtik_ompl.pilot.manoeuvre import Verdict, free_range, free_until, judge_move
+from rrtik_ompl.pilot.manoeuvre import Verdict, advice_to_get_free, free_range, free_until, judge_move
 from rrtik_ompl.pilot.record import Record
 from rrtik_ompl.pilot.route import Route, route_to, route_to_grasp
 from rrtik_ompl.pilot.surroundings import Surroundings
@@ -66,7 +66,7 @@ class Session:
         self._commands: dict[str, Callable[..., str]] = {
             "select": self._select, "move": self._move, "nudge": self._nudge, "stop": self._stop,
             "object": self._object, "grasp": self._grasp, "plan": self._plan, "accept": self._accept,
-            "reject": self._reject, "next": self._next, "back": self._back, "replan": self._replan,
+            "reject": self._reject, "next": self._next, "back": self._back, "replan": self._plan,
             "halt": self._halt,
         }  # fmt: skip
 
@@ -76,7 +76,7 @@ class Session:
         """Take in what a picture shows."""
         self.time, self.picture_time = max(self.time, time), time
         if self.surroundings.see(objects):
-            self._record.write("seen", time, objects=[_placed(each) for each in self.surroundings.seen])
+            self._record.write("seen", time, objects=self.surroundings.places())
             if self.target is None:
                 targets = [o.object.name for o in objects if o.object.role == "target" and o.object.grasps]
                 self.target = targets[0] if targets else None
@@ -93,12 +93,15 @@ class Session:
         self.q = q
         if self.follower is None or self.mode != FOLLOWING:
             return
-        self.progress = self.follower.update(q)
+        before, self.progress = self.follower.current, self.follower.update(q)
         if self.progress.advice == "lost":
             self.arm.stop()
             self.message = f"off the route: {self.progress.fault}; 'replan' finds a new one from here"
         elif self.progress.advice == "done":
             self.mode, self.message = MANOEUVRE, "all moves are done"
+        elif self.follower.current != before:
+            self._show_due(self.follower)
+            self.message = f"move {self.follower.current} of {len(self.follower.moves)} is done; 'next' makes the next"
 
     def command(self, verb: str, time: float, /, **arguments: Any) -> str:
         """Do what the pilot wants; the answer is a line for a person, and `message` from then on.
@@ -164,6 +167,8 @@ class Session:
     def _send(self, joint: int, target: float) -> str:
         self.verdict = judge_move(self.surroundings.world, self.q, joint, target)
         if not self.verdict.allowed:
+            if not self.surroundings.world.valid(self.q):
+                return f"refused: {self.verdict.reason}"
             room = free_until(self.surroundings.world, self.q, joint, target)
             value, unit = reading(room, joint_unit(self.robot.prismatic[joint]))
             return f"refused: {self.verdict.reason}; free until {value:.4g} {unit}"
@@ -213,7 +218,8 @@ class Session:
         if isinstance(found, str):
             self.route = self.follower = self.progress = None
             self.mode = CHOOSING if self.choice else MANOEUVRE
-            return f"no route: {found}" + ("; choose another grasp" if self.choice else "")
+            otherwise = "choose another grasp" if self.choice else "drive the arm elsewhere, or choose an object"
+            return f"no route: {found}; {advice_to_get_free(self.surroundings.world, self.q) or otherwise}"
         self.route, self.mode = found, PROPOSED
         self.follower, self.progress = Follower(found.path, self.rates), None
         self.desired = frozen(found.path.end)
@@ -239,7 +245,14 @@ class Session:
         if progress.advice == "lost":
             raise InputError(f"the arm is not where the route starts: {progress.fault}; 'replan' starts it from here")
         self.mode, self.progress = FOLLOWING, progress
+        self._show_due(self.follower)
         return "accepted; 'next' makes the next move"
+
+    def _show_due(self, follower: Follower) -> None:
+        """The joint of the current move is the one selected, and where it is to go is what is desired."""
+        joint = follower.joint()
+        if joint is not None:
+            self.desired, self.selected = frozen(follower.target), joint
 
     def _reject(self) -> str:
         self.route = self.follower = self.progress = None
@@ -256,7 +269,7 @@ class Session:
         fault = self._fault_of_rest()
         if fault:
             raise InputError(f"the route is blocked now: {fault}; 'replan' looks for another")
-        self.desired, self.selected = frozen(self.follower.target), joint
+        self._show_due(self.follower)
         self.arm.move(joint, float(self.desired[joint]))
         move = self.follower.moves[self.follower.current]
         return f"move {self.follower.current + 1} of {len(self.follower.moves)}: {move.joint}"
@@ -269,9 +282,6 @@ class Session:
         self.follower, self.mode = Follower(way, self.rates), PROPOSED
         self.progress = None
         return f"the way back: {len(way.moves())} moves; 'accept' or 'reject'"
-
-    def _replan(self) -> str:
-        return self._plan()
 
     def _check_route(self) -> None:
         """The scene is another one: is the route that is followed, or proposed, still free?"""
@@ -288,10 +298,3 @@ class Session:
         grasped = self.target is not None and self.choice is not None
         world = self.surroundings.holding(str(self.target)) if grasped else self.surroundings.world
         return still_free(world, self.follower.rest(self.q))
-
-
-def _placed(each: SeenObject) -> dict[str, Any]:
-    pose = each.T_base_object
-    # The matrix and not a quaternion: a replay has to find the same routes, to the last bit.
-    place = {"name": each.object.name, "xyz": pose.translation.tolist(), "rotation": pose.rotation.tolist()}
-    return place | {"covariance": each.covariance.tolist(), "sigmas": each.sigmas}

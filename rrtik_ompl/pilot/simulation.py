@@ -6,7 +6,7 @@ For measurements of the markers themselves use `sensing.synthetic_camera`, which
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import cv2
@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.overlay.augment import Augmenter
-from rrtik_ompl.pilot.arm import SimulatedArm
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.sensing.camera import Camera
@@ -24,7 +23,7 @@ from rrtik_ompl.sensing.pictures import Picture
 
 FINE = 24  # pixels a cell of a marker's picture
 WATER = ((96, 84, 60), (60, 52, 40))  # blue, green, red above and below
-NOISE = 2.0  # grey levels
+NOISE, NOISES = 2.0, 4  # grey levels; pictures of noise, taken in turn
 RATE = 30.0  # pictures a second
 TRIANGLES = 8_000  # of the arm
 
@@ -56,23 +55,26 @@ class SimulatedCamera:
         self.camera, self.marker_map, self.T_base_camera = camera, marker_map, T_base_camera
         self.places = dict(places)
         self._scene, self._arm = scene, Augmenter(robot, camera, TRIANGLES)
-        rng = np.random.default_rng(seed)
-        self._noise = [rng.normal(0.0, NOISE, (camera.height, camera.width, 1)).astype(np.float32) for _ in range(4)]
+        rng, size = np.random.default_rng(seed), (camera.height, camera.width, 1)
+        grey = [np.rint(rng.normal(0.0, NOISE, size)).astype(np.int16) for _ in range(NOISES)]
+        self._noise = [np.repeat(each, 3, axis=2) for each in grey]
         self._kept: Any = (None, None, None)
+        self._kept_arm: Any = (None, None, None)
 
     def picture(self, q: NDArray[np.float64], time: float) -> Picture:
         """What it sees with the arm at a configuration, shape (dof,)."""
-        drawn, solids = self._still()
-        drawn = self._arm.draw(drawn, self.T_base_camera, q, real=solids, opacity=1.0)
-        noisy = drawn + self._noise[int(time * RATE) % len(self._noise)]
-        return Picture(np.clip(noisy, 0, 255).astype(np.uint8), "simulated camera", time)
+        noise = self._noise[int(time * RATE) % NOISES]
+        noisy = cv2.add(self._clean(q), noise, dtype=cv2.CV_8U)
+        return Picture(np.asarray(noisy, dtype=np.uint8), "simulated camera", time)
 
-    def stream(self, arm: SimulatedArm) -> Iterator[Picture]:
-        """Pictures without end, thirty a second of the arm's own time."""
-        count = 0
-        while True:
-            yield self.picture(arm.read(), count / RATE)
-            count += 1
+    def _clean(self, q: NDArray[np.float64]) -> NDArray[np.uint8]:
+        """The picture without noise; made anew only when the arm or an object moved."""
+        still, solids = self._still()
+        before, there, clean = self._kept_arm
+        if before is not still or not np.array_equal(there, q):
+            clean = self._arm.draw(still, self.T_base_camera, q, real=solids, opacity=1.0)
+            self._kept_arm = (still, np.array(q), clean)
+        return np.asarray(clean)
 
     def _still(self) -> tuple[NDArray[np.uint8], list[Obstacle]]:
         """The picture without the arm, and the solids in it; made anew only when an object moved."""

@@ -21,7 +21,7 @@ def state_document(session: Session) -> dict[str, Any]:
         "stale": bool(age > STALE),
         "selected": session.selected,
         "joints": _joints(session),
-        "objects": [_object(session, seen) for seen in session.surroundings.seen],
+        "objects": [_object(seen) for seen in session.surroundings.seen],
         "target": session.target,
         "choice": None if session.choice is None else {"type": session.choice[0], "level": session.choice[1]},
         "lamps": [
@@ -44,18 +44,14 @@ def _joints(session: Session) -> list[dict[str, Any]]:
         found.append({
             "name": name, "value": value, "desired": reading(float(session.desired[k]), unit)[0], "unit": shown,
             "lower": None if endless else reading(low, unit)[0], "upper": None if endless else reading(high, unit)[0],
-            "share": None if endless else float(np.clip((session.q[k] - low) / (high - low), 0.0, 1.0)),
         })  # fmt: skip
     return found
 
 
-def _object(session: Session, seen: Any) -> dict[str, Any]:
-    tip = session.robot.fk(session.q).translation
+def _object(seen: Any) -> dict[str, Any]:
     return {
         "name": seen.object.name,
-        "role": seen.object.role,
         "graspable": bool(seen.object.grasps),
-        "distance": round(float(np.linalg.norm(seen.T_base_object.translation - tip)), 4),
         "sigma_mm": round(1e3 * seen.position_sigma, 2),
     }
 
@@ -110,5 +106,4 @@ def _route(session: Session) -> dict[str, Any] | None:
         "steady": round(route.steady, 2),
         "share": 0.0 if progress is None else progress.share,
         "advice": "" if progress is None else progress.advice,
-        "fault": "" if progress is None else progress.fault,
     }

@@ -42,6 +42,13 @@ class Surroundings:
         """What is known of an object, None if it was never seen."""
         return self._seen.get(name)
 
+    def places(self) -> list[dict[str, Any]]:
+        """What is known to be there as plain values, for a record.
+
+        Matrices and not quaternions: a replay has to find the same routes, to the last bit.
+        """
+        return [_plain(each) for each in self.seen]
+
     def see(self, objects: Sequence[SeenObject]) -> bool:
         """Take in what the camera sees; True if something moved or is new, so that the world is another one."""
         news = [each for each in objects if self._moved(each)]
@@ -78,6 +85,12 @@ class Surroundings:
         pairs = (*scene.allowed_collisions, *allowed)
         changed: Scene = replace(scene, obstacles=(*kept, *more), allowed_collisions=pairs)
         return World(self._given.robot, changed, motion_resolution=self._given.motion_resolution)
+
+
+def _plain(seen: SeenObject) -> dict[str, Any]:
+    T = seen.T_base_object
+    place = {"name": seen.object.name, "xyz": T.translation.tolist(), "rotation": T.rotation.tolist()}
+    return place | {"covariance": seen.covariance.tolist(), "sigmas": seen.sigmas}
 
 
 def _margins(seen: SeenObject) -> list[float]:

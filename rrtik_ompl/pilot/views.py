@@ -55,13 +55,13 @@ class CameraView:
         return drawn
 
     def _depth_aids(self, drawn: NDArray[np.uint8], T_base_camera: Any) -> None:
-        """A line from the tool to the chosen object with its length, and one straight down from the tool."""
+        """A line from the tool to the chosen grasp or object with its length, and one straight down from the tool."""
         session = self._session
         tip = session.robot.fk(session.q).translation
         seen = None if session.target is None else session.surroundings.named(session.target)
         if seen is None:
             return
-        goal = seen.T_base_object.translation
+        goal = (*_chosen(session), seen.T_base_object)[0].translation
         ends = np.stack([tip, goal, [tip[0], tip[1], goal[2]]])
         points = ends @ T_base_camera.rotation - T_base_camera.rotation.T @ T_base_camera.translation
         if (points[:, 2] < 0.05).any():
@@ -69,9 +69,8 @@ class CameraView:
         a, b, c = (tuple(int(v) for v in np.clip(pixel, -4000, 4000)) for pixel in self._camera.project(points))
         cv2.line(drawn, a, b, (255, 255, 255), 1, cv2.LINE_AA)
         cv2.line(drawn, a, c, (200, 200, 80), 1, cv2.LINE_AA)
-        middle = ((a[0] + b[0]) // 2 + 6, (a[1] + b[1]) // 2)
-        text = f"{float(np.linalg.norm(goal - tip)):.3f} m"
-        cv2.putText(drawn, text, middle, cv2.FONT_HERSHEY_SIMPLEX, 0.5, (255, 255, 255), 1, cv2.LINE_AA)
+        beside = ((a[0] + b[0]) // 2 - 30, (a[1] + b[1]) // 2 + 26)
+        _write(drawn, f"{float(np.linalg.norm(goal - tip)):.3f} m", beside)
 
 
 class OutsideView:
@@ -148,6 +147,14 @@ def along(session: Session, share: float) -> Vector:
     lengths = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(rows, axis=0)).sum(axis=1))])
     at = float(np.clip(share, 0.0, 1.0)) * lengths[-1]
     return np.array([np.interp(at, lengths, column) for column in rows.T])
+
+
+def _write(drawn: NDArray[np.uint8], text: str, left_foot: tuple[int, int]) -> None:
+    """Light words on a dark plate: legible on any ground."""
+    font, (x, y) = (cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1), left_foot
+    (width, height), below = cv2.getTextSize(text, *font)
+    cv2.rectangle(drawn, (x - 4, y - height - 4), (x + width + 4, y + below), (28, 21, 15), cv2.FILLED)
+    cv2.putText(drawn, text, left_foot, font[0], font[1], (255, 255, 255), font[2], cv2.LINE_AA)
 
 
 def _chosen(session: Session) -> list[Any]:

@@ -6,6 +6,7 @@ const PRESETS = ["corner", "side", "top", "behind"];
 const COLOR_WORDS = { green: "reach", amber: "blocked", red: "no reach" };
 const MM_PER_DEGREE = 2, NEAR_LIMIT = 0.04, HOLD_MS = 3000;
 const WORRYING = /refused|no route|must|cannot|not where|off the route|blocked|lost|takes|first|there is no|narrow|left;/;
+const FIRST_WORDS = "Choose a grasp with G and L, then plan with P. Or choose a joint with 1 … 9 and drive it with ← →.";
 let state = null, role = { role: "watching", free: false, pages: 1 }, step = 3, preset = 0, receivedAt = 0, playing = null;
 let previousAlert = "", heldUntil = 0;
 
@@ -40,7 +41,7 @@ function chooseGrasp(byType, byLevel) {
   const now = state.choice ? types.indexOf(state.choice.type) : byType ? -1 : 0;
   const type = types[(now + byType + types.length) % types.length];
   const levels = state.lamps.filter((lamp) => lamp.type === type).length;
-  const level = state.choice ? state.choice.level + byLevel : byLevel ? 0 : 0;
+  const level = state.choice ? state.choice.level + byLevel : 0;
   send("grasp", { type, level: level % levels });
 }
 function nextPreset() { preset = (preset + 1) % PRESETS.length; send("preset", { view: PRESETS[preset] }); }
@@ -99,7 +100,7 @@ function showState(said) {
   receivedAt = performance.now();
   for (const item of byId("modes").children)
     item.dataset.mode === said.mode ? item.setAttribute("aria-current", "step") : item.removeAttribute("aria-current");
-  if (newMessage || performance.now() > heldUntil) say(said.message, WORRYING.test(said.message), 0);
+  if (newMessage || performance.now() > heldUntil) say(said.message || FIRST_WORDS, WORRYING.test(said.message), 0);
   showJoints(); showTarget(); showLamps(); showRoute(); showAim(); showButtons(); showPreview(); showAge();
   if (newRoute && role.role === "pilot" && !said.replay && !playing) togglePlay();
 }
@@ -231,9 +232,10 @@ function showRoute() {
   byId("current").hidden = !route || state.mode !== "following";
   if (!route) { if (list.children.length) list.replaceChildren(); list.dataset.key = ""; set(byId("route_numbers"), ""); return; }
   const clear = route.clearance_mm === null ? "" : ` · ${fixed(route.clearance_mm, 0)} mm clear`;
-  set(byId("route_numbers"), `${route.moves.length} · ${fixed(route.travel, 0)}° · ${fixed(route.seconds, 0)} s${clear} · ${fixed(100 * route.steady, 0)} % free at ±1°`);
+  set(byId("route_numbers"), `${route.moves.length} · ${fixed(route.travel, 0)}° · ${fixed(route.seconds, 0)} s${clear} · ${fixed(100 * route.steady, 0)} % safe at ±1°`);
+  byId("route_numbers").title = `joints: ${route.joints.join(", ").replaceAll("_", " ")}`;
   const key = JSON.stringify(route.moves.map((move) => move.text));
-  if (list.dataset.key !== key) { list.dataset.key = key; list.replaceChildren(...route.moves.map((move) => make("li", {}, move.text))); list.scrollTop = 0; }
+  if (list.dataset.key !== key) { list.dataset.key = key; list.replaceChildren(...route.moves.map((move) => make("li", { ariaLabel: move.text }, inShort(move)))); list.scrollTop = 0; }
   route.moves.forEach((move, k) => {
     const item = list.children[k], now = state.mode === "following" && move.status === "current";
     const name = `${now ? "current" : move.status === "done" ? "done" : ""}${k >= route.grasp_from ? " grasp" : ""}`.trim();
@@ -241,21 +243,29 @@ function showRoute() {
     item.className = name;
     if (now) { item.setAttribute("aria-current", "step"); item.scrollIntoView({ block: "nearest" }); } else item.removeAttribute("aria-current");
   });
-  const words = { move: "MOVE", stop: "LET GO", lost: "OFF ROUTE", done: "DONE" };
+  const words = { move: route.share > 0.01 ? "MOVING" : "NEXT", stop: "LET GO", lost: "OFF ROUTE", done: "DONE" };
+  const due = route.moves.find((move) => move.status === "current");
   byId("advice").className = route.advice;
   set(byId("advice"), words[route.advice] ?? "");
+  set(byId("due"), due ? inShort(due) : "");
   byId("progress").value = route.share;
 }
 
+function inShort(move) {
+  const digits = move.unit === "m" ? 3 : 1, sign = move.unit === "m" ? " m" : "°";
+  return `${move.joint.replaceAll("_", " ")} ${move.to > move.from ? "▲" : "▼"} ${fixed(Math.abs(move.to - move.from), digits)}${sign} to ${fixed(move.to, digits)}${sign}`;
+}
+
 function showAim() {
-  const aim = state.aim, rows = [["tip xyz", aim.tip.map((value) => fixed(value, 3)).join("  ")]];
-  if (aim.to) rows.push([`to ${aim.to}`, `${fixed(aim.distance, 3)} m`], ["ahead of the tool", `${fixed(aim.ahead, 3)} m`],
-    ["aside of it", `${fixed(aim.aside, 3)} m`], ["turn to go", `${fixed(aim.turn_deg)}°`], ["below / above", `${fixed(aim.xyz[2], 3)} m`]);
-  for (const seen of state.objects) rows.push([`${seen.name} known to`, `± ${fixed(seen.sigma_mm, 2)} mm`]);
+  const aim = state.aim, metres = (value) => `${fixed(Math.abs(value), 3)} m`;
+  const rows = [["tip x, y, z [m]", aim.tip.map((value) => fixed(value, 2)).join("  ")]];
+  if (aim.to) rows.push([`to ${aim.to}`, metres(aim.distance)], [aim.ahead < 0 ? "behind the tool" : "ahead of the tool", metres(aim.ahead)],
+    ["aside of its axis", metres(aim.aside)], [aim.xyz[2] < 0 ? "lower" : "higher", metres(aim.xyz[2])], ["turned away by", `${fixed(aim.turn_deg)}°`]);
+  for (const seen of state.objects) rows.push([`${seen.name} seen to within`, `± ${fixed(seen.sigma_mm, 2)} mm`]);
   const list = byId("depth"), key = rows.map((row) => row[0]).join();
   if (list.dataset.key !== key) { list.dataset.key = key; list.replaceChildren(...rows.flatMap(([name]) => [make("dt", {}, name), make("dd")])); }
   rows.forEach(([, value], k) => set(list.children[2 * k + 1], value));
-  set(byId("numbers"), aim.to ? `${aim.to}\n${fixed(aim.distance, 3)} m away\n${fixed(aim.ahead, 3)} m ahead\n${fixed(aim.aside, 3)} m aside` : "");
+  set(byId("numbers"), aim.to ? `${aim.to}\n${metres(aim.distance)} away\n${metres(aim.ahead)} ${aim.ahead < 0 ? "behind" : "ahead"}\n${metres(aim.aside)} aside` : "");
 }
 
 function showButtons() {

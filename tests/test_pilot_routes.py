@@ -1,0 +1,110 @@
+"""Routes for a pilot: few moves, a place before the object that few joints lead on from, and room for small errors."""
+
+import numpy as np
+import pytest
+
+from rrtik_ompl import load_problem
+from rrtik_ompl.pilot.approach import ASIDE, FARTHER, MOST_JOINTS, TILT, approaches
+from rrtik_ompl.pilot.arm import joint_rates
+from rrtik_ompl.pilot.clearance import executions, free_rows
+from rrtik_ompl.pilot.follower import slack
+from rrtik_ompl.pilot.lamps import stage_poses
+from rrtik_ompl.pilot.route import route_to, route_to_grasp
+from rrtik_ompl.pilot.scenario import find_scenario, load_scenario
+from rrtik_ompl.pilot.surroundings import Surroundings
+from rrtik_ompl.pilot.way_search import Way, WaySearch
+from rrtik_ompl.sensing.scene_from_view import SeenObject
+
+PROBLEM = load_problem("titan4_sdu")
+ROBOT, RATES = PROBLEM.robot, joint_rates(PROBLEM.robot)
+SCENARIO = load_scenario(find_scenario("titan4_sdu"))
+VALVE, PLACE = SCENARIO.marker_map.named("valve"), SCENARIO.places["valve"]
+
+
+def surroundings():
+    made = Surroundings(PROBLEM.world)
+    made.see([SeenObject(VALVE, PLACE, 1e-8 * np.eye(6), None)])
+    return made.world, made.holding("valve")
+
+
+def grasp(kind, level):
+    world, holding = surroundings()
+    stages = stage_poses(PLACE, VALVE.grasp(kind), level)
+    route = route_to_grasp(world, holding, np.array(PROBLEM.start), stages, np.array(PROBLEM.start), RATES, 1)
+    return world, holding, stages, route
+
+
+@pytest.mark.parametrize(("kind", "level"), [("straight", 1), ("aslant", 2)])
+def test_a_route_to_a_grasp_is_short_and_free_and_forgives_small_errors(kind, level):
+    world, holding, stages, route = grasp(kind, level)
+    assert len(route.path.moves()) <= ROBOT.dof + MOST_JOINTS
+    assert route.path.one_joint_at_a_time
+    rows = route.path.waypoints
+    assert rows[0] == pytest.approx(PROBLEM.start, abs=0.0)
+    assert ROBOT.fk(rows[-1]).homogeneous == pytest.approx(stages[1].homogeneous, abs=1e-6)
+    assert world.certify(rows[: route.grasp_from + 1]).all()
+    assert world.motion_valid_batch(rows[: route.grasp_from], rows[1 : route.grasp_from + 1]).all()
+    assert not route.path.violations(holding)
+    made = executions(route.path, slack(route.path), 300, np.random.default_rng(11))
+    before, after = made[:, : route.grasp_from + 1], made[:, route.grasp_from :]
+    assert (free_rows(world, before) & free_rows(holding, after)).mean() >= 0.97
+
+
+def test_last_parts_begin_clear_of_the_object_and_in_front_of_it():
+    world, holding, stages, route = grasp("straight", 1)
+    end = route.path.end
+    found = approaches(world, holding, end, stages, 5)
+    assert 1 <= len(found) <= 5
+    back = stages[0].translation - stages[1].translation
+    for parts in found:
+        begin = parts[0][0]
+        assert world.valid(begin)
+        tip = ROBOT.fk(begin)
+        places = [stages[1].translation + far * back for far in FARTHER]
+        assert min(np.linalg.norm(tip.translation - place) for place in places) < ASIDE
+        assert np.arccos(0.5 * (np.trace(stages[1].rotation.T @ tip.rotation) - 1.0)) < TILT
+        for rows in parts:
+            assert (rows[0] == begin).all()
+            assert (rows[-1] == end).all()
+            assert ((np.diff(rows, axis=0) != 0.0).sum(axis=1) == 1).all()
+            assert len(rows) - 1 <= MOST_JOINTS
+            assert holding.motion_valid_batch(rows[:-1], rows[1:]).all()
+
+
+def test_a_joint_that_goes_on_needs_one_move_and_that_may_touch_the_object():
+    start, end = np.array(PROBLEM.start), np.array(PROBLEM.start)
+    middle = start.copy()
+    middle[0] += 0.1
+    end[0] += 0.2
+    end[1] += 0.1
+    last = np.array([middle, [*end[:1], *middle[1:]], end])
+    world = load_problem("titan4_sdu").world
+    way = WaySearch(world, world, start, 0).find([[last]])
+    assert isinstance(way, Way)
+    assert (way.rows == [start, last[1], end]).all()
+    assert way.grasp_from == 0
+
+
+@pytest.mark.parametrize("name", ["planar3_b", "env_e"])
+def test_where_no_joint_alone_goes_round_a_planner_finds_the_route(name):
+    problem = load_problem(name)
+    route = route_to(problem.world, np.array(problem.start), np.array(problem.goal.q), joint_rates(problem.robot), 1)
+    assert len(route.path.moves()) >= 4
+    assert route.path.one_joint_at_a_time
+    assert not route.path.violations(problem.world)
+    assert route.grasp_from == len(route.path.moves())
+
+
+def test_an_arm_that_stands_in_something_is_told_so():
+    world, _, _, route = grasp("straight", 1)  # the gripper holds the valve, which it may not touch any more
+    assert "overlap" in route_to(world, route.path.end, np.array(PROBLEM.start), RATES, 1)
+
+
+def test_of_several_ways_one_that_forgives_errors_is_taken():
+    start, goal = np.array(PROBLEM.start), np.array(PROBLEM.goal.q)
+    search = WaySearch(PROBLEM.world, PROBLEM.world, start, 1)
+    ways = list(search._around([goal[None]]))
+    shares = [search.steady(way) for way in ways]
+    best = search.steady(search.find([[goal[None]]]))
+    assert min(shares) + 0.1 < best
+    assert best > max(shares) - 0.06  # ways are compared in tenths: below that fewer moves count
