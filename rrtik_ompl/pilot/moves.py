@@ -19,7 +19,7 @@ from rrtik_ompl.shortening.move_lattice import MoveLattice
 from rrtik_ompl.shortening.move_values import Values, lattice_size, spread_values, values_of
 from rrtik_ompl.world import World
 
-SECONDS = 2.0
+SECONDS = 5.0
 BRIEF = {"searches": 1, "rounds": 0}  # of the planner
 MOST_CORNERS = 256
 FURTHER_VALUES = 24  # of a joint
