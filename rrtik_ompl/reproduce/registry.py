@@ -6,15 +6,19 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 from rrtik_ompl.errors import UnknownNameError
-from rrtik_ompl.reproduce import crdt, ga_reb, mb_rrt, postprocessing, sensing, titan4
+from rrtik_ompl.reproduce import crdt, ga_reb, mb_rrt, postprocessing, sensing, sensing_camera, titan4
 from rrtik_ompl.reproduce.rows import Table
 
 TABLES: Mapping[str, Table] = MappingProxyType(
-    {table.name: table for page in (titan4, mb_rrt, ga_reb, crdt, postprocessing, sensing) for table in page.TABLES}
+    {
+        table.name: table
+        for page in (titan4, mb_rrt, ga_reb, crdt, postprocessing, sensing, sensing_camera)
+        for table in page.TABLES
+    }
 )
 NOT_HERE = (
     "IKURT and DRRT-Con: published as figures without numbers; their methods are not in this version",
-    "Marker sensing, sections 4 and 5: the measured series need the camera; what follows from them is here",
+    "Marker sensing, section 6: the sequences with 125, 400 and 500 mm, of which only a plot was published",
 )
 
 

@@ -18,8 +18,9 @@ from rrtik_ompl.arrays import Matrix
 
 Pixels = NDArray[np.float32]
 
-LEAST_LIKENESS = 0.9  # below it something covers the marker or the picture is not sharp: the corners stay as they were
-_CELL_PIXELS = (3, 12)  # of a cell in the ideal picture; near its size in the camera's
+LEAST_LIKENESS = 0.9  # below it something covers the marker or the picture is not sharp
+_FARTHEST = 0.25  # of a side, that a corner may move: a cell is less, and an ideal marker aside by a cell is not like it
+_CELL_PIXELS = (3, 16)  # of a cell in the ideal picture; near its size in the camera's
 _QUIET_CELLS = 0.5  # of the white rim that takes part; farther out blur brings in what is behind the marker
 _USUAL_SPOT = 0.8  # standard deviation of a sharp picture's blur: lens, photosite, interpolation [pixels]
 _SPOTS = _USUAL_SPOT * 1.5 ** np.arange(-2, 3)  # that are tried
@@ -36,7 +37,7 @@ def aligned_corners(gray: NDArray[np.uint8], corners: Matrix, cells: NDArray[np.
         cells: The ideal marker, its border included. Shape (n, n).
 
     Returns:
-        Corners, shape (4, 2), and likeness from 0 to 1. Where the two do not fit the corners are returned unchanged.
+        Corners, shape (4, 2), and likeness from 0 to 1. Below `LEAST_LIKENESS` the corners are returned unchanged.
     """
     count, side = len(cells), float(np.linalg.norm(np.roll(corners, -1, 0) - corners, axis=1).mean())
     cell = int(np.clip(round(side / count), *_CELL_PIXELS))
@@ -49,9 +50,9 @@ def aligned_corners(gray: NDArray[np.uint8], corners: Matrix, cells: NDArray[np.
     except cv2.error:  # the two never came to agree
         return corners, 0.0
     better = cv2.perspectiveTransform(square[:, None], homography.astype(np.float64))[:, 0] + low
-    if likeness < LEAST_LIKENESS or np.abs(better - corners).max() > max(2.0, 0.08 * side):
-        return corners, float(likeness)
-    return better, float(likeness)
+    if np.abs(better - corners).max() > max(2.0, _FARTHEST * side):
+        return corners, 0.0
+    return (better if likeness >= LEAST_LIKENESS else corners), likeness
 
 
 def _aligned(ideal: Pixels, piece: Pixels, homography: Pixels) -> tuple[float, Pixels]:
