@@ -185,4 +185,6 @@ def _flips(looks: list[Look]) -> list[str]:
             followed.append(each.flipped(each.tracked))
             if known:
                 settled.append(followed[-1])
-    return [f"{100 * np.mean(values):.2f}" if values else "none" for values in (first, flagged, sure, followed, settled)]
+    return [
+        f"{100 * np.mean(values):.2f}" if values else "none" for values in (first, flagged, sure, followed, settled)
+    ]

@@ -115,7 +115,7 @@ def safe_range(report: Report, count: int) -> None:
         row = [f"{distance:g}"]
         for name, how in (("plain", PLAIN), ("hard", HARD)):
             away, found = [], 0
-            for T in random_poses(distance, POSES, 1):
+            for T in [T for T in random_poses(distance, 8 * POSES, 1) if in_view([T])][:POSES]:
                 seen = positions(seen_poses([T], count, 7, **how))
                 found += len(seen)
                 away += list(np.linalg.norm(seen - T.translation, axis=1))
