@@ -51,7 +51,7 @@ def silhouettes(report: Report, count: int) -> None:
         )
     report.table("Silhouettes against a z-buffer in double precision",
                  ["robot", "pictures", "triangles", "pixels drawn", "that differ",
-                  f"centres within {ROUNDING:g} pixels of an edge", "largest difference of depth [mm]"], rows)  # fmt: skip
+                  f"centres within {ROUNDING:g} of an edge", "largest difference of depth [mm]"], rows)  # fmt: skip
     report.bar("silhouette against an independent z-buffer", "equal pixel for pixel",
                f"{different} pixels differ", different == 0)  # fmt: skip
 

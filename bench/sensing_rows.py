@@ -37,17 +37,17 @@ from rrtik_ompl.sensing.tracker import PoseTracker
 BOARD = [pose([x * 0.0535, y * 0.0535, 0.0]) for x in (-1, 1) for y in (-1, 1)]
 
 
-def algebra(report: Report) -> None:
+def algebra(report: Report, count: int) -> None:
     """Section 1: both ways to the gripper, and the inverse by its formula."""
     worst = 0.0
-    for _ in range(1000):
+    for _ in range(count):
         T_0h, T_hb, T_be, T_0m = (pin.SE3.Random() for _ in range(4))
         T_0b = T_0h * T_hb
         R, p = T_0b.rotation, T_0b.translation
         formula = np.block([[R.T, -(R.T @ p)[:, None]], [np.zeros((1, 3)), np.ones((1, 1))]])
         ways = (T_0b * T_be).homogeneous - (T_0m * ((T_0b.inverse() * T_0m).inverse() * T_be)).homogeneous
         worst = max(worst, np.abs(ways).max(), np.abs(formula - T_0b.inverse().homogeneous).max())
-    report.bar("transform algebra, 1000 random frames", "<= 1e-12", f"{worst:.1e}", worst <= 1e-12)
+    report.bar(f"transform algebra, {count} random frames", "<= 1e-12", f"{worst:.1e}", worst <= 1e-12)
 
 
 def exactness(report: Report, count: int) -> None:
@@ -83,7 +83,7 @@ def simulated_sensor(report: Report, count: int) -> None:
     report.bar("sigma 0.03 px: sd of z at 1537 mm", "< 1 mm", f"{near:.3f} mm", near < 1.0)
 
 
-def statistics(report: Report) -> None:
+def statistics(report: Report, _: int) -> None:
     """The module of statistics against the printed summaries."""
     first = Series(100, 505.9640, 505.6400, 505.7898, 0.0671)
     last = Series(100, 2041.1300, 2029.8200, 2035.0656, 2.1142)
@@ -97,7 +97,7 @@ def statistics(report: Report) -> None:
                bool(good) and flags == [False, False, False, True])  # fmt: skip
 
 
-def simulated_accuracy(report: Report) -> None:
+def simulated_accuracy(report: Report, _: int) -> None:
     """Section 6 without pictures: corners pulled inwards by blur, a lens whose distortion is not corrected."""
     errors, published = [], [error for _, _, _, error in ACCURACY]
     bent, straight = published_camera((0.3, 0.0, 0.0, 0.0, 0.0)), published_camera()
@@ -118,7 +118,7 @@ def simulated_accuracy(report: Report) -> None:
 
 
 def jitter(report: Report, count: int) -> None:
-    """The tip of the virtual arm in the picture's frame: base known from the mount, by one marker, by four, smoothed."""
+    """The tip of the virtual arm before the camera: base known from its mount, by one marker, by four, smoothed."""
     rng, base = np.random.default_rng(0), facing(np.deg2rad(25.0), 0.4, 0.2, [0.1, 0.0, 1.5])
     reach = np.array([ARM, 0.0, 0.0])
     one = MarkedObject("one", "base", (MountedMarker(9, SIDE),))

@@ -73,7 +73,7 @@ def gripper(report: Report, count: int) -> None:
             seen = [gripper_distances(seen_poses([T], count, distance, align=align, **how)) for T in places]
             row.append(_range([series_of(each).robust_deviation for each in seen]))
         rows.append(row)
-    report.table("Gripper 1.92 m from the marker: spread of its distance by the quartiles [mm], median / worst of poses",
+    report.table("Gripper 1.92 m from the marker: spread of its distance by the quartiles [mm], median / worst",
                  ["l [mm]", "published", "corners with 0.03 px", *(name for name, _, _ in WAYS)], rows)  # fmt: skip
     report.bar("lever arm, simulated sensor of 0.03 px: spread grows with l", "grows; > 2 mm beyond 1.5 m",
                ", ".join(f"{value:.2f}" for value in model) + " mm",

@@ -13,7 +13,8 @@ from rrtik_ompl.reproduce.mb_rrt_runs import PUBLISHED, Measured
 from rrtik_ompl.reproduce.registry import TABLES, chosen
 from rrtik_ompl.reproduce.rows import DIFFERS, HELD, MISSED, Row, Table, verdict, within
 
-FAST = ("titan4", "sensing-arithmetic", "sensing-noise", "sensing-accuracy", "crdt-routes", "mb-rrt-example", "mb-rrt-10")
+FAST = ("titan4", "sensing-arithmetic", "sensing-noise", "sensing-accuracy", "crdt-routes", "mb-rrt-example",
+        "mb-rrt-10")  # fmt: skip
 
 
 def test_all_tables_of_the_quick_round_together_are_said_to_take_less_than_ten_minutes():

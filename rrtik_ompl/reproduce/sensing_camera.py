@@ -7,7 +7,6 @@ sensed here.
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,9 +28,8 @@ def precision(quick: bool) -> list[Row]:
     for number, (_, _, z, printed) in enumerate(SERIES, start=1):
         worst = {}
         for align in (False, True):
-            seen = partial(seen_poses, count=count, seed=number, align=align, **PLAIN)
-            depths = [positions(seen([T]))[:, 2] for T in random_poses(1e-3 * z, poses, 0)]
-            worst[align] = 1e3 * max(_steady(depth) for depth in depths)
+            seen = [seen_poses([T], count, number, align=align, **PLAIN) for T in random_poses(1e-3 * z, poses, 0)]
+            worst[align] = 1e3 * max(_steady(positions(each)[:, 2]) for each in seen)
         rows += _rows(f"series {number}, z = {z:.0f} mm: standard deviation of z", printed, worst, TIMES_STEADIER)
     return rows
 
@@ -44,9 +42,9 @@ def gripper(quick: bool) -> list[Row]:
     for distance, _, _, _, first, third in GRIPPER:
         spread = {}
         for align in (False, True):
-            seen = partial(seen_poses, count=count, seed=distance, align=align, **PLAIN)
-            tips = [gripper_distances(seen([T])) for T in gripper_poses(1e-3 * distance, poses)]
-            spread[align] = 1e3 * float(np.median([_steady(tip) for tip in tips]))
+            places = gripper_poses(1e-3 * distance, poses)
+            seen = [seen_poses([T], count, distance, align=align, **PLAIN) for T in places]
+            spread[align] = 1e3 * float(np.median([_steady(gripper_distances(each)) for each in seen]))
         rows += _rows(f"gripper, l = {distance} mm: spread by the quartiles",
                       (third - first) / NORMAL_QUARTILES, spread, 1.0)  # fmt: skip
     return rows
@@ -66,7 +64,7 @@ def accuracy(quick: bool) -> list[Row]:
         name = f"300 mm apart at {distance} mm: error"
         rows.append(Row(f"{name}, {ROUGH}, lens not corrected", f"{printed:.2f} %", f"{error[False]:.2f} %",
                         verdict(abs(error[False] - printed) < 0.2, abs(error[False] - printed) < 1.0),
-                        "their lens and light are not known; here blur pulls corners inwards by 0.2 pixels"))  # fmt: skip
+                        "their lens and light are not known; blur pulls corners inwards"))  # fmt: skip
         rows.append(Row(f"{name}, {FINE}, lens calibrated", f"{printed:.2f} %", f"{error[True]:.3f} %",
                         verdict(False, abs(error[True]) < max(0.3 * abs(printed), LEAST_ERROR)),
                         "nearer to the truth"))  # fmt: skip

@@ -84,7 +84,7 @@ def positions(rows: Sequence[Sequence[CornerPose | None]], marker: int = 0) -> M
 def gripper_distances(rows: Sequence[Sequence[CornerPose | None]]) -> Vector:
     """From the camera to a gripper that is `ARM` away from the marker along its x axis [m]. Shape (k,)."""
     tips = [pose.T_camera_object.act(np.array([ARM, 0.0, 0.0])) for row in rows if (pose := row[0]) is not None]
-    return np.linalg.norm(np.array(tips).reshape(-1, 3), axis=1)
+    return np.asarray(np.linalg.norm(np.array(tips).reshape(-1, 3), axis=1))
 
 
 def gripper_poses(distance: float, count: int) -> list[Any]:

@@ -19,7 +19,7 @@ from rrtik_ompl.arrays import Matrix
 Pixels = NDArray[np.float32]
 
 LEAST_LIKENESS = 0.9  # below it something covers the marker or the picture is not sharp
-_FARTHEST = 0.25  # of a side, that a corner may move: a cell is less, and an ideal marker aside by a cell is not like it
+_FARTHEST = 0.25  # of a side, that a corner may move; inner edges are found in place of outer ones now and then
 _CELL_PIXELS = (3, 16)  # of a cell in the ideal picture; near its size in the camera's
 _QUIET_CELLS = 0.5  # of the white rim that takes part; farther out blur brings in what is behind the marker
 _USUAL_SPOT = 0.8  # standard deviation of a sharp picture's blur: lens, photosite, interpolation [pixels]

@@ -12,6 +12,7 @@ from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.sensing.camera import Camera
 from rrtik_ompl.sensing.frames import base_from_camera, position_in_base
+from rrtik_ompl.sensing.margins import grown
 from rrtik_ompl.sensing.marker_map import MarkedObject, MarkerMap
 from rrtik_ompl.sensing.sight import Sighting, look
 
@@ -39,8 +40,12 @@ class SeenObject:
         """How far from its place it may be: three standard deviations along the worst direction [m]."""
         return SIGMAS * float(np.sqrt(max(np.linalg.eigvalsh(self.covariance)[-1], 0.0)))
 
+    def kept_away(self) -> tuple[Obstacle, ...]:
+        """Its solids, larger by the margin: what planners should keep away from."""
+        return tuple(grown(solid, self.margin) for solid in self.solids())
+
     def solids(self) -> tuple[Obstacle, ...]:
-        """Its solids as obstacles in the frame of the base, named after it."""
+        """Its solids as obstacles in the frame of the base, named after it, at their own size."""
         several = len(self.object.solids) > 1
         return tuple(
             Obstacle(f"{self.object.name}.{each.name}" if several else self.object.name, each.shape,
@@ -72,12 +77,20 @@ def objects_in_base(sightings: tuple[Sighting, ...], marker_map: MarkerMap) -> t
     )
 
 
-def scene_from_image(picture: NDArray[np.uint8], camera: Camera, marker_map: MarkerMap) -> Scene:
+def scene_from_image(
+    picture: NDArray[np.uint8], camera: Camera, marker_map: MarkerMap, *, margins: bool = False
+) -> Scene:
     """The scene that a picture shows: the solids of every target and obstacle in view, in the frame of the base.
+
+    Args:
+        picture: Shape (height, width) or (height, width, 3), 8 bits.
+        camera: Who took it.
+        marker_map: What may be there.
+        margins: Make each solid larger by three standard deviations of its place.
 
     Raises:
         NoBaseError: If nothing says where the base is.
         InputError: If the picture cannot be used.
     """
     seen = objects_in_base(look(picture, camera, marker_map), marker_map)
-    return Scene(tuple(solid for each in seen for solid in each.solids()))
+    return Scene(tuple(solid for each in seen for solid in (each.kept_away() if margins else each.solids())))

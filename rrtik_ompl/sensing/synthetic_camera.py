@@ -100,7 +100,7 @@ def photograph(
         picture = cv2.blur(picture, (round(motion), 1))
     grain = rng.standard_normal(picture.shape, dtype=np.float32)
     picture = picture * np.float32(1.0 + flicker * rng.standard_normal()) + np.float32(noise) * grain
-    taken = np.clip(np.rint(np.float32(255.0) * picture), 0, 255).astype(np.uint8)
+    taken: NDArray[np.uint8] = np.clip(np.rint(np.float32(255.0) * picture), 0, 255).astype(np.uint8)
     if jpeg is None:
         return taken
     _, packed = cv2.imencode(".jpg", taken, [cv2.IMWRITE_JPEG_QUALITY, jpeg])
