@@ -148,7 +148,7 @@ def jitter(report: Report, count: int) -> None:
 
 def end_to_end(report: Report, count: int) -> None:
     """Photograph, pose of the object, grasp, closed-form inverse kinematics, forward kinematics: error at the tip."""
-    robot, rng, errors = load_robot("titan4"), np.random.default_rng(3), []
+    robot, rng, errors, covered = load_robot("titan4"), np.random.default_rng(3), [], []
     T_base_camera = eye_at([1.2, 0.0, 0.1], 0.8, np.deg2rad(-150.0), np.deg2rad(35.0))
     thing = MarkedObject("valve", "target", (MountedMarker(0, SIDE),))
     marker_map = MarkerMap(DICTIONARY, (thing,), T_base_camera)
@@ -164,6 +164,9 @@ def end_to_end(report: Report, count: int) -> None:
             continue
         picture = photograph(clean_picture(CAMERA, [(T, sheet)], rays=5), rng, **HARD)
         (placed,) = objects_in_base(look(picture, CAMERA, marker_map), marker_map)
+        covered.append(
+            np.linalg.norm(placed.T_base_object.translation - (T_base_camera * T).translation) < placed.margin
+        )
         found = solutions(robot, (placed.T_base_object * grasp).homogeneous[None])
         if found.valid.any():
             reached = robot.fk(found.branches[0][found.valid[0]][0]).translation
@@ -172,3 +175,6 @@ def end_to_end(report: Report, count: int) -> None:
     report.bar("end to end, endogenous, grasp 80 mm before the marker, l 0.5 to 1 m, hard pictures", "<= 2 mm rms",
                f"{rms:.2f} mm rms, {max(errors, default=np.inf):.2f} mm worst of {len(errors)}",
                rms <= 2.0 and len(errors) == count)  # fmt: skip
+    share = float(np.mean(covered))
+    report.bar("covariance as obstacle margin: true place within the margin by which solids grow", ">= 99 %",
+               f"{100 * share:.0f} % of {len(covered)}", share >= 0.99)  # fmt: skip
