@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
 from pathlib import Path
@@ -47,21 +48,18 @@ def overlay(
     with progress("drawing"):
         drawn = _drawn(arm, pictures, lambda: sensor.why_nothing(source))
         if out.suffix.lower() in ENDINGS[2:]:
-            *before, last = drawn
+            (last,) = deque(drawn, maxlen=1)
             write_picture(last, out)
-            count = len(before) + 1
         else:
-            count = write_film(out, drawn, rate)
+            write_film(out, drawn, rate)
     missing = f"; the first {arm.without_base} show no base and stay as they were" if arm.without_base else ""
-    say(f"wrote {out}: {count} pictures, {rate:g} a second{missing}")
+    say(f"wrote {out}: {arm.count} pictures, {rate:g} a second{missing}")
     return 0
 
 
 def _drawn(arm: Any, pictures: Iterable[Any], why_nothing: Callable[[], str]) -> Iterator[Any]:
     """All pictures with the arm; an error after the last one if the base was in none of them."""
-    count = 0
     for picture in pictures:
         yield arm.draw(picture)
-        count += 1
-    if arm.without_base == count:
+    if arm.without_base == arm.count:
         raise InputError(why_nothing())

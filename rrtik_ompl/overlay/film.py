@@ -30,7 +30,8 @@ class ArmInPictures:
     """Draws an arm that follows a path into pictures, one after the other.
 
     Attributes:
-        without_base: How many pictures there were before anything said where the arm's base is; they stay as they are.
+        count: How many pictures there were.
+        without_base: How many of them came before anything said where the arm's base is; they stay as they are.
     """
 
     def __init__(self, robot: Robot, sensor: Sensor, waypoints: ArrayLike, *, seconds: float, ghosts: int = 1) -> None:
@@ -58,7 +59,7 @@ class ArmInPictures:
         self._T_base_camera: Any | None = None
         self._known: dict[str, SeenObject] = {}
         self._begin: float | None = None
-        self.without_base = 0
+        self.count = self.without_base = 0
 
     def draw(self, picture: Picture) -> NDArray[np.uint8]:
         """The picture with arm, ghosts, the trail of the tip, and the frames of tip and objects.
@@ -69,6 +70,7 @@ class ArmInPictures:
             InputError: If the picture does not have the camera's size, or times go backwards.
         """
         view = self._sensor.view(picture)
+        self.count += 1
         try:
             self._T_base_camera = base_from_camera(self._sensor.marker_map, view.seen)[0]
         except NoBaseError:
@@ -101,20 +103,19 @@ def rate_of(pictures: Iterator[Picture]) -> tuple[float, Iterator[Picture]]:
     return rate, chain(first, pictures)
 
 
-def write_film(path: Path, frames: Iterable[NDArray[np.uint8]], rate: float) -> int:
-    """Write pictures as a film and return how many they were; the file appears when it is whole.
+def write_film(path: Path, frames: Iterable[NDArray[np.uint8]], rate: float) -> None:
+    """Write pictures as a film; the file appears when it is whole.
 
     Raises:
         InputError: If the ending is none of `FILMS`, there is no picture, or the file cannot be written.
     """
     if path.suffix.lower() not in FILMS:
         raise InputError(f"{path}: a film ends in {', '.join(FILMS)}")
-    unfinished, writer, count = path.with_name(f".{path.stem}.unfinished{path.suffix}"), None, 0
+    unfinished, writer = path.with_name(f".{path.stem}.unfinished{path.suffix}"), None
     try:
         for frame in frames:
             writer = writer or _writer(unfinished, path, rate, frame.shape)
             writer.write(frame)
-            count += 1
         if writer is None:
             raise InputError(f"{path}: there is no picture to write")
         writer.release()
@@ -125,7 +126,6 @@ def write_film(path: Path, frames: Iterable[NDArray[np.uint8]], rate: float) -> 
         if writer is not None:
             writer.release()
         unfinished.unlink(missing_ok=True)
-    return count
 
 
 def _writer(file: Path, path: Path, rate: float, shape: tuple[int, ...]) -> Any:
