@@ -278,6 +278,15 @@ def test_the_branch_of_before_is_kept_where_two_poses_fit():
     assert np.linalg.norm(pin.log3(found.T_camera_object.rotation.T @ right.rotation)) < 1e-9
 
 
+def test_the_first_sighting_without_doubt_ends_a_wrong_guess_at_once():
+    right, wrong = facing([0.4, 0.0, 0.0], [0.0, 0.0, 1.5]), facing([-0.4, 0.0, 0.0], [0.0, 0.0, 1.5])
+    tracker = PoseTracker()
+    tracker.update(sight_at(wrong, right, (0.01, 0.011)), 0.0)
+    found = tracker.update(sight_at(right, wrong, (0.01, 1.0)), 0.033)
+    assert not found.outlier
+    assert np.linalg.norm(pin.log3(found.T_camera_object.rotation.T @ right.rotation)) < 1e-9
+
+
 def test_one_outlier_is_left_out_and_a_new_place_is_believed_in_the_end():
     tracker, here, there = PoseTracker(), facing([0.3, 0, 0], [0, 0, 1.0]), facing([0.3, 0, 0], [0.4, 0, 1.0])
     for k in range(5):
