@@ -17,6 +17,7 @@ from rrtik_ompl.fast import announce
 from rrtik_ompl.ik_commands import inverse_kinematics
 from rrtik_ompl.marker_commands import markers
 from rrtik_ompl.motion_commands import list_moves, time_path
+from rrtik_ompl.overlay_command import overlay
 from rrtik_ompl.path_text import FORMATS as PATH_FORMATS
 from rrtik_ompl.pilot_commands import pilot
 from rrtik_ompl.plan_command import plan
@@ -179,6 +180,7 @@ app.command("moves")(list_moves)
 app.command("time")(time_path)
 app.command("replan")(replan_scenario)
 app.add_typer(markers, name="markers")
+app.command("overlay")(overlay)
 app.command("pilot")(pilot)
 
 

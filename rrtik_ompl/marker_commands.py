@@ -92,13 +92,22 @@ def sense(
     marker_map: Annotated[Path, typer.Option("--map", help="Which marker sits on which object: .yaml.")],
     frames: Annotated[int, typer.Option(help="Look at so many pictures at most; a camera device: 1 unless given.")] = 0,
     scene: Annotated[Path | None, typer.Option(help="Write the scene in the frame of the base: .yaml.")] = None,
+    task: Annotated[
+        Path | None, typer.Option(help="Write a problem with what was seen: .yaml. Needs --problem and --grasp.")
+    ] = None,
+    problem: Annotated[str | None, typer.Option(help="Robot, start and further obstacles of --task.")] = None,
+    grasp: Annotated[
+        str | None, typer.Option(metavar="OBJECT:TYPE:LEVEL", help="Goal of --task; levels from 1.")
+    ] = None,
     picture: Annotated[Path | None, typer.Option(help="Write the last picture with what was seen: .png, .jpg.")] = None,
     sigmas: Annotated[float, typer.Option(help="Margins of the scene's obstacles: so many deviations; 0: none.")] = 3.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object a picture.")] = False,
 ) -> int:
     """Say where the marked objects are, from pictures."""
     check_target(scene, SCENES)
+    check_target(task, SCENES)
     check_target(picture, PICTURES)
+    goal = _task_goal(task, problem, grasp)
     from rrtik_ompl.sensing.camera_file import load_camera
     from rrtik_ompl.sensing.marker_map_file import load_marker_map
     from rrtik_ompl.sensing.sensor import Sensor
@@ -115,7 +124,25 @@ def sense(
         from rrtik_ompl.scene_file import save_scene
 
         save_scene(view.scene(), scene)
+    if task is not None:
+        from rrtik_ompl import load_problem, save_problem
+        from rrtik_ompl.sensing.problem_from_view import grasp_problem
+
+        save_problem(grasp_problem(load_problem(str(problem)), view.usable(), *goal), task)
     return 0
+
+
+def _task_goal(task: Path | None, problem: str | None, grasp: str | None) -> tuple[str, str, int]:
+    """Object, grasp type and level of a task."""
+    if len({task is None, problem is None, grasp is None}) > 1:
+        raise InputError("--task FILE, --problem PROBLEM and --grasp OBJECT:TYPE:LEVEL go together; give all or none")
+    if grasp is None:
+        return "", "", 0
+    name, _, rest = grasp.partition(":")
+    kind, _, level = rest.partition(":")
+    if not (name and kind and level.isdecimal()):
+        raise InputError(f"--grasp {grasp}: expected OBJECT:TYPE:LEVEL, for instance valve:aslant:2")
+    return name, kind, int(level)
 
 
 def _views(sensor: Any, source: str, frames: int) -> Any:

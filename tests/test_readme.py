@@ -63,10 +63,11 @@ def test_the_suite_of_benchmarks_loads(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "verb", ["plan", "check", "show", "list", "convert", "moves", "time", "ik", "reach", "reproduce", "bench"]
+    "verb",
+    ["plan", "check", "show", "list", "convert", "moves", "time", "ik", "reach", "reproduce", "bench", "overlay"],
 )
 def test_every_option_that_the_readme_names_is_there(verb, capsys):
-    (usage,) = re.findall(rf"^rrtik {verb} [^\n]*(?:\n  [^\n]*)*", README, re.MULTILINE)
+    usage, *_ = re.findall(rf"^rrtik {verb} [^\n]*(?:\n  [^\n]*)*", README, re.MULTILINE)
     assert run([verb, "--help"]) == 0
     text = capsys.readouterr().out
     assert [option for option in re.findall(r"--[a-z]+", usage) if option not in text] == []

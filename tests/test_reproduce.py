@@ -13,7 +13,8 @@ from rrtik_ompl.reproduce.mb_rrt_runs import PUBLISHED, Measured
 from rrtik_ompl.reproduce.registry import TABLES, chosen
 from rrtik_ompl.reproduce.rows import DIFFERS, HELD, MISSED, Row, Table, verdict, within
 
-FAST = ("titan4", "sensing", "crdt-routes", "mb-rrt-example", "mb-rrt-10", "ikurt-solutions", "drrt-con-arm")
+FAST = ("titan4", "sensing-arithmetic", "sensing-noise", "sensing-accuracy", "crdt-routes", "mb-rrt-example",
+        "mb-rrt-10", "ikurt-solutions", "drrt-con-arm")  # fmt: skip
 
 
 def test_all_tables_of_the_quick_round_together_are_said_to_take_less_than_ten_minutes():
@@ -26,6 +27,9 @@ def test_the_beginning_of_names_chooses_all_tables_of_a_page():
         "mb-rrt-8",
         "sensing-arithmetic",
         "sensing-noise",
+        "sensing-precision",
+        "sensing-gripper",
+        "sensing-accuracy",
     ]
     with pytest.raises(UnknownNameError, match="no table 'mbrrt'"):
         chosen(["mbrrt"])

@@ -84,6 +84,16 @@ def test_alignment_removes_the_inward_pull_of_blur():
     assert np.std(errors[True]) < 0.4 * np.std(errors[False])
 
 
+@pytest.mark.parametrize("blur", [0.4, 1.1])
+def test_alignment_finds_out_how_blurred_a_picture_is(blur):
+    T = facing([0.5, 0.4, 0.2], [0.1, -0.05, 1.7])
+    away = []
+    for seed in range(10):
+        (marker,) = find_markers(picture_of([(7, T)], seed, blur=blur), "4x4_50")
+        away.append(pose_of_square(CAMERA, marker.corners, SIDE).T_camera_object.translation[2] - T.translation[2])
+    assert abs(np.mean(away)) < 0.6e-3
+
+
 def test_the_stated_uncertainty_is_neither_boast_nor_panic():
     T = facing([0.5, 0.2, 0.1], [0.05, -0.05, 1.0])
     truth, away, sigma = T.translation, [], []
@@ -301,6 +311,15 @@ def test_the_branch_of_before_is_kept_where_two_poses_fit():
     tracker.update(sight_at(right, wrong, (0.01, 1.0)), 0.0)
     found = tracker.update(sight_at(wrong, right, (0.01, 0.011)), 0.033)
     assert found.other_branch
+    assert np.linalg.norm(pin.log3(found.T_camera_object.rotation.T @ right.rotation)) < 1e-9
+
+
+def test_the_first_sighting_without_doubt_ends_a_wrong_guess_at_once():
+    right, wrong = facing([0.4, 0.0, 0.0], [0.0, 0.0, 1.5]), facing([-0.4, 0.0, 0.0], [0.0, 0.0, 1.5])
+    tracker = PoseTracker()
+    tracker.update(sight_at(wrong, right, (0.01, 0.011)), 0.0)
+    found = tracker.update(sight_at(right, wrong, (0.01, 1.0)), 0.033)
+    assert not found.outlier
     assert np.linalg.norm(pin.log3(found.T_camera_object.rotation.T @ right.rotation)) < 1e-9
 
 

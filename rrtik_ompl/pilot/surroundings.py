@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.sensing.problem_from_view import scene_with
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world import World
 
@@ -79,11 +79,9 @@ class Surroundings:
         return shifted > SAME_PLACE or turned > SAME_TURN or abs(wider) > SAME_PLACE
 
     def _with(self, allowed: Sequence[tuple[str, str]]) -> World:
-        scene = self._given.scene
-        more: list[Obstacle] = [solid for each in self._seen.values() for solid in each.solids()]
-        kept = tuple(o for o in scene.obstacles if o.name not in {solid.name for solid in more})
-        pairs = (*scene.allowed_collisions, *allowed)
-        changed: Scene = replace(scene, obstacles=(*kept, *more), allowed_collisions=pairs)
+        given = self._given.scene
+        scene = scene_with(given, [solid for each in self._seen.values() for solid in each.solids()])
+        changed = replace(scene, allowed_collisions=(*given.allowed_collisions, *allowed))
         return World(self._given.robot, changed, motion_resolution=self._given.motion_resolution)
 
 

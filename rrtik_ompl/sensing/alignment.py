@@ -2,7 +2,8 @@
 
 The agreement is the enhanced correlation coefficient of Evangelidis and Psarakis (PAMI 2008), which does not change
 with brightness and contrast; the motion is a homography. Four corners alone are pulled inwards by blur, by as much
-as 0.2 pixels; all edges of all cells together are not.
+as 0.2 pixels; all edges of all cells together are not, if the ideal marker is blurred as the picture is: as much, and
+evenly in the picture, so unevenly on a marker that is tilted.
 """
 
 from __future__ import annotations
@@ -15,9 +16,15 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
 
-LEAST_LIKENESS = 0.9  # below it something covers the marker or the picture is not sharp: the corners stay as they were
-_CELL_PIXELS = (3, 12)  # of a cell in the ideal picture; near its size in the camera's
-_QUIET_CELLS = 0.7  # of the white rim that takes part
+Pixels = NDArray[np.float32]
+
+LEAST_LIKENESS = 0.9  # below it something covers the marker or the picture is not sharp
+_FARTHEST = 0.25  # of a side, that a corner may move; inner edges are found in place of outer ones now and then
+_CELL_PIXELS = (3, 16)  # of a cell in the ideal picture; near its size in the camera's
+_QUIET_CELLS = 0.5  # of the white rim that takes part; farther out blur brings in what is behind the marker
+_USUAL_SPOT = 0.8  # standard deviation of a sharp picture's blur: lens, photosite, interpolation [pixels]
+_SPOTS = _USUAL_SPOT * 1.5 ** np.arange(-2, 3)  # that are tried
+_SAME_SPOT = 0.1  # relative difference that is not worth a second alignment
 _STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 1e-6)
 
 
@@ -30,35 +37,81 @@ def aligned_corners(gray: NDArray[np.uint8], corners: Matrix, cells: NDArray[np.
         cells: The ideal marker, its border included. Shape (n, n).
 
     Returns:
-        Corners, shape (4, 2), and likeness from 0 to 1. Where the two do not fit the corners are returned unchanged.
+        Corners, shape (4, 2), and likeness from 0 to 1. Below `LEAST_LIKENESS` the corners are returned unchanged.
     """
     count, side = len(cells), float(np.linalg.norm(np.roll(corners, -1, 0) - corners, axis=1).mean())
     cell = int(np.clip(round(side / count), *_CELL_PIXELS))
     rim = round(_QUIET_CELLS * cell)
-    ideal = _ideal(cells, cell, rim, blur=0.7 * cell * count / side)
     square = np.array([[0, 0], [count, 0], [count, count], [0, count]], dtype=np.float64) * cell + rim - 0.5
     low, piece = _neighbourhood(gray, corners, margin=int(0.35 * side) + 4)
     guess = cv2.getPerspectiveTransform(square.astype(np.float32), (corners - low).astype(np.float32))
     try:
-        align: Any = cv2.findTransformECC  # its type wants a mask where None does
-        likeness, homography = align(
-            ideal, piece.astype(np.float32), guess.astype(np.float32), cv2.MOTION_HOMOGRAPHY, _STOP, None, 1
-        )
+        likeness, homography = _aligned(_ideal(cells, cell, rim), piece, guess.astype(np.float32))
     except cv2.error:  # the two never came to agree
         return corners, 0.0
     better = cv2.perspectiveTransform(square[:, None], homography.astype(np.float64))[:, 0] + low
-    if likeness < LEAST_LIKENESS or np.abs(better - corners).max() > max(2.0, 0.08 * side):
-        return corners, float(likeness)
-    return better, float(likeness)
+    if np.abs(better - corners).max() > max(2.0, _FARTHEST * side):
+        return corners, 0.0
+    return (better if likeness >= LEAST_LIKENESS else corners), likeness
 
 
-def _ideal(cells: NDArray[np.uint8], cell: int, rim: int, blur: float) -> NDArray[np.float32]:
+def _aligned(ideal: Pixels, piece: Pixels, homography: Pixels) -> tuple[float, Pixels]:
+    """Likeness and the homography from the ideal marker to a picture, the blur of the picture found out on the way."""
+    likeness, rough = _fitted(ideal, piece, homography, _USUAL_SPOT)
+    spot = _spot(ideal, piece, rough)
+    if abs(spot - _USUAL_SPOT) < _SAME_SPOT * _USUAL_SPOT:
+        return likeness, rough
+    return _fitted(ideal, piece, rough, spot)
+
+
+def _fitted(ideal: Pixels, piece: Pixels, homography: Pixels, spot: float) -> tuple[float, Pixels]:
+    align: Any = cv2.findTransformECC  # its type wants a mask where None does
+    blurred = _blurred(ideal, spot**2 * _spread(homography, ideal.shape))
+    likeness, better = align(blurred, piece, homography, cv2.MOTION_HOMOGRAPHY, _STOP, None, 1)
+    return float(likeness), better
+
+
+def _spot(ideal: Pixels, piece: Pixels, homography: Pixels) -> float:
+    """Standard deviation of the blur that makes the ideal marker likest the picture [pixels]."""
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    seen = cv2.warpPerspective(piece, homography, ideal.shape[::-1], flags=flags)
+    spread = _spread(homography, ideal.shape)
+    rows = np.stack([_blurred(ideal, spot**2 * spread).ravel() for spot in _SPOTS])
+    rows -= rows.mean(axis=1, keepdims=True)
+    likeness = rows @ (seen.ravel() - seen.mean()) / np.sqrt((rows**2).sum(axis=1))
+    best = int(np.clip(likeness.argmax(), 1, len(_SPOTS) - 2))
+    low, middle, high = likeness[best - 1 : best + 2]
+    bend = low - 2.0 * middle + high
+    aside = float(np.clip(0.5 * (low - high) / bend, -1.0, 1.0)) if bend < 0.0 else 0.0
+    return float(_SPOTS[best] * (_SPOTS[1] / _SPOTS[0]) ** aside)
+
+
+def _ideal(cells: NDArray[np.uint8], cell: int, rim: int) -> Pixels:
     large = np.kron(cells, np.ones((cell, cell), dtype=np.uint8))
     framed = cv2.copyMakeBorder(large, rim, rim, rim, rim, cv2.BORDER_CONSTANT, value=(255.0,))
-    return np.asarray(cv2.GaussianBlur(framed.astype(np.float32), (0, 0), blur), dtype=np.float32)
+    return framed.astype(np.float32)
 
 
-def _neighbourhood(gray: NDArray[np.uint8], corners: Matrix, margin: int) -> tuple[Matrix, NDArray[np.uint8]]:
+def _spread(homography: Pixels, shape: tuple[int, ...]) -> Matrix:
+    """Covariance, in the middle of the ideal marker, of what a round spot in the picture covers. Shape (2, 2)."""
+    middle = np.array([0.5 * (shape[1] - 1), 0.5 * (shape[0] - 1), 1.0])
+    (x, y), bottom = homography[:2] @ middle, homography[2] @ middle
+    slope = (homography[:2, :2] - np.outer([x, y], homography[2, :2]) / bottom) / bottom
+    back = np.linalg.inv(slope)
+    return np.asarray(back @ back.T, dtype=np.float64)
+
+
+def _blurred(picture: Pixels, spread: Matrix) -> Pixels:
+    reach = max(int(np.ceil(3.0 * np.sqrt(spread.diagonal().max()))), 1)
+    x = np.arange(-reach, reach + 1.0)
+    y = x[:, None]
+    (a, b), (_, c) = np.linalg.inv(spread)
+    weights = np.exp(-0.5 * (a * x * x + 2.0 * b * x * y + c * y * y))
+    blurred = cv2.filter2D(picture, cv2.CV_32F, weights / weights.sum(), borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(blurred, dtype=np.float32)
+
+
+def _neighbourhood(gray: NDArray[np.uint8], corners: Matrix, margin: int) -> tuple[Matrix, Pixels]:
     low = np.maximum(np.floor(corners.min(axis=0)).astype(int) - margin, 0)
     high = np.ceil(corners.max(axis=0)).astype(int) + margin
-    return low.astype(np.float64), gray[low[1] : high[1], low[0] : high[0]]
+    return low.astype(np.float64), gray[low[1] : high[1], low[0] : high[0]].astype(np.float32)

@@ -17,7 +17,7 @@ from rrtik_ompl.arrays import Matrix, frozen
 from rrtik_ompl.sensing.camera import Camera
 
 RATIO_TO_TRUST = 6.0  # of the two errors of a square; below it 27 % of near-frontal views, and every wrong choice
-ALIGNED_SIGMA = 0.01  # error of a corner [pixels]: twice what noise of 1 % makes of it
+ALIGNED_SIGMA = 0.02  # error of a corner [pixels]: a quarter is noise of 1 %, the rest lens and blur
 FARTHEST = 1e4  # [m]
 _STEPS = 40
 ROUGH_SIGMA = 0.2  # blur pulls corners that were not aligned inwards by as much

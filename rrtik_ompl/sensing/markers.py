@@ -31,7 +31,8 @@ class SeenMarker:
         dictionary: Its dictionary.
         number: Its number in there.
         corners: Top left, top right, bottom right, bottom left as printed. Shape (4, 2), pixels.
-        likeness: Correlation of the ideal marker with the picture, 1 at best; 0 if the corners were not aligned.
+        likeness: Correlation of the ideal marker with the picture, 1 at best; below `LEAST_LIKENESS` the corners
+            are as they were found; NaN if nobody asked for better ones.
     """
 
     dictionary: str
@@ -73,7 +74,7 @@ def find_markers(gray: NDArray[np.uint8], dictionary: str, *, align: bool = True
         return ()
     for k in np.argsort(np.ravel(numbers), kind="stable"):
         number, rough = int(np.ravel(numbers)[k]), corners[k].reshape(4, 2).astype(np.float64)
-        better, likeness = aligned_corners(gray, rough, marker_cells(dictionary, number)) if align else (rough, 0.0)
+        better, likeness = aligned_corners(gray, rough, marker_cells(dictionary, number)) if align else (rough, np.nan)
         found.append(SeenMarker(dictionary, number, frozen(better), likeness))
     return tuple(found)
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.text_file import write_bytes
 
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 VIDEO_ENDINGS = (".mp4", ".avi", ".webm", ".mkv", ".mov", ".m4v")
@@ -53,6 +54,17 @@ def read_picture(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     if picture is None:
         raise InputError(f"{path}: is not an image that can be read; use {', '.join(IMAGE_ENDINGS)}")
     return np.asarray(picture, dtype=np.uint8)
+
+
+def write_picture(picture: NDArray[np.uint8], path: Path) -> None:
+    """Write an image file; its ending says which kind.
+
+    Raises:
+        InputError: If it cannot be written.
+    """
+    if path.suffix.lower() not in IMAGE_ENDINGS:
+        raise InputError(f"{path}: an image ends in {', '.join(IMAGE_ENDINGS)}")
+    write_bytes(path, cv2.imencode(path.suffix, picture)[1].tobytes())
 
 
 def pictures_from(source: str | os.PathLike[str] | int) -> Iterator[Picture]:
@@ -111,11 +123,20 @@ def _device(number: int) -> Iterator[Picture]:
 
 
 @contextmanager
-def _opened(source: str | int) -> Iterator[Any]:
+def quiet() -> Iterator[None]:
+    """Let OpenCV keep its warnings: why something cannot be opened is said in one line, not in three."""
     log: Any = cv2.utils.logging
-    before = log.setLogLevel(log.LOG_LEVEL_ERROR)  # why a source cannot be opened is said in one line, not in three
-    capture = cv2.VideoCapture(source)
-    log.setLogLevel(before)
+    before = log.setLogLevel(log.LOG_LEVEL_ERROR)
+    try:
+        yield
+    finally:
+        log.setLogLevel(before)
+
+
+@contextmanager
+def _opened(source: str | int) -> Iterator[Any]:
+    with quiet():
+        capture = cv2.VideoCapture(source)
     try:
         yield capture
     finally:

@@ -110,7 +110,11 @@ def scene_from_image(
 ) -> Scene:
     """The scene that a picture shows: the solids of every target and obstacle in view, in the frame of the base.
 
-    Their margins cover ``sigmas`` standard deviations of where they are.
+    Args:
+        picture: Shape (height, width) or (height, width, 3), 8 bits.
+        camera: Who took it.
+        marker_map: What may be there.
+        sigmas: How many standard deviations of where they are the margins cover.
 
     Raises:
         NoBaseError: If nothing says where the base is.

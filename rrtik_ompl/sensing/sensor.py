@@ -6,11 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.errors import InputError
 from rrtik_ompl.poses import quaternion_xyzw
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.sensing.annotate import annotated
@@ -18,7 +16,7 @@ from rrtik_ompl.sensing.camera import Camera
 from rrtik_ompl.sensing.frames import NoBaseError
 from rrtik_ompl.sensing.marker_map import MarkerMap
 from rrtik_ompl.sensing.markers import dictionaries_seen
-from rrtik_ompl.sensing.pictures import Picture
+from rrtik_ompl.sensing.pictures import Picture, write_picture
 from rrtik_ompl.sensing.scene_from_view import SIGMAS, SeenObject, checked_sigmas, objects_in_base
 from rrtik_ompl.sensing.sight import Sighting, as_gray, look
 from rrtik_ompl.sensing.tracker import PoseTracker
@@ -48,9 +46,17 @@ class View:
         Raises:
             NoBaseError: If nothing says where the base is.
         """
+        return Scene(tuple(solid for each in self.usable() for solid in each.solids()))
+
+    def usable(self) -> tuple[SeenObject, ...]:
+        """All placed objects.
+
+        Raises:
+            NoBaseError: If nothing says where the base is.
+        """
         if self.why_not_placed:
             raise NoBaseError(self.why_not_placed)
-        return Scene(tuple(solid for each in self.placed for solid in each.solids()))
+        return self.placed
 
     def save_picture(self, path: Path) -> None:
         """Write the picture with what was seen in it.
@@ -58,12 +64,7 @@ class View:
         Raises:
             InputError: If it cannot be written.
         """
-        good, data = cv2.imencode(path.suffix, annotated(self.picture.pixels, self.camera, self.seen))
-        try:
-            if good:
-                path.write_bytes(data.tobytes())
-        except OSError as error:
-            raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+        write_picture(annotated(self.picture.pixels, self.camera, self.seen), path)
 
     def lines(self) -> list[str]:
         """One line an object, for a person."""

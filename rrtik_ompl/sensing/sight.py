@@ -11,6 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.sensing.alignment import LEAST_LIKENESS
 from rrtik_ompl.sensing.camera import Camera
 from rrtik_ompl.sensing.corner_pose import ALIGNED_SIGMA, ROUGH_SIGMA, CornerPose, pose_of_points, pose_of_square
 from rrtik_ompl.sensing.marker_map import MarkedObject, MarkerMap
@@ -41,8 +42,8 @@ class Sighting:
         """From 0 (no use) to 1: likeness of the best marker, halved where the pose is ambiguous, 0 if refused."""
         if self.refused:
             return 0.0
-        likeness = max((m.likeness for m in self.markers), default=0.0)
-        return max(likeness, 0.5) * (0.5 if self.pose.ambiguous else 1.0)
+        likeness = max((m.likeness for m in self.markers if m.likeness > 0.5), default=0.5)
+        return likeness * (0.5 if self.pose.ambiguous else 1.0)
 
 
 def as_gray(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -94,7 +95,9 @@ def sighting(camera: Camera, thing: MarkedObject, seen: Sequence[SeenMarker]) ->
     usable = [marker for marker in own if marker.side >= LEAST_SIDE] or list(own)
     if not own:
         return None
-    sigma = ALIGNED_SIGMA if all(m.likeness > 0.0 for m in usable) else ROUGH_SIGMA
+    sharp = [marker for marker in usable if marker.likeness >= LEAST_LIKENESS]
+    sigma = ALIGNED_SIGMA if sharp else ROUGH_SIGMA
+    usable = sharp or usable
     if len(usable) == 1:
         pose = _of_one(camera, usable[0], mounted[usable[0].number], sigma)
     else:
@@ -118,6 +121,9 @@ def _refusal(pose: CornerPose, markers: Sequence[SeenMarker]) -> str:
     side = max(marker.side for marker in markers)
     if side < LEAST_SIDE:
         return f"too far away or too small: {side:.0f} pixels a side, {LEAST_SIDE:.0f} are needed"
+    likeness = max(marker.likeness for marker in markers)
+    if likeness < LEAST_LIKENESS:
+        return f"covered or blurred: {likeness:.2f} like the marker, {LEAST_LIKENESS:g} is needed; free it, hold still"
     if pose.error > MOST_ERROR:
         return f"corners lie {pose.error:.1f} pixels off: check the marker map, the side of the markers and the camera"
     return ""

@@ -93,13 +93,14 @@ def photograph(
         motion: Length of a blur along x [pixels].
         jpeg: Quality of a compression, or None.
     """
-    picture = clean * (1.0 - gradient * np.linspace(0.0, 1.0, clean.shape[1], dtype=np.float32))
+    picture = clean * (np.float32(1.0) - np.float32(gradient) * np.linspace(0.0, 1.0, clean.shape[1], dtype=np.float32))
     if blur > 0.0:
         picture = cv2.GaussianBlur(picture, (0, 0), blur)
     if motion >= 1.0:
         picture = cv2.blur(picture, (round(motion), 1))
-    picture = picture * (1.0 + flicker * rng.standard_normal()) + noise * rng.standard_normal(picture.shape)
-    taken = np.clip(np.rint(255.0 * picture), 0, 255).astype(np.uint8)
+    grain = rng.standard_normal(picture.shape, dtype=np.float32)
+    picture = picture * np.float32(1.0 + flicker * rng.standard_normal()) + np.float32(noise) * grain
+    taken: NDArray[np.uint8] = np.clip(np.rint(np.float32(255.0) * picture), 0, 255).astype(np.uint8)
     if jpeg is None:
         return taken
     _, packed = cv2.imencode(".jpg", taken, [cv2.IMWRITE_JPEG_QUALITY, jpeg])

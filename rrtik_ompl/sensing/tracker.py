@@ -85,6 +85,7 @@ class PoseTracker:
         self._last: Any | None = None  # as seen, not smoothed
         self._origin: Any | None = None  # rotations are smoothed as vectors about this one
         self._strays = 0
+        self._sure = False  # a sighting was not ambiguous
 
     def update(self, sight: Sighting, time: float) -> Tracked:
         """Take a sighting at a time [s].
@@ -97,7 +98,9 @@ class PoseTracker:
         pose, other = self._branch(sight)
         outlier = self._is_outlier(pose, sight, time - self._time)
         self._strays = self._strays + 1 if outlier else 0
-        if outlier and self._strays < PATIENCE:
+        guessed, self._sure = not self._sure, self._sure or not sight.pose.ambiguous
+        settled = guessed and self._sure  # what was followed until now may have been the wrong one of two poses
+        if outlier and not settled and self._strays < PATIENCE:
             return Tracked(self._smooth_pose(), True, other)
         if outlier:
             self._place.restart()

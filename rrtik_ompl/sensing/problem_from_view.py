@@ -1,0 +1,54 @@
+"""From what the camera saw to a problem that can be planned: its solids in the scene, a grasp ahead as the goal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.goal import PoseGoal
+from rrtik_ompl.poses import pose
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.sensing.scene_from_view import SeenObject
+from rrtik_ompl.world import World
+
+
+def scene_with(scene: Scene, solids: Iterable[Obstacle]) -> Scene:
+    """A scene with more solids, which take the place of those of the same names."""
+    more = tuple(solids)
+    names = {solid.name for solid in more}
+    kept = tuple(obstacle for obstacle in scene.obstacles if obstacle.name not in names)
+    return replace(scene, obstacles=(*kept, *more))
+
+
+def grasp_problem(problem: Problem, seen: Iterable[SeenObject], name: str, kind: str, level: int) -> Problem:
+    """From the start of a problem to where the approach to a grasp of a seen object begins.
+
+    From there the tip goes straight along its own z axis, by the ``approach`` of the grasp type; that is not part of
+    the problem, so nothing may touch the object on the way. Solids that were seen have their margins.
+
+    Args:
+        problem: Its robot, start and scene are kept.
+        seen: Objects in the frame of the base.
+        name: Of the object to be grasped.
+        kind: Grasp type.
+        level: From 1.
+
+    Raises:
+        InputError: If the object was not seen, or has no such grasp.
+        ProblemError: If the start touches something.
+    """
+    objects = tuple(seen)
+    wanted = next((each for each in objects if each.object.name == name), None)
+    if wanted is None:
+        names = ", ".join(each.object.name for each in objects) or "nothing"
+        raise InputError(f"object '{name}' was not seen; {names} was")
+    levels = len(wanted.object.grasp(kind).levels)
+    if not 1 <= level <= levels:
+        raise InputError(f"grasp type '{kind}' of '{name}' has levels 1 to {levels}, not {level}")
+    solids = [solid for each in objects for solid in each.solids()]
+    scene = scene_with(problem.world.scene, solids)
+    world = World(problem.robot, scene, motion_resolution=problem.world.motion_resolution)
+    before = wanted.grasp_pose(kind, level - 1) * pose([0.0, 0.0, -wanted.object.grasp(kind).approach])
+    return Problem(world, problem.start, PoseGoal(before), name=f"{name}_{kind}_{level}")
