@@ -38,15 +38,19 @@ def finite_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) ->
         array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{what}: expected numbers, got {_short(values)}") from error
-    wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
-    if array.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, array.shape, strict=True)):
-        raise InputError(f"{what}: expected an array of shape {wanted}, got shape {array.shape}")
+    if array.shape != shape and not _has_shape(array, shape):
+        wanted = ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "")
+        raise InputError(f"{what}: expected an array of shape ({wanted}), got shape {array.shape}")
     if not np.isfinite(array).all():
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         if not place:
             raise InputError(f"{what}: must be a finite number, got {array}")
         raise InputError(f"{what}: every number must be finite, but entry {list(place)} is {array[place]}")
     return array
+
+
+def _has_shape(array: NDArray[np.float64], shape: tuple[int | None, ...]) -> bool:
+    return array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape, strict=True))
 
 
 def finite_number(value: ArrayLike, what: str) -> float:

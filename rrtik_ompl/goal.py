@@ -199,7 +199,7 @@ def tip_errors(goal: TipGoal, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vecto
 def pose_errors(tips: NDArray[np.float64], target: Any) -> tuple[Vector, Vector]:
     """Distance [m] and rotation angle [rad] between poses, shape (m, 4, 4), and one target pose."""
     away = tips[:, :3, 3] - target.translation
-    position: Vector = np.hypot(np.hypot(away[:, 0], away[:, 1]), away[:, 2])
+    position: Vector = np.hypot.reduce(away, axis=1)
     return position, rotation_angles(target.rotation.T @ tips[:, :3, :3])
 
 

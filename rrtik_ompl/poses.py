@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -51,21 +52,30 @@ def rigid(T: Any, what: str) -> Any:
         InputError: If it is neither, or scales, skews or mirrors.
     """
     matrix = finite_array(T.homogeneous if isinstance(T, pin.SE3) else T, (4, 4), what)
-    if np.abs(matrix[3] - LAST_ROW).max() > LAST_ROW_TOLERANCE:
-        raise InputError(f"{what}: the last row must be 0 0 0 1, got {matrix[3].tolist()}")
-    rotation = matrix[:3, :3]
-    off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
+    x, y, z, last = matrix.tolist()  # numbers of Python's own: four rows are too few for numpy
+    if max(abs(last[0]), abs(last[1]), abs(last[2]), abs(last[3] - 1.0)) > LAST_ROW_TOLERANCE:
+        raise InputError(f"{what}: the last row must be 0 0 0 1, got {last}")
+    lengths, corners = (_dot(x, x), _dot(y, y), _dot(z, z)), (_dot(x, y), _dot(y, z), _dot(z, x))
+    off = max(*(abs(square - 1.0) for square in lengths), *map(abs, corners))  # lengths first: they are never nan
     if off > NOT_RIGID:
         raise InputError(
             f"{what}: its upper left 3 x 3 part is no rotation: {off:.3g} away from orthonormal "
             f"(at most {NOT_RIGID:g}); make it orthonormal"
         )
-    x, y, z = rotation.tolist()
-    if x[0] * (y[1] * z[2] - y[2] * z[1]) < x[1] * (y[0] * z[2] - y[2] * z[0]) - x[2] * (y[0] * z[1] - y[1] * z[0]):
+    if left_handed(x, y, z):
         raise InputError(
             f"{what}: its upper left 3 x 3 part mirrors (determinant -1); make it orthonormal and right-handed"
         )
     return pin.SE3(matrix)
+
+
+def left_handed(x: Any, y: Any, z: Any) -> Any:
+    """Whether the determinant of three vectors is negative; their coordinates are numbers or arrays of them."""
+    return x[0] * (y[1] * z[2] - y[2] * z[1]) < x[1] * (y[0] * z[2] - y[2] * z[0]) - x[2] * (y[0] * z[1] - y[1] * z[0])
+
+
+def _dot(a: Sequence[float], b: Sequence[float]) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def unit_vector(values: ArrayLike, what: str) -> Vector:
@@ -83,9 +93,9 @@ def unit_vector(values: ArrayLike, what: str) -> Vector:
 
 def rotation_angles(rotations: NDArray[np.float64]) -> Vector:
     """Angle of rotations, shape (m, 3, 3): atan2(|R - R^T| / (2 sqrt 2), (tr R - 1) / 2), accurate near 0 and pi."""
-    skew = (rotations - np.swapaxes(rotations, 1, 2)).reshape(len(rotations), 9)
+    skew = (rotations - rotations.transpose(0, 2, 1)).reshape(len(rotations), 9)
     sine = np.sqrt(np.vecdot(skew, skew) / 8.0)
-    angle: Vector = np.arctan2(sine, 0.5 * (np.einsum("mii->m", rotations) - 1.0))
+    angle: Vector = np.arctan2(sine, 0.5 * (rotations.trace(axis1=1, axis2=2) - 1.0))
     return angle
 
 
@@ -99,3 +109,24 @@ def rpy_matrices(angles: Matrix) -> NDArray[np.float64]:
     ]
     matrices: NDArray[np.float64] = np.moveaxis(np.array(rows), 2, 0)
     return matrices
+
+
+def joint_motions(axis: Vector, prismatic: bool, values: Vector) -> NDArray[np.float64]:
+    """Transforms of one joint for many values, shape (m, 4, 4): a translation, or Rodrigues' rotation formula."""
+    motion = np.zeros((len(values), 4, 4))
+    motion[:, [0, 1, 2, 3], [0, 1, 2, 3]] = 1.0
+    if prismatic:
+        motion[:, :3, 3] = values[:, None] * axis
+        return motion
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    sine, cosine = np.sin(values)[:, None, None], np.cos(values)[:, None, None]
+    motion[:, :3, :3] += sine * cross + (1.0 - cosine) * (cross @ cross)
+    return motion
+
+
+def cross_products(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Cross products of rows, shape (m, 3); numpy's own is some five times slower for few rows."""
+    product = a[:, [1, 2, 0]] * b[:, [2, 0, 1]]
+    product -= a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
+    return product

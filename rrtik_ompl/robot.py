@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.poses import cross_products, joint_motions
 
 FEW = 16  # configurations up to which Pinocchio's calls cost less than numpy's
 LIMIT_TOLERANCE = 1e-6  # [rad] or [m]; a value this far outside counts as inside and is moved onto the limit
@@ -126,8 +127,8 @@ class Robot:
 
     def within_limits(self, Q: ArrayLike, tolerance: float = LIMIT_TOLERANCE) -> Mask:
         """Which of the configurations Q, shape (m, dof), lie inside the limits. Shape (m,)."""
-        rows = self._rows(Q)
-        inside: Mask = (rows >= self.lower - tolerance) & (rows <= self.upper + tolerance)
+        rows, (lower, upper) = self._rows(Q), _widened_limits(self, tolerance)
+        inside: Mask = (rows >= lower) & (rows <= upper)
         fits: Mask = np.logical_and.reduce(inside, axis=1)
         return fits
 
@@ -172,12 +173,9 @@ class Robot:
         if self.model.nq == len(self.chain.parent):
             return values
         full = np.empty((len(rows), self.model.nq))
-        for k in range(self.model.njoints - 1):
-            start, size = self.model.idx_qs[k + 1], self.model.nqs[k + 1]
-            if size == 1:
-                full[:, start] = values[:, k]
-            else:
-                full[:, start], full[:, start + 1] = np.cos(values[:, k]), np.sin(values[:, k])
+        joints, places, turning, cosines = _places_of(self)
+        angles = values[:, turning]
+        full[:, places], full[:, cosines], full[:, cosines + 1] = values[:, joints], np.cos(angles), np.sin(angles)
         return full
 
     def joint_frames(self, Q: ArrayLike) -> NDArray[np.float64]:
@@ -187,7 +185,7 @@ class Robot:
         frames = np.empty((len(rows), len(self.chain.parent) + 1, 4, 4))
         frames[:, 0] = np.eye(4)
         for k, parent in enumerate(self.chain.parent):
-            motion = _joint_motion(self.chain.axis[k], bool(self.chain.prismatic[k]), values[:, k])
+            motion = joint_motions(self.chain.axis[k], bool(self.chain.prismatic[k]), values[:, k])
             frames[:, k + 1] = frames[:, parent + 1] @ self.chain.placement[k] @ motion
         return frames
 
@@ -248,7 +246,7 @@ class Robot:
             if self.chain.prismatic[joint]:
                 columns[:, :3, joint] = axis
             else:
-                columns[:, :3, joint] = _cross(axis, point - frames[:, joint + 1, :3, 3])
+                columns[:, :3, joint] = cross_products(axis, point - frames[:, joint + 1, :3, 3])
                 columns[:, 3:, joint] = axis
             joint = int(self.chain.parent[joint])
         product: NDArray[np.float64] = columns @ self.chain.gain
@@ -256,23 +254,33 @@ class Robot:
 
     def _rows(self, Q: ArrayLike) -> Matrix:
         """One configuration or several as rows, shape (m, dof)."""
-        rows = np.atleast_2d(np.asarray(Q, dtype=np.float64))
+        rows = np.array(Q, dtype=np.float64, ndmin=2, copy=None)
         if rows.ndim != 2 or rows.shape[1] != self.dof:
             raise InputError(f"configurations of robot '{self.name}': expected shape (m, {self.dof}), got {rows.shape}")
         return rows
 
     def _frame_id(self, frame: str | None) -> int:
-        name = self.tip if frame is None else frame
-        if not self.model.existFrame(name):
-            raise UnknownNameError(f"frame of robot '{self.name}'", name, (f.name for f in self.model.frames))
-        return int(self.model.getFrameId(name))
+        return _frame_number(self, self.tip if frame is None else frame)
 
 
-def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cross products of rows, shape (m, 3); numpy's own is some five times slower for few rows."""
-    product = a[:, [1, 2, 0]] * b[:, [2, 0, 1]]
-    product -= a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
-    return product
+@lru_cache(maxsize=64)
+def _widened_limits(robot: Robot, tolerance: float) -> tuple[Vector, Vector]:
+    return robot.lower - tolerance, robot.upper + tolerance
+
+
+@lru_cache(maxsize=256)
+def _frame_number(robot: Robot, name: str) -> int:
+    if not robot.model.existFrame(name):
+        raise UnknownNameError(f"frame of robot '{robot.name}'", name, (f.name for f in robot.model.frames))
+    return int(robot.model.getFrameId(name))
+
+
+@lru_cache(maxsize=64)
+def _places_of(robot: Robot) -> tuple[NDArray[np.int64], ...]:
+    """Joints with one number in Pinocchio's vectors and where it is; those with two and where their cosines are."""
+    starts, sizes = np.array(robot.model.idx_qs.tolist()[1:]), np.array(robot.model.nqs.tolist()[1:])
+    single, double = np.flatnonzero(sizes == 1), np.flatnonzero(sizes != 1)
+    return single, starts[single], double, starts[double]
 
 
 @lru_cache(maxsize=64)
@@ -280,17 +288,3 @@ def _data_of(robot: Robot, thread: int) -> Any:
     """Pinocchio's working memory for a robot, of one thread's own."""
     del thread
     return robot.model.createData()
-
-
-def _joint_motion(axis: Vector, prismatic: bool, values: Vector) -> NDArray[np.float64]:
-    """Transforms of one joint for many values, shape (m, 4, 4): a translation, or Rodrigues' rotation formula."""
-    motion = np.zeros((len(values), 4, 4))
-    motion[:, [0, 1, 2, 3], [0, 1, 2, 3]] = 1.0
-    if prismatic:
-        motion[:, :3, 3] = values[:, None] * axis
-        return motion
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    sine, cosine = np.sin(values)[:, None, None], np.cos(values)[:, None, None]
-    motion[:, :3, :3] += sine * cross + (1.0 - cosine) * (cross @ cross)
-    return motion

@@ -18,6 +18,7 @@ from rrtik_ompl.ik.descent import Search, walk
 from rrtik_ompl.ik.face import usual_posture
 from rrtik_ompl.ik.goal_rows import goal_rows, pose_rows
 from rrtik_ompl.ik.limb import SEEDS
+from rrtik_ompl.ik.numeric import numeric_ik
 from rrtik_ompl.ik.plain_descent import walk_plainly
 from rrtik_ompl.shapes import Box
 
@@ -198,3 +199,8 @@ def test_forward_kinematics_of_few_and_of_many_agree():
         rows = random_rows(robot, 40, seed=9)
         few = np.concatenate([robot.fk_batch(rows[:1]), robot.fk_batch(rows[1:16]), robot.fk_batch(rows[16:32])])
         np.testing.assert_allclose(few, robot.fk_batch(rows)[:32], atol=1e-12)
+
+
+def test_a_region_without_starts_has_no_solutions():
+    goal = GoalRegion((PoseGoal(pin.SE3.Identity()), PoseGoal(pin.SE3.Identity())))
+    assert numeric_ik(rrtik.load_robot("puma560"), goal, np.zeros((0, 6))).shape == (0, 6)

@@ -7,7 +7,7 @@ Every joint frame is turned so that its axis is z; the balls and the frames of t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -50,15 +50,14 @@ MARGIN_PER_METRE = 5e-6  # relative error of a coordinate in float32, with room 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Table:
-    """Fields for the kernels and the arrays whose addresses they hold."""
+    """Fields for the kernels, where they are, and the arrays whose addresses they hold."""
 
     header: Header
     arrays: dict[int, NDArray[Any]]
+    address: int = field(init=False)
 
-    @property
-    def address(self) -> int:
-        """Where the fields are."""
-        return int(self.header.ctypes.data)
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "address", int(self.header.ctypes.data))
 
     def __getitem__(self, place: int) -> NDArray[Any]:
         return self.arrays[place]

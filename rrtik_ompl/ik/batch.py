@@ -10,12 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, not_negative, whole_number
 from rrtik_ompl.goal import PoseGoal, joint_difference
-from rrtik_ompl.ik.closed_form import check_poses, form_of, solutions
+from rrtik_ompl.ik.closed_form import branches_of, check_poses, form_of
 from rrtik_ompl.ik.descent import Search
 from rrtik_ompl.ik.face import SECONDS, chosen_method, free_of_collision, solve_ik, usual_posture
-from rrtik_ompl.ik.goal_rows import pose_rows
+from rrtik_ompl.ik.goal_rows import POSE, pose_rows
 from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ik.plain_branches import tip_residuals
+from rrtik_ompl.ik.question import tolerances
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World, check_world
 
@@ -95,7 +96,7 @@ def _by_closed_form(
     robot: Robot, targets: NDArray[np.float64], near: Vector, world: World | None, q: Matrix, residuals: Matrix
 ) -> None:
     """Write the nearest valid branch of each target into q, shape (m, dof), and residuals, shape (m, 2)."""
-    found = solutions(robot, targets, near=near)
+    found = branches_of(robot, targets, np.broadcast_to(near, (len(targets), robot.dof)))
     valid = np.array(found.valid)
     valid[valid] = free_of_collision(world, found.branches[valid])
     distance = np.linalg.norm(joint_difference(robot, found.branches, near), axis=2)
@@ -128,7 +129,6 @@ def _by_search(
 def _checked(robot: Robot, targets: NDArray[np.float64], q: Matrix) -> Matrix:
     """Residuals by forward kinematics, shape (m, 2); rows of q that are not at their targets become NaN, in place."""
     residuals = tip_residuals(robot, q.T[:, None], targets)[:, 0].T
-    goal = PoseGoal(np.eye(4))
-    residuals[~(residuals <= (goal.position_tolerance, goal.orientation_tolerance)).all(axis=1)] = np.nan
+    residuals[~(residuals <= tolerances(POSE)).all(axis=1)] = np.nan
     q[np.isnan(residuals[:, 0])] = np.nan
     return residuals

@@ -14,7 +14,7 @@ from rrtik_ompl.ik.form import ClosedFormSolver
 from rrtik_ompl.ik.kernel_branches import kernel_branches
 from rrtik_ompl.ik.plain_branches import plain_branches, tip_fault
 from rrtik_ompl.ik.planar import planar_form
-from rrtik_ompl.poses import LAST_ROW, LAST_ROW_TOLERANCE, NOT_RIGID
+from rrtik_ompl.poses import LAST_ROW, LAST_ROW_TOLERANCE, NOT_RIGID, left_handed
 from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
 
 SWEEP = 72  # samples of a singular pose's curve of solutions
@@ -159,7 +159,7 @@ def check_poses(poses: NDArray[np.float64], what: str) -> None:
             f"{what}: entry {worst} is no rotation: its columns are {off[worst]:.3g} away from orthonormal "
             f"(at most {NOT_RIGID:g}); make it orthonormal"
         )
-    mirrored = np.flatnonzero((np.cross(columns[0], columns[1], axis=0) * columns[2]).sum(axis=0) < 0.0)
+    mirrored = np.flatnonzero(left_handed(*columns))
     if len(mirrored):
         raise InputError(f"{what}: entry {mirrored[0]} mirrors (determinant -1); a rotation is right-handed")
     odd = np.flatnonzero((np.abs(poses[:, 3] - LAST_ROW) > LAST_ROW_TOLERANCE).any(axis=1))

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix
-from rrtik_ompl.fast.ik_layout import DONE, KERNELS
+from rrtik_ompl.fast.ik_layout import KERNELS
 from rrtik_ompl.fast.library import library
 from rrtik_ompl.goal import TipGoal
 from rrtik_ompl.ik.goal_rows import goal_rows
@@ -41,7 +41,7 @@ def walk(
         return walk_plainly(robot, aims, starts, steps, patience)
     call = KernelCall(limb, aims, np.clip(starts, robot.lower, robot.upper), steps, patience)
     most = kernels.walk(limb.address, call.address)
-    return call.q, call.reached.astype(bool), most
+    return call.q, call.reached, most
 
 
 def descend(robot: Robot, goal: TipGoal, starts: Matrix, *, iterations: int = STEPS) -> tuple[Matrix, int]:
@@ -91,9 +91,9 @@ class Search:
             return self._advance_plainly(rows)
         call = KernelCall(limb, self._aims[rows], self.q[rows], STEPS, PATIENCE, self._near[rows], self._next[rows])
         kernels.solve(limb.address, call.address)
-        self.steps += int(call.header[DONE])
+        self.steps += call.steps
         self.q[rows], self._next[rows] = call.q, call.next
-        return call.reached.astype(bool)
+        return call.reached
 
     def _advance_plainly(self, rows: NDArray[np.int64]) -> Mask:
         """The same in numpy, all goals side by side."""

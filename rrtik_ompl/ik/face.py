@@ -112,7 +112,9 @@ def solve_ik(
         name = _walker(goal)
         answer, q, residuals, free = _tried(question, name)
     turned = joint_difference(robot, q, posture)
-    kept = _different(turned, np.flatnonzero(free), None if all else 1)
+    (rows,) = free.nonzero()
+    order = rows[np.vecdot(turned, turned)[rows].argsort(kind="stable")]
+    kept = _different(turned, order) if all else order[:1]
     reason, detail = ("", "") if len(kept) else _why(question, answer, name, q)
     return IkResult(
         solutions=frozen(np.where(robot.continuous, posture + turned[kept], q[kept])),
@@ -168,29 +170,33 @@ def free_of_collision(world: World | None, Q: Matrix) -> Mask:
 
 
 def _tried(question: Question, name: str) -> tuple[Answer, Matrix, Matrix, Mask]:
-    """What a method answers: of that the rows at the goal, shape (k, dof), their residuals, and which are accepted."""
-    answer = METHODS[name].run(question)
-    q, residuals = _at_goal(question.robot, question.goal, answer.q)
+    """What a method answers: of that the rows at the goal, shape (k, dof), their residuals, and which are accepted.
+
+    If one is enough, the nearest is looked at first and alone: mostly it will do.
+    """
+    robot, answer = question.robot, METHODS[name].run(question)
+    inside = robot.clamp(answer.q[robot.within_limits(answer.q)])
+    if not question.all and len(inside) > 1:
+        away = joint_difference(robot, inside, question.near)
+        nearest = int(np.vecdot(away, away).argmin())
+        q, residuals = _at_goal(robot, question.goal, inside[nearest : nearest + 1])
+        if len(q) and question.accept(q)[0]:
+            return answer, q, residuals, np.ones(1, dtype=bool)
+    q, residuals = _at_goal(robot, question.goal, inside)
     return answer, q, residuals, question.accept(q)
 
 
-def _different(difference: Matrix, rows: NDArray[np.intp], most: int | None) -> list[int]:
-    """Some of the rows without repetitions, by their differences from a posture: the nearest first, at most so many."""
+def _different(difference: Matrix, rows: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Some of the rows without repetitions, by their differences from a posture."""
     kept: list[int] = []
-    for k in rows[np.vecdot(difference, difference)[rows].argsort(kind="stable")]:
-        if len(kept) == most:
-            break
+    for k in rows.tolist():
         if not kept or np.abs(difference[k] - difference[kept]).max(axis=1).min() > SAME_POSTURE:
-            kept.append(int(k))
-    return kept
+            kept.append(k)
+    return np.array(kept, dtype=np.intp)
 
 
 def _at_goal(robot: Robot, goal: TipGoal, q: Matrix) -> tuple[Matrix, Matrix]:
-    """The rows of q at the goal and inside the limits, and their residuals, shape (k, 2).
-
-    Of a region those from the part that a row is nearest to.
-    """
-    q = robot.clamp(q[robot.within_limits(q)])
+    """The rows of q at the goal, and their residuals, shape (k, 2): of a region from the part a row is nearest to."""
     if len(q) == 0:
         return q, np.zeros((0, 2))
     if isinstance(goal, Target):

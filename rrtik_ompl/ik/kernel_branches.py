@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -14,17 +13,16 @@ from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.fast import branch_layout as layout
 from rrtik_ompl.fast import ik_layout
 from rrtik_ompl.fast.branch_layout import BRANCHES, DOF
-from rrtik_ompl.fast.layout import ALIGNMENT
 from rrtik_ompl.fast.library import library
 from rrtik_ompl.fast.processor import WIDTH
 from rrtik_ompl.fast.robot_tables import Table, table
+from rrtik_ompl.ik.call_memory import WORD, CallLayout, CallMemory
 from rrtik_ompl.ik.form import ClosedFormSolver
 from rrtik_ompl.ik.limb import limb_of
 from rrtik_ompl.ik.plain_branches import mountings, plain_branches
 from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
 
 ENDLESS = 1e300  # limits of continuous joints: kernels know no infinity
-NOTHING = np.zeros(1)
 
 
 def kernel_branches(
@@ -38,7 +36,7 @@ def kernel_branches(
     call = _Call(poses, hints, slack, check)
     getattr(kernels, form.kernel)(arm.table.address, call.address)
     answers = call.answers()
-    odd = np.flatnonzero(call.odd)
+    (odd,) = call.odd.nonzero()
     if len(odd):
         rest = plain_branches(robot, form, poses[odd], None if hints is None else hints[odd], slack, check)
         for whole, part in zip(answers, rest, strict=True):
@@ -78,57 +76,50 @@ def _numbers(pose: Matrix) -> NDArray[np.float64]:
 
 
 class _Call:
-    """The table of one call, and its memory, so that threads do not meet. Answers are filled up to whole blocks."""
+    """One call of a kernel. Answers are filled up to whole blocks."""
 
     def __init__(self, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool) -> None:
-        self._count, blocks = len(poses), -(-len(poses) // WIDTH)
-        shape = (DOF + 2 if check else DOF, BRANCHES, WIDTH * blocks)
-        size = math.prod(shape)
-        memory = _aligned(size + layout.WORK_LANES * WIDTH)
-        self._numbers = memory[:size].reshape(shape)
-        self._truths = np.empty((2 * BRANCHES + 1, shape[2]), dtype=np.bool_)
-        self._given = [
-            np.ascontiguousarray(each, np.float64) for each in (poses, NOTHING if hints is None else hints, slack)
-        ]
-        targets, near, near_singular = (array.ctypes.data for array in self._given)
-        numbers, truths = memory.ctypes.data, self._truths.ctypes.data
-        self._header = np.zeros(layout.CALL_FIELDS, dtype=np.int64)
-        fields = {
-            layout.ROWS: self._count,
-            layout.BLOCKS: blocks,
-            layout.POSES: targets,
-            layout.NEAR: 0 if hints is None else near,
-            layout.SLACK: near_singular,
-            layout.Q: numbers,
-            layout.REAL: truths,
-            layout.FITS: truths + self._truths[:BRANCHES].nbytes,
-            layout.ODD: truths + self._truths[:-1].nbytes,
-            layout.RESIDUALS: numbers + self._numbers[:DOF].nbytes if check else 0,
-            layout.WORK: numbers + self._numbers.nbytes,
-        }
-        for place, value in fields.items():
-            self._header[place] = value
-
-    @property
-    def address(self) -> int:
-        """Where the fields are."""
-        return int(self._header.ctypes.data)
+        self._count, self._shape = len(poses), (BRANCHES, WIDTH * _blocks(len(poses)))
+        self._checked = int(check)
+        self._memory = memory = CallMemory(_layout_of(len(poses), hints is not None, check))
+        self.address = memory.address
+        memory[layout.POSES].reshape(poses.shape)[:] = poses
+        memory[layout.SLACK][:] = slack
+        if hints is not None:
+            memory[layout.NEAR].reshape(hints.shape)[:] = hints
 
     @property
     def odd(self) -> NDArray[np.bool_]:
         """Which targets are to be answered otherwise, shape (m,)."""
-        return self._truths[-1, : self._count]
+        return self._memory[layout.ODD].view(np.bool_)[: self._count]
 
     def answers(self) -> list[NDArray[Any]]:
         """As of `plain_branches`."""
-        own = slice(self._count)
-        real, fits = self._truths[:BRANCHES, own], self._truths[BRANCHES:-1, own]
-        q, residuals = self._numbers[:DOF, :, own], self._numbers[DOF:, :, own]
+        memory, own = self._memory, slice(self._count)
+        q = memory[layout.Q].reshape(DOF, *self._shape)[:, :, own]
+        residuals = memory[layout.RESIDUALS].reshape(2 * self._checked, *self._shape)[:, :, own]
+        real, fits = (memory[place].view(np.bool_).reshape(self._shape)[:, own] for place in (layout.REAL, layout.FITS))
         return [q, real, real & fits, np.zeros(self._count, dtype=np.uint8), residuals]
 
 
-def _aligned(count: int) -> NDArray[np.float64]:
-    """So many numbers, not set, that start on a multiple of ``ALIGNMENT`` bytes."""
-    memory = np.empty(count + ALIGNMENT // 8)
-    start = -memory.ctypes.data % ALIGNMENT // 8
-    return memory[start : start + count]
+@lru_cache(maxsize=64)
+def _layout_of(count: int, hinted: bool, check: bool) -> CallLayout:
+    blocks = _blocks(count)
+    lanes = WIDTH * blocks
+    arrays = {
+        layout.Q: DOF * BRANCHES * lanes,
+        layout.RESIDUALS: 2 * BRANCHES * lanes if check else 0,
+        layout.WORK: layout.WORK_LANES * WIDTH,
+        layout.POSES: 16 * count,
+        layout.NEAR: DOF * count if hinted else 0,
+        layout.SLACK: 1,
+        layout.REAL: BRANCHES * lanes // WORD,
+        layout.FITS: BRANCHES * lanes // WORD,
+        layout.ODD: -(-lanes // WORD),
+    }
+    return CallLayout(arrays, {layout.ROWS: count, layout.BLOCKS: blocks})
+
+
+def _blocks(count: int) -> int:
+    """Of ``WIDTH`` targets, the last one filled up."""
+    return -(-count // WIDTH)

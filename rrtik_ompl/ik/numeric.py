@@ -45,15 +45,16 @@ def numeric(question: Question) -> Answer:
         return _many(question)
     aims, timed_out = aims_of(question), False
     search, waiting = Search(question.robot, aims, question.near), np.arange(len(aims))
-    found = np.zeros((0, question.robot.dof))
+    found = []
     while len(waiting):
         going, waiting = waiting[:AT_ONCE], waiting[AT_ONCE:]
         going = going[search.advance(going)]
-        found, waiting = np.concatenate([found, search.q[going]]), np.concatenate([waiting, going])
+        found.append(search.q[going])
         timed_out = time.monotonic() > question.deadline
-        if timed_out or question.accept(search.q[going]).any():
+        if timed_out or question.accept(found[-1]).any():
             break
-    return _answered(question, found, search.steps, timed_out)
+        waiting = np.concatenate([waiting, going])
+    return _answered(question, np.concatenate(found), search.steps, timed_out)
 
 
 def _many(question: Question) -> Answer:
