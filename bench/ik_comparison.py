@@ -42,7 +42,7 @@ PEER_BUDGET = 7  # times the budget of a method of ours
 KERNEL_BARS = {"ur5": 10.0, "panda": 40.0}  # [us]
 KERNEL = "kernel alone"
 OTHERS = ("pytracik", "ikpy", "damped", "pinocchio", "ccd")  # numeric methods not of ours
-COMPILED = "roboticstoolbox"  # a loop in C without limits, collisions or a check, beyond what the bar names
+COMPILED = "roboticstoolbox"  # a loop in C, beyond what the bar names
 HEAD = ["method", "poses", "solved", "median [us]", "p95 [us]", "median [m]", "worst [m]", "worst [rad]"]
 
 
