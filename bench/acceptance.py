@@ -32,7 +32,7 @@ class Report:
 
     def bar(self, what: str, wanted: str, measured: str, held: bool) -> None:
         """Add an acceptance row."""
-        self.bars.append((what, wanted, measured, held))
+        self.bars.append((what, wanted, measured, bool(held)))
 
     def markdown(self) -> str:
         """The whole page."""

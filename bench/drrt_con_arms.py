@@ -5,7 +5,7 @@ from __future__ import annotations
 import drrt_con_runs as runs
 import numpy as np
 from acceptance import Report
-from parallel import Measuring
+from parts import Parts
 
 HEAD = ["arrived", "length", "repairs", "waits", "evasions", "repair median / p95 [ms]", "tick p95 [ms]"]
 
@@ -20,7 +20,7 @@ def figures(found: list[runs.Outcome]) -> list[str]:
     return [arrived, f"{length:.2f}", *counts, times, f"{1e3 * np.percentile(ticks, 95):.1f}"]
 
 
-def arm_rows(report: Report, count: int, measure: Measuring) -> None:
+def arm_rows(report: Report, count: int, measure: Parts) -> None:
     """Six joints, 20 obstacles: contact, arrival, repairs."""
     rows = []
     for name, arm in runs.ARMS.items():

@@ -1,8 +1,9 @@
 """Measure the acceptance rows of DRRT-Con and the issue's targets for arms, and write them as Markdown.
 
-Usage: ``nice python bench/drrt_con_report.py [--jobs 2] [--keep FILE] [--repeats 30] [--runs 1000]``
+Usage: ``nice python bench/drrt_con_report.py [--jobs 2] [--repeats 30] [--runs 1000]``
 
-Times are of the processor, so that runs beside each other are fair. With ``--keep`` a broken measurement goes on.
+Times are of the processor, so that runs beside each other are fair. An interrupted run goes on
+where it was.
 """
 
 from __future__ import annotations
@@ -10,15 +11,14 @@ from __future__ import annotations
 import argparse
 import time
 from itertools import groupby
-from pathlib import Path
 
 import drrt_con_runs as runs
 import drrt_con_scenes as scenes
 import numpy as np
-from acceptance import Report
+from acceptance import Report, processes
 from drrt_con_arms import HEAD, arm_rows, figures, repair_rows
 from drrt_con_runs import outcome
-from parallel import Measuring
+from parts import Parts, add_options
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.moving_world import MovingWorld
@@ -180,7 +180,7 @@ def plane_part(report: Report, count: int) -> None:
     arm_order(report, count)
 
 
-def _part(section: str, amount: int) -> Report:
+def part(section: str, amount: int) -> Report:
     """A part of the report."""
     report = Report("", "")
     {"plane": plane_part, "repairs": repair_rows}[section](report, amount)
@@ -191,20 +191,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=30, help="runs of each scene in the plane")
     parser.add_argument("--runs", type=int, default=1000, help="runs of DRRT-Con of each arm")
-    parser.add_argument("--jobs", type=int, default=1, help="processes")
-    parser.add_argument("--keep", type=Path, help="results are kept in this file, and taken from it by the next call")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "reports" / "drrt_con.md")
+    add_options(parser, "drrt_con.md")
     given = parser.parse_args()
-    report = Report("DRRT-Con", "python bench/drrt_con_report.py")
-    measure = Measuring(given.jobs, given.keep)
+    report = Report("DRRT-Con", "python bench/drrt_con_report.py", processes(given.jobs))
     parts = [("plane", given.repeats), ("repairs", max(given.repeats // 5, 2))]
-    for part in measure(_part, parts):
-        report.bars += part.bars
-        report.lines += part.lines
-    given.out.write_text(report.markdown())
-    arm_rows(report, given.runs, measure)
-    report.note("How it is read", READING)
-    given.out.write_text(report.markdown())
+    with Parts(given.out, given.jobs) as measure:
+        for section in measure(part, parts):
+            report.bars += section.bars
+            report.lines += section.lines
+        given.out.write_text(report.markdown())
+        arm_rows(report, given.runs, measure)
+        report.note("How it is read", READING)
+        given.out.write_text(report.markdown())
 
 
 READING = (

@@ -54,8 +54,8 @@ class Outcome:
     arrived: bool
     length: float
     counts: dict[str, int]
-    repairs: np.ndarray
-    ticks: np.ndarray
+    repairs: list[float]
+    ticks: list[float]
     contacts: tuple[str, ...] = ()
     nearest: float = np.inf
 
@@ -64,7 +64,7 @@ def outcome(run: Run, verdict: Verdict | None = None) -> Outcome:
     """A run in short, and what a judge says of it."""
     seen = {} if verdict is None else {"contacts": tuple(c[1] for c in verdict.contacts), "nearest": verdict.nearest}
     counts = {event: run.count(event) for event in ("repair", "wait", "evade")}
-    times = run.seconds("repair", "repair"), run.seconds("all")
+    times = run.seconds("repair", "repair").tolist(), run.seconds("all").tolist()
     return Outcome(run.arrived, run.length, counts, *times, **seen)
 
 

@@ -8,14 +8,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
+from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 from acceptance import Report, processes
-from parts import in_parts
+from parts import Parts, add_options
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError
@@ -109,19 +107,13 @@ def _chain(
     return path
 
 
-def as_written(arm: str, family: str, seed: int) -> dict[str, Any]:
-    """One scene in plain words and numbers."""
-    return asdict(measured(arm, family, seed))
-
-
-def scenes(count: int, jobs: int, kept: Path) -> dict[str, list[Scene]]:
+def scenes(count: int, measure: Parts) -> dict[str, list[Scene]]:
     """By arm, families in turns, spread over processes."""
     names = list(FAMILIES)
     parts = [(arm, names[k % len(names)], k // len(names)) for arm in ARMS for k in range(count)]
     results: dict[str, list[Scene]] = {arm: [] for arm in ARMS}
-    for (arm, *_), text in zip(parts, in_parts(as_written, parts, jobs=jobs, kept=kept), strict=True):
-        found = {name: Outcome(**outcome) for name, outcome in text["found"].items()}
-        results[arm].append(Scene(**{**text, "found": found}))
+    for (arm, *_), scene in zip(parts, measure(measured, parts), strict=True):
+        results[arm].append(scene)
     return results
 
 
@@ -181,13 +173,18 @@ def main() -> None:
     """Run everything and write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scenes", type=int, default=100, help="of each arm")
-    parser.add_argument("--jobs", type=int, default=1, help="processes; more than one make the times longer")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "reports" / "generated.md")
+    add_options(parser, "generated.md")
     options = parser.parse_args()
     report = Report(
         "Single-joint moves in generated scenes", "python bench/generated_report.py", processes(options.jobs)
     )
-    results = scenes(options.scenes, options.jobs, options.out.with_suffix(".parts.jsonl"))
+    with Parts(options.out, options.jobs) as measure:
+        results = scenes(options.scenes, measure)
+        write(report, results, options)
+
+
+def write(report: Report, results: dict[str, list[Scene]], options: argparse.Namespace) -> None:
+    """Fill the page."""
     bars(report, [scene for found in results.values() for scene in found])
     for arm, found in results.items():
         tables(report, arm, found)
@@ -198,7 +195,6 @@ def main() -> None:
         f"clock and include all stages; {options.jobs} at a time."
     )
     report.note("What was done", text)
-    options.out.parent.mkdir(parents=True, exist_ok=True)
     options.out.write_text(report.markdown(), encoding="utf-8")
     print(report.markdown())
 

@@ -1,7 +1,7 @@
 """IKURT: every acceptance row for the published algorithm and the improved one, and both beside IK and RRT-Connect.
 
-Usage: ``python bench/ikurt_report.py [--mbm mbm_panda] [--jobs 2] [--keep FILE] [--quick]``; half an hour of one core.
-With ``--keep`` a broken measurement goes on.
+Usage: ``python bench/ikurt_report.py [--mbm mbm_panda] [--jobs 2] [--quick]``; half an hour of one core. An interrupted
+run goes on where it was.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from pathlib import Path
 
 import ikurt_cases as cases
 import numpy as np
-from acceptance import Report
+from acceptance import Report, processes
 from ikurt_runs import (
     BLOCKED_SECONDS,
     IMPROVED,
@@ -28,7 +28,7 @@ from ikurt_runs import (
     literal_falls,
     panda,
 )
-from parallel import Measuring
+from parts import Parts, add_options
 
 from rrtik_ompl.reproduce.ikurt import EXAMPLES, METRIC
 
@@ -50,7 +50,7 @@ def worst(runs: list[Run]) -> float:
     return max((each.away for each in runs if each.solved), default=np.inf)
 
 
-def acceptance(report: Report, measure: Measuring, literal: int, improved: int, stretch: float) -> None:
+def acceptance(report: Report, measure: Parts, literal: int, improved: int, stretch: float) -> None:
     wanted = [(name, which, improved if which == IMPROVED else literal)
               for name in EXAMPLES for which in (LITERAL, IMPROVED, PLAIN)]  # fmt: skip
     done: dict[str, dict[str, list[Run]]] = {name: {} for name in EXAMPLES}
@@ -62,7 +62,7 @@ def acceptance(report: Report, measure: Measuring, literal: int, improved: int, 
     table(report, done)
 
 
-def seeds_of(measure: Measuring, wanted: list[tuple[str, str, int]], limit: float, stretch: float) -> list[list[Run]]:
+def seeds_of(measure: Parts, wanted: list[tuple[str, str, int]], limit: float, stretch: float) -> list[list[Run]]:
     """Runs of examples by variants, so many seeds each, a few in a process."""
     pieces = [(name, which, first, min(first + AT_ONCE, count), limit, stretch)
               for name, which, count in wanted for first in range(0, count, AT_ONCE)]  # fmt: skip
@@ -129,7 +129,7 @@ def table(report: Report, done: dict[str, dict[str, list[Run]]]) -> None:
     report.table("The examples: medians of all runs, those that failed included", head, lines)
 
 
-def hundred(report: Report, measure: Measuring, seeds: int, stretch: float) -> None:
+def hundred(report: Report, measure: Parts, seeds: int, stretch: float) -> None:
     lines, everything = [], True
     wanted = [(name, IMPROVED, seeds) for name in EXAMPLES]
     for name, runs in zip(EXAMPLES, seeds_of(measure, wanted, SOON, stretch), strict=True):
@@ -148,7 +148,7 @@ def hundred(report: Report, measure: Measuring, seeds: int, stretch: float) -> N
     )
 
 
-def poses(report: Report, measure: Measuring, problems: int, folder: Path | None, pandas: int, stretch: float) -> None:
+def poses(report: Report, measure: Parts, problems: int, folder: Path | None, pandas: int, stretch: float) -> None:
     """All ways on generated poses, and on those of MotionBenchMaker if its folder is given."""
     pieces = [(arm, problems // len(cases.ARMS), stretch) for arm in cases.ARMS]
     for (arm, *_), (count, found) in zip(pieces, measure(generated, pieces), strict=True):
@@ -164,22 +164,17 @@ def main() -> None:
     parser.add_argument("--problems", type=int, default=500, help="generated pose problems, all arms together")
     parser.add_argument("--panda", type=int, default=140, help="problems of MotionBenchMaker")
     parser.add_argument("--stretch", type=float, default=1.0, help="wall time per processor time, on a busy machine")
-    parser.add_argument("--jobs", type=int, default=1, help="processes")
-    parser.add_argument("--keep", type=Path, help="results are kept in this file, and taken from it by the next call")
     parser.add_argument("--quick", action="store_true", help="a look at everything")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "reports" / "ikurt.md")
+    add_options(parser, "ikurt.md")
     options = parser.parse_args()
     literal, improved, seeds = (2, 5, 10) if options.quick else (options.literal, 20, 100)
     problems, pandas = (12, 7) if options.quick else (options.problems, options.panda)
-    measure, stretch = Measuring(options.jobs, options.keep), options.stretch
-    report = Report("IKURT", "python bench/ikurt_report.py")
+    report = Report("IKURT", "python bench/ikurt_report.py", processes(options.jobs))
     report.note("What was run", INTRODUCTION)
-    for section in (
-        lambda: hundred(report, measure, seeds, stretch),
-        lambda: poses(report, measure, problems, options.mbm, pandas, stretch),
-        lambda: acceptance(report, measure, literal, improved, stretch),
-    ):
-        section()
+    with Parts(options.out, options.jobs) as measure:
+        hundred(report, measure, seeds, options.stretch)
+        poses(report, measure, problems, options.mbm, pandas, options.stretch)
+        acceptance(report, measure, literal, improved, options.stretch)
         options.out.write_text(report.markdown())
     print(report.markdown())
 

@@ -13,11 +13,10 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from acceptance import Report, processes
-from parts import in_parts
+from parts import Parts, add_options
 
 from rrtik_ompl import load_problem, load_robot, one_joint_moves, shorten
 from rrtik_ompl.errors import InputError
@@ -90,10 +89,10 @@ def soak(part: int, paths: int) -> dict[str, list[float]]:
     return {method: count.tolist() for method, count in counts.items()}
 
 
-def all_parts(paths: int, jobs: int, kept: Path) -> dict[str, np.ndarray]:
+def all_parts(paths: int, measure: Parts) -> dict[str, np.ndarray]:
     """The sums of all parts, see :func:`soak`."""
     parts = [(number, min(PART, paths - number * PART)) for number in range(-(-paths // PART))]
-    found = in_parts(soak, parts, jobs=jobs, kept=kept)
+    found = measure(soak, parts)
     return {method: np.sum([counts[method] for counts in found], axis=0) for method in METHODS}
 
 
@@ -117,13 +116,11 @@ def main() -> int:
     """Shorten, check, write the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--paths", type=int, default=10_000)
-    parser.add_argument("--jobs", type=int, default=1, help="processes")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "reports" / "shortening_soak.md")
+    add_options(parser, "shortening_soak.md")
     options = parser.parse_args()
-    kept = options.out.with_suffix(".parts.jsonl")
-    report = page(all_parts(options.paths, options.jobs, kept), options.jobs)
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    options.out.write_text(report.markdown(), encoding="utf-8")
+    with Parts(options.out, options.jobs) as measure:
+        report = page(all_parts(options.paths, measure), options.jobs)
+        options.out.write_text(report.markdown(), encoding="utf-8")
     print(report.markdown())
     return int(not all(bar[3] for bar in report.bars))
 

@@ -50,12 +50,15 @@ class RunSection(Section):
         """The goal's way, or None if it stands still.
 
         Raises:
-            InputError: If times go backwards or a row has the wrong number of joints.
+            InputError: If times go backwards, or a row has the wrong number of joints or is outside the limits.
         """
         if self.goal is None:
             return None
         rows = [np.radians(w.joints_deg or []) if w.joints is None else w.joints for w in self.goal]
         joints = [robot.configuration(row, f"goal at {w.time:g} s") for row, w in zip(rows, self.goal, strict=True)]
+        for waypoint, row in zip(self.goal, joints, strict=True):
+            if fault := robot.limit_fault(row):
+                raise InputError(f"goal at {waypoint.time:g} s: {fault}")
         return GoalMotion(np.array([w.time for w in self.goal]), np.array(joints))
 
 

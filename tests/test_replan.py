@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 import warnings
@@ -343,6 +344,33 @@ def test_times_that_go_backwards_are_refused():
         replan(crossing(), [(0.0, scene), (0.5, scene), (0.3, scene)], **OPTIONS)
 
 
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ([5, 6], "expected pairs of a time"),
+        ([(0.0, None)], "expected pairs of a time"),
+        ([(float("nan"), Scene(()))], "expected pairs of a time"),
+        (lambda time: None, "what it returns at 0 s must be of type Scene, got NoneType"),
+    ],
+)
+def test_what_is_no_feed_is_refused(given, words):
+    with pytest.raises(InputError, match=words):
+        replan(crossing(), given, **OPTIONS)
+
+
+@pytest.mark.parametrize(
+    ("goal", "words"),
+    [
+        ([1.0, 2.0], "goal_feed: expected a function of time"),
+        (lambda time: [1.0, 2.0, 3.0], "goal at 0 s: robot 'point2d' has 2 joints"),
+        (lambda time: [16.0, 10.0 + 50.0 * time], r"goal at 0\.\d s: joint 'y' is at \d+ m, outside its limits"),
+    ],
+)
+def test_a_moving_goal_that_is_none_is_refused(goal, words):
+    with pytest.raises(InputError, match=words):
+        replan(crossing(), goal_feed=goal, **OPTIONS)
+
+
 def test_snapshots_are_a_feed_too():
     scene = crossing().world.scene
     run = replan(crossing(), ((0.1 * k, scene.at(0.1 * k)) for k in range(200)), **OPTIONS)
@@ -398,6 +426,25 @@ def test_a_file_that_is_no_record_is_refused(tmp_path):
     (tmp_path / "run.json").write_text('{"kind": "replan_run", "version": 1, "ticks": [{"time": 0}]}')
     with pytest.raises(InputError, match="not a whole record"):
         load_run(tmp_path / "run.json")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda record: record.update(ticks=[]), "no tick"),
+        (lambda record: record.update(outcome="flew"), "no outcome 'flew'"),
+        (lambda record: record["ticks"][1].update(event="jump"), "no event of a tick 'jump'"),
+        (lambda record: record["ticks"][2].update(time=0.0), "times go backwards"),
+    ],
+)
+def test_a_record_that_cannot_be_is_refused_with_its_name(tmp_path, change, words):
+    file = tmp_path / "run.json"
+    replan(crossing(), record=file, **{**OPTIONS, "seconds": 0.5})
+    record = json.loads(file.read_text())
+    change(record)
+    file.write_text(json.dumps(record))
+    with pytest.raises(InputError, match=f"run.json: .*{words}"):
+        load_run(file)
 
 
 # The judge and the generator ----------------------------------------------------------------------------------------

@@ -69,6 +69,7 @@ def test_a_goal_that_moves_is_read_from_the_file(crossing):
         ("run: {", "motoin_resolution: {", "unknown key 'motoin_resolution'"),
         ("velocity: [1000]", "velocity: [1, 2, 3]", r"run: .*2 joints, but got 3"),
         ("velocity: [1000]", "goal: [{time: 1, joints: [1, 1]}, {time: 0, joints: [1, 2]}]", "times must increase"),
+        ("velocity: [1000]", "goal: [{time: 2, joints: [19, 30]}]", r"run: goal at 2 s: joint 'y' is at 30 m, outside"),
         (TEXT[TEXT.index("run:") :], "", "needs the key 'run'"),
     ],
 )

@@ -60,7 +60,7 @@ class DRRTCon(SafePlanner):
                 if ptc() or core.begin(start, goals, checker, ptc):
                     break
         assert core is not None
-        statistics = {"iterations": core.connect.samples, "repairs": core.counts.repairs, "reused": int(reused)}
+        statistics = {"iterations": core.connect.samples, "repairs": core.repairs, "reused": int(reused)}
         return SearchResult(core.path if core.free else None, statistics)
 
     def _from_kept(self, core: DrrtCon, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> bool:

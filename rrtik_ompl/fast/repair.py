@@ -18,6 +18,7 @@ from rrtik_ompl.fast.shortcut import ShortcutSearch
 from rrtik_ompl.robot import Chain
 
 FIRST_ROOM = 256  # rows
+NEAR = 4.0  # gaps; in 60 runs among six triangles 209 ticks had contact, with 0.5 296
 
 
 class PathRepair:
@@ -66,7 +67,7 @@ class PathRepair:
         )
         self._iterations, self._dof = iterations, len(weights)
         fields: dict[int, Any] = dict.fromkeys(range(layout.FIELD_COUNT), 0)
-        fields |= {layout.TRIES: tries, layout.PATIENCE: patience, layout.STEP: np.array([0.5 * eps])}
+        fields |= {layout.TRIES: tries, layout.PATIENCE: patience, layout.NUMBERS: np.array([0.5 * eps, NEAR])}
         self._table = table(fields)
         self._address, self._points = self._table.address, np.zeros((0, self._dof))
         self._make_room(FIRST_ROOM)

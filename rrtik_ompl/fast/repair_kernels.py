@@ -23,7 +23,6 @@ from rrtik_ompl.fast.motion_kernels import SLACK, copy_row, judge_motion, lift
 from rrtik_ompl.fast.shortcut_kernels import resume as resume_cuts
 from rrtik_ompl.fast.tree_kernels import parent_of
 
-FIRST_SPREAD = 0.5  # of the gap: half the side of the first sample's box
 STRAIGHT = 1e-9  # change of direction that is none
 
 
@@ -37,7 +36,7 @@ def row_at(repair: int, place: int, number: int) -> Any:
 def divide(repair: int, rows: int) -> bool:
     """Set POINTS to points along the path as it was given, all its waypoints among them; False if there is no room."""
     dof, count = field(field(repair, table.SEARCH), connect_layout.DOF), 1
-    step = double_at(field(repair, table.STEP), 0)
+    step = double_at(field(repair, table.NUMBERS), table.STEP)
     copy_row(dof, field(repair, table.GIVEN), field(repair, table.POINTS))
     for k in range(rows - 1):
         here, there = row_at(repair, table.GIVEN, k), row_at(repair, table.GIVEN, k + 1)
@@ -106,7 +105,7 @@ def sample_near(repair: int, first: int, second: int) -> None:
     dof = field(search, connect_layout.DOF)
     for k in range(dof):
         set_double(field(search, connect_layout.CENTRE), k, 0.5 * (double_at(a, k) + double_at(b, k)))
-    spread = FIRST_SPREAD * distance(dof, a, b)
+    spread = double_at(field(repair, table.NUMBERS), table.NEAR) * distance(dof, a, b)
     set_double(field(search, connect_layout.NUMBERS), connect_layout.SPREAD, spread)
 
 

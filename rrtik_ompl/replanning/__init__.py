@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 
-from rrtik_ompl.errors import require
+from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning.feed import Source, SpeedWarning, feed_of
 from rrtik_ompl.replanning.loop import Clock, GoalFeed, Loop
@@ -75,6 +75,10 @@ def replan(
         UnknownNameError: If there is no planner of that name.
     """
     require(problem, Problem, "problem to replan", "use Problem(world, start, goal) or load_scenario(name)")
+    if limits is not None:
+        require(limits, RateLimits, "limits", "use RateLimits(velocity, acceleration)")
+    if goal_feed is not None and not callable(goal_feed):
+        raise InputError(f"goal_feed: expected a function of time [s], got {type(goal_feed).__name__}")
     chosen = settings(
         problem.robot, step=step, rate=rate, planner=planner, eps=eps, margin=margin, speed_bound=speed_bound,
         limits=limits, predict=predict, seconds=seconds, slot=slot, seed=seed,

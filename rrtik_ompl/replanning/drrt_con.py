@@ -8,7 +8,6 @@ samples (a path that becomes free by itself needs none).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -24,21 +23,6 @@ STRAIGHT = 1e-9  # change of direction
 Post = Callable[[Matrix], Matrix]  # a free route, shape (k, n), made shorter
 
 
-@dataclass(slots=True)
-class Counts:
-    """What a replanner has done so far.
-
-    Attributes:
-        looks: Times that the path was checked again.
-        repairs: Times that a new path was looked for.
-        failures: Of these, how often there was none.
-    """
-
-    looks: int = 0
-    repairs: int = 0
-    failures: int = 0
-
-
 class DrrtCon:
     """A path from where the robot is to a goal, kept free while the scene changes.
 
@@ -46,7 +30,7 @@ class DrrtCon:
         path: Shape (k, n), the robot's place first; None before :meth:`begin` has found one. It is kept while it is
             blocked.
         free: Whether every motion of the path was free when last looked at.
-        counts: See :class:`Counts`.
+        repairs: Times that a new path was looked for so far.
 
     Args:
         connect: The search between pieces of a path.
@@ -59,8 +43,7 @@ class DrrtCon:
     def __init__(self, connect: Connect, eps: float, *, post: Post | None = None) -> None:
         self.connect, self.eps, self.post = connect, eps, post
         self.path: Matrix | None = None
-        self.free = False
-        self.counts = Counts()
+        self.free, self.repairs = False, 0
         self._dense = np.zeros((0, 0))
         self._hits: Mask = np.zeros(0, dtype=bool)
 
@@ -76,7 +59,6 @@ class DrrtCon:
         """Check the path again, all of it in one call; whether it is free."""
         if self.path is None:
             return False
-        self.counts.looks += 1
         self._dense = points_along(self.path, 0.5 * self.eps)
         self._hits = ~motions.motion_valid_batch(self._dense[:-1], self._dense[1:])
         self.free = not self._hits.any()
@@ -84,10 +66,9 @@ class DrrtCon:
 
     def repair(self, motions: Motions, stop: Stop = never) -> bool:
         """After a :meth:`look` that found the path hit: find another one; whether there is one."""
-        self.counts.repairs += 1
+        self.repairs += 1
         ends_free = self.path is not None and bool(motions.valid_batch(self.path[[0, -1]]).all())
         found = self._reconnected(motions, stop) if ends_free else None
-        self.counts.failures += found is None
         return self._take(found, motions)
 
     def retarget(self, goals: Matrix, motions: Motions, stop: Stop = never) -> bool:

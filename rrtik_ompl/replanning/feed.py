@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.extent import farthest
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.scene import Obstacle, Scene
 
 Feed: TypeAlias = Callable[[float], Scene]
@@ -38,17 +38,28 @@ def feed_of(source: Source) -> Feed:
     if isinstance(source, Scene):
         return source.at
     if callable(source):
-        return source
+        return _seen(source)
     if isinstance(source, Iterable):
         return Stream(source)
     raise InputError(f"scene feed: expected a scene, a function of time or pairs, got {type(source).__name__}")
+
+
+def _seen(source: Feed) -> Feed:
+    """A function of time whose answers are checked."""
+
+    def at(time: float) -> Scene:
+        scene = source(time)
+        require(scene, Scene, f"scene feed: what it returns at {time:g} s", "return the scene at that time")
+        return scene
+
+    return at
 
 
 class Stream:
     """Snapshots one after the other; called with a time, the last one that is not later."""
 
     def __init__(self, snapshots: Iterable[tuple[float, Scene]]) -> None:
-        self._left: Iterator[tuple[float, Scene]] = iter(snapshots)
+        self._left: Iterator[tuple[float, Scene]] = map(_snapshot, snapshots)
         self._next = next(self._left, None)
         if self._next is None:
             raise InputError("scene feed: it holds no snapshot; give at least one pair of a time and a scene")
@@ -58,15 +69,23 @@ class Stream:
         """The scene as last seen at ``time`` [s].
 
         Raises:
-            InputError: If a snapshot is older than the one before it, or its time is no number.
+            InputError: If a snapshot is older than the one before it, or is no pair of a time and a scene.
         """
         while self._next is not None and self._next[0] <= time:
             self._now = self._next
             self._next = next(self._left, None)
-            if self._next is not None and not self._next[0] >= self._now[0]:
+            if self._next is not None and self._next[0] < self._now[0]:
                 stamps = f"{self._next[0]:g} s comes after {self._now[0]:g} s"
                 raise InputError(f"scene feed: times go backwards: {stamps}; sort the snapshots by time")
         return self._now[1]
+
+
+def _snapshot(given: Any) -> tuple[float, Scene]:
+    """A pair of a time and a scene, checked."""
+    match given:
+        case (float() | int() | np.number() as time, Scene() as scene) if np.isfinite(time):
+            return float(time), scene
+    raise InputError(f"scene feed: expected pairs of a time [s] and a scene, got {given!r:.80}")
 
 
 class Watch:

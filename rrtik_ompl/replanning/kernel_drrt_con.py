@@ -47,19 +47,17 @@ class KernelDrrtCon(DrrtCon):
         """See :meth:`DrrtCon.look`."""
         if self.path is None:
             return False
-        self.counts.looks += 1
         self.free = self._kernels.look(self.path)
         self._world.checked += self._kernels.checked
         return self.free
 
     def repair(self, motions: Motions, stop: Stop = never) -> bool:
         """See :meth:`DrrtCon.repair`."""
-        self.counts.repairs += 1
+        self.repairs += 1
         seed = int(self._rng.integers(2**62))
         found: Matrix | None = None
         if self.path is not None:
             found = self._kernels.repair(seed, stop, forgetting=self._forgetting)
-        self.counts.failures += found is None
         self.free = found is not None
         self.path = self.path if found is None else found
         return self.free

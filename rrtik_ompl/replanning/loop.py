@@ -21,6 +21,7 @@ from rrtik_ompl.replanning.feed import Feed, Watch, rooms
 from rrtik_ompl.replanning.run import Run, Tick
 from rrtik_ompl.replanning.settings import COPIES, TURN, Settings, planner_of
 from rrtik_ompl.replanning.walking import one_step, to_first_corner
+from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.world import World
 
@@ -55,7 +56,7 @@ class Loop:
         self._watch = Watch(scene, chosen.speed_bound)
         self._rng = np.random.default_rng(chosen.seed)
         self.q = problem.start
-        self._goals = _goals(problem, self._alone, self._rng) if goal_feed is None else _goal(goal_feed, 0.0)
+        self._goals = _goals(problem, self._alone, self._rng) if goal_feed is None else _goal(robot, goal_feed, 0.0)
         self._first = {o.name: o.pose for o in scene.obstacles}
         self._see(0.0)
         _check_start(self.q, scene, first, self._world)
@@ -74,7 +75,7 @@ class Loop:
             self._note(now, self.q, "arrive", {}, 0, "")
             return False
         if self._goal_feed is not None:
-            self._goals = _goal(self._goal_feed, now)
+            self._goals = _goal(self._problem.robot, self._goal_feed, now)
         spent: dict[str, float] = {}
         changed = self._timed(spent, "sense", self._see, now)
         self._timed(spent, "retarget", self._follow_goal)
@@ -216,8 +217,16 @@ def _goals(problem: Problem, alone: World, rng: np.random.Generator) -> Matrix:
     return found.rows
 
 
-def _goal(goal_feed: GoalFeed, now: float) -> Matrix:
-    return np.asarray(goal_feed(now), dtype=np.float64)[None]
+def _goal(robot: Robot, goal_feed: GoalFeed, now: float) -> Matrix:
+    """Where a moving goal is, shape (1, n).
+
+    Raises:
+        InputError: If that is no configuration of the robot, or outside the limits.
+    """
+    q = robot.configuration(goal_feed(now), f"goal at {now:g} s")
+    if fault := robot.limit_fault(q):
+        raise InputError(f"goal at {now:g} s: {fault}")
+    return q[None]
 
 
 def _held_pairs(scene: Scene) -> tuple[tuple[str, str], ...]:

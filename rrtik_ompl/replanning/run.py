@@ -6,13 +6,14 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.path_text import json_object
 from rrtik_ompl.text_file import read_text, write_text
 
@@ -149,11 +150,26 @@ def load_run(path: str | os.PathLike[str]) -> Run:
         document = json_object(read_text(path), KIND, "ticks")
         given = {name: document[name] for name in _HEADS}
         ticks = [_tick(entry, len(given["joint_names"])) for entry in document["ticks"]]
+        _check(given["outcome"], ticks)
         return Run(**{**given, "joint_names": tuple(given["joint_names"])}, ticks=ticks)
     except (KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{path}: not a whole record: {error!r}; write it again with rrtik replan --record") from None
     except InputError as error:
         raise error if str(error).startswith(str(path)) else InputError(f"{path}: {error}") from None
+
+
+def _check(outcome: str, ticks: list[Tick]) -> None:
+    """Raise unless there are ticks in the order of time, and all words are known."""
+    if not ticks:
+        raise InputError("the record has no tick: the run was interrupted before the first; run it again")
+    if outcome not in OUTCOMES:
+        raise UnknownNameError("outcome", str(outcome), OUTCOMES)
+    for tick in ticks:
+        if tick.event not in EVENTS:
+            raise UnknownNameError("event of a tick", tick.event, EVENTS)
+    for before, after in pairwise(ticks):
+        if not after.time > before.time:
+            raise InputError(f"ticks: times go backwards: {after.time:g} s comes after {before.time:g} s")
 
 
 def _tick_data(tick: Tick) -> dict[str, Any]:
