@@ -91,7 +91,8 @@ def plan(
         planner: Name of one of :func:`list_planners` (``geometric::`` may stand before OMPL's names), or a planner
             class that is built from a SpaceInformation alone.
         seconds: Time limit for all attempts together [s].
-        seed: The same seed gives the same path, as long as the time limit does not cut in; drawn if None.
+        seed: The same seed gives the same path, as long as the time limit does not cut in; drawn if None. PRM and
+            PRMstar work by the clock, so theirs may differ.
         restarts: Further attempts at most.
         parameters: Options of the planner; of OMPL's planners in snake case, such as ``range`` or ``goal_bias``.
         accuracy: "exact", or "conservative" to leave it at what can be proven without coal: faster, and blind to narrow

@@ -54,7 +54,7 @@ def test_every_planner_finds_a_valid_path_with_exact_ends(wall, name):
     assert found.statistics["attempts"] >= 1
 
 
-@pytest.mark.parametrize("name", ["bicrdt", "RRTConnect", "RRT", "KPIECE1", "PRM"])
+@pytest.mark.parametrize("name", ["bicrdt", "RRTConnect", "RRT", "KPIECE1"])  # PRM works by the clock
 def test_the_same_seed_gives_the_same_path(wall, name):
     one, two, other = (plan(wall, name, seconds=8.0, seed=s).path.waypoints for s in (4, 4, 5))
     assert np.array_equal(one, two)
