@@ -13,7 +13,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.terminal import progress, say
 from rrtik_ompl.text_file import check_target
 
-markers = typer.Typer(help="Print markers, calibrate a camera, sense what it sees.", no_args_is_help=True)
+markers = typer.Typer(help="Print markers, calibrate a camera, sense what it sees.")
 
 Dictionary = Annotated[str, typer.Option(help="4x4_50 sees farthest; aruco_mip_36h12 confuses least; apriltag_36h11.")]
 PICTURES, SCENES = (".png", ".jpg"), (".yaml", ".yml")

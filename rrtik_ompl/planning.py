@@ -91,7 +91,8 @@ def plan(
         planner: Name of one of :func:`list_planners` (``geometric::`` may stand before OMPL's names), or a planner
             class that is built from a SpaceInformation alone.
         seconds: Time limit for all attempts together [s].
-        seed: The same seed gives the same path, as long as the time limit does not cut in; drawn if None.
+        seed: The same seed gives the same path, as long as the time limit does not cut in; drawn if None. PRM and
+            PRMstar work by the clock, so theirs may differ.
         restarts: Further attempts at most.
         parameters: Options of the planner; of OMPL's planners in snake case, such as ``range`` or ``goal_bias``.
         accuracy: "exact", or "conservative" to leave it at what can be proven without coal: faster, and blind to narrow
@@ -117,11 +118,16 @@ def plan(
     seeds = [int(child) for child in np.random.SeedSequence(used).generate_state(restarts + 1, np.uint32)]
     _load_kernels(problem, factory)
     begin = time.perf_counter()
-    path, reason, totals = _search(problem, factory, name, begin + limit, seeds, parameters or {})
-    elapsed = time.perf_counter() - begin
+    search = _Search(problem, factory, name, begin + limit, seeds, parameters or {})
+    if _nothing_to_do(problem):  # some planners wander off and come back, others break
+        path: JointPath | None = JointPath.of(problem.robot, problem.start[None])
+    else:
+        path = search.run()
+    elapsed, reason = time.perf_counter() - begin, search.reason
     if path is None and elapsed >= limit:
-        reason = f"no path within {limit:g} s ({totals['attempts']} attempts; the last one: {reason or 'out of time'})"
-    return Plan(path is not None, path, reason, elapsed, name, used, MappingProxyType(totals))
+        attempts = search.totals["attempts"]
+        reason = f"no path within {limit:g} s ({attempts} attempts; the last one: {reason or 'out of time'})"
+    return Plan(path is not None, path, reason, elapsed, name, used, MappingProxyType(search.totals))
 
 
 def _load_kernels(problem: Problem, factory: PlannerFactory) -> None:
@@ -133,92 +139,115 @@ def _load_kernels(problem: Problem, factory: PlannerFactory) -> None:
             library(name)
 
 
-def _search(
-    problem: Problem,
-    factory: PlannerFactory,
-    name: str,
-    deadline: float,
-    seeds: list[int],
-    parameters: Mapping[str, Any],
-) -> tuple[JointPath | None, str, dict[str, int | float]]:
-    """Attempt after attempt, one per seed: the path or None, the reason, and the counts of all of them."""
-    totals: dict[str, int | float] = {"attempts": 0, "rejected": 0}
-    reason = ""
-    if _nothing_to_do(problem):  # some planners wander off and come back, others break
-        return JointPath.of(problem.world.robot, problem.start[None]), "", totals
-    turns_matter = isinstance(problem.goal, JointGoal) and bool(problem.world.robot.continuous.any())
-    needless = finds_goals(factory) and not isinstance(problem.goal, JointGoal)
-    # An optimal path touches what it goes round, and an anytime planner has no time left for a second attempt.
-    asked = problem.refined(SECOND_CHECK) if getattr(factory, "__name__", "") in ANYTIME_PLANNERS else problem
-    search = GoalSearch(problem, np.random.default_rng(seeds[0]))
-    for number, seed in enumerate(seeds):
-        if time.perf_counter() >= deadline:
-            break
-        totals["attempts"] += 1
-        short_way = turns_matter and number == 0 and len(seeds) > 1
-        aims = np.zeros((0, problem.robot.dof)) if needless else _aims(search, number, short_way)
-        left = deadline - time.perf_counter()
-        aimless = len(aims) == 0 and not needless
-        if aimless and search.exhausted:
-            break
-        if aimless or left <= 0.0:
-            continue
-        if number == 0 and problem.world.accuracy == "exact" and can_be_brief(factory):
-            path = _without_coal(problem, factory, name, aims, left, seed, parameters, totals)
+class _Search:
+    """Attempt after attempt, one per seed, until the second check accepts a path.
+
+    Attributes:
+        totals: The counts of all attempts.
+        reason: Why there is no path, in a line; "" if there is one.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        factory: PlannerFactory,
+        name: str,
+        deadline: float,
+        seeds: list[int],
+        parameters: Mapping[str, Any],
+    ) -> None:
+        self.totals: dict[str, int | float] = {"attempts": 0, "rejected": 0}
+        self.reason = ""
+        self._problem, self._factory, self._name, self._parameters = problem, factory, name, parameters
+        self._deadline, self._seeds = deadline, seeds
+        self._goals = GoalSearch(problem, np.random.default_rng(seeds[0]))
+        joints = isinstance(problem.goal, JointGoal)
+        self._aimless = finds_goals(factory) and not joints
+        self._brief = can_be_brief(factory)
+        self._long_ways = joints and bool(problem.robot.continuous.any()) and len(seeds) > 1
+        # An optimal path touches what it goes round, and an anytime planner has no time left for a second attempt.
+        anytime = getattr(factory, "__name__", "") in ANYTIME_PLANNERS
+        self._asked = problem.refined(SECOND_CHECK) if anytime else problem
+
+    def run(self) -> JointPath | None:
+        """The path, or None and a reason."""
+        for number in range(len(self._seeds)):
+            if self._left() <= 0.0:
+                break
+            self.totals["attempts"] += 1
+            aims = self._aims(number)
+            if len(aims) == 0 and not self._aimless:
+                if self._goals.exhausted:
+                    break
+                continue
+            if self._left() <= 0.0:
+                break
+            path = self._proven_path(aims) if number == 0 else None
+            path = self._path(number, aims) if path is None else path
             if path is not None:
-                return path, "", totals
-            left = max(deadline - time.perf_counter(), SHORTEST)
-        half = 0.5 if short_way else 1.0  # of the time for the short way round, before the long one is tried too
-        others = not needless and _others(search, factory, number) and number < len(seeds) - 1
-        effort = 2**number if others and can_be_brief(factory) else None
-        outcome = attempt(asked, factory, aims, seconds=half * left, seed=seed, parameters=parameters, effort=effort)
-        _add(totals, outcome.statistics)
-        path, reason = _judged(problem, outcome, name)
-        if path is not None:
-            return path, "", totals
-        if outcome.rows is not None:
-            totals["rejected"] += 1
-            asked = problem.refined(SECOND_CHECK)
-    return None, reason or search.reason, totals
-
-
-def _aims(search: GoalSearch, number: int, short_way: bool) -> Matrix:
-    """What an attempt aims at: all that is known, the newest first, for some planners heed the first alone."""
-    known = len(search.rows)
-    newer = number > 0 and search.more()
-    rows = search.first()
-    return rows[:1] if short_way else np.roll(rows, -known if newer else -number, axis=0)
-
-
-def _others(search: GoalSearch, factory: PlannerFactory, number: int) -> bool:
-    """Whether later attempts would aim at other configurations than this one."""
-    one = getattr(factory, "__name__", "") in ONE_GOAL_PLANNERS
-    return not search.exhausted or (one and number + 1 < len(search.rows))
-
-
-def _without_coal(
-    problem: Problem,
-    factory: PlannerFactory,
-    name: str,
-    aims: Matrix,
-    seconds: float,
-    seed: int,
-    parameters: Mapping[str, Any],
-    totals: dict[str, int | float],
-) -> JointPath | None:
-    """A brief attempt on what the kernels can prove; None where it finds nothing or where an end cannot be proven."""
-    proven = problem.with_accuracy("conservative")
-    aims = aims[proven.world.valid_batch(aims)]
-    if len(aims) == 0 or not proven.world.valid(problem.start):
+                return path
+        self.reason = self.reason or self._goals.reason
         return None
-    outcome = attempt(proven, factory, aims, seconds=seconds, seed=seed, parameters=parameters, effort=1)
-    _add(totals, outcome.statistics)
-    return _judged(problem, outcome, name)[0]
 
+    def _left(self) -> float:
+        return self._deadline - time.perf_counter()
 
-def _add(totals: dict[str, int | float], counts: Mapping[str, int | float]) -> None:
-    for key, value in counts.items():
-        totals[key] = value if key in OF_THE_PATH else totals.get(key, 0) + value
+    def _short_way(self, number: int) -> bool:
+        """Whether an attempt goes the short way round alone."""
+        return self._long_ways and number == 0
+
+    def _aims(self, number: int) -> Matrix:
+        """What an attempt aims at: all that is known, the newest first, for some planners heed the first alone."""
+        if self._aimless:
+            return np.zeros((0, self._problem.robot.dof))
+        known = len(self._goals.rows)
+        newer = number > 0 and self._goals.more()
+        rows = self._goals.first()
+        return rows[:1] if self._short_way(number) else np.roll(rows, -known if newer else -number, axis=0)
+
+    def _proven_path(self, aims: Matrix) -> JointPath | None:
+        """Of a brief attempt on what the kernels can prove; None where it finds nothing or cannot prove an end."""
+        if not self._brief or self._problem.world.accuracy != "exact":
+            return None
+        proven = self._problem.with_accuracy("conservative")
+        aims = aims[proven.world.valid_batch(aims)]
+        if len(aims) == 0 or not proven.world.valid(proven.start):
+            return None
+        return _judged(self._problem, self._attempt(proven, 0, aims, self._left(), effort=1), self._name)[0]
+
+    def _path(self, number: int, aims: Matrix) -> JointPath | None:
+        """Of an attempt that asks exactly; from the first path on that was rejected, as densely as the second check."""
+        share = 0.5 if self._short_way(number) else 1.0  # before the long way is tried too
+        effort = 2**number if self._brief and self._others(number) else None
+        seconds = share * max(self._left(), SHORTEST)
+        outcome = self._attempt(self._asked, number, aims, seconds, effort)
+        path, self.reason = _judged(self._problem, outcome, self._name)
+        if path is None and outcome.rows is not None:
+            self.totals["rejected"] += 1
+            self._asked = self._problem.refined(SECOND_CHECK)
+        return path
+
+    def _others(self, number: int) -> bool:
+        """Whether later attempts would aim at other configurations than this one."""
+        if self._aimless or number == len(self._seeds) - 1:
+            return False
+        one = getattr(self._factory, "__name__", "") in ONE_GOAL_PLANNERS
+        return not self._goals.exhausted or (one and number + 1 < len(self._goals.rows))
+
+    def _attempt(self, problem: Problem, number: int, aims: Matrix, seconds: float, effort: int | None) -> Attempt:
+        """One attempt, counted."""
+        outcome = attempt(
+            problem,
+            self._factory,
+            aims,
+            seconds=seconds,
+            seed=self._seeds[number],
+            parameters=self._parameters,
+            effort=effort,
+        )
+        for key, value in outcome.statistics.items():
+            self.totals[key] = value if key in OF_THE_PATH else self.totals.get(key, 0) + value
+        return outcome
 
 
 def _nothing_to_do(problem: Problem) -> bool:

@@ -211,6 +211,8 @@ COMMAND_LINE = {
     "no problem given": ({}, ("plan",), ["Missing argument", "rrtik plan --help"]),
     "unknown option": ({}, ("plan", "titan4_sdu", "--sed", "1"), ["--sed"]),
     "option without value": ({}, ("plan", "titan4_sdu", "--seed"), ["--seed"]),
+    "option with too few values": ({}, ("ik", "titan4", "--position", "1", "2"), ["--position", "rrtik ik --help"]),
+    "no command of a group": ({}, ("markers",), ["Missing command", "rrtik markers --help"]),
     "unknown planner": (task(), ("plan", "task.yaml", "--planner", "bicdrt"), ["bicdrt", "did you mean 'bicrdt'"]),
     "seed is text": (task(), ("plan", "task.yaml", "--seed", "one"), ["--seed", "integer"]),
     "negative seed": (task(), ("plan", "task.yaml", "--seed", "-1"), ["seed", "-1"]),

@@ -236,7 +236,7 @@ def test_compiling_is_told_in_one_line(monkeypatch, capsys):
     monkeypatch.setattr(announce, "_told", False)
     announce.announce_compiling()
     announce.announce_compiling()
-    assert capsys.readouterr().err == "rrtik: compiling kernels for this processor, once per machine: 20 to 40 s\n"
+    assert capsys.readouterr().err == "rrtik: compiling kernels for this processor, once per machine: 10 to 80 s\n"
 
 
 def test_the_sources_of_kernels_need_no_collision_library():

@@ -54,7 +54,7 @@ def test_every_planner_finds_a_valid_path_with_exact_ends(wall, name):
     assert found.statistics["attempts"] >= 1
 
 
-@pytest.mark.parametrize("name", ["bicrdt", "RRTConnect", "RRT", "KPIECE1", "PRM"])
+@pytest.mark.parametrize("name", ["bicrdt", "RRTConnect", "RRT", "KPIECE1"])  # PRM works by the clock
 def test_the_same_seed_gives_the_same_path(wall, name):
     one, two, other = (plan(wall, name, seconds=8.0, seed=s).path.waypoints for s in (4, 4, 5))
     assert np.array_equal(one, two)
@@ -221,10 +221,16 @@ def test_where_the_start_is_the_goal_the_path_is_a_single_configuration(wall, na
     assert found.path.waypoints.tolist() == [wall.start.tolist()]
 
 
-def test_aorrtc_finds_the_straight_motion_where_it_is_free(wall):
-    found = plan(Problem(wall.world, [2, 2], [2, 8]), "AORRTC", seconds=2.0, seed=1)
+@pytest.mark.parametrize("name", ["AORRTC", "SORRTstar"])
+def test_the_straight_motion_is_found_where_it_is_free(wall, name):
+    found = plan(Problem(wall.world, [2, 2], [2, 8]), name, seconds=2.0, seed=1)
     assert found.found, found.reason
     assert found.path.waypoints.tolist() == [[2, 2], [2, 8]]
+
+
+def test_a_planner_that_draws_samples_until_its_time_is_up_does_not_blame_the_goal(wall):
+    found = plan(wall, "BFMT", seconds=0.1, seed=1, restarts=0, parameters={"num_samples": 1_000_000})
+    assert "ended with 'Timeout'" in found.reason
 
 
 @pytest.mark.parametrize("name", ["PRM", "PRMstar"])

@@ -18,4 +18,4 @@ def announce_compiling() -> None:
     global _told
     if not _told:
         _told = True
-        on_compile("compiling kernels for this processor, once per machine: 20 to 40 s")
+        on_compile("compiling kernels for this processor, once per machine: 10 to 80 s")

@@ -1,6 +1,6 @@
 """What hatch does when it builds a wheel: kernels go along as LLVM bitcode, so that nobody who installs it compiles.
 
-That takes about half a minute and numba, which the built package needs anyway; ``RRTIK_KERNELS=0`` in the environment
+That takes a minute or two and numba, which the built package needs anyway; ``RRTIK_KERNELS=0`` in the environment
 goes without. Whatever goes wrong, there is a wheel: kernels are then compiled when they are first used. Editable
 installs compile then too, because their sources change.
 """

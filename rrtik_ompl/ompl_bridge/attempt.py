@@ -31,8 +31,9 @@ ANYTIME_PLANNERS = ("AORRTC", "BITstar", "FewestMoves", "InformedRRTstar", "PRMs
 # it is led from one goal to another: with 16 goals of a UR5 its paths were thrice as long as with one.
 ONE_GOAL_PLANNERS = ("AORRTC", "PRM", "PRMstar")
 
-# Those that answer with a path from the goal to the goal if a straight motion from the start to it is free.
-STRAIGHT_FIRST_PLANNERS = ("AORRTC",)
+# AORRTC answers with a path from the goal to the goal if a straight motion from the start to it is free. SORRTstar
+# finds that motion, then draws from what could be shorter, which is nothing, and does not look at its time meanwhile.
+STRAIGHT_FIRST_PLANNERS = ("AORRTC", "SORRTstar")
 
 # Options of our planners that `attempt` itself sets.
 GIVEN_OPTIONS = ("world", "seed", "goal")
@@ -116,7 +117,10 @@ def attempt(
             refused = last.removeprefix(REFUSAL)
             raise PlannerError(f"planner {name}: {refused}" if refused != last else f"planner {name} broke: {last}")
         counts = dict(planner.statistics) if own else {"checked_states": judge.states, "checked_motions": judge.motions}
-        return Attempt(exact_path(definition, si), str(status), counts, planner.reason if own else "")
+        rows, words = exact_path(definition, si), str(status)
+        if rows is None and judge.late and words.startswith("Invalid"):  # only because all answers were no by then
+            words = "Timeout"
+        return Attempt(rows, words, counts, planner.reason if own else "")
 
 
 def finds_goals(factory: PlannerFactory) -> bool:
@@ -141,9 +145,9 @@ def planner_options(factory: PlannerFactory) -> tuple[str, ...]:
 
 
 def _straight_motion(problem: Problem, goals: Matrix) -> Matrix | None:
-    """The first free straight motion from the start to a goal, shape (2, n), or None."""
-    ends = (np.stack([problem.start, goal]) for goal in goals)
-    return next((rows for rows in ends if problem.world.motion_valid(*rows)), None)
+    """The straight motion from the start to the nearest goal if it is free, shape (2, n): no path is shorter."""
+    nearest = goals[np.linalg.norm(goals - problem.start, axis=1).argmin()]
+    return np.stack([problem.start, nearest]) if problem.world.motion_valid(problem.start, nearest) else None
 
 
 def _own_planner(

@@ -32,6 +32,11 @@ class Judge:
     deadline: float = np.inf
     most_motions: float = np.inf
 
+    @property
+    def late(self) -> bool:
+        """Whether the deadline has passed."""
+        return time.monotonic() > self.deadline
+
     def valid(self, q: Vector) -> bool:
         """Whether q, shape (n,), is free; False from the first error on."""
         self.states += 1
@@ -47,7 +52,7 @@ class Judge:
         return self._ask(self.world.motion_valid, a, b)
 
     def _ask(self, question: Any, *arguments: Vector) -> bool:
-        if self.error is not None or time.monotonic() > self.deadline:
+        if self.error is not None or self.late:
             return False
         try:
             return bool(question(*arguments))

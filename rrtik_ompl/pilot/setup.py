@@ -25,6 +25,8 @@ from rrtik_ompl.sensing.pictures import pictures_from
 from rrtik_ompl.sensing.scene_from_view import SIGMAS
 from rrtik_ompl.sensing.sensor import Sensor
 
+LAST_PORT = 65535
+
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
@@ -107,7 +109,7 @@ def _simulated(scenario: Scenario, problem: Problem) -> SimulatedCamera:
 
 def _line_arm(problem: Problem, address: str) -> LineArm:
     host, colon, port = address.rpartition(":")
-    if not colon or not host or not port.isdecimal():
+    if not colon or not host or not port.isdecimal() or not 0 < int(port) <= LAST_PORT:
         raise InputError(f"--arm {address}: expected HOST:PORT, for example 127.0.0.1:5600")
     return LineArm(problem.robot, host.strip("[]"), int(port))
 

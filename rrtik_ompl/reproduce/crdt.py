@@ -127,8 +127,8 @@ def counts(quick: bool) -> list[Row]:
 
 TABLES = (
     Table("crdt-routes", "Number of single-joint routes", f"{SOURCE}, section 1", counts, 1, 1),
-    Table("crdt-e", "Environment E: RRT and C-RDT", f"{SOURCE}, table of section 6.1", environment_e, 240, 30),
-    Table("crdt-planar", "Planar arm, two squares", f"{SOURCE}, section 6.2", planar, 60, 10),
-    Table("crdt-sdu", "TITAN-4 at the subsea unit", f"{SOURCE}, section 6.3", subsea, 40, 10),
-    Table("crdt-prisms", "TITAN-4 and two prisms", f"{SOURCE}, section 6.4", prisms, 40, 10),
+    Table("crdt-e", "Environment E: RRT and C-RDT", f"{SOURCE}, table of section 6.1", environment_e, 65, 8),
+    Table("crdt-planar", "Planar arm, two squares", f"{SOURCE}, section 6.2", planar, 7, 1),
+    Table("crdt-sdu", "TITAN-4 at the subsea unit", f"{SOURCE}, section 6.3", subsea, 11, 3),
+    Table("crdt-prisms", "TITAN-4 and two prisms", f"{SOURCE}, section 6.4", prisms, 6, 2),
 )

@@ -100,6 +100,6 @@ def solutions(quick: bool) -> list[Row]:
 
 
 TABLES = (
-    Table("ikurt-examples", "Six examples, to the letter and repaired", f"{SOURCE}, section 5", examples, 300, 8),
-    Table("ikurt-solutions", "Solutions of a pose", f"{SOURCE}, section 4", solutions, 2, 1),
+    Table("ikurt-examples", "Six examples, to the letter and repaired", f"{SOURCE}, section 5", examples, 180, 8),
+    Table("ikurt-solutions", "Solutions of a pose", f"{SOURCE}, section 4", solutions, 1, 1),
 )

@@ -132,8 +132,8 @@ def example(quick: bool) -> list[Row]:
 
 TABLES = (
     Table("mb-rrt-example", "Surface sampling, worked example", f"{SOURCE}, figures of section 4", example, 1, 1),
-    Table("mb-rrt-8", "All variants, 3 joints (tables 6, 8)", SOURCE, partial(variants, 3), 150, 30),
-    Table("mb-rrt-9", "All variants, 10 joints (tables 7, 9)", SOURCE, partial(variants, 10), 600, 120),
-    Table("mb-rrt-10", "MB-RRT's precision, 3 joints", SOURCE, partial(precision, 3), 3, 1),
-    Table("mb-rrt-11", "MB-RRT's precision, 10 joints", SOURCE, partial(precision, 10), 15, 4),
+    Table("mb-rrt-8", "All variants, 3 joints (tables 6, 8)", SOURCE, partial(variants, 3), 25, 5),
+    Table("mb-rrt-9", "All variants, 10 joints (tables 7, 9)", SOURCE, partial(variants, 10), 100, 20),
+    Table("mb-rrt-10", "MB-RRT's precision, 3 joints", SOURCE, partial(precision, 3), 1, 1),
+    Table("mb-rrt-11", "MB-RRT's precision, 10 joints", SOURCE, partial(precision, 10), 2, 1),
 )

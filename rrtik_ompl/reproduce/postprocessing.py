@@ -100,7 +100,7 @@ def pilots_route(quick: bool) -> list[Row]:
 
 TABLES = (
     Table("shortening-4", "Sequential cut, random cut, retraction", "Post-processing paper, table of section 4",
-          shortening, 60, 10),
+          shortening, 20, 4),
     Table("pilot-route", "Time of a route in the shared-control tool", "Shared-control tool, section 5",
-          pilots_route, 30, 10),
+          pilots_route, 1, 1),
 )  # fmt: skip

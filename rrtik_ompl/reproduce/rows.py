@@ -37,7 +37,7 @@ class Table:
         title: What it shows.
         source: Where it was published.
         run: Measures it, quickly (fewer runs, the same rules) or in full.
-        seconds: About how long the full measurement takes on two cores.
+        seconds: About how long the full measurement takes on two cores, on its own; tables of a page may share runs.
         quick_seconds: The same for the quick one.
     """
 

@@ -155,8 +155,8 @@ def _least_singular_value(robot: Robot, q: Matrix) -> float:
 
 
 TABLES = (
-    Table("titan4-size", "Reach and envelope", f"{SOURCE}, sections 1 to 5", sizes, 10, 2),
-    Table("titan4-branches", "Closed form: eight branches", f"{SOURCE}, section 7", branches, 5, 1),
-    Table("titan4-singular-poses", "Closed form: singular families", f"{SOURCE}, section 8", singular_families, 3, 1),
-    Table("titan4-singularities", "Determinant and ranks", f"{SOURCE}, section 9", singularities, 2, 1),
+    Table("titan4-size", "Reach and envelope", f"{SOURCE}, sections 1 to 5", sizes, 2, 1),
+    Table("titan4-branches", "Closed form: eight branches", f"{SOURCE}, section 7", branches, 1, 1),
+    Table("titan4-singular-poses", "Closed form: singular families", f"{SOURCE}, section 8", singular_families, 1, 1),
+    Table("titan4-singularities", "Determinant and ranks", f"{SOURCE}, section 9", singularities, 1, 1),
 )
