@@ -111,10 +111,8 @@ class Run:
             for event, noun in (("repair", "repair"), ("wait", "wait"), ("evade", "evasion"))
         )
         why = f" ({self.reason})" if self.reason else ""
-        return (
-            f"{self.problem}: {self.outcome}{why} after {self.ticks[-1].time:.2f} s: {made}{worst}, {waits}, {evasions}, "
-            f"length {self.length:.2f}"
-        )
+        end = f"{self.problem}: {self.outcome}{why} after {self.ticks[-1].time:.2f} s"
+        return f"{end}: {made}{worst}, {waits}, {evasions}, length {self.length:.2f}"
 
     def figures(self) -> dict[str, Any]:
         """The run in numbers, for JSON: outcome, times [s], counts of events, length, and wall times of repairs [s]."""

@@ -27,7 +27,7 @@ LATER_SECONDS = (1.0, 2.0, 3.0)  # when an obstacle of constant velocity is draw
 
 
 def draw_scene(vis: Any, scene: Scene, frame: Frame) -> None:
-    """Draw all obstacles, with their margins, under ``obstacles`` and the later places of moving ones under ``later``."""
+    """Draw obstacles and their margins under ``obstacles``, the later places of moving ones under ``later``."""
     for obstacle in scene.at(0.0).obstacles:
         _draw_obstacle(vis["obstacles"][node_name(obstacle.name)], obstacle, frame)
     for obstacle in scene.obstacles:
@@ -45,15 +45,15 @@ def _draw_obstacle(node: Any, obstacle: Obstacle, frame: Frame) -> None:
         look = look_of_shape(obstacle.shape)
         node.set_object(look.geometry, _material(palette.OBSTACLE))
         node.set_transform(pose @ look.placement)
-        _draw_margin(node[MARGIN_NODE], obstacle, np.linalg.inv(look.placement))
+        _draw_margin(node[MARGIN_NODE], obstacle, look.placement)
 
 
-def _draw_margin(node: Any, obstacle: Obstacle, local: Matrix) -> None:
-    """Draw under the obstacle's node, with which it moves, what lies within its margin; ``local``: pose under it."""
+def _draw_margin(node: Any, obstacle: Obstacle, placement: Matrix) -> None:
+    """Draw what lies within an obstacle's margin under its node, which has ``placement`` in the obstacle's frame."""
     look = look_of_margin(obstacle.shape, obstacle.margin) if obstacle.margin else None
     if look is not None:
         node.set_object(look.geometry, _material(palette.OBSTACLE, opacity=0.2))
-        node.set_transform(local @ look.placement)
+        node.set_transform(np.linalg.solve(placement, look.placement))
 
 
 def _draw_motion(node: Any, obstacle: Obstacle, motion: Motion, frame: Frame) -> None:

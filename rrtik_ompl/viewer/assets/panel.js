@@ -148,7 +148,7 @@ function seeThrough(on) {
 function addMarginSwitch() {
   const kept = story.obstacles.filter(({ margin }) => margin > 0);
   if (kept.length === 0) return;
-  const sizes = [Math.min, Math.max].map((pick) => `${pick(...kept.map(({ margin }) => margin))}`);
+  const sizes = [Math.min, Math.max].map((pick) => Number(pick(...kept.map(({ margin }) => margin)).toPrecision(3)));
   const drawn = kept.filter((obstacle) => obstacle.margin_drawn);
   const missing = kept.length - drawn.length;
   const text = `margins: ${[...new Set(sizes)].join(" to ")} m${missing ? ` (${missing} not drawn)` : ""}`;
