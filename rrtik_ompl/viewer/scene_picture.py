@@ -22,7 +22,6 @@ from rrtik_ompl.viewer.triangles import tube
 
 MAX_GOALS_DRAWN = 20
 FRAMES_OF_A_RANGE = 7
-MARGIN_NODE = "margin"
 LATER_SECONDS = (1.0, 2.0, 3.0)  # when an obstacle of constant velocity is drawn again, faintly
 
 
@@ -45,7 +44,7 @@ def _draw_obstacle(node: Any, obstacle: Obstacle, frame: Frame) -> None:
         look = look_of_shape(obstacle.shape)
         node.set_object(look.geometry, _material(palette.OBSTACLE))
         node.set_transform(pose @ look.placement)
-        _draw_margin(node[MARGIN_NODE], obstacle, look.placement)
+        _draw_margin(node["margin"], obstacle, look.placement)
 
 
 def _draw_margin(node: Any, obstacle: Obstacle, placement: Matrix) -> None:
