@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.ik.face import solve_ik as solve_ik
     from rrtik_ompl.ik.trajectory import IkTrajectory as IkTrajectory
     from rrtik_ompl.ik.trajectory import solve_ik_trajectory as solve_ik_trajectory
+    from rrtik_ompl.mesh_file import load_mesh as load_mesh
     from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler as GoalSampler
     from rrtik_ompl.one_joint import one_joint_moves as one_joint_moves
     from rrtik_ompl.path import JointPath as JointPath
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.planning import list_planners as list_planners
     from rrtik_ompl.planning import plan as plan
     from rrtik_ompl.plot import plot_joints as plot_joints
+    from rrtik_ompl.poses import pose as pose
     from rrtik_ompl.problem import Problem as Problem
     from rrtik_ompl.problem_file import load_problem as load_problem
     from rrtik_ompl.problem_file import save_problem as save_problem
@@ -49,10 +51,20 @@ if TYPE_CHECKING:
     from rrtik_ompl.scenario import Scenario as Scenario
     from rrtik_ompl.scenario import load_scenario as load_scenario
     from rrtik_ompl.scene import AttachedObject as AttachedObject
+    from rrtik_ompl.scene import ConstantVelocity as ConstantVelocity
     from rrtik_ompl.scene import Obstacle as Obstacle
     from rrtik_ompl.scene import Scene as Scene
+    from rrtik_ompl.scene import Waypoints as Waypoints
     from rrtik_ompl.scene_file import load_scene as load_scene
     from rrtik_ompl.scene_file import save_scene as save_scene
+    from rrtik_ompl.shapes import Box as Box
+    from rrtik_ompl.shapes import Capsule as Capsule
+    from rrtik_ompl.shapes import Cylinder as Cylinder
+    from rrtik_ompl.shapes import HalfSpace as HalfSpace
+    from rrtik_ompl.shapes import Mesh as Mesh
+    from rrtik_ompl.shapes import Prism as Prism
+    from rrtik_ompl.shapes import Sphere as Sphere
+    from rrtik_ompl.shortening import MoveRules as MoveRules
     from rrtik_ompl.shortening import shorten as shorten
     from rrtik_ompl.task_region import TaskRegion as TaskRegion
     from rrtik_ompl.trajectory import RateLimits as RateLimits
@@ -70,10 +82,12 @@ else:
         "ik.face": ("IkResult", "list_ik_methods", "solve_ik"),
         "ik.trajectory": ("IkTrajectory", "solve_ik_trajectory"),
         "ompl_bridge.goal_sampler": ("GoalSampler",),
+        "mesh_file": ("load_mesh",),
         "one_joint": ("one_joint_moves",),
         "path": ("JointPath", "load_path"),
         "planning": ("Plan", "list_planners", "plan"),
         "plot": ("plot_joints",),
+        "poses": ("pose",),
         "problem": ("Problem",),
         "problem_file": ("load_problem", "save_problem"),
         "reach.grid_map": ("ReachMap", "load_reach_map"),
@@ -81,9 +95,10 @@ else:
         "replanning": ("Run", "load_run", "replan"),
         "robot": ("Robot",),
         "scenario": ("Scenario", "load_scenario"),
-        "scene": ("AttachedObject", "Obstacle", "Scene"),
+        "scene": ("AttachedObject", "ConstantVelocity", "Obstacle", "Scene", "Waypoints"),
         "scene_file": ("load_scene", "save_scene"),
-        "shortening": ("shorten",),
+        "shapes": ("Box", "Capsule", "Cylinder", "HalfSpace", "Mesh", "Prism", "Sphere"),
+        "shortening": ("MoveRules", "shorten"),
         "task_region": ("TaskRegion",),
         "trajectory": ("RateLimits", "Trajectory", "load_trajectory", "timed"),
         "viewer": ("view",),
@@ -100,4 +115,4 @@ else:
         return value
 
     def __dir__() -> list[str]:
-        return [*globals(), *__all__]
+        return [*__all__, "__version__"]

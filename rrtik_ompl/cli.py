@@ -81,9 +81,10 @@ def check(problem: ProblemName, path: PathFile = None) -> int:
     question = load_problem(problem)
     world = question.world
     route = None if path is None else load_path(path, world.robot)
-    say(f"{question.name}: start is free, clearance {_millimetres(world.clearance(question.start))}")
+    kept = " beyond the margins" if any(obstacle.margin for obstacle in world.scene.obstacles) else ""
+    say(f"{question.name}: start is free, clearance {_millimetres(world.clearance(question.start))}{kept}")
     if isinstance(question.goal, JointGoal):
-        say(f"{question.name}: goal is free, clearance {_millimetres(world.clearance(question.goal.q))}")
+        say(f"{question.name}: goal is free, clearance {_millimetres(world.clearance(question.goal.q))}{kept}")
     if route is None:
         return FOUND
     faults = [f"edge {v.edge + 1}: {v.reason}" for v in route.violations(world)]

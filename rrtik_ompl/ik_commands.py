@@ -40,11 +40,14 @@ def inverse_kinematics(
     robot: Annotated[
         str | None, typer.Argument(help="A name (see: rrtik list robots), a URDF or a DH table; left out if --problem.")
     ] = None,
-    position: Annotated[Triple | None, typer.Option(help="Of the tip in the world: x y z [m].")] = None,
+    position: Annotated[Triple | None, typer.Option(metavar="X Y Z", help="Of the tip in the world [m].")] = None,
     quaternion: Annotated[
-        tuple[float, float, float, float] | None, typer.Option(help="Orientation: x y z w; any orientation if absent.")
+        tuple[float, float, float, float] | None,
+        typer.Option(metavar="X Y Z W", help="Orientation; any if absent."),
     ] = None,
-    rpy_deg: Annotated[Triple | None, typer.Option(help="Orientation: roll pitch yaw about fixed axes [deg].")] = None,
+    rpy_deg: Annotated[
+        Triple | None, typer.Option(metavar="R P Y", help="Roll, pitch and yaw about fixed axes [deg].")
+    ] = None,
     problem: Annotated[
         str | None, typer.Option(help="Take robot, scene, start (as --near) and, without --position, goal from it.")
     ] = None,

@@ -35,7 +35,8 @@ class Problem:
         name: For messages and files.
 
     Raises:
-        ProblemError: If start or goal is in collision or outside the limits; pair, joint and limit are named.
+        ProblemError: If start or goal is in collision, within an obstacle's margin or outside the limits; pair, margin,
+            joint and limit are named.
         InputError: If start or goal has the wrong number of joints or is not finite.
     """
 
@@ -89,6 +90,8 @@ def _usable(world: World, values: ArrayLike, what: str) -> Vector:
     if not world.valid(q) or not world.certify(q[None])[0]:
         touching = world.contacts(q)
         pairs = [(c.first, c.second) for c in touching]
+        if touching and all(c.distance > 0.0 for c in touching):
+            raise ProblemError(f"{what} is too near: {world.explain(q)}; move it or lower the margin", pairs)
         raise ProblemError(f"{what} is in collision: {world.explain(q)}; move it or allow the pair", pairs)
     return q
 

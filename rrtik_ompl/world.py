@@ -194,7 +194,8 @@ class World:
         touching = self.contacts(row)
         if not touching:
             return ""
-        return f"{touching[0]}" + (f" (and {len(touching) - 1} more pairs)" if len(touching) > 1 else "")
+        more = len(touching) - 1
+        return f"{touching[0]}" + (f" (and {more} more pair{'s' * (more > 1)})" if more else "")
 
     def certify(self, Q: ArrayLike) -> Mask:
         """A second opinion on the rows of Q, independent of the checks that planners use. Shape (m,)."""

@@ -1,12 +1,15 @@
 """The house is a ladder: a module imports only from those that stand before it."""
 
 import ast
+import inspect
 import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+
+import rrtik_ompl
 
 ROOT = Path(__file__).resolve().parent.parent
 RUNGS = (
@@ -82,3 +85,8 @@ def test_a_world_is_loaded_without_a_compiler_and_without_what_covers_are_made_w
     code += "; print([m for m in ('numba', 'scipy') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_every_public_name_is_there_and_says_what_it_is():
+    assert set(rrtik_ompl.__all__) < set(dir(rrtik_ompl))
+    assert [name for name in rrtik_ompl.__all__ if not inspect.getdoc(getattr(rrtik_ompl, name))] == []

@@ -138,7 +138,8 @@ def test_cubes_have_no_faces_between_two_cells():
 
 def test_the_classes_of_a_map_are_all_its_cells_but_the_quarter_that_is_cut_away(found):
     whole = reach_marks(found, cut=False)
-    assert [mark.name for mark in whole] == ["0 to 0.2", "0.2 to 0.4", "0.4 to 0.6", "0.6 to 0.8", "0.8 to 1"]
+    steps = ["0 to 0.2", "0.2 to 0.4", "0.4 to 0.6", "0.6 to 0.8", "0.8 to 1"]
+    assert [mark.name for mark in whole] == [f"{step} of all directions" for step in steps]
     cut = np.concatenate([mark.vertices for mark in reach_marks(found) if len(mark.faces)]) - found.base
     assert not ((cut[:, 0] > 1.5 * found.size) & (cut[:, 1] < -1.5 * found.size)).any()
     full = np.concatenate([mark.vertices for mark in whole if len(mark.faces)]) - found.base

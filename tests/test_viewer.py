@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 import umsgpack
+from scipy.spatial import ConvexHull
 
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.errors import InputError
@@ -26,10 +27,11 @@ from rrtik_ompl.goal import GoalRegion, JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.poses import pose
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, Waypoints
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Sphere
+from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
 from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.viewer import palette, view
 from rrtik_ompl.viewer.framing import frame_around
+from rrtik_ompl.viewer.meshes import look_of_margin
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.serve import PageServer
@@ -153,6 +155,56 @@ def test_importing_the_library_does_not_import_meshcat() -> None:
 
 
 # The picture --------------------------------------------------------------------------------------------------------
+
+
+def gap_to_box(points: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(np.maximum(np.abs(points) - [0.1, 0.15, 0.25], 0.0), axis=1)
+
+
+def gap_to_cylinder(points: np.ndarray) -> np.ndarray:
+    aside = np.maximum(np.linalg.norm(points[:, :2], axis=1) - 0.2, 0.0)
+    return np.hypot(aside, np.maximum(np.abs(points[:, 2]) - 0.25, 0.0))
+
+
+def gap_to_capsule(points: np.ndarray) -> np.ndarray:
+    return np.hypot(np.linalg.norm(points[:, :2], axis=1), np.maximum(np.abs(points[:, 2]) - 0.2, 0.0)) - 0.1
+
+
+@pytest.mark.parametrize(
+    ("shape", "gap"),
+    [(Box([0.2, 0.3, 0.5]), gap_to_box), (Cylinder(0.2, 0.5), gap_to_cylinder), (Capsule(0.1, 0.4), gap_to_capsule)],
+    ids=["box", "cylinder", "capsule"],
+)
+def test_a_margin_is_drawn_as_far_from_the_shape_as_it_is_wide(shape: Shape, gap: Any) -> None:
+    look = look_of_margin(shape, 0.05)
+    assert look is not None
+    corners = look.geometry.vertices
+    assert gap(corners) == pytest.approx(0.05)
+    a, b, c = (corners[look.geometry.faces[:, k]] for k in range(3))
+    hull = ConvexHull(corners).volume
+    assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0 == pytest.approx(hull, rel=1e-3)  # closed, facing out
+
+
+def test_margins_are_drawn_with_their_obstacles_and_told(crane: Robot) -> None:
+    obstacles = (
+        Obstacle("box", Box([0.1, 0.1, 0.1]), pose([1.0, 1.0, 0.0]), margin=0.05),
+        Obstacle("can", Cylinder(0.1, 0.3), pose([1.0, -1.0, 0.0]), margin=0.02),
+        Obstacle("bare", Sphere(0.1), pose([-1.0, 1.0, 0.0])),
+        Obstacle("spike", TETRAHEDRON, pose([-1.0, -1.0, 0.0]), margin=0.1),
+    )
+    subject = subject_of(problem(crane, Scene(obstacles)), WAYPOINTS)
+    window, _ = draw(subject)
+    drawn = {path.split("/")[3] for path in window.paths if path.endswith("/margin")}
+    assert drawn == {"box", "can"}
+    told = story(page(problem(crane, Scene(obstacles)), WAYPOINTS))["obstacles"]
+    assert [(o["margin"], o["margin_drawn"]) for o in told] == [(0.05, True), (0.02, True), (0.0, False), (0.1, False)]
+
+
+def test_a_path_to_compare_with_is_counted_in_moves_of_one_joint(crane: Robot, scene: Scene) -> None:
+    in_two = np.insert(WAYPOINTS, 1, 0.5 * (WAYPOINTS[0] + WAYPOINTS[1]), axis=0)
+    told = story(page(problem(crane, scene), WAYPOINTS, before=in_two))["before"]
+    assert told.startswith("4 moves")
+    assert "now 4," in told
 
 
 def test_every_solid_is_in_the_picture(crane: Robot, scene: Scene) -> None:
@@ -348,7 +400,7 @@ def test_serving_ends_quietly_when_ctrl_c_is_pressed() -> None:
 
 # In a browser -------------------------------------------------------------------------------------------------------
 
-PANE = np.s_[50:700, 0:870]  # of a window of 1280 x 800: where the 3-D picture is
+PANE = np.s_[50:700, 0:860]  # of a window of 1280 x 800: where the 3-D picture is
 
 
 def chromium(url: str, *options: str) -> str:

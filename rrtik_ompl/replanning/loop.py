@@ -196,7 +196,8 @@ def _check_start(q: Vector, scene: Scene, world: World, moving: MovingWorld) -> 
         InputError: It names the pair.
     """
     if not world.valid(q):
-        raise InputError(f"scene feed: at its begin the robot is in collision: {world.explain(q)}; move the obstacle")
+        found = f"scene feed: at its begin the robot is in collision: {world.explain(q)}"
+        raise InputError(f"{found}; move the obstacle or lower its margin")
     if not moving.valid(q):
         nearest = world.closest(q)
         pair = "" if nearest is None else f" ('{nearest.first}' to '{nearest.second}': {nearest.distance:.3g} m)"

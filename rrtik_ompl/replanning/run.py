@@ -107,11 +107,13 @@ class Run:
         """One line for a person."""
         repairs = self.seconds("repair", "repair")
         worst = f", the longest {1e3 * repairs.max():.1f} ms" if len(repairs) else ""
-        counts = f"{self.count('repair')} repairs{worst}, {self.count('wait')} waits, {self.count('evade')} evasions"
-        why = f" ({self.reason})" if self.reason else ""
-        return (
-            f"{self.problem}: {self.outcome}{why} after {self.ticks[-1].time:.2f} s: {counts}, length {self.length:.2f}"
+        made, waits, evasions = (
+            f"{self.count(event)} {noun}{'s' * (self.count(event) != 1)}"
+            for event, noun in (("repair", "repair"), ("wait", "wait"), ("evade", "evasion"))
         )
+        why = f" ({self.reason})" if self.reason else ""
+        end = f"{self.problem}: {self.outcome}{why} after {self.ticks[-1].time:.2f} s"
+        return f"{end}: {made}{worst}, {waits}, {evasions}, length {self.length:.2f}"
 
     def figures(self) -> dict[str, Any]:
         """The run in numbers, for JSON: outcome, times [s], counts of events, length, and wall times of repairs [s]."""

@@ -15,7 +15,7 @@ from rrtik_ompl.collision.shape_of import shape_of
 from rrtik_ompl.collision.solids import is_mesh
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
-from rrtik_ompl.viewer.triangles import Faces, box_corners, capsule, extruded, split_creases, thin_out, tube
+from rrtik_ompl.viewer.triangles import Faces, box_corners, capsule, extruded, rounded, split_creases, thin_out, tube
 
 MAX_OBSTACLE_TRIANGLES = 30_000  # a drawn mesh above this is thinned out; the one that is checked stays as it is
 BEAD = 0.9  # radius of the bead that stands for a robot that is a mere point, in thicknesses of a line
@@ -57,6 +57,23 @@ def look_of_shape(shape: Shape, limit: int = MAX_OBSTACLE_TRIANGLES) -> Look:
     if isinstance(shape, Mesh):
         return look_of_triangles(*split_creases(*thin_out(shape.vertices, shape.triangles, limit)))
     raise InputError(f"a {type(shape).__name__} cannot be drawn as a bounded solid")
+
+
+def look_of_margin(shape: Shape, margin: float) -> Look | None:
+    """How everything within a margin [m] of a shape is drawn; None for half-spaces, polygons and meshes."""
+    if isinstance(shape, Sphere):
+        return look_of_shape(Sphere(shape.radius + margin))
+    if isinstance(shape, Capsule):
+        return look_of_shape(Capsule(shape.radius + margin, shape.length))
+    if isinstance(shape, Cylinder):
+        turn = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
+        circle = shape.radius * np.stack([np.cos(turn), np.sin(turn)], 1)
+        return look_of_triangles(*rounded(circle, turn, shape.length, margin))
+    if isinstance(shape, Box):
+        turn = np.concatenate([np.linspace(0.0, 0.5 * np.pi, 7) + 0.5 * np.pi * k for k in range(4)])
+        corners = np.repeat(0.5 * shape.size[:2] * [[1, 1], [-1, 1], [-1, -1], [1, -1]], 7, axis=0)
+        return look_of_triangles(*rounded(corners, turn, float(shape.size[2]), margin))
+    return None
 
 
 def look_of_triangles(vertices: Matrix, faces: Faces) -> Look:

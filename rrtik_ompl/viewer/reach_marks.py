@@ -8,6 +8,7 @@ from rrtik_ompl.reach.grid_map import ReachMap
 from rrtik_ompl.viewer.marks import Mark, cubes
 
 SCALE = ("#440154", "#3b528b", "#21918c", "#5ec962", "#fde725")  # of viridis, low to high
+MEANING = {"orientations": "of all directions", "manipulability": "manipulability", "samples": "samples"}
 
 
 def reach_marks(reach: ReachMap, *, cut: bool = True) -> list[Mark]:
@@ -24,7 +25,8 @@ def reach_marks(reach: ReachMap, *, cut: bool = True) -> list[Mark]:
     most = 1.0 if reach.measure == "orientations" else float(reach.values.max(initial=0.0))
     step = most / len(SCALE)
     kind = np.minimum((reach.values / step).astype(int), len(SCALE) - 1) if most else np.zeros(seen.shape, dtype=int)
+    names = [f"{k * step:.2g} to {(k + 1) * step:.2g} {MEANING[reach.measure]}" for k in range(len(SCALE))]
     return [
-        cubes(f"{k * step:.2g} to {(k + 1) * step:.2g}", color, seen & (kind == k), reach.corner, reach.size)
-        for k, color in enumerate(SCALE)
+        cubes(name, color, seen & (kind == k), reach.corner, reach.size)
+        for k, (name, color) in enumerate(zip(names, SCALE, strict=True))
     ]

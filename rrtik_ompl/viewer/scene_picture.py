@@ -16,7 +16,7 @@ from rrtik_ompl.shapes import Box, HalfSpace, Sphere
 from rrtik_ompl.task_region import TURN, TaskRegion
 from rrtik_ompl.viewer import palette
 from rrtik_ompl.viewer.framing import Frame
-from rrtik_ompl.viewer.meshes import half_space_plate, look_of_shape, look_of_triangles
+from rrtik_ompl.viewer.meshes import half_space_plate, look_of_margin, look_of_shape, look_of_triangles
 from rrtik_ompl.viewer.robot_picture import node_name
 from rrtik_ompl.viewer.triangles import tube
 
@@ -26,7 +26,7 @@ LATER_SECONDS = (1.0, 2.0, 3.0)  # when an obstacle of constant velocity is draw
 
 
 def draw_scene(vis: Any, scene: Scene, frame: Frame) -> None:
-    """Draw all obstacles under ``obstacles`` and the later places of moving ones under ``later``."""
+    """Draw obstacles and their margins under ``obstacles``, the later places of moving ones under ``later``."""
     for obstacle in scene.at(0.0).obstacles:
         _draw_obstacle(vis["obstacles"][node_name(obstacle.name)], obstacle, frame)
     for obstacle in scene.obstacles:
@@ -44,6 +44,15 @@ def _draw_obstacle(node: Any, obstacle: Obstacle, frame: Frame) -> None:
         look = look_of_shape(obstacle.shape)
         node.set_object(look.geometry, _material(palette.OBSTACLE))
         node.set_transform(pose @ look.placement)
+        _draw_margin(node["margin"], obstacle, look.placement)
+
+
+def _draw_margin(node: Any, obstacle: Obstacle, placement: Matrix) -> None:
+    """Draw what lies within an obstacle's margin under its node, which has ``placement`` in the obstacle's frame."""
+    look = look_of_margin(obstacle.shape, obstacle.margin) if obstacle.margin else None
+    if look is not None:
+        node.set_object(look.geometry, _material(palette.OBSTACLE, opacity=0.2))
+        node.set_transform(np.linalg.solve(placement, look.placement))
 
 
 def _draw_motion(node: Any, obstacle: Obstacle, motion: Motion, frame: Frame) -> None:

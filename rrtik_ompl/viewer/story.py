@@ -12,10 +12,11 @@ from rrtik_ompl.goal import Goal, GoalRegion, JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.shapes import HalfSpace
-from rrtik_ompl.transitions import moved, route_length
+from rrtik_ompl.transitions import moved, route_length, transitions
 from rrtik_ompl.viewer import palette
 from rrtik_ompl.viewer.framing import Frame
 from rrtik_ompl.viewer.marks import Mark
+from rrtik_ompl.viewer.meshes import look_of_margin
 from rrtik_ompl.viewer.robot_picture import joint_nodes, node_name
 from rrtik_ompl.viewer.run_story import run_story
 from rrtik_ompl.viewer.subject import Subject
@@ -152,7 +153,7 @@ def _moves(waypoints: Matrix) -> list[dict[str, Any]]:
 def _compared(before: Matrix, after: Matrix) -> str:
     """Number of moves and length of two paths: "12 moves, length 16.06; now 7, 3.16"."""
     lengths = [f"{route_length(rows):.2f}" for rows in (before, after)]
-    return f"{len(before) - 1} moves, length {lengths[0]}; now {len(after) - 1}, {lengths[1]}"
+    return f"{transitions(before)} moves, length {lengths[0]}; now {transitions(after)}, {lengths[1]}"
 
 
 def _obstacles(scene: Scene) -> list[dict[str, Any]]:
@@ -162,6 +163,8 @@ def _obstacles(scene: Scene) -> list[dict[str, Any]]:
             "node": node_name(o.name),
             "plate": isinstance(o.shape, HalfSpace),
             "moving": o.motion is not None,
+            "margin": o.margin,
+            "margin_drawn": o.margin > 0.0 and look_of_margin(o.shape, o.margin) is not None,
         }
         for o in scene.obstacles
     ]

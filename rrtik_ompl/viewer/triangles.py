@@ -81,6 +81,26 @@ def capsule(radius: float, length: float, segments: int = 24) -> tuple[Matrix, F
     return circles.reshape(-1, 3), _wrap(len(radii), segments)
 
 
+def rounded(outline: Matrix, turn: Vector, length: float, radius: float, rings: int = 6) -> tuple[Matrix, Faces]:
+    """What lies within a radius of an upright convex solid: its surface.
+
+    Args:
+        outline: Points on the solid's outline, anticlockwise, shape (k, 2).
+        turn: Angles of the outward normal at each of them, shape (k,) [rad]; a corner is repeated, once for each.
+        length: Full extent of the solid along z.
+        radius: Of the edges.
+        rings: Steps from an upright side to a face.
+    """
+    quarter = np.linspace(0.0, 0.5 * np.pi, rings + 1)
+    out = np.stack([np.cos(turn), np.sin(turn)], 1)
+    side = [outline + radius * np.cos(angle) * out for angle in quarter]
+    half = 0.5 * length + radius * np.sin(np.append(quarter, quarter[-1]))
+    middle = np.broadcast_to(outline.mean(axis=0), outline.shape)
+    upper = [np.column_stack([ring, np.full(len(ring), z)]) for ring, z in zip([*side, middle], half, strict=True)]
+    circles = [*(ring * [1.0, 1.0, -1.0] for ring in upper[::-1]), *upper]
+    return np.concatenate(circles), _wrap(len(circles), len(outline))
+
+
 def tube(points: Matrix, radius: float, sides: int = 8) -> tuple[Matrix, Faces]:
     """Tube of the given radius along a line through at least two points, shape (k, 3)."""
     along = np.gradient(points, axis=0)

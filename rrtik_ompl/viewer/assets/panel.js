@@ -144,6 +144,18 @@ function seeThrough(on) {
   viewer.set_dirty();
 }
 
+/** Margins: those of polygons, meshes and half-spaces are not drawn, which the text says. */
+function addMarginSwitch() {
+  const kept = story.obstacles.filter(({ margin }) => margin > 0);
+  if (kept.length === 0) return;
+  const sizes = [Math.min, Math.max].map((pick) => Number(pick(...kept.map(({ margin }) => margin)).toPrecision(3)));
+  const drawn = kept.filter((obstacle) => obstacle.margin_drawn);
+  const missing = kept.length - drawn.length;
+  const text = `margins: ${[...new Set(sizes)].join(" to ")} m${missing ? ` (${missing} not drawn)` : ""}`;
+  const change = (on) => drawn.forEach((obstacle) => setVisible(["obstacles", obstacle.node, "margin"], on));
+  addSwitch(text, story.colors.obstacle, 0.35, change, true, "wide");
+}
+
 function buildLegend() {
   const { colors } = story;
   const axes = ["x", "y", "z"].map((textContent, k) => {
@@ -166,13 +178,14 @@ function buildLegend() {
   if (story.goal && story.goal !== "joint values") addSwitch(`goal: ${story.goal}`, colors.goal, 1, toggles("goal"));
   if (story.run) {
     addSwitch("path ahead", colors.trail, 1, toggles("current path"));
-    addSwitch("path before a repair", colors.before, 1, toggles("replaced path"));
+    addSwitch("before a repair", colors.before, 1, toggles("replaced path"));
     addSwitch("way gone", colors.trail, 0.45, toggles("trail"), false);
   } else if (story.moves.length) addSwitch("way of the tip", colors.trail, 1, toggles("trail", "beads"));
   if (story.before) addSwitch(`before: ${story.before}`, colors.before, 1, toggles("before"), true, "wide");
   if (story.attached.length) addSwitch(`held: ${story.attached.join(", ")}`, colors.attached, 1, () => {});
   if (story.obstacles.length) {
     addSwitch(count(story.obstacles.length, "obstacle"), colors.obstacle, 1, toggles("obstacles", "later"));
+    addMarginSwitch();
     addSwitch("see-through", null, 1, seeThrough, false);
     addSwitch("names of obstacles", null, 1, (on) => setLabels("obstacle", on), false);
   }

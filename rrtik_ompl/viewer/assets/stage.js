@@ -130,12 +130,30 @@ function setLabels(kind, on) {
 }
 
 function placeLabels() {
-  for (const { element, position, on } of labels) {
-    const place = position.clone().project(viewer.camera);
-    element.hidden = !on || Math.abs(place.z) > 1;
-    element.style.left = `${(0.5 + 0.5 * place.x) * pane.clientWidth}px`;
-    element.style.top = `${(0.5 - 0.5 * place.y) * pane.clientHeight}px`;
+  const taken = [];
+  for (const label of labels) {
+    const place = label.position.clone().project(viewer.camera);
+    label.element.hidden = !label.on || Math.abs(place.z) > 1;
+    if (label.element.hidden) continue;
+    label.wide ??= label.element.offsetWidth;
+    label.tall ??= label.element.offsetHeight;
+    const [x, y] = [(0.5 + 0.5 * place.x) * pane.clientWidth, (0.5 - 0.5 * place.y) * pane.clientHeight];
+    const spots = spotsBeside(x, y, label);
+    const spot = spots.find((box) => !taken.some((other) => overlap(box, other))) ?? spots[0];
+    taken.push(spot);
+    label.element.style.transform = `translate(${spot.x}px, ${spot.y}px)`;
   }
+}
+
+/** Where a label may stand, best first: right of its place and above it (the start: left), left, below, farther up. */
+function spotsBeside(x, y, { kind, wide, tall }) {
+  const columns = kind === "start" ? [x - wide - 9, x + 9] : [x + 9, x - wide - 9];
+  const rows = [y - tall, y + 4, y - 2 * tall - 2, y + tall + 6];
+  return rows.flatMap((top) => columns.map((left) => ({ x: left, y: top, wide, tall })));
+}
+
+function overlap(a, b) {
+  return a.x < b.x + b.wide && b.x < a.x + a.wide && a.y < b.y + b.tall && b.y < a.y + a.tall;
 }
 
 // Camera -----------------------------------------------------------------------------------------------------------
