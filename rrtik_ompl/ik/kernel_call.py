@@ -27,6 +27,7 @@ class KernelCall:
 
     Attributes:
         address: Where its fields are.
+        aims: Its goals; they may be changed between calls.
         q: Where the rows have come to.
         next: Number of the next start of each row now.
     """
@@ -47,7 +48,8 @@ class KernelCall:
         self.q: Matrix = memory[layout.Q].reshape(q.shape)
         self.q[:] = q
         self.next: NDArray[np.int64] = memory[layout.NEXT].view(np.int64)
-        memory[layout.AIMS].reshape(aims.shape)[:] = aims
+        self.aims: Matrix = memory[layout.AIMS].reshape(aims.shape)
+        self.aims[:] = aims
         if near is not None:
             memory[layout.NEAR].reshape(near.shape)[:] = near
         if following is not None:
