@@ -116,8 +116,8 @@ class PoseTracker:
         """
         if not time > self._time:
             raise InputError(f"times of pictures must increase, got {time:g} s after {self._time:g} s")
-        seconds, pose, doubtful = time - self._time, sight.pose, sight.pose.ambiguous and sight.pose.other is not None
-        branches = [pose.T_camera_object, pose.other] if doubtful else [pose.T_camera_object]
+        seconds, pose = time - self._time, sight.pose
+        branches = [pose.T_camera_object, pose.other] if pose.ambiguous else [pose.T_camera_object]
         belief = self._believed(branches, np.array([pose.error, pose.other_error])[: len(branches)], pose, seconds)
         taken, switched = self._taken(branches, belief)
         settled = not self._sure(self._belief) and self._sure(belief)  # a wrong guess may have been followed until now
