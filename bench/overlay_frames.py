@@ -68,14 +68,19 @@ def frame_times(report: Report, count: int) -> None:
     taken = np.repeat(gray[..., None], 3, axis=2)
     q, goal = np.array(problem.start), np.array(problem.goal.q)
     tips = problem.robot.fk_batch(q + np.linspace(0.0, 1.0, 40)[:, None] * (goal - q))[:, :3, 3]
-    arm = partial(augmenter.draw, taken, scenario.T_base_camera, q)
-    more = partial(arm, ghosts=[Ghost(goal)], trail=tips, frames=[problem.robot.fk(goal)])
-    drawn = arm()
-    stages: dict[str, Callable[[int], Any]] = {
+    arm = partial(augmenter.draw, taken, scenario.T_base_camera)
+    more: dict[str, Any] = {"trail": tips, "frames": [problem.robot.fk(goal)]}
+    drawn = arm(q)
+    stages: dict[str, Callable[[int], Any]] = {  # arms that move: what stands still is not drawn anew
         "detect, refine, pose": lambda k: sensor.view(Picture(taken, "picture", k / 30.0)),
-        "draw the arm": lambda _: arm(),
+        "draw the arm, which moves": lambda k: arm(q + 1e-3 * k * (goal - q)),
         "encode (JPEG, quality 80)": lambda _: cv2.imencode(".jpg", drawn, [cv2.IMWRITE_JPEG_QUALITY, 80]),
-        "draw a ghost, a trail and a frame as well": lambda _: more(),
+        "draw the moving arm, a ghost that stands still, a trail and a frame": lambda k: arm(
+            q + 1e-3 * (k + 0.5) * (goal - q), ghosts=[Ghost(goal)], **more
+        ),
+        "the same, the ghost moves, too": lambda k: arm(
+            q + 1e-3 * (k + 0.7) * (goal - q), ghosts=[Ghost(goal + 1e-3 * k * (q - goal))], **more
+        ),
     }
     spent = {name: [] for name in stages}  # type: dict[str, list[float]]
     for k in range(count):
@@ -90,3 +95,5 @@ def frame_times(report: Report, count: int) -> None:
     whole = sum(list(median.values())[:3])
     report.bar("whole 640 x 480 frame: detect, refine, pose, draw, encode", f"<= {BUDGET:g} ms of processor time",
                f"{whole:.1f} ms", whole <= BUDGET)  # fmt: skip
+    report.bar("draw the moving arm, a moving ghost, a trail and a frame", f"<= {BUDGET:g} ms of processor time",
+               f"{list(median.values())[-1]:.1f} ms", list(median.values())[-1] <= BUDGET)  # fmt: skip

@@ -2,14 +2,14 @@
 
 Usage: ``python bench/sensing_report.py [--share S] [--jobs N] [--out bench/reports/sensing.md]``
 
-All pictures are rendered: no camera, print or water was there. Times are processor time of this process alone.
+All pictures are rendered: no camera, print or water was there. Times are processor time of one process alone, which is
+why the last section is measured when the others are done.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import cv2
@@ -17,7 +17,8 @@ import overlay_frames
 import rendered_scenes
 import sensing_rows
 import sensing_series
-from acceptance import Report
+from acceptance import Report, processes
+from parallel import Measuring
 
 PICTURES = (
     "The published camera (640 x 480, its matrix, skew left out) with the distortion of a usual web camera; one 4x4 "
@@ -53,12 +54,13 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "reports" / "sensing.md")
     options = parser.parse_args()
     command = f"python bench/sensing_report.py --share {options.share:g} --jobs {options.jobs}"
-    report = Report("Marker sensing and overlay, on rendered pictures", command)
+    report = Report("Marker sensing and overlay, on rendered pictures", command, processes(options.jobs))
     report.note("Pictures", PICTURES)
-    with ProcessPoolExecutor(options.jobs) as pool:
-        for part in pool.map(measured, range(len(SECTIONS)), [options.share] * len(SECTIONS)):
-            report.lines += part.lines
-            report.bars += part.bars
+    pieces = [(number, options.share) for number in range(len(SECTIONS))]
+    parts = Measuring(options.jobs, None)(measured, pieces[:-1]) + Measuring(1, None)(measured, pieces[-1:])
+    for part in parts:
+        report.lines += part.lines
+        report.bars += part.bars
     options.out.write_text(report.markdown(), encoding="utf-8")
     print(report.markdown())
 

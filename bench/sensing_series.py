@@ -56,8 +56,10 @@ def precision(report: Report, count: int) -> None:
     report.bar("sd of z at 1 % noise, worst of 8 poses, at every distance", ">= 3 times below published",
                f"{min(steadier):.1f} times at least", min(steadier) >= 3.0)  # fmt: skip
     plain, hard = biases["laid over", len(SERIES)], biases["laid over, hard", len(SERIES)]
-    report.bar("error of the mean of z at 2 m, worst of 8 poses", "< 2 mm",
-               f"{plain:.2f} mm; hard pictures {hard:.2f} mm", plain < 2.0)  # fmt: skip
+    report.bar("error of the mean of z at 2 m, worst of 8 poses, plain pictures", "< 2 mm", f"{plain:.2f} mm",
+               plain < 2.0)  # fmt: skip
+    report.bar("error of the mean of z at 2 m, worst of 8 poses, hard pictures", "< 2 mm", f"{hard:.2f} mm",
+               hard < 2.0)  # fmt: skip
 
 
 def gripper(report: Report, count: int) -> None:

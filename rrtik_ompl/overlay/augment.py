@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.overlay.canvas import NEAR, Canvas
-from rrtik_ompl.overlay.figure import Figure, figure_of, placed
+from rrtik_ompl.overlay.figure import Figure, figure_of, placed, tinted
 from rrtik_ompl.overlay.surfaces import ROBOT_TRIANGLES, obstacle_surfaces, robot_surfaces
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle
@@ -53,24 +53,22 @@ class Layer:
     painted: NDArray[np.uint8]
 
     @classmethod
-    def of(cls, canvas: Canvas, color: str | None = None) -> Layer:
-        """What is on a canvas, in its own colours or all in shades of one ('#rrggbb')."""
+    def of(cls, canvas: Canvas) -> Layer:
+        """What is on a canvas."""
         drawn = canvas.drawn
         left, top, width, height = cv2.boundingRect(drawn.view(np.uint8))
         box = np.s_[top : top + height, left : left + width]
-        piece = canvas.colors[box]
-        if color is not None and width > 0:
-            tint = np.array(palette.fractions(color), dtype=np.float32)
-            piece = (0.35 + 0.65 * piece.max(axis=2, keepdims=True)) * tint
-        painted = cv2.convertScaleAbs(np.ascontiguousarray(piece[..., ::-1]), alpha=255.0) if width > 0 else piece
-        return cls(canvas.depths.copy(), drawn, box, np.asarray(painted, dtype=np.uint8))
+        piece: Any = canvas.colors[box]
+        if width > 0:
+            piece = cv2.cvtColor(cv2.convertScaleAbs(piece, alpha=255.0), cv2.COLOR_RGB2BGR)
+        return cls(canvas.depths.copy(), drawn, box, np.asarray(piece, dtype=np.uint8))
 
     def blend(self, picture: NDArray[np.uint8], mask: NDArray[np.bool_], opacity: float) -> None:
         """Lay it over a picture where a mask is, in place."""
         if self.painted.size == 0:
             return
         piece = picture[self.box]
-        mixed = cv2.addWeighted(np.ascontiguousarray(piece), 1.0 - opacity, self.painted, opacity, 0.0)
+        mixed = cv2.addWeighted(piece, 1.0 - opacity, self.painted, opacity, 0.0)
         cv2.copyTo(mixed, mask[self.box].view(np.uint8), piece)
 
 
@@ -173,12 +171,13 @@ class Augmenter:
         if key not in self._layers:
             self._canvas.clear()
             if arm is not None and q is not None:
-                self._canvas.draw(placed(arm, T @ self._joint_frames(q)))
+                shown = placed(arm, T @ self._joint_frames(q))
+                self._canvas.draw(shown if color is None else tinted(shown, palette.fractions(color)))
             if solids is not None:
                 self._canvas.draw(placed(solids, T[None]))
             if len(self._layers) >= LAYERS_KEPT:
                 self._layers.pop(next(iter(self._layers)))
-            self._layers[key] = Layer.of(self._canvas, color)
+            self._layers[key] = Layer.of(self._canvas)
         layer = self._layers[key] = self._layers.pop(key)  # the one that was used last is the last to go
         return layer
 

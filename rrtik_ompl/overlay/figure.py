@@ -19,9 +19,10 @@ class Figure:
     """Surfaces put together, sorted by frame.
 
     Attributes:
-        vertices, normals: In the frames that carry them, shape (n, 3).
+        vertices: In the frames that carry them [m], shape (n, 3).
+        normals: Unit vectors out of the solids, in the same frames, shape (n, 3).
         faces: Shape (m, 3).
-        colors: Of the vertices, shape (n, 3).
+        colors: Of the vertices: red, green, blue from 0 to 1, shape (n, 3).
         frames: Numbers of the frames.
         bounds: Vertices of ``frames[k]`` are those from ``bounds[k]`` to ``bounds[k + 1]``.
     """
@@ -36,7 +37,13 @@ class Figure:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """A figure for one camera: vertices in its frame and what colour the light makes of them."""
+    """A figure before a camera, ready to be drawn.
+
+    Attributes:
+        points: Vertices in the frame of the camera [m], shape (n, 3).
+        faces: Shape (m, 3).
+        colors: What the light makes of those of the vertices: red, green, blue from 0 to 1, shape (n, 3).
+    """
 
     points: NDArray[np.float32]
     faces: NDArray[np.int32]
@@ -79,3 +86,9 @@ def placed(figure: Figure, T_camera_frames: Sequence[Any] | NDArray[np.float64])
     facing = np.abs(np.einsum("ij,ij->i", normals, points)) / np.maximum(lengths, 1e-9)
     colors = figure.colors * (AMBIENT + (1.0 - AMBIENT) * facing)[:, None]
     return Placed(points, figure.faces, colors.astype(np.float32))
+
+
+def tinted(figure: Placed, color: Sequence[float]) -> Placed:
+    """The same figure in shades of one colour: red, green, blue from 0 to 1. The brightest stay the brightest."""
+    shades = AMBIENT + (1.0 - AMBIENT) * figure.colors.max(axis=1)
+    return Placed(figure.points, figure.faces, np.outer(shades, color).astype(np.float32))

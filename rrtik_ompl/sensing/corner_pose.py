@@ -1,7 +1,9 @@
 """The pose of an object from pixels of points that are known on it, and how far it can be trusted.
 
 A single square seen almost from the front has two poses that explain its picture nearly as well (Collins and Bartoli,
-IPPE, IJCV 2014): both are kept. Covariance: first-order propagation of the error of a corner.
+IPPE, IJCV 2014): both are kept. Where perspective is strong, or by chance, only one of the two is a minimum of the
+error: then the second one is what the closed form gives, for a long valley may lead from there to the minimum, with the
+true pose somewhere on its way. Covariance: first-order propagation of the error of a corner.
 """
 
 from __future__ import annotations
@@ -17,10 +19,12 @@ from rrtik_ompl.arrays import Matrix, frozen
 from rrtik_ompl.sensing.camera import Camera
 
 RATIO_TO_TRUST = 6.0  # of the two errors of a square; below it 27 % of near-frontal views, and every wrong choice
+LUCKY_ERROR = 0.015  # [pixels]: four corners that agree better do so by chance, which proves nothing
 ALIGNED_SIGMA = 0.02  # error of a corner [pixels]: a quarter is noise of 1 %, the rest lens and blur
-FARTHEST = 1e4  # [m]
-_STEPS = 40
 ROUGH_SIGMA = 0.2  # blur pulls corners that were not aligned inwards by as much
+FARTHEST = 1e4  # [m]
+SAME_TURN = 1e-3  # [rad]: minima that are nearer to each other are one; distinct ones are 0.03 apart and more
+_STEPS = 40
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,7 +33,7 @@ class CornerPose:
 
     Attributes:
         T_camera_object: The pose that explains them best.
-        other: The second pose of a single square, or None.
+        other: The second pose of a single square, None if there is none.
         error: Root mean square distance of a point from its pixel, in pixels.
         other_error: That of the second pose; infinite if there is none.
         covariance: Of (position [m], small rotation about the axes of the camera [rad]). Shape (6, 6).
@@ -44,7 +48,7 @@ class CornerPose:
     @property
     def ambiguous(self) -> bool:
         """The second pose explains the picture almost as well, so that the first may be the wrong one."""
-        return self.other_error < RATIO_TO_TRUST * self.error
+        return self.other_error < RATIO_TO_TRUST * max(self.error, LUCKY_ERROR)
 
     @property
     def position_sigma(self) -> float:
@@ -57,6 +61,11 @@ class CornerPose:
         return float(np.sqrt(np.linalg.eigvalsh(self.covariance[3:, 3:])[-1]))
 
 
+def turn_between(first: Any, second: Any) -> float:
+    """Angle between the rotations of two poses [rad]."""
+    return float(np.linalg.norm(pin.log3(first.rotation.T @ second.rotation)))
+
+
 def square_corners(side: float) -> Matrix:
     """Corners of a marker in its own frame: x right, y up, z out of it; in the order they are found. Shape (4, 3)."""
     half = 0.5 * side
@@ -67,24 +76,31 @@ def pose_of_square(camera: Camera, pixels: Matrix, side: float, sigma: float = A
     """Pose of one marker of a given side [m] from its four corners. Shape of ``pixels``: (4, 2)."""
     points = square_corners(side)
     # Exactly in front of the camera the closed form fails: not a number, or a marker that faces away.
-    poses = _poses(camera, points, pixels, cv2.SOLVEPNP_IPPE_SQUARE) or _poses(camera, points, pixels)
-    (error, first), (other_error, second) = poses[0], poses[-1]
-    return CornerPose(first, second, error, other_error, _covariance(camera, points, first, max(sigma, error)))
+    guesses = _guesses(camera, points, pixels, cv2.SOLVEPNP_IPPE_SQUARE) or _guesses(camera, points, pixels)
+    refined = [_refined(camera, points, pixels, guess) for guess in guesses]
+    errors = [_error(camera, points, pixels, pose) for pose in refined]
+    best = int(np.argmin(errors))
+    first, error, other, other_error = refined[best], errors[best], None, np.inf
+    if len(guesses) > 1:
+        merged = turn_between(first, refined[1 - best]) < SAME_TURN
+        other = max(guesses, key=lambda guess: turn_between(first, guess)) if merged else refined[1 - best]
+        other_error = _error(camera, points, pixels, other)
+    return CornerPose(first, other, error, other_error, _covariance(camera, points, first, max(sigma, error)))
 
 
 def pose_of_points(camera: Camera, pixels: Matrix, points: Matrix, sigma: float = ALIGNED_SIGMA) -> CornerPose:
     """Pose of an object from points on it that are known in its frame. Shapes (m, 2) and (m, 3), m at least 4."""
-    error, best = _poses(camera, points, pixels)[0]
+    best = _refined(camera, points, pixels, _guesses(camera, points, pixels)[0])
+    error = _error(camera, points, pixels, best)
     return CornerPose(best, None, error, np.inf, _covariance(camera, points, best, max(sigma, error)))
 
 
-def _poses(camera: Camera, points: Matrix, pixels: Matrix, method: int = cv2.SOLVEPNP_SQPNP) -> list[tuple[float, Any]]:
-    """Poses that explain the pixels, with their errors, best first."""
+def _guesses(camera: Camera, points: Matrix, pixels: Matrix, method: int = cv2.SOLVEPNP_SQPNP) -> list[Any]:
+    """Poses in closed form that explain the pixels, best first."""
     rows, seen = np.ascontiguousarray(points), np.ascontiguousarray(pixels)
     _, turns, shifts, _ = cv2.solvePnPGeneric(rows, seen, camera.matrix, camera.distortion, flags=method)
-    guesses = [pin.SE3(cv2.Rodrigues(r)[0], t.ravel()) for r, t in zip(turns, shifts, strict=True)]
-    poses = [_refined(camera, rows, seen, T) for T in guesses if _sensible(T, method == cv2.SOLVEPNP_IPPE_SQUARE)]
-    return sorted(((_error(camera, rows, seen, T), T) for T in poses), key=lambda pair: pair[0])
+    found = [pin.SE3(cv2.Rodrigues(r)[0], t.ravel()) for r, t in zip(turns, shifts, strict=True)]
+    return [T for T in found if _sensible(T, method == cv2.SOLVEPNP_IPPE_SQUARE)]
 
 
 def _sensible(pose: Any, facing: bool) -> bool:

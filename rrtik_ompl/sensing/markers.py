@@ -118,4 +118,5 @@ def _detector(dictionary: str) -> Any:
     parameters = cv2.aruco.DetectorParameters()
     parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
     parameters.minMarkerPerimeterRate = SMALLEST_SHARE
+    parameters.minDistanceToBorder = 0  # else markers that fill half of the picture are lost, though wholly in view
     return cv2.aruco.ArucoDetector(_table(dictionary), parameters)

@@ -13,6 +13,7 @@ from rrtik_ompl.poses import quaternion_xyzw
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.sensing.annotate import annotated
 from rrtik_ompl.sensing.camera import Camera
+from rrtik_ompl.sensing.corner_pose import CornerPose
 from rrtik_ompl.sensing.frames import NoBaseError
 from rrtik_ompl.sensing.marker_map import MarkerMap
 from rrtik_ompl.sensing.markers import dictionaries_seen
@@ -128,12 +129,14 @@ class Sensor:
         tracker = self._trackers.get(sight.object.name)
         if tracker is None or sight.refused:
             return sight
-        found = tracker.update(sight, time)
-        other = sight.pose.T_camera_object if found.other_branch else sight.pose.other
+        found, pose = tracker.update(sight, time), sight.pose
         refused = "jumped: left out as an outlier" if found.outlier else ""
-        return replace(
-            sight, pose=replace(sight.pose, T_camera_object=found.T_camera_object, other=other), refused=refused
-        )
+        first, second = (pose.T_camera_object, pose.error), (pose.other, pose.other_error)
+        taken, other = (second, first) if found.other_branch else (first, second)
+        if found.sure:  # by this picture or those before it
+            other = None, np.inf
+        pose = CornerPose(found.T_camera_object, other[0], taken[1], other[1], pose.covariance)
+        return replace(sight, pose=pose, refused=refused)
 
 
 def _line(sight: Sighting, place: SeenObject | None) -> str:

@@ -110,7 +110,8 @@ def _of_one(camera: Camera, marker: SeenMarker, mounted: Any, sigma: float) -> C
     """The pose of the object from that of its only visible marker."""
     found = pose_of_square(camera, marker.corners, mounted.side, sigma)
     T_marker_object = mounted.T_object_marker.inverse()
-    first, second = found.T_camera_object * T_marker_object, found.other * T_marker_object
+    first = found.T_camera_object * T_marker_object
+    second = None if found.other is None else found.other * T_marker_object
     arm = first.translation - found.T_camera_object.translation  # a rotation at the marker moves the object's origin
     lever = np.eye(6)
     lever[:3, 3:] = -pin.skew(arm)

@@ -14,12 +14,18 @@ import pinocchio as pin
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.sensing.corner_pose import ALIGNED_SIGMA, CornerPose, turn_between
 from rrtik_ompl.sensing.sight import Sighting
 
 OUTLIER_LIMIT = 5.0  # standard deviations
 MOST_SPEED = 1.0  # [m/s]: what may have moved between two pictures is no outlier
 MOST_TURN = 2.0  # [rad/s]
+USUAL_TURN = 0.5  # [rad/s]: poses of one branch in two pictures differ by that, and by twice their uncertainty
 PATIENCE = 3  # as many outliers in a row are the new truth
+MEMORY = 0.75  # of the logarithm of what was believed, from picture to picture
+MOST_ODDS = 3.0  # that a single doubtful picture may speak for one of two poses
+TO_SWITCH = 0.8  # belief that the other pose needs; more than one picture can give it, starting from evens
+SURE = 0.99  # more than doubtful pictures can give, however many: errors of lens and blur repeat themselves
 
 
 @dataclass(slots=True)
@@ -63,15 +69,29 @@ class OneEuro:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tracked:
-    """What a tracker makes of a sighting: the smoothed pose, and whether the sighting was an outlier."""
+    """What a tracker makes of a sighting.
+
+    Attributes:
+        T_camera_object: The smoothed pose; that of before if the sighting was an outlier.
+        outlier: The sighting was left out.
+        other_branch: Of the two poses of the sighting the second one was taken, which explains its picture less well.
+        sure: This picture, or those before it, leave no doubt which of two poses is the right one.
+    """
 
     T_camera_object: Any
     outlier: bool
     other_branch: bool
+    sure: bool
 
 
 class PoseTracker:
-    """Follows one object through pictures with times."""
+    """Follows one object through pictures with times.
+
+    Where a picture fits two poses, both are followed. Each has a share of belief, which passes from the poses of one
+    picture to the nearest ones of the next and grows for the pose that has less error, as in a hidden Markov model
+    with two states; what was believed long ago is forgotten. A pose is given up for the other one only if the
+    other has most of the belief, which no single doubtful picture can give it.
+    """
 
     def __init__(self, cutoff: float = 0.5, gain: float = 5.0) -> None:
         """Start with nothing seen.
@@ -82,10 +102,11 @@ class PoseTracker:
         """
         self._place, self._turn = OneEuro(cutoff, gain), OneEuro(cutoff, gain)
         self._time = -np.inf
-        self._last: Any | None = None  # as seen, not smoothed
+        self._branches: list[Any] = []  # poses of the last sighting, not smoothed
+        self._belief: Vector = np.ones(0)  # in each of them
+        self._last: Any | None = None  # the one of them that is followed
         self._origin: Any | None = None  # rotations are smoothed as vectors about this one
         self._strays = 0
-        self._sure = False  # a sighting was not ambiguous
 
     def update(self, sight: Sighting, time: float) -> Tracked:
         """Take a sighting at a time [s].
@@ -95,32 +116,52 @@ class PoseTracker:
         """
         if not time > self._time:
             raise InputError(f"times of pictures must increase, got {time:g} s after {self._time:g} s")
-        pose, other = self._branch(sight)
-        outlier = self._is_outlier(pose, sight, time - self._time)
+        seconds, pose = time - self._time, sight.pose
+        branches = [pose.T_camera_object, pose.other] if pose.ambiguous else [pose.T_camera_object]
+        belief = self._believed(branches, np.array([pose.error, pose.other_error])[: len(branches)], pose, seconds)
+        taken, switched = self._taken(branches, belief)
+        settled = not self._sure(self._belief) and self._sure(belief)  # a wrong guess may have been followed until now
+        outlier = not switched and self._is_outlier(branches[taken], sight, seconds)
         self._strays = self._strays + 1 if outlier else 0
-        guessed, self._sure = not self._sure, self._sure or not sight.pose.ambiguous
-        settled = guessed and self._sure  # what was followed until now may have been the wrong one of two poses
         if outlier and not settled and self._strays < PATIENCE:
-            return Tracked(self._smooth_pose(), True, other)
-        if outlier:
+            return Tracked(self._smooth_pose(), True, taken == 1, self._sure(self._belief))
+        if outlier or switched:
             self._place.restart()
             self._turn.restart()
-        seconds, self._time, self._last = time - self._time, time, pose
-        return Tracked(self._smoothed(pose, seconds), False, other)
+        self._time, self._branches, self._belief, self._last = time, branches, belief, branches[taken]
+        return Tracked(self._smoothed(branches[taken], seconds), False, taken == 1, self._sure(belief))
 
-    def _branch(self, sight: Sighting) -> tuple[Any, bool]:
-        """The pose of the two that is nearer to the last one, where the picture does not tell them apart."""
-        first, second = sight.pose.T_camera_object, sight.pose.other
-        if second is None or self._last is None or not sight.pose.ambiguous:
-            return first, False
-        away = [np.linalg.norm(pin.log3(self._last.rotation.T @ T.rotation)) for T in (first, second)]
-        return (second, True) if away[1] < away[0] else (first, False)
+    def _believed(self, branches: list[Any], errors: Vector, pose: CornerPose, seconds: float) -> Vector:
+        """How far each pose of a new sighting is believed to be the true one; sums to 1."""
+        prior = np.ones(len(branches))
+        if self._branches:
+            reach = np.hypot(2.0 * pose.rotation_sigma, USUAL_TURN * seconds)
+            apart = np.array([[turn_between(before, now) for now in branches] for before in self._branches])
+            passed = 1.0 / (1.0 + (apart / reach) ** 2)  # much farther than usual is rare, not impossible
+            before = self._belief**MEMORY
+            prior = before / before.sum() @ (passed / passed.sum(axis=1, keepdims=True))
+        squares = errors**2 + ALIGNED_SIGMA**2
+        belief = prior / np.minimum(squares / squares.min(), MOST_ODDS)
+        return np.asarray(belief / belief.sum())
+
+    def _taken(self, branches: list[Any], belief: Vector) -> tuple[int, bool]:
+        """Which pose is followed, and whether it does not go on from the one that was followed until now."""
+        best = int(belief.argmax())
+        if self._last is None:
+            return best, False
+        next_one = int(np.argmin([turn_between(self._last, each) for each in branches]))
+        switched = best != next_one and belief[best] > TO_SWITCH
+        return (best if switched else next_one), switched
+
+    @staticmethod
+    def _sure(belief: Vector) -> bool:
+        return len(belief) > 0 and bool(belief.max() >= SURE)
 
     def _is_outlier(self, pose: Any, sight: Sighting, seconds: float) -> bool:
         if self._last is None:
             return False
         shift = float(np.linalg.norm(pose.translation - self._last.translation))
-        turn = float(np.linalg.norm(pin.log3(self._last.rotation.T @ pose.rotation)))
+        turn = turn_between(self._last, pose)
         return (
             shift > OUTLIER_LIMIT * sight.pose.position_sigma + MOST_SPEED * seconds
             or turn > OUTLIER_LIMIT * sight.pose.rotation_sigma + MOST_TURN * seconds
