@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from pathlib import Path
 
 import cv2
 import overlay_frames
@@ -18,7 +17,7 @@ import rendered_scenes
 import sensing_rows
 import sensing_series
 from acceptance import Report, processes
-from parallel import Measuring
+from parts import Parts, add_options
 
 PICTURES = (
     "The published camera (640 x 480, its matrix, skew left out) with the distortion of a usual web camera; one 4x4 "
@@ -50,18 +49,17 @@ def main() -> None:
     """Run everything and write the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--share", type=float, default=1.0, help="of all counts; 0.1 for a first look")
-    parser.add_argument("--jobs", type=int, default=1, help="sections measured at the same time")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "reports" / "sensing.md")
+    add_options(parser, "sensing.md")
     options = parser.parse_args()
     command = f"python bench/sensing_report.py --share {options.share:g} --jobs {options.jobs}"
     report = Report("Marker sensing and overlay, on rendered pictures", command, processes(options.jobs))
     report.note("Pictures", PICTURES)
     pieces = [(number, options.share) for number in range(len(SECTIONS))]
-    parts = Measuring(options.jobs, None)(measured, pieces[:-1]) + Measuring(1, None)(measured, pieces[-1:])
-    for part in parts:
-        report.lines += part.lines
-        report.bars += part.bars
-    options.out.write_text(report.markdown(), encoding="utf-8")
+    with Parts(options.out, options.jobs) as measure:
+        for part in (*measure(measured, pieces[:-1]), measured(*pieces[-1])):
+            report.lines += part.lines
+            report.bars += part.bars
+        options.out.write_text(report.markdown(), encoding="utf-8")
     print(report.markdown())
 
 
