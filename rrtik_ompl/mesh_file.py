@@ -14,7 +14,7 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, finite_array
+from rrtik_ompl.arrays import Matrix, positive
 from rrtik_ompl.errors import InputError, MeshWarning
 from rrtik_ompl.shapes import Mesh
 from rrtik_ompl.text_file import file_name, read_bytes
@@ -40,9 +40,7 @@ def load_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
         MeshWarning: If the surface is not closed (or not manifold): it is then treated as a surface, not as a solid.
     """
     file_name(path)
-    factor = float(finite_array(scale, (), f"{path}: scale"))
-    if factor <= 0.0:
-        raise InputError(f"{path}: scale must be greater than 0, got {factor:g}")
+    factor = positive(scale, f"{path}: scale")
     if Path(path).suffix.lower() not in SUFFIXES:
         raise InputError(f"{path}: unknown kind of mesh; have {', '.join(SUFFIXES)}; export it as STL")
     data = read_bytes(path, MAX_BYTES)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.path_text import decoded, encoded, path_format
 from rrtik_ompl.robot import Robot
@@ -184,9 +184,7 @@ class JointPath:
 
     def resample(self, step: float) -> JointPath:
         """The same path with further waypoints, none farther than ``step`` [rad] from the next; all old ones stay."""
-        size = float(finite_array(step, (), "resample step"))
-        if size <= 0.0:
-            raise InputError(f"resample step must be greater than 0, got {size:g}")
+        size = positive(step, "resample step")
         counts = np.ceil(np.linalg.norm(np.diff(self.waypoints, axis=0), axis=1) / size - 1e-9)
         return self.with_waypoints(subdivided(self.waypoints, counts)[0])
 

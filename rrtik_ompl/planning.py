@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl import catalog
-from rrtik_ompl.arrays import Matrix, finite_array, whole_number
+from rrtik_ompl.arrays import Matrix, positive, whole_number
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast.library import library
 from rrtik_ompl.goal import JointGoal
@@ -105,9 +105,7 @@ def plan(
     """
     require(problem, Problem, "problem to plan", "use Problem(world, start, goal) or load_problem(name)")
     require(planner, str | Callable, "planner", "use a name of list_planners() or a planner class")
-    limit = float(finite_array(seconds, (), "seconds"))
-    if limit <= 0.0:
-        raise InputError(f"seconds must be greater than 0, got {limit:g}")
+    limit = positive(seconds, "seconds")
     if limit > MAX_SECONDS:
         raise InputError(f"seconds must be {MAX_SECONDS:g} or less, got {limit:g}")
     if isinstance(restarts, bool) or not isinstance(restarts, int) or not 0 <= restarts <= MAX_RESTARTS:

@@ -8,15 +8,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
+from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen, positive
 from rrtik_ompl.errors import InputError
-
-
-def _positive(value: float, what: str) -> float:
-    number = float(finite_array(value, (), what))
-    if number <= 0.0:
-        raise InputError(f"{what} must be greater than 0, got {number:g}")
-    return number
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +19,7 @@ class Sphere:
     radius: float
 
     def __post_init__(self) -> None:
-        _positive(self.radius, "sphere radius")
+        positive(self.radius, "sphere radius")
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +30,8 @@ class Cylinder:
     length: float
 
     def __post_init__(self) -> None:
-        _positive(self.radius, "cylinder radius")
-        _positive(self.length, "cylinder length")
+        positive(self.radius, "cylinder radius")
+        positive(self.length, "cylinder length")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +42,8 @@ class Capsule:
     length: float
 
     def __post_init__(self) -> None:
-        _positive(self.radius, "capsule radius")
-        _positive(self.length, "capsule length")
+        positive(self.radius, "capsule radius")
+        positive(self.length, "capsule length")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,7 +97,7 @@ class Prism:
             raise InputError(f"polygon needs at least 3 different vertices, got {len(vertices)}")
         _check_simple(vertices)
         object.__setattr__(self, "polygon", frozen(vertices))
-        object.__setattr__(self, "height", _positive(height, "polygon height"))
+        object.__setattr__(self, "height", positive(height, "polygon height"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

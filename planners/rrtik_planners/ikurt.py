@@ -7,12 +7,13 @@ from typing import Any
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.fast.connect_lengths import positive
 from rrtik_ompl.goal import Goal
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
 from rrtik_ompl.ik.ikurt.search import BatchedSearch, Judge, Options
 from rrtik_ompl.ompl_bridge import MotionChecker, SearchResult, WorldLike
 from rrtik_ompl.world import World
-from rrtik_planners.tip_seeker import TipSeeker, misses, positive
+from rrtik_planners.tip_seeker import TipSeeker, misses
 
 
 class IKURT(TipSeeker):

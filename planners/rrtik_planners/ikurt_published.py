@@ -6,12 +6,13 @@ from dataclasses import replace
 from typing import Any
 
 from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.fast.connect_lengths import positive
 from rrtik_ompl.goal import Goal
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric, reach
 from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
 from rrtik_ompl.ompl_bridge import MotionChecker, SearchResult, WorldLike
 from rrtik_ompl.world import World
-from rrtik_planners.tip_seeker import TipSeeker, misses, positive
+from rrtik_planners.tip_seeker import TipSeeker, misses
 
 THRESHOLD_ANGLE = 0.5  # [rad] in the metric of poses
 THRESHOLD_REACH = 0.13  # of the reach, for positions

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, finite_array
+from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import Goal, JointGoal, PoseGoal
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
@@ -58,18 +58,6 @@ class TipSeeker(SafePlanner):
             path, exact = _ended(path, metric.goals, checker)
         difference = 0.0 if exact else max(float(tree.distance[nearest]), LEAST_DIFFERENCE)
         return SearchResult(path, {**counts, "metric_evaluations": metric.evaluations, **tip}, difference)
-
-
-def positive(value: float, what: str) -> float:
-    """An option that must be a number greater than 0.
-
-    Raises:
-        InputError: If it is not.
-    """
-    number = float(finite_array(value, (), what))
-    if number <= 0.0:
-        raise InputError(f"{what}: expected a number greater than 0, got {value!r}")
-    return number
 
 
 def misses(metric: TipMetric, q: Any, what: str) -> str:

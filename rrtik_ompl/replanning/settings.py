@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.arrays import Vector, finite_array
+from rrtik_ompl.arrays import Vector, finite_array, whole_number
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.fast.connect_lengths import RANGE_SHARE
 from rrtik_ompl.moving_world import MovingWorld
@@ -76,8 +76,7 @@ def settings(
     if frequency > FASTEST:
         raise InputError(f"rate must be {FASTEST:g} Hz or less, got {frequency:g}")
     for value, name in ((predict, "predict"), (seed, "seed")):
-        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
-            raise InputError(f"{name} must be a whole number of at least 0, got {value!r}")
+        whole_number(value, name)
     distance = float(finite_array(margin, (), "margin"))
     if distance < 0.0:
         raise InputError(f"margin must not be negative, got {distance:g} m")

@@ -9,7 +9,7 @@ from typing import Any
 
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Matrix, finite_array, frozen
+from rrtik_ompl.arrays import Matrix, frozen, not_negative
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.scene import Obstacle
 from rrtik_ompl.sensing.corner_pose import square_corners
@@ -58,10 +58,7 @@ class GraspType:
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "levels", tuple(levels))
         for word, value in (("approach", approach), ("lift", lift)):
-            number = float(finite_array(value, (), f"grasp type '{name}': {word}"))
-            if number < 0.0:
-                raise InputError(f"grasp type '{name}': {word} must not be negative, got {number:g}")
-            object.__setattr__(self, word, number)
+            object.__setattr__(self, word, not_negative(value, f"grasp type '{name}': {word}"))
         if not self.levels:
             raise InputError(f"grasp type '{name}' needs at least one level")
 

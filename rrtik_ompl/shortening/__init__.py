@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, finite_array, whole_number
+from rrtik_ompl.arrays import Matrix, positive, whole_number
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.ompl_bridge.simplify import simplified
 from rrtik_ompl.path import SECOND_CHECK, JointPath
@@ -167,8 +167,8 @@ def _checked(
     require(problem, Problem, "problem of a path to shorten")
     if method not in METHODS:
         raise UnknownNameError("shortening method", method, METHODS)
-    if seconds is not None and float(finite_array(seconds, (), "seconds")) <= 0.0:
-        raise InputError(f"seconds must be greater than 0, got {seconds:g}")
+    if seconds is not None:
+        positive(seconds, "seconds")
     whole_number(seed, "seed")
     if len(path.waypoints) < 2:
         raise InputError("path to shorten: it has one waypoint, so there is nothing to shorten")

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.path import SECOND_CHECK, JointPath
 from rrtik_ompl.robot import Robot
@@ -168,9 +168,7 @@ class Trajectory:
         Raises:
             InputError: If the factor is not greater than 0.
         """
-        k = float(finite_array(factor, (), "factor of a trajectory"))
-        if k <= 0.0:
-            raise InputError(f"factor of a trajectory must be greater than 0, got {k:g}")
+        k = positive(factor, "factor of a trajectory")
         rates = (self.velocities / k, self.accelerations / k**2)
         return Trajectory(self.times * k, self.positions, *rates, **self._names())
 

@@ -8,10 +8,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import finite_array
+from rrtik_ompl.arrays import finite_array, not_negative
 from rrtik_ompl.description.robot_build import build_robot
 from rrtik_ompl.description.tree import Joint, Link, Solid, Tree
-from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.shapes import Cylinder, Sphere
 
@@ -40,10 +39,7 @@ def point2d(
     Raises:
         InputError: If the radius is negative or a bound makes no sense.
     """
-    size = float(finite_array(radius, (), "point2d: radius"))
-    if size < 0.0:
-        raise InputError(f"point2d: radius must not be negative, got {size:g}")
-    size = max(size, SMALLEST_RADIUS)
+    size = max(not_negative(radius, "point2d: radius"), SMALLEST_RADIUS)
     (left, right), (bottom, top) = finite_array(bounds, (2, 2), "point2d: bounds").tolist()
     ball, disc = Solid(Sphere(size), pin.SE3.Identity(), SLATE), Solid(Cylinder(size, 0.1 * size), colour=SLATE)
     tree = Tree(
