@@ -15,6 +15,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.poses import rigid, rotation_angles
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.task_region import TaskRegion, WithinTolerances
+from rrtik_ompl.tip_distance import metres_per_radian
 
 JOINT_TOLERANCE = 1e-6  # [rad] or [m]
 NO_BOX = frozen([0.0, 0.0, 0.0])
@@ -191,7 +192,7 @@ def tip_errors(goal: TipGoal, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vecto
     if not isinstance(goal, GoalRegion):
         return goal.errors(robot, Q)
     each = goal.member_errors(robot, Q)
-    best = np.argmin([part.distance(robot, Q) for part in goal.parts], axis=0)
+    best = np.argmin(each[..., 0] + metres_per_radian(robot) * each[..., 1], axis=0)
     position, angle = each[best, np.arange(each.shape[1])].T
     return position, angle
 

@@ -184,15 +184,15 @@ class Region(Section):
         return GoalRegion([self.region.build()], self.region.free_rotation_axis, self.region.box)
 
 
+JOINT_KEYS = ("joints_deg", "joints", "posture")
+TIP_KEYS = ("pose", "position", "any_of", "region", "task_region", "about_axis")
+
 StartSection: TypeAlias = Annotated[
     Annotated[JointsDeg, Tag(tag("joints_deg"))]
     | Annotated[Joints, Tag(tag("joints"))]
     | Annotated[Posture, Tag(tag("posture"))],
-    told_apart_by("joints_deg", "joints", "posture", what="start"),
+    told_apart_by(*JOINT_KEYS, what="start"),
 ]
-
-JOINT_KEYS = ("joints_deg", "joints", "posture")
-TIP_KEYS = ("pose", "position", "any_of", "region", "task_region", "about_axis")
 
 GoalSection: TypeAlias = Annotated[
     Annotated[JointsDeg, Tag(tag("joints_deg"))]

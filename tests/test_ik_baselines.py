@@ -10,7 +10,6 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.ik.ccd import ccd
 from rrtik_ompl.ik.fabrik import fabrik
 from rrtik_ompl.ik.hinges import Swing
-from rrtik_ompl.ik.question import errors
 from rrtik_ompl.ik.residual import twist
 from rrtik_ompl.poses import pose_from_rpy
 from rrtik_ompl.shapes import Sphere
@@ -106,8 +105,8 @@ def test_every_pass_in_the_plane_comes_nearer(walk):
     robot = rrtik.load_robot("planar10")
     goal = rrtik.PositionGoal(robot.fk(np.full(10, 0.15)).translation, 1e-6)
     starts = np.random.default_rng(0).uniform(-0.3, 0.3, (20, 10))
-    before = errors(robot, goal, starts)[:, 0]
-    after = errors(robot, goal, walk(robot, goal, starts, **{"sweeps" if walk is ccd else "iterations": 20})[0])[:, 0]
+    before = goal.distance(robot, starts)
+    after = goal.distance(robot, walk(robot, goal, starts, **{"sweeps" if walk is ccd else "iterations": 20})[0])
     assert (after <= before + 1e-12).all()
     assert np.median(after) < 0.2 * np.median(before)
 

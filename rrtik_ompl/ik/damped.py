@@ -13,7 +13,7 @@ import pinocchio as pin
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.ik.question import Target
-from rrtik_ompl.ik.residual import twist, walked
+from rrtik_ompl.ik.residual import shortened, twist, walked
 from rrtik_ompl.robot import Robot
 
 ITERATIONS = 200
@@ -45,8 +45,7 @@ def damped_least_squares(
         J = robot.jacobian_batch(Q)[:, rows]
         square = J @ J.transpose(0, 2, 1) + DAMPING**2 * np.eye(J.shape[1])
         dq = (J.transpose(0, 2, 1) @ np.linalg.solve(square, e))[..., 0]
-        largest = np.abs(dq).max(axis=1, keepdims=True)
-        return robot.clamp(Q + dq * np.minimum(1.0, LARGEST_STEP / np.maximum(largest, 1e-12)))
+        return robot.clamp(Q + shortened(dq, LARGEST_STEP))
 
     return walked(robot, goal, starts, step, iterations, enough)
 

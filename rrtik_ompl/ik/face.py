@@ -14,7 +14,7 @@ from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.goal import PositionGoal, TipGoal, has_task_regions, joint_difference, parts_of, tip_errors
 from rrtik_ompl.ik.mb_rrt.search import out_of_reach
 from rrtik_ompl.ik.methods import METHODS, load_kernels
-from rrtik_ompl.ik.question import Answer, Question, Target, errors, tolerances
+from rrtik_ompl.ik.question import Answer, Question, Target, tolerances
 from rrtik_ompl.ik.targets import leaves_freedom, targets
 from rrtik_ompl.random_stream import RandomStream
 from rrtik_ompl.robot import Robot
@@ -199,11 +199,8 @@ def _at_goal(robot: Robot, goal: TipGoal, q: Matrix) -> tuple[Matrix, Matrix]:
     """The rows of q at the goal, and their residuals, shape (k, 2): of a region from the part a row is nearest to."""
     if len(q) == 0:
         return q, np.zeros((0, 2))
-    if isinstance(goal, Target):
-        residuals = errors(robot, goal, q)
-        at = (residuals <= tolerances(goal)).all(axis=1)
-    else:
-        residuals, at = np.array(tip_errors(goal, robot, q)).T, goal.satisfied(robot, q)
+    residuals = np.array(tip_errors(goal, robot, q)).T
+    at = (residuals <= tolerances(goal)).all(axis=1) if isinstance(goal, Target) else goal.satisfied(robot, q)
     return q[at], residuals[at]
 
 

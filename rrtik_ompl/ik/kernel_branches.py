@@ -18,7 +18,7 @@ from rrtik_ompl.fast.processor import WIDTH
 from rrtik_ompl.fast.robot_tables import Table, table
 from rrtik_ompl.ik.call_memory import WORD, CallLayout, CallMemory
 from rrtik_ompl.ik.form import ClosedFormSolver
-from rrtik_ompl.ik.limb import limb_of
+from rrtik_ompl.ik.limb import limb_of, pose_numbers
 from rrtik_ompl.ik.plain_branches import mountings, plain_branches
 from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
 
@@ -58,7 +58,8 @@ def _arm_of(robot: Robot, form: ClosedFormSolver) -> _Arm | None:
     limb = limb_of(robot)
     if limb is None or limb.header[ik_layout.JOINTS] != DOF or limb[ik_layout.SLIDING].any():
         return None
-    from_world, to_frame = (_numbers(np.eye(4) if each is None else each) for each in mountings(robot, form))
+    placements = np.array([np.eye(4) if each is None else each for each in mountings(robot, form)])
+    from_world, to_frame = pose_numbers(placements)
     fields: dict[int, int | NDArray[Any]] = {
         layout.FROM_WORLD: from_world,
         layout.TO_FRAME: to_frame,
@@ -69,10 +70,6 @@ def _arm_of(robot: Robot, form: ClosedFormSolver) -> _Arm | None:
         layout.LIMB: limb.address,
     }
     return _Arm(table(fields), limb)
-
-
-def _numbers(pose: Matrix) -> NDArray[np.float64]:
-    return np.concatenate([pose[:3, :3].ravel(), pose[:3, 3]])
 
 
 class _Call:

@@ -47,7 +47,7 @@ def limb_of(robot: Robot) -> Table | None:
         {
             layout.JOINTS: len(columns),
             layout.DOF: robot.dof,
-            layout.FIXED: _numbers(tip.fixed),
+            layout.FIXED: pose_numbers(tip.fixed),
             layout.SLIDING: tip.prismatic.astype(np.int32),
             layout.COLUMN: columns.astype(np.int32),
             layout.GAIN: tip.gain[np.arange(len(columns)), columns],
@@ -69,10 +69,10 @@ def seeded_limb_of(robot: Robot) -> Table | None:
     if bare is None:
         return None
     fields: dict[int, Any] = {place: bare.arrays.get(place, int(number)) for place, number in enumerate(bare.header)}
-    fields |= {layout.SEED_COUNT: len(seeds.q), layout.SEEDS: seeds.q, layout.SEED_TIPS: _numbers(seeds.tips)}
+    fields |= {layout.SEED_COUNT: len(seeds.q), layout.SEEDS: seeds.q, layout.SEED_TIPS: pose_numbers(seeds.tips)}
     return table(fields)
 
 
-def _numbers(poses: NDArray[np.float64]) -> Matrix:
+def pose_numbers(poses: NDArray[np.float64]) -> Matrix:
     """Poses, shape (k, 4, 4), as 12 numbers each: the rotation row by row, then the origin."""
     return np.concatenate([poses[:, :3, :3].reshape(-1, 9), poses[:, :3, 3]], axis=1)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.goal import as_task_region, parts_of
 from rrtik_ompl.ik.question import Answer, Question
-from rrtik_ompl.ik.residual import SHARE, rotation_vectors
+from rrtik_ompl.ik.residual import SHARE, shortened, twist_between
 from rrtik_ompl.poses import rpy_matrices
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.task_region import TURN, TaskRegion
@@ -52,7 +52,8 @@ def project(robot: Robot, region: TaskRegion, starts: Matrix, *, places: Matrix 
         aims = region.nearest(tips)
         slides = np.isnan(places[left, 0])
         aims[:, :3] = np.where(slides[:, None], aims[:, :3], places[left])
-        twist = _twist(tips, region.poses(aims))
+        poses = region.poses(aims)
+        twist = twist_between(tips, poses[:, :3, :3], poses[:, :3, 3])
         square = ((twist * scale[:, 0]) ** 2).sum(axis=1)
         kept = ~_arrived(region, twist)
         if step % PATIENCE == 0:
@@ -101,12 +102,6 @@ def projection(question: Question) -> Answer:
     return Answer(found, nearest, number + 1, timed_out)
 
 
-def _twist(tips: NDArray[np.float64], aims: NDArray[np.float64]) -> Matrix:
-    """From tips to aims, shapes (m, 4, 4), in world axes: (linear [m]; rotation vector [rad]), shape (m, 6)."""
-    turn = aims[:, :3, :3] @ np.swapaxes(tips[:, :3, :3], 1, 2)
-    return np.hstack([aims[:, :3, 3] - tips[:, :3, 3], rotation_vectors(turn)])
-
-
 def _arrived(region: TaskRegion, twist: Matrix) -> Mask:
     """Which rows are at most a hundredth of the tolerance away."""
     position, angle = (np.linalg.norm(part, axis=1) for part in (twist[:, :3], twist[:, 3:]))
@@ -138,7 +133,4 @@ def _held(region: TaskRegion, aims: Matrix, scale: Matrix, slides: Mask) -> NDAr
 def _step(J: NDArray[np.float64], e: NDArray[np.float64], square: Vector) -> Matrix:
     """J^T (J J^T + (|e|^2 / 2 + DAMPING) I)^-1 e, no joint too far; shapes (m, 6, n), (m, 6, 1), (m,) -> (m, n)."""
     damped = J @ np.swapaxes(J, 1, 2) + (0.5 * square + DAMPING)[:, None, None] * np.eye(6)
-    step: Matrix = (np.swapaxes(J, 1, 2) @ np.linalg.solve(damped, e))[..., 0]
-    largest = np.abs(step).max(axis=1, keepdims=True)
-    bounded: Matrix = step * np.minimum(1.0, LARGEST_STEP / np.maximum(largest, 1e-12))
-    return bounded
+    return shortened((np.swapaxes(J, 1, 2) @ np.linalg.solve(damped, e))[..., 0], LARGEST_STEP)

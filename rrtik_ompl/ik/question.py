@@ -74,15 +74,8 @@ class Method:
     run: Callable[[Question], Answer]
 
 
-def errors(robot: Robot, target: Target, Q: Matrix) -> Matrix:
-    """Distance [m] and angle [rad] (0 for a position) of configurations from a target, shape (k, 2)."""
-    if isinstance(target, PositionGoal):
-        return np.array([target.distance(robot, Q), np.zeros(len(Q))]).T
-    return np.array(target.errors(robot, Q)).T
-
-
 def tolerances(target: Target) -> tuple[float, float]:
-    """What `errors` may be at most."""
+    """What the errors of a target may be at most: distance [m] and angle [rad] (0 for a position)."""
     if isinstance(target, PositionGoal):
         return target.tolerance, 0.0
     return target.position_tolerance, target.orientation_tolerance

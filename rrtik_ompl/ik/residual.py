@@ -52,16 +52,25 @@ def walked(
 
 def twist(goal: Target, tips: NDArray[np.float64]) -> Matrix:
     """Twist from the tips, shape (m, 4, 4), to the goal in world axes: (linear [m]; rotation vector [rad]), (m, 6)."""
-    residual = np.zeros((len(tips), 6))
     if isinstance(goal, PositionGoal):
-        residual[:, :3] = goal.position - tips[:, :3, 3]
-        return residual
-    residual[:, :3] = goal.T_world_tip.translation - tips[:, :3, 3]
-    residual[:, 3:] = rotation_vectors(goal.T_world_tip.rotation @ tips[:, :3, :3].transpose(0, 2, 1))
-    return residual
+        return np.hstack([goal.position - tips[:, :3, 3], np.zeros((len(tips), 3))])
+    return twist_between(tips, goal.T_world_tip.rotation, goal.T_world_tip.translation)
 
 
-def rotation_vectors(R: NDArray[np.float64]) -> Matrix:
+def twist_between(tips: NDArray[np.float64], rotations: NDArray[np.float64], positions: NDArray[np.float64]) -> Matrix:
+    """The same to rotations, shape (m, 3, 3), and positions, shape (m, 3), one for each tip or one for all: (m, 6)."""
+    turns = rotations @ tips[:, :3, :3].transpose(0, 2, 1)
+    return np.hstack([positions - tips[:, :3, 3], _rotation_vectors(turns)])
+
+
+def shortened(steps: Matrix, largest: float) -> Matrix:
+    """Steps of joints, shape (m, dof), scaled so that no joint moves further than allowed [rad or m]."""
+    most = np.abs(steps).max(axis=1, keepdims=True)
+    bounded: Matrix = steps * np.minimum(1.0, largest / np.maximum(most, 1e-12))
+    return bounded
+
+
+def _rotation_vectors(R: NDArray[np.float64]) -> Matrix:
     """Logarithms of rotations, shape (m, 3, 3): (m, 3)."""
     skew = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
     sine = np.linalg.norm(skew, axis=1)

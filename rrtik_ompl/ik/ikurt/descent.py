@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.ik.ikurt.metric import TipMetric, reach
+from rrtik_ompl.ik.residual import shortened
 
 ITERATIONS = 24
 DAMPING = 1e-6  # the constant part, in units of the squared residual
@@ -69,7 +70,5 @@ def bounded_step(J: NDArray[np.float64], e: Matrix) -> Matrix:
     """Solve (J^T J + (e^T e / 2 + DAMPING) I) dq = J^T e for every row; shapes (m, k, n), (m, k) -> (m, n)."""
     damping: Vector = 0.5 * np.einsum("mi,mi->m", e, e) + DAMPING
     normal = np.einsum("mki,mkj->mij", J, J) + damping[:, None, None] * np.eye(J.shape[2])
-    step: Matrix = np.linalg.solve(normal, np.einsum("mki,mk->mi", J, e)[..., None])[..., 0]
-    largest = np.abs(step).max(axis=1, keepdims=True)
-    bounded: Matrix = step * np.minimum(1.0, LARGEST_STEP / np.maximum(largest, 1e-12))
-    return bounded
+    step = np.linalg.solve(normal, np.einsum("mki,mk->mi", J, e)[..., None])[..., 0]
+    return shortened(step, LARGEST_STEP)
