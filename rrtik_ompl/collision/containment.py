@@ -25,6 +25,7 @@ class Containment:
 
     Attributes:
         pairs: Numbers of the bodies, the one that may hold first.
+        places: The place of each of them in ``pairs``.
     """
 
     def __init__(
@@ -40,7 +41,7 @@ class Containment:
         both_ways = [*pairs, *((j, i) for i, j in pairs)]
         solid = {o for o in {o for o, _ in both_ways} if _has_inside(bodies[o])}
         self.pairs = [(o, i) for o, i in both_ways if o in solid and _may_hold(bodies[o].geometry, bodies[i].geometry)]
-        self._places = {pair: k for k, pair in enumerate(self.pairs)}
+        self.places = {pair: k for k, pair in enumerate(self.pairs)}
         outer, inner = ([bodies[p[k]] for p in self.pairs] for k in (0, 1))
         self._outer_joint = np.array([b.joint for b in outer], dtype=np.int64)
         self._inner_joint = np.array([b.joint for b in inner], dtype=np.int64)
@@ -60,7 +61,7 @@ class Containment:
             pair: Numbers of the bodies, in either order.
             frames: Pose of every joint frame in the world, world first, shape (joints + 1, 4, 4).
         """
-        return any(self._holds(self._places[p], frames) for p in (pair, pair[::-1]) if p in self._places)
+        return any(self._holds(self.places[p], frames) for p in (pair, pair[::-1]) if p in self.places)
 
     def reached(self, places: NDArray[np.int64], frames: NDArray[np.float64]) -> Mask:
         """Which of some pairs may be such: the ends of the inner body are in the bounding box of the outer one.
@@ -94,9 +95,9 @@ class Containment:
             pairs: Numbers of the bodies.
             joints: ``pinocchio.SE3`` of every joint frame in the world, world first.
         """
-        both_ways = (pair for i, j in pairs for pair in ((i, j), (j, i)) if pair in self._places)
+        both_ways = (pair for i, j in pairs for pair in ((i, j), (j, i)) if pair in self.places)
         for pair in both_ways:
-            k = self._places[pair]
+            k = self.places[pair]
             between = joints[int(self._outer_joint[k])].actInv(joints[int(self._inner_joint[k])])
             in_joint = self._points[k] @ between.rotation.T + between.translation
             local = in_joint @ self._to_outer[k, :3, :3].T + self._to_outer[k, :3, 3]
