@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.boxes import half_extents
 from rrtik_ompl.collision.enclosure import enclosure
 from rrtik_ompl.collision.solids import inside_mesh, is_closed, is_mesh, mesh_arrays
 
@@ -49,7 +50,7 @@ class Containment:
         self._points = np.array(points).reshape(-1, 6, 3)
         self._to_outer = np.array([b.placement.inverse().homogeneous for b in outer]).reshape(-1, 4, 4)
         self._centres = np.array([b.geometry.aabb_local.center() for b in outer]).reshape(-1, 3)
-        self._halves = np.array([_half_extents(b.geometry) for b in outer]).reshape(-1, 3) + ROUNDING
+        self._halves = np.array([half_extents(b.geometry) for b in outer]).reshape(-1, 3) + ROUNDING
         everywhere = np.array([[0.0, 0.0, 0.0, np.inf]])
         self._covers = {o: everywhere if covers is None else covers[o] for o, _ in self.pairs}
         self._meshes = {o: bodies[o].geometry for o, _ in self.pairs}
@@ -127,12 +128,7 @@ def _has_inside(body: Body) -> bool:
 def _may_hold(outer: Any, inner: Any) -> bool:
     if isinstance(inner, coal.Halfspace):
         return False
-    return bool(_half_extents(inner).max() <= outer.aabb_radius)
-
-
-def _half_extents(geometry: Any) -> NDArray[np.float64]:
-    box = geometry.aabb_local
-    return 0.5 * np.array([box.width(), box.height(), box.depth()])
+    return bool(half_extents(inner).max() <= outer.aabb_radius)
 
 
 def _end_points(geometry: Any) -> Matrix:
@@ -143,7 +139,7 @@ def _end_points(geometry: Any) -> Matrix:
     elif isinstance(geometry, coal.ConvexBase):
         points = np.array(geometry.points()).reshape(-1, 3)
     elif isinstance(geometry, (coal.Box, coal.Sphere, coal.Capsule, coal.Cylinder)):
-        return np.concatenate([np.eye(3), -np.eye(3)]) * _half_extents(geometry)
+        return np.concatenate([np.eye(3), -np.eye(3)]) * half_extents(geometry)
     else:
         return np.zeros((6, 3))
     return np.asarray(points[np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])])
