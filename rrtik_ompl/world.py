@@ -6,7 +6,7 @@ import copy
 import warnings
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Matrix, finite_array
 from rrtik_ompl.checks import CollisionChecks
@@ -14,7 +14,7 @@ from rrtik_ompl.collision.bodies import Body, colliding_pairs, link_bodies, scen
 from rrtik_ompl.collision.certificate import Certificate
 from rrtik_ompl.collision.contacts import Contact as Contact
 from rrtik_ompl.collision.contacts import inside, measured
-from rrtik_ompl.collision.motion_bound import displacement_weights
+from rrtik_ompl.collision.motion_bound import displacement_weights, step_counts
 from rrtik_ompl.errors import InputError, MeshWarning, UnknownNameError, require
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.robot import Robot
@@ -223,14 +223,9 @@ class World:
     def _motions_free(self, starts: Matrix, ends: Matrix) -> Mask:
         mask = self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self._always_colliding)
         starts, ends = _one_way(starts[mask], ends[mask])
-        mask[mask] = self._checks.motions_free(starts, ends, self._step_counts(starts, ends))
+        steps = step_counts(starts, ends, self.weights, self.motion_resolution)
+        mask[mask] = self._checks.motions_free(starts, ends, steps)
         return mask
-
-    def _step_counts(self, starts: Matrix, ends: Matrix) -> NDArray[np.int64]:
-        """See :meth:`steps`; shapes (m, dof), (m,)."""
-        travel = np.abs(ends - starts) @ self.weights
-        counts: NDArray[np.int64] = np.maximum(1, np.ceil(travel / self.motion_resolution - 1e-9)).astype(np.int64)
-        return counts
 
 
 def _standing_free(robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> bool:
