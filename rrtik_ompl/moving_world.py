@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Mask, Vector, finite_array
 from rrtik_ompl.checks import fast_world
 from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.collision.certificate import Certificate
+from rrtik_ompl.collision.certificate import standing_contact
 from rrtik_ompl.collision.motion_bound import step_counts
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast import FREE, FastWorld
@@ -140,10 +140,7 @@ class MovingWorld:
 
     def _contact_of_base(self) -> str:
         """See ``blocked``; predicted places do not count, for nothing can be done about them."""
-        if not self._fixed:
-            return ""
-        certificate = Certificate(self.robot, tuple(self._bodies), self._fixed)
-        (found,) = certificate.first_pairs(np.zeros((1, self.robot.dof)))
+        found = standing_contact(self.robot, tuple(self._bodies), self._fixed)
         return "" if found is None else f"'{found[0]}' and '{found[1]}' overlap, and the base cannot give way"
 
 

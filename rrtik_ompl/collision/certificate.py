@@ -128,6 +128,19 @@ class Certificate:
         return gaps
 
 
+def standing_contact(
+    robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]
+) -> tuple[str, str] | None:
+    """Names of two bodies that touch and never move (the base and the obstacles), None if all are clear of each other.
+
+    Args:
+        robot: The arm.
+        bodies: All solids.
+        pairs: Numbers of those that never move and must not touch.
+    """
+    return Certificate(robot, bodies, pairs).first_pairs(np.zeros((1, robot.dof)))[0] if pairs else None
+
+
 def _shorter(
     begins: Numbers, run: Numbers, pair: Numbers, size: int, shorter: int, end: int
 ) -> tuple[Numbers, Numbers, Numbers]:
