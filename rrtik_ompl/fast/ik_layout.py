@@ -19,7 +19,6 @@ ROWS, AIMS, AIM_BYTES, NEAR, NEAR_BYTES, Q, REACHED, NEXT, STEPS, PATIENCE = ran
 # Its memory: FIRST frame seen from the goal, FRAMES of the joints and the tip, COLUMNS of the Jacobian, ERROR,
 # its WEIGHTS, SQUARE matrix, CHANGE of the joints, FARNESS of the seeds; DONE: steps taken
 FIRST, FRAMES, COLUMNS, ERROR, WEIGHTS, SQUARE, CHANGE, FARNESS, DONE = range(10, 19)
-CALL_FIELDS = 19
 
 # Aim: T_world_tip as 12 numbers, then tolerances [m] and of the chord 2 sin(angle / 2), half sides of the box in the
 # goal frame within which the position is free [m], and what turn is free.
