@@ -9,6 +9,7 @@ KERNELS = "ik_kernels"  # their library
 # LOWER, UPPER: limits of q · SEEDS: configurations, SEED_TIPS: where they bring the tip, 12 numbers each ·
 # NUMBERS: see below
 JOINTS, DOF, FIXED, SLIDING, COLUMN, GAIN, OFFSET, LOWER, UPPER, SEED_COUNT, SEEDS, SEED_TIPS, NUMBERS = range(13)
+FRAME_BYTES = 96  # of 12 numbers
 PER_METRE, PER_CHORD, DAMPING, SHARE, SHARE_GROWTH, LARGEST_STEP, STALLED = range(7)  # the numbers
 
 # Call. ROWS: how many goals or starts · AIMS: goals, AIM_BYTES apart (0: all the same) · NEAR: postures, NEAR_BYTES
