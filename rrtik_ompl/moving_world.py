@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Mask, Vector, finite_array
 from rrtik_ompl.checks import fast_world
 from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.collision.certificate import Certificate
+from rrtik_ompl.collision.certificate import standing_contact
+from rrtik_ompl.collision.motion_bound import step_counts
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast import FREE, FastWorld
 from rrtik_ompl.robot import Robot
@@ -131,8 +132,7 @@ class MovingWorld:
     def motion_valid_batch(self, A: ArrayLike, B: ArrayLike) -> Mask:
         """Which straight motions A[k] -> B[k], shapes (m, dof), are free. Shape (m,)."""
         starts, ends = (finite_array(Q, (None, self.robot.dof), "ends of motions") for Q in (A, B))
-        travel = np.abs(ends - starts) @ self.weights
-        steps = np.maximum(1, np.ceil(travel / self.motion_resolution - 1e-9)).astype(np.int64)
+        steps = step_counts(starts, ends, self.weights, self.motion_resolution)
         self.checked += int(steps.sum()) + len(steps)
         sides = self.robot.joint_values(starts), self.robot.joint_values(ends)
         free: Mask = self._fast.classify_edges(*sides, steps, prove=False) == FREE
@@ -140,10 +140,7 @@ class MovingWorld:
 
     def _contact_of_base(self) -> str:
         """See ``blocked``; predicted places do not count, for nothing can be done about them."""
-        if not self._fixed:
-            return ""
-        certificate = Certificate(self.robot, tuple(self._bodies), self._fixed)
-        (found,) = certificate.first_pairs(np.zeros((1, self.robot.dof)))
+        found = standing_contact(self.robot, tuple(self._bodies), self._fixed)
         return "" if found is None else f"'{found[0]}' and '{found[1]}' overlap, and the base cannot give way"
 
 

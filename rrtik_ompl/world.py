@@ -6,15 +6,15 @@ import copy
 import warnings
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Matrix, finite_array
 from rrtik_ompl.checks import CollisionChecks
-from rrtik_ompl.collision.bodies import Body, colliding_pairs, link_bodies, scene_bodies
-from rrtik_ompl.collision.certificate import Certificate
+from rrtik_ompl.collision.bodies import colliding_pairs, link_bodies, scene_bodies
+from rrtik_ompl.collision.certificate import Certificate, standing_contact
 from rrtik_ompl.collision.contacts import Contact as Contact
 from rrtik_ompl.collision.contacts import inside, measured
-from rrtik_ompl.collision.motion_bound import displacement_weights
+from rrtik_ompl.collision.motion_bound import displacement_weights, step_counts
 from rrtik_ompl.errors import InputError, MeshWarning, UnknownNameError, require
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.robot import Robot
@@ -99,8 +99,8 @@ class World:
         self.accuracy = _accuracy(accuracy)
         self._certificate = Certificate(robot, self.bodies, pairs)
         self._checks = CollisionChecks(robot, self.bodies, moving, conservative=accuracy == "conservative")
-        standing = tuple(p for p in pairs if p not in set(moving))
-        self._always_colliding = bool(standing) and not _standing_free(robot, self.bodies, standing)
+        standing = tuple(p for p in pairs if all(self.bodies[i].joint == 0 for i in p))
+        self._always_colliding = standing_contact(robot, self.bodies, standing) is not None
 
     def __repr__(self) -> str:
         return f"World({self.robot.name}, {self.scene}, motion_resolution={self.motion_resolution:g} m)"
@@ -223,19 +223,9 @@ class World:
     def _motions_free(self, starts: Matrix, ends: Matrix) -> Mask:
         mask = self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self._always_colliding)
         starts, ends = _one_way(starts[mask], ends[mask])
-        mask[mask] = self._checks.motions_free(starts, ends, self._step_counts(starts, ends))
+        steps = step_counts(starts, ends, self.weights, self.motion_resolution)
+        mask[mask] = self._checks.motions_free(starts, ends, steps)
         return mask
-
-    def _step_counts(self, starts: Matrix, ends: Matrix) -> NDArray[np.int64]:
-        """See :meth:`steps`; shapes (m, dof), (m,)."""
-        travel = np.abs(ends - starts) @ self.weights
-        counts: NDArray[np.int64] = np.maximum(1, np.ceil(travel / self.motion_resolution - 1e-9)).astype(np.int64)
-        return counts
-
-
-def _standing_free(robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> bool:
-    """Whether bodies that never move (the base and the obstacles) are clear of each other."""
-    return bool(Certificate(robot, bodies, pairs).free(np.zeros((1, robot.dof)))[0])
 
 
 def _one_way(starts: Matrix, ends: Matrix) -> tuple[Matrix, Matrix]:

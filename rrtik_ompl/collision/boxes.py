@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import coal
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
 
 ENDLESS = 1e9  # [m] half extent of a half-space's box
@@ -80,6 +81,11 @@ def _local_boxes(bodies: Sequence[Body]) -> tuple[Matrix, Matrix]:
     centres, halves = np.zeros((len(bodies), 3)), np.full((len(bodies), 3), ENDLESS)
     for k, body in enumerate(bodies):
         if not isinstance(body.geometry, coal.Halfspace):
-            box = body.geometry.aabb_local
-            centres[k], halves[k] = box.center(), 0.5 * np.array([box.width(), box.height(), box.depth()])
+            centres[k], halves[k] = body.geometry.aabb_local.center(), half_extents(body.geometry)
     return centres, halves
+
+
+def half_extents(geometry: Any) -> Vector:
+    """Half extents of a coal geometry's own bounding box, shape (3,)."""
+    box = geometry.aabb_local
+    return 0.5 * np.array([box.width(), box.height(), box.depth()])

@@ -39,7 +39,7 @@ class Certificate:
         self._planes = _half_space_pairs(bodies, pairs)
         self._margins = np.array([kept_apart(bodies[i], bodies[j]) for i, j in pairs])
         self._containment = Containment(bodies, pairs)
-        places = {pair: k for k, pair in enumerate(self._containment.pairs)}
+        places = self._containment.places
         ways = [(places.get((i, j), -1), places.get((j, i), -1)) for i, j in pairs]
         self._hollow = np.array(ways, dtype=np.int64).reshape(-1, 2)
 
@@ -84,10 +84,10 @@ class Certificate:
         near = np.array([np.abs(Q[a:b] - Q[m]).max(axis=0) for a, b, m in zip(begins, ends, middles, strict=True)])
         frames = self._robot.joint_frames(Q[middles])
         placed = self._boxes.placed(frames)
-        open_: Mask = self._gaps(placed, run, pair) <= ROOM + self._approached(near, run, pair)
+        approach = ROOM + self._approached(near, run, pair)
+        open_: Mask = self._gaps(placed, run, pair) <= approach
         kept = np.flatnonzero(open_)
-        approach = ROOM + self._approached(near, run[kept], pair[kept])
-        columns = (kept, run[kept], pair[kept], approach, self._reached(frames, run[kept], pair[kept]))
+        columns = (kept, run[kept], pair[kept], approach[kept], self._reached(frames, run[kept], pair[kept]))
         for entry, r, p, most, reached in zip(*(k.tolist() for k in columns), strict=True):
             i, j = self._pairs[p].tolist()
             first, second = ((self._bodies[k].geometry, placed.pose(r, k)) for k in (i, j))
@@ -126,6 +126,19 @@ class Certificate:
             gaps[mine] = placed.centres[rows] @ normal - offset - placed.halves[rows] @ np.abs(normal)
         gaps -= self._margins[pair]
         return gaps
+
+
+def standing_contact(
+    robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]
+) -> tuple[str, str] | None:
+    """Names of two bodies that touch and never move (the base and the obstacles), None if all are clear of each other.
+
+    Args:
+        robot: The arm.
+        bodies: All solids.
+        pairs: Numbers of those that never move and must not touch.
+    """
+    return Certificate(robot, bodies, pairs).first_pairs(np.zeros((1, robot.dof)))[0] if pairs else None
 
 
 def _shorter(

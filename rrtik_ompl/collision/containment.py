@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.boxes import half_extents
 from rrtik_ompl.collision.enclosure import enclosure
 from rrtik_ompl.collision.solids import inside_mesh, is_closed, is_mesh, mesh_arrays
 
@@ -25,6 +26,7 @@ class Containment:
 
     Attributes:
         pairs: Numbers of the bodies, the one that may hold first.
+        places: The place of each of them in ``pairs``.
     """
 
     def __init__(
@@ -40,7 +42,7 @@ class Containment:
         both_ways = [*pairs, *((j, i) for i, j in pairs)]
         solid = {o for o in {o for o, _ in both_ways} if _has_inside(bodies[o])}
         self.pairs = [(o, i) for o, i in both_ways if o in solid and _may_hold(bodies[o].geometry, bodies[i].geometry)]
-        self._places = {pair: k for k, pair in enumerate(self.pairs)}
+        self.places = {pair: k for k, pair in enumerate(self.pairs)}
         outer, inner = ([bodies[p[k]] for p in self.pairs] for k in (0, 1))
         self._outer_joint = np.array([b.joint for b in outer], dtype=np.int64)
         self._inner_joint = np.array([b.joint for b in inner], dtype=np.int64)
@@ -48,7 +50,7 @@ class Containment:
         self._points = np.array(points).reshape(-1, 6, 3)
         self._to_outer = np.array([b.placement.inverse().homogeneous for b in outer]).reshape(-1, 4, 4)
         self._centres = np.array([b.geometry.aabb_local.center() for b in outer]).reshape(-1, 3)
-        self._halves = np.array([_half_extents(b.geometry) for b in outer]).reshape(-1, 3) + ROUNDING
+        self._halves = np.array([half_extents(b.geometry) for b in outer]).reshape(-1, 3) + ROUNDING
         everywhere = np.array([[0.0, 0.0, 0.0, np.inf]])
         self._covers = {o: everywhere if covers is None else covers[o] for o, _ in self.pairs}
         self._meshes = {o: bodies[o].geometry for o, _ in self.pairs}
@@ -60,7 +62,7 @@ class Containment:
             pair: Numbers of the bodies, in either order.
             frames: Pose of every joint frame in the world, world first, shape (joints + 1, 4, 4).
         """
-        return any(self._holds(self._places[p], frames) for p in (pair, pair[::-1]) if p in self._places)
+        return any(self._holds(self.places[p], frames) for p in (pair, pair[::-1]) if p in self.places)
 
     def reached(self, places: NDArray[np.int64], frames: NDArray[np.float64]) -> Mask:
         """Which of some pairs may be such: the ends of the inner body are in the bounding box of the outer one.
@@ -94,9 +96,9 @@ class Containment:
             pairs: Numbers of the bodies.
             joints: ``pinocchio.SE3`` of every joint frame in the world, world first.
         """
-        both_ways = (pair for i, j in pairs for pair in ((i, j), (j, i)) if pair in self._places)
+        both_ways = (pair for i, j in pairs for pair in ((i, j), (j, i)) if pair in self.places)
         for pair in both_ways:
-            k = self._places[pair]
+            k = self.places[pair]
             between = joints[int(self._outer_joint[k])].actInv(joints[int(self._inner_joint[k])])
             in_joint = self._points[k] @ between.rotation.T + between.translation
             local = in_joint @ self._to_outer[k, :3, :3].T + self._to_outer[k, :3, 3]
@@ -126,12 +128,7 @@ def _has_inside(body: Body) -> bool:
 def _may_hold(outer: Any, inner: Any) -> bool:
     if isinstance(inner, coal.Halfspace):
         return False
-    return bool(_half_extents(inner).max() <= outer.aabb_radius)
-
-
-def _half_extents(geometry: Any) -> NDArray[np.float64]:
-    box = geometry.aabb_local
-    return 0.5 * np.array([box.width(), box.height(), box.depth()])
+    return bool(half_extents(inner).max() <= outer.aabb_radius)
 
 
 def _end_points(geometry: Any) -> Matrix:
@@ -142,7 +139,7 @@ def _end_points(geometry: Any) -> Matrix:
     elif isinstance(geometry, coal.ConvexBase):
         points = np.array(geometry.points()).reshape(-1, 3)
     elif isinstance(geometry, (coal.Box, coal.Sphere, coal.Capsule, coal.Cylinder)):
-        return np.concatenate([np.eye(3), -np.eye(3)]) * _half_extents(geometry)
+        return np.concatenate([np.eye(3), -np.eye(3)]) * half_extents(geometry)
     else:
         return np.zeros((6, 3))
     return np.asarray(points[np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])])

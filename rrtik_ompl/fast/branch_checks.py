@@ -24,7 +24,6 @@ from rrtik_ompl.fast.lanes import (
 from rrtik_ompl.fast.wide_angles import TURN, arc_sine, wide_sine_and_cosine, within_half_turn
 
 POSE_BYTES = 128
-FRAME_BYTES = 96
 FAR = 1e9  # [m] squares of what is farther away could leave the numbers; it is out of reach all the same
 
 
@@ -139,7 +138,7 @@ def row_of_tip(fixed: int, work: int, row: int) -> Any:
     x, y = spread_wide(double_at(fixed, 3 * row)), spread_wide(double_at(fixed, 3 * row + 1))
     z, o = spread_wide(double_at(fixed, 3 * row + 2)), spread_wide(double_at(fixed, 9 + row))
     for joint in range(6):
-        fixed += FRAME_BYTES
+        fixed += ik_layout.FRAME_BYTES
         sine, cosine = wide_lanes_at(work, table.SINES + joint), wide_lanes_at(work, table.COSINES + joint)
         a, b = cosine * x + sine * y, cosine * y - sine * x
         o = o + (a * double_at(fixed, 9) + b * double_at(fixed, 10) + z * double_at(fixed, 11))

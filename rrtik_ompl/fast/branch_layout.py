@@ -16,7 +16,6 @@ FROM_WORLD, TO_FRAME, NUMBERS, LOWEST, HIGHEST, TURNING, LIMB = range(7)
 # reaches the target and whether it is inside the limits; ODD: whether the answer is not to be used; RESIDUALS: of each
 # branch its distance, then of each its angle (0: not wanted) · WORK: see below
 ROWS, BLOCKS, POSES, NEAR, SLACK, Q, REAL, FITS, ODD, RESIDUALS, WORK = range(11)
-CALL_FIELDS = 11
 
 # Workspace, in wide lanes: TARGET as given and FRAME as the closed form wants it (12 each), the joint values of the
 # HINT (6), SINES and COSINES of the joints

@@ -93,7 +93,6 @@ class ConnectSearch:
         if joints == 0:
             self._search.header[layout.ROW_VALUES] = self._search.header[layout.ROW]
         self._search.header[layout.PATIENCE] = patience
-        self._address = self._search.address
         self._roots = [np.empty((0, dof)), np.empty((0, dof))]
         self._places = [0, 0]  # addresses of the roots in memory, which numpy takes a microsecond to tell
         for side in range(2):
@@ -135,7 +134,7 @@ class ConnectSearch:
         header[layout.PROVING] = ask is not None
         header[layout.LIMIT] = NO_LIMIT if max_iterations is None else max_iterations
         self._questions = 0
-        outside = self._kernels.begin(self._address, len(starts), len(goals), int(seed) & (2**63 - 1))
+        outside = self._kernels.begin(self._search.address, len(starts), len(goals), int(seed) & (2**63 - 1))
         if outside >= 0:
             what = f"start {outside}" if outside < len(starts) else f"goal {outside - len(starts)}"
             raise InputError(f"search: {what} is not in the box of configurations")
@@ -148,7 +147,7 @@ class ConnectSearch:
         """
         self._fit_trees(roots)
         self._search.header[layout.PROVING], self._search.header[layout.LIMIT] = 0, max_iterations
-        return self._address
+        return self._search.address
 
     def go_on(self, stop: Callable[[], Any]) -> bool:
         """Search on, where another kernel has begun; whether there is a path."""
@@ -157,7 +156,7 @@ class ConnectSearch:
     def proven_free(self, rows: Matrix) -> bool:
         """Whether all configurations, shape (k, n), lie in the box and the covers prove them free."""
         self._set_roots(0, rows)
-        return self._kernels.rows_free(self._address, self._places[0], len(rows)) != 0
+        return self._kernels.rows_free(self._search.address, self._places[0], len(rows)) != 0
 
     def statistics(self) -> dict[str, int | float]:
         """Counts of the last search.
@@ -179,7 +178,7 @@ class ConnectSearch:
         budget = FIRST_BUDGET
         while True:
             begin = time.perf_counter()
-            status = self._kernels.resume(self._address, budget)
+            status = self._kernels.resume(self._search.address, budget)
             if status == layout.ASKING and ask is not None:
                 self._answer(ask)
             elif status == layout.FULL:
@@ -204,11 +203,11 @@ class ConnectSearch:
             grow(tree)
 
     def _path(self) -> Matrix:
-        count = self._kernels.write_path(self._address, self._path_place, len(self._path_rows))
+        count = self._kernels.write_path(self._search.address, self._path_place, len(self._path_rows))
         if count > len(self._path_rows):
             self._path_rows = np.empty((2 * count, self._dof))
             self._path_place = self._path_rows.ctypes.data
-            self._kernels.write_path(self._address, self._path_place, count)
+            self._kernels.write_path(self._search.address, self._path_place, count)
         return self._path_rows[:count].copy()
 
     def _set_roots(self, side: int, rows: Matrix) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 from rrtik_ompl.fast import ik_layout as table
 from rrtik_ompl.fast.compiled import entry, inlined, kernel
-from rrtik_ompl.fast.ik_kinematics import FRAME_BYTES, differentiate, measure, move_tip, number, see_from, weigh
+from rrtik_ompl.fast.ik_kinematics import differentiate, measure, move_tip, number, see_from, weigh
 from rrtik_ompl.fast.lanes import double_at, field, set_double, set_field, set_int
 
 FAR = 1e300
@@ -140,7 +140,7 @@ def measure_seeds(limb: int, call: int, aim: int) -> None:
     free = int(double_at(aim, table.FREE_TURN))
     metre, chord = number(limb, table.PER_METRE), number(limb, table.PER_CHORD)
     for seed in range(field(limb, table.SEED_COUNT)):
-        tip = field(limb, table.SEED_TIPS) + FRAME_BYTES * seed
+        tip = field(limb, table.SEED_TIPS) + table.FRAME_BYTES * seed
         away, turned = 0.0, 0.0
         for k in range(3):
             way = double_at(tip, 9 + k) - double_at(aim, 9 + k)

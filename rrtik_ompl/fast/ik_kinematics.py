@@ -9,7 +9,6 @@ from rrtik_ompl.fast import ik_layout as table
 from rrtik_ompl.fast.compiled import inlined, kernel
 from rrtik_ompl.fast.lanes import double_at, field, int_at, set_double
 
-FRAME_BYTES = 96
 TINY = 1e-12  # cosine of half an angle, below which the turn is a half turn
 
 
@@ -46,19 +45,19 @@ def move_tip(limb: int, call: int, q: int) -> Any:
     for joint in range(field(limb, table.JOINTS)):
         value = double_at(field(limb, table.GAIN), joint) * double_at(q, int_at(columns, joint))
         value += double_at(field(limb, table.OFFSET), joint)
-        fixed += FRAME_BYTES
+        fixed += table.FRAME_BYTES
         if int_at(field(limb, table.SLIDING), joint) != 0:
             move_joint(frame, fixed, value, 1.0, 0.0)
         else:
             move_joint(frame, fixed, 0.0, math.cos(value), math.sin(value))
-        frame += FRAME_BYTES
+        frame += table.FRAME_BYTES
     return frame
 
 
 @kernel
 def move_joint(frame: int, fixed: int, slide: float, cosine: float, sine: float) -> None:
     """Move a frame along its z and place the next one, a fixed frame away after a turn about z."""
-    after = frame + FRAME_BYTES
+    after = frame + table.FRAME_BYTES
     for row in range(3):
         a, b, z = double_at(frame, 3 * row), double_at(frame, 3 * row + 1), double_at(frame, 3 * row + 2)
         x, y = cosine * a + sine * b, cosine * b - sine * a
@@ -143,7 +142,7 @@ def differentiate(limb: int, call: int, aim: int, tip: int) -> None:
             add(column, u * (y * c - z * b), v * (z * a - x * c), w * (x * b - y * a))
             x, y, z = felt(free, tip, x, y, z)
             add(column + 24, chord * x, chord * y, chord * z)
-        frame += FRAME_BYTES
+        frame += table.FRAME_BYTES
 
 
 @inlined

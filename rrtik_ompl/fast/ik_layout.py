@@ -9,6 +9,7 @@ KERNELS = "ik_kernels"  # their library
 # LOWER, UPPER: limits of q · SEEDS: configurations, SEED_TIPS: where they bring the tip, 12 numbers each ·
 # NUMBERS: see below
 JOINTS, DOF, FIXED, SLIDING, COLUMN, GAIN, OFFSET, LOWER, UPPER, SEED_COUNT, SEEDS, SEED_TIPS, NUMBERS = range(13)
+FRAME_BYTES = 96  # of 12 numbers
 PER_METRE, PER_CHORD, DAMPING, SHARE, SHARE_GROWTH, LARGEST_STEP, STALLED = range(7)  # the numbers
 
 # Call. ROWS: how many goals or starts · AIMS: goals, AIM_BYTES apart (0: all the same) · NEAR: postures, NEAR_BYTES
@@ -19,7 +20,6 @@ ROWS, AIMS, AIM_BYTES, NEAR, NEAR_BYTES, Q, REACHED, NEXT, STEPS, PATIENCE = ran
 # Its memory: FIRST frame seen from the goal, FRAMES of the joints and the tip, COLUMNS of the Jacobian, ERROR,
 # its WEIGHTS, SQUARE matrix, CHANGE of the joints, FARNESS of the seeds; DONE: steps taken
 FIRST, FRAMES, COLUMNS, ERROR, WEIGHTS, SQUARE, CHANGE, FARNESS, DONE = range(10, 19)
-CALL_FIELDS = 19
 
 # Aim: T_world_tip as 12 numbers, then tolerances [m] and of the chord 2 sin(angle / 2), half sides of the box in the
 # goal frame within which the position is free [m], and what turn is free.

@@ -69,7 +69,7 @@ class PathRepair:
         fields: dict[int, Any] = dict.fromkeys(range(layout.FIELD_COUNT), 0)
         fields |= {layout.TRIES: tries, layout.PATIENCE: patience, layout.NUMBERS: np.array([0.5 * eps, NEAR])}
         self._table = table(fields)
-        self._address, self._points = self._table.address, np.zeros((0, self._dof))
+        self._points = np.zeros((0, self._dof))
         self._make_room(FIRST_ROOM)
         self.checked = 0
 
@@ -80,7 +80,7 @@ class PathRepair:
             self._make_room(2 * len(rows))
         while True:
             self._given[: len(rows)] = rows
-            found = self._kernels.look(self._address, len(rows))
+            found = self._kernels.look(self._table.address, len(rows))
             if found != layout.NO_ROOM:
                 break
             self._make_room(2 * int(self._table.header[layout.COUNT]))
@@ -95,12 +95,12 @@ class PathRepair:
             stop: Asked about every millisecond; True gives up.
             forgetting: Whether to plan from scratch, as to compare with: the pieces of the path are not used.
         """
-        rows = self._kernels.repair(self._address, seed, forgetting, FIRST_BUDGET)
+        rows = self._kernels.repair(self._table.address, seed, forgetting, FIRST_BUDGET)
         if rows == layout.NOT_YET:
-            rows = self._kernels.finish(self._address, seed) if self._search.go_on(stop) else layout.NO_WAY
+            rows = self._kernels.finish(self._table.address, seed) if self._search.go_on(stop) else layout.NO_WAY
         while rows == layout.LONG:
             self._make_room(2 * len(self._given))
-            rows = self._kernels.finish(self._address, seed)
+            rows = self._kernels.finish(self._table.address, seed)
         return self._path[:rows].copy() if rows > 0 else None
 
     def _make_room(self, rows: int) -> None:
