@@ -18,6 +18,7 @@ from rrtik_ompl.fast.connect_layout import KERNELS
 from rrtik_ompl.fast.library import library
 from rrtik_ompl.fast.shortcut import ShortcutSearch
 from rrtik_ompl.fast.shortcut_layout import KERNELS as CUT_KERNELS
+from rrtik_ompl.transitions import without_repeats
 
 Stop = Callable[[], Any]  # true when it is time to stop
 
@@ -227,12 +228,6 @@ class Tree:
         row = target if length <= eps else start + (target - start) * (eps / length)
         free = length > 0.0 and bool(motions.motion_valid_batch(start[None], row[None])[0])
         return self.add(row, near) if free else None
-
-
-def without_repeats(path: Matrix) -> Matrix:
-    """The path without waypoints that repeat the one before, shape (k, n)."""
-    kept: Matrix = path[np.concatenate([[True], (np.diff(path, axis=0) != 0.0).any(axis=1)])]
-    return kept
 
 
 def joined(first: Matrix, bridge: Matrix, second: Matrix, *, chain: bool) -> Joined:

@@ -151,9 +151,3 @@ def _edges(route: Matrix) -> list[tuple[bytes, bytes]]:
     """The edges of a route as keys."""
     keys = [row.tobytes() for row in route]
     return list(pairwise(keys))
-
-
-def without_repeats(route: Matrix) -> Matrix:
-    """The route without waypoints that repeat the one before, shape (k, n); both ends stay."""
-    kept: Matrix = route[np.append(True, (np.diff(route, axis=0) != 0.0).any(axis=1))]
-    return kept
