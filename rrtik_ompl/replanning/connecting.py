@@ -164,15 +164,6 @@ def has_kernels(world: Any) -> bool:
     return getattr(world, "fast", None) is not None and None not in (library(KERNELS), library(CUT_KERNELS))
 
 
-def connector(
-    world: Any, lower: Vector, upper: Vector, eps: float, seed: int, iterations: int = ITERATIONS
-) -> KernelConnect | PlainConnect:
-    """The search in a kernel where the world has kernels, else the one in Python."""
-    if has_kernels(world):
-        return KernelConnect(world, lower, upper, eps, seed, iterations)
-    return PlainConnect(lower, upper, eps, seed, iterations)
-
-
 class Tree:
     """Vertices that hang on roots.
 
