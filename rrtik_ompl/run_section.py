@@ -27,6 +27,20 @@ class GoalWaypoint(Section):
             raise PydanticCustomError("units", "give either joints or joints_deg")
         return self
 
+    def configuration(self, robot: Robot) -> Vector:
+        """Shape (dof,), rad or m.
+
+        Raises:
+            InputError: If it has the wrong number of joints or is outside the limits.
+        """
+        what = f"goal at {self.time:g} s"
+        q = robot.configuration(self.joints_deg if self.joints is None else self.joints, what)
+        if self.joints is None:
+            q = np.where(robot.prismatic, q, np.radians(q))
+        if fault := robot.limit_fault(q):
+            raise InputError(f"{what}: {fault}")
+        return q
+
 
 class RunSection(Section):
     """Steps, ticks and distances of a run; what is left out is as in ``rrtik_ompl.replanning``."""
@@ -54,12 +68,8 @@ class RunSection(Section):
         """
         if self.goal is None:
             return None
-        rows = [np.radians(w.joints_deg or []) if w.joints is None else w.joints for w in self.goal]
-        joints = [robot.configuration(row, f"goal at {w.time:g} s") for row, w in zip(rows, self.goal, strict=True)]
-        for waypoint, row in zip(self.goal, joints, strict=True):
-            if fault := robot.limit_fault(row):
-                raise InputError(f"goal at {waypoint.time:g} s: {fault}")
-        return GoalMotion(np.array([w.time for w in self.goal]), np.array(joints))
+        rows = [waypoint.configuration(robot) for waypoint in self.goal]
+        return GoalMotion(np.array([w.time for w in self.goal]), np.array(rows))
 
 
 class GoalMotion:

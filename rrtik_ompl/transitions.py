@@ -57,6 +57,12 @@ def merge_moves(waypoints: ArrayLike, tolerance: float = SAME) -> Matrix:
     return rows[kept]
 
 
+def without_repeats(route: Matrix) -> Matrix:
+    """The route without waypoints that repeat the one before, shape (k, n); both ends stay."""
+    kept: Matrix = route[np.append(True, (np.diff(route, axis=0) != 0.0).any(axis=1))]
+    return kept
+
+
 def transitions(waypoints: ArrayLike, tolerance: float = SAME) -> int:
     """Number of moves of a route, shape (k, n): its edges after :func:`merge_moves`.
 

@@ -10,7 +10,7 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.fast.connect_layout import KERNELS
 from rrtik_ompl.fast.connect_lengths import connect_lengths, positive
 from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
-from rrtik_ompl.replanning.connecting import PlainConnect, connector
+from rrtik_ompl.replanning.connecting import KernelConnect, PlainConnect, has_kernels
 from rrtik_ompl.replanning.drrt_con import DrrtCon, points_along
 
 UNLIMITED = 2**62  # samples; the time is the limit
@@ -52,8 +52,8 @@ class DRRTCon(SafePlanner):
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
-        core = self._core if self._core is not None and self._core.path is not None else None
-        reused = core is not None and self._from_kept(core, starts, goals, checker, ptc)
+        core = self._core
+        reused = core is not None and core.path is not None and self._from_kept(core, starts, goals, checker, ptc)
         if not reused:
             core = self._core = self._new()
             for start in starts:
@@ -68,9 +68,7 @@ class DRRTCon(SafePlanner):
         assert core.path is not None
         start, passed = _nearest_place(core.path, starts, 0.5 * core.eps)
         core.rejoin(start, passed)
-        if not (goals == core.path[-1]).all(axis=1).any():
-            core.retarget(goals, checker, ptc)
-        if not (goals == core.path[-1]).all(axis=1).any():
+        if not (goals == core.path[-1]).all(axis=1).any() and not core.retarget(goals, checker, ptc):
             return False
         return core.look(checker) or core.repair(checker, ptc)
 
@@ -78,8 +76,8 @@ class DRRTCon(SafePlanner):
         lower, upper = self.bounds()
         eps, _ = connect_lengths(lower, upper, self.range, None)
         seed, world = int(self.rng.integers(2**63)), self._world
-        if getattr(world, "accuracy", "exact") == "conservative":
-            return DrrtCon(connector(world, lower, upper, eps, seed, UNLIMITED), eps)
+        if getattr(world, "accuracy", "exact") == "conservative" and has_kernels(world):
+            return DrrtCon(KernelConnect(world, lower, upper, eps, seed, UNLIMITED), eps)
         return DrrtCon(PlainConnect(lower, upper, eps, seed, UNLIMITED), eps)
 
 

@@ -18,6 +18,7 @@ from rrtik_ompl.fast.connect_layout import KERNELS
 from rrtik_ompl.fast.library import library
 from rrtik_ompl.fast.shortcut import ShortcutSearch
 from rrtik_ompl.fast.shortcut_layout import KERNELS as CUT_KERNELS
+from rrtik_ompl.transitions import without_repeats
 
 Stop = Callable[[], Any]  # true when it is time to stop
 
@@ -163,15 +164,6 @@ def has_kernels(world: Any) -> bool:
     return getattr(world, "fast", None) is not None and None not in (library(KERNELS), library(CUT_KERNELS))
 
 
-def connector(
-    world: Any, lower: Vector, upper: Vector, eps: float, seed: int, iterations: int = ITERATIONS
-) -> KernelConnect | PlainConnect:
-    """The search in a kernel where the world has kernels, else the one in Python."""
-    if has_kernels(world):
-        return KernelConnect(world, lower, upper, eps, seed, iterations)
-    return PlainConnect(lower, upper, eps, seed, iterations)
-
-
 class Tree:
     """Vertices that hang on roots.
 
@@ -227,12 +219,6 @@ class Tree:
         row = target if length <= eps else start + (target - start) * (eps / length)
         free = length > 0.0 and bool(motions.motion_valid_batch(start[None], row[None])[0])
         return self.add(row, near) if free else None
-
-
-def without_repeats(path: Matrix) -> Matrix:
-    """The path without waypoints that repeat the one before, shape (k, n)."""
-    kept: Matrix = path[np.concatenate([[True], (np.diff(path, axis=0) != 0.0).any(axis=1)])]
-    return kept
 
 
 def joined(first: Matrix, bridge: Matrix, second: Matrix, *, chain: bool) -> Joined:

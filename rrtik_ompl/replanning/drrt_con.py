@@ -14,7 +14,8 @@ import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.path import subdivided
-from rrtik_ompl.replanning.connecting import Connect, Joined, Motions, Stop, never, without_repeats
+from rrtik_ompl.replanning.connecting import Connect, Joined, Motions, Stop, never
+from rrtik_ompl.transitions import without_repeats
 
 MOST_CUTS = 24  # ends that are tried from one point of a path
 STRAIGHT = 1e-9  # change of direction

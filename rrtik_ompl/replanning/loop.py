@@ -60,8 +60,9 @@ class Loop:
         self._first = {o.name: o.pose for o in scene.obstacles}
         self._see(0.0)
         _check_start(self.q, scene, first, self._world)
-        lower = np.where(np.isfinite(robot.lower), robot.lower, np.vstack([self.q, self._goals]).min(axis=0) - TURN)
-        upper = np.where(np.isfinite(robot.upper), robot.upper, np.vstack([self.q, self._goals]).max(axis=0) + TURN)
+        ends = np.vstack([self.q, self._goals])
+        lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - TURN)
+        upper = np.where(np.isfinite(robot.upper), robot.upper, ends.max(axis=0) + TURN)
         self._planner = planner_of(chosen, self._world, lower, upper)
         self.run = Run(
             problem.name, robot.name, robot.joint_names, chosen.planner, chosen.seed, chosen.step, chosen.rate,

@@ -16,6 +16,7 @@ from rrtik_ompl.arrays import Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.path_text import json_object
 from rrtik_ompl.text_file import read_text, write_text
+from rrtik_ompl.transitions import route_length
 
 KIND = "replan_run"
 EVENTS = ("plan", "walk", "repair", "wait", "evade", "arrive")
@@ -91,8 +92,7 @@ class Run:
     @property
     def length(self) -> float:
         """Length of the way that was gone [rad, metres counted alike]."""
-        rows = self.configurations
-        return float(np.linalg.norm(np.diff(rows, axis=0), axis=1).sum()) if len(rows) else 0.0
+        return route_length(self.configurations) if self.ticks else 0.0
 
     def count(self, event: str) -> int:
         """Number of ticks of a kind."""

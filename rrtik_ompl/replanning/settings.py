@@ -8,7 +8,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Vector, finite_array, whole_number
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.fast.connect_lengths import RANGE_SHARE
+from rrtik_ompl.fast.connect_lengths import connect_lengths
 from rrtik_ompl.moving_world import MovingWorld
 from rrtik_ompl.replanning.connecting import KernelCuts, PlainConnect, has_kernels
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
@@ -82,7 +82,7 @@ def settings(
         raise InputError(f"margin must not be negative, got {distance:g} m")
     rates = RateLimits.of(robot) if limits is None else limits.for_joints(robot.dof)
     lower, upper = (np.clip(ends, -TURN, TURN) for ends in (robot.lower, robot.upper))
-    usual = RANGE_SHARE * float(np.linalg.norm(np.minimum(upper - lower, TURN)))
+    usual, _ = connect_lengths(lower, upper, None, None)
     return Settings(
         step=_above(step, "step", "how far to go in a tick [rad or m]"),
         rate=frequency,

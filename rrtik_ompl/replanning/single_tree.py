@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.replanning.connecting import Joined, Motions, Stop, Tree, joined, never
+from rrtik_ompl.replanning.connecting import ITERATIONS, Joined, Motions, Stop, Tree, joined, never
 from rrtik_ompl.replanning.drrt_con import DrrtCon, Post
 
 TO_THE_ROBOT = 0.4  # probability
@@ -24,17 +24,14 @@ class SingleTree(DrrtCon):
         lower, upper: The box to sample in, shape (n,).
         eps: See :class:`DrrtCon`.
         seed: Of the samples.
-        iterations: Samples of one repair at most.
         post: See :class:`DrrtCon`.
     """
 
     name: ClassVar[str] = "drrt"
 
-    def __init__(
-        self, lower: Vector, upper: Vector, eps: float, seed: int, *, iterations: int = 4000, post: Post | None = None
-    ) -> None:
+    def __init__(self, lower: Vector, upper: Vector, eps: float, seed: int, *, post: Post | None = None) -> None:
         super().__init__(self, eps, post=post)
-        self._lower, self._upper, self._iterations = lower, upper, iterations
+        self._lower, self._upper = lower, upper
         self._rng = np.random.default_rng(seed)
         self._tree: Tree | None = None
         self.samples = 0
@@ -57,7 +54,7 @@ class SingleTree(DrrtCon):
         aim = first[-1]
         if self._tree is None or not (self._tree.rows[0] == second[0]).all():
             self._tree = Tree(second[:1])
-        for _ in range(self._iterations):
+        for _ in range(ITERATIONS):
             if stop():
                 return None
             self.samples += 1

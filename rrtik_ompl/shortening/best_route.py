@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from rrtik_ompl.shortening.move_lattice import MoveLattice
 from rrtik_ompl.shortening.move_rules import long_enough
 from rrtik_ompl.shortening.move_values import Values, lattice_size
 from rrtik_ompl.shortening.questions import Questions, never
+from rrtik_ompl.shortening.task import edge_keys
 from rrtik_ompl.transitions import merge_moves, transitions
 
 DIGITS = 9  # of the travel after the point; the rest is rounding
@@ -109,11 +109,6 @@ class BestRoute:
 
     def _confirmed(self, route: Matrix, known: Matrix) -> bool:
         """Whether every edge of a route is free; those of the known one are. A run is asked about in pieces before."""
-        old = set(_edges(known))
-        fresh = [k for k, edge in enumerate(_edges(route)) if edge not in old]
+        old = set(edge_keys(known))
+        fresh = [k for k, edge in enumerate(edge_keys(route)) if edge not in old]
         return not fresh or bool(self._ask(route[fresh], route[np.add(fresh, 1)]).all())
-
-
-def _edges(route: Matrix) -> list[tuple[bytes, bytes]]:
-    """The edges of a route as keys."""
-    return list(pairwise(row.tobytes() for row in route))

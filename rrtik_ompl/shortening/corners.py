@@ -14,8 +14,8 @@ from collections.abc import Callable
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.shortening.task import Task, without_repeats
-from rrtik_ompl.transitions import route_length
+from rrtik_ompl.shortening.task import Task
+from rrtik_ompl.transitions import route_length, without_repeats
 
 FIRST_GAIN = 2e-3  # of the length: what the first round does not bother to gain at a bend
 LEAST_GAIN = 1.2e-4  # likewise for the second round; the rounds after it are finer still

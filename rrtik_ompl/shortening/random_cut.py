@@ -14,7 +14,8 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.fast.library import library
 from rrtik_ompl.fast.shortcut import ShortcutSearch
 from rrtik_ompl.fast.shortcut_layout import KERNELS
-from rrtik_ompl.shortening.task import Task, without_repeats
+from rrtik_ompl.shortening.task import Task
+from rrtik_ompl.transitions import without_repeats
 
 TRIES = 400  # where there is no end to the time
 PATIENCE = 2000  # tries without gain that end the search where there is one

@@ -12,8 +12,8 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.path import subdivided
-from rrtik_ompl.shortening.task import Task, without_repeats
-from rrtik_ompl.transitions import merge_moves, route_length
+from rrtik_ompl.shortening.task import Task
+from rrtik_ompl.transitions import merge_moves, route_length, without_repeats
 
 STEPS = 40  # of the planner along a route, where nobody says how large they are
 FINENESS = 5.0  # the third phase's steps are this many times as small

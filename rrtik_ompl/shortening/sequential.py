@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.shortening.task import Task, without_repeats
+from rrtik_ompl.shortening.task import Task
+from rrtik_ompl.transitions import without_repeats
 
 
 def sequential_cut(route: Matrix, task: Task) -> Matrix:

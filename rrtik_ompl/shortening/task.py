@@ -90,8 +90,8 @@ class Task:
         Parts of free edges are checked at other configurations than the whole, so they count as new. This is asked
         even when the time is up.
         """
-        known = self._known.union(_edges(old))
-        fresh = [k for k, edge in enumerate(_edges(new)) if edge not in known and edge[::-1] not in known]
+        known = self._known.union(edge_keys(old))
+        fresh = [k for k, edge in enumerate(edge_keys(new)) if edge not in known and edge[::-1] not in known]
         self.confirmed_again += len(fresh)
         return not fresh or bool(self._ask(new[fresh], new[np.add(fresh, 1)]).all())
 
@@ -147,13 +147,6 @@ class Task:
             self._on_better(route)
 
 
-def _edges(route: Matrix) -> list[tuple[bytes, bytes]]:
+def edge_keys(route: Matrix) -> list[tuple[bytes, bytes]]:
     """The edges of a route as keys."""
-    keys = [row.tobytes() for row in route]
-    return list(pairwise(keys))
-
-
-def without_repeats(route: Matrix) -> Matrix:
-    """The route without waypoints that repeat the one before, shape (k, n); both ends stay."""
-    kept: Matrix = route[np.append(True, (np.diff(route, axis=0) != 0.0).any(axis=1))]
-    return kept
+    return list(pairwise(row.tobytes() for row in route))
