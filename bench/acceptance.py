@@ -4,11 +4,20 @@ from __future__ import annotations
 
 import platform
 from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
 
 
 def processes(count: int) -> str:
     """How many there were, as a page says it."""
     return "one process" if count == 1 else f"{count} processes"
+
+
+def package_version(name: str) -> str:
+    """The version of an installed package, or that it is missing."""
+    try:
+        return f"{name} {version(name)}"
+    except PackageNotFoundError:
+        return f"{name} not installed"
 
 
 @dataclass

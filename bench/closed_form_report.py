@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from peers.eaik import eaik_robot
+from peers.eaik import eaik_robot, turned_back
 
 from rrtik_ompl import load_robot
 from rrtik_ompl.ik.closed_form import form_of, solutions
@@ -98,9 +98,7 @@ def speeds(robot: Robot, repeats: int, rng: np.random.Generator) -> dict[str, fl
     }
     if find_spec("eaik") is not None and robot.dof == 6:
         other, at_zero = eaik_robot(robot)
-        turned = poses.copy()
-        turned[:, :3, :3] = poses[:, :3, :3] @ at_zero.T
-        work["EAIK"] = partial(other.IK_batched, turned, 1)
+        work["EAIK"] = partial(other.IK_batched, turned_back(poses, at_zero), 1)
     times: dict[str, list[float]] = {name: [] for name in work}
     for _ in range(repeats + 1):
         for name, run in work.items():

@@ -15,13 +15,12 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from acceptance import Report
-from peers.eaik import eaik_robot
+from acceptance import Report, package_version
+from peers.eaik import eaik_robot, turned_back
 from peers.ik import Solver, solvers
 
 import rrtik_ompl as rrtik
@@ -144,8 +143,7 @@ def batches(robot: Robot, poses: np.ndarray, repeats: int = 5) -> dict[str, tupl
     }
     try:
         other, at_zero = eaik_robot(robot)
-        turned = poses.copy()
-        turned[:, :3, :3] = poses[:, :3, :3] @ at_zero.T
+        turned = turned_back(poses, at_zero)
         work["eaik, one thread"] = lambda: np.nan if other.IK_batched(turned, 1) else 0.0
     except (ImportError, ValueError):
         pass
@@ -197,13 +195,8 @@ def _percent(share: float) -> str:
 
 
 def versions() -> str:
-    found = [f"Python {platform.python_version()}"]
-    for package in ("numpy", "pin", "numba", "pytracik", "ikpy", "eaik", "roboticstoolbox-python"):
-        try:
-            found.append(f"{package} {version(package)}")
-        except PackageNotFoundError:
-            found.append(f"{package} absent")
-    return ", ".join(found)
+    packages = ("numpy", "pin", "numba", "pytracik", "ikpy", "eaik", "roboticstoolbox-python")
+    return ", ".join([f"Python {platform.python_version()}", *map(package_version, packages)])
 
 
 def main() -> None:

@@ -19,14 +19,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from acceptance import Report
+from acceptance import Report, package_version
 from ik_comparison import ARMS, METRES, RADIANS, single
 from ik_comparison import HEAD as IK_HEAD
 from peers.description import task_of
 from peers.host import Answer, Host, answered
 from peers.serve import timed
 from peers.task import PER_RADIAN, RANGE, Rows
-from speed import machine, package_version
+from speed import machine
 from speed_cases import Options, exact_problem, family, panda_files
 from speed_ours import our_search, warm_up
 

@@ -15,8 +15,8 @@ from rrtik_ompl.sensing.scene_from_view import SeenObject
 NAME = "titan4_sdu"
 PROBLEM = rrtik.load_problem(NAME)
 ROBOT, WORLD = PROBLEM.robot, PROBLEM.world
-VALVE = load_scenario(find_scenario(NAME)).marker_map.named("valve")
-PLACE = load_scenario(find_scenario(NAME)).places["valve"]
+SCENARIO = load_scenario(find_scenario(NAME))
+VALVE, PLACE = SCENARIO.marker_map.named("valve"), SCENARIO.places["valve"]
 
 
 def seen_at(T: Any) -> SeenObject:

@@ -12,13 +12,12 @@ from rrtik_ompl import load_robot
 from rrtik_ompl.ik.closed_form import solutions
 from rrtik_ompl.overlay.gods_eye import eye_at
 from rrtik_ompl.poses import pose
-from rrtik_ompl.reproduce.sensing import ACCURACY, GRIPPER, SERIES
+from rrtik_ompl.reproduce.sensing import ACCURACY, GRIPPER, NOISE, SERIES
 from rrtik_ompl.reproduce.sensing_runs import (
     ARM,
     CAMERA,
     DICTIONARY,
     HARD,
-    NOISE,
     SIDE,
     facing,
     in_view,

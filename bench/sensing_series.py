@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from acceptance import Report
 
-from rrtik_ompl.reproduce.sensing import ACCURACY, GRIPPER, NORMAL_QUARTILES, SERIES
+from rrtik_ompl.reproduce.sensing import ACCURACY, GRIPPER, SERIES
 from rrtik_ompl.reproduce.sensing_runs import (
     CAMERA,
     HARD,
@@ -22,7 +22,7 @@ from rrtik_ompl.reproduce.sensing_runs import (
     random_poses,
     seen_poses,
 )
-from rrtik_ompl.sensing.precision import series_of
+from rrtik_ompl.sensing.precision import NORMAL_QUARTILES, series_of
 from rrtik_ompl.sensing.synthetic_camera import published_camera
 
 POSES = 8

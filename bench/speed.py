@@ -16,10 +16,9 @@ import argparse
 import os
 import platform
 import sys
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from acceptance import Report
+from acceptance import Report, package_version
 from ompl import util as ou
 from speed_cases import Options
 from speed_checks import free_motions, near_obstacles
@@ -80,14 +79,6 @@ def machine() -> str:
     load = ", ".join(f"{value:.1f}" for value in os.getloadavg())  # what else ran shows in wall times
     about += f" Load at the start (1, 5, 15 minutes): {load}."
     return f"{about}\n\nOur planner: `{PLANNER}`. Kernels: {lanes()}. CPU time of the process unless said otherwise."
-
-
-def package_version(name: str) -> str:
-    """The version of an installed package, or that it is missing."""
-    try:
-        return f"{name} {version(name)}"
-    except PackageNotFoundError:
-        return f"{name} not installed"
 
 
 def processor() -> str:

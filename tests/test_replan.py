@@ -226,12 +226,6 @@ def test_copies_of_an_obstacle_count_as_well():
     assert moving.valid([12.0, 10.0])
 
 
-def test_a_scene_of_other_obstacles_is_refused():
-    moving = MovingWorld(plane(box("a", 5.0, 10.0)).world)
-    with pytest.raises(InputError, match="expected the obstacles a"):
-        moving.move(Scene([box("b", 5.0, 10.0)]))
-
-
 # Runs ---------------------------------------------------------------------------------------------------------------
 def crossing(speed=3.0):
     """A box that crosses the straight way."""

@@ -266,38 +266,20 @@ def test_arguments_that_all_calls_have_are_refused_in_one_line(call):
     robot, twin = rrtik.load_robot("ur5"), rrtik.load_robot("ur10")  # as many joints, other lengths
     assert robot.dof == twin.dof
     for seed in (-1, 1.5, "a", None, True):
-        with pytest.raises(InputError, match="seed must be a whole number of at least 0"):
+        with pytest.raises(InputError, match=f"seed must be a whole number of at least 0, got {seed!r}"):
             call(robot, seed=seed)
     with pytest.raises(InputError, match="world: it holds another robot, 'ur10'"):
         call(robot, world=rrtik.World(twin))
-    with pytest.raises(InputError, match="world must be of type World, got Scene; make it with World"):
-        call(robot, world=rrtik.Scene())
-    with pytest.raises(InputError, match="robot must be of type Robot, got str; use load_robot"):
+    for world, kind in ((rrtik.Scene(), "Scene"), ("empty", "str")):
+        with pytest.raises(InputError, match=f"world must be of type World, got {kind}; make it with World"):
+            call(robot, world=world)
+    with pytest.raises(InputError, match=r"robot must be of type Robot, got str; use load_robot\(name or file\)"):
         call("ur5")
     if call is not CALLS["map"]:
         with pytest.raises(InputError, match="seconds must not be negative, got -1"):
             call(robot, seconds=-1)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        ({"seed": -1}, "seed must be a whole number of at least 0, got -1"),
-        ({"seed": 1.5}, "seed must be a whole number of at least 0, got 1.5"),
-        ({"seed": None}, "seed must be a whole number of at least 0, got None"),
-        ({"seconds": -1.0}, "seconds must not be negative, got -1"),
-        ({"seconds": np.inf}, "seconds: must be a finite number, got inf"),
-        ({"world": "empty"}, "world must be of type World, got str; make it with World"),
-        ({"robot": "titan4"}, r"robot must be of type Robot, got str; use load_robot\(name or file\)"),
-    ],
-)
-def test_every_face_refuses_the_same_arguments(arguments, said):
-    titan = rrtik.load_robot("titan4")
-    asked = {"robot": titan} | arguments
-    tip = titan.fk(Q_TITAN)
-    for face, goal in ((solve_ik, "goal"), (rrtik.solve_ik_batch, "poses"), (rrtik.solve_ik_trajectory, "poses")):
-        with pytest.raises(InputError, match=said):
-            face(**asked, **{goal: rrtik.PoseGoal(tip) if goal == "goal" else tip.homogeneous[None]})
+        with pytest.raises(InputError, match="seconds: must be a finite number, got inf"):
+            call(robot, seconds=np.inf)
 
 
 def test_the_joint_that_forbids_a_pose_is_of_the_branch_that_breaks_the_limits_least():

@@ -56,9 +56,7 @@ def serial_urdf(robot: Robot, bodies: tuple[Body, ...] = (), folder: Path | None
     Raises:
         ValueError: If the arm has coupled joints.
     """
-    tip = tip_columns(robot)
-    if not np.array_equal(tip.gain, np.eye(robot.dof)) or tip.offset.any():
-        raise ValueError("coupled joints")
+    tip = uncoupled_columns(robot)
     links = [f"link{k}" for k in range(robot.dof + 1)]
     text = ['<robot name="arm">', *(f'<link name="{name}"/>' for name in (*links, TIP))]
     for k, (low, high) in enumerate(zip(*robot.finite_range(), strict=True)):
@@ -70,6 +68,18 @@ def serial_urdf(robot: Robot, bodies: tuple[Body, ...] = (), folder: Path | None
     text.append(f'<joint name="last" type="fixed">{_between(links[-1], TIP, tip.fixed[-1])}</joint>')
     text += _body_text(robot, bodies, folder)
     return "\n".join([*text, "</robot>"])
+
+
+def uncoupled_columns(robot: Robot) -> TipColumns:
+    """What stands between the joints of an arm without coupled ones.
+
+    Raises:
+        ValueError: If it has some.
+    """
+    tip = tip_columns(robot)
+    if not np.array_equal(tip.gain, np.eye(robot.dof)) or tip.offset.any():
+        raise ValueError("coupled joints")
+    return tip
 
 
 def _body_text(robot: Robot, bodies: tuple[Body, ...], folder: Path | None) -> Iterator[str]:

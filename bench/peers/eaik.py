@@ -17,9 +17,7 @@ def solver(robot: Robot, start: np.ndarray) -> Solver:
     arm, at_zero = eaik_robot(robot)
 
     def solve(pose: np.ndarray) -> np.ndarray | None:
-        turned = pose.copy()
-        turned[:3, :3] = pose[:3, :3] @ at_zero.T
-        answer = arm.IK(turned)
+        answer = arm.IK(turned_back(pose, at_zero))
         exact = ~np.array(answer.is_LS, dtype=bool)
         found = turned_inside(robot, np.array(answer.Q).reshape(-1, robot.dof)[exact])
         inside = found[robot.within_limits(found)]
@@ -46,6 +44,13 @@ def eaik_robot(robot: Robot) -> tuple[Any, np.ndarray]:
     if not solver.hasKnownDecomposition():
         raise ValueError("it knows no decomposition of this arm")
     return solver, tip[:3, :3]
+
+
+def turned_back(poses: np.ndarray, at_zero: np.ndarray) -> np.ndarray:
+    """Poses of the tip as EAIK takes them, its rotation at zero being none. Shape (..., 4, 4)."""
+    turned = poses.copy()
+    turned[..., :3, :3] = poses[..., :3, :3] @ at_zero.T
+    return turned
 
 
 def turned_inside(robot: Robot, q: np.ndarray) -> np.ndarray:

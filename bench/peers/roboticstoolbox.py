@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from peers.description import uncoupled_columns
 from peers.ik import Solver
-from rrtik_ompl.ik.tip_columns import tip_columns
 from rrtik_ompl.robot import Robot
 
 TOLERANCE = 1e-10  # of half the squared error, which is TRAC-IK's 1e-5; its default 1e-6 leaves 1.4 mm
@@ -19,9 +19,7 @@ def solver(robot: Robot, start: np.ndarray) -> Solver:
     """
     from roboticstoolbox import ET, ETS
 
-    tip = tip_columns(robot)
-    if not np.array_equal(tip.gain, np.eye(robot.dof)) or tip.offset.any():
-        raise ValueError("coupled joints")
+    tip = uncoupled_columns(robot)
     steps = [ET.SE3(tip.fixed[0])]
     for k, limits in enumerate(zip(*robot.finite_range(), strict=True)):
         moves = ET.tz if tip.prismatic[k] else ET.Rz

@@ -7,6 +7,7 @@ import pinocchio as pin
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.reproduce.rows import Row, Table, verdict, within
+from rrtik_ompl.sensing.precision import NORMAL_QUARTILES
 
 SOURCE = "Marker sensing"
 COUNT = 100  # observations of a series
@@ -38,7 +39,6 @@ ACCURACY = (
     (1500, 300.8539, 0.1088, 0.2846),
     (2000, 302.9160, 0.1712, 0.9720),
 )
-NORMAL_QUARTILES = 1.349  # standard deviations between them
 
 
 def arithmetic(quick: bool) -> list[Row]:

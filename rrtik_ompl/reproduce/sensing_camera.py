@@ -7,12 +7,11 @@ sensed here.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from rrtik_ompl.reproduce.rows import Row, Table, verdict, within
-from rrtik_ompl.reproduce.sensing import ACCURACY, GRIPPER, NORMAL_QUARTILES, SERIES, SOURCE
+from rrtik_ompl.reproduce.sensing import ACCURACY, GRIPPER, SERIES, SOURCE
+from rrtik_ompl.sensing.precision import NORMAL_QUARTILES, series_of
 
 TIMES_STEADIER = 3.0  # wanted of the depth of a marker; of a gripper only that it is not less steady
 CHANCE = 3.0  # factor between poses of one series; theirs is not known
@@ -29,7 +28,7 @@ def precision(quick: bool) -> list[Row]:
         worst = {}
         for align in (False, True):
             seen = [seen_poses([T], count, number, align=align, **PLAIN) for T in random_poses(1e-3 * z, poses, 0)]
-            worst[align] = 1e3 * max(_steady(positions(each)[:, 2]) for each in seen)
+            worst[align] = 1e3 * max(series_of(positions(each)[:, 2]).robust_deviation for each in seen)
         rows += _rows(f"series {number}, z = {z:.0f} mm: standard deviation of z", printed, worst, TIMES_STEADIER)
     return rows
 
@@ -44,7 +43,7 @@ def gripper(quick: bool) -> list[Row]:
         for align in (False, True):
             places = gripper_poses(1e-3 * distance, poses)
             seen = [seen_poses([T], count, distance, align=align, **PLAIN) for T in places]
-            spread[align] = 1e3 * float(np.median([_steady(gripper_distances(each)) for each in seen]))
+            spread[align] = 1e3 * float(np.median([series_of(gripper_distances(each)).robust_deviation for each in seen]))
         rows += _rows(f"gripper, l = {distance} mm: spread by the quartiles",
                       (third - first) / NORMAL_QUARTILES, spread, 1.0)  # fmt: skip
     return rows
@@ -69,12 +68,6 @@ def accuracy(quick: bool) -> list[Row]:
                         verdict(False, abs(error[True]) < max(0.3 * abs(printed), LEAST_ERROR)),
                         "nearer to the truth"))  # fmt: skip
     return rows
-
-
-def _steady(values: Any) -> float:
-    """Standard deviation by the quartiles: a choice of the wrong one of two poses does not count."""
-    low, high = np.quantile(values, [0.25, 0.75])
-    return float(high - low) / NORMAL_QUARTILES
 
 
 def _rows(name: str, printed: float, found: dict[bool, float], times: float) -> list[Row]:

@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.reproduce.sensing import NOISE
 from rrtik_ompl.sensing.camera import Camera
 from rrtik_ompl.sensing.corner_pose import ALIGNED_SIGMA, ROUGH_SIGMA, CornerPose, pose_of_square, square_corners
 from rrtik_ompl.sensing.markers import find_markers, marker_cells
@@ -23,7 +24,6 @@ LENS = (0.05, -0.12, 0.0005, -0.0007, 0.03)  # of a usual web camera
 CAMERA = published_camera(LENS)
 PLAIN: Mapping[str, Any] = {"noise": 0.01, "blur": 0.6}
 HARD: Mapping[str, Any] = {"noise": 0.01, "blur": 1.0, "gradient": 0.4, "flicker": 0.02, "jpeg": 85}
-NOISE = 0.03  # of each corner coordinate, chosen to fit the published series [pixels]
 ARM = 1.92  # from the marker to the gripper of the virtual arm, across the line of sight [m]
 MOST_TILT = np.deg2rad(40.0)
 

@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import finite_array
 from rrtik_ompl.errors import InputError
 
+NORMAL_QUARTILES = 1.349  # standard deviations between them
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Series:
@@ -46,7 +48,7 @@ class Series:
         """Standard deviation of the normal distribution that has these quartiles."""
         if self.quartiles is None:
             raise InputError("this series has no quartiles; use deviation")
-        return (self.quartiles[2] - self.quartiles[0]) / 1.349
+        return (self.quartiles[2] - self.quartiles[0]) / NORMAL_QUARTILES
 
     @property
     def possible(self) -> bool:
