@@ -34,7 +34,7 @@ class GoalWaypoint(Section):
             InputError: If it has the wrong number of joints or is outside the limits.
         """
         what = f"goal at {self.time:g} s"
-        q = robot.configuration(self.joints_deg if self.joints is None else self.joints, what)
+        q = robot.configuration(self.joints or self.joints_deg or [], what)
         if self.joints is None:
             q = np.where(robot.prismatic, q, np.radians(q))
         if fault := robot.limit_fault(q):

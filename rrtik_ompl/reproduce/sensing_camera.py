@@ -43,7 +43,9 @@ def gripper(quick: bool) -> list[Row]:
         for align in (False, True):
             places = gripper_poses(1e-3 * distance, poses)
             seen = [seen_poses([T], count, distance, align=align, **PLAIN) for T in places]
-            spread[align] = 1e3 * float(np.median([series_of(gripper_distances(each)).robust_deviation for each in seen]))
+            spread[align] = 1e3 * float(
+                np.median([series_of(gripper_distances(each)).robust_deviation for each in seen])
+            )
         rows += _rows(f"gripper, l = {distance} mm: spread by the quartiles",
                       (third - first) / NORMAL_QUARTILES, spread, 1.0)  # fmt: skip
     return rows
