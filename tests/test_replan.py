@@ -21,6 +21,7 @@ from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning import PLANNERS, SpeedWarning, load_run, replan
 from rrtik_ompl.replanning.connecting import KernelConnect, PlainConnect, Tree, never
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch, points_along, sequential_cut, without_points_between
+from rrtik_ompl.replanning.evading import evasion
 from rrtik_ompl.replanning.generate import moving_problem, moving_scene
 from rrtik_ompl.replanning.judge import judge
 from rrtik_ompl.replanning.single_tree import trimmed
@@ -278,6 +279,28 @@ def test_an_obstacle_that_comes_too_near_is_evaded():
         run = replan(plane(lid, chaser, start=(14.0, 10.0)), speed_bound=3.0, margin=0.1, seconds=7.0, **OPTIONS)
     assert run.outcome == "out of time"
     assert run.count("evade") > 0
+
+
+def test_a_robot_between_two_obstacles_that_close_in_leaves_sideways():
+    inwards = {side: ConstantVelocity([-0.5 * side, 0, 0]) for side in (-1, 1)}
+    walls = [box(f"wall{side}", 10.0 + 1.2 * side, 10.0, 2.0, 8.0, motion) for side, motion in inwards.items()]
+    problem = plane(*walls, start=(10.0, 13.0))
+    scene, ticks = problem.world.scene, 4
+    near, q = MovingWorld(problem.world, self_collision=False), problem.start
+    later, rng = (lambda ticks: scene.at(0.1 * ticks)), np.random.default_rng(0)
+    way = evasion(q, 0.5, np.full(2, 0.5), 0.5, near, later, World(problem.robot, Scene()), rng, None) - q
+    assert abs(way[1]) > 2.0 * abs(way[0])
+    assert World(problem.robot, scene.at(0.1 * ticks)).valid(q + ticks * way)
+
+
+@pytest.mark.parametrize(
+    ("name", "seed", "speed", "step", "seconds"), [("ur5", 922, 0.2, 0.05, 3.0), ("titan4", 953, 0.1, 0.02, 5.0)]
+)
+def test_an_arm_is_not_caught_between_obstacles(name, seed, speed, step, seconds):
+    problem = moving_problem(load_robot(name), 20, speed, seed, seconds=20.0)
+    run = replan(problem, step=step, rate=50.0, margin=0.02, speed_bound=speed, slot=30.0, seconds=seconds, seed=seed)
+    assert run.count("evade") > 0
+    assert not judge(problem.robot, run, problem.world.scene, fine=5).contacts
 
 
 def test_a_moving_goal_is_caught():

@@ -156,13 +156,16 @@ class Loop:
             path = self._planner.path
             blocked = path is not None and not self._world.valid(path[-1])
             return "wait", "the goal is not free" if blocked else "there is no way", self.q
-        self._near.move(self._world.scene)
-        chosen = self._chosen
-        place = evasion(self.q, chosen.step, chosen.most, self._near, self._alone, self._rng, self._planner.path)
+        chosen, way = self._chosen, self._planner.path
+        room = max(self._room.values())
+        place = evasion(self.q, chosen.step, chosen.most, room, self._near, self._later, self._alone, self._rng, way)
         if place is None:
             return "wait", "an obstacle is too near, and there is nowhere to go", self.q
         self._planner.rejoin(place)
         return "evade", "an obstacle is too near", place
+
+    def _later(self, ticks: int) -> Scene:
+        return self._watch.later(self._world.scene, ticks * self._chosen.tick) if ticks else self._world.scene
 
     def _arrived(self) -> bool:
         return bool((np.abs(self._goals - self.q).max(axis=1) <= JOINT_TOLERANCE).any())
