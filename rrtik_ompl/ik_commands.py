@@ -56,7 +56,9 @@ def inverse_kinematics(
     near_deg: Annotated[
         str | None, typer.Option(metavar="Q1,Q2,..", help="The same in joint values, with commas [deg; m if sliding].")
     ] = None,
-    everything: Annotated[bool, typer.Option("--all", help="All solutions, not just the nearest.")] = False,
+    everything: Annotated[
+        bool, typer.Option("--all", help="All solutions, not just one; those that differ by full turns once.")
+    ] = False,
     method: Annotated[str, typer.Option(help="auto, closed-form, numeric, mb-rrt, genetic, ...")] = "auto",
     tolerance_mm: Annotated[float | None, typer.Option(help="Of the position [mm]; 1 if absent.")] = None,
     tolerance_deg: Annotated[float | None, typer.Option(help="Of the orientation [deg]; 0.57 if absent.")] = None,
@@ -105,6 +107,9 @@ def _asked(robot: str | None, problem: str | None, scene: Path | None, near: str
 
 def _tolerances(millimetres: float | None, degrees: float | None) -> dict[str, float]:
     """Those that are given, by the names of `PoseGoal`, in metres and radians."""
+    for option, value in (("--tolerance-mm", millimetres), ("--tolerance-deg", degrees)):
+        if value is not None and not value > 0.0:
+            raise InputError(f"{option} must be greater than 0, got {value:g}")
     found = {} if millimetres is None else {"position_tolerance": 1e-3 * millimetres}
     return found if degrees is None else {**found, "orientation_tolerance": math.radians(degrees)}
 
@@ -163,18 +168,19 @@ def _one(asked: Asked, goal: Any, everything: bool, common: dict[str, Any], outp
 
     robot, world = asked.robot, asked.world
     with progress(f"inverse kinematics of {robot.name}"):
-        result = solve_ik(robot, goal, all=everything, **common)
+        result, turns = ik_report.fold_full_turns(robot, solve_ik(robot, goal, all=everything, **common), asked.near)
     names = ik_report.branch_names(robot, goal, result.solutions)
     if output.as_json:
-        print(json.dumps(ik_report.document(robot, result, names)))
+        print(json.dumps(ik_report.document(robot, result, names, turns)))
     elif output.as_csv:
-        reasons = [""] * len(result.solutions)
-        print(ik_report.rows_csv(robot, result.solutions, result.residuals, reasons, names), end="")
+        reasons, notes = [""] * len(result.solutions), ik_report.solution_notes(names, turns)
+        print(ik_report.rows_csv(robot, result.solutions, result.residuals, reasons, notes), end="")
     elif result.found:
         obstacles = () if world is None else world.scene.obstacles
         clearances = [world.clearance(q) for q in result.solutions] if obstacles else []
-        say(f"{robot.name}, {result.method}: {_count(len(result.solutions), 'solution')}, {_time(result)}")
-        say(ik_report.solutions_table(robot, result, names, clearances, MOST_ROWS))
+        more = f" and {sum(turns)} more by full turns of joints" if any(turns) else ""
+        say(f"{robot.name}, {result.method}: {_count(len(result.solutions), 'solution')}{more}, {_time(result)}")
+        say(ik_report.solutions_table(robot, result, names, turns, clearances, MOST_ROWS))
         say(*_more(len(result.solutions)))
     if not result.found and not output.as_json:
         tell = note if output.as_csv else say
