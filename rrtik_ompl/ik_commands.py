@@ -43,7 +43,7 @@ def inverse_kinematics(
     position: Annotated[Triple | None, typer.Option(metavar="X Y Z", help="Of the tip in the world [m].")] = None,
     quaternion: Annotated[
         tuple[float, float, float, float] | None,
-        typer.Option(metavar="X Y Z W", help="Orientation; any if absent."),
+        typer.Option(metavar="X Y Z W", help="Orientation; any if left out."),
     ] = None,
     rpy_deg: Annotated[
         Triple | None, typer.Option(metavar="R P Y", help="Roll, pitch and yaw about fixed axes [deg].")
@@ -59,18 +59,20 @@ def inverse_kinematics(
     everything: Annotated[
         bool, typer.Option("--all", help="All solutions, not just one; those that differ by full turns once.")
     ] = False,
-    method: Annotated[str, typer.Option(help="auto, closed-form, numeric, mb-rrt, genetic, ...")] = "auto",
-    tolerance_mm: Annotated[float | None, typer.Option(help="Of the position [mm]; 1 if absent.")] = None,
-    tolerance_deg: Annotated[float | None, typer.Option(help="Of the orientation [deg]; 0.57 if absent.")] = None,
-    seconds: Annotated[float | None, typer.Option(help="Time for a numeric method; per pose with --poses.")] = None,
+    method: Annotated[str, typer.Option(help="auto, or see: rrtik list ik.")] = "auto",
+    tolerance_mm: Annotated[float | None, typer.Option(help="Of the position [mm]; 1 if left out.")] = None,
+    tolerance_deg: Annotated[float | None, typer.Option(help="Of the orientation [deg]; 0.57 if left out.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Time for a numeric method [s]; per pose with --poses.")] = None,
     seed: Annotated[int, typer.Option(help="The same seed gives the same answer.")] = 0,
     poses: Annotated[Path | None, typer.Option(help="Many poses or points: .csv, .json or .yaml.")] = None,
-    trajectory: Annotated[bool, typer.Option(help="Follow --poses from one to the next without jumps.")] = False,
+    trajectory: Annotated[
+        bool, typer.Option("--trajectory", help="Follow --poses from one to the next without jumps.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, in radians and metres.")] = False,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print CSV, in degrees and millimetres.")] = False,
     html: Annotated[Path | None, typer.Option(help="Write a 3-D page with the solutions as ghosts.")] = None,
 ) -> int:
-    """Find joint values for a pose or a point of the tip; exit code 1 if there are none."""
+    """Find joint values for a pose or a point of the tip. Exit code 1 if there are none."""
     if as_json and as_csv:
         raise InputError("give one of --json and --csv, not both")
     if trajectory and poses is None:
@@ -270,8 +272,7 @@ def _followed(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[
 
 def _draw(asked: Asked, goal: Any, q: Any, output: Output, *, moving: bool = False) -> None:
     """The page: the first solution as the arm and the others as ghosts, or the arm moving through all of them."""
-    html = output.html
-    if html is None:
+    if output.html is None:
         return
     from rrtik_ompl import Scene
     from rrtik_ompl.viewer import view
@@ -280,11 +281,11 @@ def _draw(asked: Asked, goal: Any, q: Any, output: Output, *, moving: bool = Fal
     shown = Shown(asked.robot, Scene() if asked.world is None else asked.world.scene, goal, q[0])
     with progress("drawing"):
         if moving and len(q) > 1:
-            view(shown, q, html=html, title=f"{asked.robot.name}: trajectory of {_count(len(q), 'point')}")
+            view(shown, q, html=output.html, title=f"{asked.robot.name}: trajectory of {_count(len(q), 'point')}")
         else:
-            view(shown, ghosts=q, html=html, title=f"{asked.robot.name}: {_count(len(q), 'solution')}")
+            view(shown, ghosts=q, html=output.html, title=f"{asked.robot.name}: {_count(len(q), 'solution')}")
     if not output.as_json and not output.as_csv:
-        say(f"wrote {html}")
+        say(f"wrote {output.html}")
 
 
 def _more(rows: int) -> list[str]:
