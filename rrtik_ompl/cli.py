@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import warnings
+from collections.abc import Callable
 from contextlib import redirect_stdout
 from enum import Enum
 from pathlib import Path
@@ -72,7 +73,7 @@ def _options(
 def check(problem: ProblemName, path: PathFile = None) -> int:
     """Check a problem, and a path for it.
 
-    The check is denser than a planner's and shares no code with it. Exit code 1 if the path is not valid.
+    The check is denser than a planner's and independent of it. Exit code 1 if the path is not valid.
     """
     from rrtik_ompl import JointGoal, load_path, load_problem
     from rrtik_ompl.path import SECOND_CHECK
@@ -177,7 +178,7 @@ def warmup() -> int:
     return FOUND if warm_up(say) else NOT_FOUND
 
 
-COMMANDS = {
+COMMANDS: dict[str, Callable[..., int]] = {
     "plan": plan,
     "check": check,
     "show": show,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rich import box
 from rich.table import Table
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.goal import PoseGoal, PositionGoal, joint_difference
 from rrtik_ompl.ik.closed_form import form_of, has_closed_form, solutions
 from rrtik_ompl.ik.face import IkResult, different_rows, usual_posture
@@ -67,7 +67,7 @@ def fold_full_turns(robot: Robot, result: IkResult, near: Vector | None) -> tupl
     kept = different_rows(looks, np.linalg.norm(Q - posture, axis=1).argsort(kind="stable"))
     q, lower, upper = Q[kept][:, counted], robot.lower[counted], robot.upper[counted]
     fitting = 1.0 + np.floor((upper - q) / TURN) + np.floor((q - lower) / TURN)
-    folded = replace(result, solutions=Q[kept], residuals=result.residuals[kept])
+    folded = replace(result, solutions=frozen(Q[kept]), residuals=frozen(result.residuals[kept]))
     return folded, [int(number) - 1 for number in fitting.prod(axis=1)]
 
 

@@ -142,7 +142,7 @@ def test_points_in_yaml_are_reached_with_any_orientation(capsys, tmp_path):
 
 
 def test_solutions_that_differ_by_full_turns_are_listed_once_and_counted(capsys):
-    asked = ("ik", "ur5", "--position", 0.4, 0.2, 0.5, "--rpy-deg", 180, 0, 0, "--all")
+    asked = ("ik", "ur5", "--position", 0.4, 0.2, 0.5, "--rpy-deg", 180, 0, 0, "--all", "--seconds", 30)
     found = json.loads(rrtik(capsys, *asked, "--json")[1])
     q, robot = np.array(found["solutions"]), load_robot("ur5")
     assert len(q) == 8
