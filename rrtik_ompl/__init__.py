@@ -1,6 +1,25 @@
 """Motion planning for robot arms: a robot and a scene, a problem, a plan, a path that has been checked.
 
 What stands here is loaded when it is first used, so that ``import rrtik_ompl`` costs next to nothing.
+
+Where what is, from below; each module imports only from those below it:
+
+- robot, description, catalog: robots, from URDF and SRDF, DH tables, or by name.
+- scene, goal, task_region, problem and their ``*_file``: what is asked, and its YAML.
+- collision, fast: collision checks; batched kernels on sphere covers, which ``World`` asks first; searches in kernels.
+- checks, world, moving_world: margins, the second opinion, the rule for steps; a world that follows what moves.
+- ik, goal_configurations, tip_distance, reach: inverse kinematics, with MB-RRT, IKURT and the genetic algorithm in
+  folders of their own; configurations for a goal of the tip; maps of reach.
+- path, transitions, one_joint, moves_text: what counts as a move; from any path to single-joint moves, in words.
+- ompl_bridge: the only room where arrays become OMPL states.
+- planning, random_stream, shortening: from a problem to a path, and a shorter one; seeds.
+- scenarios: generated problems for any arm, in families.
+- trajectory: from a path to a timed motion. replanning, scenario: replanning among moving obstacles.
+- viewer, ``plot*``, report: the 3-D page; plots; tables.
+- sensing, overlay: markers, cameras, poses of marked objects; the arm drawn over pictures.
+- reproduce: published tables, one module a page. benchmark: suites, guarded runs, records, OMPL's logs, reports.
+- pilot: the pilot's tool: session, engine, server, page; an arm over TCP.
+- cli, ``*_command``, ``*_commands``: the command line.
 """
 
 from importlib import import_module

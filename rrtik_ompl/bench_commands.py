@@ -14,7 +14,9 @@ from rrtik_ompl.terminal import counter, note, progress, say
 
 def bench(
     suite: Annotated[str, typer.Argument(help="A shipped suite (see: rrtik list suites) or a YAML file.")],
-    runs: Annotated[int | None, typer.Option(help="In place of the suite's.", min=1)] = None,
+    runs: Annotated[
+        int | None, typer.Option(help="Of each planner on each problem, in place of the suite's.", min=1)
+    ] = None,
     jobs: Annotated[int, typer.Option(help="Runs at a time; more than one make the times longer.", min=1)] = 1,
     out: Annotated[Path | None, typer.Option(help="Folder for records and reports; bench-SUITE if left out.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted campaign.")] = False,
@@ -25,9 +27,10 @@ def bench(
     views: Annotated[int, typer.Option(help="3-D views at most.", min=0)] = 12,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of a table.")] = False,
 ) -> int:
-    """Run a benchmark; a run that crashes, hangs or takes too much memory is a failed run and no more.
+    """Run planners beside each other on many problems.
 
-    Exit code 1 if every run of some planner ended with an error, as with a parameter that it cannot use.
+    A run that crashes, hangs or takes too much memory is a failed run and no more. Exit code 1 if every run of some
+    planner ended with an error, as with a parameter that it cannot use.
     """
     from rrtik_ompl.benchmark.campaign import Progress, run_campaign
     from rrtik_ompl.benchmark.report import write_report

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import warnings
+from collections.abc import Callable
 from contextlib import redirect_stdout
 from enum import Enum
 from pathlib import Path
@@ -31,7 +32,7 @@ FOUND, NOT_FOUND, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 UsageError: Any = typer.BadParameter.__bases__[0]  # click's, which typer carries under a private name
 
 app = typer.Typer(
-    help="Plan collision-free paths for robot arms.",
+    help="Plan collision-free paths for robot arms.\n\nExit 0: found or valid; 1: not; 2: bad input; 130: interrupted.",
     add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -69,12 +70,11 @@ def _options(
     del version
 
 
-app.command()(plan)
-
-
-@app.command()
 def check(problem: ProblemName, path: PathFile = None) -> int:
-    """Check a problem file, and a path for it, densely and independently of any planner."""
+    """Check a problem, and a path for it.
+
+    The check is denser than a planner's and independent of it. Exit code 1 if the path is not valid.
+    """
     from rrtik_ompl import JointGoal, load_path, load_problem
     from rrtik_ompl.path import SECOND_CHECK
 
@@ -102,7 +102,6 @@ def check(problem: ProblemName, path: PathFile = None) -> int:
     return FOUND
 
 
-@app.command()
 def show(
     problem: ProblemName,
     path: PathFile = None,
@@ -110,7 +109,10 @@ def show(
     html: HtmlFile = None,
     port: Annotated[int, typer.Option(help="Port on 127.0.0.1; 0 takes a free one.", min=0, max=65535)] = 0,
 ) -> int:
-    """Show a problem, and a path for it, in 3-D: a live page on 127.0.0.1, or a file."""
+    """Show a problem, and a path for it, in 3-D.
+
+    A live page on 127.0.0.1, or a file.
+    """
     check_target(html, (".html", ".htm"))
     from rrtik_ompl import load_path, load_problem
     from rrtik_ompl.viewer import view
@@ -126,7 +128,6 @@ def show(
     return FOUND
 
 
-@app.command("list")
 def list_names(kind: Annotated[Kind | None, typer.Argument(help="All kinds if left out.")] = None) -> int:
     """List what is there by name."""
     from rrtik_ompl import list_ik_methods, list_planners, list_problems, list_robots
@@ -146,13 +147,15 @@ def list_names(kind: Annotated[Kind | None, typer.Argument(help="All kinds if le
     return FOUND
 
 
-@app.command()
 def convert(
     source: Annotated[str, typer.Argument(metavar="IN", help="A path file, or a problem (MotionBenchMaker too).")],
     target: Annotated[Path, typer.Argument(metavar="OUT", help="The ending says which format.")],
     robot: Annotated[str | None, typer.Option(help="Robot that the file is for, where the file does not say.")] = None,
 ) -> int:
-    """Convert between path formats (.json, .csv, .txt), or write any problem as a problem file (.yaml)."""
+    """Convert a path or a problem to another format.
+
+    Paths: .json, .csv, .txt (OMPL's matrix). Problems, MotionBenchMaker's too, become problem files (.yaml).
+    """
     from rrtik_ompl import load_path, load_problem, load_robot, save_problem
 
     if Path(source).suffix.lower() in PATH_FORMATS:
@@ -165,24 +168,36 @@ def convert(
     return FOUND
 
 
-@app.command()
 def warmup() -> int:
-    """Compile all kernels now, once per machine, so that no later command waits for them."""
+    """Compile all kernels now, once per machine.
+
+    No later command waits for them then.
+    """
     from rrtik_ompl.fast import warm_up
 
     return FOUND if warm_up(say) else NOT_FOUND
 
 
-app.command("ik")(inverse_kinematics)
-app.command("reach")(reach)
-app.command("reproduce")(reproduce)
-app.command("bench")(bench)
-app.command("moves")(list_moves)
-app.command("time")(time_path)
-app.command("replan")(replan_scenario)
+COMMANDS: dict[str, Callable[..., int]] = {
+    "plan": plan,
+    "check": check,
+    "show": show,
+    "moves": list_moves,
+    "time": time_path,
+    "replan": replan_scenario,
+    "ik": inverse_kinematics,
+    "reach": reach,
+    "overlay": overlay,
+    "pilot": pilot,
+    "reproduce": reproduce,
+    "bench": bench,
+    "list": list_names,
+    "warmup": warmup,
+    "convert": convert,
+}
+for _name, _command in COMMANDS.items():
+    app.command(_name)(_command)
 app.add_typer(markers, name="markers")
-app.command("overlay")(overlay)
-app.command("pilot")(pilot)
 
 
 def main() -> None:

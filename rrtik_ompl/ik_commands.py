@@ -43,7 +43,7 @@ def inverse_kinematics(
     position: Annotated[Triple | None, typer.Option(metavar="X Y Z", help="Of the tip in the world [m].")] = None,
     quaternion: Annotated[
         tuple[float, float, float, float] | None,
-        typer.Option(metavar="X Y Z W", help="Orientation; any if absent."),
+        typer.Option(metavar="X Y Z W", help="Orientation; any if left out."),
     ] = None,
     rpy_deg: Annotated[
         Triple | None, typer.Option(metavar="R P Y", help="Roll, pitch and yaw about fixed axes [deg].")
@@ -56,19 +56,23 @@ def inverse_kinematics(
     near_deg: Annotated[
         str | None, typer.Option(metavar="Q1,Q2,..", help="The same in joint values, with commas [deg; m if sliding].")
     ] = None,
-    everything: Annotated[bool, typer.Option("--all", help="All solutions, not just the nearest.")] = False,
-    method: Annotated[str, typer.Option(help="auto, closed-form, numeric, mb-rrt, genetic, ...")] = "auto",
-    tolerance_mm: Annotated[float | None, typer.Option(help="Of the position [mm]; 1 if absent.")] = None,
-    tolerance_deg: Annotated[float | None, typer.Option(help="Of the orientation [deg]; 0.57 if absent.")] = None,
-    seconds: Annotated[float | None, typer.Option(help="Time for a numeric method; per pose with --poses.")] = None,
+    everything: Annotated[
+        bool, typer.Option("--all", help="All solutions, not just one; those that differ by full turns once.")
+    ] = False,
+    method: Annotated[str, typer.Option(help="auto, or see: rrtik list ik.")] = "auto",
+    tolerance_mm: Annotated[float | None, typer.Option(help="Of the position [mm]; 1 if left out.")] = None,
+    tolerance_deg: Annotated[float | None, typer.Option(help="Of the orientation [deg]; 0.57 if left out.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Time for a numeric method [s]; per pose with --poses.")] = None,
     seed: Annotated[int, typer.Option(help="The same seed gives the same answer.")] = 0,
     poses: Annotated[Path | None, typer.Option(help="Many poses or points: .csv, .json or .yaml.")] = None,
-    trajectory: Annotated[bool, typer.Option(help="Follow --poses from one to the next without jumps.")] = False,
+    trajectory: Annotated[
+        bool, typer.Option("--trajectory", help="Follow --poses from one to the next without jumps.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, in radians and metres.")] = False,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print CSV, in degrees and millimetres.")] = False,
     html: Annotated[Path | None, typer.Option(help="Write a 3-D page with the solutions as ghosts.")] = None,
 ) -> int:
-    """Find joint values for a pose or a point of the tip; exit code 1 if there are none."""
+    """Find joint values for a pose or a point of the tip. Exit code 1 if there are none."""
     if as_json and as_csv:
         raise InputError("give one of --json and --csv, not both")
     if trajectory and poses is None:
@@ -105,6 +109,9 @@ def _asked(robot: str | None, problem: str | None, scene: Path | None, near: str
 
 def _tolerances(millimetres: float | None, degrees: float | None) -> dict[str, float]:
     """Those that are given, by the names of `PoseGoal`, in metres and radians."""
+    for option, value in (("--tolerance-mm", millimetres), ("--tolerance-deg", degrees)):
+        if value is not None and not value > 0.0:
+            raise InputError(f"{option} must be greater than 0, got {value:g}")
     found = {} if millimetres is None else {"position_tolerance": 1e-3 * millimetres}
     return found if degrees is None else {**found, "orientation_tolerance": math.radians(degrees)}
 
@@ -163,18 +170,19 @@ def _one(asked: Asked, goal: Any, everything: bool, common: dict[str, Any], outp
 
     robot, world = asked.robot, asked.world
     with progress(f"inverse kinematics of {robot.name}"):
-        result = solve_ik(robot, goal, all=everything, **common)
+        result, turns = ik_report.fold_full_turns(robot, solve_ik(robot, goal, all=everything, **common), asked.near)
     names = ik_report.branch_names(robot, goal, result.solutions)
     if output.as_json:
-        print(json.dumps(ik_report.document(robot, result, names)))
+        print(json.dumps(ik_report.document(robot, result, names, turns)))
     elif output.as_csv:
-        reasons = [""] * len(result.solutions)
-        print(ik_report.rows_csv(robot, result.solutions, result.residuals, reasons, names), end="")
+        reasons, notes = [""] * len(result.solutions), ik_report.solution_notes(names, turns)
+        print(ik_report.rows_csv(robot, result.solutions, result.residuals, reasons, notes), end="")
     elif result.found:
         obstacles = () if world is None else world.scene.obstacles
         clearances = [world.clearance(q) for q in result.solutions] if obstacles else []
-        say(f"{robot.name}, {result.method}: {_count(len(result.solutions), 'solution')}, {_time(result)}")
-        say(ik_report.solutions_table(robot, result, names, clearances, MOST_ROWS))
+        more = f" and {sum(turns)} more by full turns of joints" if any(turns) else ""
+        say(f"{robot.name}, {result.method}: {_count(len(result.solutions), 'solution')}{more}, {_time(result)}")
+        say(ik_report.solutions_table(robot, result, names, turns, clearances, MOST_ROWS))
         say(*_more(len(result.solutions)))
     if not result.found and not output.as_json:
         tell = note if output.as_csv else say
@@ -264,8 +272,7 @@ def _followed(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[
 
 def _draw(asked: Asked, goal: Any, q: Any, output: Output, *, moving: bool = False) -> None:
     """The page: the first solution as the arm and the others as ghosts, or the arm moving through all of them."""
-    html = output.html
-    if html is None:
+    if output.html is None:
         return
     from rrtik_ompl import Scene
     from rrtik_ompl.viewer import view
@@ -274,11 +281,11 @@ def _draw(asked: Asked, goal: Any, q: Any, output: Output, *, moving: bool = Fal
     shown = Shown(asked.robot, Scene() if asked.world is None else asked.world.scene, goal, q[0])
     with progress("drawing"):
         if moving and len(q) > 1:
-            view(shown, q, html=html, title=f"{asked.robot.name}: trajectory of {_count(len(q), 'point')}")
+            view(shown, q, html=output.html, title=f"{asked.robot.name}: trajectory of {_count(len(q), 'point')}")
         else:
-            view(shown, ghosts=q, html=html, title=f"{asked.robot.name}: {_count(len(q), 'solution')}")
+            view(shown, ghosts=q, html=output.html, title=f"{asked.robot.name}: {_count(len(q), 'solution')}")
     if not output.as_json and not output.as_csv:
-        say(f"wrote {html}")
+        say(f"wrote {output.html}")
 
 
 def _more(rows: int) -> list[str]:

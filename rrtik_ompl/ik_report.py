@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,16 +13,17 @@ from numpy.typing import NDArray
 from rich import box
 from rich.table import Table
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.goal import PoseGoal, PositionGoal, joint_difference
 from rrtik_ompl.ik.closed_form import form_of, has_closed_form, solutions
-from rrtik_ompl.ik.face import IkResult
+from rrtik_ompl.ik.face import IkResult, different_rows, usual_posture
 from rrtik_ompl.ik.plain_branches import tip_fault
 from rrtik_ompl.robot import Robot
 
 SAME = 1e-5  # [rad] or [m]; a double root is known to the square root of the rounding
 MILLIMETRES = 1e3
 DEGREES = 180.0 / np.pi
+TURN = 2.0 * np.pi
 
 
 def branch_names(robot: Robot, goal: Any, Q: Matrix) -> list[str]:
@@ -45,6 +47,30 @@ def branch_names(robot: Robot, goal: Any, Q: Matrix) -> list[str]:
     return names
 
 
+def fold_full_turns(robot: Robot, result: IkResult, near: Vector | None) -> tuple[IkResult, list[int]]:
+    """The result with one solution of those that differ by full turns of joints: the arm looks the same in all.
+
+    Args:
+        robot: The arm.
+        result: What inverse kinematics found.
+        near: Joints are turned as near to this posture, shape (dof,), as the limits allow; their middle if None.
+
+    Returns:
+        The result, nearest first, and for each of its solutions how many more there are inside the limits by full
+        turns, found or not. Joints that turn without limits are not counted.
+    """
+    posture = usual_posture(robot) if near is None else near
+    counted = ~(robot.prismatic | robot.continuous)
+    turned = result.solutions - TURN * np.round((result.solutions - posture) / TURN)
+    Q = np.where(counted & (robot.lower <= turned) & (turned <= robot.upper), turned, result.solutions)
+    looks = np.hstack([np.where(robot.prismatic, Q, np.cos(Q)), np.where(robot.prismatic, 0.0, np.sin(Q))])
+    kept = different_rows(looks, np.linalg.norm(Q - posture, axis=1).argsort(kind="stable"))
+    q, lower, upper = Q[kept][:, counted], robot.lower[counted], robot.upper[counted]
+    fitting = 1.0 + np.floor((upper - q) / TURN) + np.floor((q - lower) / TURN)
+    folded = replace(result, solutions=frozen(Q[kept]), residuals=frozen(result.residuals[kept]))
+    return folded, [int(number) - 1 for number in fitting.prod(axis=1)]
+
+
 def _targets(robot: Robot, goal: Any) -> NDArray[np.float64] | None:
     """The target of a goal as the robot's closed form takes it; None if there is no such form or it does not fit."""
     if not has_closed_form(robot) or tip_fault(robot, form_of(robot)):
@@ -65,16 +91,26 @@ def joint_heads(robot: Robot) -> list[str]:
 
 
 def solutions_table(
-    robot: Robot, result: IkResult, names: Sequence[str], clearances: Sequence[float], most: int
+    robot: Robot,
+    result: IkResult,
+    names: Sequence[str],
+    turns: Sequence[int],
+    clearances: Sequence[float],
+    most: int,
 ) -> Table:
-    """One row per solution, nearest first, at most so many: branch, joints, residuals, clearance if there is any."""
-    named, cleared = any(names), len(clearances) > 0
+    """One row per solution, nearest first, at most so many: branch, joints, residuals, full turns, clearance.
+
+    Columns that have nothing to say are left out.
+    """
+    named, turned, cleared = any(names), any(turns), len(clearances) > 0
     heads = ["no.", *(["branch"] if named else []), *joint_heads(robot), "off [mm]", "off [deg]"]
-    table = Table(*heads, *(["clearance [mm]"] if cleared else []), box=box.SIMPLE_HEAD, pad_edge=False)
+    heads += ["by full turns"] * turned + ["clearance [mm]"] * cleared
+    table = Table(*heads, box=box.SIMPLE_HEAD, pad_edge=False)
     for number, column in enumerate(table.columns):
         column.justify = "left" if named and number == 1 else "right"
     for k, (q, residual) in enumerate(zip(result.solutions[:most], result.residuals[:most], strict=True)):
         cells = [str(k + 1), *([names[k]] if named else []), *_joint_cells(robot, q), *_residual_cells(residual)]
+        cells += [f"+{turns[k]}"] if turned else []
         table.add_row(*cells, *([f"{MILLIMETRES * clearances[k]:.1f}"] if cleared else []))
     return table
 
@@ -106,8 +142,14 @@ def rows_csv(robot: Robot, q: Matrix, residuals: Matrix, reasons: Sequence[str],
     return text.getvalue()
 
 
-def document(robot: Robot, result: IkResult, names: Sequence[str]) -> dict[str, Any]:
-    """One answer for machines: rad, m, s."""
+def solution_notes(names: Sequence[str], turns: Sequence[int]) -> list[str]:
+    """The branch of each solution, and how many more there are by full turns."""
+    more = [f"{number} more by full turns" if number else "" for number in turns]
+    return [", ".join(filter(None, parts)) for parts in zip(names, more, strict=True)]
+
+
+def document(robot: Robot, result: IkResult, names: Sequence[str], turns: Sequence[int]) -> dict[str, Any]:
+    """One answer for machines: rad, m, s; ``by_full_turns`` says how many more there are by full turns of joints."""
     return {
         "robot": robot.name,
         "method": result.method,
@@ -117,6 +159,7 @@ def document(robot: Robot, result: IkResult, names: Sequence[str]) -> dict[str, 
         "joint_names": list(robot.joint_names),
         "solutions": result.solutions.tolist(),
         "branches": list(names),
+        "by_full_turns": list(turns),
         "residuals": result.residuals.tolist(),
         "iterations": result.iterations,
         "seconds": result.seconds,

@@ -38,7 +38,10 @@ def print_sheet(
     dictionary: Dictionary = "4x4_50",
     paper: Annotated[str, typer.Option(help="a4, a3 or letter.")] = "a4",
 ) -> int:
-    """Write sheets of markers or a calibration board at their true size."""
+    """Write sheets of markers, or a calibration board.
+
+    At their true size: print at 100 % and measure the rule on the sheet.
+    """
     from rrtik_ompl.sensing import sheets
 
     if kind is Kind.board:
@@ -64,7 +67,10 @@ def calibrate_camera(
     marker: Annotated[float, typer.Option(help="Side of a marker as printed [mm].")] = 22.0,
     dictionary: Dictionary = "4x4_50",
 ) -> int:
-    """Find out a camera's intrinsics from photographs of a printed board."""
+    """Find out a camera's intrinsics.
+
+    From photographs of a printed board; writes the camera file.
+    """
     check_target(out, SCENES)
     from rrtik_ompl.sensing.calibration import calibrate
     from rrtik_ompl.sensing.camera_file import save_camera
@@ -90,7 +96,7 @@ def sense(
     source: Annotated[str, typer.Argument(help="An image, a folder of images, a video, or a camera's number.")],
     camera: Annotated[Path, typer.Option(help="Camera file (see: rrtik markers calibrate).")],
     marker_map: Annotated[Path, typer.Option("--map", help="Which marker sits on which object: .yaml.")],
-    frames: Annotated[int, typer.Option(help="Look at so many pictures at most; a camera device: 1 unless given.")] = 0,
+    frames: Annotated[int, typer.Option(help="So many pictures at most; 0: all, of a camera device 1.", min=0)] = 0,
     scene: Annotated[Path | None, typer.Option(help="Write the scene in the frame of the base: .yaml.")] = None,
     task: Annotated[
         Path | None, typer.Option(help="Write a problem with what was seen: .yaml. Needs --problem and --grasp.")

@@ -17,21 +17,27 @@ TRAJECTORY_FORMATS, PLOT_FORMATS = (".json", ".csv"), (".png", ".svg")
 
 Problem = Annotated[str, typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.")]
 GivenPath = Annotated[Path, typer.Argument(help="A path file: .json, .csv or .txt.")]
-Rate = Annotated[str | None, typer.Option(help="One number, or one per joint with commas; deg (m if it slides) and s.")]
+UNITS = "One number, or one per joint with commas [deg/s{0}; m/s{0} if it slides]."
 
 
 def list_moves(
     path: GivenPath,
     problem: Annotated[
-        str | None, typer.Option(help="Of the path; if the path moves several joints at once, it is converted.")
+        str | None, typer.Option(help="What the path is for; if it moves several joints at once, it is converted.")
     ] = None,
-    shorten: Annotated[str | None, typer.Option(metavar="METHOD", help="Then make fewer moves: axis, ...")] = None,
+    shorten: Annotated[
+        str | None,
+        typer.Option(metavar="METHOD", help="Then make fewer moves, as in rrtik plan: fewest-moves, axis, ..."),
+    ] = None,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print CSV, in degrees.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, in radians.")] = False,
     spoken: Annotated[bool, typer.Option("--spoken", help="Print sentences, to be read aloud.")] = False,
     out: Annotated[Path | None, typer.Option(help="Save the path of moves: .json, .csv or .txt.")] = None,
 ) -> int:
-    """List the single-joint moves of a path: a table, CSV, JSON or sentences."""
+    """List the single-joint moves of a path.
+
+    As a table, CSV, JSON or sentences.
+    """
     if as_csv + as_json + spoken > 1:
         raise InputError("give one of --csv, --json and --spoken, not several")
     check_target(out, PATH_FORMATS)
@@ -54,10 +60,10 @@ def list_moves(
 def time_path(
     problem: Problem,
     path: GivenPath,
-    velocity: Rate = None,
-    acceleration: Rate = None,
-    jerk: Annotated[str | None, typer.Option(help="Likewise; inf for no limit.")] = None,
-    share: Annotated[float, typer.Option(help="Of all limits: 0.5 is half as fast.")] = 1.0,
+    velocity: Annotated[str | None, typer.Option(help=UNITS.format(""))] = None,
+    acceleration: Annotated[str | None, typer.Option(help=UNITS.format("^2"))] = None,
+    jerk: Annotated[str | None, typer.Option(help=f"{UNITS.format('^3')} inf: no limit.")] = None,
+    share: Annotated[float, typer.Option(help="Of all limits, above 0 to 1: 0.5 is half as fast.")] = 1.0,
     blend: Annotated[float, typer.Option(help="Round corners from this far before them [deg]; 0 stops there.")] = 0.0,
     out: Annotated[Path | None, typer.Option(help="Save the trajectory: .json (JointTrajectory) or .csv.")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw the joints over time: .png or .svg.")] = None,

@@ -25,11 +25,16 @@ def overlay(
     camera: Annotated[Path, typer.Option(help="Camera file (see: rrtik markers calibrate).")],
     marker_map: Annotated[Path, typer.Option("--map", help="Which marker sits on which object: .yaml.")],
     out: Annotated[Path, typer.Option(help="Film (.mp4, .avi), or the last picture (.png, .jpg).")],
-    seconds: Annotated[float, typer.Option(help="That the arm takes for the whole path.")] = 10.0,
-    ghosts: Annotated[int, typer.Option(help="Configurations ahead on the path, drawn as well.")] = 1,
-    frames: Annotated[int, typer.Option(help="So many pictures at most; a camera device needs it.", min=0)] = 0,
+    seconds: Annotated[float, typer.Option(help="That the arm takes for the whole path [s].")] = 10.0,
+    ghosts: Annotated[int, typer.Option(help="Configurations ahead on the path, drawn as well, 0 to 20.")] = 1,
+    frames: Annotated[
+        int, typer.Option(help="So many pictures at most; 0: all; a camera device needs a number.", min=0)
+    ] = 0,
 ) -> int:
-    """Draw the arm into a video: where it is, ghosts of where it goes, the trail of its tip, frames of what is seen."""
+    """Draw the arm on its way into a video.
+
+    Where it is, ghosts of where it goes, the trail of its tip, frames of what is seen.
+    """
     check_target(out, ENDINGS)
     if source.isdecimal() and not frames:
         raise InputError(f"camera {source} has no last picture; say --frames N")

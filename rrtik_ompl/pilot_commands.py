@@ -20,19 +20,22 @@ def pilot(
     images: Annotated[Path | None, typer.Option(help="A folder of images, one a second.")] = None,
     simulated: Annotated[bool, typer.Option("--simulated", help="A simulated vehicle and camera.")] = False,
     scenario: Annotated[Path | None, typer.Option(help="What is simulated; a shipped one if left out.")] = None,
-    camera_file: Annotated[Path | None, typer.Option(help="See: rrtik markers calibrate.")] = None,
+    camera_file: Annotated[Path | None, typer.Option(help="Camera file (see: rrtik markers calibrate).")] = None,
     map_file: Annotated[Path | None, typer.Option("--map", help="Which marker sits on which object: .yaml.")] = None,
     record: Annotated[Path | None, typer.Option(help="Write the session to this file, line by line.")] = None,
     replay: Annotated[Path | None, typer.Option(help="Play a recorded session.")] = None,
     arm: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="An arm; a simulated one if left out.")] = None,
     port: Annotated[int, typer.Option(help="Of the page; 0 takes a free one.", min=0, max=65535)] = 0,
     host: Annotated[str, typer.Option(help="Address for other machines; needs --token.")] = "127.0.0.1",
-    token: Annotated[str, typer.Option(help="Secret word, at least 16 letters.")] = "",
+    token: Annotated[str, typer.Option(help="Secret word for --host, at least 16 letters.")] = "",
     sigmas: Annotated[float, typer.Option(help="Margins of what is seen: so many deviations; 0: none.")] = 3.0,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open a browser.")] = False,
-    seed: Annotated[int, typer.Option(help="The same commands give the same routes.")] = 0,
+    seed: Annotated[int, typer.Option(help="The same commands give the same routes.", min=0)] = 0,
 ) -> int:
-    """Help a pilot drive an arm: a page with the camera, the arm in it, grasps, routes and moves. Ctrl-C ends it."""
+    """Help a pilot drive an arm: a page in the browser.
+
+    The camera with the arm drawn in, grasps, routes and moves. Ctrl-C ends it.
+    """
     given = (camera is not None, video is not None, images is not None, simulated or bool(scenario), replay is not None)
     if sum(given) != 1 and not (sum(given) == 2 and given[3] and given[4]):
         named = [name for name, there in zip(SOURCES, given, strict=True) if there]

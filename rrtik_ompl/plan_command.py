@@ -38,17 +38,23 @@ def plan(
     problem: Annotated[str, typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.")],
     planner: Annotated[str, typer.Option(help="See: rrtik list planners.")] = "bicrdt",
     seconds: Annotated[float, typer.Option(help="Time limit [s].")] = 5.0,
-    seed: Annotated[int | None, typer.Option(help="The same seed gives the same path.")] = None,
+    seed: Annotated[int | None, typer.Option(help="The same seed gives the same path; drawn if left out.")] = None,
     restarts: Annotated[int, typer.Option(help="New attempts at most, if one gives up early.")] = 20,
     parameter: Annotated[
-        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="An option of the planner; repeatable.")
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="An option of the planner, in JSON; repeatable."),
     ] = None,
-    shorten: Annotated[Shorten, typer.Option(help="Post-processing.")] = Shorten.auto,
+    shorten: Annotated[
+        Shorten, typer.Option(help="How the path is made shorter; auto: fewest-moves for single-joint moves.")
+    ] = Shorten.auto,
     out: Annotated[Path | None, typer.Option(help="Save the path: .json, .csv or .txt (OMPL matrix).")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> int:
-    """Find a path and print its moves."""
+    """Find a path and print its moves.
+
+    One that moves several joints at once is printed as waypoints. Exit code 1 if no path was found.
+    """
     check_target(out, PATH_FORMATS)
     check_target(html, (".html", ".htm"))
     from rrtik_ompl import load_problem, report
@@ -102,5 +108,7 @@ def _parameters(pairs: list[str]) -> dict[str, Any]:
         try:
             found[name] = json.loads(value)
         except json.JSONDecodeError:
+            if value[:1] in ("[", "{"):
+                raise InputError(f"--set {pair}: names stand in quotes: --set 'frozen_joints=[\"elbow\"]'") from None
             found[name] = value
     return found

@@ -23,9 +23,11 @@ LABELS = {
 def reach(
     robot: Annotated[str, typer.Argument(help="A name (see: rrtik list robots), a URDF or a DH table.")],
     measure: Annotated[str, typer.Option(help="orientations, manipulability or samples.")] = "orientations",
-    cell: Annotated[float | None, typer.Option(help="Side of a cell [m]; an 18th of the reach if absent.")] = None,
+    cell: Annotated[float | None, typer.Option(help="Side of a cell [m]; an 18th of the reach if left out.")] = None,
     samples: Annotated[int, typer.Option(help="Postures to draw.")] = 200_000,
-    axis: Annotated[str | None, typer.Option(help="Of the tip's frame that points: z; of planar arms x.")] = None,
+    axis: Annotated[
+        str | None, typer.Option(help="Of the tip's frame that points: x, y or z; z if left out, of planar arms x.")
+    ] = None,
     scene: Annotated[Path | None, typer.Option(help="Obstacles: only free postures count. A YAML file.")] = None,
     free: Annotated[bool, typer.Option("--free", help="Leave out postures in which the arm hits itself.")] = False,
     effective: Annotated[

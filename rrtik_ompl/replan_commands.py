@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from rrtik_ompl.errors import InputError
 from rrtik_ompl.terminal import progress, say
 from rrtik_ompl.text_file import check_target
 
@@ -25,7 +26,12 @@ def replan_scenario(
     html: Annotated[Path | None, typer.Option(help="Write a self-contained page that replays the run.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> int:
-    """Move a robot to its goal while obstacles move: look, repair, step. Exit 0: arrived; 1: not."""
+    """Move a robot to its goal while obstacles move.
+
+    Look, repair, step, again and again. Exit code 1 if it did not arrive.
+    """
+    if record is not None and replay is not None:
+        raise InputError("--replay shows what has happened: leave out --record")
     check_target(html, (".html", ".htm"))
     check_target(record, (".json",))
     from rrtik_ompl.replanning import load_run

@@ -29,7 +29,10 @@ def reproduce(
     markdown: Annotated[Path | None, typer.Option(help="Write the comparison to this file: .md.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")] = False,
 ) -> int:
-    """Measure published tables again; exit code 1 if a figure is missed."""
+    """Measure published tables again.
+
+    Exit code 1 if a figure is missed.
+    """
     check_target(markdown, (".md",))
     from rrtik_ompl.reproduce.registry import NOT_HERE, TABLES, chosen
 

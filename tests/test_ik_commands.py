@@ -141,6 +141,35 @@ def test_points_in_yaml_are_reached_with_any_orientation(capsys, tmp_path):
     np.testing.assert_allclose(tips, [[0.4, 0.2, 0.9], [0.4, 0.3, 0.9]], atol=1e-3)
 
 
+def test_solutions_that_differ_by_full_turns_are_listed_once_and_counted(capsys):
+    asked = ("ik", "ur5", "--position", 0.4, 0.2, 0.5, "--rpy-deg", 180, 0, 0, "--all", "--seconds", 30)
+    found = json.loads(rrtik(capsys, *asked, "--json")[1])
+    q, robot = np.array(found["solutions"]), load_robot("ur5")
+    assert len(q) == 8
+    apart = np.abs(np.exp(1j * q[:, None]) - np.exp(1j * q)).max(axis=2)
+    assert (apart[~np.eye(8, dtype=bool)] > 0.1).all()
+    # Five joints have room for two turns and the elbow for one: of 2 ** 5 ways the one nearest to the middle is listed.
+    np.testing.assert_allclose(robot.upper - robot.lower, np.radians([720.0, 720.0, 360.0, 720.0, 720.0, 720.0]))
+    assert (np.abs(q) <= np.pi).all()
+    assert found["by_full_turns"] == [31] * 8
+    out = rrtik(capsys, *asked)[1]
+    assert "8 solutions and 248 more by full turns of joints" in out
+    assert [line.split()[-1] for line in out.splitlines()[4:12]] == ["+31"] * 8
+    rows = list(csv.DictReader(io.StringIO(rrtik(capsys, *asked, "--csv")[1])))
+    assert [row["note"] for row in rows] == ["31 more by full turns"] * 8
+
+
+def test_full_turns_count_only_where_they_fit_the_limits(capsys):
+    robot = load_robot("puma560")  # of its joints the last alone has room for more than a turn: 266 deg to either side
+    for last, more in ((20.0, 0), (120.0, 1), (-266.0, 1)):
+        q = np.radians([40.0, 60.0, -120.0, 30.0, 40.0, last])
+        near = ",".join(map(str, np.degrees(q)))
+        found = json.loads(rrtik(capsys, "ik", "puma560", *asked_pose(robot, q), "--near-deg", near, "--json")[1])
+        assert found["by_full_turns"] == [more]
+    found = json.loads(rrtik(capsys, "ik", "kinova", "--position", 0.3, 0.1, 0.4, "--json")[1])
+    assert found["by_full_turns"] == [0]  # what turns without limits is not counted
+
+
 def test_a_page_shows_every_solution_as_a_ghost(capsys, tmp_path):
     page = tmp_path / "ik.html"
     code, out, _ = rrtik(capsys, "ik", "puma560", *asked_pose(load_robot("puma560")), "--all", "--html", page)
@@ -169,6 +198,7 @@ def test_a_page_shows_every_solution_as_a_ghost(capsys, tmp_path):
         (["ur5", "--position", 0.4, 0, 0.4, "--method", "closed-form"], "brings no closed form; what fits: numeric"),
         (["puma560", "--position", 1, 0, 0, "--seed", -1], "seed must be a whole number"),
         (["puma560", "--position", 1, 0, 0, "--seconds", -1], "seconds must not be negative"),
+        (["puma560", "--position", 1, 0, 0, "--tolerance-mm", -1], "--tolerance-mm must be greater than 0, got -1"),
         (["puma560", "--position", 1, 0, 0, "--tolerance-deg", 1], "--tolerance-deg is of an orientation"),
         (["puma560", "--poses", "points.csv", "--tolerance-deg", 1], "a point has none: leave it out"),
         (["--problem", "puma_pose", "--tolerance-mm", 1], "has tolerances of its own"),

@@ -1,5 +1,6 @@
 """What the README shows, works."""
 
+import json
 import re
 from pathlib import Path
 
@@ -53,6 +54,12 @@ def test_the_problem_file_loads_and_its_other_goals_can_be_reached(tmp_path):
         assert solve_ik(problem.robot, member, near=problem.start, world=problem.world).found
 
 
+def test_the_command_for_the_schema_prints_json(capsys):
+    (command,) = re.findall(r'python -c "(import json.*)"', README)
+    exec(command, {})
+    assert json.loads(capsys.readouterr().out)["$schema"].startswith("https://json-schema.org")
+
+
 def test_the_suite_of_benchmarks_loads(tmp_path):
     (text,) = (block for block in blocks("yaml") if "\nplanners:" in block)
     file = tmp_path / "three.yaml"
@@ -64,7 +71,22 @@ def test_the_suite_of_benchmarks_loads(tmp_path):
 
 @pytest.mark.parametrize(
     "verb",
-    ["plan", "check", "show", "list", "convert", "moves", "time", "ik", "reach", "reproduce", "bench", "overlay"],
+    [
+        "plan",
+        "check",
+        "show",
+        "list",
+        "convert",
+        "moves",
+        "time",
+        "replan",
+        "ik",
+        "reach",
+        "reproduce",
+        "bench",
+        "overlay",
+        "pilot",
+    ],
 )
 def test_every_option_that_the_readme_names_is_there(verb, capsys):
     usage, *_ = re.findall(rf"^rrtik {verb} [^\n]*(?:\n  [^\n]*)*", README, re.MULTILINE)

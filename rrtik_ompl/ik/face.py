@@ -114,7 +114,7 @@ def solve_ik(
     turned = joint_difference(robot, q, posture)
     (rows,) = free.nonzero()
     order = rows[np.vecdot(turned, turned)[rows].argsort(kind="stable")]
-    kept = _different(turned, order) if all else order[:1]
+    kept = different_rows(turned, order) if all else order[:1]
     reason, detail = ("", "") if len(kept) else _why(question, answer, name, q)
     return IkResult(
         solutions=frozen(np.where(robot.continuous, posture + turned[kept], q[kept])),
@@ -186,11 +186,11 @@ def _tried(question: Question, name: str) -> tuple[Answer, Matrix, Matrix, Mask]
     return answer, q, residuals, question.accept(q)
 
 
-def _different(difference: Matrix, rows: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Some of the rows without repetitions, by their differences from a posture."""
+def different_rows(rows: Matrix, order: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Numbers of the rows, taken in that order, without those that repeat an earlier one to `SAME_POSTURE`."""
     kept: list[int] = []
-    for k in rows.tolist():
-        if not kept or np.abs(difference[k] - difference[kept]).max(axis=1).min() > SAME_POSTURE:
+    for k in order.tolist():
+        if not kept or np.abs(rows[k] - rows[kept]).max(axis=1).min() > SAME_POSTURE:
             kept.append(k)
     return np.array(kept, dtype=np.intp)
 
