@@ -42,7 +42,7 @@ def _groups(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
     for (event, reason), members in groupby(ticks, lambda tick: (tick.event, tick.reason)):
         rows = list(members)
         first = found[-1]["first"] + found[-1]["count"] if found else 0
-        spent = [1e3 * tick.seconds[event] for tick in rows if event in ("plan", "repair")]
+        spent = [1e3 * tick.seconds[event] for tick in rows if event in tick.seconds]  # of a plan or a repair
         text = event + (f" ({reason})" if reason else "")
         text += f", {max(spent):.1f} ms" if spent else ""
         found.append({"first": first, "count": len(rows), "event": event, "text": text})
