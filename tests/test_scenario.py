@@ -107,6 +107,24 @@ def test_the_command_refuses_a_problem_that_is_no_scenario(capsys):
     assert "needs the key 'run'" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("option", "value"), [("--record", "other.json"), ("--seconds", "3"), ("--predict", "2")])
+def test_what_only_a_new_run_can_heed_is_refused_beside_a_replay(option, value, capsys):
+    assert rrtik(["replan", "replan_walls", "--replay", "run.json", option, value]) == 2
+    assert f"{option}: a run that is replayed is over" in capsys.readouterr().err
+
+
+def test_the_command_replays_no_run_of_another_scenario(crossing, tmp_path, capsys):
+    load_scenario(crossing).run(seconds=0.3, record=tmp_path / "run.json")
+    assert rrtik(["replan", "replan_walls", "--replay", str(tmp_path / "run.json")]) == 2
+    assert "a run of 'crossing', not of 'replan_walls'" in capsys.readouterr().err
+
+
+def test_a_run_is_not_shown_with_another_robot(crossing):
+    run = load_scenario(crossing).run(seconds=0.3)
+    with pytest.raises(InputError, match="one of robot 'point2d' with other joints"):
+        page(load_problem("replan_planar_arm"), run=run)
+
+
 def test_a_record_of_another_problem_is_refused(crossing):
     run = load_scenario(crossing).run(slot=30.0)
     with pytest.raises(InputError, match="lift"):
@@ -122,10 +140,11 @@ def test_a_scenario_is_a_problem_too():
 @pytest.fixture
 def kept(quiet_ompl):
     """A problem in plain OMPL whose obstacle can be switched, solved once."""
-    where = {"bar": (0.0, 0.0)}
+    where = {"bar": (0.0, 0.0), "wall": False}
 
     def valid(state):
-        return bool(max(abs(state[0] - where["bar"][0]), abs(state[1] - where["bar"][1])) > 0.5)
+        away = max(abs(state[0] - where["bar"][0]), abs(state[1] - where["bar"][1]))
+        return bool(away > 0.5 and not (where["wall"] and abs(state[0]) < 0.2))
 
     setup = small_problem(valid)
     planner = DRRTCon(setup.getSpaceInformation(), seed=2, range=0.4)
@@ -154,6 +173,19 @@ def test_a_path_that_is_still_free_is_given_back_without_a_sample(kept):
     setup.getProblemDefinition().clearSolutionPaths()
     assert str(setup.solve(10.0)) == "Exact solution"
     assert planner.statistics["iterations"] == drawn
+    assert (solution_rows(setup) == first).all()
+
+
+def test_a_path_that_nothing_leads_round_is_kept_for_later(kept):
+    setup, planner, where = kept
+    first = solution_rows(setup)
+    where["wall"] = True
+    setup.getProblemDefinition().clearSolutionPaths()
+    assert str(setup.solve(0.3)) != "Exact solution"
+    where["wall"] = False
+    setup.getProblemDefinition().clearSolutionPaths()
+    assert str(setup.solve(10.0)) == "Exact solution"
+    assert planner.statistics["reused"] == 1
     assert (solution_rows(setup) == first).all()
 
 
