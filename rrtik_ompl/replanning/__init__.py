@@ -44,8 +44,9 @@ def replan(
     nearer than allowed it goes out of its way.
 
     No contact can happen in a step along the path if no obstacle is faster than ``speed_bound``: the robot stays
-    ``margin`` and as far as an obstacle comes in a tick away from what moves, and ``margin`` from all else. A robot
-    that is cornered can still be run over.
+    ``margin`` and as far as an obstacle comes in a tick away from what moves, and ``margin`` from all else. What moves
+    is what states a motion or was seen to; an obstacle of a feed that sets off beside the robot comes unannounced, and
+    a robot that is cornered can still be run over.
 
     Args:
         problem: Robot, scene at the begin, start and goal. Of a pose, position or region all configurations are goals:

@@ -20,6 +20,7 @@ from rrtik_ompl.text_file import read_text, write_text
 from rrtik_ompl.transitions import route_length
 
 KIND = "replan_run"
+LARGEST = 512 * 1024 * 1024  # bytes of a record, half an hour of 20 obstacles at 50 Hz
 EVENTS = ("plan", "walk", "repair", "wait", "evade", "arrive")
 OUTCOMES = ("arrived", "out of time", "interrupted")
 
@@ -151,7 +152,7 @@ def load_run(path: str | os.PathLike[str]) -> Run:
         InputError: If the file is missing or malformed; the message names it.
     """
     try:
-        document = json_object(read_text(path), KIND, "ticks")
+        document = json_object(read_text(path, LARGEST), KIND, "ticks")
         heads = _heads(document)
         ticks = [_tick(entry, len(heads["joint_names"])) for entry in document["ticks"]]
         _check_times(ticks)

@@ -57,7 +57,7 @@ class Subject:
         """Configuration of the goal ghost, shape (dof,): end of the path or the goal's joint values, or None."""
         if self.ghosts is not None:
             return None
-        if not self.is_path:
+        if not self.is_path or (self.run is not None and not self.run.arrived):
             return self.goal.q if isinstance(self.goal, JointGoal) else None
         end: Vector = self.waypoints[-1]
         return end
