@@ -102,7 +102,8 @@ class BatchedSearch:
         self._newest, self._batches = starts[:0], 0
         self.connects = self.restarts = self._dropped = 0
         self.blocked = starts[:0]
-        self._nearest, self._least = starts[self._distances.argmin()], float(self._distances.min())
+        self._nearest: Vector = starts[self._distances.argmin()]
+        self._least = float(self._distances.min())
 
     @property
     def nearest(self) -> Vector:
