@@ -120,10 +120,10 @@ class GoalRegion:
     def __init__(
         self, members: Iterable[GoalPart], free_rotation_axis: str | None = None, box: ArrayLike = NO_BOX
     ) -> None:
-        goals = tuple(members)
+        goals = tuple(members) if isinstance(members, Iterable) else ()
         if not goals or not all(isinstance(goal, PoseGoal | PositionGoal | TaskRegion) for goal in goals):
             raise InputError(
-                "goal: a region needs at least one pose or position or task-space region, and nothing else"
+                "goal: a region needs a list of at least one pose or position or task-space region, and nothing else"
             )
         if free_rotation_axis not in (None, "x", "y", "z"):
             raise InputError(

@@ -110,9 +110,10 @@ class GoalSearch:
             why = self._problem.world.explain(self._found[0])
             return f"{len(self._found)} configurations reach the goal, all in collision: for instance {why}"
         distance, angle = nearest_miss(self._problem.world.robot, goal)
+        rounds = f"{self._rounds} round{'s' * (self._rounds != 1)}"
         return (
-            f"inverse kinematics found no configuration at the goal in {self._rounds} rounds; the nearest one misses "
-            f"it by {1e3 * distance:.1f} mm and {np.degrees(angle):.1f} degrees; is it in reach?"
+            f"inverse kinematics found no configuration at the goal in {rounds}; "
+            f"the nearest one misses it by {1e3 * distance:.1f} mm and {np.degrees(angle):.1f} degrees; is it in reach?"
         )
 
     def _round(self, goal: TipGoal) -> Matrix:

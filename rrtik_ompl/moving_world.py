@@ -7,7 +7,7 @@ answer never waits for coal. When the scene changes, only the obstacles that mov
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +21,7 @@ from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast import FREE, FastWorld
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Shape
+from rrtik_ompl.shapes import same_shape
 from rrtik_ompl.world import World
 
 
@@ -149,15 +149,8 @@ def _check_obstacles(scene: Scene, known: Mapping[str, Obstacle]) -> None:
     if {o.name for o in scene.obstacles} != known.keys():
         raise InputError(f"scene: expected the obstacles {', '.join(sorted(known))}, got {scene}")
     for obstacle in scene.obstacles:
-        if not _same_shape(obstacle.shape, known[obstacle.name].shape):
+        if not same_shape(obstacle.shape, known[obstacle.name].shape):
             raise InputError(f"scene: '{obstacle.name}' has another shape than before; make a new world")
-
-
-def _same_shape(first: Shape, second: Shape) -> bool:
-    return first is second or (
-        type(first) is type(second)
-        and all(np.array_equal(getattr(first, f.name), getattr(second, f.name)) for f in fields(first))
-    )
 
 
 def _with_copies(

@@ -124,7 +124,8 @@ def plan(
     elapsed, reason = time.perf_counter() - begin, search.reason
     if path is None and elapsed >= limit:
         attempts = search.totals["attempts"]
-        reason = f"no path within {limit:g} s ({attempts} attempts; the last one: {reason or 'out of time'})"
+        tried = f"{attempts} attempt{'s' * (attempts != 1)}"
+        reason = f"no path within {limit:g} s ({tried}; the last one: {reason or 'out of time'})"
     return Plan(path is not None, path, reason, elapsed, name, used, MappingProxyType(search.totals))
 
 

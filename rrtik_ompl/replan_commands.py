@@ -34,17 +34,18 @@ def replan_scenario(
         raise InputError("--replay shows what has happened: leave out --record")
     check_target(html, (".html", ".htm"))
     check_target(record, (".json",))
-    from rrtik_ompl.replanning import load_run
+    options = {"predict": predict, "seconds": seconds, "record": record}
+    given = {name: value for name, value in options.items() if value is not None}
+    if replay is not None and given:
+        raise InputError(f"--{next(iter(given))}: a run that is replayed is over; leave this out, or --replay")
     from rrtik_ompl.scenario import load_scenario
 
     chosen = load_scenario(scenario)
-    changes: dict[str, Any] = {"planner": planner, "seed": seed, "record": record}
-    changes |= {name: value for name, value in (("predict", predict), ("seconds", seconds)) if value is not None}
     if replay is None:
         with progress(f"{chosen.problem.name} with {planner}"):
-            run = chosen.run(**changes)
+            run = chosen.run(planner=planner, seed=seed, **given)
     else:
-        run = load_run(replay)
+        run = _recorded(replay, chosen.problem.name)
     if html is not None:
         from rrtik_ompl.viewer import view
 
@@ -54,5 +55,19 @@ def replan_scenario(
         print(json.dumps(run.figures()))
     else:
         say(run.summary())
-        say(*(f"wrote {file}" for file in (record if replay is None else None, html) if file is not None))
+        say(*(f"wrote {file}" for file in (record, html) if file is not None))
     return 0 if run.arrived else 1
+
+
+def _recorded(file: Path, problem: str) -> Any:
+    """The run of a record, which must be one of the problem.
+
+    Raises:
+        InputError: If it is not, or is no record.
+    """
+    from rrtik_ompl.replanning import load_run
+
+    run = load_run(file)
+    if run.problem != problem:
+        raise InputError(f"{file}: a run of '{run.problem}', not of '{problem}'; give the scenario that was run")
+    return run

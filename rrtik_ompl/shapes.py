@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -142,6 +142,14 @@ class Mesh:
 
 
 Shape: TypeAlias = Sphere | Cylinder | Capsule | Box | HalfSpace | Prism | Mesh
+
+
+def same_shape(first: Shape, second: Shape) -> bool:
+    """Whether two shapes are of one kind and one size."""
+    return first is second or (
+        type(first) is type(second)
+        and all(np.array_equal(getattr(first, f.name), getattr(second, f.name)) for f in fields(first))
+    )
 
 
 def _welded(points: Matrix, faces: NDArray[np.int64]) -> tuple[Matrix, NDArray[np.int64]]:

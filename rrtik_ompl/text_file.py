@@ -11,13 +11,13 @@ from rrtik_ompl.errors import InputError
 MAX_BYTES = 64 * 1024 * 1024  # far above any problem or path file; keeps /dev/zero from filling the memory
 
 
-def read_text(path: str | os.PathLike[str]) -> str:
-    """Contents of a UTF-8 text file.
+def read_text(path: str | os.PathLike[str], limit: int = MAX_BYTES) -> str:
+    """Contents of a UTF-8 text file of at most ``limit`` bytes.
 
     Raises:
-        InputError: If the file is missing, a folder, unreadable, larger than 64 MiB, or not UTF-8 text.
+        InputError: If the file is missing, a folder, unreadable, too large, or not UTF-8 text.
     """
-    data = read_bytes(path)
+    data = read_bytes(path, limit)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

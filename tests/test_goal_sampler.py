@@ -217,6 +217,8 @@ def test_a_goal_out_of_reach_says_how_near_the_arm_came_and_ends_at_once(quiet_o
 def test_bad_arguments_are_refused(turning):
     with pytest.raises(InputError, match="most: expected a whole number"):
         GoalSampler(turning, most=0)
+    with pytest.raises(InputError, match="seed must be a whole number"):
+        GoalSampler(turning, seed=-1)
     with pytest.raises(InputError, match="problem of a goal sampler"):
         GoalSampler(turning.world)
     space = ob.RealVectorStateSpace(3)

@@ -263,6 +263,14 @@ def test_the_nearest_miss_is_that_of_the_stretched_arm(puma: Any) -> None:
     assert float(plan.reason.rstrip(" m)").split("misses it by ")[1]) == pytest.approx(3.0 - stretched, rel=2e-3)
 
 
+def test_without_descents_the_nearest_miss_is_that_of_the_tree(puma: Any) -> None:
+    problem = rrtik.Problem(puma.world, puma.start, PositionGoal([3.0, 0.0, 0.672]))
+    plan = rrtik.plan(problem, IKURT, seconds=0.3, seed=1, parameters={"jacobian": False})
+    told = float(plan.reason.rstrip(" m)").split("misses it by ")[1])
+    assert told == pytest.approx(plan.statistics["position_error"], rel=1e-3)
+    assert told < problem.goal.distance(puma.robot, puma.start)[0] - 0.1
+
+
 def test_a_goal_that_is_blocked_is_told_with_what_is_in_the_way(puma: Any) -> None:
     ball = rrtik.Obstacle("ball", Sphere(0.06), pose(puma.goal.T_world_tip.translation))
     problem = rrtik.Problem(rrtik.World(puma.robot, rrtik.Scene([ball])), puma.start, puma.goal)

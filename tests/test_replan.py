@@ -342,6 +342,11 @@ def test_predicted_places_are_heeded():
         ({"predict": 1.5}, "predict must be a whole number"),
         ({"speed_bound": 0.0}, "speed_bound must be greater than 0"),
         ({"seconds": float("nan")}, "seconds"),
+        ({"eps": 1e-6}, "eps must be at least .* suits this robot"),
+        ({"limits": RateLimits([1.0] * 3, [1.0] * 3)}, "limits: there are 2 joints, but limits for 3"),
+        ({"clock": None}, "clock: expected a function"),
+        ({"record": "run.txt"}, "unknown ending '.txt'; use .json"),
+        ({"record": "no/such/folder/run.json"}, "does not exist; create it"),
     ],
 )
 def test_a_number_that_makes_no_sense_is_named(changes, words):
@@ -373,6 +378,23 @@ def test_times_that_go_backwards_are_refused():
 def test_what_is_no_feed_is_refused(given, words):
     with pytest.raises(InputError, match=words):
         replan(crossing(), given, **OPTIONS)
+
+
+@pytest.mark.parametrize(
+    "later",
+    [
+        lambda lift: [],
+        lambda lift: [lift, box("new", 5.0, 5.0)],
+        lambda lift: [Obstacle("lift", Box([4.0, 9.0, 1.0]), lift.pose)],
+    ],
+)
+def test_obstacles_that_come_go_or_grow_are_refused_and_the_record_is_kept(later, tmp_path):
+    lift = box("lift", 10.0, 4.0)
+    with pytest.raises(InputError, match=r"expected the obstacles lift|another shape than before"):
+        replan(
+            plane(lift), lambda t: Scene([lift] if t < 0.5 else later(lift)), record=tmp_path / "run.json", **OPTIONS
+        )
+    assert len(load_run(tmp_path / "run.json").ticks) == 5
 
 
 @pytest.mark.parametrize(
@@ -415,6 +437,16 @@ def test_an_obstacle_faster_than_the_bound_is_warned_about_once():
     assert "speed_bound of 1 m/s" in said[0]
 
 
+def test_a_floor_that_slides_has_a_speed_like_any_obstacle():
+    tilted, slid = (pin.SE3(pin.exp3(np.array([0.0, 0.0, 0.3])), np.array([x, 0.0, 0.0])) for x in (0.0, 4.0))
+    floor = Obstacle("floor", HalfSpace([0.0, 1.0, 0.0], -5.0), tilted, Waypoints([0.0, 8.0], [tilted, slid]))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert replan(plane(floor), speed_bound=0.6, **OPTIONS).arrived
+    with pytest.warns(SpeedWarning, match="'floor' moves at 0.5 m/s"):
+        assert replan(plane(floor), speed_bound=0.4, **OPTIONS).arrived
+
+
 # Records ------------------------------------------------------------------------------------------------------------
 def test_a_record_reads_back_as_the_same_run(tmp_path):
     run = replan(crossing(), record=tmp_path / "run.json", **OPTIONS)
@@ -422,6 +454,14 @@ def test_a_record_reads_back_as_the_same_run(tmp_path):
     assert (again.configurations == run.configurations).all()
     assert again.figures() == run.figures()
     assert again.ticks[3].poses["lift"] == pytest.approx(run.ticks[3].poses["lift"])
+
+
+def test_a_record_of_a_long_run_is_read_too(tmp_path):
+    file = tmp_path / "run.json"
+    replan(crossing(), record=file, **{**OPTIONS, "seconds": 0.5})
+    with file.open("a") as record:
+        record.write(" " * (65 * 2**20))
+    assert len(load_run(file).ticks) == 6
 
 
 def test_the_record_is_kept_when_the_run_is_interrupted(tmp_path):
@@ -439,6 +479,19 @@ def test_the_record_is_kept_when_the_run_is_interrupted(tmp_path):
     assert len(kept.ticks) == 11
 
 
+def test_a_run_interrupted_before_its_first_tick_leaves_no_record(tmp_path):
+    scene, looks = crossing().world.scene, iter(range(9))
+
+    def feed(_):
+        if next(looks) == 2:
+            raise KeyboardInterrupt
+        return scene
+
+    with pytest.raises(KeyboardInterrupt):
+        replan(crossing(), feed, record=tmp_path / "run.json", **OPTIONS)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_file_that_is_no_record_is_refused(tmp_path):
     (tmp_path / "run.json").write_text('{"kind": "replan_run", "version": 1, "ticks": [{"time": 0}]}')
     with pytest.raises(InputError, match="not a whole record"):
@@ -452,6 +505,12 @@ def test_a_file_that_is_no_record_is_refused(tmp_path):
         (lambda record: record.update(outcome="flew"), "no outcome 'flew'"),
         (lambda record: record["ticks"][1].update(event="jump"), "no event of a tick 'jump'"),
         (lambda record: record["ticks"][2].update(time=0.0), "times go backwards"),
+        (lambda record: record["ticks"][2].update(time="x"), "time of a tick: expected numbers, got 'x'"),
+        (lambda record: record["ticks"][1]["poses"].update(lift=[0.0] * 7), "'lift': quat_xyzw must have length 1"),
+        (lambda record: record["ticks"][1]["seconds"].update(look="x"), "seconds of 'look': expected numbers"),
+        (lambda record: record["ticks"][1].update(checked=0.5), "checked must be a whole number"),
+        (lambda record: record.update(rate=0), "rate must be greater than 0"),
+        (lambda record: record.update(problem=7), "problem must be of type str"),
     ],
 )
 def test_a_record_that_cannot_be_is_refused_with_its_name(tmp_path, change, words):

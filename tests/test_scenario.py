@@ -9,15 +9,23 @@ import numpy as np
 import pytest
 from ompl import base as ob
 
-from rrtik_ompl.catalog import find_problem, list_problems
+from rrtik_ompl.catalog import find_problem, list_problems, load_robot
 from rrtik_ompl.cli import run as rrtik
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.ompl_bridge.contract import GOAL, small_problem, solution_rows
+from rrtik_ompl.poses import pose
+from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_file import load_problem
-from rrtik_ompl.replanning import load_run
+from rrtik_ompl.replanning import load_run, replan
 from rrtik_ompl.replanning.judge import judge
 from rrtik_ompl.scenario import load_scenario
+from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene
+from rrtik_ompl.shapes import HalfSpace
 from rrtik_ompl.viewer.page import page
+from rrtik_ompl.viewer.picture import draw
+from rrtik_ompl.viewer.run_story import run_story
+from rrtik_ompl.viewer.subject import subject_of_run
+from rrtik_ompl.world import World
 from rrtik_planners import DRRTCon
 
 SCENARIOS = [name for name in list_problems() if name.startswith("replan_")]
@@ -107,6 +115,43 @@ def test_the_command_refuses_a_problem_that_is_no_scenario(capsys):
     assert "needs the key 'run'" in capsys.readouterr().err
 
 
+def test_where_a_run_was_given_up_is_not_shown_as_its_goal(crossing):
+    scenario = load_scenario(crossing)
+    shown = subject_of_run(scenario.problem, scenario.run(seconds=0.3))
+    assert (shown.end == scenario.problem.goal.q).all()
+
+
+def test_a_floor_that_moves_is_replayed_as_it_lies():
+    robot = load_robot("point2d", radius=0.0, bounds=[[0, 20], [0, 20]])
+    floor = Obstacle("floor", HalfSpace([0, 1, 0], -2.0), pose(), ConstantVelocity([0.0, 0.1, 0.0]))
+    problem = Problem(World(robot, Scene([floor])), [1, 10], [19, 10])
+    run = replan(problem, step=0.5, rate=10.0, seconds=0.3)
+    subject = subject_of_run(problem, run)
+    told = run_story(run, robot, subject.scene, draw(subject)[1])["moving"]["floor"]
+    plate = np.reshape(told["placement"], (4, 4))
+    assert plate[:3, 2] == pytest.approx([0, 1, 0])
+    assert plate[1, 3] == pytest.approx(-2.0, abs=0.2)
+    assert np.array(told["poses"])[:, 1] == pytest.approx([0.0, 0.01, 0.02, 0.03])
+
+
+@pytest.mark.parametrize(("option", "value"), [("--record", "other.json"), ("--seconds", "3"), ("--predict", "2")])
+def test_what_only_a_new_run_can_heed_is_refused_beside_a_replay(option, value, capsys):
+    assert rrtik(["replan", "replan_walls", "--replay", "run.json", option, value]) == 2
+    assert f"{option}: a run that is replayed is over" in capsys.readouterr().err
+
+
+def test_the_command_replays_no_run_of_another_scenario(crossing, tmp_path, capsys):
+    load_scenario(crossing).run(seconds=0.3, record=tmp_path / "run.json")
+    assert rrtik(["replan", "replan_walls", "--replay", str(tmp_path / "run.json")]) == 2
+    assert "a run of 'crossing', not of 'replan_walls'" in capsys.readouterr().err
+
+
+def test_a_run_is_not_shown_with_another_robot(crossing):
+    run = load_scenario(crossing).run(seconds=0.3)
+    with pytest.raises(InputError, match="one of robot 'point2d' with other joints"):
+        page(load_problem("replan_planar_arm"), run=run)
+
+
 def test_a_record_of_another_problem_is_refused(crossing):
     run = load_scenario(crossing).run(slot=30.0)
     with pytest.raises(InputError, match="lift"):
@@ -122,10 +167,11 @@ def test_a_scenario_is_a_problem_too():
 @pytest.fixture
 def kept(quiet_ompl):
     """A problem in plain OMPL whose obstacle can be switched, solved once."""
-    where = {"bar": (0.0, 0.0)}
+    where = {"bar": (0.0, 0.0), "wall": False}
 
     def valid(state):
-        return bool(max(abs(state[0] - where["bar"][0]), abs(state[1] - where["bar"][1])) > 0.5)
+        away = max(abs(state[0] - where["bar"][0]), abs(state[1] - where["bar"][1]))
+        return bool(away > 0.5 and not (where["wall"] and abs(state[0]) < 0.2))
 
     setup = small_problem(valid)
     planner = DRRTCon(setup.getSpaceInformation(), seed=2, range=0.4)
@@ -154,6 +200,19 @@ def test_a_path_that_is_still_free_is_given_back_without_a_sample(kept):
     setup.getProblemDefinition().clearSolutionPaths()
     assert str(setup.solve(10.0)) == "Exact solution"
     assert planner.statistics["iterations"] == drawn
+    assert (solution_rows(setup) == first).all()
+
+
+def test_a_path_that_nothing_leads_round_is_kept_for_later(kept):
+    setup, planner, where = kept
+    first = solution_rows(setup)
+    where["wall"] = True
+    setup.getProblemDefinition().clearSolutionPaths()
+    assert str(setup.solve(0.3)) != "Exact solution"
+    where["wall"] = False
+    setup.getProblemDefinition().clearSolutionPaths()
+    assert str(setup.solve(10.0)) == "Exact solution"
+    assert planner.statistics["reused"] == 1
     assert (solution_rows(setup) == first).all()
 
 

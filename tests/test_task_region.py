@@ -191,6 +191,7 @@ BAD = {
         "slide goes from 0.1 up to 0",
     ),
     "an empty set": (lambda: GoalRegion([]), "at least one pose"),
+    "a pose that is no list": (lambda: GoalRegion(PoseGoal(AT)), "a list of at least one pose"),
 }
 
 

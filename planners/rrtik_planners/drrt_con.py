@@ -21,8 +21,9 @@ class DRRTCon(SafePlanner):
 
     The first ``solve`` is RRT-Connect and the sequential cut. A later one starts from the kept path: what lies behind
     the start is dropped, the rest is checked in one call, cut at the first blocked motion seen from either end and
-    reconnected. The start may move along the path or near it, the goal may move, and the validity checker may change
-    its mind. ``clear()`` forgets. Source: DRRT-Con paper, algorithms 6 to 8; the search: :mod:`rrtik_ompl.replanning`.
+    reconnected; while no way is found it stays. The start may move along the path or near it, the goal may move, and
+    the validity checker may change its mind. ``clear()`` forgets. Source: DRRT-Con paper, algorithms 6 to 8; the
+    search: :mod:`rrtik_ompl.replanning`.
     """
 
     kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
@@ -54,12 +55,11 @@ class DRRTCon(SafePlanner):
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         core = self._core
         reused = core is not None and core.path is not None and self._from_kept(core, starts, goals, checker, ptc)
-        if not reused:
-            core = self._core = self._new()
-            for start in starts:
-                if ptc() or core.begin(start, goals, checker, ptc):
-                    break
-        assert core is not None
+        if core is None or not reused:
+            fresh = self._new()
+            found = any(not ptc() and fresh.begin(start, goals, checker, ptc) for start in starts)
+            if core is None or found:  # a path that is blocked now is of more use to the next call than none
+                core = self._core = fresh
         statistics = {"iterations": core.connect.samples, "repairs": core.repairs, "reused": int(reused)}
         return SearchResult(core.path if core.free else None, statistics)
 

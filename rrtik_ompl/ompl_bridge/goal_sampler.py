@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Mask, Matrix, frozen
+from rrtik_ompl.arrays import Mask, Matrix, frozen, whole_number
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal_configurations import LARGEST, GoalSearch
 from rrtik_ompl.ompl_bridge.setup import Judge, space_information
@@ -55,7 +55,7 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
         super().__init__(si)
         self._problem, self._io, self._most, self._given, self._seen = problem, io, most, 0, 0
         self._rows: Matrix = frozen(np.zeros((0, robot.dof)))
-        self._search = GoalSearch(problem, np.random.default_rng(seed))
+        self._search = GoalSearch(problem, np.random.default_rng(whole_number(seed, "seed")))
         self._search.first()
 
     @property

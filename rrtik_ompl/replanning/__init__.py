@@ -11,6 +11,7 @@ from rrtik_ompl.replanning.feed import Source, SpeedWarning, feed_of
 from rrtik_ompl.replanning.loop import Clock, GoalFeed, Loop
 from rrtik_ompl.replanning.run import Run, Tick, load_run
 from rrtik_ompl.replanning.settings import PLANNERS, settings
+from rrtik_ompl.text_file import check_target, file_name
 from rrtik_ompl.trajectory.limits import RateLimits
 
 __all__ = ["PLANNERS", "Run", "SpeedWarning", "Tick", "load_run", "replan"]
@@ -43,14 +44,16 @@ def replan(
     nearer than allowed it goes out of its way.
 
     No contact can happen in a step along the path if no obstacle is faster than ``speed_bound``: the robot stays
-    ``margin`` and as far as an obstacle comes in a tick away from what moves, and ``margin`` from all else. A robot
-    that is cornered can still be run over.
+    ``margin`` and as far as an obstacle comes in a tick away from what moves, and ``margin`` from all else. What moves
+    is what states a motion or was seen to; an obstacle of a feed that sets off beside the robot comes unannounced, and
+    a robot that is cornered can still be run over.
 
     Args:
         problem: Robot, scene at the begin, start and goal. Of a pose, position or region all configurations are goals:
             if one is blocked another one is tried.
         scene_feed: What is seen over time: a scene whose obstacles state their motion, a function of time [s], or
             pairs of a time and a scene; the problem's scene if None. The obstacles' names and shapes stay the same.
+            What is seen less often than once a tick moves in jumps, whose speed is that of the one tick.
         step: How far the robot goes in a tick [rad, metres counted alike], unless its joints are too slow.
         rate: Ticks a second [Hz].
         planner: One of ``PLANNERS``.
@@ -65,7 +68,7 @@ def replan(
         seed: The same seed gives the same run, as long as no repair is cut short by its slot.
         goal_feed: A goal that moves: the configuration at a time [s], in place of the problem's goal.
             It is reached when the robot is where it was at the begin of the last tick.
-        record: A JSON file for the record; it is written on Ctrl-C too.
+        record: A ``.json`` file for the record; it is written on Ctrl-C and errors too, once there is a tick.
         clock: What the times of the ticks and the ``slot`` are taken with [s]; ``time.process_time`` counts the
             processor's, on a machine that does other things too.
 
@@ -79,6 +82,10 @@ def replan(
         require(limits, RateLimits, "limits", "use RateLimits(velocity, acceleration)")
     if goal_feed is not None and not callable(goal_feed):
         raise InputError(f"goal_feed: expected a function of time [s], got {type(goal_feed).__name__}")
+    if not callable(clock):
+        raise InputError(f"clock: expected a function that gives a time [s], got {type(clock).__name__}")
+    if record is not None:
+        check_target(file_name(record), (".json",))
     chosen = settings(
         problem.robot, step=step, rate=rate, planner=planner, eps=eps, margin=margin, speed_bound=speed_bound,
         limits=limits, predict=predict, seconds=seconds, slot=slot, seed=seed,
@@ -93,5 +100,5 @@ def replan(
         loop.run.outcome, loop.run.reason = "out of time", loop.run.ticks[-1].reason or "still on its way"
         return loop.run
     finally:
-        if record is not None:
+        if record is not None and loop.run.ticks:
             loop.run.save(record)

@@ -14,11 +14,13 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.extent import farthest
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.shapes import same_shape
 
 Feed: TypeAlias = Callable[[float], Scene]
 Source: TypeAlias = Scene | Feed | Iterable[tuple[float, Scene]]
 
 FASTER = 1.0 + 1e-6  # than the bound, to be warned about
+STILL = 1e-9  # [rad] from look to look, which is rounding and no turn
 
 
 class SpeedWarning(UserWarning):
@@ -104,19 +106,20 @@ class Watch:
         self.speeds: dict[str, float] = {}
 
     def see(self, time: float, scene: Scene) -> bool:
-        """Take in the scene at a time [s]; whether an obstacle or a margin has changed (at the first look: True)."""
+        """Take in the scene at a time [s]; whether anything about the obstacles is new (at the first look: True)."""
         before, self._last = self._last, (time, scene)
         if before is None or time <= before[0]:
             return True
-        seconds, old, moved = time - before[0], {o.name: o.pose for o in before[1].obstacles}, False
-        margins = {o.name: o.margin for o in before[1].obstacles}
+        old = {o.name: o for o in before[1].obstacles}
+        changed = {o.name for o in scene.obstacles} != old.keys()
         self._velocities = {}
         for obstacle in scene.obstacles:
-            if obstacle.name in old and not np.array_equal(old[obstacle.name].homogeneous, obstacle.pose.homogeneous):
-                moved = True
-                self._measure(obstacle, old[obstacle.name], seconds, time)
-            moved |= obstacle.margin != margins.get(obstacle.name)
-        return moved
+            last = old.get(obstacle.name, obstacle)
+            if not np.array_equal(last.pose.homogeneous, obstacle.pose.homogeneous):
+                changed = True
+                self._measure(obstacle, last.pose, time - before[0], time)
+            changed |= obstacle.margin != last.margin or not same_shape(obstacle.shape, last.shape)
+        return changed
 
     def later(self, scene: Scene, seconds: float) -> Scene:
         """Where the obstacles of the last scene will be: by the motion that they state, or else by their velocity."""
@@ -133,10 +136,11 @@ class Watch:
 
     def _measure(self, obstacle: Obstacle, old: Any, seconds: float, time: float) -> None:
         name = obstacle.name
-        turn = pin.log3(old.rotation.T @ obstacle.pose.rotation) / seconds
-        velocity = (obstacle.pose.translation - old.translation) / seconds
-        speed = float(np.linalg.norm(velocity) + self._radii[name] * np.linalg.norm(turn))
-        self._velocities[name] = (velocity, turn)
+        way, turn = obstacle.pose.translation - old.translation, pin.log3(old.rotation.T @ obstacle.pose.rotation)
+        angle = float(np.linalg.norm(turn))
+        farthest_way = self._radii[name] * angle if angle > STILL else 0.0  # a half-space has no farthest point
+        speed = (float(np.linalg.norm(way)) + farthest_way) / seconds
+        self._velocities[name] = (way / seconds, turn / seconds)
         self.speeds[name] = max(speed, self.speeds.get(name, 0.0))
         if self._bound is not None and speed > FASTER * self._bound and name not in self._warned:
             self._warned.add(name)

@@ -12,13 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector, finite_array
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.arrays import Matrix, Vector, finite_array, finite_number, not_negative, positive, whole_number
+from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.path_text import json_object
+from rrtik_ompl.poses import pose
 from rrtik_ompl.text_file import read_text, write_text
 from rrtik_ompl.transitions import route_length
 
 KIND = "replan_run"
+LARGEST = 512 * 1024 * 1024  # bytes of a record, half an hour of 20 obstacles at 50 Hz
 EVENTS = ("plan", "walk", "repair", "wait", "evade", "arrive")
 OUTCOMES = ("arrived", "out of time", "interrupted")
 
@@ -34,7 +36,8 @@ class Tick:
             one; "wait"; "evade"; "arrive": the last place.
         path: The path after the tick's work, shape (k, n), or None if there is none.
         poses: Of the obstacles that are not where they were in the first tick: x, y, z and quaternion x, y, z, w.
-        seconds: Wall time of its parts [s]: "sense", "look", "plan" or "repair" (search and shortening), "all".
+        seconds: Wall time of its parts [s]: "sense", "retarget", "look", "plan" or "repair" (search and shortening),
+            "all".
         checked: Configurations that the look at the path asked for.
         reason: Why the robot waits or evades, or "".
     """
@@ -149,28 +152,40 @@ def load_run(path: str | os.PathLike[str]) -> Run:
         InputError: If the file is missing or malformed; the message names it.
     """
     try:
-        document = json_object(read_text(path), KIND, "ticks")
-        given = {name: document[name] for name in _HEADS}
-        ticks = [_tick(entry, len(given["joint_names"])) for entry in document["ticks"]]
-        _check(given["outcome"], ticks)
-        return Run(**{**given, "joint_names": tuple(given["joint_names"])}, ticks=ticks)
+        document = json_object(read_text(path, LARGEST), KIND, "ticks")
+        heads = _heads(document)
+        ticks = [_tick(entry, len(heads["joint_names"])) for entry in document["ticks"]]
+        _check_times(ticks)
+        return Run(**heads, ticks=ticks)
     except (KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{path}: not a whole record: {error!r}; write it again with rrtik replan --record") from None
     except InputError as error:
         raise error if str(error).startswith(str(path)) else InputError(f"{path}: {error}") from None
 
 
-def _check(outcome: str, ticks: list[Tick]) -> None:
-    """Raise unless there are ticks in the order of time, and all words are known."""
+def _heads(document: Mapping[str, Any]) -> dict[str, Any]:
+    """What a record says beside its ticks, each entry of the right kind."""
+    given = {name: document[name] for name in _HEADS}
+    for name in ("problem", "robot", "planner", "outcome", "reason"):
+        require(given[name], str, name)
+    require(given["joint_names"], list, "joint_names")
+    whole_number(given["seed"], "seed")
+    for name in ("step", "rate"):
+        positive(given[name], name)
+    not_negative(given["margin"], "margin")
+    if given["speed_bound"] is not None:
+        positive(given["speed_bound"], "speed_bound")
+    if given["outcome"] not in OUTCOMES:
+        raise UnknownNameError("outcome", given["outcome"], OUTCOMES)
+    return {**given, "joint_names": tuple(given["joint_names"])}
+
+
+def _check_times(ticks: list[Tick]) -> None:
+    """Raise unless there are ticks in the order of time."""
     if not ticks:
-        raise InputError("the record has no tick: the run was interrupted before the first; run it again")
-    if outcome not in OUTCOMES:
-        raise UnknownNameError("outcome", str(outcome), OUTCOMES)
-    for tick in ticks:
-        if tick.event not in EVENTS:
-            raise UnknownNameError("event of a tick", tick.event, EVENTS)
+        raise InputError("the record has no tick; run it again")
     for before, after in pairwise(ticks):
-        if not after.time > before.time:
+        if after.time <= before.time:
             raise InputError(f"ticks: times go backwards: {after.time:g} s comes after {before.time:g} s")
 
 
@@ -182,11 +197,23 @@ def _tick_data(tick: Tick) -> dict[str, Any]:
 
 
 def _tick(entry: Mapping[str, Any], joints: int) -> Tick:
-    path = None if entry["path"] is None else finite_array(entry["path"], (None, joints), "path of a tick")
-    poses = {name: finite_array(pose, (7,), f"pose of '{name}'") for name, pose in entry["poses"].items()}
-    q = finite_array(entry["q"], (joints,), "q of a tick")
-    seconds = {part: float(value) for part, value in entry["seconds"].items()}
+    event = str(entry["event"])
+    if event not in EVENTS:
+        raise UnknownNameError("event of a tick", event, EVENTS)
     return Tick(
-        float(entry["time"]), q, str(entry["event"]), path, poses, seconds, int(entry["checked"]),
+        finite_number(entry["time"], "time of a tick"),
+        finite_array(entry["q"], (joints,), "q of a tick"),
+        event,
+        None if entry["path"] is None else finite_array(entry["path"], (None, joints), "path of a tick"),
+        {name: _placed(values, f"pose of '{name}'") for name, values in entry["poses"].items()},
+        {part: finite_number(value, f"seconds of '{part}'") for part, value in entry["seconds"].items()},
+        whole_number(entry["checked"], "checked"),
         str(entry.get("reason", "")),
-    )  # fmt: skip
+    )
+
+
+def _placed(values: Any, what: str) -> Vector:
+    """x, y, z and a unit quaternion, as written."""
+    row = finite_array(values, (7,), what)
+    pose(row[:3], row[3:], what)
+    return row

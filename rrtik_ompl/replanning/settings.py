@@ -20,6 +20,7 @@ from rrtik_ompl.trajectory.limits import RateLimits
 PLANNERS = ("drrt-con", "rrt-connect", "drrt")
 TURN = 2.0 * np.pi
 FASTEST = 1e5  # [Hz]
+SHORTEST = 1e-3  # of the usual eps: a path is looked at in pieces of half of it, which must fit into memory
 COPIES = 3  # places of an obstacle that are heeded at once where its motion is predicted
 
 
@@ -87,7 +88,7 @@ def settings(
         step=_above(step, "step", "how far to go in a tick [rad or m]"),
         rate=frequency,
         planner=planner,
-        eps=usual if eps is None else _above(eps, "eps", "the longest motion of the trees [rad or m]"),
+        eps=usual if eps is None else _long_enough(eps, usual),
         margin=distance,
         speed_bound=None if speed_bound is None else _above(speed_bound, "speed_bound", "metres a second"),
         most=rates.velocity / frequency,
@@ -110,6 +111,13 @@ def planner_of(chosen: Settings, world: MovingWorld, lower: Vector, upper: Vecto
         return KernelDrrtCon(world, lower, upper, chosen.eps, chosen.seed, forgetting=forgetting)
     kind = FromScratch if forgetting else DrrtCon
     return kind(PlainConnect(lower, upper, chosen.eps, chosen.seed), chosen.eps)
+
+
+def _long_enough(eps: float, usual: float) -> float:
+    number = _above(eps, "eps", "the longest motion of the trees [rad or m]")
+    if number < SHORTEST * usual:
+        raise InputError(f"eps must be at least {SHORTEST * usual:.3g}, got {number:g}; {usual:.3g} suits this robot")
+    return number
 
 
 def _above(value: float, name: str, what: str) -> float:

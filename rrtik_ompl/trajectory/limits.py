@@ -95,7 +95,8 @@ class RateLimits:
             InputError: If they are for another number of joints.
         """
         if len(self.velocity) not in (1, count):
-            raise InputError(f"path to time: it has {count} joints, but there are limits for {len(self.velocity)}")
+            given = len(self.velocity)
+            raise InputError(f"limits: there are {count} joints, but limits for {given}; give one, or one a joint")
         return RateLimits(*(np.broadcast_to(row, (count,)) for row in (self.velocity, self.acceleration, self.jerk)))
 
     def slowing(self, velocity: Vector, acceleration: Vector, jerk: Vector | None = None) -> float:

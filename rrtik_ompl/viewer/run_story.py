@@ -12,24 +12,24 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.poses import quaternion_xyzw
 from rrtik_ompl.replanning.run import Run, Tick
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Scene
-from rrtik_ompl.shapes import HalfSpace
-from rrtik_ompl.viewer.meshes import look_of_shape
+from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.viewer.framing import Frame
 from rrtik_ompl.viewer.robot_picture import node_name
+from rrtik_ompl.viewer.scene_picture import obstacle_look
 
 POINTS = 40  # of a path's line at most
 SHOWN = 0.5  # [s] that a path is seen after it was replaced
 DIGITS = 5
 
 
-def run_story(run: Run, robot: Robot, scene: Scene) -> dict[str, Any]:
+def run_story(run: Run, robot: Robot, scene: Scene, frame: Frame) -> dict[str, Any]:
     """The part of the page's story that is about a run."""
     lines, numbers = _lines(run, robot)
     moved = sorted({name for tick in run.ticks for name in tick.poses})
     return {
         "groups": _groups(run.ticks),
         "outcome": run.outcome + (f": {run.reason}" if run.reason else ""),
-        "moving": {node_name(name): _places(scene, name, run.ticks) for name in moved},
+        "moving": {node_name(name): _places(scene.obstacle(name), run.ticks, frame) for name in moved},
         "lines": lines,
         "line": numbers,
         "replaced": _replaced(run, numbers),
@@ -42,20 +42,18 @@ def _groups(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
     for (event, reason), members in groupby(ticks, lambda tick: (tick.event, tick.reason)):
         rows = list(members)
         first = found[-1]["first"] + found[-1]["count"] if found else 0
-        spent = [1e3 * tick.seconds[event] for tick in rows if event in ("plan", "repair")]
+        spent = [1e3 * tick.seconds[event] for tick in rows if event in tick.seconds]  # of a plan or a repair
         text = event + (f" ({reason})" if reason else "")
         text += f", {max(spent):.1f} ms" if spent else ""
         found.append({"first": first, "count": len(rows), "event": event, "text": text})
     return found
 
 
-def _places(scene: Scene, name: str, ticks: list[Tick]) -> dict[str, Any]:
+def _places(obstacle: Obstacle, ticks: list[Tick], frame: Frame) -> dict[str, Any]:
     """Where an obstacle is drawn in its own frame, and where that frame is in each tick."""
-    obstacle = scene.obstacle(name)
-    flat = isinstance(obstacle.shape, HalfSpace)
-    own = np.eye(4) if flat else look_of_shape(obstacle.shape).placement
+    _, own = obstacle_look(obstacle, frame)
     rest = np.concatenate([obstacle.pose.translation, quaternion_xyzw(obstacle.pose)])
-    poses = np.array([tick.poses.get(name, rest) for tick in ticks])
+    poses = np.array([tick.poses.get(obstacle.name, rest) for tick in ticks])
     return {"placement": own.ravel().tolist(), "poses": np.round(poses, DIGITS).tolist()}
 
 

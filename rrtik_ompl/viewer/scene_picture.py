@@ -16,7 +16,7 @@ from rrtik_ompl.shapes import Box, HalfSpace, Sphere
 from rrtik_ompl.task_region import TURN, TaskRegion
 from rrtik_ompl.viewer import palette
 from rrtik_ompl.viewer.framing import Frame
-from rrtik_ompl.viewer.meshes import half_space_plate, look_of_margin, look_of_shape, look_of_triangles
+from rrtik_ompl.viewer.meshes import Look, half_space_plate, look_of_margin, look_of_shape, look_of_triangles
 from rrtik_ompl.viewer.robot_picture import node_name
 from rrtik_ompl.viewer.triangles import tube
 
@@ -34,17 +34,21 @@ def draw_scene(vis: Any, scene: Scene, frame: Frame) -> None:
             _draw_motion(vis["later"][node_name(obstacle.name)], obstacle, obstacle.motion, frame)
 
 
-def _draw_obstacle(node: Any, obstacle: Obstacle, frame: Frame) -> None:
-    pose = obstacle.pose.homogeneous
+def obstacle_look(obstacle: Obstacle, frame: Frame) -> tuple[Look, Matrix]:
+    """How an obstacle is drawn, and where that is in the obstacle's own frame, shape (4, 4)."""
     if isinstance(obstacle.shape, HalfSpace):
         look, local = half_space_plate(obstacle.shape, obstacle.pose.actInv(frame.centre), 1.5 * frame.size)
-        node.set_object(look.geometry, _material(palette.OBSTACLE, opacity=0.2))
-        node.set_transform(pose @ local @ look.placement)
-    else:
-        look = look_of_shape(obstacle.shape)
-        node.set_object(look.geometry, _material(palette.OBSTACLE))
-        node.set_transform(pose @ look.placement)
-        _draw_margin(node["margin"], obstacle, look.placement)
+        return look, local @ look.placement
+    look = look_of_shape(obstacle.shape)
+    return look, look.placement
+
+
+def _draw_obstacle(node: Any, obstacle: Obstacle, frame: Frame) -> None:
+    look, placement = obstacle_look(obstacle, frame)
+    opacity = 0.2 if isinstance(obstacle.shape, HalfSpace) else 1.0
+    node.set_object(look.geometry, _material(palette.OBSTACLE, opacity))
+    node.set_transform(obstacle.pose.homogeneous @ placement)
+    _draw_margin(node["margin"], obstacle, placement)
 
 
 def _draw_margin(node: Any, obstacle: Obstacle, placement: Matrix) -> None:

@@ -49,7 +49,7 @@ def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
         "before": "" if subject.before is None else _compared(subject.before, subject.waypoints),
         "moves": [] if robot is None else _moves(subject.waypoints),
         "times": [] if robot is None else _numbers(_times(subject, robot, frame)),
-        "run": None if subject.run is None or robot is None else run_story(subject.run, robot, subject.scene),
+        "run": None if subject.run is None or robot is None else run_story(subject.run, robot, subject.scene, frame),
         "frame": {"low": _numbers(frame.low), "high": _numbers(frame.high)},
         "overview": _numbers(overview(_places(subject), subject.scene)),
         "planar": robot is not None and robot.planar,

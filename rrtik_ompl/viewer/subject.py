@@ -57,7 +57,7 @@ class Subject:
         """Configuration of the goal ghost, shape (dof,): end of the path or the goal's joint values, or None."""
         if self.ghosts is not None:
             return None
-        if not self.is_path:
+        if not self.is_path or (self.run is not None and not self.run.arrived):
             return self.goal.q if isinstance(self.goal, JointGoal) else None
         end: Vector = self.waypoints[-1]
         return end
@@ -135,6 +135,9 @@ def subject_of_run(problem: Any, run: Any) -> Subject:
     require(run, Run, "run to show", "use replan() or load_run(file)")
     if len(run.ticks) == 0:
         raise InputError("run to show: it has no tick")
+    robot = subject_of(problem).robot
+    if robot is None or robot.joint_names != run.joint_names:
+        raise InputError(f"run to show: one of robot '{run.robot}' with other joints; give the problem that was run")
     shown = subject_of(problem, run.configurations)
     scene = shown.scene
     still = tuple(replace(o, motion=None) for o in scene.at(0.0).obstacles)

@@ -80,7 +80,6 @@ class BatchedSearch:
         back: The tree from goal configurations that are known, likewise.
         goals: Those, shape (k, n).
         blocked: One in collision, if any was met, shape (0 or 1, n).
-        nearest: The configuration nearest to the goal that was seen, in collision or not, shape (n,).
         connects, restarts, vertices: Counts.
     """
 
@@ -103,7 +102,14 @@ class BatchedSearch:
         self._newest, self._batches = starts[:0], 0
         self.connects = self.restarts = self._dropped = 0
         self.blocked = starts[:0]
-        self.nearest, self._least = starts[self._distances.argmin()], float(self._distances.min())
+        self._nearest: Vector = starts[self._distances.argmin()]
+        self._least = float(self._distances.min())
+
+    @property
+    def nearest(self) -> Vector:
+        """The configuration nearest to the goal that was seen, in collision or not, shape (n,)."""
+        self._see(self.tree.q, self.tree.distance)
+        return self._nearest
 
     @property
     def vertices(self) -> int:
@@ -216,8 +222,7 @@ class BatchedSearch:
         samples = self._rng.uniform(self._lower, self._upper, (scouts, len(self._lower)))
         origins = np.vstack([self.tree.q[vertices], samples])
         ends = descend(self._metric, origins, self._lower, self._upper)
-        if ends.distance.min() < self._least:
-            self.nearest, self._least = ends.q[ends.distance.argmin()], float(ends.distance.min())
+        self._see(ends.q, ends.distance)
         arrived = ends.distance <= self._metric.radius
         near = arrived[: len(vertices)]
         path = self._straight(vertices[near], ends.q[: len(vertices)][near])
@@ -251,7 +256,14 @@ class BatchedSearch:
         path = self._join(self.back, roots, self.tree)
         return None if path is None else path[::-1]
 
+    def _see(self, Q: Matrix, distances: Vector) -> None:
+        """Remember the nearest to the goal of some configurations."""
+        k = distances.argmin()
+        if distances[k] < self._least:
+            self._nearest, self._least = Q[k].copy(), float(distances[k])
+
     def _restart(self) -> None:
+        self._see(self.tree.q, self.tree.distance)
         self._dropped += self.tree.size + self.back.size
         self.restarts += 1
         self.tree = Tree(self._starts, self._distances)
