@@ -204,7 +204,7 @@ def main() -> None:
     add_options(parser, "drrt_con.md")
     given = parser.parse_args()
     report = Report("DRRT-Con", "python bench/drrt_con_report.py", processes(given.jobs))
-    parts = [("plane", given.repeats), ("repairs", max(given.repeats // 5, 2))]
+    parts = [("plane", given.repeats), ("repairs", max(given.repeats // 3, 2))]
     with Parts(given.out, given.jobs) as measure:
         for section in measure(part, parts):
             report.bars += section.bars

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.terminal import progress, say
+from rrtik_ompl.terminal import note, progress, say
 from rrtik_ompl.text_file import check_target
 
 Scenario = Annotated[str, typer.Argument(help="A problem with a run: section, shipped or a YAML file.")]
@@ -30,8 +30,6 @@ def replan_scenario(
 
     Look, repair, step, again and again. Exit code 1 if it did not arrive.
     """
-    if record is not None and replay is not None:
-        raise InputError("--replay shows what has happened: leave out --record")
     check_target(html, (".html", ".htm"))
     check_target(record, (".json",))
     options = {"predict": predict, "seconds": seconds, "record": record}
@@ -42,8 +40,13 @@ def replan_scenario(
 
     chosen = load_scenario(scenario)
     if replay is None:
-        with progress(f"{chosen.problem.name} with {planner}"):
-            run = chosen.run(planner=planner, seed=seed, **given)
+        try:
+            with progress(f"{chosen.problem.name} with {planner}"):
+                run = chosen.run(planner=planner, seed=seed, **given)
+        except KeyboardInterrupt:
+            if record is not None:
+                note(f"{record} holds the run as far as it went, if it had begun")
+            raise
     else:
         run = _recorded(replay, chosen.problem.name)
     if html is not None:

@@ -11,7 +11,7 @@ from rrtik_ompl.moving_world import MovingWorld
 from rrtik_ompl.replanning.connecting import CUTS, ITERATIONS, PATIENCE, KernelConnect, KernelCuts, Motions, Stop, never
 from rrtik_ompl.replanning.drrt_con import DrrtCon
 
-REPAIR_CUTS, REPAIR_PATIENCE = 24, 8  # as CUTS and PATIENCE, where only a detour is new
+REPAIR_CUTS, REPAIR_PATIENCE = 16, 6  # as CUTS and PATIENCE, where only a detour is new; walking shortens it further
 
 
 class KernelDrrtCon(DrrtCon):

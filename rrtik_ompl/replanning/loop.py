@@ -59,6 +59,7 @@ class Loop:
         self._goals = _goals(problem, self._alone, self._rng) if goal_feed is None else _goal(robot, goal_feed, 0.0)
         self._first = {o.name: o.pose for o in scene.obstacles}
         self._see(0.0)
+        self._world.move(scene, rooms=self._room)  # a start may stand where something is only expected
         _check_start(self.q, scene, first, self._world)
         ends = np.vstack([self.q, self._goals])
         lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - TURN)
@@ -84,8 +85,9 @@ class Loop:
         free = self._timed(spent, "look", self._look) if changed or not self._planner.free else True
         checked, event, reason = self._world.checked - checked, "walk", ""
         if not free and not self._world.blocked:
-            event = "repair" if self._planner.path is not None else "plan"
+            event, before = "repair" if self._planner.path is not None else "plan", self._planner.path
             free = self._timed(spent, event, self._repair)
+            event = "walk" if free and self._planner.path is before else event
         here = self.q
         if free:
             place = self._walk()
@@ -154,8 +156,9 @@ class Loop:
             return "wait", self._world.blocked, self.q
         if self._world.valid(self.q):
             path = self._planner.path
-            blocked = path is not None and not self._world.valid(path[-1])
-            return "wait", "the goal is not free" if blocked else "there is no way", self.q
+            goals = self._goals if path is None else path[-1:]
+            reason = "there is no way" if self._world.valid_batch(goals).any() else "the goal is not free"
+            return "wait", reason, self.q
         chosen, way = self._chosen, self._planner.path
         room = max(self._room.values())
         place = evasion(self.q, chosen.step, chosen.most, room, self._near, self._later, self._alone, self._rng, way)
