@@ -22,6 +22,7 @@ import pytest
 from rrtik_ompl import catalog, load_robot, plan
 from rrtik_ompl.benchmark.campaign import run_campaign
 from rrtik_ompl.benchmark.records import NAME, RecordFile, key_of, read_head, read_records
+from rrtik_ompl.benchmark.report import write_report
 from rrtik_ompl.benchmark.scaling import crowded_arm, planar_chain
 from rrtik_ompl.benchmark.sources import build
 from rrtik_ompl.benchmark.statistics import QUANTITIES, results, spread
@@ -162,8 +163,11 @@ def test_the_database_is_sound_and_has_ompls_columns_and_ours(campaign):
         times = base.execute("SELECT time FROM runs ORDER BY time").fetchall()
         (clear,) = base.execute("SELECT COUNT(*) FROM runs WHERE solution_clearance > 0").fetchone()
         (strict,) = base.execute("SELECT SUM(correct_solution_strict) FROM runs").fetchone()
+        (graphs,) = base.execute("SELECT COUNT(*) FROM runs WHERE graph_motions > 0 AND graph_states > 0").fetchone()
+        fractions = base.execute("SELECT valid_segment_fraction, plannerid = 1 FROM runs").fetchall()
         (solved,) = base.execute("SELECT COUNT(*) FROM runs WHERE solved = 1 AND status = 6").fetchone()
     ompls = {"time", "memory", "solved", "status", "solution_length", "simplified_solution_length", "graph_states"}
+    ompls |= {"graph_motions", "valid_segment_fraction"}
     ompls |= {
         f"{first}solution_{name}" for first in ("", "simplified_") for name in ("clearance", "smoothness", "segments")
     }
@@ -173,7 +177,20 @@ def test_the_database_is_sound_and_has_ompls_columns_and_ours(campaign):
     np.testing.assert_allclose(
         [time for (time,) in times], sorted(r["plan_seconds"] for r in read_records(campaign / NAME)), rtol=1e-8
     )
-    assert solved == clear == strict == TOTAL
+    assert solved == clear == strict == graphs == TOTAL
+    assert all(ours if share is None else 0.0 < share <= 1.0 for share, ours in fractions)
+
+
+def test_records_of_an_earlier_version_are_still_reported(campaign, tmp_path):
+    later = ("edges", "free_motions")
+    with RecordFile(tmp_path / NAME, read_head(campaign / NAME)) as out:
+        for record in read_records(campaign / NAME):
+            out.append({**record, "counts": {k: v for k, v in record["counts"].items() if k not in later}})
+    _, files = write_report(tmp_path / NAME, views=0)
+    assert all(file.stat().st_size for file in files)
+    with closing(sqlite3.connect(tmp_path / "benchmark.db")) as base:
+        told = base.execute("SELECT COUNT(graph_motions), COUNT(valid_segment_fraction), COUNT(*) FROM runs").fetchone()
+    assert told == (0, 0, TOTAL)
 
 
 def test_ompls_own_planners_are_logged_like_ompl_logs_them(campaign):
@@ -365,8 +382,8 @@ def _lives(pid):
 
 
 def test_where_the_disk_is_full_all_records_before_stay_whole(tmp_path):
-    head = {"version": 1, "suite": {}}
-    record = {"problem": "p", "planner": "a", "seed": 1, "group": "p", "status": "solved"}
+    head = {"version": 1, "suite": {}, "machine": {}}
+    record = {"problem": "p", "planner": "a", "seed": 1, "group": "p", "axis": "", "value": 0, "status": "hang"}
     file = tmp_path / NAME
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     with RecordFile(file, head) as out:
@@ -400,21 +417,37 @@ def _append(out, records):
     [
         ("{half", "not a record of a run"),
         ("[1]", "found list"),
-        ('{"problem": "p"}', "planner is missing"),
-        ('{"problem":"p","planner":"a","run":0,"seed":1,"group":"p","status":"great"}', "status 'great' is none of"),
+        ('{"problem": "p"}', "group is missing"),
+        ("\udcff", "codec can't decode"),
+        ({"axis": None}, "axis cannot be None"),
+        ({"status": "great"}, "status 'great' is none of"),
+        ({"plan_seconds": "soon"}, "plan_seconds cannot be 'soon'"),
+        ({"counts": {"iterations": []}}, "count iterations cannot be []"),
+        ({"waypoints": 3}, "waypoints cannot be 3"),
     ],
 )
 def test_a_corrupt_record_is_named_by_its_line_and_nothing_is_lost(campaign, suite, tmp_path, capsys, line, words):
     lines = (campaign / NAME).read_text().splitlines()
-    lines[4] = line
+    lines[4] = line if isinstance(line, str) else json.dumps({**json.loads(lines[4]), **line})
     text = "\n".join([*lines, ""])
-    (tmp_path / NAME).write_text(text)
+    (tmp_path / NAME).write_text(text, errors="surrogateescape")
     assert run(["bench", str(suite), "--out", str(tmp_path), "--resume"]) == 2
     message = capsys.readouterr().err
     assert f"{NAME}:5: " in message
     assert words in message
     assert message.count("\n") == 1
-    assert (tmp_path / NAME).read_text() == text
+    assert (tmp_path / NAME).read_text(errors="surrogateescape") == text
+
+
+def test_a_solved_run_without_its_path_and_a_head_without_its_machine_are_told(campaign, tmp_path):
+    head, *lines = (campaign / NAME).read_text().splitlines()
+    lines[0] = json.dumps({key: value for key, value in json.loads(lines[0]).items() if key != "waypoints"})
+    (tmp_path / NAME).write_text("\n".join([head, *lines, ""]))
+    with pytest.raises(InputError, match=f"{NAME}:2: not a record of a run .waypoints is missing"):
+        write_report(tmp_path / NAME)
+    (tmp_path / NAME).write_text(json.dumps({**json.loads(head), "machine": {"ompl": "2"}}) + "\n")
+    with pytest.raises(InputError, match=f"{NAME}:1: machine lacks rrtik-ompl, pin"):
+        write_report(tmp_path / NAME)
 
 
 def test_a_file_that_is_no_campaign_is_refused(suite, tmp_path, capsys):
