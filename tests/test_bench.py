@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rrtik_ompl import catalog, load_robot, plan
-from rrtik_ompl.benchmark.campaign import run_campaign
+from rrtik_ompl import catalog, load_problem, load_robot, plan, plan_batch
+from rrtik_ompl.benchmark.campaign import machine, run_campaign
 from rrtik_ompl.benchmark.records import NAME, RecordFile, key_of, read_head, read_records
 from rrtik_ompl.benchmark.report import write_report
 from rrtik_ompl.benchmark.scaling import crowded_arm, planar_chain
@@ -137,6 +137,24 @@ def test_an_interrupted_campaign_goes_on_and_finds_the_same_one_at_a_time(campai
     assert run(["bench", str(suite), "--out", str(tmp_path), "--views", "0", "--resume", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["outcomes"] == {"solved": TOTAL - 7}
     assert found(tmp_path) == found(campaign)
+
+
+def test_another_machine_is_told_and_a_campaign_that_never_began_begins_anew(suite, tmp_path):
+    tiny = load_suite(suite, runs=1)
+    head = {"version": 1, "suite": tiny.plain(), "machine": {**machine(3, None), "ompl": "1.0"}}
+    with RecordFile(tmp_path / NAME, head) as out:
+        pass
+    assert read_head(tmp_path / NAME)["machine"]["ompl"] == "1.0"
+    first = {"problem": "planar3_a", "planner": "bicrdt", "run": 0, "seed": 1, "status": "hang"}
+    with RecordFile(tmp_path / NAME, {**head, "machine": machine(1, None)}) as out:
+        out.append({**first, "group": "planar3_a", "axis": "", "value": 0.0})
+    assert read_head(tmp_path / NAME)["machine"]["at a time"] == 1
+
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    with pytest.warns(UserWarning, match="begun with at a time 1, now 2: times"), pytest.raises(KeyboardInterrupt):
+        run_campaign(tiny, tmp_path, jobs=2, resume=True, on_run=stop)
 
 
 def test_a_campaign_is_not_continued_with_another_suite(campaign, suite, tmp_path, capsys):
@@ -402,7 +420,8 @@ def test_where_the_disk_is_full_all_records_before_stay_whole(tmp_path):
 
 
 def test_two_campaigns_do_not_write_one_file(suite, tmp_path, capsys):
-    with RecordFile(tmp_path / NAME, {"version": 1, "suite": load_suite(suite).plain()}):
+    head = {"version": 1, "suite": load_suite(suite).plain(), "machine": machine(1, None)}
+    with RecordFile(tmp_path / NAME, head):
         assert run(["bench", str(suite), "--out", str(tmp_path), "--resume"]) == 2
     assert f"{NAME}: another campaign is writing it" in capsys.readouterr().err
 
@@ -541,6 +560,35 @@ def _wait_for_workers(address, count):
         client.wait_for_workers(count, timeout=60)
 
 
+def test_a_batch_of_queries_comes_in_order_and_finds_what_plan_finds(tmp_path):
+    problem = load_problem("planar3_a")
+    (tmp_path / "planar3_a.yaml").write_text("version: 1\n")  # of the same name, and no problem
+    queries = ["titan4_prisms", "planar3_a", tmp_path / "planar3_a.yaml"]
+    records = plan_batch(queries, "RRTConnect", seconds=20.0, seed=3, parameters={"range": 0.5}, jobs=2)
+    assert [record["problem"] for record in records] == ["titan4_prisms", "planar3_a", "planar3_a"]
+    assert [record["status"] for record in records] == ["solved", "solved", "error"]
+    assert "robot" in records[2]["reason"]
+    alone = plan(problem, "RRTConnect", seconds=20.0, seed=records[1]["seed"], parameters={"range": 0.5})
+    assert records[1]["waypoints"] == alone.path.waypoints.tolist()
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"problems": ["planar3_z"]}, "no problem 'planar3_z'"),
+        ({"problems": "planar3_a"}, "must be a list"),
+        ({"planner": "bicrtd"}, "no planner 'bicrtd'"),
+        ({"parameters": {"rnage": 1}}, "no parameter of planner bicrdt 'rnage'"),
+        ({"shorten": "axle"}, "no shortening method 'axle'"),
+        ({"seconds": 0}, "seconds"),
+        ({"jobs": 0}, "jobs"),
+    ],
+)
+def test_a_batch_refuses_what_makes_no_sense(given, words):
+    with pytest.raises(InputError, match=words):
+        plan_batch(**{"problems": ["planar3_a"], **given})
+
+
 @pytest.mark.parametrize("name", sorted(file.stem for file in FOLDER.glob("*.yaml")))
 def test_shipped_suites_name_what_there_is(name):
     file = FOLDER / f"{name}.yaml"
@@ -549,8 +597,7 @@ def test_shipped_suites_name_what_there_is(name):
             load_suite(file)
         return
     campaign = load_suite(file)
-    runs = campaign.runs * len(campaign.sources) * len(campaign.entrants)
-    assert f"# {runs:,} runs" in file.read_text()  # its head says what a person lets himself in for
+    assert f"# {campaign.total:,} runs" in file.read_text()  # its head says what a person lets himself in for
 
 
 def test_suites_are_found_by_name_and_unknown_ones_listed(monkeypatch, capsys):

@@ -28,6 +28,7 @@ NEEDED = {
 }
 OF_A_PATH = ("plan_seconds", "length", "waypoints")
 NO_NUMBERS = {"reason": str, "counts": dict, "waypoints": list, **NEEDED}  # whatever else was measured is a number
+# What the head says of the machine, the beginning of the campaign last.
 MACHINE = ("rrtik-ompl", "ompl", "pin", "coal", "numpy", "python", "system", "processor", "cores", "at a time", "begun")
 
 
@@ -137,8 +138,9 @@ class RecordFile:
         self._file.close()
 
     def _cut_half_line(self) -> None:
+        """What is not whole goes; so does a head without runs, for that of this campaign takes its place."""
         data = self._name.read_bytes()
-        self._end = data.rfind(b"\n") + 1
+        self._end = data.rfind(b"\n") + 1 if data.count(b"\n") > 1 else 0
         if self._end < len(data):
             os.truncate(self._name, self._end)
 
