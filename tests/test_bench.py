@@ -469,6 +469,15 @@ def test_a_solved_run_without_its_path_and_a_head_without_its_machine_are_told(c
         write_report(tmp_path / NAME)
 
 
+@pytest.mark.parametrize("other", [{"problem": "planar3_z"}, {"group": "planar3_z"}, {"planner": "nobody"}])
+def test_a_run_that_the_suite_does_not_name_is_told(campaign, tmp_path, other):
+    head, *lines = (campaign / NAME).read_text().splitlines()
+    lines[0] = json.dumps({**json.loads(lines[0]), **other})
+    (tmp_path / NAME).write_text("\n".join([head, *lines, ""]))
+    with pytest.raises(InputError, match=r"nobody|planar3_z"):
+        write_report(tmp_path / NAME)
+
+
 def test_a_file_that_is_no_campaign_is_refused(suite, tmp_path, capsys):
     (tmp_path / NAME).write_text('{"a": 1}\n{"b": 2}\n')
     with pytest.raises(InputError, match="not the head of a campaign"):

@@ -97,7 +97,7 @@ def measured(record: Mapping[str, Any], quantity: str) -> float | None:
     counts = record.get("counts", {})
     if quantity == "free_share":
         motions = counts.get("checked_motions", 0)
-        return counts["free_motions"] / motions if motions and "free_motions" in counts else None
+        return float(counts["free_motions"] / motions) if motions and "free_motions" in counts else None
     value = record.get(quantity, counts.get(quantity))
     return None if value is None else float(value)
 
