@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from rrtik_ompl.benchmark.batch import plan_batch as plan_batch
     from rrtik_ompl.catalog import list_problems as list_problems
     from rrtik_ompl.catalog import list_robots as list_robots
     from rrtik_ompl.catalog import load_robot as load_robot
@@ -95,6 +96,7 @@ if TYPE_CHECKING:
 else:
     _HOMES = {
         "catalog": ("list_problems", "list_robots", "load_robot"),
+        "benchmark.batch": ("plan_batch",),
         "errors": ("InputError", "PlannerError", "ProblemError", "RrtikError", "UnknownNameError"),
         "goal": ("GoalRegion", "JointGoal", "PoseGoal", "PositionGoal"),
         "ik.batch": ("IkBatch", "solve_ik_batch"),

@@ -43,7 +43,7 @@ def bench(
     folder = Path(f"bench-{campaign.name}") if out is None else out
     if scheduler is None:
         warm_up(lambda _: None)  # once, before processes that work side by side would all compile
-    total = len(campaign.sources) * len(campaign.entrants) * campaign.runs
+    total = campaign.total
     outcomes: Counter[str] = Counter()
     so_far = Progress(0, total)
     with counter(campaign.name, total) as show:

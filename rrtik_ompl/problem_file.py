@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import Field
 
 from rrtik_ompl.catalog import find_problem, load_robot, robot_from_entry
-from rrtik_ompl.errors import ProblemError, UnknownNameError, require
+from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError, require
 from rrtik_ompl.file_format import Positive, Section, Version, parse, without_null
 from rrtik_ompl.goal_file import GoalSection, StartSection, build_goal, goal_data
 from rrtik_ompl.motion_bench_maker import is_motion_bench_maker, load_motion_bench_maker
@@ -26,6 +26,10 @@ from rrtik_ompl.world import FINEST_RESOLUTION, MOTION_RESOLUTION, World
 from rrtik_ompl.yaml_file import YamlDocument, read_yaml, write_yaml
 
 FilePath = str | os.PathLike[str]
+
+
+ONLY_PATHS = (".csv", ".txt")  # endings; a .json may be either
+OF_PATHS = ("waypoints", "points")  # keys of files of paths and of trajectories
 
 
 class ProblemFile(Section):
@@ -56,7 +60,7 @@ def load_problem(name_or_file: FilePath, *, robot: Robot | FilePath | None = Non
         ProblemError: If start or goal is in collision or outside the limits.
     """
     path = problem_path(name_or_file)
-    document = read_yaml(path)
+    document = _read(path)
     if is_motion_bench_maker(document.data):
         return load_motion_bench_maker(path, robot=robot)
     entry = parse(document, ProblemFile)
@@ -71,6 +75,15 @@ def load_problem(name_or_file: FilePath, *, robot: Robot | FilePath | None = Non
         line = document.lines[("goal",) if str(error).startswith("goal") else ("start",)]
         error.args = (f"{path}:{line}: {error}",)
         raise
+
+
+def _read(path: Path) -> YamlDocument:
+    """The content of a problem file; whoever names a path alone is told what is missing."""
+    document = None if path.suffix.lower() in ONLY_PATHS and path.is_file() else read_yaml(path)
+    if document is None or (isinstance(document.data, dict) and not document.data.keys().isdisjoint(OF_PATHS)):
+        name = path.name
+        raise InputError(f"{path}: a path, not a problem; name its problem before it: rrtik check PROBLEM {name}")
+    return document
 
 
 def save_problem(problem: Problem, path: FilePath) -> None:

@@ -19,9 +19,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rrtik_ompl import catalog, load_robot, plan
-from rrtik_ompl.benchmark.campaign import run_campaign
+from rrtik_ompl import catalog, load_problem, load_robot, plan, plan_batch
+from rrtik_ompl.benchmark.campaign import machine, run_campaign
 from rrtik_ompl.benchmark.records import NAME, RecordFile, key_of, read_head, read_records
+from rrtik_ompl.benchmark.report import write_report
 from rrtik_ompl.benchmark.scaling import crowded_arm, planar_chain
 from rrtik_ompl.benchmark.sources import build
 from rrtik_ompl.benchmark.statistics import QUANTITIES, results, spread
@@ -138,6 +139,24 @@ def test_an_interrupted_campaign_goes_on_and_finds_the_same_one_at_a_time(campai
     assert found(tmp_path) == found(campaign)
 
 
+def test_another_machine_is_told_and_a_campaign_that_never_began_begins_anew(suite, tmp_path):
+    tiny = load_suite(suite, runs=1)
+    head = {"version": 1, "suite": tiny.plain(), "machine": {**machine(3, None), "ompl": "1.0"}}
+    with RecordFile(tmp_path / NAME, head) as out:
+        pass
+    assert read_head(tmp_path / NAME)["machine"]["ompl"] == "1.0"
+    first = {"problem": "planar3_a", "planner": "bicrdt", "run": 0, "seed": 1, "status": "hang"}
+    with RecordFile(tmp_path / NAME, {**head, "machine": machine(1, None)}) as out:
+        out.append({**first, "group": "planar3_a", "axis": "", "value": 0.0})
+    assert read_head(tmp_path / NAME)["machine"]["at a time"] == 1
+
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    with pytest.warns(UserWarning, match="begun with at a time 1, now 2: times"), pytest.raises(KeyboardInterrupt):
+        run_campaign(tiny, tmp_path, jobs=2, resume=True, on_run=stop)
+
+
 def test_a_campaign_is_not_continued_with_another_suite(campaign, suite, tmp_path, capsys):
     other = tmp_path / "two.yaml"
     other.write_text(SUITE.replace("seed: 7", "seed: 8"))
@@ -162,8 +181,11 @@ def test_the_database_is_sound_and_has_ompls_columns_and_ours(campaign):
         times = base.execute("SELECT time FROM runs ORDER BY time").fetchall()
         (clear,) = base.execute("SELECT COUNT(*) FROM runs WHERE solution_clearance > 0").fetchone()
         (strict,) = base.execute("SELECT SUM(correct_solution_strict) FROM runs").fetchone()
+        (graphs,) = base.execute("SELECT COUNT(*) FROM runs WHERE graph_motions > 0 AND graph_states > 0").fetchone()
+        fractions = base.execute("SELECT valid_segment_fraction, plannerid = 1 FROM runs").fetchall()
         (solved,) = base.execute("SELECT COUNT(*) FROM runs WHERE solved = 1 AND status = 6").fetchone()
     ompls = {"time", "memory", "solved", "status", "solution_length", "simplified_solution_length", "graph_states"}
+    ompls |= {"graph_motions", "valid_segment_fraction"}
     ompls |= {
         f"{first}solution_{name}" for first in ("", "simplified_") for name in ("clearance", "smoothness", "segments")
     }
@@ -173,7 +195,20 @@ def test_the_database_is_sound_and_has_ompls_columns_and_ours(campaign):
     np.testing.assert_allclose(
         [time for (time,) in times], sorted(r["plan_seconds"] for r in read_records(campaign / NAME)), rtol=1e-8
     )
-    assert solved == clear == strict == TOTAL
+    assert solved == clear == strict == graphs == TOTAL
+    assert all(ours if share is None else 0.0 < share <= 1.0 for share, ours in fractions)
+
+
+def test_records_of_an_earlier_version_are_still_reported(campaign, tmp_path):
+    later = ("edges", "free_motions")
+    with RecordFile(tmp_path / NAME, read_head(campaign / NAME)) as out:
+        for record in read_records(campaign / NAME):
+            out.append({**record, "counts": {k: v for k, v in record["counts"].items() if k not in later}})
+    _, files = write_report(tmp_path / NAME, views=0)
+    assert all(file.stat().st_size for file in files)
+    with closing(sqlite3.connect(tmp_path / "benchmark.db")) as base:
+        told = base.execute("SELECT COUNT(graph_motions), COUNT(valid_segment_fraction), COUNT(*) FROM runs").fetchone()
+    assert told == (0, 0, TOTAL)
 
 
 def test_ompls_own_planners_are_logged_like_ompl_logs_them(campaign):
@@ -365,8 +400,8 @@ def _lives(pid):
 
 
 def test_where_the_disk_is_full_all_records_before_stay_whole(tmp_path):
-    head = {"version": 1, "suite": {}}
-    record = {"problem": "p", "planner": "a", "seed": 1, "group": "p", "status": "solved"}
+    head = {"version": 1, "suite": {}, "machine": {}}
+    record = {"problem": "p", "planner": "a", "seed": 1, "group": "p", "axis": "", "value": 0, "status": "hang"}
     file = tmp_path / NAME
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     with RecordFile(file, head) as out:
@@ -385,7 +420,8 @@ def test_where_the_disk_is_full_all_records_before_stay_whole(tmp_path):
 
 
 def test_two_campaigns_do_not_write_one_file(suite, tmp_path, capsys):
-    with RecordFile(tmp_path / NAME, {"version": 1, "suite": load_suite(suite).plain()}):
+    head = {"version": 1, "suite": load_suite(suite).plain(), "machine": machine(1, None)}
+    with RecordFile(tmp_path / NAME, head):
         assert run(["bench", str(suite), "--out", str(tmp_path), "--resume"]) == 2
     assert f"{NAME}: another campaign is writing it" in capsys.readouterr().err
 
@@ -400,21 +436,46 @@ def _append(out, records):
     [
         ("{half", "not a record of a run"),
         ("[1]", "found list"),
-        ('{"problem": "p"}', "planner is missing"),
-        ('{"problem":"p","planner":"a","run":0,"seed":1,"group":"p","status":"great"}', "status 'great' is none of"),
+        ('{"problem": "p"}', "group is missing"),
+        ("\udcff", "codec can't decode"),
+        ({"axis": None}, "axis cannot be None"),
+        ({"status": "great"}, "status 'great' is none of"),
+        ({"plan_seconds": "soon"}, "plan_seconds cannot be 'soon'"),
+        ({"counts": {"iterations": []}}, "count iterations cannot be []"),
+        ({"waypoints": 3}, "waypoints cannot be 3"),
     ],
 )
 def test_a_corrupt_record_is_named_by_its_line_and_nothing_is_lost(campaign, suite, tmp_path, capsys, line, words):
     lines = (campaign / NAME).read_text().splitlines()
-    lines[4] = line
+    lines[4] = line if isinstance(line, str) else json.dumps({**json.loads(lines[4]), **line})
     text = "\n".join([*lines, ""])
-    (tmp_path / NAME).write_text(text)
+    (tmp_path / NAME).write_text(text, errors="surrogateescape")
     assert run(["bench", str(suite), "--out", str(tmp_path), "--resume"]) == 2
     message = capsys.readouterr().err
     assert f"{NAME}:5: " in message
     assert words in message
     assert message.count("\n") == 1
-    assert (tmp_path / NAME).read_text() == text
+    assert (tmp_path / NAME).read_text(errors="surrogateescape") == text
+
+
+def test_a_solved_run_without_its_path_and_a_head_without_its_machine_are_told(campaign, tmp_path):
+    head, *lines = (campaign / NAME).read_text().splitlines()
+    lines[0] = json.dumps({key: value for key, value in json.loads(lines[0]).items() if key != "waypoints"})
+    (tmp_path / NAME).write_text("\n".join([head, *lines, ""]))
+    with pytest.raises(InputError, match=f"{NAME}:2: not a record of a run .waypoints is missing"):
+        write_report(tmp_path / NAME)
+    (tmp_path / NAME).write_text(json.dumps({**json.loads(head), "machine": {"ompl": "2"}}) + "\n")
+    with pytest.raises(InputError, match=f"{NAME}:1: machine lacks rrtik-ompl, pin"):
+        write_report(tmp_path / NAME)
+
+
+@pytest.mark.parametrize("other", [{"problem": "planar3_z"}, {"group": "planar3_z"}, {"planner": "nobody"}])
+def test_a_run_that_the_suite_does_not_name_is_told(campaign, tmp_path, other):
+    head, *lines = (campaign / NAME).read_text().splitlines()
+    lines[0] = json.dumps({**json.loads(lines[0]), **other})
+    (tmp_path / NAME).write_text("\n".join([head, *lines, ""]))
+    with pytest.raises(InputError, match=r"nobody|planar3_z"):
+        write_report(tmp_path / NAME)
 
 
 def test_a_file_that_is_no_campaign_is_refused(suite, tmp_path, capsys):
@@ -508,6 +569,35 @@ def _wait_for_workers(address, count):
         client.wait_for_workers(count, timeout=60)
 
 
+def test_a_batch_of_queries_comes_in_order_and_finds_what_plan_finds(tmp_path):
+    problem = load_problem("planar3_a")
+    (tmp_path / "planar3_a.yaml").write_text("version: 1\n")  # of the same name, and no problem
+    queries = ["titan4_prisms", "planar3_a", tmp_path / "planar3_a.yaml"]
+    records = plan_batch(queries, "RRTConnect", seconds=20.0, seed=3, parameters={"range": 0.5}, jobs=2)
+    assert [record["problem"] for record in records] == ["titan4_prisms", "planar3_a", "planar3_a"]
+    assert [record["status"] for record in records] == ["solved", "solved", "error"]
+    assert "robot" in records[2]["reason"]
+    alone = plan(problem, "RRTConnect", seconds=20.0, seed=records[1]["seed"], parameters={"range": 0.5})
+    assert records[1]["waypoints"] == alone.path.waypoints.tolist()
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"problems": ["planar3_z"]}, "no problem 'planar3_z'"),
+        ({"problems": "planar3_a"}, "must be a list"),
+        ({"planner": "bicrtd"}, "no planner 'bicrtd'"),
+        ({"parameters": {"rnage": 1}}, "no parameter of planner bicrdt 'rnage'"),
+        ({"shorten": "axle"}, "no shortening method 'axle'"),
+        ({"seconds": 0}, "seconds"),
+        ({"jobs": 0}, "jobs"),
+    ],
+)
+def test_a_batch_refuses_what_makes_no_sense(given, words):
+    with pytest.raises(InputError, match=words):
+        plan_batch(**{"problems": ["planar3_a"], **given})
+
+
 @pytest.mark.parametrize("name", sorted(file.stem for file in FOLDER.glob("*.yaml")))
 def test_shipped_suites_name_what_there_is(name):
     file = FOLDER / f"{name}.yaml"
@@ -516,8 +606,7 @@ def test_shipped_suites_name_what_there_is(name):
             load_suite(file)
         return
     campaign = load_suite(file)
-    runs = campaign.runs * len(campaign.sources) * len(campaign.entrants)
-    assert f"# {runs:,} runs" in file.read_text()  # its head says what a person lets himself in for
+    assert f"# {campaign.total:,} runs" in file.read_text()  # its head says what a person lets himself in for
 
 
 def test_suites_are_found_by_name_and_unknown_ones_listed(monkeypatch, capsys):

@@ -91,6 +91,18 @@ def test_check_rejects_a_path_of_another_problem(capsys, tmp_path):
     assert "does not begin at the start" in out
 
 
+@pytest.mark.parametrize("ending", [".json", ".csv", ".txt"])
+def test_a_path_in_place_of_a_problem_is_told_what_is_missing(capsys, tmp_path, ending):
+    from rrtik_ompl import JointPath, load_problem
+
+    file, problem = tmp_path / f"path{ending}", load_problem("planar3_a")
+    JointPath.of(problem.robot, [problem.start, problem.goal.q]).save(file)
+    code, out, err = rrtik(capsys, "check", str(file))
+    assert (code, out) == (2, "")
+    assert err == f"rrtik: {file}: a path, not a problem; name its problem before it: rrtik check PROBLEM {file.name}\n"
+    assert "no such file" in rrtik(capsys, "check", str(tmp_path / f"other{ending}"))[2]
+
+
 @pytest.fixture(scope="module")
 def several(tmp_path_factory):
     """A path of the subsea unit that moves several joints at once."""
@@ -235,6 +247,12 @@ def test_help_and_version_are_there(capsys):
     code, out, _ = rrtik(capsys, "--version")
     assert code == 0
     assert out.startswith("rrtik ")
+
+
+def test_the_package_can_be_run_as_a_module():
+    done = subprocess.run([sys.executable, "-m", "rrtik_ompl", "list", "no"], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("rrtik: ")
 
 
 def command(*arguments):

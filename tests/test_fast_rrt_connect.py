@@ -319,7 +319,8 @@ def test_the_planner_uses_the_kernels_of_its_world(coarse):
     assert (status, planner.error) == ("Exact solution", None)
     require_path(world, path, START, GOAL)
     assert planner.statistics["motions"] > 0
-    assert planner.statistics["checked_motions"] == planner.statistics["questions"]
+    assert planner.statistics["checked_motions"] == planner.statistics["motions"]
+    assert planner.statistics["edges"] == planner.statistics["vertices"] - 2
 
 
 @pytest.mark.parametrize("coarse", [False, True])
@@ -345,7 +346,7 @@ def test_the_planner_asks_nothing_in_a_conservative_world():
     planner, status, path = solved_by_planner(world)
     assert status == "Exact solution"
     require_path(world, path, START, GOAL)
-    assert planner.statistics["checked_motions"] == 0
+    assert (planner.statistics["questions"], planner.statistics["checked_motions"] > 0) == (0, True)
 
 
 def test_the_planner_gives_the_same_path_for_the_same_seed():

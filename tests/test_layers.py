@@ -20,7 +20,7 @@ RUNGS = (
     "trajectory replanning scenario plot plot_tree plot_genetic plot_reach",
     "viewer report ik_report sensing overlay reproduce benchmark terminal",
     "motion_commands plan_command ik_commands reach_commands replan_commands reproduce_commands bench_commands",
-    "marker_commands overlay_command pilot pilot_commands cli command",
+    "marker_commands overlay_command pilot pilot_commands cli command __main__",
 )
 PEERS = {"vamp", "roboplan", "pytracik", "trac_ik", "ikpy", "eaik"}  # measured where they are installed
 LADDER = [name for rung in RUNGS for name in rung.split()]

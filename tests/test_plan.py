@@ -7,6 +7,7 @@ import threading
 import numpy as np
 import pinocchio as pin
 import pytest
+from ompl import base as ob
 
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.checks import CollisionChecks
@@ -52,6 +53,32 @@ def test_every_planner_finds_a_valid_path_with_exact_ends(wall, name):
     assert (found.path.end == wall.goal.q).all()
     assert found.reason == ""
     assert found.statistics["attempts"] >= 1
+
+
+@pytest.mark.parametrize("name", ["bicrdt", "crdt", "fastrrtconnect", "RRTConnect", "KPIECE1", "PRM"])
+def test_vertices_and_edges_are_counted(wall, name):
+    counts = plan(wall, name, seconds=20.0, seed=1).statistics
+    assert counts["vertices"] >= 2
+    assert counts["checked_motions"] >= 1
+    trees = {"crdt": 1, "RRTConnect": 1, "KPIECE1": 1}.get(name, 2)  # OMPL counts the edge that joins its two trees
+    assert counts["edges"] == counts["vertices"] - trees or (name == "PRM" and counts["edges"] > 0)
+    assert 0 < counts.get("free_motions", 1) <= counts["checked_motions"]
+
+
+def test_a_planner_that_is_written_in_python_is_not_asked_for_its_graph(wall):
+    class Foreign(ob.Planner):
+        def __init__(self, si):
+            super().__init__(si, "Foreign")
+
+        def solve(self, ptc):
+            return ob.PlannerStatus(ob.PlannerStatus.TIMEOUT)
+
+        def getPlannerData(self, data):
+            raise AssertionError("from C++ this would end the process")
+
+    found = plan(wall, Foreign, seconds=1.0, seed=1, restarts=0)
+    assert not found.found
+    assert "vertices" not in found.statistics
 
 
 @pytest.mark.parametrize("name", ["bicrdt", "RRTConnect", "RRT", "KPIECE1"])  # PRM works by the clock

@@ -96,7 +96,8 @@ class BiCRDT(SafePlanner):
             met = _join(*trees.meeting())
             path = met if self.options.accepts(met) else None
         checker.checked_motions += trees.motions
-        return SearchResult(path, {"iterations": trees.iterations, "vertices": trees.vertices})
+        edges = trees.vertices - len(starts) - len(goals)
+        return SearchResult(path, {"iterations": trees.iterations, "vertices": trees.vertices, "edges": edges})
 
 
 class TreePair:

@@ -89,7 +89,8 @@ def connect(
             if other is not None:
                 meeting = (vertex, other) if side == 0 else (other, vertex)
                 path = _joined(trees[0].branch(meeting[0]), trees[1].branch(meeting[1]))
-    return path, {"iterations": iterations, "vertices": trees[0].size + trees[1].size}
+    vertices = trees[0].size + trees[1].size
+    return path, {"iterations": iterations, "vertices": vertices, "edges": vertices - len(starts) - len(goals)}
 
 
 def _straight(starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> Matrix | None:

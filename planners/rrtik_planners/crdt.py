@@ -95,7 +95,7 @@ class CRDT(SafePlanner):
             found = tree.ending()
             path = found if self.options.accepts(found) else None
         checker.checked_motions += tree.motions
-        statistics = {"iterations": tree.iterations, "vertices": tree.vertices}
+        statistics = {"iterations": tree.iterations, "vertices": tree.vertices, "edges": tree.vertices - len(starts)}
         if path is not None:
             return SearchResult(path, statistics)
         nearest, distance = _nearest_to_goal(tree.tree(0), goals)

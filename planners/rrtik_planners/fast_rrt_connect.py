@@ -71,7 +71,9 @@ class FastRRTConnect(SafePlanner):
             stop=ptc,
             max_iterations=self.max_iterations,
         )
-        return SearchResult(path, kernels.statistics())
+        counts = kernels.statistics()
+        checker.checked_motions += int(counts["motions"] - counts["questions"])  # those it was asked it has counted
+        return SearchResult(path, {**counts, "edges": counts["vertices"] - len(starts) - len(goals)})
 
     def ends_free(self, rows: Matrix, checker: MotionChecker) -> Mask:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.ends_free`; the kernels know in a few microseconds."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import time
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib.metadata import version as installed
@@ -54,15 +55,16 @@ def run_campaign(
         The file of records.
 
     Raises:
-        InputError: If there are records and ``resume`` is not set, they are of another suite, or cannot be read or
+        InputError: If there are runs and ``resume`` is not set, they are of another suite, or cannot be read or
             written; if the scheduler cannot be used.
     """
     file = folder / records.NAME
-    done = _held(file, suite, resume)
-    total = len(suite.sources) * len(suite.entrants) * suite.runs
+    about = machine(jobs, scheduler)
+    done = _held(file, suite, about, resume)
+    total = suite.total
     left = (job for job in all_jobs(suite) if records.key_of(job["run"]) not in done)
     on_run(Progress(len(done), total), None)
-    with records.RecordFile(file, {"version": 1, "suite": suite.plain(), "machine": machine(jobs, scheduler)}) as out:
+    with records.RecordFile(file, {"version": 1, "suite": suite.plain(), "machine": about}) as out:
         if len(done) == total:
             return file
         finished = spread.local(left, jobs) if scheduler is None else spread.cluster(left, scheduler)
@@ -126,15 +128,26 @@ def _processor() -> str:
     return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), "unknown")
 
 
-def _held(file: Path, suite: Suite, resume: bool) -> set[records.Key]:
+def _held(file: Path, suite: Suite, about: Mapping[str, Any], resume: bool) -> set[records.Key]:
     """Which runs are done already."""
     if not file.is_file() or file.stat().st_size == 0:
         return set()
+    head, done = records.read_head(file), {records.key_of(record) for record in records.read_records(file)}
+    if not done:  # it never began, as where a scheduler did not answer
+        return done
     if not resume:
-        count = sum(1 for _ in records.read_records(file))
-        raise InputError(f"{file}: holds {count} runs already; continue with --resume, or choose another --out")
-    before, now = records.read_head(file)["suite"], records.json_like(suite.plain())
+        raise InputError(f"{file}: holds {len(done)} runs already; continue with --resume, or choose another --out")
+    before, now = head["suite"], records.json_like(suite.plain())
     changed = [key for key in now if before.get(key) != now[key] and key not in ("runs", "title")]
     if changed:
         raise InputError(f"{file}: was begun with another suite ({', '.join(changed)} differ); choose another --out")
-    return {records.key_of(record) for record in records.read_records(file)}
+    if len(done) < suite.total:
+        _warn_of_change(file, head["machine"], about)
+    return done
+
+
+def _warn_of_change(file: Path, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
+    """Reports tell the machine that a campaign was begun on."""
+    other = [f"{name} {before[name]}, now {now[name]}" for name in records.MACHINE[:-1] if before[name] != now[name]]
+    if other:
+        warnings.warn(f"{file}: was begun with {'; '.join(other)}: times may not compare", stacklevel=4)

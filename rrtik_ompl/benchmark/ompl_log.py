@@ -34,6 +34,8 @@ PROPERTIES = {
     "simplified solution clearance REAL": "clearance",
     "simplified solution segments INTEGER": "segments",
     "graph states INTEGER": "vertices",
+    "graph motions INTEGER": "edges",
+    "valid segment fraction REAL": "free_share",
     "total time REAL": "total_seconds",
     "transitions INTEGER": "initial_transitions",
     "simplified transitions INTEGER": "transitions",
@@ -66,9 +68,11 @@ def write_logs(found: Sequence[Result], head: Mapping[str, Any], folder: Path) -
         InputError: If a file cannot be written.
     """
     make_folder(folder)
-    files = []
+    files: list[Path] = []
     for label, results in by_label(found).items():
-        files.append(folder / f"{re.sub(r'[^A-Za-z0-9_.-]+', '_', label)}.log")
+        name = re.sub(r"[^A-Za-z0-9_.-]+", "_", label)
+        file = folder / f"{name}.log"
+        files.append(folder / f"{name}-{len(files)}.log" if file in files else file)
         write_text(files[-1], log_text(results, head))
     return files
 

@@ -13,6 +13,7 @@ from rrtik_ompl.plot import COLORS, DASHES, save_figure, tidy
 
 PANELS = 24  # in a picture at most; tables hold the rest
 ACROSS = 3
+LEGENDS = 2  # names beside each other above a panel
 BOXES = ("total_seconds", "length", "transitions")
 LEAST = 1e-4  # [s] where axes of time begin
 
@@ -75,8 +76,8 @@ def _panels(
     lines = {line.get_label(): line for panel in panels for line in panel.get_lines()}
     known = [name for name in planners if name in lines]
     if known:
-        figure.legend([lines[name] for name in known], known, loc="outside upper center", ncols=min(len(known), 6),
-                      frameon=False)  # fmt: skip
+        beside = min(len(known), LEGENDS * columns)
+        figure.legend([lines[name] for name in known], known, loc="outside upper center", ncols=beside, frameon=False)
     if len(groups) > len(shown):
         figure.suptitle(f"the first {len(shown)} of {len(groups)}", fontsize=9)
     return figure

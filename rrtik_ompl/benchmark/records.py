@@ -13,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeAlias
 
-from rrtik_ompl.benchmark.run import STATUSES
+from rrtik_ompl.benchmark.run import SOLVED, STATUSES
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.text_file import make_folder
 
@@ -21,7 +21,15 @@ Record: TypeAlias = dict[str, Any]
 Key: TypeAlias = tuple[str, str, int]  # problem, planner's label, number of the run
 
 NAME = "runs.jsonl"
-NEEDED = {"problem": str, "planner": str, "run": int, "seed": int, "group": str, "status": str}
+NUMBER = (int, float)
+NEEDED = {
+    **{"problem": str, "group": str, "axis": str, "value": NUMBER, "planner": str},
+    **{"run": int, "seed": int, "status": str},
+}
+OF_A_PATH = ("plan_seconds", "length", "waypoints")
+NO_NUMBERS = {"reason": str, "counts": dict, "waypoints": list, **NEEDED}  # whatever else was measured is a number
+# What the head says of the machine, the beginning of the campaign last.
+MACHINE = ("rrtik-ompl", "ompl", "pin", "coal", "numpy", "python", "system", "processor", "cores", "at a time", "begun")
 
 
 def key_of(record: Mapping[str, Any]) -> Key:
@@ -36,8 +44,12 @@ def read_head(file: Path) -> Record:
         InputError: If the file cannot be read or is something else.
     """
     for _, data in _lines(file):
-        if not isinstance(data.get("suite"), dict) or data.get("version") != 1:
+        suite, machine = data.get("suite"), data.get("machine")
+        if data.get("version") != 1 or not isinstance(suite, dict) or not isinstance(machine, dict):
             raise InputError(f"{file}:1: not the head of a campaign; choose another --out, or delete the file")
+        lacking = [name for name in MACHINE if name not in machine]
+        if lacking:
+            raise InputError(f"{file}:1: machine lacks {', '.join(lacking)}; put it back, or choose another --out")
         return data
     raise InputError(f"{file}: holds nothing; delete it to begin anew")
 
@@ -51,12 +63,26 @@ def read_records(file: Path) -> Iterator[Record]:
     lines = _lines(file)
     next(lines, None)
     for number, data in lines:
-        for name, kind in NEEDED.items():
-            if not isinstance(data.get(name), kind):
-                raise _corrupt(file, number, f"{name} is missing or no {kind.__name__}")
-        if data["status"] not in STATUSES:
-            raise _corrupt(file, number, f"status '{data['status']}' is none of {', '.join(STATUSES)}")
+        fault = _fault(data)
+        if fault:
+            raise _corrupt(file, number, fault)
         yield data
+
+
+def _fault(data: Record) -> str:
+    """What is wrong with a record; "" if nothing is."""
+    status = data.get("status")
+    for name in (*NEEDED, *(OF_A_PATH if status == SOLVED else ())):
+        if name not in data:
+            return f"{name} is missing"
+    if status not in STATUSES:
+        return f"status {status!r} is none of {', '.join(STATUSES)}"
+    for name, value in data.items():
+        kind: Any = NO_NUMBERS.get(name, (*NUMBER, type(None)))
+        if not isinstance(value, kind):
+            return f"{name} cannot be {value!r:.40}"
+    counts = data.get("counts", {})
+    return next((f"count {key} cannot be {n!r:.40}" for key, n in counts.items() if not isinstance(n, NUMBER)), "")
 
 
 class RecordFile:
@@ -112,8 +138,9 @@ class RecordFile:
         self._file.close()
 
     def _cut_half_line(self) -> None:
+        """What is not whole goes; so does a head without runs, for that of this campaign takes its place."""
         data = self._name.read_bytes()
-        self._end = data.rfind(b"\n") + 1
+        self._end = data.rfind(b"\n") + 1 if data.count(b"\n") > 1 else 0
         if self._end < len(data):
             os.truncate(self._name, self._end)
 
@@ -127,16 +154,16 @@ class RecordFile:
 def _lines(file: Path) -> Iterator[tuple[int, Record]]:
     """Whole lines with their numbers."""
     try:
-        with open(file, encoding="utf-8") as stream:
+        with open(file, "rb") as stream:
             for number, line in enumerate(stream, start=1):
-                if not line.endswith("\n"):
+                if not line.endswith(b"\n"):
                     return
                 yield number, _decoded(file, number, line)
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror or error}") from error
 
 
-def _decoded(file: Path, number: int, line: str) -> Record:
+def _decoded(file: Path, number: int, line: bytes) -> Record:
     try:
         data = json.loads(line)
     except ValueError as error:

@@ -54,10 +54,10 @@ def _in_order(file: Path, found: list[Result], head: records.Record) -> list[Res
     suite = head["suite"]
     labels = list(dict.fromkeys(s["name"] if s["axis"] else s["group"] for s in suite["sources"]))
     planners = [entrant["label"] for entrant in suite["entrants"]]
+    names = {source["name"] for source in suite["sources"]}
     for result in found:
-        if result.label not in labels or result.planner not in planners:
-            raise InputError(
-                f"{file}: holds runs of '{result.planner}' on '{result.label}', of which its first line says nothing; "
-                "delete their lines"
-            )
+        strange = next((run["problem"] for run in result.runs if run["problem"] not in names), None)
+        if strange is not None or result.label not in labels or result.planner not in planners:
+            which = f"'{result.planner}' on '{strange or result.label}'"
+            raise InputError(f"{file}: holds runs of {which}, of which its first line says nothing; delete their lines")
     return sorted(found, key=lambda result: (labels.index(result.label), planners.index(result.planner)))

@@ -19,6 +19,7 @@ QUANTITIES: Mapping[str, tuple[str, str]] = MappingProxyType(
         "total_seconds": ("total", "s"),
         "iterations": ("iterations", ""),
         "vertices": ("vertices", ""),
+        "edges": ("edges", ""),
         "checked_states": ("checked states", ""),
         "checked_motions": ("checked motions", ""),
         "initial_length": ("initial length", "rad, m"),
@@ -93,7 +94,11 @@ def measured(record: Mapping[str, Any], quantity: str) -> float | None:
     """A quantity of a record, None if it was not counted."""
     if quantity == "total_seconds":
         return float(record["plan_seconds"] + record.get("shorten_seconds", 0.0)) if "plan_seconds" in record else None
-    value = record.get(quantity, record.get("counts", {}).get(quantity))
+    counts = record.get("counts", {})
+    if quantity == "free_share":
+        motions = counts.get("checked_motions", 0)
+        return float(counts["free_motions"] / motions) if motions and "free_motions" in counts else None
+    value = record.get(quantity, counts.get(quantity))
     return None if value is None else float(value)
 
 

@@ -69,6 +69,11 @@ class Suite:
     memory_mb: float
     seed: int
 
+    @property
+    def total(self) -> int:
+        """Number of runs."""
+        return len(self.sources) * len(self.entrants) * self.runs
+
     def plain(self) -> dict[str, Any]:
         """For JSON."""
         return asdict(self)
@@ -157,4 +162,5 @@ def _planner(name: str) -> Any:
 def _refuse_twins(document: YamlDocument, key: str, names: list[str]) -> None:
     name, number = Counter(names).most_common(1)[0]
     if number > 1:
-        raise document.error((key,), f"'{name}' stands there {number} times; delete one, or give labels to planners")
+        remedy = "give them labels" if key == "planners" else "delete one"
+        raise document.error((key,), f"'{name}' stands there {number} times; {remedy}")

@@ -13,7 +13,7 @@ from rrtik_ompl.benchmark.statistics import QUANTITIES, Result, Spread
 
 OVERVIEW = (
     *("problem", "planner", "solved / valid / total", "planning, median / 95 % [s]", "shortening [s]"),
-    *("total, median / 95 % [s]", "iterations", "length, before > after", "transitions, before > after"),
+    *("total, median / 95 % [s]", "iterations", "length, found / shortened", "transitions, found / shortened"),
 )
 OF_A_SPREAD = ("mean", "std", "min", "25 %", "median", "75 %", "95 %", "max")
 
@@ -29,8 +29,8 @@ def overview(results: Iterable[Result]) -> list[tuple[str, ...]]:
             _median(result.spread("shorten_seconds")),
             _two(result.spread("total_seconds")),
             _median(result.spread("iterations")),
-            f"{_median(result.spread('initial_length'))} > {_median(result.spread('length'))}",
-            f"{_median(result.spread('initial_transitions'))} > {_median(result.spread('transitions'))}",
+            f"{_median(result.spread('initial_length'))} / {_median(result.spread('length'))}",
+            f"{_median(result.spread('initial_transitions'))} / {_median(result.spread('transitions'))}",
         )
         for result in results
     ]

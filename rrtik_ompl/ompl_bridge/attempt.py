@@ -35,6 +35,9 @@ ONE_GOAL_PLANNERS = ("AORRTC", "PRM", "PRMstar")
 # finds that motion, then draws from what could be shorter, which is nothing, and does not look at its time meanwhile.
 STRAIGHT_FIRST_PLANNERS = ("AORRTC", "SORRTstar")
 
+# AORRTC hands out an empty graph; BITstar's is never freed again (60 kB a run).
+GRAPHLESS_PLANNERS = ("AORRTC", "BITstar")
+
 # Options of our planners that `attempt` itself sets.
 GIVEN_OPTIONS = ("world", "seed", "goal")
 
@@ -50,12 +53,16 @@ PlannerFactory = Callable[..., Any]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Attempt:
-    """What came out: rows of the path, shape (k, n), or None; OMPL's status in words; plain counts; a reason if any."""
+    """What came out: rows of the path, shape (k, n), or None; OMPL's status in words; plain counts; a reason if any.
+
+    ``counting`` is how long it took to count the vertices and edges of an OMPL planner [s], which is no planning.
+    """
 
     rows: Matrix | None
     status: str
     statistics: Mapping[str, int | float]
     reason: str = ""
+    counting: float = 0.0
 
 
 def ompl_planners() -> dict[str, Any]:
@@ -116,11 +123,14 @@ def attempt(
             last = str(problem_in_planner).splitlines()[-1]
             refused = last.removeprefix(REFUSAL)
             raise PlannerError(f"planner {name}: {refused}" if refused != last else f"planner {name} broke: {last}")
-        counts = dict(planner.statistics) if own else {"checked_states": judge.states, "checked_motions": judge.motions}
         rows, words = exact_path(definition, si), str(status)
         if rows is None and judge.late and words.startswith("Invalid"):  # only because all answers were no by then
             words = "Timeout"
-        return Attempt(rows, words, counts, planner.reason if own else "")
+        if own:
+            return Attempt(rows, words, dict(planner.statistics), planner.reason)
+        begin = time.perf_counter()
+        graph = _graph(planner, si) if factory in ompl_planners().values() and name not in GRAPHLESS_PLANNERS else {}
+        return Attempt(rows, words, {**judge.counts(), **graph}, counting=time.perf_counter() - begin)
 
 
 def finds_goals(factory: PlannerFactory) -> bool:
@@ -142,6 +152,13 @@ def planner_options(factory: PlannerFactory) -> tuple[str, ...]:
         return tuple(sorted(set(names).difference(GIVEN_OPTIONS)))
     setters = {s for s in dir(factory) if s.startswith("set") and not hasattr(ob.Planner, s)}
     return tuple(sorted(map(_snake, setters)))
+
+
+def _graph(planner: Any, si: Any) -> dict[str, int]:
+    """Size of the trees or the roadmap of a planner of the wheel; one that is written in Python may end the process."""
+    graph = ob.PlannerData(si)
+    planner.getPlannerData(graph)
+    return {"vertices": graph.numVertices(), "edges": graph.numEdges()}
 
 
 def _straight_motion(problem: Problem, goals: Matrix) -> Matrix | None:

@@ -27,6 +27,7 @@ class Judge:
     world: World
     states: int = 0
     motions: int = 0
+    free_motions: int = 0
     error: Exception | None = None
     stop: Callable[[], object] | None = None  # ends the planner
     deadline: float = np.inf
@@ -49,7 +50,17 @@ class Judge:
             if self.stop is not None:
                 self.stop()
             return False
-        return self._ask(self.world.motion_valid, a, b)
+        free = self._ask(self.world.motion_valid, a, b)
+        self.free_motions += free
+        return free
+
+    def counts(self) -> dict[str, int]:
+        """Of the questions, and of the motions that were found free."""
+        return {
+            "checked_states": self.states,
+            "checked_motions": self.motions,
+            "free_motions": self.free_motions,
+        }
 
     def _ask(self, question: Any, *arguments: Vector) -> bool:
         if self.error is not None or self.late:

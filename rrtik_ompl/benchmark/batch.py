@@ -1,0 +1,86 @@
+"""Many planning queries at once: in processes of this machine that may be lost, or on a Dask cluster."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from rrtik_ompl.arrays import positive, whole_number
+from rrtik_ompl.benchmark import spread
+from rrtik_ompl.benchmark.campaign import all_jobs
+from rrtik_ompl.benchmark.sources import file_source
+from rrtik_ompl.benchmark.suite import Entrant, Suite
+from rrtik_ompl.benchmark.suite_file import BY_KIND, NONE
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.ompl_bridge.attempt import planner_options
+from rrtik_ompl.planning import DEFAULT_PLANNER, find_planner
+from rrtik_ompl.shortening import METHODS
+
+
+def plan_batch(
+    problems: Sequence[str | os.PathLike[str]],
+    planner: str = DEFAULT_PLANNER,
+    *,
+    seconds: float = 5.0,
+    seed: int = 0,
+    parameters: Mapping[str, Any] | None = None,
+    shorten: str = NONE,
+    memory_mb: float = 4096.0,
+    jobs: int = 1,
+    scheduler: str | None = None,
+) -> list[dict[str, Any]]:
+    """Plan for many problems; one that crashes, hangs or takes too much memory is lost alone.
+
+    The same seed gives the same paths however the queries are spread, as long as no time limit cuts in.
+
+    Args:
+        problems: Names of shipped problems, or files.
+        planner: Name of one of :func:`rrtik_ompl.list_planners`.
+        seconds: For planning, each [s]; a query that takes 30 s more than thrice as long is killed.
+        seed: Of all of them.
+        parameters: Options of the planner.
+        shorten: A method of shortening, "none", or "by-kind": axis for single-joint moves.
+        memory_mb: That a query may take beside robot, scene and library [MB].
+        jobs: Queries at a time on this machine.
+        scheduler: Address of a Dask scheduler whose workers do them instead.
+
+    Returns:
+        One record for each problem, in their order: status ("solved", "not found", ...), reason, and what was
+        measured, as in the file of a campaign; ``waypoints`` is the path, shape (k, n), if it was solved.
+
+    Raises:
+        UnknownNameError: If there is no such problem, planner, parameter or method of shortening.
+        InputError: If a number makes no sense, a file is not there, or the scheduler cannot be used.
+    """
+    if isinstance(problems, str | os.PathLike):
+        raise InputError(f"problems must be a list of names or files, got '{os.fspath(problems)}'")
+    named = [file_source(os.fspath(each), Path.cwd()) for each in problems]
+    limit = positive(seconds, "seconds")
+    suite = Suite(
+        name="batch",
+        title="batch",
+        sources=tuple(replace(source, name=str(k)) for k, source in enumerate(named)),  # two may be of one name
+        entrants=(_entrant(planner, dict(parameters or {}), shorten),),
+        runs=1,
+        seconds=limit,
+        patience=3.0 * limit + 30.0,
+        memory_mb=positive(memory_mb, "memory_mb"),
+        seed=whole_number(seed, "seed"),
+    )
+    left, count = all_jobs(suite), whole_number(jobs, "jobs", 1)
+    finished = spread.local(left, count) if scheduler is None else spread.cluster(left, scheduler)
+    records = {int(record["problem"]): record for record in finished}
+    return [{**records[k], "problem": source.name} for k, source in enumerate(named)]
+
+
+def _entrant(planner: str, parameters: dict[str, Any], shorten: str) -> Entrant:
+    options = planner_options(find_planner(planner))
+    for key in parameters:
+        if key not in options:
+            raise UnknownNameError(f"parameter of planner {planner}", key, options)
+    if shorten not in (*METHODS, BY_KIND, NONE):
+        raise UnknownNameError("shortening method", shorten, (*METHODS, BY_KIND, NONE))
+    return Entrant(planner, planner, parameters, shorten)
