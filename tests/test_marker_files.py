@@ -209,7 +209,7 @@ def test_margins_of_what_is_sensed_can_be_switched_off(capsys, folder):
     ("prepare", "message"),
     [
         (lambda f: cv2.imwrite(str(f / "view.png"), np.full((480, 640), 90, np.uint8)), "no marker in view"),
-        (lambda f: (f / "map.yaml").write_text(MAP.replace("4x4_50", "apriltag_36h11")), "mend"),
+        (lambda f: (f / "map.yaml").write_text(MAP.replace("4x4_50", "apriltag_36h11")), "but of 4x4_50"),
         (
             lambda f: (f / "map.yaml").write_text(MAP.replace("id: 3", "id: 30").replace("id: 7", "id: 31")),
             "add their ids",

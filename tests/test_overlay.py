@@ -100,6 +100,18 @@ def test_ghosts_trails_and_frames_are_seen_through_and_leave_the_picture_as_it_w
     assert 50 < (lines != 120).any(axis=2).sum() < 10_000
 
 
+def test_a_gripper_without_a_configuration_is_drawn_where_the_arm_would_have_it():
+    robot = load_robot("titan4")
+    q, blank = robot.posture("ready"), np.zeros((CAMERA.height, CAMERA.width, 3), dtype=np.uint8)
+    drawing = Augmenter(robot, CAMERA, 2000)
+    arm = drawing.draw(blank, EYE, ghosts=[Ghost(q, opacity=1.0)]).any(axis=2)
+    gripper = drawing.draw(blank, EYE, ghosts=[Ghost(None, opacity=1.0, T_base_tip=robot.fk(q))]).any(axis=2)
+    assert 100 < gripper.sum() < 0.5 * arm.sum()
+    assert (gripper & ~arm).sum() < 5
+    elsewhere = robot.fk(q) * pose([0.0, 0.0, 0.3])
+    assert (drawing.draw(blank, EYE, ghosts=[Ghost(None, T_base_tip=elsewhere)]).any(axis=2) != gripper).sum() > 100
+
+
 def test_what_lies_behind_the_camera_is_not_drawn():
     away = pin.SE3(EYE.rotation @ np.diag([-1.0, 1.0, -1.0]), EYE.translation)
     robot, grey = load_robot("ur5"), np.full((480, 640, 3), 120, np.uint8)

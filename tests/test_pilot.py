@@ -6,22 +6,23 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl import load_problem
+from rrtik_ompl import load_problem, load_robot
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.ik.closed_form import solutions
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.pilot.arm import SimulatedArm, joint_rates
 from rrtik_ompl.pilot.follower import REACTION, Follower
 from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED, lamps, stage_poses
-from rrtik_ompl.pilot.manoeuvre import free_until, judge_move, way_out
+from rrtik_ompl.pilot.manoeuvre import free_until, judge_move, room_of, way_out
 from rrtik_ompl.pilot.record import Record, read_record
 from rrtik_ompl.pilot.session import CHOOSING, FOLLOWING, MANOEUVRE, PROPOSED, Session
 from rrtik_ompl.pilot.surroundings import Surroundings, gripper_links
 from rrtik_ompl.poses import pose, pose_from_rpy
-from rrtik_ompl.scene import Obstacle
+from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.sensing.marker_map import GraspType, MarkedObject, MountedMarker
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.shapes import Box
+from rrtik_ompl.world import World
 
 PROBLEM = load_problem("titan4_sdu")
 ROBOT, WORLD = PROBLEM.robot, PROBLEM.world
@@ -109,6 +110,30 @@ def test_little_room_is_warned_of():
     assert 0.0 <= verdict.clearance < 0.02
 
 
+def test_the_room_of_a_joint_names_what_ends_it_and_where_the_arm_is_singular():
+    q = np.array(PROBLEM.start)
+    room = room_of(WORLD, q, 0)
+    assert (room.above, room.high) == ("limit", pytest.approx(ROBOT.upper[0]))
+    assert "meets bay_wall" in room.below
+    assert judge_move(WORLD, q, 0, room.low + 1e-3).allowed
+    assert "bay_wall" in judge_move(WORLD, q, 0, room.low - 0.01).reason
+    yaw = room_of(WORLD, q, 4)
+    low, high, case = yaw.singular[0]
+    assert yaw.low < low < high <= yaw.high
+    assert any(case in warning for warning in judge_move(WORLD, q, 4, 0.5 * (low + high)).warnings)
+    assert not judge_move(WORLD, q, 4, low - 0.1).warnings
+
+
+def test_an_arm_without_named_singular_postures_is_warned_by_its_jacobian():
+    robot = load_robot("ur5")
+    world = World(robot, Scene())
+    q = np.array([0.0, -1.2, 1.0, -1.4, 1.0, 0.0])
+    stretches = room_of(world, q, 2).singular
+    assert any(low <= 0.0 <= high for low, high, _ in stretches)  # the elbow straight
+    assert "near a singular posture" in judge_move(world, q, 2, 0.0).warnings
+    assert not judge_move(world, q, 2, 1.2).warnings
+
+
 def test_an_arm_that_touches_something_may_go_out_of_it_and_no_deeper():
     q = np.array(PROBLEM.goal.q)
     q[2] = free_until(WORLD, q, 2, float(ROBOT.lower[2])) - np.radians(0.5)
@@ -162,6 +187,21 @@ def test_the_postures_of_a_green_lamp_reach_its_stages():
     for lamp in green:
         for q, T in zip(lamp.q, stage_poses(PLACE, VALVE.grasp(lamp.type), lamp.level), strict=True):
             assert ROBOT.fk(q).homogeneous == pytest.approx(T.homogeneous, abs=1e-6)
+
+
+def test_a_grasp_that_cannot_be_made_says_by_how_much_or_what_would_touch():
+    far, _ = session()
+    far.see([seen_at(pin.SE3(PLACE.rotation, np.array([3.0, 0.0, 0.0])))], 0.1)
+    assert "m and" in far.command("grasp", 0.2, type="front", level=0)
+    assert "away from the goal" in far.fault()
+    inside, _ = session()
+    inside.see([seen_at(pin.SE3(PLACE.rotation, np.array([1.45, 0.17, 0.09])))], 0.1)  # within the panel
+    assert inside.lamps()[0].color == AMBER
+    assert "'panel'" in inside.command("grasp", 0.2, type="front", level=0)
+    near, _ = session()
+    green = next(lamp for lamp in near.lamps() if lamp.color == GREEN)
+    near.command("grasp", 0.2, type=green.type, level=green.level)
+    assert near.fault() == ""
 
 
 def test_the_gripper_may_touch_what_it_holds_and_nothing_else():

@@ -81,7 +81,7 @@ class Browser:
         return self.ask(f"document.getElementById('{name}').textContent")
 
     def press(self, key):
-        code = ord(key.upper()) if len(key) == 1 and key.isalnum() else {" ": 32}.get(key, 0)
+        code = ord(key.upper()) if len(key) == 1 and key.isalnum() else {" ": 32, "Enter": 13, "Escape": 27}.get(key, 0)
         words = {"key": key, "windowsVirtualKeyCode": code}
         self.call("Input.dispatchKeyEvent", type="keyDown", **words)
         self.call("Input.dispatchKeyEvent", type="keyUp", **words)
@@ -154,7 +154,7 @@ def test_from_start_to_grasp_by_keys_alone(browser, tmp_path):
         assert browser.ask("document.documentElement.scrollHeight") <= HEIGHT
         assert browser.ask("document.documentElement.scrollWidth") <= WIDTH
         choose(browser, "red")
-        assert "joint limits" in browser.text("reason")
+        browser.wait("document.getElementById('reason').textContent.includes('outside its limits')")
         choose(browser, "green")
         browser.press("p")
         browser.wait(
@@ -165,8 +165,10 @@ def test_from_start_to_grasp_by_keys_alone(browser, tmp_path):
         browser.wait("state.playing > 0")  # the route plays by itself in the outside view
         browser.press("0")
         browser.wait("state.playing === null")
+        browser.ask("document.getElementById('scrub').focus()")  # whoever used the mouse still commands by keys
         browser.press("a")
         browser.wait("state.mode === 'following'")
+        browser.ask("document.activeElement.blur()")
         browser.wait("document.getElementById('advice').textContent === 'NEXT'")
         due = browser.ask("state.route.moves[0].joint")
         assert browser.text("due").startswith(due.replace("_", " "))
@@ -180,12 +182,27 @@ def test_from_start_to_grasp_by_keys_alone(browser, tmp_path):
         browser.press("ArrowUp")
         browser.press("ArrowRight")
         browser.wait("/moving|refused/.test(state.message)")
+        type_a_value(browser, running)
     kinds = [json.loads(line)["kind"] for line in record.read_text().splitlines()]
     assert kinds[0] == "begin"
     assert {"seen", "command", "answer", "joints"} <= set(kinds)
     with Running(Wanted("titan4_sdu", replay=record)) as again:
         browser.open(again.server.url)
         browser.wait("state && state.replay && state.route")
+
+
+def type_a_value(browser, running):
+    """By M, a number and Enter, from where the arm is free; letters commanded again after that."""
+    session = running.opened.engine.session
+    session.arm._q[:] = session.problem.start
+    browser.press("5")
+    browser.wait("state.selected === 4 && document.getElementById('room').textContent.includes('meets')")
+    browser.press("m")
+    browser.call("Input.insertText", text="-20")
+    browser.press("Enter")
+    browser.wait("Math.abs(state.joints[4].value + 20) < 0.01")
+    browser.press("1")
+    browser.wait("state.selected === 0")
 
 
 def follow(browser, running):
@@ -257,6 +274,8 @@ def test_everything_has_a_name_and_the_keys_are_listed(browser):
         assert {"camera picture with the arm, the chosen grasp and distances drawn over it", "messages"} <= named
         assert any(name.startswith("straight level 1: no reach") for name in named)
         assert any(name.startswith("azimuth, limits") for name in named)
+        assert any("Shift with the arrow keys" in name for name in named)
+        browser.wait("document.querySelector('[role=meter]').getAttribute('aria-valuetext').includes('degrees')")
         browser.press("?")
         browser.wait("document.getElementById('help').open")
         keys = browser.text("key_list")

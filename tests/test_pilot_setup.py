@@ -149,12 +149,61 @@ def test_a_folder_of_images_drives_a_session(tmp_path):
     opened = open_session(Wanted("titan4_sdu", source=tmp_path, **files))
     opened.engine.look(0.0)
     assert [each["name"] for each in opened.engine.state()["objects"]] == ["valve"]
+    until(lambda: opened.engine.look(1.0) or opened.engine.state()["pictures_ended"])
+    assert opened.engine.state()["objects"][0]["unseen"] == 0.0
     opened.close()
     with pytest.raises(InputError, match="--map"):
         open_session(Wanted("titan4_sdu", source=tmp_path, camera_file=files["camera_file"]))
     (tmp_path / "none").mkdir()
     with pytest.raises(InputError, match="no images"):
         open_session(Wanted("titan4_sdu", source=tmp_path / "none", **files))
+
+
+def test_pictures_that_the_camera_cannot_have_taken_are_refused_before_anything_is_shown(tmp_path):
+    cv2.imwrite(str(tmp_path / "a.png"), np.zeros((240, 320, 3), dtype=np.uint8))
+    with pytest.raises(InputError, match="320 x 240 pixels"):
+        open_session(Wanted("titan4_sdu", source=tmp_path, camera_file=CAMERA, map_file=MAP))
+
+
+def test_an_object_that_is_out_of_view_is_said_and_costs_no_search_for_other_markers(monkeypatch):
+    searched = []
+    monkeypatch.setattr("rrtik_ompl.sensing.sensor.dictionaries_seen", lambda gray: searched.append(gray) or ())
+    engine = open_session(Wanted("titan4_sdu")).engine
+    camera = engine.eyes._source._camera
+    there, camera.places = camera.places, {}
+    for k in range(10):
+        engine.look(0.1 * k)
+    assert "no marker in view" in engine.state()["hint"]
+    assert len(searched) == 1
+    camera.places = there
+    engine.look(1.0)
+    assert (engine.state()["hint"], engine.state()["objects"][0]["unseen"]) == ("", 0.0)
+    camera.places = {}
+    engine.look(9.0)
+    assert engine.state()["objects"][0]["unseen"] == 8.0
+    assert len(searched) == 1
+
+
+def test_a_record_of_a_real_camera_is_shown_with_that_cameras_file_and_map(tmp_path):
+    simulated = open_session(Wanted("titan4_sdu")).engine
+    simulated.look(0.0)
+    cv2.imwrite(str(tmp_path / "a.png"), simulated.eyes.picture)
+    record, given = tmp_path / "r.jsonl", {"camera_file": Path(CAMERA), "map_file": Path(MAP)}
+    opened = open_session(Wanted("titan4_sdu", source=tmp_path, record=record, **given))
+    opened.engine.look(0.0)
+    opened.close()
+    for map_text in (Path(MAP).read_text(), _with_a_base_marker(Path(MAP).read_text())):
+        given["map_file"] = tmp_path / "map.yaml"
+        given["map_file"].write_text(map_text)
+        again = open_session(Wanted("titan4_sdu", replay=record, **given)).engine
+        again.look(1.0)
+        assert [each["name"] for each in again.state()["objects"]] == ["valve"]
+        assert again.camera_picture()
+
+
+def _with_a_base_marker(text):
+    lines = [line for line in text.splitlines() if not line.startswith("camera_pose")]
+    return "\n".join([*lines, "  - {name: mount, role: base, markers: [{id: 1, side: 0.08}]}", ""])
 
 
 def test_a_record_is_played_again_to_the_same_end(tmp_path):
@@ -186,6 +235,7 @@ def test_a_record_is_played_again_to_the_same_end(tmp_path):
         ({"kind": "seen", "objects": [{"name": "ship", "xyz": [0, 0, 0], "rotation": np.eye(3).tolist()}]}, "ship"),
         ({"kind": "command", "name": "plan"}, "arguments"),
         ({"kind": "begin", "problem": "env_e", "q": [0] * 6}, "env_e"),
+        ({"kind": "answer", "text": "no beginning"}, "holds no line 'begin'"),
     ],
 )
 def test_a_record_that_does_not_fit_is_refused_before_anything_is_shown(tmp_path, line, word):

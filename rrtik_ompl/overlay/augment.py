@@ -29,11 +29,19 @@ FIGURES_KEPT, LAYERS_KEPT = 4, 6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ghost:
-    """The arm at another configuration, in one colour ('#rrggbb') and seen through."""
+    """The arm at another configuration, in one colour ('#rrggbb') and seen through.
 
-    q: Vector
+    Attributes:
+        q: The configuration, shape (dof,); None for the gripper alone, where no configuration gets it.
+        color: Its colour.
+        opacity: From 0 to 1.
+        T_base_tip: Where the gripper is, without a configuration.
+    """
+
+    q: Vector | None
     color: str = palette.GOAL
     opacity: float = 0.35
+    T_base_tip: Any | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,7 +95,10 @@ class Augmenter:
         self._canvas = Canvas(camera)
         self._layers: dict[tuple[Any, ...], Layer] = {}
         self._arm = figure_of(robot_surfaces(robot, triangles))
-        self._ghost = figure_of(robot_surfaces(robot, min(triangles, GHOST_TRIANGLES)))
+        thin = robot_surfaces(robot, min(triangles, GHOST_TRIANGLES))
+        self._tip = robot.model.frames[robot.model.getFrameId(robot.tip)]
+        self._ghost = figure_of(thin)
+        self._gripper = figure_of([each for each in thin if each.frame == self._tip.parentJoint])
         self._figures: dict[tuple[Any, ...], tuple[tuple[Obstacle, ...], Figure]] = {}
         self._last: Layer | None = None
 
@@ -111,7 +122,7 @@ class Augmenter:
             picture: Of the camera's size; grey or blue, green, red.
             T_base_camera: Where the camera is, in the frame of the arm's base.
             q: Configuration of the arm, shape (dof,); no arm if None.
-            ghosts: Further configurations.
+            ghosts: Further configurations, or places of the gripper.
             obstacles: Virtual ones, drawn.
             real: Solids that are in the picture already: they hide what is behind them.
             trail: Points that are joined by a line, shape (k, 3) in the frame of the base [m].
@@ -129,7 +140,7 @@ class Augmenter:
         T_camera_base = T_base_camera.inverse().homogeneous
         hidden_by = self._depths(real, T_camera_base)
         for ghost in ghosts:
-            self._draw_arm(drawn, self._ghost, ghost.q, T_camera_base, hidden_by, ghost.opacity, ghost.color)
+            self._draw_ghost(drawn, ghost, T_camera_base, hidden_by)
         solids = self._figure(obstacles)
         self._draw_arm(drawn, self._arm, q, T_camera_base, hidden_by, opacity, color, solids)
         if trail is not None:
@@ -147,6 +158,16 @@ class Augmenter:
         if self._last is None:
             raise InputError("depths: draw a picture first")
         return self._last.depths.copy()
+
+    def _draw_ghost(
+        self, drawn: Any, ghost: Ghost, T_camera_base: NDArray[np.float64], hidden_by: NDArray[np.float32] | None
+    ) -> None:
+        look = T_camera_base, hidden_by, ghost.opacity, ghost.color
+        if ghost.q is not None:
+            self._draw_arm(drawn, self._ghost, ghost.q, *look)
+        elif ghost.T_base_tip is not None:
+            joint = (ghost.T_base_tip * self._tip.placement.inverse()).homogeneous
+            self._draw_arm(drawn, self._gripper, joint, *look)
 
     def _draw_arm(
         self,
@@ -166,12 +187,15 @@ class Augmenter:
     def _layer(
         self, arm: Figure | None, q: Vector | None, solids: Figure | None, T: NDArray[np.float64], color: str | None
     ) -> Layer:
-        """An arm and solids before the camera; kept for some pictures, for most of what is drawn stands still."""
+        """An arm and solids before the camera; kept for some pictures, for most of what is drawn stands still.
+
+        The arm is at a configuration, or all of it where one joint is, shape (4, 4).
+        """
         key = (arm, None if q is None else np.asarray(q).tobytes(), solids, T.tobytes(), color)
         if key not in self._layers:
             self._canvas.clear()
             if arm is not None and q is not None:
-                shown = placed(arm, T @ self._joint_frames(q))
+                shown = placed(arm, T @ (self._all_at(q) if q.ndim == 2 else self._joint_frames(q)))
                 self._canvas.draw(shown if color is None else tinted(shown, palette.fractions(color)))
             if solids is not None:
                 self._canvas.draw(placed(solids, T[None]))
@@ -184,6 +208,10 @@ class Augmenter:
     def _joint_frames(self, q: Vector) -> NDArray[np.float64]:
         """``T_base_joint`` of all joints at a configuration. Shape (joints + 1, 4, 4)."""
         return np.asarray(self.robot.joint_frames(self.robot.configuration(q)[None])[0])
+
+    def _all_at(self, pose: NDArray[np.float64]) -> NDArray[np.float64]:
+        """One pose for every joint. Shape (joints + 1, 4, 4)."""
+        return np.broadcast_to(pose, (self.robot.model.njoints, 4, 4))
 
     def _depths(self, real: Sequence[Obstacle], T_camera_base: NDArray[np.float64]) -> NDArray[np.float32] | None:
         """Depths of solids that hide what is behind them."""

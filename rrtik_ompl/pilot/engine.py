@@ -15,6 +15,7 @@ from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.pilot.arguments import LONGEST, number
 from rrtik_ompl.pilot.arm import SimulatedArm
 from rrtik_ompl.pilot.eyes import Eyes
+from rrtik_ompl.pilot.feed import ENDED
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.state import state_document
 from rrtik_ompl.pilot.views import PRESETS, CameraView, OutsideView
@@ -65,7 +66,9 @@ class Engine:
 
     def state(self) -> dict[str, Any]:
         """What there is to be shown beside the pictures."""
-        shown = {"camera_lost": self.eyes.lost, "playing": self.outside.share}
+        lost = self.eyes.lost
+        shown = {"camera_lost": lost, "pictures_ended": lost == ENDED, "hint": self.eyes.hint}
+        shown["playing"] = self.outside.share
         return state_document(self.session) | shown
 
     def camera_picture(self) -> bytes:

@@ -15,7 +15,9 @@ from rrtik_ompl.pilot.simulation import SimulatedCamera
 from rrtik_ompl.sensing.camera import Camera
 from rrtik_ompl.sensing.frames import base_from_camera
 from rrtik_ompl.sensing.pictures import Picture
-from rrtik_ompl.sensing.sensor import Sensor
+from rrtik_ompl.sensing.sensor import Sensor, View
+
+EXPLAIN_EVERY = 5.0  # [s]
 
 
 class Eyes(Protocol):
@@ -27,6 +29,7 @@ class Eyes(Protocol):
         T_base_camera: Where the camera is, None if that is not known yet.
         arm_in_picture: The arm itself is to be seen.
         lost: Why there are no pictures any more; "" if there are.
+        hint: Why no object can be placed by the last picture; "" if one can.
     """
 
     camera: Camera
@@ -34,6 +37,7 @@ class Eyes(Protocol):
     T_base_camera: Any | None
     arm_in_picture: bool
     lost: str
+    hint: str
 
     def look(self, session: Session, time: float) -> None:
         """Look once, and tell the session what there is to be seen."""
@@ -50,7 +54,8 @@ class LiveEyes:
         self.camera, self.arm_in_picture = sensor.camera, arm_in_picture
         self.picture = np.zeros((self.camera.height, self.camera.width, 3), dtype=np.uint8)
         self.T_base_camera: Any | None = sensor.marker_map.T_base_camera
-        self.lost = ""
+        self.lost = self.hint = ""
+        self._explain_again = -np.inf
         self._sensor, self._source = sensor, source
 
     def look(self, session: Session, time: float) -> None:
@@ -65,12 +70,27 @@ class LiveEyes:
             return
         self.lost, self.picture = "", taken.pixels
         session.see(view.placed, time)
+        self.hint = self._why_nothing(view, time, known=bool(session.surroundings.seen))
         if not view.why_not_placed:
             self.T_base_camera, _ = base_from_camera(self._sensor.marker_map, view.seen)
 
     def close(self) -> None:
         """Let the camera go."""
         self._source.close()
+
+    def _why_nothing(self, view: View, time: float, known: bool) -> str:
+        """Why an object cannot be placed. Looking for unknown markers is slow: only while none was ever seen."""
+        if view.placed:
+            return ""
+        if view.seen:
+            refused = next((f"{each.object.name}: {each.refused}" for each in view.seen if each.refused), "")
+            return refused or view.why_not_placed
+        if known:
+            return "no marker in view"
+        if time >= self._explain_again:
+            self._explain_again = time + EXPLAIN_EVERY
+            return self._sensor.why_nothing("camera")
+        return self.hint
 
 
 class SimulatedSource:

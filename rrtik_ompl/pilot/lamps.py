@@ -16,7 +16,7 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.goal import PoseGoal, joint_difference
 from rrtik_ompl.ik.batch import solve_ik_batch
 from rrtik_ompl.ik.closed_form import solutions
-from rrtik_ompl.ik.face import chosen_method
+from rrtik_ompl.ik.face import chosen_method, solve_ik
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.sensing.marker_map import GraspType, MarkedObject
 from rrtik_ompl.world import World
@@ -25,6 +25,7 @@ STAGES = ("approach", "grasp", "lift")
 GREEN, AMBER, RED = "green", "amber", "red"
 LIMITS, UNREACHABLE = "joint limits", "out of reach"
 NUMERIC_SECONDS = 0.01  # for a pose, where the arm has no closed form
+TELLING_SECONDS = 0.02  # for the reason why one grasp cannot be made
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,6 +80,26 @@ def lamps(world: World, thing: MarkedObject, T_base_object: Any, near: Vector, *
         color, reason = _color(reasons, free[row].any(axis=1))
         found.append(Lamp(grasp.name, level, color, reason, nearest[row]))
     return tuple(found)
+
+
+def fault_of(lamp: Lamp, thing: MarkedObject, T_base_object: Any, near: Vector, world: World, holding: World) -> str:
+    """Which stage of a grasp fails, and by how much it is out of reach or what would touch; "" if none does.
+
+    Args:
+        lamp: Of the grasp.
+        thing: What is to be grasped.
+        T_base_object: Where it is.
+        near: Posture near which the arm would be, shape (dof,).
+        world: For the approach.
+        holding: For grasp and lift.
+    """
+    if not lamp.reason:
+        return ""
+    name = lamp.reason.partition(":")[0]
+    stage = STAGES.index(name)
+    goal = PoseGoal(stage_poses(T_base_object, thing.grasp(lamp.type), lamp.level)[stage])
+    asked = solve_ik(world.robot, goal, near=near, world=(world, holding, holding)[stage], seconds=TELLING_SECONDS)
+    return f"{name}: {asked.detail}" if asked.detail else lamp.reason
 
 
 def _postures(robot: Robot, poses: NDArray[np.float64], near: Vector) -> tuple[NDArray[np.float64], list[str]]:

@@ -9,19 +9,43 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.ik.singularity import singularity_report
+from rrtik_ompl.ik.closed_form import form_of, has_closed_form
 from rrtik_ompl.moves_text import joint_unit, reading
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.pilot.clearance import tightest
 from rrtik_ompl.pilot.follower import slack
+from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 
 NEAR_SINGULAR = 0.05  # sines of the angles that vanish in a singular posture, metres of a lever
 LITTLE_ROOM = 0.02  # [m]
 LOOKS = 20  # along the move, for the clearance
+SINGULAR_LOOKS = 60  # along the whole way of a joint
 WAYS_OUT = (1, 2, 3, 4, 6, 8)  # small errors, by which a joint is driven to get out of contact
+
+
+Stretch = tuple[float, float, str]  # from, to [rad or m], name of the singular case
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Room:
+    """How far one joint can be driven while the others stand still.
+
+    Attributes:
+        low: The least value [rad or m].
+        high: The largest value.
+        below: What ends the way at ``low``: "limit", "full turn" or the pair that touches.
+        above: What ends it at ``high``.
+        singular: Stretches in between on which the arm is near a singular posture; its name is "" if it has none.
+    """
+
+    low: float
+    high: float
+    below: str
+    above: str
+    singular: tuple[Stretch, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,16 +122,39 @@ def free_until(world: World, q: Vector, joint: int, target: float) -> float:
     return float(start[joint] + low * (end[joint] - start[joint]))
 
 
-def free_range(world: World, q: Vector, joint: int) -> tuple[float, float]:
-    """From where to where a joint can be driven without touching anything [rad or m]; a full turn if it is endless."""
-    robot = world.robot
-    here = float(q[joint])
+def room_of(world: World, q: Vector, joint: int) -> Room:
+    """How far a joint can be driven; nowhere if the arm touches something, a full turn if it is endless and free."""
+    robot, here = world.robot, float(q[joint])
     if not world.valid(q):
-        return here, here
-    ends = [end if np.isfinite(end) else here + turn for end, turn in
-            ((robot.lower[joint], -2.0 * np.pi), (robot.upper[joint], 2.0 * np.pi))]  # fmt: skip
-    low, high = (free_until(world, q, joint, float(end)) for end in ends)
-    return low, high
+        why = world.explain(q)
+        return Room(here, here, why, why, ())
+    low, below = _way(world, q, joint, float(robot.lower[joint]), here - 2.0 * np.pi)
+    high, above = _way(world, q, joint, float(robot.upper[joint]), here + 2.0 * np.pi)
+    return Room(low, high, below, above, _singular_stretches(robot, q, joint, low, high))
+
+
+def _way(world: World, q: Vector, joint: int, limit: float, turn: float) -> tuple[float, str]:
+    """How far a joint goes towards its limit, or round once, and what ends it: that, or the pair that touches."""
+    end, name = (limit, "limit") if np.isfinite(limit) else (turn, "full turn")
+    reached = free_until(world, q, joint, end)
+    if reached == end:
+        return end, name
+    start, last = q.copy(), q.copy()
+    start[joint], last[joint] = reached, end
+    touching = world.contacts(_first_stuck(world, start, last))
+    return reached, f"{touching[0].first} meets {touching[0].second}" if touching else "too close to tell"
+
+
+def _singular_stretches(robot: Robot, q: Vector, joint: int, low: float, high: float) -> tuple[Stretch, ...]:
+    """Where along the way of a joint the arm is near a singular posture."""
+    values = np.linspace(low, high, SINGULAR_LOOKS)
+    rows = np.tile(q, (len(values), 1))
+    rows[:, joint] = values
+    found: list[Stretch] = []
+    for case, near in _near_singular(robot, rows).items():
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], near, [False]]).astype(int)))
+        found += [(float(values[a]), float(values[b - 1]), case) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return tuple(found)
 
 
 def way_out(world: World, q: Vector) -> tuple[int, float] | None:
@@ -146,16 +193,29 @@ def _out_of_contact(world: World, start: Vector, end: Vector) -> Verdict:
     return Verdict(True, "", ("out of contact",), float(room[-1]))
 
 
-def _obstruction(world: World, start: Vector, end: Vector, joint: int) -> str:
-    """Which pair touches first along a move that is not free, and at which value of the joint."""
+def _first_stuck(world: World, start: Vector, end: Vector) -> Vector:
+    """The first configuration along a motion that is not free; its end if none is seen. Shape (dof,)."""
     rows = start + np.linspace(0.0, 1.0, world.steps(start, end) + 1)[:, None] * (end - start)
     stuck = np.flatnonzero(~world.valid_batch(rows))
-    first = rows[stuck[0]] if len(stuck) else end
+    return np.array(rows[stuck[0]] if len(stuck) else end)
+
+
+def _obstruction(world: World, start: Vector, end: Vector, joint: int) -> str:
+    """Which pair touches first along a move that is not free, and at which value of the joint."""
+    first = _first_stuck(world, start, end)
     value, unit = reading(float(first[joint]), joint_unit(world.robot.prismatic[joint]))
     why = world.explain(first) or "too close to tell"
     return f"{world.robot.joint_names[joint]} at {value:.3g} {unit}: {why}"
 
 
 def _singular(world: World, q: Vector) -> list[str]:
-    report = singularity_report(world.robot, q)
-    return [f"near the singular posture '{case}'" for case, near in report.nearness.items() if near < NEAR_SINGULAR]
+    near = [case for case, there in _near_singular(world.robot, q[None]).items() if there[0]]
+    return [f"near the singular posture '{case}'" if case else "near a singular posture" for case in near]
+
+
+def _near_singular(robot: Robot, rows: Matrix) -> dict[str, Mask]:
+    """Which configurations are near each singular case, shape (m,); by the Jacobian, "", if the robot names none."""
+    if has_closed_form(robot):
+        return {case: np.asarray(size < NEAR_SINGULAR) for case, size in form_of(robot).nearness(rows).items()}
+    least = np.linalg.svd(robot.jacobian_batch(rows), compute_uv=False)[:, -1]
+    return {"": np.asarray(least < NEAR_SINGULAR)}

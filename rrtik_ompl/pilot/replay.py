@@ -54,7 +54,7 @@ class RecordedEyes:
         self._entries, self._arm, self._world, self._next = entries, arm, world, 0
         self.camera, self.T_base_camera, self.arm_in_picture = world.camera, world.T_base_camera, True
         self.picture: NDArray[np.uint8] = np.zeros((self.camera.height, self.camera.width, 3), dtype=np.uint8)
-        self.lost = ""
+        self.lost = self.hint = ""
 
     def look(self, session: Session, time: float) -> None:
         """Let happen what has happened until a time of the record [s]."""
@@ -97,6 +97,8 @@ def entries_for(path: str | os.PathLike[str], problem: str, robot: Robot, marker
         except (KeyError, TypeError, ValueError, InputError) as error:
             why = f"lacks {error}" if isinstance(error, KeyError) else str(error)
             raise InputError(f"{path}:{count}: a line '{str(entry['kind'])[:20]}' that does not fit: {why}") from None
+    if not begin:
+        raise InputError(f"{path}: holds no line 'begin'; give a record of rrtik pilot")
     return entries
 
 

@@ -90,14 +90,14 @@ def _last_parts(
     """What may end a route to a grasp: few moves from about the pose before it, or else some from exactly there."""
     at = solve_ik_batch(world.robot, [stages[1].homogeneous], near=near, world=holding, seed=seed)
     if not at.found[0]:
-        return f"the grasp: {at.reasons[0] or 'not to be reached'}"
+        return f"the grasp: {at.details[0] or at.reasons[0] or 'not to be reached'}"
     grasp = _settled(holding, at.q[0], q)
     short = approaches(world, holding, grasp, stages, BEGINNINGS)
     if short:
         return short
     before = solve_ik_batch(world.robot, [stages[0].homogeneous], near=grasp, world=world, seed=seed)
     if not before.found[0]:
-        return f"the pose before the object: {before.reasons[0] or 'not to be reached'}"
+        return f"the pose before the object: {before.details[0] or before.reasons[0] or 'not to be reached'}"
     last = planned(holding, before.q[0], grasp, seed)
     return f"from before the object to it: {last}" if isinstance(last, str) else [[last]]
 

@@ -83,7 +83,10 @@ def find_scenario(problem: str) -> Path:
     shipped = {file.stem: file for folder in problem_folders() for file in _scenarios(folder)}
     if problem not in shipped:
         there = ", ".join(sorted(shipped)) or "no problem"
-        raise InputError(f"no simulated vehicle ships for '{problem}' (but for {there}); give one with --scenario FILE")
+        raise InputError(
+            f"no simulated vehicle ships for '{problem}' (but for {there}); give one with --scenario FILE, or "
+            "show a record with its own --camera-file and --map"
+        )
     return shipped[problem]
 
 

@@ -18,8 +18,9 @@ from rrtik_ompl.moves_text import joint_unit, reading
 from rrtik_ompl.pilot.arguments import LONGEST, fitting
 from rrtik_ompl.pilot.arm import Arm, joint_rates
 from rrtik_ompl.pilot.follower import Follower, Progress, still_free
-from rrtik_ompl.pilot.lamps import Lamp, lamps, stage_poses
-from rrtik_ompl.pilot.manoeuvre import Verdict, advice_to_get_free, free_range, free_until, judge_move
+from rrtik_ompl.pilot.lamps import Lamp, stage_poses
+from rrtik_ompl.pilot.manoeuvre import Room, Verdict, advice_to_get_free, free_until, judge_move
+from rrtik_ompl.pilot.outlook import Outlook
 from rrtik_ompl.pilot.record import Record
 from rrtik_ompl.pilot.route import Route, route_to, route_to_grasp
 from rrtik_ompl.pilot.surroundings import Surroundings
@@ -60,9 +61,9 @@ class Session:
         self.desired: Vector = self.q
         self.time = 0.0
         self.picture_time = -np.inf
+        self._seen_at: dict[str, float] = {}
         self._record = record or Record(None)
-        self._lamps: tuple[tuple[Any, ...], tuple[Lamp, ...]] = ((), ())
-        self._room: tuple[tuple[Any, ...], tuple[float, float]] = ((), (0.0, 0.0))
+        self._outlook = Outlook(self.surroundings)
         self._commands: dict[str, Callable[..., str]] = {
             "select": self._select, "move": self._move, "nudge": self._nudge, "stop": self._stop,
             "object": self._object, "grasp": self._grasp, "plan": self._plan, "accept": self._accept,
@@ -75,6 +76,7 @@ class Session:
     def see(self, objects: Sequence[SeenObject], time: float) -> None:
         """Take in what a picture shows."""
         self.time, self.picture_time = max(self.time, time), time
+        self._seen_at |= {each.object.name: time for each in objects}
         if self.surroundings.see(objects):
             self._record.write("seen", time, objects=self.surroundings.places())
             if self.target is None:
@@ -124,29 +126,25 @@ class Session:
     # --- what goes out -------------------------------------------------------------------------------------------
 
     def lamps(self) -> tuple[Lamp, ...]:
-        """Lamps of the chosen object where it is and for where the arm is; worked out anew only when that changed."""
-        seen = None if self.target is None else self.surroundings.named(self.target)
-        if seen is None:
-            return ()
-        key = (self.target, self.surroundings.version)
-        if key != self._lamps[0]:
-            holding = self.surroundings.holding(seen.object.name)
-            found = lamps(self.surroundings.world, seen.object, seen.T_base_object, self.q, holding=holding)
-            self._lamps = (key, found)
-        return self._lamps[1]
+        """Lamps of the chosen object where it is and for where the arm is."""
+        return self._outlook.lamps(self.target, self.q)
 
     def lamp(self) -> Lamp | None:
         """The lamp of the grasp that is chosen."""
         return next((lamp for lamp in self.lamps() if (lamp.type, lamp.level) == self.choice), None)
 
-    def room(self) -> tuple[float, float]:
-        """From where to where the selected joint can be driven now [rad or m]; the same while it alone moves."""
-        others = np.delete(self.q, self.selected).tobytes()
-        key = (self.selected, others, self.surroundings.version)
-        low, high = self._room[1]
-        if key != self._room[0] or not low <= self.q[self.selected] <= high:
-            self._room = (key, free_range(self.surroundings.world, self.q, self.selected))
-        return self._room[1]
+    def fault(self) -> str:
+        """What is wrong with the grasp that is chosen: by how much it is out of reach, what touches; "" if nothing."""
+        lamp = self.lamp()
+        return "" if lamp is None else self._outlook.fault(str(self.target), lamp, self.q)
+
+    def room(self) -> Room:
+        """From where to where the selected joint can be driven now."""
+        return self._outlook.room(self.q, self.selected)
+
+    def unseen(self, name: str) -> float:
+        """For how long an object has not been in view, by the pictures taken since [s]."""
+        return max(self.picture_time - self._seen_at.get(name, self.picture_time), 0.0)
 
     # --- commands ------------------------------------------------------------------------------------------------
 
@@ -208,8 +206,7 @@ class Session:
         if not 0 <= int(level) < count:
             raise InputError(f"level must be 1 to {count}, got {int(level) + 1}")
         self.choice, self.mode = (type, int(level)), CHOOSING
-        lamp = self.lamp()
-        return f"{type} at level {int(level) + 1}: " + ("" if lamp is None else lamp.reason or "can be reached")
+        return f"{type} at level {int(level) + 1}: {self.fault() or 'can be reached'}"
 
     def _plan(self) -> str:
         self.arm.stop()

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.overlay.gods_eye import eye_at
 from rrtik_ompl.pilot.arm import Arm, SimulatedArm
 from rrtik_ompl.pilot.engine import Engine
 from rrtik_ompl.pilot.eyes import LiveEyes, SimulatedSource
@@ -19,13 +22,16 @@ from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.simulation import SimulatedCamera
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_file import load_problem
+from rrtik_ompl.sensing.camera import Camera
 from rrtik_ompl.sensing.camera_file import load_camera
 from rrtik_ompl.sensing.marker_map_file import load_marker_map
-from rrtik_ompl.sensing.pictures import pictures_from
+from rrtik_ompl.sensing.pictures import Picture, pictures_from
 from rrtik_ompl.sensing.scene_from_view import SIGMAS
 from rrtik_ompl.sensing.sensor import Sensor
+from rrtik_ompl.sensing.sight import check_size
 
 LAST_PORT = 65535
+FROM_ASIDE = 2.5, np.radians(125.0), np.radians(30.0)  # [m], [rad]: where a camera is imagined that moved with its base
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +96,14 @@ def _eyes(wanted: Wanted, problem: Problem, arm: Arm) -> LiveEyes:
     camera, marker_map = load_camera(str(wanted.camera_file)), load_marker_map(str(wanted.map_file))
     sensor = Sensor(camera, marker_map, sigmas=wanted.sigmas)
     source = wanted.source
-    return LiveEyes(sensor, Feed(lambda: pictures_from(source), paced=not isinstance(source, int)))
+    return LiveEyes(sensor, Feed(lambda: _fitting(pictures_from(source), camera), paced=not isinstance(source, int)))
+
+
+def _fitting(pictures: Iterator[Picture], camera: Camera) -> Iterator[Picture]:
+    """The same pictures; the first that the camera cannot have taken ends them with an error."""
+    for picture in pictures:
+        check_size(picture.pixels, camera)
+        yield picture
 
 
 def _scenario(wanted: Wanted, problem: Problem) -> Scenario:
@@ -98,6 +111,14 @@ def _scenario(wanted: Wanted, problem: Problem) -> Scenario:
     if wanted.camera_file is None and wanted.map_file is None:
         return scenario
     raise InputError("--simulated takes camera and map from its scenario: leave out --camera-file and --map")
+
+
+def _recorded(wanted: Wanted, problem: Problem) -> Scenario:
+    """What a record is shown with: a scenario, or the camera and map that it was made with."""
+    if wanted.camera_file is None or wanted.map_file is None:
+        return _scenario(wanted, problem)
+    camera, marker_map = load_camera(wanted.camera_file), load_marker_map(wanted.map_file)
+    return Scenario(camera, marker_map, {}, marker_map.T_base_camera or eye_at(np.zeros(3), *FROM_ASIDE))
 
 
 def _simulated(scenario: Scenario, problem: Problem) -> SimulatedCamera:
@@ -115,7 +136,7 @@ def _line_arm(problem: Problem, address: str) -> LineArm:
 
 
 def _replay(wanted: Wanted, problem: Problem, file: Path) -> Opened:
-    scenario = _scenario(wanted, problem)
+    scenario = _recorded(wanted, problem)
     entries = entries_for(file, problem.name, problem.robot, scenario.marker_map)
     start, seed = start_of(entries, problem.start)
     arm = RecordedArm(problem.robot, start)

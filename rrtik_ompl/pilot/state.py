@@ -21,12 +21,13 @@ def state_document(session: Session) -> dict[str, Any]:
         "stale": bool(age > STALE),
         "selected": session.selected,
         "joints": _joints(session),
-        "objects": [_object(seen) for seen in session.surroundings.seen],
+        "objects": [_object(seen, session.unseen(seen.object.name)) for seen in session.surroundings.seen],
         "target": session.target,
         "choice": None if session.choice is None else {"type": session.choice[0], "level": session.choice[1]},
         "lamps": [
             {"type": la.type, "level": la.level, "color": la.color, "reason": la.reason} for la in session.lamps()
         ],
+        "fault": session.fault(),
         "route": _route(session),
         "room": _room(session),
         "aim": _aim(session),
@@ -48,18 +49,21 @@ def _joints(session: Session) -> list[dict[str, Any]]:
     return found
 
 
-def _object(seen: Any) -> dict[str, Any]:
+def _object(seen: Any, unseen: float) -> dict[str, Any]:
     return {
         "name": seen.object.name,
         "graspable": bool(seen.object.grasps),
         "sigma_mm": round(1e3 * seen.position_sigma, 2),
+        "unseen": round(unseen, 1),
     }
 
 
-def _room(session: Session) -> list[float | None]:
-    """From where to where the selected joint can be driven."""
-    unit = joint_unit(session.robot.prismatic[session.selected])
-    return [reading(end, unit)[0] for end in session.room()]
+def _room(session: Session) -> dict[str, Any]:
+    """From where to where the selected joint can be driven, what ends it there, and where the arm is near singular."""
+    unit, room = joint_unit(session.robot.prismatic[session.selected]), session.room()
+    low, high = (reading(end, unit)[0] for end in (room.low, room.high))
+    singular = [[reading(a, unit)[0], reading(b, unit)[0], case] for a, b, case in room.singular]
+    return {"low": low, "high": high, "below": room.below, "above": room.above, "singular": singular}
 
 
 def _aim(session: Session) -> dict[str, Any]:

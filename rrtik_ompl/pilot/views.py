@@ -126,8 +126,9 @@ def ghosts(session: Session) -> list[Ghost]:
     lamp = session.lamp()
     if lamp is None:
         return []
-    postures = [q for q in lamp.q[1:2] if not np.isnan(q).any()]
-    return [Ghost(q, LAMP_COLORS[lamp.color], 0.45) for q in postures]
+    if np.isnan(lamp.q[1]).any():  # no configuration holds the object: the gripper alone, where it would have to be
+        return [Ghost(None, LAMP_COLORS[lamp.color], 0.55, at) for at in _chosen(session)]
+    return [Ghost(lamp.q[1], LAMP_COLORS[lamp.color], 0.45)]
 
 
 def trail(session: Session) -> Matrix | None:

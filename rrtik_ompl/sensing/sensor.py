@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from rrtik_ompl.poses import quaternion_xyzw
 from rrtik_ompl.scene import Scene
@@ -99,7 +100,7 @@ class Sensor:
         """
         self.camera, self.marker_map, self._sigmas = camera, marker_map, checked_sigmas(sigmas)
         self._trackers = {each.name: PoseTracker() for each in marker_map.objects} if smooth else {}
-        self._dictionaries_seen: set[str] = set()
+        self._blank: NDArray[np.uint8] | None = None  # the last picture in which nothing was found
 
     def view(self, picture: Picture) -> View:
         """What a picture shows, later than the one before.
@@ -108,8 +109,8 @@ class Sensor:
             InputError: If the picture does not have the camera's size, or times go backwards.
         """
         seen = tuple(self._tracked(each, picture.time) for each in look(picture.pixels, self.camera, self.marker_map))
-        if not seen and not self._dictionaries_seen:
-            self._dictionaries_seen.update(dictionaries_seen(as_gray(picture.pixels)))
+        if not seen:
+            self._blank = picture.pixels
         try:
             placed = objects_in_base(seen, self.marker_map, sigmas=self._sigmas)
             return View(picture, self.camera, seen, placed)
@@ -117,12 +118,17 @@ class Sensor:
             return View(picture, self.camera, seen, (), str(error))
 
     def why_nothing(self, source: str) -> str:
-        """One line on why no object was seen, with a remedy."""
-        known, others = self.marker_map.dictionary in self._dictionaries_seen, sorted(self._dictionaries_seen)
-        if others and not known:
-            return f"{source}: no marker of {self.marker_map.dictionary}, but of {', '.join(others[:3])}; mend its key"
-        if known:
+        """One line on why no object was seen in the last picture without one, with a remedy.
+
+        Looks for markers of all dictionaries, which takes as long as dozens of pictures.
+        """
+        if self._blank is None:
+            return f"{source}: markers of the map are in view, but none that says where the arm's base is"
+        wanted, found = self.marker_map.dictionary, dictionaries_seen(as_gray(self._blank))
+        if wanted in found:
             return f"{source}: markers are in view, but none that the map knows; add their ids to the map"
+        if found:
+            return f"{source}: no marker of {wanted}, but of {found[0]}: print others, or change the map's 'dictionary'"
         return f"{source}: no marker in view; go nearer, add light, or check that the white rim of the marker is whole"
 
     def _tracked(self, sight: Sighting, time: float) -> Sighting:

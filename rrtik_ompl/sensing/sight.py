@@ -78,14 +78,24 @@ def look(
         InputError: If the picture does not have the camera's size, or is none.
     """
     gray = as_gray(picture)
-    if gray.shape != (camera.height, camera.width):
-        raise InputError(
-            f"the picture has {gray.shape[1]} x {gray.shape[0]} pixels, the camera {camera.width} x {camera.height}; "
-            "take pictures of the size that it was calibrated for"
-        )
+    check_size(gray, camera)
     seen = find_markers(gray, marker_map.dictionary, align=align)
     sightings = (sighting(camera, each, seen) for each in marker_map.objects)
     return tuple(found for found in sightings if found is not None)
+
+
+def check_size(picture: NDArray[np.uint8], camera: Camera) -> None:
+    """Make sure that a camera may have taken a picture.
+
+    Raises:
+        InputError: If the picture does not have the camera's size.
+    """
+    height, width = picture.shape[:2]
+    if (height, width) != (camera.height, camera.width):
+        raise InputError(
+            f"the picture has {width} x {height} pixels, the camera {camera.width} x {camera.height}; "
+            "take pictures of the size that it was calibrated for"
+        )
 
 
 def sighting(camera: Camera, thing: MarkedObject, seen: Sequence[SeenMarker]) -> Sighting | None:

@@ -6,6 +6,7 @@ const KEYS = [
   ["1 … 9", [..."123456789"], "select a joint", (key) => selectJoint(Number(key) - 1)],
   ["↑ ↓", ["ArrowUp", "ArrowDown"], "previous, next joint", (key) => neighbourJoint(key === "ArrowUp" ? -1 : 1)],
   ["← →", ["ArrowLeft", "ArrowRight"], "drive the joint by a step", (key) => nudge(key === "ArrowLeft" ? -1 : 1)],
+  ["M", ["m"], "type a value for the joint, Enter drives there", () => byId("value").select()],
   [", .", [",", "."], "smaller, larger step", (key) => changeStep(key === "," ? -1 : 1)],
   ["O", ["o"], "next object", () => nextObject()],
   ["G", ["g"], "next grasp type", () => chooseGrasp(1, 0)],
@@ -30,13 +31,19 @@ const KEYS = [
 ];
 const ACTIONS = new Map(KEYS.flatMap(([, keys, , act]) => keys.map((key) => [key, act])));
 const TURNS = { ArrowLeft: [-0.12, 0], ArrowRight: [0.12, 0], ArrowUp: [0, 0.08], ArrowDown: [0, -0.08] };
+const SCRUBBING = new Set(["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"]);
 const REPEATED = new Set(["ArrowLeft", "ArrowRight", "[", "]", "+", "=", "-"]);
 
 function openHelp() { document.getElementById("help").showModal(); }
 
+// What is focused keeps the keys that it cannot do without; all others command, wherever the mouse has been.
+function needsKey(element, key) {
+  return element.matches("select, input[type=number]") || (element.matches("input[type=range]") && SCRUBBING.has(key));
+}
+
 function onKey(event) {
   if (event.ctrlKey || event.altKey || event.metaKey || document.getElementById("help").open) return;
-  if (event.target.matches("select, input") && event.key !== " ") return;
+  if (event.key !== " " && needsKey(event.target, event.key)) return;
   const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
   const turn = event.shiftKey && TURNS[key];
   const act = turn ? () => send("turn", { right: turn[0], up: turn[1] }) : ACTIONS.get(key);

@@ -4,8 +4,8 @@
 const STEPS = [0.2, 1, 2, 5, 10, 20];  // degrees, or 5 mm for one
 const PRESETS = ["corner", "side", "top", "behind"];
 const COLOR_WORDS = { green: "reach", amber: "blocked", red: "no reach" };
-const MM_PER_DEGREE = 2, NEAR_LIMIT = 0.04, HOLD_MS = 3000;
-const WORRYING = /refused|no route|must|cannot|not where|off the route|blocked|lost|takes|first|there is no|narrow|left;/;
+const MM_PER_DEGREE = 2, NEAR_LIMIT = 0.04, MARK = 0.006, UNSEEN_S = 1, HOLD_MS = 3000;
+const WORRYING = /refused|no route|must|cannot|not where|off the route|blocked|lost|takes|first|there is no|narrow|left;|outside|collision|away from the goal/;
 const FIRST_WORDS = "Choose a grasp with G and L, then plan with P. Or choose a joint with 1 … 9 and drive it with ← →.";
 let state = null, role = { role: "watching", free: false, pages: 1 }, step = 3, preset = 0, receivedAt = 0, playing = null;
 let previousAlert = "", heldUntil = 0;
@@ -17,6 +17,7 @@ const make = (tag, attributes = {}, ...children) => {
   element.append(...children);
   return element;
 };
+const inWords = (text) => state.joints.reduce((said, { name }) => said.replaceAll(name, name.replaceAll("_", " ")), text);
 const fixed = (value, digits = 1) => value.toFixed(digits).replace("-", "\u2212");
 
 // --- commands ---------------------------------------------------------------------------------------------------
@@ -100,7 +101,7 @@ function showState(said) {
   receivedAt = performance.now();
   for (const item of byId("modes").children)
     item.dataset.mode === said.mode ? item.setAttribute("aria-current", "step") : item.removeAttribute("aria-current");
-  if (newMessage || performance.now() > heldUntil) say(said.message || FIRST_WORDS, WORRYING.test(said.message), 0);
+  if (newMessage || performance.now() > heldUntil) say(inWords(said.message) || FIRST_WORDS, WORRYING.test(said.message), 0);
   showJoints(); showTarget(); showLamps(); showRoute(); showAim(); showButtons(); showPreview(); showAge();
   if (newRoute && role.role === "pilot" && !said.replay && !playing) togglePlay();
 }
@@ -120,14 +121,15 @@ function showAge() {
   if (!state) return;
   const chip = byId("age"), waited = (performance.now() - receivedAt) / 1000;
   const age = state.picture_age === null ? null : state.picture_age + waited;
-  const stale = age === null || age > STALE_S;
-  document.body.classList.toggle("stale", stale && !state.replay);
+  const past = state.replay || state.pictures_ended;  // photographs and films end: no reason for alarm
+  const stale = !past && (age === null || age > STALE_S);
+  document.body.classList.toggle("stale", stale);
   chip.classList.toggle("bad", stale);
-  set(chip, age === null ? "no picture yet" : stale ? `STALE picture: ${fixed(age)} s old` : `picture ${Math.round(1000 * age)} ms old`);
+  set(chip, state.replay ? state.camera_lost || (state.paused ? "record, paused" : "record")
+    : state.pictures_ended ? "the last picture" : age === null ? "no picture yet" : stale ? `STALE picture: ${fixed(age)} s old` : `picture ${Math.round(1000 * age)} ms old`);
   const reasons = [];
-  if (state.camera_lost) reasons.push(state.replay ? state.camera_lost : `Camera lost: ${state.camera_lost}. What is shown is the last known state.`);
+  if (state.camera_lost && !past) reasons.push(`Camera lost: ${state.camera_lost}. What is shown is the last known state.`);
   if (state.arm_lost) reasons.push(`${state.arm_lost}`);
-  if (state.paused) reasons.push("paused: Z goes on");
   if (!reasons.length && stale && age !== null) reasons.push("The picture is stale. Do not trust it.");
   byId("camera_banner").hidden = !reasons.length;
   set(byId("camera_banner"), reasons.join(" "));
@@ -139,12 +141,23 @@ function showJoints() {
   const body = byId("joints").tBodies[0];
   if (body.children.length !== state.joints.length) body.replaceChildren(...state.joints.map(jointRow));
   state.joints.forEach((joint, k) => showJoint(body.children[k], joint, k));
-  const unit = state.joints[state.selected].unit;
-  set(byId("step_size"), `${state.joints[state.selected].name.replaceAll("_", " ")} · step ${unit === "m" ? fixed(1000 * stepOf(unit)) + " mm" : stepOf(unit) + "°"}`);
+  const { name, unit } = state.joints[state.selected];
+  set(byId("step_size"), `${inWords(name)} · step ${unit === "m" ? fixed(1000 * stepOf(unit)) + " mm" : stepOf(unit) + "°"}`);
+  set(byId("unit"), unit === "m" ? "m" : "°");
+  showRoom(unit);
+}
+
+function showRoom(unit) {
+  const room = state.room, at = (value) => fixed(value, unit === "m" ? 3 : 1) + (unit === "m" ? " m" : "°");
+  const singular = room.singular.map(([from, to, name]) => `near singular${name && " "}${name} ${at(from)} to ${at(to)}`);
+  const text = inWords(room.low === room.high ? `in contact, only out of it: ${room.below}`
+    : [`free ${at(room.low)} (${room.below}) to ${at(room.high)} (${room.above})`, ...singular].join(" · "));
+  set(byId("room"), text);
+  byId("room").title = text;
 }
 
 function jointRow(joint, k) {
-  const bar = make("div", { className: "bar" }, ...["free", "way", "wanted", "is"].map((name) => make("i", { className: name })));
+  const bar = make("div", { className: "bar" }, ...["free", "singular", "way", "wanted", "is"].map((name) => make("i", { className: name })));
   bar.setAttribute("role", "meter");
   bar.onclick = (event) => driveTo(k, event);
   bar.title = "click: select and drive there";
@@ -164,7 +177,8 @@ function driveTo(k, event) {
 }
 
 function showJoint(row, joint, k) {
-  const bar = row.cells[1].firstChild, [free, way, wanted, is] = bar.children, digits = joint.unit === "m" ? 3 : 1;
+  const bar = row.cells[1].firstChild, [free, singular, way, wanted, is] = bar.children, digits = joint.unit === "m" ? 3 : 1;
+  if (k === state.selected && row.getAttribute("aria-selected") !== "true") row.scrollIntoView({ block: "nearest" });
   row.setAttribute("aria-selected", String(k === state.selected));
   const share = (value) => joint.lower === null ? 0.5 + (((value % 360) + 540) % 360 - 180) / 360
     : Math.min(Math.max((value - joint.lower) / (joint.upper - joint.lower), 0), 1);
@@ -173,10 +187,14 @@ function showJoint(row, joint, k) {
   wanted.style.left = percent(goal);
   way.style.left = percent(Math.min(now, goal));
   way.style.width = percent(Math.abs(goal - now));
-  free.hidden = k !== state.selected || joint.lower === null;
+  free.hidden = singular.hidden = k !== state.selected || joint.lower === null;
   if (!free.hidden) {
-    free.style.left = percent(share(state.room[0]));
-    free.style.width = percent(share(state.room[1]) - share(state.room[0]));
+    const { low, high, singular: stretches } = state.room;
+    free.style.left = percent(share(low));
+    free.style.width = percent(share(high) - share(low));
+    const marks = stretches.map(([from, to]) => [percent(share(from) - MARK), percent(share(to) + MARK)]);
+    singular.style.background = marks.length ? `linear-gradient(to right, ${marks.map(([from, to]) =>
+      `transparent ${from}, var(--amber) ${from} ${to}, transparent ${to}`).join()})` : "none";
   }
   bar.classList.toggle("near", joint.lower !== null && (now < NEAR_LIMIT || now > 1 - NEAR_LIMIT));
   const difference = joint.desired - joint.value, small = Math.abs(difference) < (joint.unit === "m" ? 0.002 : 1);
@@ -186,6 +204,7 @@ function showJoint(row, joint, k) {
   row.cells[4].className = small ? "there" : "off";
   const limits = joint.lower === null ? "endless" : `limits ${fixed(joint.lower)} to ${fixed(joint.upper)}`;
   bar.setAttribute("aria-label", `${joint.name}, ${limits}`);
+  bar.setAttribute("aria-valuetext", `${fixed(joint.value, digits)}, wanted ${fixed(joint.desired, digits)} ${joint.unit === "m" ? "metres" : "degrees"}`);
   for (const [name, value] of [["valuenow", joint.value], ["valuemin", joint.lower ?? -180], ["valuemax", joint.upper ?? 180]])
     bar.setAttribute(`aria-${name}`, value.toFixed(digits));
 }
@@ -217,9 +236,10 @@ function showLamps() {
     set(button.lastChild, COLOR_WORDS[lamp.color]);
   }
   const lamp = state.choice && state.lamps.find((each) => each.type === state.choice.type && each.level === state.choice.level);
-  set(byId("reason"), !state.lamps.length ? "No object with grasps in view."
+  const words = !state.lamps.length ? state.hint || "No object with grasps in view."
     : !lamp ? "Choose with G (type) and L (level)."
-    : `${lamp.type} level ${lamp.level + 1}: ${lamp.reason || "approach, grasp and lift can be reached"}`);
+    : `${lamp.type} level ${lamp.level + 1}: ${state.fault || "approach, grasp and lift can be reached"}`;
+  set(byId("reason"), inWords(words));
 }
 
 function lampButton(lamp) {
@@ -256,19 +276,27 @@ function inShort(move) {
   return `${move.joint.replaceAll("_", " ")} ${move.to > move.from ? "▲" : "▼"} ${fixed(Math.abs(move.to - move.from), digits)}${sign} to ${fixed(move.to, digits)}${sign}`;
 }
 
+const isOutOfView = (seen) => !state.replay && seen.unseen > UNSEEN_S;
+
 function showAim() {
   const aim = state.aim, metres = (value) => `${fixed(Math.abs(value), 3)} m`;
   const rows = [["tip x, y, z [m]", aim.tip.map((value) => fixed(value, 2)).join("  ")]];
   if (aim.to) rows.push([`to ${aim.to}`, metres(aim.distance)], [aim.ahead < 0 ? "behind the tool" : "ahead of the tool", metres(aim.ahead)],
     ["aside of its axis", metres(aim.aside)], [aim.xyz[2] < 0 ? "lower" : "higher", metres(aim.xyz[2])], ["turned away by", `${fixed(aim.turn_deg)}°`]);
   for (const seen of state.objects) rows.push([`${seen.name} seen to within`, `± ${fixed(seen.sigma_mm, 2)} mm`]);
+  for (const gone of state.objects.filter(isOutOfView)) rows.push([`${gone.name} not in view for`, `${fixed(gone.unseen, 0)} s`]);
   const list = byId("depth"), key = rows.map((row) => row[0]).join();
   if (list.dataset.key !== key) { list.dataset.key = key; list.replaceChildren(...rows.flatMap(([name]) => [make("dt", {}, name), make("dd")])); }
   rows.forEach(([, value], k) => set(list.children[2 * k + 1], value));
-  set(byId("numbers"), aim.to ? `${aim.to}\n${metres(aim.distance)} away\n${metres(aim.ahead)} ${aim.ahead < 0 ? "behind" : "ahead"}\n${metres(aim.aside)} aside` : "");
+  const target = state.objects.find((each) => each.name === state.target);
+  const unseen = target && isOutOfView(target) ? `not in view for ${fixed(target.unseen, 0)} s\n` : "";
+  byId("numbers").classList.toggle("unseen", Boolean(unseen));
+  set(byId("numbers"), aim.to ? `${unseen}${aim.to}\n${metres(aim.distance)} away\n${metres(aim.ahead)} ${aim.ahead < 0 ? "behind" : "ahead"}\n${metres(aim.aside)} aside` : "");
 }
 
 function showButtons() {
+  byId("pause").hidden = !state.replay || role.role !== "pilot";
+  set(byId("pause").firstChild, state.paused ? "Go on" : "Pause");
   const mine = role.role === "pilot" && !state.replay, at = (...modes) => mine && modes.includes(state.mode);
   for (const [id, good] of [["accept", at("proposed")], ["reject", at("proposed")], ["next", at("following")], ["plan", mine],
     ["replan", mine && Boolean(state.route)], ["back", mine && Boolean(state.route)], ["stop", mine]]) byId(id).disabled = !good;
@@ -282,13 +310,21 @@ function showPreview() {
 
 // --- buttons, mouse ---------------------------------------------------------------------------------------------
 
-for (const name of ["plan", "replan", "accept", "reject", "next", "back", "stop", "take", "hand_over"]) byId(name).onclick = () => send(name);
+for (const name of ["plan", "replan", "accept", "reject", "next", "back", "stop", "take", "hand_over", "pause"]) byId(name).onclick = () => send(name);
+byId("value").onkeydown = (event) => {
+  const typed = event.target.valueAsNumber;
+  if (event.key !== "Enter" && event.key !== "Escape") return;
+  if (event.key === "Enter" && Number.isFinite(typed)) send("move", { target: inRadians(typed, state.joints[state.selected].unit) });
+  event.target.value = "";
+  event.target.blur();
+};
 byId("target").onchange = (event) => { send("object", { name: event.target.value }); event.target.blur(); };
 byId("play").onclick = togglePlay;
 byId("live").onclick = showNow;
 byId("step_back").onclick = () => stepPreview(-1);
 byId("step_on").onclick = () => stepPreview(1);
 byId("scrub").oninput = (event) => preview(Number(event.target.value));
+byId("scrub").onpointerup = (event) => event.target.blur();  // whoever drags goes on with the arrow keys as before
 byId("presets").replaceChildren(...PRESETS.map((name, k) => make("button", { onclick: () => { preset = k; send("preset", { view: name }); } }, name)));
 
 const dragged = { right: 0, up: 0 };
