@@ -35,7 +35,7 @@ def replan_scenario(
     options = {"predict": predict, "seconds": seconds, "record": record}
     given = {name: value for name, value in options.items() if value is not None}
     if replay is not None and given:
-        raise InputError(f"--{next(iter(given))}: a run that is replayed is over; leave this out, or --replay")
+        raise InputError(f"--replay shows a run that is over: leave out --{next(iter(given))}, or --replay")
     from rrtik_ompl.scenario import load_scenario
 
     chosen = load_scenario(scenario)
