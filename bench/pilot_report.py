@@ -61,7 +61,8 @@ def write_routes(report: Report, part: int) -> None:
     report.note(
         "Routes on the panel",
         f"On the mean {moves:.1f} moves, {degrees:.0f} deg, {seconds:.0f} s; {narrow} of {len(routes)} are warned of: "
-        "with errors of 1 deg a move more than 1 of 100 executions touches something.",
+        "with errors of 1 deg a move more than 1 of 100 executions touches something, or comes into the margin that an "
+        "object has because nobody knows exactly where it is.",
     )
 
 

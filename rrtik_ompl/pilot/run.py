@@ -7,6 +7,8 @@ import time as clock
 from collections.abc import Callable
 from typing import Any
 
+import cv2
+
 from rrtik_ompl.pilot.engine import VIEW_COMMANDS, Engine
 from rrtik_ompl.pilot.server import PilotServer
 
@@ -38,6 +40,7 @@ class Loop:
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
         """Go on until Ctrl-C, or until asked to end."""
+        cv2.setNumThreads(1)  # more of them only spin: no picture of this size is ready sooner
         while not until():
             begin = clock.monotonic()
             self._step()
