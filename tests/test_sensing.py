@@ -2,26 +2,33 @@
 
 import itertools
 
+import cv2
 import numpy as np
 import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.poses import pose
-from rrtik_ompl.scene import Obstacle
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.replanning import replan
+from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.sensing.camera import Camera
 from rrtik_ompl.sensing.corner_pose import CornerPose, pose_of_points, pose_of_square, square_corners, turn_between
 from rrtik_ompl.sensing.frames import NoBaseError, base_from_camera, place_in_base
 from rrtik_ompl.sensing.marker_map import GraspType, MarkedObject, MarkerMap, MountedMarker
 from rrtik_ompl.sensing.markers import DICTIONARIES, dictionaries_seen, find_markers, marker_cells
+from rrtik_ompl.sensing.pictures import Picture
+from rrtik_ompl.sensing.scene_feed import scene_feed
 from rrtik_ompl.sensing.scene_from_view import SeenObject, objects_in_base, scene_from_image
 from rrtik_ompl.sensing.sensor import Sensor
 from rrtik_ompl.sensing.sight import look
 from rrtik_ompl.sensing.synthetic_camera import clean_picture, marker_print, photograph, published_camera
 from rrtik_ompl.sensing.tracker import PATIENCE, PoseTracker
 from rrtik_ompl.shapes import Box, HalfSpace
+from rrtik_ompl.world import World
 
 CAMERA = published_camera((0.05, -0.12, 0.0005, -0.0007, 0.03))
 SIDE = 0.08
@@ -196,6 +203,43 @@ def test_an_object_is_placed_in_the_frame_of_a_base_that_is_seen():
     assert scene_from_image(gray, CAMERA, marker_map, sigmas=0.0).obstacles[0].margin == 0.0
     tip = placed.grasp_pose("top", 1)
     assert (placed.T_base_object.inverse() * tip).translation == pytest.approx([0.05, 0.0, 0.1])
+
+
+def film(places):
+    """Pictures of the box's markers where they are seen at 30 Hz; None is an empty view."""
+    for k, place in enumerate(places):
+        markers = [] if place is None else [(10 + j, place * T) for j, T in enumerate(T_BOX_MARKERS)]
+        yield Picture(cv2.cvtColor(picture_of(markers, k), cv2.COLOR_GRAY2BGR), f"picture {k}", 5.0 + k / 30.0)
+
+
+def test_a_film_is_a_feed_in_which_what_is_out_of_view_stays_where_it_was_seen_last():
+    marker_map = MarkerMap("4x4_50", (BOX,), pin.SE3.Identity())
+    places = [None, *(facing([0.4, -0.3, 0.1], [0.05 + 0.01 * k, 0.0, 1.0]) for k in range(3)), None]
+    post = Obstacle("post", Box([0.1, 0.1, 0.1]), pose([3.0, 0.0, 0.0]))
+    feed = list(scene_feed(film(places), Sensor(CAMERA, marker_map, smooth=False), Scene((post,))))
+    assert [time for time, _ in feed] == pytest.approx([0.0, 1 / 30, 2 / 30, 0.1])  # nothing was known at first
+    for (_, scene), place in zip(feed, places[1:4], strict=False):
+        assert [obstacle.name for obstacle in scene.obstacles] == ["post", "box"]
+        assert scene.obstacle("box").pose.translation == pytest.approx(place.translation, abs=4e-3)
+    assert (feed[3][1].obstacle("box").pose.homogeneous == feed[2][1].obstacle("box").pose.homogeneous).all()
+
+
+def test_replanning_follows_what_a_camera_sees():
+    marker_map = MarkerMap("4x4_50", (BOX,), pose([0.4, 0.3, 0.0]))
+    places = [facing([0.4, -0.3, 0.1], [0.05 + 0.01 * k, 0.0, 1.0]) for k in range(4)]
+    start = np.array([0.0, -1.6, 1.2, -1.2, 1.6, 0.0])
+    problem = Problem(World(load_robot("ur5"), Scene(())), start, start + 0.3)
+    feed = scene_feed(film(places), Sensor(CAMERA, marker_map, smooth=False))
+    run = replan(problem, feed, step=0.02, rate=30.0, seconds=0.1, slot=9.0)
+    gone = [float(tick.poses["box"][0]) for tick in run.ticks if "box" in tick.poses]
+    assert len(gone) == 3
+    assert np.diff(gone) == pytest.approx([0.01, 0.01], abs=4e-3)
+
+
+def test_a_film_in_which_an_object_never_appears_says_which():
+    marker_map = MarkerMap("4x4_50", (BOX,), pin.SE3.Identity())
+    with pytest.raises(InputError, match="seen: box; show every"):
+        next(scene_feed(film([None]), Sensor(CAMERA, marker_map)))
 
 
 @given(st.integers(0, 2**32 - 1))

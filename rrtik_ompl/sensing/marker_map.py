@@ -89,6 +89,12 @@ class MarkedObject:
         if not self.markers:
             raise InputError(f"object '{self.name}' needs at least one marker")
 
+    @property
+    def solid_names(self) -> tuple[str, ...]:
+        """Names of its solids in a scene: its own, with that of the solid if there are several."""
+        several = len(self.solids) > 1
+        return tuple(f"{self.name}.{each.name}" if several else self.name for each in self.solids)
+
     def grasp(self, name: str) -> GraspType:
         """The grasp type of a name.
 

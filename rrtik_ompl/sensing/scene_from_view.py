@@ -64,14 +64,10 @@ class SeenObject:
 
     def solids(self) -> tuple[Obstacle, ...]:
         """Its solids as obstacles in the frame of the base, named after it, with what is uncertain as their margins."""
-        several = len(self.object.solids) > 1
         return tuple(
-            Obstacle(
-                f"{self.object.name}.{each.name}" if several else self.object.name, each.shape,
-                self.T_base_object * each.pose, margin=each.margin + self.margin(each),
-            )
-            for each in self.object.solids
-        )  # fmt: skip
+            Obstacle(name, each.shape, self.T_base_object * each.pose, margin=each.margin + self.margin(each))
+            for name, each in zip(self.object.solid_names, self.object.solids, strict=True)
+        )
 
     def grasp_pose(self, kind: str, level: int) -> Any:
         """``T_base_tip`` of a grasp.
