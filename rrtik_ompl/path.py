@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
 from rrtik_ompl.errors import InputError, require
@@ -21,7 +21,8 @@ from rrtik_ompl.world import World
 
 SECOND_CHECK = 2.0  # how many times finer than the motion resolution a path is checked again
 MAX_VALUE = 1e6  # of a joint [rad or m], as everywhere in our files
-MAX_CHECKS = 10_000_000  # of a path; with more of them the memory would run out long before the patience
+MAX_CHECKS = 30_000_000  # of a path; more than that take minutes
+AT_ONCE = 200_000  # of them, so that a long path needs no more memory than a short one
 
 
 class Move(NamedTuple):
@@ -211,16 +212,21 @@ class JointPath:
         fine = half if resolution is None else float(finite_array(resolution, (), "resolution"))
         if fine <= 0.0:
             raise InputError(f"resolution must be greater than 0 metres, got {fine:g}")
-        counts = [world.steps(a, b, fine) for a, b in pairwise(rows)]
-        if sum(counts) > MAX_CHECKS:
+        rows = np.vstack([rows, rows]) if len(rows) == 1 else rows
+        counts = np.array([world.steps(a, b, fine) for a, b in pairwise(rows)], dtype=np.float64)
+        if counts.sum() > MAX_CHECKS:
             raise InputError(
-                f"path: {sum(counts):.1e} checks are too many (at most {MAX_CHECKS:.0e}); "
+                f"path: {counts.sum():.1e} checks are too many (at most {MAX_CHECKS:.0e}); "
                 f"raise motion_resolution, or look whether the joint values are rad and m"
             )
-        dense, edges = subdivided(rows, np.array(counts, dtype=np.float64))
-        bad = np.flatnonzero(~world.certify(dense))
-        _, first = np.unique(edges[bad], return_index=True)
-        return tuple(Violation(int(edges[k]), frozen(dense[k]), world.explain(dense[k])) for k in bad[first])
+        found: list[Violation] = []
+        for part in _in_parts(counts):
+            dense, edges = subdivided(rows[part[0] : part[-1] + 2], counts[part])
+            bad = np.flatnonzero(~world.certify(dense))
+            bad = bad[(bad > 0) | (part[0] == 0)]  # the point at which a part begins is the last one of the part before
+            _, first = np.unique(edges[bad], return_index=True)
+            found += [Violation(int(part[edges[k]]), frozen(dense[k]), world.explain(dense[k])) for k in bad[first]]
+        return tuple(found)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the path to a file: .json (complete), .csv (a header of joint names), .txt (OMPL's matrix text).
@@ -244,6 +250,12 @@ class JointPath:
             "transitions": self.transitions,
             "waypoints": self.waypoints.tolist(),
         }
+
+
+def _in_parts(counts: Vector) -> list[NDArray[np.int64]]:
+    """Numbers of the edges with so many checks each, shape (k,), in parts of about AT_ONCE checks."""
+    edges = np.arange(len(counts), dtype=np.int64)
+    return np.split(edges, np.flatnonzero(np.diff(counts.cumsum() // AT_ONCE)) + 1)
 
 
 def subdivided(rows: Matrix, counts: Vector) -> tuple[Matrix, Vector]:

@@ -135,6 +135,20 @@ def test_violations_name_edge_and_pair():
         JointPath([[0.0, 0.0, 0.0]]).violations(world)
 
 
+@pytest.mark.parametrize("at_once", [1, 7, 100])
+def test_a_long_path_is_checked_in_parts_with_the_same_violations(monkeypatch, at_once):
+    box = Obstacle("box", Box([1, 1, 2]), pin.SE3(np.eye(3), np.array([5.0, 5.0, 0.0])))
+    world = World(load_robot("point2d", radius=0.1, bounds=[[0, 10], [0, 10]]), Scene([box]), motion_resolution=0.1)
+    rows = np.random.default_rng(0).integers(0, 12, (40, 2)).astype(float)
+    rows[[7, 20]] = 5.0  # waypoints inside the box, where parts may end
+    whole = JointPath(rows).violations(world)
+    monkeypatch.setattr("rrtik_ompl.path.AT_ONCE", at_once)
+    parts = JointPath(rows).violations(world)
+    assert len(whole) > 5
+    assert [(v.edge, v.reason) for v in parts] == [(v.edge, v.reason) for v in whole]
+    assert np.array_equal([v.q for v in parts], [v.q for v in whole])
+
+
 def test_an_interrupted_save_leaves_the_old_file(tmp_path, monkeypatch):
     import os
 
