@@ -25,8 +25,7 @@ class JointsDeg(Section):
 
     def configuration(self, robot: Robot) -> Vector:
         """Shape (dof,), rad or m."""
-        values = robot.configuration(self.joints_deg, "joints_deg")
-        return np.where(robot.prismatic, values, np.radians(values))
+        return robot.configuration_deg(self.joints_deg, "joints_deg")
 
 
 class Joints(Section):

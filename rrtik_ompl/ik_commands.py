@@ -123,10 +123,7 @@ def _posture(asked: Asked, near: str | None, near_deg: str | None) -> Any:
         return asked.robot.posture(near)
     if near_deg is None:
         return asked.near
-    import numpy as np
-
-    q = asked.robot.configuration(comma_numbers(near_deg, "--near-deg"), "--near-deg")
-    return np.where(asked.robot.prismatic, q, np.radians(q))
+    return asked.robot.configuration_deg(comma_numbers(near_deg, "--near-deg"), "--near-deg")
 
 
 def _goal(asked: Asked, position: Any, quaternion: Any, rpy_deg: Any, tolerances: dict[str, float]) -> Any:

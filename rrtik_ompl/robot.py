@@ -114,6 +114,11 @@ class Robot:
             )
         return finite_array(values, (self.dof,), what).copy()
 
+    def configuration_deg(self, values: ArrayLike, what: str = "configuration") -> Vector:
+        """As :meth:`configuration`, of joints that turn in degrees and joints that slide in metres. In rad or m."""
+        q = self.configuration(values, what)
+        return np.where(self.prismatic, q, np.radians(q))
+
     def posture(self, name: str) -> Vector:
         """Named configuration, shape (dof,).
 

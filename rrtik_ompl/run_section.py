@@ -34,9 +34,10 @@ class GoalWaypoint(Section):
             InputError: If it has the wrong number of joints or is outside the limits.
         """
         what = f"goal at {self.time:g} s"
-        q = robot.configuration(self.joints or self.joints_deg or [], what)
         if self.joints is None:
-            q = np.where(robot.prismatic, q, np.radians(q))
+            q = robot.configuration_deg(self.joints_deg or [], what)
+        else:
+            q = robot.configuration(self.joints, what)
         if fault := robot.limit_fault(q):
             raise InputError(f"{what}: {fault}")
         return q

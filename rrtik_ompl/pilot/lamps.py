@@ -83,18 +83,16 @@ def lamps(world: World, thing: MarkedObject, T_base_object: Any, near: Vector, *
 
 
 def fault_of(lamp: Lamp, thing: MarkedObject, T_base_object: Any, near: Vector, world: World, holding: World) -> str:
-    """Which stage of a grasp fails, and by how much it is out of reach or what would touch; "" if none does.
+    """Which stage of a grasp fails, and by how much it is out of reach or what would touch.
 
     Args:
-        lamp: Of the grasp.
+        lamp: Of the grasp; it has a reason.
         thing: What is to be grasped.
         T_base_object: Where it is.
         near: Posture near which the arm would be, shape (dof,).
         world: For the approach.
         holding: For grasp and lift.
     """
-    if not lamp.reason:
-        return ""
     name = lamp.reason.partition(":")[0]
     stage = STAGES.index(name)
     goal = PoseGoal(stage_poses(T_base_object, thing.grasp(lamp.type), lamp.level)[stage])
