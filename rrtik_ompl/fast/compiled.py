@@ -15,14 +15,13 @@ from numba import njit
 from numba.core.caching import FunctionCache
 from numba.core.sigutils import normalize_signature
 
-from rrtik_ompl.fast.code_files import sources_digest
+from rrtik_ompl.fast.code_files import PACKAGE, sources_digest
 from rrtik_ompl.fast.processor import WIDTH
 
 __all__ = ["WIDTH", "entries", "entry", "inlined", "kernel"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-_IDENTITY = f"{WIDTH}_{sources_digest()[:16]}"
 _OPTIONS = {"error_model": "numpy", "boundscheck": False, "no_cfunc_wrapper": True}
 _entries: dict[str, dict[str, Any]] = {}
 
@@ -49,7 +48,8 @@ class _ForgivingCache(FunctionCache):  # type: ignore[misc]
 
 def kernel(function: Function) -> Function:
     """Compile a function on its first call; kept on disk, and in memory alone where no folder can be written."""
-    function.__qualname__ = f"{function.__qualname__}_{_IDENTITY}"
+    module = function.__module__.removeprefix(f"{PACKAGE}.")
+    function.__qualname__ = f"{function.__qualname__}_{WIDTH}_{sources_digest(module)[:16]}"
     compiled: Any = njit(nogil=True, **_OPTIONS)(function)
     with suppress(RuntimeError):  # numba's word for "no place to keep it"
         compiled._cache = _ForgivingCache(function)
