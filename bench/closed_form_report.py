@@ -24,9 +24,9 @@ import numpy as np
 from peers.eaik import eaik_robot, turned_back
 
 from rrtik_ompl import load_robot
-from rrtik_ompl.ik.closed_form import form_of, solutions
-from rrtik_ompl.ik.form import wrapped
-from rrtik_ompl.ik.plain_branches import plain_branches
+from rrtik_ompl.ik.analytic.analytic_solver import wrapped
+from rrtik_ompl.ik.analytic.closed_form import form_of, solutions
+from rrtik_ompl.ik.analytic.reference_branches import plain_branches
 from rrtik_ompl.robot import Robot
 from rrtik_robots.puma560 import singular_samples as puma_samples
 from rrtik_robots.titan4 import singular_samples as titan_samples

@@ -24,9 +24,9 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl import Obstacle, Scene, World, load_robot
+from rrtik_ompl.covers.spheres import inner_spheres, outer_cover, protrusion_bound
 from rrtik_ompl.fast import FREE, UNDECIDED, FastWorld, needs_covers
-from rrtik_ompl.fast.covers import inner_spheres, outer_cover, protrusion_bound
-from rrtik_ompl.motion_bench_maker import load_motion_bench_maker
+from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.shapes import Box, Cylinder
 

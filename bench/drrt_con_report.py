@@ -21,12 +21,12 @@ from drrt_con_runs import outcome
 from parts import Parts, add_options
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.moving_world import MovingWorld
 from rrtik_ompl.replanning import Run, replan
 from rrtik_ompl.replanning.connecting import PlainConnect
+from rrtik_ompl.replanning.contact_check import judge
 from rrtik_ompl.replanning.drrt_con import DrrtCon
-from rrtik_ompl.replanning.judge import judge
 from rrtik_ompl.reproduce.plane_worlds import Plane
+from rrtik_ompl.world.moving_world import MovingWorld
 
 PLANNERS = ("drrt-con", "rrt-connect", "drrt")
 

@@ -11,9 +11,9 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.planning import plan
 from rrtik_ompl.replanning import Run, replan
 from rrtik_ompl.replanning.connecting import PlainConnect
+from rrtik_ompl.replanning.contact_check import Verdict, judge
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
 from rrtik_ompl.replanning.generate import moving_problem
-from rrtik_ompl.replanning.judge import Verdict, judge
 from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
 from rrtik_ompl.replanning.loop import Loop
 from rrtik_ompl.replanning.settings import settings

@@ -17,10 +17,10 @@ from parts import Parts, add_options
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.generated_problems import FAMILIES, generated_problem
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.reproduce.crdt_runs import histogram, sound
-from rrtik_ompl.scenarios import FAMILIES, generated_problem
 from rrtik_ompl.transitions import lower_bound
 
 ARMS = ("titan4", "ur5")
@@ -189,8 +189,8 @@ def write(report: Report, results: dict[str, list[Scene]], options: argparse.Nam
     for arm, found in results.items():
         tables(report, arm, found)
     text = (
-        f"Scenes of `rrtik_ompl.scenarios`, families in turns, seeds 0, 1, ...; every one has a path, found by "
-        f"RRT-Connect or BiCRDT, but neither a free straight motion nor a free order of moving every joint once. "
+        f"Scenes of `rrtik_ompl.generated_problems`, families in turns, seeds 0, 1, ...; every one has a path, found "
+        f"by RRT-Connect or BiCRDT, but neither a free straight motion nor a free order of moving every joint once. "
         f"Limits: {LIMIT:g} s for every planner, {MAKE_FEWER:g} s for fewest-moves as a way to shorten; times are wall "
         f"clock and include all stages; {options.jobs} at a time."
     )

@@ -13,7 +13,7 @@ import numpy as np
 from acceptance import Report
 from genetic_extensions import extensions
 
-from rrtik_ompl.ik.closed_form import solutions
+from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.ik.genetic.options import HISTORICAL, STANDARD
 from rrtik_ompl.reproduce.ga_published import FIRST_POINT, INCH, REFERENCE, TABLE_4, TABLE_5, curve, expanded_tip
 from rrtik_ompl.reproduce.ga_runs import JUMP, TRAJECTORIES, Run, arm, mean, median, run, runs

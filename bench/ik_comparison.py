@@ -25,13 +25,13 @@ from peers.ik import Solver, solvers
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.ik_layout import KERNELS
-from rrtik_ompl.fast.library import library
-from rrtik_ompl.ik.descent import PATIENCE, STEPS
-from rrtik_ompl.ik.face import list_ik_methods, usual_posture
+from rrtik_ompl.fast.ik.ik_layout import KERNELS
+from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.ik.goal_rows import pose_rows
-from rrtik_ompl.ik.kernel_call import KernelCall
-from rrtik_ompl.ik.limb import seeded_limb_of
+from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS
+from rrtik_ompl.ik.numeric.kernel_call import KernelCall
+from rrtik_ompl.ik.serial_chain import seeded_limb_of
+from rrtik_ompl.ik.solve import list_ik_methods, usual_posture
 from rrtik_ompl.robot import Robot
 
 ARMS = ("ur5", "panda", "puma560", "titan4")

@@ -14,7 +14,7 @@ from acceptance import Report
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.ik.face import IkResult, list_ik_methods
+from rrtik_ompl.ik.solve import IkResult, list_ik_methods
 
 POSES = ("ur5", "panda", "puma560", "titan4")
 POINTS = ("puma560_5dof", "panda", "planar10")

@@ -13,7 +13,7 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.errors import ProblemError
 from rrtik_ompl.goal import JointGoal, PoseGoal
 from rrtik_ompl.ik.ikurt.metric import reach
-from rrtik_ompl.motion_bench_maker import load_motion_bench_maker
+from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
 from rrtik_ompl.reproduce.ikurt import EXAMPLES
 from rrtik_ompl.shapes import Sphere
 

@@ -11,18 +11,18 @@ from planar_solvers import ccd, fabrik
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
-from rrtik_ompl.ik.descent import descend
-from rrtik_ompl.ik.face import solve_ik
 from rrtik_ompl.ik.mb_rrt.arc import arc_chains, grow_on_arcs
 from rrtik_ompl.ik.mb_rrt.axes import axes_of
 from rrtik_ompl.ik.mb_rrt.axis_rule_b import grow_by_rule_b
-from rrtik_ompl.ik.mb_rrt.axis_tree import AxisTree
 from rrtik_ompl.ik.mb_rrt.c_space import grow_in_joint_space
 from rrtik_ompl.ik.mb_rrt.closing import grow_and_close
 from rrtik_ompl.ik.mb_rrt.growth import grow
 from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
 from rrtik_ompl.ik.mb_rrt.links import Links, directions, sunflower
 from rrtik_ompl.ik.mb_rrt.search import polished
+from rrtik_ompl.ik.mb_rrt.workspace_tree import AxisTree
+from rrtik_ompl.ik.numeric.descent import descend
+from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.shapes import Cylinder
 from rrtik_planners import MBRRT, BiCRDT
 from rrtik_robots.planar import planar

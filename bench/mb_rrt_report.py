@@ -18,7 +18,7 @@ import numpy as np
 from rrtik_ompl.ik.mb_rrt.arc import grow_on_arcs
 from rrtik_ompl.ik.mb_rrt.growth import grow
 from rrtik_ompl.ik.mb_rrt.links import Links, headings_to_joints, joints_to_chain, sunflower
-from rrtik_ompl.plot_tree import plot_tree
+from rrtik_ompl.plots.mb_rrt_tree import plot_tree
 from rrtik_ompl.reproduce.mb_rrt_runs import arm
 from rrtik_ompl.reproduce.mb_rrt_runs import laws as laws_of
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rrtik_ompl.errors import RrtikError
 from rrtik_ompl.goal import JointGoal
-from rrtik_ompl.motion_bench_maker import load_motion_bench_maker
+from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
 
 
 def main() -> int:

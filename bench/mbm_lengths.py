@@ -17,9 +17,9 @@ from acceptance import Report
 
 from rrtik_ompl import one_joint_moves, plan, shorten
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.motion_bench_maker import load_motion_bench_maker
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
+from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
 from rrtik_ompl.reproduce.crdt_runs import sound
 
 PUBLISHED = 4.90  # [rad], median after simplification; of VAMP, whose path before it has 7.76

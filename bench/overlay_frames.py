@@ -15,14 +15,14 @@ from rrtik_ompl import load_problem, load_robot
 from rrtik_ompl.overlay.augment import Augmenter, Ghost
 from rrtik_ompl.overlay.canvas import FAR, Canvas
 from rrtik_ompl.overlay.figure import figure_of, placed
-from rrtik_ompl.overlay.gods_eye import eye_at
-from rrtik_ompl.overlay.plain_z_buffer import ROUNDING, plain_z_buffer
+from rrtik_ompl.overlay.reference_z_buffer import ROUNDING, plain_z_buffer
 from rrtik_ompl.overlay.surfaces import robot_surfaces
-from rrtik_ompl.pilot.scenario import find_scenario, load_scenario
-from rrtik_ompl.sensing.markers import marker_cells
-from rrtik_ompl.sensing.pictures import Picture
+from rrtik_ompl.overlay.virtual_camera import eye_at
+from rrtik_ompl.pilot.devices.simulated_vehicle import find_scenario, load_scenario
+from rrtik_ompl.sensing.cameras.pictures import Picture
+from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph, published_camera
+from rrtik_ompl.sensing.markers.detection import marker_cells
 from rrtik_ompl.sensing.sensor import Sensor
-from rrtik_ompl.sensing.synthetic_camera import clean_picture, marker_print, photograph, published_camera
 
 BUDGET = 20.0  # [ms] of processor time
 

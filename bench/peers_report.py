@@ -32,7 +32,8 @@ from speed_ours import our_search, warm_up
 
 import rrtik_ompl as rrtik
 from rrtik_ompl import JointPath, Problem
-from rrtik_ompl.scenarios import generated_problem
+from rrtik_ompl.arrays import TAU
+from rrtik_ompl.generated_problems import generated_problem
 
 OURS, OWN_RULE = "rrtik_ompl, fastrrtconnect", "the same by its own, denser rule"
 PEERS = {
@@ -48,7 +49,6 @@ HEAD += ["versions"]
 NO_FOLDER = "Without MotionBenchMaker's problems: their folder was not given."
 SHIPPED = ("titan4_sdu", "titan4_prisms")
 GENERATED = (("titan4", "clutter"), ("ur5", "clutter"))
-TURN = 2.0 * np.pi
 HOW = """RRT-Connect of everybody, motions of a tree at most {range:g} rad, {density:g} checks per radian (MPlib: OMPL's
 1 % of the space's extent, it cannot be set), first path, no shortening; {seeds} seeds on each problem, at most
 {seconds:g} s each. All read the same files: the arm's own solids (meshes as triangles), limits and pairs, so that the
@@ -96,7 +96,7 @@ class Runs:
 def joins(problem: Problem, rows: Rows) -> bool:
     """Whether a path leads from the start to the goal, whole turns of a joint aside."""
     off = np.abs(rows[[0, -1]] - (problem.start, problem.goal.q))  # type: ignore[union-attr]
-    turns = np.where(problem.robot.prismatic, 0.0, TURN * np.round(off / TURN))
+    turns = np.where(problem.robot.prismatic, 0.0, TAU * np.round(off / TAU))
     return bool(np.allclose(off, turns, atol=1e-6))
 
 

@@ -17,15 +17,15 @@ import tornado.websocket
 from pilot_scene import NAME, PLACE, ROBOT, seen_at
 
 from rrtik_ompl.overlay.augment import Augmenter
-from rrtik_ompl.overlay.gods_eye import eye_at
+from rrtik_ompl.overlay.virtual_camera import eye_at
 from rrtik_ompl.pilot.engine import Engine
 from rrtik_ompl.pilot.run import Loop
-from rrtik_ompl.pilot.server import PilotServer
 from rrtik_ompl.pilot.setup import Wanted, open_session
+from rrtik_ompl.pilot.web.server import PilotServer
 from rrtik_ompl.poses import pose
 from rrtik_ompl.scene import Obstacle
-from rrtik_ompl.sensing.pictures import Picture
-from rrtik_ompl.sensing.synthetic_camera import published_camera
+from rrtik_ompl.sensing.cameras.pictures import Picture
+from rrtik_ompl.sensing.cameras.synthetic_camera import published_camera
 from rrtik_ompl.shapes import Box
 
 PICTURES, SWAY = 30, 0.03  # of the object that moves; [m]

@@ -15,7 +15,7 @@ from pilot_pictures import registration, served, stages, state_rate
 from pilot_routes import REACTION, REPLANNING, panel_routes, simulated_pilot, small_errors
 from pilot_session import color_logic, preventive_checks, scripted_scenario
 
-from rrtik_ompl.pilot.way_search import STEADY
+from rrtik_ompl.pilot.routes.route_search import STEADY
 
 PUBLISHED = 1.08  # [s] of one route: search and shortening
 

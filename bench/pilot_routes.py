@@ -10,12 +10,12 @@ from pilot_scene import NAME, PROBLEM, ROBOT, WORLD, green_grasps
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.path import JointPath
-from rrtik_ompl.pilot.arm import SimulatedArm, joint_rates
-from rrtik_ompl.pilot.clearance import executions, free_rows
-from rrtik_ompl.pilot.route import Route, route_to
+from rrtik_ompl.pilot.devices.arm import SimulatedArm, joint_rates
+from rrtik_ompl.pilot.routes.clearance import executions, free_rows
+from rrtik_ompl.pilot.routes.route import Route, route_to
+from rrtik_ompl.pilot.routes.route_search import STEADY
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.setup import Wanted, open_session
-from rrtik_ompl.pilot.way_search import STEADY
 
 REACTION, OVERSHOOT, REPLANNING = 0.3, np.deg2rad(1.0), 2.0
 

@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio as pin
 from pilot_scene import NAME, PLACE, PROBLEM, ROBOT, VALVE, WORLD, seen_at
 
-from rrtik_ompl.ik.closed_form import solutions
+from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED, lamps, stage_poses
-from rrtik_ompl.pilot.manoeuvre import judge_move
+from rrtik_ompl.pilot.routes.manoeuvre import judge_move
 from rrtik_ompl.pilot.setup import Wanted, open_session
 from rrtik_ompl.pilot.surroundings import Surroundings
 

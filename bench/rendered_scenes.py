@@ -12,10 +12,10 @@ from acceptance import Report
 
 from rrtik_ompl.poses import pose
 from rrtik_ompl.reproduce.sensing_runs import CAMERA, DICTIONARY, SIDE, facing, in_view
-from rrtik_ompl.sensing.marker_map import MarkedObject, MarkerMap, MountedMarker
-from rrtik_ompl.sensing.markers import marker_cells
+from rrtik_ompl.sensing.cameras.synthetic_camera import Print, clean_picture, marker_print, photograph
+from rrtik_ompl.sensing.markers.detection import marker_cells
+from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
 from rrtik_ompl.sensing.sight import Sighting, look
-from rrtik_ompl.sensing.synthetic_camera import Print, clean_picture, marker_print, photograph
 from rrtik_ompl.sensing.tracker import PoseTracker, Tracked
 
 FRAMES = 12  # of a sequence

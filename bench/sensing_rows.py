@@ -9,8 +9,8 @@ import pinocchio as pin
 from acceptance import Report
 
 from rrtik_ompl import load_robot
-from rrtik_ompl.ik.closed_form import solutions
-from rrtik_ompl.overlay.gods_eye import eye_at
+from rrtik_ompl.ik.analytic.closed_form import solutions
+from rrtik_ompl.overlay.virtual_camera import eye_at
 from rrtik_ompl.poses import pose
 from rrtik_ompl.reproduce.sensing import ACCURACY, GRIPPER, NOISE, SERIES
 from rrtik_ompl.reproduce.sensing_runs import (
@@ -24,13 +24,13 @@ from rrtik_ompl.reproduce.sensing_runs import (
     noisy_poses,
     positions,
 )
-from rrtik_ompl.sensing.corner_pose import pose_of_square, square_corners
-from rrtik_ompl.sensing.marker_map import MarkedObject, MarkerMap, MountedMarker
-from rrtik_ompl.sensing.markers import marker_cells
+from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph, published_camera
+from rrtik_ompl.sensing.markers.corner_pose import pose_of_square, square_corners
+from rrtik_ompl.sensing.markers.detection import marker_cells
+from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
 from rrtik_ompl.sensing.precision import Series
 from rrtik_ompl.sensing.scene_from_view import objects_in_base
 from rrtik_ompl.sensing.sight import look
-from rrtik_ompl.sensing.synthetic_camera import clean_picture, marker_print, photograph, published_camera
 from rrtik_ompl.sensing.tracker import PoseTracker
 
 BOARD = [pose([x * 0.0535, y * 0.0535, 0.0]) for x in (-1, 1) for y in (-1, 1)]

@@ -22,8 +22,8 @@ from rrtik_ompl.reproduce.sensing_runs import (
     random_poses,
     seen_poses,
 )
+from rrtik_ompl.sensing.cameras.synthetic_camera import published_camera
 from rrtik_ompl.sensing.precision import NORMAL_QUARTILES, series_of
-from rrtik_ompl.sensing.synthetic_camera import published_camera
 
 POSES = 8
 WAYS = (("corners one by one", False, PLAIN), ("laid over", True, PLAIN), ("laid over, hard", True, HARD))

@@ -20,9 +20,9 @@ from parts import Parts, add_options
 
 from rrtik_ompl import load_problem, load_robot, one_joint_moves, shorten
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.generated_problems import FAMILIES, generated_problem
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.scenarios import FAMILIES, generated_problem
 from rrtik_ompl.shortening import METHODS
 
 SHIPPED = ("planar3_boxes", "titan4_sdu", "titan4_prisms")

@@ -26,8 +26,8 @@ from speed_ours import PLANNER
 from speed_planning import callbacks, exact, ompl_layer, spheres, titan
 from speed_process import memory, starts
 
-from rrtik_ompl.fast.library import library
-from rrtik_ompl.fast.processor import WIDTH
+from rrtik_ompl.fast.simd.library import library
+from rrtik_ompl.fast.simd.processor import WIDTH
 
 ROWS = {
     "spheres": spheres,
@@ -91,7 +91,7 @@ def processor() -> str:
 
 def lanes() -> str:
     """Width of the kernels on this machine."""
-    return "none, plain numpy" if library("kernels") is None else f"{WIDTH} lanes"
+    return "none, plain numpy" if library("checks.check_kernels") is None else f"{WIDTH} lanes"
 
 
 if __name__ == "__main__":

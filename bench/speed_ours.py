@@ -13,8 +13,8 @@ from ompl import geometric as og
 
 from rrtik_ompl import Problem, World
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.fast.connect import ConnectSearch
-from rrtik_ompl.goal_configurations import goal_configurations
+from rrtik_ompl.fast.search.connect import ConnectSearch
+from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.ompl_bridge.attempt import attempt
 from rrtik_ompl.ompl_bridge.setup import planning_bounds, unjudged_space
 from rrtik_ompl.ompl_bridge.states import StateIO

@@ -15,7 +15,7 @@ from speed_cases import Options
 from speed_ours import PLANNER
 
 import rrtik_ompl
-from rrtik_ompl.cli import FOUND, NOT_FOUND
+from rrtik_ompl.cli.app import FOUND, NOT_FOUND
 
 PROBLEM = "titan4_sdu"
 WARM_RUNS = 5
@@ -24,7 +24,7 @@ MEGABYTE = 1e6
 FLAT = 2.0  # [MB] of growth over the second half that still counts as none
 MODULES = ("rrtik_ompl", "rrtik_ompl.planning")
 CACHES = {"XDG_CACHE_HOME": "cache", "NUMBA_CACHE_DIR": "numba", "RRTIK_CACHE": "rrtik"}
-PLAN = "from rrtik_ompl.command import main; main()"
+PLAN = "from rrtik_ompl.cli.entry import main; main()"
 SOURCE = "import pathlib, rrtik_ompl; print(pathlib.Path(rrtik_ompl.__file__).resolve())"
 IMPORT = "import time; t = time.perf_counter(); import {}; print(time.perf_counter() - t)"
 

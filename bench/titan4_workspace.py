@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rrtik_ompl.plot_reach import plot_slices
+from rrtik_ompl.plots.reach import plot_slices
 from rrtik_robots.titan4.workspace import effective_slices
 
 

@@ -37,46 +37,46 @@ if TYPE_CHECKING:
     from rrtik_ompl.errors import ProblemError as ProblemError
     from rrtik_ompl.errors import RrtikError as RrtikError
     from rrtik_ompl.errors import UnknownNameError as UnknownNameError
+    from rrtik_ompl.files.mesh import load_mesh as load_mesh
     from rrtik_ompl.goal import GoalRegion as GoalRegion
     from rrtik_ompl.goal import JointGoal as JointGoal
     from rrtik_ompl.goal import PoseGoal as PoseGoal
     from rrtik_ompl.goal import PositionGoal as PositionGoal
     from rrtik_ompl.ik.batch import IkBatch as IkBatch
     from rrtik_ompl.ik.batch import solve_ik_batch as solve_ik_batch
-    from rrtik_ompl.ik.face import IkResult as IkResult
-    from rrtik_ompl.ik.face import list_ik_methods as list_ik_methods
-    from rrtik_ompl.ik.face import solve_ik as solve_ik
+    from rrtik_ompl.ik.solve import IkResult as IkResult
+    from rrtik_ompl.ik.solve import list_ik_methods as list_ik_methods
+    from rrtik_ompl.ik.solve import solve_ik as solve_ik
     from rrtik_ompl.ik.trajectory import IkTrajectory as IkTrajectory
     from rrtik_ompl.ik.trajectory import solve_ik_trajectory as solve_ik_trajectory
-    from rrtik_ompl.mesh_file import load_mesh as load_mesh
+    from rrtik_ompl.moves.staircase import one_joint_moves as one_joint_moves
     from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler as GoalSampler
-    from rrtik_ompl.one_joint import one_joint_moves as one_joint_moves
     from rrtik_ompl.path import JointPath as JointPath
     from rrtik_ompl.path import load_path as load_path
     from rrtik_ompl.planning import Plan as Plan
     from rrtik_ompl.planning import list_planners as list_planners
     from rrtik_ompl.planning import plan as plan
-    from rrtik_ompl.plot import plot_joints as plot_joints
+    from rrtik_ompl.plots.joints import plot_joints as plot_joints
     from rrtik_ompl.poses import pose as pose
     from rrtik_ompl.problem import Problem as Problem
-    from rrtik_ompl.problem_file import load_problem as load_problem
-    from rrtik_ompl.problem_file import save_problem as save_problem
+    from rrtik_ompl.problem_files.problem import load_problem as load_problem
+    from rrtik_ompl.problem_files.problem import save_problem as save_problem
+    from rrtik_ompl.problem_files.scene import load_scene as load_scene
+    from rrtik_ompl.problem_files.scene import save_scene as save_scene
     from rrtik_ompl.reach.grid_map import ReachMap as ReachMap
     from rrtik_ompl.reach.grid_map import load_reach_map as load_reach_map
     from rrtik_ompl.reach.sampling import reach_map as reach_map
     from rrtik_ompl.replanning import Run as Run
     from rrtik_ompl.replanning import load_run as load_run
     from rrtik_ompl.replanning import replan as replan
+    from rrtik_ompl.replanning.scenario import Scenario as Scenario
+    from rrtik_ompl.replanning.scenario import load_scenario as load_scenario
     from rrtik_ompl.robot import Robot as Robot
-    from rrtik_ompl.scenario import Scenario as Scenario
-    from rrtik_ompl.scenario import load_scenario as load_scenario
     from rrtik_ompl.scene import AttachedObject as AttachedObject
     from rrtik_ompl.scene import ConstantVelocity as ConstantVelocity
     from rrtik_ompl.scene import Obstacle as Obstacle
     from rrtik_ompl.scene import Scene as Scene
     from rrtik_ompl.scene import Waypoints as Waypoints
-    from rrtik_ompl.scene_file import load_scene as load_scene
-    from rrtik_ompl.scene_file import save_scene as save_scene
     from rrtik_ompl.shapes import Box as Box
     from rrtik_ompl.shapes import Capsule as Capsule
     from rrtik_ompl.shapes import Cylinder as Cylinder
@@ -100,24 +100,24 @@ else:
         "errors": ("InputError", "PlannerError", "ProblemError", "RrtikError", "UnknownNameError"),
         "goal": ("GoalRegion", "JointGoal", "PoseGoal", "PositionGoal"),
         "ik.batch": ("IkBatch", "solve_ik_batch"),
-        "ik.face": ("IkResult", "list_ik_methods", "solve_ik"),
+        "ik.solve": ("IkResult", "list_ik_methods", "solve_ik"),
         "ik.trajectory": ("IkTrajectory", "solve_ik_trajectory"),
         "ompl_bridge.goal_sampler": ("GoalSampler",),
-        "mesh_file": ("load_mesh",),
-        "one_joint": ("one_joint_moves",),
+        "files.mesh": ("load_mesh",),
+        "moves.staircase": ("one_joint_moves",),
         "path": ("JointPath", "load_path"),
         "planning": ("Plan", "list_planners", "plan"),
-        "plot": ("plot_joints",),
+        "plots.joints": ("plot_joints",),
         "poses": ("pose",),
         "problem": ("Problem",),
-        "problem_file": ("load_problem", "save_problem"),
+        "problem_files.problem": ("load_problem", "save_problem"),
         "reach.grid_map": ("ReachMap", "load_reach_map"),
         "reach.sampling": ("reach_map",),
         "replanning": ("Run", "load_run", "replan"),
         "robot": ("Robot",),
-        "scenario": ("Scenario", "load_scenario"),
+        "replanning.scenario": ("Scenario", "load_scenario"),
         "scene": ("AttachedObject", "ConstantVelocity", "Obstacle", "Scene", "Waypoints"),
-        "scene_file": ("load_scene", "save_scene"),
+        "problem_files.scene": ("load_scene", "save_scene"),
         "shapes": ("Box", "Capsule", "Cylinder", "HalfSpace", "Mesh", "Prism", "Sphere"),
         "shortening": ("MoveRules", "shorten"),
         "task_region": ("TaskRegion",),

@@ -1,6 +1,6 @@
 """``python -m rrtik_ompl``: the command `rrtik`."""
 
-from rrtik_ompl.command import main
+from rrtik_ompl.cli.entry import main
 
 if __name__ == "__main__":
     main()

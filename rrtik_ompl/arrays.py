@@ -13,6 +13,8 @@ Vector: TypeAlias = NDArray[np.float64]  # shape (n,)
 Matrix: TypeAlias = NDArray[np.float64]  # shape (m, n)
 Mask: TypeAlias = NDArray[np.bool_]  # shape (m,)
 
+TAU = 2.0 * np.pi  # [rad] a full turn
+
 
 def frozen(values: ArrayLike, dtype: Any = np.float64) -> NDArray[Any]:
     """Return a read-only, contiguous private copy of ``values``."""

@@ -24,8 +24,8 @@ from rrtik_ompl.description.robot_cache import RobotCache
 from rrtik_ompl.description.robot_source import base_pose, plain, source_entry
 from rrtik_ompl.description.urdf import URDF_OPTIONS, robot_from_urdf
 from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.files.text import file_name
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.text_file import file_name
 
 FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh")
 FILE_KINDS = (".urdf", ".xml", ".yaml", ".yml")

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
 from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.path_text import decoded, encoded, path_format
+from rrtik_ompl.files.tables import decoded, encoded, path_format
+from rrtik_ompl.files.text import read_text, write_text
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.text_file import read_text, write_text
 from rrtik_ompl.transitions import SAME, merge_moves, moved, route_length, single_joint, transitions
 from rrtik_ompl.world import World
 
@@ -163,8 +163,8 @@ class JointPath:
         """The list of single-joint moves that the path consists of; consecutive moves of the same joint are one.
 
         Raises:
-            InputError: If an edge moves several joints at once; :func:`rrtik_ompl.one_joint.one_joint_moves` makes a
-                path of single-joint moves from any path.
+            InputError: If an edge moves several joints at once; :func:`rrtik_ompl.moves.staircase.one_joint_moves`
+                makes a path of single-joint moves from any path.
         """
         rows = merge_moves(self.waypoints)
         changes = moved(rows[:-1], rows[1:])

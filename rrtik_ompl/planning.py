@@ -13,9 +13,9 @@ import numpy as np
 from rrtik_ompl import catalog
 from rrtik_ompl.arrays import Matrix, positive, whole_number
 from rrtik_ompl.errors import InputError, UnknownNameError, require
-from rrtik_ompl.fast.library import library
+from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.goal import JointGoal
-from rrtik_ompl.goal_configurations import GoalSearch
+from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ompl_bridge.attempt import (
     ANYTIME_PLANNERS,

@@ -8,12 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Vector, frozen
+from rrtik_ompl.arrays import TAU, Vector, frozen
 from rrtik_ompl.errors import ProblemError, require
 from rrtik_ompl.goal import Goal, JointGoal
 from rrtik_ompl.world import World
-
-TURN = 2.0 * np.pi
 
 
 class Problem:
@@ -98,6 +96,6 @@ def _usable(world: World, values: ArrayLike, what: str) -> Vector:
 
 def _nearest_turn(world: World, start: Vector, q: Vector) -> Vector:
     """The goal with its continuous joints turned by whole turns to lie nearest to the start; no turn, no rounding."""
-    turns = np.where(world.robot.continuous, np.round((start - q) / TURN), 0.0)
-    nearest: Vector = q + turns * TURN
+    turns = np.where(world.robot.continuous, np.round((start - q) / TAU), 0.0)
+    nearest: Vector = q + turns * TAU
     return nearest

@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
+from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector, finite_array, frozen, positive
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.poses import rigid, rotation_angles, rpy_matrices, unit_vector
 from rrtik_ompl.robot import Robot
@@ -24,7 +24,6 @@ from rrtik_ompl.tip_distance import metres_per_radian
 
 COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 SWEEPS = 3  # over roll, pitch and yaw; one is exact where a single one of them is free
-TURN = 2.0 * np.pi
 
 
 class WithinTolerances(ABC):
@@ -204,5 +203,5 @@ def _into(angles: NDArray[np.float64], low: ArrayLike, high: ArrayLike) -> NDArr
     """The nearest of equal angles within bounds, or the nearer bound."""
     low, high = np.asarray(low), np.asarray(high)
     middle = 0.5 * (low + high)
-    nearest: NDArray[np.float64] = np.clip(middle + (angles - middle + np.pi) % TURN - np.pi, low, high)
+    nearest: NDArray[np.float64] = np.clip(middle + (angles - middle + np.pi) % TAU - np.pi, low, high)
     return nearest

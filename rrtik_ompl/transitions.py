@@ -5,6 +5,7 @@ Source: the metric and the count of routes of the C-RDT paper.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import factorial, radians
 
 import numpy as np
@@ -118,3 +119,8 @@ def _rows(waypoints: ArrayLike) -> Matrix:
     if len(rows) == 0:
         raise InputError("waypoints: a route needs at least one configuration")
     return rows
+
+
+def edge_keys(route: Matrix) -> list[tuple[bytes, bytes]]:
+    """The edges of a route as keys."""
+    return list(pairwise(row.tobytes() for row in route))

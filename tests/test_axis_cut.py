@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.shortening.axis import axis_cut, axis_moves, cut_parts, double_axis_cut
-from rrtik_ompl.shortening.axis_rounds import axis_cut_rounds, best_of
+from rrtik_ompl.moves.axis_cut import axis_cut, axis_moves, cut_parts, double_axis_cut
+from rrtik_ompl.moves.axis_cut_rounds import axis_cut_rounds, best_of
 from rrtik_ompl.transitions import lower_bound, merge_moves, route_length, single_joint, transitions
 
 GRID = 6

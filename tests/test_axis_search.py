@@ -12,15 +12,15 @@ import pytest
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
-from rrtik_ompl.fast import axis_search
-from rrtik_ompl.fast.axis_rules import AxisRules, runs_in_kernels
-from rrtik_ompl.fast.axis_search import AxisSearch
-from rrtik_ompl.goal_configurations import goal_configurations
+from rrtik_ompl.fast.search.crdt import search as axis_search
+from rrtik_ompl.fast.search.crdt.rules import AxisRules, runs_in_kernels
+from rrtik_ompl.fast.search.crdt.search import AxisSearch
+from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.ompl_bridge import WorldChecker
 from rrtik_ompl.ompl_bridge.attempt import attempt
 from rrtik_ompl.ompl_bridge.contract import small_problem
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.problem_file import load_problem
+from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box
 from rrtik_ompl.transitions import merge_moves, single_joint

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.cli import run
+from rrtik_ompl.cli.app import run
 from rrtik_ompl.errors import RrtikError
 from rrtik_ompl.poses import pose
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Sphere
@@ -271,7 +271,7 @@ def test_the_command_line_says_it_in_one_line_and_exits_with_2(
 def test_a_process_of_its_own_says_the_same(tmp_path, row):
     files, arguments, fragments = COMMAND_LINE[row]
     place(tmp_path, files)
-    code = "from rrtik_ompl.cli import main; main()"
+    code = "from rrtik_ompl.cli.app import main; main()"
     done = subprocess.run([sys.executable, "-c", code, *arguments], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1), done.stderr
     assert all(part in done.stderr for part in fragments)

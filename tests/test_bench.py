@@ -28,7 +28,7 @@ from rrtik_ompl.benchmark.sources import build
 from rrtik_ompl.benchmark.statistics import QUANTITIES, results, spread
 from rrtik_ompl.benchmark.suite import load_suite
 from rrtik_ompl.benchmark.tables import remark
-from rrtik_ompl.cli import run
+from rrtik_ompl.cli.app import run
 from rrtik_ompl.errors import InputError
 from rrtik_planners.suites import FOLDER
 
@@ -80,7 +80,7 @@ class Raiser(Bad):
 def command(*arguments, **options):
     """`rrtik` in a process of its own."""
     return subprocess.Popen(
-        [sys.executable, "-m", "rrtik_ompl.cli", *map(str, arguments)],
+        [sys.executable, "-m", "rrtik_ompl.cli.app", *map(str, arguments)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

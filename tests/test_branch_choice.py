@@ -5,8 +5,8 @@ import pytest
 
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.ik.branch_choice import follow, nearest
-from rrtik_ompl.ik.closed_form import solutions
+from rrtik_ompl.ik.analytic.branch_choice import follow, nearest
+from rrtik_ompl.ik.analytic.closed_form import solutions
 
 LINE = np.linspace(0.0, 1.0, 201)[:, None]
 

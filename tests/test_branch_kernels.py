@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.fast.branch_layout import KERNELS
-from rrtik_ompl.fast.compiled import WIDTH, kernel
-from rrtik_ompl.fast.lanes import set_wide_lanes, wide_lanes_at
-from rrtik_ompl.fast.library import library
-from rrtik_ompl.fast.robot_tables import aligned
-from rrtik_ompl.fast.wide_angles import arc_sine, arc_tangent, opposite, wide_sine_and_cosine, within_half_turn
-from rrtik_ompl.ik import kernel_branches as module
-from rrtik_ompl.ik.closed_form import form_of, solutions
-from rrtik_ompl.ik.form import wrapped
-from rrtik_ompl.ik.kernel_branches import kernel_branches
-from rrtik_ompl.ik.plain_branches import plain_branches
+from rrtik_ompl.fast.ik.branch_layout import KERNELS
+from rrtik_ompl.fast.simd.compiled import WIDTH, kernel
+from rrtik_ompl.fast.simd.lanes import set_wide_lanes, wide_lanes_at
+from rrtik_ompl.fast.simd.library import library
+from rrtik_ompl.fast.simd.wide_angles import arc_sine, arc_tangent, opposite, wide_sine_and_cosine, within_half_turn
+from rrtik_ompl.fast.tables.robot_tables import aligned
+from rrtik_ompl.ik.analytic import kernel_branches as module
+from rrtik_ompl.ik.analytic.analytic_solver import wrapped
+from rrtik_ompl.ik.analytic.closed_form import form_of, solutions
+from rrtik_ompl.ik.analytic.kernel_branches import kernel_branches
+from rrtik_ompl.ik.analytic.reference_branches import plain_branches
 from rrtik_ompl.poses import pose_from_rpy
 from rrtik_robots.puma560 import singular_samples as puma_samples
 from rrtik_robots.titan4 import singular_samples as titan_samples

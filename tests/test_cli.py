@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from rrtik_ompl.cli import run
+from rrtik_ompl.cli.app import run
 from rrtik_ompl.path import load_path
 
 
@@ -256,7 +256,7 @@ def test_the_package_can_be_run_as_a_module():
 
 
 def command(*arguments):
-    return [sys.executable, "-m", "rrtik_ompl.cli", *arguments]
+    return [sys.executable, "-m", "rrtik_ompl.cli.app", *arguments]
 
 
 def test_ctrl_c_exits_130_says_so_and_leaves_no_file(tmp_path):
@@ -286,7 +286,7 @@ def test_ctrl_c_while_the_program_loads_is_one_line():
         "    def find_spec(self, name, *_):\n"
         "        if name == 'numpy': os.kill(os.getpid(), signal.SIGINT)\n"
         "sys.meta_path.insert(0, Finder())\n"
-        "from rrtik_ompl.command import main; main()"
+        "from rrtik_ompl.cli.entry import main; main()"
     )
     done = subprocess.run([sys.executable, "-c", code, "list"], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "rrtik: interrupted; no file is half-written\n")
@@ -300,14 +300,14 @@ def test_rrtik_alone_prints_the_help(capsys):
 
 @pytest.mark.parametrize(("streams", "code"), [(">&-", 0), ("2>&-", 0), ("<&- >&- 2>&-", 0), (">/dev/full", 2)])
 def test_streams_that_are_closed_or_full_give_no_traceback(streams, code):
-    line = f'exec "$0" -m rrtik_ompl.cli plan planar3_a --seed 1 {streams}'
+    line = f'exec "$0" -m rrtik_ompl.cli.app plan planar3_a --seed 1 {streams}'
     done = subprocess.run(["sh", "-c", line, sys.executable], capture_output=True, text=True, check=False)
     assert done.returncode == code
     assert done.stderr in ("", "rrtik: standard output cannot be written: No space left on device\n")
 
 
 def test_an_error_stays_out_of_standard_output_if_standard_error_is_closed():
-    line = 'exec "$0" -m rrtik_ompl.cli check nothing.yaml 2>&-'
+    line = 'exec "$0" -m rrtik_ompl.cli.app check nothing.yaml 2>&-'
     done = subprocess.run(["sh", "-c", line, sys.executable], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (2, "")
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.ik.closed_form import form_of, has_closed_form, solutions
-from rrtik_ompl.ik.form import two_links, wrapped
+from rrtik_ompl.ik.analytic.analytic_solver import two_links, wrapped
+from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form, solutions
 from rrtik_ompl.ik.tip_columns import tip_columns
 from rrtik_ompl.poses import pose_from_rpy
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.ik.closed_form import solutions
-from rrtik_ompl.ik.form import wrapped
+from rrtik_ompl.ik.analytic.analytic_solver import wrapped
+from rrtik_ompl.ik.analytic.closed_form import solutions
 
 eaik = pytest.importorskip("eaik.IK_HP", reason="pip install eaik")
 

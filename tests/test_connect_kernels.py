@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast import tree_kernels as trees
-from rrtik_ompl.fast import tree_layout as layout
-from rrtik_ompl.fast.compiled import WIDTH, entry
-from rrtik_ompl.fast.connect_lengths import connect_lengths
-from rrtik_ompl.fast.halton import inverse_bases
-from rrtik_ompl.fast.random_kernels import next_point, next_share, start_points
-from rrtik_ompl.fast.robot_tables import table
-from rrtik_ompl.fast.tree_memory import grow, tree_table
+from rrtik_ompl.fast.search import tree_kernels as trees
+from rrtik_ompl.fast.search import tree_layout as layout
+from rrtik_ompl.fast.search.connect_lengths import connect_lengths
+from rrtik_ompl.fast.search.tree_memory import grow, tree_table
+from rrtik_ompl.fast.simd.compiled import WIDTH, entry
+from rrtik_ompl.fast.simd.halton import inverse_bases
+from rrtik_ompl.fast.simd.random_kernels import next_point, next_share, start_points
+from rrtik_ompl.fast.tables.robot_tables import table
 
 
 @entry

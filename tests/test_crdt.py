@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.axis_rules import AxisRules
+from rrtik_ompl.fast.search.crdt.rules import AxisRules
 from rrtik_ompl.ompl_bridge.contract import small_problem, solution_rows
 from rrtik_ompl.transitions import single_joint
 from rrtik_planners import CRDT, BiCRDT
-from rrtik_planners.axis_tree import AxisTree, Outcome
+from rrtik_planners.crdt_tree import AxisTree, Outcome
 
 
 class Interval:

@@ -9,17 +9,16 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.fast.ik_layout import KERNELS
-from rrtik_ompl.fast.library import library
+from rrtik_ompl.fast.ik.ik_layout import KERNELS
+from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal
-from rrtik_ompl.ik import descent
 from rrtik_ompl.ik.batch import solve_ik_batch
-from rrtik_ompl.ik.descent import Search, walk
-from rrtik_ompl.ik.face import usual_posture
 from rrtik_ompl.ik.goal_rows import goal_rows, pose_rows
-from rrtik_ompl.ik.limb import SEEDS
-from rrtik_ompl.ik.numeric import numeric_ik
-from rrtik_ompl.ik.plain_descent import walk_plainly
+from rrtik_ompl.ik.numeric.descent import Search, walk
+from rrtik_ompl.ik.numeric.levenberg_marquardt import descent, numeric_ik
+from rrtik_ompl.ik.numeric.reference_descent import walk_plainly
+from rrtik_ompl.ik.serial_chain import SEEDS
+from rrtik_ompl.ik.solve import usual_posture
 from rrtik_ompl.shapes import Box
 
 MIXED = """

@@ -14,11 +14,13 @@ from scipy.spatial import ConvexHull
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.collision.enclosure import enclosure
 from rrtik_ompl.collision.solids import bvh, hull, inside_mesh, is_closed, is_mesh, mesh_arrays, pieces, robot_solids
-from rrtik_ompl.fast import COLLIDING, FREE, FastWorld, cover_cache, covers, needs_covers
-from rrtik_ompl.fast.cache_files import FOLDER_VARIABLE
-from rrtik_ompl.fast.cover_cache import cached_inner_spheres, cached_outer_cover
-from rrtik_ompl.fast.cover_solids import distance_to_triangles, rim_caps
-from rrtik_ompl.fast.covers import inner_spheres, outer_cover, protrusion_bound
+from rrtik_ompl.covers import cache as cover_cache
+from rrtik_ompl.covers import spheres as covers
+from rrtik_ompl.covers.cache import cached_inner_spheres, cached_outer_cover
+from rrtik_ompl.covers.solids import distance_to_triangles, rim_caps
+from rrtik_ompl.covers.spheres import inner_spheres, outer_cover, protrusion_bound
+from rrtik_ompl.fast import COLLIDING, FREE, FastWorld, needs_covers
+from rrtik_ompl.files.cache import FOLDER_VARIABLE
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Mesh, Prism
 from rrtik_ompl.world import World

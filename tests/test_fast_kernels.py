@@ -18,9 +18,11 @@ from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.solids import bvh, hull
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast import COLLIDING, FREE, UNDECIDED, FastWorld, kernels, layout
-from rrtik_ompl.fast import robot_tables as tables
-from rrtik_ompl.fast.processor import WIDTH
+from rrtik_ompl.fast import COLLIDING, FREE, UNDECIDED, FastWorld
+from rrtik_ompl.fast.checks import check_kernels as kernels
+from rrtik_ompl.fast.simd.processor import WIDTH
+from rrtik_ompl.fast.tables import layout
+from rrtik_ompl.fast.tables import robot_tables as tables
 
 SLIDER = """
 <robot name="slider"><link name="base"/><link name="a"/><link name="b"/><link name="c"/><link name="d"/><link name="e"/>

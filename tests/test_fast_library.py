@@ -13,17 +13,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rrtik_ompl import terminal
-from rrtik_ompl.cli import run
-from rrtik_ompl.fast import announce, bitcode, code_files, compiled, library, warm_up
+from rrtik_ompl.cli.app import run, terminal
+from rrtik_ompl.fast import warm_up
+from rrtik_ompl.fast.simd import announce, bitcode, code_files, compiled, library
 
-KERNELS = "kernels"
+KERNELS = "checks.check_kernels"
 PROGRAM = """
 import sys, warnings; warnings.simplefilter("error")
 import coal, numpy as np, pinocchio as pin
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.fast import FastWorld, announce
+from rrtik_ompl.fast import FastWorld
+from rrtik_ompl.fast.simd import announce
 announce.on_compile = lambda message: print("compiling", file=sys.stderr)
 chain = load_robot("titan4").chain
 at = [pin.SE3(np.eye(3), np.array(p)) for p in ([0.0, 0, 0], [0.1, 0, 0], [1.0, 0.5, 0.5], [-0.8, 0.3, 0.2])]
@@ -194,20 +195,20 @@ def test_another_source_or_processor_has_another_file(edited, monkeypatch):
     before = code_files.machine_key(KERNELS)
     monkeypatch.setattr(code_files, "processor_identity", lambda: "another")
     other = code_files.machine_key(KERNELS)
-    edited("lanes")
+    edited("simd.lanes")
     assert len({code_files.file_name(KERNELS, key) for key in (before, other, code_files.machine_key(KERNELS))}) == 3
 
 
 def test_an_edit_of_a_kernel_or_a_layout_makes_anew_what_depends_on_it_and_nothing_else(edited):
     before = {name: code_files.machine_key(name) for name in code_files.kernel_modules()}
-    edited("connect_layout")
+    edited("search.connect_layout")
     assert {name for name, key in before.items() if code_files.machine_key(name) != key} == {
-        "connect_kernels",
-        "repair_kernels",
+        "search.connect_kernels",
+        "search.repair_kernels",
     }
 
 
-@pytest.mark.parametrize("module", ["covers", "cover_search", "robot_tables", "library", "cache_files"])
+@pytest.mark.parametrize("module", ["tables.robot_tables", "tables.packing", "simd.library", "checks.fast_world"])
 def test_an_edit_of_what_holds_no_kernel_makes_nothing_anew(edited, module):
     before = {name: code_files.machine_key(name) for name in code_files.kernel_modules()}
     assert all(module not in code_files.kernel_sources(name) for name in before)
@@ -220,7 +221,15 @@ def test_the_sources_of_a_kernel_are_all_that_it_imports():
         code = f"import sys, rrtik_ompl.fast.{name}; print(*sys.modules)"
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
         loaded = {m.removeprefix("rrtik_ompl.fast.") for m in done.stdout.split() if m.startswith("rrtik_ompl.fast.")}
-        assert loaded - set(code_files.kernel_sources(name)) <= {"code_files", "cache_files"}
+        assert loaded - set(code_files.kernel_sources(name)) <= {
+            "simd",
+            "checks",
+            "search",
+            "ik",
+            "tables",
+            "search.crdt",
+            "simd.code_files",
+        }
 
 
 def test_bitcode_of_another_kind_of_processor_is_not_taken():
@@ -274,9 +283,8 @@ def test_compiling_is_told_in_one_line(monkeypatch, capsys):
 
 def test_the_sources_of_kernels_need_no_collision_library():
     code = "import sys; sys.modules.update(dict.fromkeys(('coal', 'pinocchio', 'ompl', 'scipy')))\n"
-    code += (
-        f"import rrtik_ompl.fast.bitcode; [__import__('rrtik_ompl.fast.' + n) for n in {code_files.kernel_modules()}]"
-    )
+    code += f"import rrtik_ompl.fast.simd.bitcode; names = {code_files.kernel_modules()}\n"
+    code += "for name in names:\n    __import__('rrtik_ompl.fast.' + name)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
 
@@ -317,7 +325,7 @@ def hook(monkeypatch):
     interface = types.ModuleType(name)
     interface.BuildHookInterface = object
     monkeypatch.setitem(sys.modules, name, interface)
-    module = types.SimpleNamespace(**runpy.run_path(str(code_files.FOLDER / "hatch_build.py")))
+    module = types.SimpleNamespace(**runpy.run_path(str(code_files.FOLDER / "simd" / "hatch_build.py")))
     made, said = module.KernelBitcode(), []
     made.root = str(code_files.FOLDER.parent.parent)
     made.app = types.SimpleNamespace(display_info=said.append, display_warning=said.append)
@@ -350,7 +358,7 @@ def test_a_wheel_is_built_without_a_compiler(hook, monkeypatch):
 def test_a_damaged_cache_of_numba_is_not_trusted(tmp_path):
     source, folder = tmp_path / "twice.py", tmp_path / "numba"
     source.write_text(
-        "from rrtik_ompl.fast.compiled import kernel\n@kernel\ndef twice(x):\n    return 2 * x\nprint(twice(21))"
+        "from rrtik_ompl.fast.simd.compiled import kernel\n@kernel\ndef twice(x):\n    return 2 * x\nprint(twice(21))"
     )
     for _ in range(2):
         environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
@@ -365,7 +373,7 @@ def test_a_damaged_cache_of_numba_is_not_trusted(tmp_path):
 KINDS = """
 import sys
 import numba
-from rrtik_ompl.fast.compiled import kernel
+from rrtik_ompl.fast.simd.compiled import kernel
 @kernel
 def marked(x, mark):
     return x + 1 if mark == 0 else x * mark

@@ -8,11 +8,12 @@ import pinocchio as pin
 import pytest
 from ompl import base as ob
 
+from rrtik_ompl.covers.spheres import inner_spheres, outer_cover
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast import FastWorld, connect, needs_covers
-from rrtik_ompl.fast.connect import ConnectSearch
-from rrtik_ompl.fast.covers import inner_spheres, outer_cover
+from rrtik_ompl.fast import FastWorld, needs_covers
+from rrtik_ompl.fast.search import connect
+from rrtik_ompl.fast.search.connect import ConnectSearch
 from rrtik_ompl.ompl_bridge import StateIO
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box, Sphere

@@ -12,7 +12,7 @@ import pytest
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast import FREE, UNDECIDED, FastWorld
-from rrtik_ompl.fast.shortcut import ShortcutSearch
+from rrtik_ompl.fast.search.shortcut import ShortcutSearch
 from rrtik_ompl.transitions import route_length
 
 HELPERS = runpy.run_path(str(Path(__file__).with_name("test_fast_kernels.py")))

@@ -12,23 +12,23 @@ from hypothesis import strategies as st
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.collision.overlap_depth import OverlapDepth
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.moves.axis_cut import double_axis_cut
+from rrtik_ompl.moves.lattice import MoveLattice
+from rrtik_ompl.moves.lower_bounds import OneFreeValue, sharper_bound
+from rrtik_ompl.moves.search import MoveSearch
+from rrtik_ompl.moves.staircase import one_joint_moves
 from rrtik_ompl.ompl_bridge import SearchResult
-from rrtik_ompl.one_joint import one_joint_moves
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning import plan
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.problem_file import load_problem
+from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box
 from rrtik_ompl.shortening import MoveRules, shorten
-from rrtik_ompl.shortening.axis import double_axis_cut
 from rrtik_ompl.shortening.fewest_moves import fewest_moves, grid_route, least_moves
-from rrtik_ompl.shortening.move_lattice import MoveLattice
-from rrtik_ompl.shortening.move_proof import OneFreeValue, sharper_bound
-from rrtik_ompl.shortening.move_search import MoveSearch
-from rrtik_ompl.shortening.questions import never
 from rrtik_ompl.transitions import lower_bound, route_length, single_joint, transitions
 from rrtik_ompl.world import World
+from rrtik_ompl.world.motion_queries import never
 from rrtik_planners import FewestMoves
 
 GRID = 4

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 import rrtik_robots
-from rrtik_ompl import cli, load_path, load_problem, load_robot
+from rrtik_ompl import load_path, load_problem, load_robot
+from rrtik_ompl.cli.app import app as cli
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.overlay.film import ArmInPictures, write_film
-from rrtik_ompl.sensing.camera_file import load_camera
-from rrtik_ompl.sensing.marker_map_file import load_marker_map
-from rrtik_ompl.sensing.pictures import Picture, pictures_from, read_picture
+from rrtik_ompl.sensing.cameras.camera_file import load_camera
+from rrtik_ompl.sensing.cameras.pictures import Picture, pictures_from, read_picture
+from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
 from rrtik_ompl.sensing.sensor import Sensor
 
 SHIPPED = Path(rrtik_robots.__file__).parent / "problems" / "pilot"

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.ik.closed_form import solutions
-from rrtik_ompl.ik.form import wrapped
+from rrtik_ompl.ik.analytic.analytic_solver import wrapped
+from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.ik.genetic.breeding import children
 from rrtik_ompl.ik.genetic.genes import LARGEST, Window, around, from_gray, random_genes, to_gray, whole_range
 from rrtik_ompl.ik.genetic.objective import manipulability, score

@@ -13,13 +13,13 @@ from ompl import geometric as og
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal, joint_difference
-from rrtik_ompl.goal_configurations import GoalSearch
+from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.ompl_bridge import GoalSampler, StateIO
 from rrtik_ompl.ompl_bridge.attempt import ANYTIME_PLANNERS, ONE_GOAL_PLANNERS, ompl_planners
 from rrtik_ompl.planning import list_planners, plan
 from rrtik_ompl.poses import pose
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.problem_file import load_problem
+from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box
 from rrtik_ompl.task_region import TaskRegion

@@ -5,8 +5,8 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.ik.analytic.branch_choice import nearest
 from rrtik_ompl.ik.batch import solve_ik_batch
-from rrtik_ompl.ik.branch_choice import nearest
 from rrtik_ompl.shapes import Box
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from rrtik_ompl import JointGoal, load_problem, load_robot
-from rrtik_ompl.cli import run
+from rrtik_ompl.cli.app import run
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.pose_file import load_poses
 from rrtik_ompl.poses import pose, pose_from_rpy, quaternion_xyzw
+from rrtik_ompl.problem_files.poses import load_poses
 
 Q = np.radians([40.0, 60.0, -120.0, 30.0, 40.0, 20.0])
 

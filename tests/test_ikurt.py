@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.cli.plan_report import summary
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal
 from rrtik_ompl.ik.ikurt.descent import descend
@@ -19,7 +20,6 @@ from rrtik_ompl.ik.ikurt.search import BatchedSearch, Judge, Options
 from rrtik_ompl.ik.ikurt.tree import FIRST_ROOM, Tree
 from rrtik_ompl.ompl_bridge.contract import small_problem
 from rrtik_ompl.poses import pose
-from rrtik_ompl.report import summary
 from rrtik_ompl.shapes import Sphere
 from rrtik_planners import IKURT, IKURTPublished
 

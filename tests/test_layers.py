@@ -13,14 +13,12 @@ import rrtik_ompl
 
 ROOT = Path(__file__).resolve().parent.parent
 RUNGS = (
-    "errors arrays random_stream text_file path_text yaml_file file_format shapes poses transitions robot",
-    "tip_distance task_region scene goal collision fast mesh_file description catalog scene_file goal_file robot_entry",
-    "checks world moving_world path moves_text problem one_joint ik goal_configurations reach",
-    "moveit_messages motion_bench_maker run_section problem_file pose_file ompl_bridge planning shortening scenarios",
-    "trajectory replanning scenario plot plot_tree plot_genetic plot_reach",
-    "viewer report ik_report sensing overlay reproduce benchmark terminal",
-    "motion_commands plan_command ik_commands reach_commands replan_commands reproduce_commands bench_commands",
-    "marker_commands overlay_command pilot pilot_commands cli command __main__",
+    "errors arrays shapes files poses transitions robot",
+    "tip_distance task_region scene goal collision covers fast description catalog",
+    "world path problem ik problem_files moves reach",
+    "ompl_bridge planning shortening generated_problems",
+    "trajectory replanning plots",
+    "viewer sensing overlay reproduce benchmark pilot cli __main__",
 )
 PEERS = {"vamp", "roboplan", "pytracik", "trac_ik", "ikpy", "eaik"}  # measured where they are installed
 LADDER = [name for rung in RUNGS for name in rung.split()]
@@ -81,7 +79,7 @@ def test_importing_the_package_imports_nothing_heavy():
 
 
 def test_a_world_is_loaded_without_a_compiler_and_without_what_covers_are_made_with():
-    code = "import sys, rrtik_ompl.world, rrtik_ompl.fast.cover_cache, rrtik_ompl.fast.fast_world"
+    code = "import sys, rrtik_ompl.world, rrtik_ompl.covers.cache, rrtik_ompl.fast.checks.fast_world"
     code += "; print([m for m in ('numba', 'scipy') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -9,8 +9,8 @@ import pytest
 
 from rrtik_ompl import load_problem
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.pilot.arm import SimulatedArm
-from rrtik_ompl.pilot.line_arm import LineArm, LineServer
+from rrtik_ompl.pilot.devices.arm import SimulatedArm
+from rrtik_ompl.pilot.devices.line_arm import LineArm, LineServer
 from rrtik_ompl.pilot.session import Session
 
 PROBLEM = load_problem("titan4_sdu")

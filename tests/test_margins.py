@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.collision.bodies import link_bodies
 from rrtik_ompl.errors import InputError, ProblemError
-from rrtik_ompl.moving_world import MovingWorld
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning import plan
 from rrtik_ompl.problem import Problem
+from rrtik_ompl.problem_files.scene import load_scene, save_scene
 from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Obstacle, Scene
-from rrtik_ompl.scene_file import load_scene, save_scene
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
 from rrtik_ompl.world import World
+from rrtik_ompl.world.moving_world import MovingWorld
 
 NEARLY = 1e-5  # [m]; what coal's distances and the kernels' rounding may differ by
 GROOVED = Prism([(0, 0), (0.3, 0), (0.3, 0.1), (0.1, 0.1), (0.1, 0.3), (0, 0.3)], 0.2)

@@ -7,17 +7,17 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl import cli
+from rrtik_ompl.cli.app import app as cli
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.scene_file import load_scene
-from rrtik_ompl.sensing.calibration import calibrate
-from rrtik_ompl.sensing.camera_file import load_camera, save_camera
-from rrtik_ompl.sensing.marker_map_file import load_marker_map
-from rrtik_ompl.sensing.markers import charuco_board, find_markers, marker_cells
-from rrtik_ompl.sensing.pictures import pictures_from, read_picture
+from rrtik_ompl.problem_files.scene import load_scene
+from rrtik_ompl.sensing.cameras.calibration import calibrate
+from rrtik_ompl.sensing.cameras.camera_file import load_camera, save_camera
+from rrtik_ompl.sensing.cameras.pictures import pictures_from, read_picture
+from rrtik_ompl.sensing.cameras.synthetic_camera import Print, clean_picture, marker_print, photograph, published_camera
+from rrtik_ompl.sensing.markers.detection import charuco_board, find_markers, marker_cells
+from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
+from rrtik_ompl.sensing.markers.sheets import print_board, print_markers
 from rrtik_ompl.sensing.precision import Series, series_of
-from rrtik_ompl.sensing.sheets import print_board, print_markers
-from rrtik_ompl.sensing.synthetic_camera import Print, clean_picture, marker_print, photograph, published_camera
 
 CAMERA = published_camera((0.05, -0.12, 0.0005, -0.0007, 0.0))
 MAP = """version: 1

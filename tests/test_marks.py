@@ -14,12 +14,12 @@ from rrtik_ompl.ik.genetic.options import STANDARD
 from rrtik_ompl.ik.genetic.search import follow_targets
 from rrtik_ompl.ik.mb_rrt.growth import grow
 from rrtik_ompl.ik.mb_rrt.links import Links
-from rrtik_ompl.plot_genetic import plot_distances
-from rrtik_ompl.viewer.marks import balls, tubes
+from rrtik_ompl.plots.genetic import plot_distances
+from rrtik_ompl.viewer.drawing.marks import balls, tubes
+from rrtik_ompl.viewer.drawing.tree_marks import tree_marks
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.subject import subject_of
-from rrtik_ompl.viewer.tree_marks import tree_marks
 
 
 def story_of(text):

@@ -12,7 +12,7 @@ from rrtik_ompl.ik.mb_rrt.closing import grow_and_close
 from rrtik_ompl.ik.mb_rrt.growth import best_parents, grow, one_link
 from rrtik_ompl.ik.mb_rrt.links import Links, directions, headings_to_joints, joints_to_chain, sunflower
 from rrtik_ompl.ik.mb_rrt.variants import VARIANTS, nearest, one_link_away, surface
-from rrtik_ompl.plot_tree import plot_tree
+from rrtik_ompl.plots.mb_rrt_tree import plot_tree
 
 THREE, TEN = Links([10.0] * 3), Links([10.0] * 10)
 

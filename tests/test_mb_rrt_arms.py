@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 import rrtik_ompl as rrtik
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.ik.face import solve_ik
 from rrtik_ompl.ik.mb_rrt.axes import axes_of
 from rrtik_ompl.ik.mb_rrt.axis_rule_b import grow_by_rule_b
-from rrtik_ompl.ik.mb_rrt.axis_tree import AxisTree
 from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
 from rrtik_ompl.ik.mb_rrt.search import search
+from rrtik_ompl.ik.mb_rrt.workspace_tree import AxisTree
+from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.ompl_bridge.setup import Judge, space_information
 from rrtik_ompl.planning import plan
 from rrtik_ompl.shapes import Cylinder

@@ -8,8 +8,8 @@ import pytest
 
 from rrtik_ompl.errors import InputError, ProblemError, RrtikError
 from rrtik_ompl.goal import JointGoal, PoseGoal, PositionGoal
-from rrtik_ompl.motion_bench_maker import load_motion_bench_maker
-from rrtik_ompl.problem_file import load_problem, save_problem
+from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
+from rrtik_ompl.problem_files.problem import load_problem, save_problem
 from rrtik_ompl.shapes import Box, Cylinder, Sphere
 
 ARCHIVE = Path(__file__).resolve().parents[2] / "shared" / "data" / "mbm_panda.tar.bz2"

@@ -5,8 +5,8 @@ import pytest
 
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal
-from rrtik_ompl.goal_configurations import goal_configurations
-from rrtik_ompl.ik.numeric import numeric_ik
+from rrtik_ompl.ik.goal_configurations import goal_configurations
+from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric_ik
 from rrtik_ompl.ik.targets import targets
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.world import World

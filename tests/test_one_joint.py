@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.moves_text import moves_csv, moves_document, spoken_moves
-from rrtik_ompl.one_joint import one_joint_moves, staircase_orders
+from rrtik_ompl.moves.staircase import one_joint_moves, staircase_orders
+from rrtik_ompl.moves.text import moves_csv, moves_document, spoken_moves
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning import plan
 from rrtik_ompl.poses import pose_from_rpy
-from rrtik_ompl.problem_file import load_problem
+from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box
 from rrtik_ompl.world import World

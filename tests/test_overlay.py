@@ -9,12 +9,12 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.overlay.augment import LAYERS_KEPT, Augmenter, Ghost
 from rrtik_ompl.overlay.canvas import FAR, Canvas
 from rrtik_ompl.overlay.figure import figure_of, placed
-from rrtik_ompl.overlay.gods_eye import eye_at, imagined_camera, sky
-from rrtik_ompl.overlay.plain_z_buffer import plain_z_buffer
+from rrtik_ompl.overlay.reference_z_buffer import plain_z_buffer
 from rrtik_ompl.overlay.surfaces import obstacle_surfaces, robot_surfaces, surface_of_shape
+from rrtik_ompl.overlay.virtual_camera import eye_at, imagined_camera, sky
 from rrtik_ompl.poses import pose
 from rrtik_ompl.scene import Obstacle
-from rrtik_ompl.sensing.synthetic_camera import published_camera
+from rrtik_ompl.sensing.cameras.synthetic_camera import published_camera
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
 
 CAMERA = published_camera()

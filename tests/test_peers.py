@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl import JointPath, load_problem, load_robot
-from rrtik_ompl.scenarios import generated_problem
+from rrtik_ompl.generated_problems import generated_problem
 
 BENCH = Path(__file__).parent.parent / "bench"
 

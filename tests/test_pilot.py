@@ -8,18 +8,18 @@ import pytest
 
 from rrtik_ompl import load_problem, load_robot
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.ik.closed_form import solutions
+from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.path import JointPath
-from rrtik_ompl.pilot.arm import SimulatedArm, joint_rates
-from rrtik_ompl.pilot.follower import REACTION, Follower
+from rrtik_ompl.pilot.devices.arm import SimulatedArm, joint_rates
 from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED, lamps, stage_poses
-from rrtik_ompl.pilot.manoeuvre import free_until, judge_move, room_of, way_out
 from rrtik_ompl.pilot.record import Record, read_record
+from rrtik_ompl.pilot.routes.follower import REACTION, Follower
+from rrtik_ompl.pilot.routes.manoeuvre import free_until, judge_move, room_of, way_out
 from rrtik_ompl.pilot.session import CHOOSING, FOLLOWING, MANOEUVRE, PROPOSED, Session
 from rrtik_ompl.pilot.surroundings import Surroundings, gripper_links
 from rrtik_ompl.poses import pose, pose_from_rpy
 from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.sensing.marker_map import GraspType, MarkedObject, MountedMarker
+from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject, MountedMarker
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.shapes import Box
 from rrtik_ompl.world import World

@@ -15,9 +15,9 @@ import pytest
 import tornado.websocket
 
 from rrtik_ompl.pilot.run import Loop
-from rrtik_ompl.pilot.server import PilotServer
 from rrtik_ompl.pilot.setup import Wanted, open_session
-from rrtik_ompl.sensing.pictures import CameraLostError
+from rrtik_ompl.pilot.web.server import PilotServer
+from rrtik_ompl.sensing.cameras.pictures import CameraLostError
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 OPTIONS = ("--headless=new", "--no-sandbox", "--hide-scrollbars", "--remote-debugging-port=0", "--disable-gpu")

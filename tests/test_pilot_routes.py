@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from rrtik_ompl import load_problem
-from rrtik_ompl.pilot.approach import ASIDE, FARTHER, MOST_JOINTS, TILT, approaches
-from rrtik_ompl.pilot.arm import joint_rates
-from rrtik_ompl.pilot.clearance import executions, free_rows
-from rrtik_ompl.pilot.follower import slack
+from rrtik_ompl.pilot.devices.arm import joint_rates
+from rrtik_ompl.pilot.devices.simulated_vehicle import find_scenario, load_scenario
 from rrtik_ompl.pilot.lamps import stage_poses
-from rrtik_ompl.pilot.route import route_to, route_to_grasp
-from rrtik_ompl.pilot.scenario import find_scenario, load_scenario
+from rrtik_ompl.pilot.routes.approach import ASIDE, FARTHER, MOST_JOINTS, TILT, approaches
+from rrtik_ompl.pilot.routes.clearance import executions, free_rows
+from rrtik_ompl.pilot.routes.follower import slack
+from rrtik_ompl.pilot.routes.route import route_to, route_to_grasp
+from rrtik_ompl.pilot.routes.route_search import Way, WaySearch
 from rrtik_ompl.pilot.surroundings import Surroundings
-from rrtik_ompl.pilot.way_search import Way, WaySearch
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 
 PROBLEM = load_problem("titan4_sdu")

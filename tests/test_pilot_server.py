@@ -11,10 +11,10 @@ import tornado.httpclient
 import tornado.websocket
 
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.pilot.clients import Client, Clients, Lane
 from rrtik_ompl.pilot.run import Loop
-from rrtik_ompl.pilot.server import LARGEST_MESSAGE, MOST_WAITING, PilotServer
 from rrtik_ompl.pilot.setup import Wanted, open_session
+from rrtik_ompl.pilot.web.clients import Client, Clients, Lane
+from rrtik_ompl.pilot.web.server import LARGEST_MESSAGE, MOST_WAITING, PilotServer
 
 TOKEN = "a-secret-of-many-letters"
 

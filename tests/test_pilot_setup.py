@@ -11,16 +11,16 @@ import pytest
 
 from rrtik_ompl import load_problem
 from rrtik_ompl.catalog import find_problem
-from rrtik_ompl.cli import run
+from rrtik_ompl.cli.app import run
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.pilot.arm import SimulatedArm
-from rrtik_ompl.pilot.feed import Feed
+from rrtik_ompl.pilot.devices.arm import SimulatedArm
+from rrtik_ompl.pilot.devices.camera_feed import Feed
+from rrtik_ompl.pilot.devices.line_arm import LineServer
+from rrtik_ompl.pilot.devices.simulated_vehicle import find_scenario, load_scenario
 from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED
-from rrtik_ompl.pilot.line_arm import LineServer
-from rrtik_ompl.pilot.scenario import find_scenario, load_scenario
 from rrtik_ompl.pilot.setup import Wanted, open_session
 from rrtik_ompl.poses import pose
-from rrtik_ompl.sensing.pictures import CameraLostError, Picture
+from rrtik_ompl.sensing.cameras.pictures import CameraLostError, Picture
 
 FOLDER = find_problem("titan4_sdu").parent / "pilot"
 
@@ -91,7 +91,7 @@ def test_a_camera_that_is_lost_is_said_and_the_last_state_stays_until_it_is_back
 
 
 def test_a_feed_gives_the_newest_picture_and_opens_a_lost_camera_again(monkeypatch):
-    monkeypatch.setattr("rrtik_ompl.pilot.feed.TRY_AGAIN", 0.05)
+    monkeypatch.setattr("rrtik_ompl.pilot.devices.camera_feed.TRY_AGAIN", 0.05)
     attempts = itertools.count()
 
     def camera():

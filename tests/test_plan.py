@@ -10,18 +10,18 @@ import pytest
 from ompl import base as ob
 
 from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.checks import CollisionChecks
 from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.ompl_bridge.setup import Judge
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning import find_planner, list_planners, plan
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.problem_file import load_problem
+from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box
 from rrtik_ompl.shortening import shorten
 from rrtik_ompl.world import World
+from rrtik_ompl.world.exact_checks import CollisionChecks
 
 
 def at(x, y):

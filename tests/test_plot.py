@@ -8,7 +8,7 @@ import pytest
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.path import JointPath
-from rrtik_ompl.plot import plot_joints
+from rrtik_ompl.plots.joints import plot_joints
 from rrtik_ompl.trajectory import RateLimits, timed
 
 PATH = JointPath([[0.0, 0.0], [1.0, 0.2], [1.0, 0.0]], ["turn", "slide"], [False, True])

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from rrtik_ompl.catalog import list_problems
 from rrtik_ompl.errors import InputError, ProblemError, RrtikError, UnknownNameError
+from rrtik_ompl.files.strict_yaml import read_yaml, write_yaml
 from rrtik_ompl.goal import GoalRegion, JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.poses import pose
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.problem_file import load_problem, problem_schema, save_problem
+from rrtik_ompl.problem_files.problem import load_problem, problem_schema, save_problem
 from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.world import World
-from rrtik_ompl.yaml_file import read_yaml, write_yaml
 
 ARM = "{planar: {lengths: [1, 1, 1], limits_deg: [[-170, 170], [-170, 170], [-170, 170]], radius: 0.01}}"
 URDF = """<robot name="slide"><link name="base"/><link name="car"/><link name="tool">

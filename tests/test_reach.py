@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from rrtik_ompl import Obstacle, Scene, World, load_robot, reach_map
-from rrtik_ompl.cli import run
+from rrtik_ompl.cli.app import run
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.ik.singularity import manipulability
-from rrtik_ompl.plot_reach import plot_slices
+from rrtik_ompl.plots.reach import plot_slices
 from rrtik_ompl.poses import pose
 from rrtik_ompl.reach.grid_map import load_reach_map
 from rrtik_ompl.shapes import Box
-from rrtik_ompl.viewer.marks import cubes
-from rrtik_ompl.viewer.reach_marks import reach_marks
+from rrtik_ompl.viewer.drawing.marks import cubes
+from rrtik_ompl.viewer.drawing.reach_marks import reach_marks
 from rrtik_robots.titan4.workspace import effective_slices
 
 SAMPLES = 4_000

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from rrtik_ompl.benchmark import load_suite
-from rrtik_ompl.cli import run
-from rrtik_ompl.ik.face import solve_ik
+from rrtik_ompl.cli.app import run
+from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.path import load_path
-from rrtik_ompl.problem_file import load_problem
+from rrtik_ompl.problem_files.problem import load_problem
 
 README = (Path(__file__).parent.parent / "README.md").read_text()
 

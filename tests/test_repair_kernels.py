@@ -8,14 +8,14 @@ import pytest
 
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.repair import PathRepair
-from rrtik_ompl.moving_world import MovingWorld
+from rrtik_ompl.fast.search.repair import PathRepair
 from rrtik_ompl.replanning.connecting import PlainConnect, never
 from rrtik_ompl.replanning.drrt_con import DrrtCon
 from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box, Sphere
 from rrtik_ompl.world import World
+from rrtik_ompl.world.moving_world import MovingWorld
 
 LOW, HIGH = np.zeros(2), np.full(2, 20.0)
 

@@ -16,20 +16,20 @@ from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.collision.contacts import measured
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.goal import PositionGoal
-from rrtik_ompl.moving_world import MovingWorld
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning import PLANNERS, SpeedWarning, load_run, replan
 from rrtik_ompl.replanning.connecting import KernelConnect, PlainConnect, Tree, never
+from rrtik_ompl.replanning.contact_check import judge
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch, points_along, sequential_cut, without_points_between
 from rrtik_ompl.replanning.evading import evasion
 from rrtik_ompl.replanning.generate import moving_problem, moving_scene
-from rrtik_ompl.replanning.judge import judge
 from rrtik_ompl.replanning.single_tree import trimmed
 from rrtik_ompl.replanning.walking import one_step, to_first_corner
 from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene, Waypoints
 from rrtik_ompl.shapes import Box, HalfSpace, Prism, Sphere
 from rrtik_ompl.trajectory.limits import RateLimits
 from rrtik_ompl.world import World
+from rrtik_ompl.world.moving_world import MovingWorld
 
 FAST = RateLimits([1e3, 1e3], [1e3, 1e3])
 OPTIONS = {"step": 0.5, "rate": 10.0, "eps": 1.0, "slot": 30.0, "limits": FAST}

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from rrtik_ompl.cli import run
+from rrtik_ompl.cli.app import run
 from rrtik_ompl.errors import UnknownNameError
 from rrtik_ompl.reproduce import mb_rrt, registry
 from rrtik_ompl.reproduce.mb_rrt_runs import PUBLISHED, Measured

@@ -10,15 +10,15 @@ import pytest
 from ompl import base as ob
 
 from rrtik_ompl.catalog import find_problem, list_problems, load_robot
-from rrtik_ompl.cli import run as rrtik
+from rrtik_ompl.cli.app import run as rrtik
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.ompl_bridge.contract import GOAL, small_problem, solution_rows
 from rrtik_ompl.poses import pose
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.problem_file import load_problem
+from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.replanning import load_run, replan
-from rrtik_ompl.replanning.judge import judge
-from rrtik_ompl.scenario import load_scenario
+from rrtik_ompl.replanning.contact_check import judge
+from rrtik_ompl.replanning.scenario import load_scenario
 from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene
 from rrtik_ompl.shapes import HalfSpace
 from rrtik_ompl.viewer.page import page

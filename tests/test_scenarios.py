@@ -5,9 +5,9 @@ import pytest
 
 from rrtik_ompl import World, load_robot, plan
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.one_joint import staircase_orders
-from rrtik_ompl.scenarios import FAMILIES, generated_problem
-from rrtik_ompl.scenarios.families import obstacles
+from rrtik_ompl.generated_problems import FAMILIES, generated_problem
+from rrtik_ompl.generated_problems.families import obstacles
+from rrtik_ompl.moves.staircase import staircase_orders
 
 TITAN = load_robot("titan4")
 

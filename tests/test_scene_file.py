@@ -5,10 +5,10 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.strict_yaml import read_yaml
+from rrtik_ompl.problem_files.scene import load_scene, save_scene
 from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, Waypoints
-from rrtik_ompl.scene_file import load_scene, save_scene
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Sphere
-from rrtik_ompl.yaml_file import read_yaml
 
 EVERY_KEY = """version: 1
 scene:

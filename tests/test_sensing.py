@@ -15,17 +15,23 @@ from rrtik_ompl.poses import pose
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning import replan
 from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.sensing.camera import Camera
-from rrtik_ompl.sensing.corner_pose import CornerPose, pose_of_points, pose_of_square, square_corners, turn_between
+from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.sensing.cameras.pictures import Picture
+from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph, published_camera
 from rrtik_ompl.sensing.frames import NoBaseError, base_from_camera, place_in_base
-from rrtik_ompl.sensing.marker_map import GraspType, MarkedObject, MarkerMap, MountedMarker
-from rrtik_ompl.sensing.markers import DICTIONARIES, dictionaries_seen, find_markers, marker_cells
-from rrtik_ompl.sensing.pictures import Picture
+from rrtik_ompl.sensing.markers.corner_pose import (
+    CornerPose,
+    pose_of_points,
+    pose_of_square,
+    square_corners,
+    turn_between,
+)
+from rrtik_ompl.sensing.markers.detection import DICTIONARIES, dictionaries_seen, find_markers, marker_cells
+from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject, MarkerMap, MountedMarker
 from rrtik_ompl.sensing.scene_feed import scene_feed
 from rrtik_ompl.sensing.scene_from_view import SeenObject, objects_in_base, scene_from_image
 from rrtik_ompl.sensing.sensor import Sensor
 from rrtik_ompl.sensing.sight import look
-from rrtik_ompl.sensing.synthetic_camera import clean_picture, marker_print, photograph, published_camera
 from rrtik_ompl.sensing.tracker import PATIENCE, PoseTracker
 from rrtik_ompl.shapes import Box, HalfSpace
 from rrtik_ompl.world import World

@@ -11,9 +11,9 @@ from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.certificate import Certificate
 from rrtik_ompl.collision.enclosure import enclosure
 from rrtik_ompl.collision.solids import bvh, hull, inside_mesh, mesh_arrays
+from rrtik_ompl.covers.mesh_pieces import convex_pieces
 from rrtik_ompl.fast import COLLIDING, FREE, UNDECIDED, FastWorld
-from rrtik_ompl.fast.mesh_pieces import convex_pieces
-from rrtik_ompl.fast.solid_tables import NO_SOLIDS, convex_solids
+from rrtik_ompl.fast.tables.solid_tables import NO_SOLIDS, convex_solids
 from rrtik_ompl.robot import Robot
 
 ROWS = 300  # configurations of a case

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from rrtik_ompl.catalog import find_problem, list_problems
+from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.goal import JointGoal, PoseGoal, PositionGoal
-from rrtik_ompl.problem_file import load_problem, problem_schema, save_problem
-from rrtik_ompl.yaml_file import read_yaml
+from rrtik_ompl.problem_files.problem import load_problem, problem_schema, save_problem
 
 NAMES = [
     *("cut_disc", "cut_polygons", "cut_two_ls", "env_e"),

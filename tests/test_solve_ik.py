@@ -6,11 +6,11 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.ik.face import list_ik_methods, solve_ik
-from rrtik_ompl.ik.question import Question
-from rrtik_ompl.ik.restarts import ROUNDS, restarted
+from rrtik_ompl.ik.method_interface import Question
+from rrtik_ompl.ik.numeric.restarts import ROUNDS, restarted
+from rrtik_ompl.ik.random_stream import RandomStream
+from rrtik_ompl.ik.solve import list_ik_methods, solve_ik
 from rrtik_ompl.poses import pose_from_rpy
-from rrtik_ompl.random_stream import RandomStream
 from rrtik_ompl.shapes import Box, Sphere
 
 Q_TITAN = np.radians([20, 30, -70, 20, 30, 40])

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal, as_task_region, has_task_regions, tip_errors
-from rrtik_ompl.ik.face import solve_ik
-from rrtik_ompl.ik.projection import project
+from rrtik_ompl.ik.numeric.projection import project
+from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.ik.targets import targets
 from rrtik_ompl.poses import pose, pose_from_rpy, rotation_angles, rpy_matrices
 from rrtik_ompl.task_region import TaskRegion, nearest_angles

@@ -7,8 +7,8 @@ import pytest
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import UnknownNameError
 from rrtik_ompl.goal import pose_errors
-from rrtik_ompl.ik.closed_form import family, form_of, solutions
-from rrtik_ompl.ik.form import wrapped
+from rrtik_ompl.ik.analytic.analytic_solver import wrapped
+from rrtik_ompl.ik.analytic.closed_form import family, form_of, solutions
 from rrtik_ompl.ik.singularity import singularity_report
 from rrtik_robots.titan4 import TitanGeometry
 from rrtik_robots.titan4.families import psi_interval

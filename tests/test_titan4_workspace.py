@@ -5,7 +5,7 @@ import pytest
 
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.ik.closed_form import solutions
+from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.poses import pose_from_rpy
 from rrtik_robots.titan4.workspace import Camera, EffectiveWorkspace, gripper_poses
 

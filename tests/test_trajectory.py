@@ -12,7 +12,7 @@ from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning import plan
-from rrtik_ompl.problem_file import load_problem
+from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.trajectory import RateLimits, Trajectory, load_trajectory, timed
 from rrtik_ompl.world import World
 

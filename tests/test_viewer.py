@@ -29,15 +29,16 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, Waypoints
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
 from rrtik_ompl.task_region import TaskRegion
-from rrtik_ompl.viewer import palette, view
-from rrtik_ompl.viewer.framing import frame_around
-from rrtik_ompl.viewer.meshes import look_of_margin
+from rrtik_ompl.viewer import view
+from rrtik_ompl.viewer.drawing import palette
+from rrtik_ompl.viewer.drawing.framing import frame_around
+from rrtik_ompl.viewer.drawing.meshes import look_of_margin
+from rrtik_ompl.viewer.drawing.viewpoint import behind, overview
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.serve import PageServer
 from rrtik_ompl.viewer.story import grid_cell, play_times
 from rrtik_ompl.viewer.subject import subject_of
-from rrtik_ompl.viewer.viewpoint import behind, overview
 
 URDF = """
 <robot name="crane">

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rrtik_ompl.errors import InputError, ProblemError
-from rrtik_ompl.text_file import read_text, write_text
-from rrtik_ompl.yaml_file import key_path, plain_value, read_yaml, write_yaml
+from rrtik_ompl.files.strict_yaml import key_path, plain_value, read_yaml, write_yaml
+from rrtik_ompl.files.text import read_text, write_text
 
 
 def read(tmp_path, text):

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from peers.ik import Solver
+from rrtik_ompl.arrays import TAU
 from rrtik_ompl.robot import Robot
-
-TURN = 2.0 * np.pi
 
 
 def solver(robot: Robot, start: np.ndarray) -> Solver:
@@ -56,4 +55,4 @@ def turned_back(poses: np.ndarray, at_zero: np.ndarray) -> np.ndarray:
 def turned_inside(robot: Robot, q: np.ndarray) -> np.ndarray:
     """Angles moved by full turns to the lowest value above the lower limit."""
     low = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
-    return np.where(robot.prismatic, q, low + (q - low) % TURN)
+    return np.where(robot.prismatic, q, low + (q - low) % TAU)

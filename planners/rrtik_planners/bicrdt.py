@@ -8,14 +8,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.fast.axis_rules import KERNELS, AxisRules, runs_in_kernels
-from rrtik_ompl.fast.axis_search import AxisSearch
+from rrtik_ompl.fast.search.crdt.rules import KERNELS, AxisRules, runs_in_kernels
+from rrtik_ompl.fast.search.crdt.search import AxisSearch
+from rrtik_ompl.moves.rules import Joints, PerJoint, joint_numbers
 from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
-from rrtik_ompl.shortening.move_rules import Joints, PerJoint, joint_numbers
-from rrtik_planners.axis_endings import NO_ENDING, Endings
-from rrtik_planners.axis_options import AxisOptions, joint_names
-from rrtik_planners.axis_stream import AxisStream
-from rrtik_planners.axis_tree import AxisTree, Outcome
+from rrtik_planners.crdt_endings import NO_ENDING, Endings
+from rrtik_planners.crdt_options import AxisOptions, joint_names
+from rrtik_planners.crdt_stream import AxisStream
+from rrtik_planners.crdt_tree import AxisTree, Outcome
 
 
 class BiCRDT(SafePlanner):
@@ -47,7 +47,7 @@ class BiCRDT(SafePlanner):
             si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
             world: Asked instead of ``si`` whether configurations and motions are free, if given.
             seed: At least 0; drawn from OMPL's if None.
-            scale_by_range: See :class:`rrtik_planners.axis_options.AxisOptions`.
+            scale_by_range: See :class:`rrtik_planners.crdt_options.AxisOptions`.
             max_iterations: As there.
             joint_costs: As there.
             frozen_joints: As there.
@@ -101,7 +101,7 @@ class BiCRDT(SafePlanner):
 
 
 class TreePair:
-    """The search in Python: for any checker, in the same steps as :class:`rrtik_ompl.fast.axis_search.AxisSearch`.
+    """The search in Python, for any checker, step by step as `rrtik_ompl.fast.search.crdt.search.AxisSearch`.
 
     Attributes:
         iterations: Samples drawn so far.

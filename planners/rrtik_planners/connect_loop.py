@@ -1,6 +1,7 @@
 """RRT-Connect as a plain loop over any motion checker, for worlds without kernels.
 
-The same algorithm as in :mod:`rrtik_ompl.fast.connect_kernels`, with the same sources; every motion is decided at once.
+The same algorithm as in :mod:`rrtik_ompl.fast.search.connect_kernels`, with the same sources; every motion is decided
+at once.
 """
 
 from __future__ import annotations

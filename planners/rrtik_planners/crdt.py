@@ -9,13 +9,13 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.axis_rules import KERNELS, AxisRules, runs_in_kernels
-from rrtik_ompl.fast.axis_search import AxisSearch
+from rrtik_ompl.fast.search.crdt.rules import KERNELS, AxisRules, runs_in_kernels
+from rrtik_ompl.fast.search.crdt.search import AxisSearch
+from rrtik_ompl.moves.rules import Joints, PerJoint
 from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
-from rrtik_ompl.shortening.move_rules import Joints, PerJoint
-from rrtik_planners.axis_options import AxisOptions, joint_names
-from rrtik_planners.axis_stream import AxisStream
-from rrtik_planners.axis_tree import AxisTree, Outcome
+from rrtik_planners.crdt_options import AxisOptions, joint_names
+from rrtik_planners.crdt_stream import AxisStream
+from rrtik_planners.crdt_tree import AxisTree, Outcome
 
 GOAL_TOLERANCE_SHARE = 0.2  # default goal tolerance as a share of the diagonal of the space
 
@@ -56,7 +56,7 @@ class CRDT(SafePlanner):
             seed: At least 0; drawn from OMPL's if None.
             goal_tolerance: Euclidean distance to a goal below which a vertex tries to reach it [unit of the space];
                 a fifth of the diagonal of the space if None.
-            scale_by_range: See :class:`rrtik_planners.axis_options.AxisOptions`.
+            scale_by_range: See :class:`rrtik_planners.crdt_options.AxisOptions`.
             max_iterations: As there.
             joint_costs: As there.
             frozen_joints: As there.
@@ -103,7 +103,7 @@ class CRDT(SafePlanner):
 
 
 class SingleTree:
-    """The search in Python: for any checker, in the same steps as :class:`rrtik_ompl.fast.axis_search.AxisSearch`.
+    """The search in Python, for any checker, step by step as `rrtik_ompl.fast.search.crdt.search.AxisSearch`.
 
     Attributes:
         iterations: Samples drawn so far.

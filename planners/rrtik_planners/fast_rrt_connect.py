@@ -7,13 +7,13 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.fast.connect import ConnectSearch
-from rrtik_ompl.fast.connect_layout import KERNELS
-from rrtik_ompl.fast.connect_lengths import connect_lengths, positive
-from rrtik_ompl.fast.library import library
+from rrtik_ompl.fast.search.connect import ConnectSearch
+from rrtik_ompl.fast.search.connect_layout import KERNELS
+from rrtik_ompl.fast.search.connect_lengths import connect_lengths, positive
+from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
-from rrtik_planners.axis_options import iteration_limit
 from rrtik_planners.connect_loop import ConnectRules, connect
+from rrtik_planners.crdt_options import iteration_limit
 
 
 class FastRRTConnect(SafePlanner):

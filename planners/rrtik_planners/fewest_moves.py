@@ -9,19 +9,19 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.moves.lower_bounds import sharper_bound
+from rrtik_ompl.moves.rules import Joints, PerJoint, joint_numbers
+from rrtik_ompl.moves.search import MOST_NODES, MoveSearch
+from rrtik_ompl.moves.staircase import one_joint_moves
 from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
-from rrtik_ompl.one_joint import one_joint_moves
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.shortening import Task
-from rrtik_ompl.shortening.move_proof import sharper_bound
-from rrtik_ompl.shortening.move_rules import Joints, PerJoint, joint_numbers
-from rrtik_ompl.shortening.move_search import MOST_NODES, MoveSearch
 from rrtik_ompl.shortening.random_cut import shortcut
 from rrtik_ompl.transitions import transitions
 from rrtik_ompl.world import World
-from rrtik_planners.axis_endings import NO_ENDING, Endings
-from rrtik_planners.axis_options import AxisOptions, joint_names
 from rrtik_planners.bicrdt import BiCRDT
+from rrtik_planners.crdt_endings import NO_ENDING, Endings
+from rrtik_planners.crdt_options import AxisOptions, joint_names
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
 
 SEARCHES, ROUNDS = 5, 10
@@ -60,7 +60,7 @@ class FewestMoves(SafePlanner):
             seed: At least 0; drawn from OMPL's if None.
             searches: Runs of BiCRDT at the beginning, at least 1.
             rounds: Of improvement, at least 0, after the first. With time enough they alone decide what comes out.
-            joint_costs: Cost of a joint's travel; see :class:`rrtik_planners.axis_options.AxisOptions`.
+            joint_costs: Cost of a joint's travel; see :class:`rrtik_planners.crdt_options.AxisOptions`.
             frozen_joints: See there.
             smallest_move: See there.
             last_joints: See :class:`rrtik_planners.bicrdt.BiCRDT`. The bound counts their moves too.

@@ -7,7 +7,7 @@ from typing import Any
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.connect_lengths import positive
+from rrtik_ompl.fast.search.connect_lengths import positive
 from rrtik_ompl.goal import Goal
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
 from rrtik_ompl.ik.ikurt.search import BatchedSearch, Judge, Options

@@ -43,7 +43,7 @@ class MBRRT(BiCRDT):
             goal: What the tip has to reach; needs a world. If None, or where the tree finds nothing, the
                 configurations of the problem definition are the goals.
             ik_seconds: Time that the tree in the workspace may take [s].
-            scale_by_range: See :class:`rrtik_planners.axis_options.AxisOptions`.
+            scale_by_range: See :class:`rrtik_planners.crdt_options.AxisOptions`.
             max_iterations: As there.
 
         Raises:

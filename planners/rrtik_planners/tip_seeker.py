@@ -11,7 +11,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import Goal, JointGoal, PoseGoal
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
 from rrtik_ompl.ik.ikurt.tree import Tree
-from rrtik_ompl.ik.question import Target
+from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.targets import targets
 from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
 from rrtik_ompl.world import World

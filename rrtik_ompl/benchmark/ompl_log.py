@@ -14,7 +14,7 @@ from typing import Any
 from rrtik_ompl.benchmark.run import INVALID, NOT_FOUND, SOLVED, STATUSES
 from rrtik_ompl.benchmark.statistics import Result, by_label, measured
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.text_file import make_folder, write_text
+from rrtik_ompl.files.text import make_folder, write_text
 
 DATABASE = "benchmark.db"
 OMPL_STATUSES = ("Unknown status", "Invalid start", "Invalid goal", "Unrecognized goal type", "Timeout",

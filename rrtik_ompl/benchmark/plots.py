@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.benchmark.statistics import QUANTITIES, Result, by_label
-from rrtik_ompl.plot import COLORS, DASHES, save_figure, tidy
+from rrtik_ompl.plots.joints import COLORS, DASHES, save_figure, tidy
 
 PANELS = 24  # in a picture at most; tables hold the rest
 ACROSS = 3

@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 
 from rrtik_ompl.benchmark.run import SOLVED, STATUSES
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.text_file import make_folder
+from rrtik_ompl.files.text import make_folder
 
 Record: TypeAlias = dict[str, Any]
 Key: TypeAlias = tuple[str, str, int]  # problem, planner's label, number of the run

@@ -7,7 +7,7 @@ from pathlib import Path
 from rrtik_ompl.benchmark import ompl_log, page, plots, records, tables
 from rrtik_ompl.benchmark.statistics import Result, results
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.text_file import write_text
+from rrtik_ompl.files.text import write_text
 
 VIEWS = 12
 

@@ -18,13 +18,13 @@ from rrtik_ompl.benchmark.sources import (
 from rrtik_ompl.benchmark.suite_file import BY_KIND, NONE, Generated, Joints, Obstacles, PlannerGroup, SuiteFile
 from rrtik_ompl.catalog import find_suite, load_robot
 from rrtik_ompl.errors import UnknownNameError
-from rrtik_ompl.file_format import parse
+from rrtik_ompl.files.sections import parse
+from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml
+from rrtik_ompl.files.text import file_name
+from rrtik_ompl.generated_problems import FAMILIES
 from rrtik_ompl.ompl_bridge.attempt import ompl_planners, planner_options
 from rrtik_ompl.planning import find_planner
-from rrtik_ompl.scenarios import FAMILIES
 from rrtik_ompl.shortening import METHODS
-from rrtik_ompl.text_file import file_name
-from rrtik_ompl.yaml_file import Location, YamlDocument, read_yaml
 
 # Geometric planners that OMPL 2.0.1 has and its wheel does not offer; those that a later wheel offers are left out.
 UNBOUND = (

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, Tag
 
-from rrtik_ompl.file_format import Name, Positive, Section, Version, tag, told_apart_by
+from rrtik_ompl.files.sections import Name, Positive, Section, Version, tag, told_apart_by
 
 BY_KIND, NONE = "by-kind", "none"  # of shortening, beside the methods
 Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
@@ -14,7 +14,7 @@ Seed = Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)]
 
 
 class GeneratedEntry(Section):
-    """Problems of ``rrtik_ompl.scenarios``."""
+    """Problems of ``rrtik_ompl.generated_problems``."""
 
     robot: Name
     family: Name

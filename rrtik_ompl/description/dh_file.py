@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
-from rrtik_ompl.file_format import (
+from rrtik_ompl.files.sections import (
     Name,
     NotNegative,
     Number,
@@ -21,9 +21,9 @@ from rrtik_ompl.file_format import (
     Vector4,
     parse,
 )
+from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
 from rrtik_ompl.poses import IDENTITY_QUATERNION, pose
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.yaml_file import YamlDocument, read_yaml
 
 DH_OPTIONS = ("base_pose", "tip")
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from rrtik_ompl.description.robot_build import JointLimits
 from rrtik_ompl.errors import UnknownNameError
-from rrtik_ompl.yaml_file import Location, YamlDocument, describe, read_yaml
+from rrtik_ompl.files.strict_yaml import Location, YamlDocument, describe, read_yaml
 
 RATES = ("velocity", "acceleration", "jerk")
 _FLAGS = ("position", "velocity", "acceleration", "deceleration", "jerk", "effort", "soft")

@@ -13,7 +13,7 @@ import pinocchio as pin
 from rrtik_ompl.collision.solids import pieces
 from rrtik_ompl.description.tree import Joint, Link, MeshFile, Tree
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.text_file import read_bytes
+from rrtik_ompl.files.text import read_bytes
 
 GREY = (0.7, 0.7, 0.7, 1.0)
 MAX_MESH_BYTES = 256 * 1024 * 1024

@@ -13,8 +13,8 @@ from rrtik_ompl.description.robot_source import source_entry
 from rrtik_ompl.description.srdf import Srdf, read_srdf
 from rrtik_ompl.description.urdf_read import UrdfDescription, located, read_urdf
 from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.files.text import read_text
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.text_file import read_text
 
 FilePath = str | os.PathLike[str]
 URDF_OPTIONS = ("base_pose", "group", "joint_limits", "joints", "locked", "packages", "srdf", "tip")

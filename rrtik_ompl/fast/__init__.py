@@ -7,20 +7,20 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rrtik_ompl.fast.clearance import Clearance as Clearance
-    from rrtik_ompl.fast.fast_world import FastWorld as FastWorld
-    from rrtik_ompl.fast.layout import COLLIDING as COLLIDING
-    from rrtik_ompl.fast.layout import FREE as FREE
-    from rrtik_ompl.fast.layout import UNDECIDED as UNDECIDED
-    from rrtik_ompl.fast.library import warm_up as warm_up
-    from rrtik_ompl.fast.scene_tables import needs_covers as needs_covers
+    from rrtik_ompl.fast.checks.clearance import Clearance as Clearance
+    from rrtik_ompl.fast.checks.fast_world import FastWorld as FastWorld
+    from rrtik_ompl.fast.simd.library import warm_up as warm_up
+    from rrtik_ompl.fast.tables.layout import COLLIDING as COLLIDING
+    from rrtik_ompl.fast.tables.layout import FREE as FREE
+    from rrtik_ompl.fast.tables.layout import UNDECIDED as UNDECIDED
+    from rrtik_ompl.fast.tables.scene_tables import needs_covers as needs_covers
 else:
     _HOME_OF = {
-        **dict.fromkeys(("COLLIDING", "FREE", "UNDECIDED"), "layout"),
-        "Clearance": "clearance",
-        "FastWorld": "fast_world",
-        "needs_covers": "scene_tables",
-        "warm_up": "library",
+        **dict.fromkeys(("COLLIDING", "FREE", "UNDECIDED"), "tables.layout"),
+        "Clearance": "checks.clearance",
+        "FastWorld": "checks.fast_world",
+        "needs_covers": "tables.scene_tables",
+        "warm_up": "simd.library",
     }
     __all__ = sorted(_HOME_OF)
 

@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, not_negative, whole_number
 from rrtik_ompl.goal import PoseGoal, joint_difference
-from rrtik_ompl.ik.closed_form import branches_of, check_poses, form_of
-from rrtik_ompl.ik.descent import Search
-from rrtik_ompl.ik.face import SECONDS, chosen_method, free_of_collision, solve_ik, usual_posture
+from rrtik_ompl.ik.analytic.closed_form import branches_of, check_poses, form_of
+from rrtik_ompl.ik.analytic.reference_branches import tip_residuals
 from rrtik_ompl.ik.goal_rows import POSE, pose_rows
+from rrtik_ompl.ik.method_interface import tolerances
 from rrtik_ompl.ik.methods import load_kernels
-from rrtik_ompl.ik.plain_branches import tip_residuals
-from rrtik_ompl.ik.question import tolerances
+from rrtik_ompl.ik.numeric.descent import Search
+from rrtik_ompl.ik.solve import SECONDS, chosen_method, free_of_collision, solve_ik, usual_posture
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World, check_world
 

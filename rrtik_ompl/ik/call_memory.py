@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.fast.layout import ALIGNMENT
+from rrtik_ompl.fast.tables.layout import ALIGNMENT
 
 WORD = 8  # bytes
 

@@ -7,7 +7,15 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.ik_layout import AIM_FLOATS, ANY_TURN, BOX, CHORD_TOLERANCE, FREE_TURN, NO_TURN, POSITION_TOLERANCE
+from rrtik_ompl.fast.ik.ik_layout import (
+    AIM_FLOATS,
+    ANY_TURN,
+    BOX,
+    CHORD_TOLERANCE,
+    FREE_TURN,
+    NO_TURN,
+    POSITION_TOLERANCE,
+)
 from rrtik_ompl.goal import GoalPart, GoalRegion, PoseGoal, PositionGoal, TipGoal
 from rrtik_ompl.ik.residual import SHARE
 from rrtik_ompl.task_region import TaskRegion
@@ -16,7 +24,7 @@ POSE = PoseGoal(np.eye(4))  # for its tolerances
 
 
 def goal_rows(goal: TipGoal) -> Matrix:
-    """A goal as rows that `rrtik_ompl.fast.ik_layout` describes, one for each member of a region, shape (k, 18).
+    """A goal as rows that `rrtik_ompl.fast.ik.ik_layout` describes, one for each member of a region, shape (k, 18).
 
     Tolerances are a hundredth of the goal's: a solution on their rim would not survive rounding.
 

@@ -9,22 +9,22 @@ from types import MappingProxyType
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.fast import branch_layout, ik_layout
-from rrtik_ompl.fast.library import library
+from rrtik_ompl.fast.ik import branch_layout, ik_layout
+from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.goal import PositionGoal
-from rrtik_ompl.ik.ccd import ccd
-from rrtik_ompl.ik.closed_form import branches_of, family, form_of, has_closed_form
-from rrtik_ompl.ik.damped import damped_least_squares, pinocchio_iteration
-from rrtik_ompl.ik.fabrik import fabrik, fabrik_misfit
+from rrtik_ompl.ik.analytic.closed_form import branches_of, family, form_of, has_closed_form
+from rrtik_ompl.ik.analytic.reference_branches import tip_fault
+from rrtik_ompl.ik.baselines.ccd import ccd
+from rrtik_ompl.ik.baselines.damped import damped_least_squares, pinocchio_iteration
+from rrtik_ompl.ik.baselines.fabrik import fabrik, fabrik_misfit
+from rrtik_ompl.ik.baselines.joint_axes import coupled_fault
+from rrtik_ompl.ik.baselines.pso import PARTICLES, pso, resampled_pso
 from rrtik_ompl.ik.genetic.method import genetic
-from rrtik_ompl.ik.hinges import coupled_fault
 from rrtik_ompl.ik.mb_rrt.method import mb_rrt, mb_rrt_misfit
-from rrtik_ompl.ik.numeric import numeric
-from rrtik_ompl.ik.plain_branches import tip_fault
-from rrtik_ompl.ik.projection import projection
-from rrtik_ompl.ik.pso import PARTICLES, pso, resampled_pso
-from rrtik_ompl.ik.question import Answer, Method, Question, Target, tolerances
-from rrtik_ompl.ik.restarts import ROUNDS, STARTS, Walk, restarted
+from rrtik_ompl.ik.method_interface import Answer, Method, Question, Target, tolerances
+from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric
+from rrtik_ompl.ik.numeric.projection import projection
+from rrtik_ompl.ik.numeric.restarts import ROUNDS, STARTS, Walk, restarted
 from rrtik_ompl.robot import Robot
 
 ENOUGH = 4  # starts that arrive before the others of a round are given up

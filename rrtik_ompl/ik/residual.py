@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.goal import PositionGoal
-from rrtik_ompl.ik.question import Target
+from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.robot import Robot
 
 SHARE = 0.01  # of the tolerance: a solution on the rim would not survive rounding

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from rrtik_ompl.arrays import TAU
 from rrtik_ompl.goal import GoalPart, PoseGoal, PositionGoal, TipGoal, parts_of
-from rrtik_ompl.task_region import TURN, TaskRegion
+from rrtik_ompl.task_region import TaskRegion
 
 
 def targets(goal: TipGoal, most: int, rng: np.random.Generator) -> list[PoseGoal | PositionGoal]:
@@ -26,7 +27,7 @@ def _drawn(part: GoalPart, rng: np.random.Generator) -> PoseGoal | PositionGoal:
     if not isinstance(part, TaskRegion):
         return part
     (pose,) = part.poses(part.drawn(1, rng))
-    any_turn = (part.bounds[3:, 1] - part.bounds[3:, 0] >= TURN).all()
+    any_turn = (part.bounds[3:, 1] - part.bounds[3:, 0] >= TAU).all()
     if any_turn and not part.T_w_tip.translation.any():
         return PositionGoal(pose[:3, 3], part.position_tolerance)
     return PoseGoal(pose, part.position_tolerance, part.orientation_tolerance)

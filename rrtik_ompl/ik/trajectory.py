@@ -13,15 +13,15 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, not_negative, positive
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal, TipGoal, joint_difference, tip_errors
-from rrtik_ompl.ik.branch_choice import JUMP, follow
-from rrtik_ompl.ik.closed_form import check_poses, form_of
-from rrtik_ompl.ik.face import free_of_collision, solve_ik
+from rrtik_ompl.ik.analytic.branch_choice import JUMP, follow
+from rrtik_ompl.ik.analytic.closed_form import check_poses, form_of
 from rrtik_ompl.ik.genetic.options import PRESETS, GeneticOptions
 from rrtik_ompl.ik.genetic.search import follow_targets
+from rrtik_ompl.ik.method_interface import Target, tolerances
 from rrtik_ompl.ik.methods import METHODS, load_kernels
-from rrtik_ompl.ik.numeric_track import Tracker
-from rrtik_ompl.ik.question import Target, tolerances
-from rrtik_ompl.random_stream import RandomStream
+from rrtik_ompl.ik.numeric.track import Tracker
+from rrtik_ompl.ik.random_stream import RandomStream
+from rrtik_ompl.ik.solve import free_of_collision, solve_ik
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World, check_world
 

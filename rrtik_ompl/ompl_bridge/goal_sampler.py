@@ -9,7 +9,7 @@ from ompl import base as ob
 
 from rrtik_ompl.arrays import Mask, Matrix, frozen, whole_number
 from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.goal_configurations import LARGEST, GoalSearch
+from rrtik_ompl.ik.goal_configurations import LARGEST, GoalSearch
 from rrtik_ompl.ompl_bridge.setup import Judge, space_information
 from rrtik_ompl.ompl_bridge.states import StateIO, space_bounds
 from rrtik_ompl.problem import Problem
@@ -21,7 +21,7 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
     """Free configurations at the goal of a problem, for every OMPL planner that samples its goal.
 
     Those of the first rounds of inverse kinematics are looked for when the sampler is made; further ones when a
-    planner has been given all of these and asks for more (:class:`rrtik_ompl.goal_configurations.GoalSearch`).
+    planner has been given all of these and asks for more (:class:`rrtik_ompl.ik.goal_configurations.GoalSearch`).
     Configurations that the space information refuses, being out of its bounds or invalid, are left out.
 
     Three planners of OMPL need one goal that is not Python's: give them :meth:`states`. PRM and PRMstar ask for goals

@@ -61,10 +61,10 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     keeps the text in :attr:`error`. KeyboardInterrupt and SystemExit pass.
 
     Attributes:
-        kernels: For the class: names of the kernel libraries that a search may use (:mod:`rrtik_ompl.fast.library`).
-        finds_goals: For the class: whether a goal of the tip, given as the option ``goal``, is enough for it.
-        seed: The seed in use; given, or drawn from OMPL's, so that ``ompl.util.RNG.setSeed`` fixes it too.
-        rng: The generator for :meth:`search`.
+        kernels: For the class: names of the kernel libraries that a search may use
+        (:mod:`rrtik_ompl.fast.simd.library`). finds_goals: For the class: whether a goal of the tip, given as the
+        option ``goal``, is enough for it. seed: The seed in use; given, or drawn from OMPL's, so that
+        ``ompl.util.RNG.setSeed`` fixes it too. rng: The generator for :meth:`search`.
         statistics: Counts of the last ``solve``, plain ints and floats.
         error: Why the last ``solve`` could not be done, or None. The last line says it in short.
         reason: Why the last ``solve`` was done in vain, if the search could say it.

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import TAU, Matrix, Vector
 from rrtik_ompl.ompl_bridge.states import StateIO
-from rrtik_ompl.problem import TURN, Problem
+from rrtik_ompl.problem import Problem
 from rrtik_ompl.world import World
 
 
@@ -90,8 +90,8 @@ def planning_bounds(problem: Problem, goals: Matrix) -> tuple[Vector, Vector]:
     """Finite bounds to sample in, shapes (n,): the limits; for continuous joints one turn beyond start and goals."""
     robot = problem.world.robot
     ends = np.vstack([problem.start, goals])
-    lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - TURN)
-    upper = np.where(np.isfinite(robot.upper), robot.upper, ends.max(axis=0) + TURN)
+    lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - TAU)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, ends.max(axis=0) + TAU)
     return lower, upper
 
 

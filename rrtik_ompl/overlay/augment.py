@@ -20,8 +20,8 @@ from rrtik_ompl.overlay.figure import Figure, figure_of, placed, tinted
 from rrtik_ompl.overlay.surfaces import ROBOT_TRIANGLES, obstacle_surfaces, robot_surfaces
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle
-from rrtik_ompl.sensing.camera import Camera
-from rrtik_ompl.viewer import palette
+from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.viewer.drawing import palette
 
 GHOST_TRIANGLES = 5_000
 FIGURES_KEPT, LAYERS_KEPT = 4, 6

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.overlay.figure import Placed
-from rrtik_ompl.sensing.camera import Camera
+from rrtik_ompl.sensing.cameras.camera import Camera
 
 NEAR, FAR = 0.05, 50.0  # [m]
 

@@ -16,8 +16,8 @@ from rrtik_ompl.arrays import Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.overlay.augment import Augmenter, Ghost
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.sensing.cameras.pictures import Picture, quiet
 from rrtik_ompl.sensing.frames import NoBaseError, base_from_camera
-from rrtik_ompl.sensing.pictures import Picture, quiet
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.sensing.sensor import Sensor
 

@@ -15,8 +15,8 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
-from rrtik_ompl.viewer import palette
-from rrtik_ompl.viewer.triangles import Faces, capsule, extruded, split_creases, thin_out
+from rrtik_ompl.viewer.drawing import palette
+from rrtik_ompl.viewer.drawing.triangles import Faces, capsule, extruded, split_creases, thin_out
 
 ROBOT_TRIANGLES = 20_000
 OBSTACLE_TRIANGLES = 5_000

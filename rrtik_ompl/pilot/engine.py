@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.pilot.arguments import LONGEST, number
-from rrtik_ompl.pilot.arm import SimulatedArm
-from rrtik_ompl.pilot.eyes import Eyes
-from rrtik_ompl.pilot.feed import ENDED
+from rrtik_ompl.pilot.devices.arm import SimulatedArm
+from rrtik_ompl.pilot.devices.camera_feed import ENDED
+from rrtik_ompl.pilot.devices.perception import Eyes
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.state import state_document
 from rrtik_ompl.pilot.views import PRESETS, CameraView, OutsideView

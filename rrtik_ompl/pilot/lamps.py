@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.goal import PoseGoal, joint_difference
+from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.ik.batch import solve_ik_batch
-from rrtik_ompl.ik.closed_form import solutions
-from rrtik_ompl.ik.face import chosen_method, solve_ik
+from rrtik_ompl.ik.solve import chosen_method, solve_ik
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.sensing.marker_map import GraspType, MarkedObject
+from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject
 from rrtik_ompl.world import World
 
 STAGES = ("approach", "grasp", "lift")

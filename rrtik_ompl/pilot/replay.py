@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Vector, finite_array
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
 from rrtik_ompl.pilot.record import read_record
 from rrtik_ompl.pilot.session import Session
-from rrtik_ompl.pilot.simulation import SimulatedCamera
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.sensing.marker_map import MarkerMap
+from rrtik_ompl.sensing.markers.marker_map import MarkerMap
 from rrtik_ompl.sensing.scene_from_view import SIGMAS, SeenObject
 
 Entry = dict[str, Any]

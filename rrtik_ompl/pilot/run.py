@@ -10,7 +10,7 @@ from typing import Any
 import cv2
 
 from rrtik_ompl.pilot.engine import VIEW_COMMANDS, Engine
-from rrtik_ompl.pilot.server import PilotServer
+from rrtik_ompl.pilot.web.server import PilotServer
 
 PERIOD = 1.0 / 32.0  # [s]; a little less than a camera's, so that none of its pictures is left out
 CAMERA, OUTSIDE = "C", "O"

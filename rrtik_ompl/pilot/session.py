@@ -14,15 +14,15 @@ import numpy as np
 from rrtik_ompl.arrays import Vector, frozen
 from rrtik_ompl.errors import InputError, RrtikError, UnknownNameError
 from rrtik_ompl.goal import JointGoal
-from rrtik_ompl.moves_text import joint_unit, reading
+from rrtik_ompl.moves.text import joint_unit, reading
 from rrtik_ompl.pilot.arguments import LONGEST, fitting
-from rrtik_ompl.pilot.arm import Arm, joint_rates
-from rrtik_ompl.pilot.follower import Follower, Progress, still_free
+from rrtik_ompl.pilot.devices.arm import Arm, joint_rates
+from rrtik_ompl.pilot.feasibility import Outlook
 from rrtik_ompl.pilot.lamps import Lamp, stage_poses
-from rrtik_ompl.pilot.manoeuvre import Room, Verdict, advice_to_get_free, free_until, judge_move
-from rrtik_ompl.pilot.outlook import Outlook
 from rrtik_ompl.pilot.record import Record
-from rrtik_ompl.pilot.route import Route, route_to, route_to_grasp
+from rrtik_ompl.pilot.routes.follower import Follower, Progress, still_free
+from rrtik_ompl.pilot.routes.manoeuvre import Room, Verdict, advice_to_get_free, free_until, judge_move
+from rrtik_ompl.pilot.routes.route import Route, route_to, route_to_grasp
 from rrtik_ompl.pilot.surroundings import Surroundings
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.sensing.scene_from_view import SeenObject

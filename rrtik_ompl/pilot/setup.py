@@ -9,23 +9,23 @@ from pathlib import Path
 import numpy as np
 
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.overlay.gods_eye import eye_at
-from rrtik_ompl.pilot.arm import Arm, SimulatedArm
+from rrtik_ompl.overlay.virtual_camera import eye_at
+from rrtik_ompl.pilot.devices.arm import Arm, SimulatedArm
+from rrtik_ompl.pilot.devices.camera_feed import Feed
+from rrtik_ompl.pilot.devices.line_arm import LineArm
+from rrtik_ompl.pilot.devices.perception import LiveEyes, SimulatedSource
+from rrtik_ompl.pilot.devices.simulated_vehicle import Scenario, find_scenario, load_scenario
+from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
 from rrtik_ompl.pilot.engine import Engine
-from rrtik_ompl.pilot.eyes import LiveEyes, SimulatedSource
-from rrtik_ompl.pilot.feed import Feed
-from rrtik_ompl.pilot.line_arm import LineArm
 from rrtik_ompl.pilot.record import Record
 from rrtik_ompl.pilot.replay import RecordedArm, RecordedEyes, entries_for, start_of
-from rrtik_ompl.pilot.scenario import Scenario, find_scenario, load_scenario
 from rrtik_ompl.pilot.session import Session
-from rrtik_ompl.pilot.simulation import SimulatedCamera
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.problem_file import load_problem
-from rrtik_ompl.sensing.camera import Camera
-from rrtik_ompl.sensing.camera_file import load_camera
-from rrtik_ompl.sensing.marker_map_file import load_marker_map
-from rrtik_ompl.sensing.pictures import Picture, pictures_from
+from rrtik_ompl.problem_files.problem import load_problem
+from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.sensing.cameras.camera_file import load_camera
+from rrtik_ompl.sensing.cameras.pictures import Picture, pictures_from
+from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
 from rrtik_ompl.sensing.scene_from_view import SIGMAS
 from rrtik_ompl.sensing.sensor import Sensor
 from rrtik_ompl.sensing.sight import check_size

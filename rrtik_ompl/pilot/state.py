@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.moves_text import joint_unit, reading, spoken_moves
+from rrtik_ompl.moves.text import joint_unit, reading, spoken_moves
 from rrtik_ompl.pilot.session import STALE, Session
 
 

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.overlay.augment import Augmenter, Ghost
-from rrtik_ompl.overlay.gods_eye import eye_at, imagined_camera, sky
+from rrtik_ompl.overlay.virtual_camera import eye_at, imagined_camera, sky
 from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED
 from rrtik_ompl.pilot.session import FOLLOWING, PROPOSED, Session
-from rrtik_ompl.sensing.camera import Camera
+from rrtik_ompl.sensing.cameras.camera import Camera
 
 LAMP_COLORS = {GREEN: "#1b9e3a", AMBER: "#e6a100", RED: "#c62828"}
 NEXT_MOVE = "#56b4e9"

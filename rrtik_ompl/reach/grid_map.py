@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.text_file import file_name, read_bytes, write_bytes, write_text
+from rrtik_ompl.files.text import file_name, read_bytes, write_bytes, write_text
 
 FORMATS = (".npz", ".csv")
 LARGEST_FILE = 2**30  # bytes

@@ -6,12 +6,12 @@ import os
 import time
 
 from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.files.text import check_target, file_name
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning.feed import Source, SpeedWarning, feed_of
 from rrtik_ompl.replanning.loop import Clock, GoalFeed, Loop
 from rrtik_ompl.replanning.run import Run, Tick, load_run
 from rrtik_ompl.replanning.settings import PLANNERS, settings
-from rrtik_ompl.text_file import check_target, file_name
 from rrtik_ompl.trajectory.limits import RateLimits
 
 __all__ = ["PLANNERS", "Run", "SpeedWarning", "Tick", "load_run", "replan"]

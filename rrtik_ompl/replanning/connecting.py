@@ -13,11 +13,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.fast.connect import ConnectSearch
-from rrtik_ompl.fast.connect_layout import KERNELS
-from rrtik_ompl.fast.library import library
-from rrtik_ompl.fast.shortcut import ShortcutSearch
-from rrtik_ompl.fast.shortcut_layout import KERNELS as CUT_KERNELS
+from rrtik_ompl.fast.search.connect import ConnectSearch
+from rrtik_ompl.fast.search.connect_layout import KERNELS
+from rrtik_ompl.fast.search.shortcut import ShortcutSearch
+from rrtik_ompl.fast.search.shortcut_layout import KERNELS as CUT_KERNELS
+from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.transitions import without_repeats
 
 Stop = Callable[[], Any]  # true when it is time to stop
@@ -79,7 +79,7 @@ def never() -> bool:
 
 
 class KernelConnect:
-    """The search in a kernel, for worlds that have them (:mod:`rrtik_ompl.fast.connect_kernels`)."""
+    """The search in a kernel, for worlds that have them (:mod:`rrtik_ompl.fast.search.connect_kernels`)."""
 
     def __init__(
         self, world: Any, lower: Vector, upper: Vector, eps: float, seed: int, iterations: int = ITERATIONS
@@ -136,7 +136,7 @@ class PlainConnect:
 
 
 class KernelCuts:
-    """Random shortcuts of a route in a kernel, a fixed number of them (:mod:`rrtik_ompl.fast.shortcut`)."""
+    """Random shortcuts of a route in a kernel, a fixed number of them (:mod:`rrtik_ompl.fast.search.shortcut`)."""
 
     def __init__(self, world: Any, seed: int) -> None:
         self._world, self._rng = world, np.random.default_rng(seed)

@@ -11,9 +11,9 @@ from collections.abc import Callable
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.moving_world import MovingWorld
 from rrtik_ompl.replanning.connecting import Motions
 from rrtik_ompl.scene import Scene
+from rrtik_ompl.world.moving_world import MovingWorld
 
 TRIES = 192  # directions that are compared
 SPEEDS = (0.25, 1.0)  # at which the robot may go in each of them, of the fastest

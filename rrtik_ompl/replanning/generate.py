@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.moving_world import MovingWorld
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle, Scene, Waypoints
 from rrtik_ompl.shapes import Box, Capsule, Shape, Sphere
 from rrtik_ompl.world import World
+from rrtik_ompl.world.moving_world import MovingWorld
 
 SHELL = (0.5, 1.05)  # of the reach: between these distances from the first joints obstacles wander
-TURN = 0.08  # probability that one of them turns at a waypoint
+TURN_PROBABILITY = 0.08  # probability that one of them turns at a waypoint
 BETWEEN = 0.25  # [s] from waypoint to waypoint
 POSTURES = 400  # that measure the reach
 TRIES = 2000
@@ -102,7 +102,7 @@ def _wander(rng: np.random.Generator, steps: int, length: float, low: float, hig
     place = _direction(rng) * rng.uniform(low, high)
     heading, places = _direction(rng), [place]
     for _ in range(steps):
-        if rng.random() < TURN:
+        if rng.random() < TURN_PROBABILITY:
             heading = _direction(rng)
         while not low <= np.linalg.norm(place + length * heading) <= high:
             heading = _direction(rng)

@@ -6,10 +6,10 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.repair import PathRepair
-from rrtik_ompl.moving_world import MovingWorld
+from rrtik_ompl.fast.search.repair import PathRepair
 from rrtik_ompl.replanning.connecting import CUTS, ITERATIONS, PATIENCE, KernelConnect, KernelCuts, Motions, Stop, never
 from rrtik_ompl.replanning.drrt_con import DrrtCon
+from rrtik_ompl.world.moving_world import MovingWorld
 
 REPAIR_CUTS, REPAIR_PATIENCE = 16, 6  # as CUTS and PATIENCE, where only a detour is new; walking shortens it further
 
@@ -17,7 +17,7 @@ REPAIR_CUTS, REPAIR_PATIENCE = 16, 6  # as CUTS and PATIENCE, where only a detou
 class KernelDrrtCon(DrrtCon):
     """As :class:`DrrtCon`, in one world: its path is kept free of what moves there.
 
-    What the kernels add to the paper stands in :mod:`rrtik_ompl.fast.repair_kernels`.
+    What the kernels add to the paper stands in :mod:`rrtik_ompl.fast.search.repair_kernels`.
 
     Args:
         world: Who judges; the ``motions`` of all methods.

@@ -8,22 +8,22 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import TAU, Matrix, Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import JOINT_TOLERANCE, JointGoal
-from rrtik_ompl.goal_configurations import goal_configurations
-from rrtik_ompl.moving_world import MovingWorld
+from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.poses import quaternion_xyzw
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning.connecting import Stop
 from rrtik_ompl.replanning.evading import evasion
 from rrtik_ompl.replanning.feed import Feed, Watch, rooms
 from rrtik_ompl.replanning.run import Run, Tick
-from rrtik_ompl.replanning.settings import COPIES, TURN, Settings, planner_of
+from rrtik_ompl.replanning.settings import COPIES, Settings, planner_of
 from rrtik_ompl.replanning.walking import one_step, to_first_corner
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.world import World
+from rrtik_ompl.world.moving_world import MovingWorld
 
 GoalFeed = Callable[[float], ArrayLike]
 Clock = Callable[[], float]
@@ -62,8 +62,8 @@ class Loop:
         self._world.move(scene, rooms=self._room)  # a start may stand where something is only expected
         _check_start(self.q, scene, first, self._world)
         ends = np.vstack([self.q, self._goals])
-        lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - TURN)
-        upper = np.where(np.isfinite(robot.upper), robot.upper, ends.max(axis=0) + TURN)
+        lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - TAU)
+        upper = np.where(np.isfinite(robot.upper), robot.upper, ends.max(axis=0) + TAU)
         self._planner = planner_of(chosen, self._world, lower, upper)
         self.run = Run(
             problem.name, robot.name, robot.joint_names, chosen.planner, chosen.seed, chosen.step, chosen.rate,

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, finite_number, not_negative, positive, whole_number
 from rrtik_ompl.errors import InputError, UnknownNameError, require
-from rrtik_ompl.path_text import json_object
+from rrtik_ompl.files.tables import json_object
+from rrtik_ompl.files.text import read_text, write_text
 from rrtik_ompl.poses import pose
-from rrtik_ompl.text_file import read_text, write_text
 from rrtik_ompl.transitions import route_length
 
 KIND = "replan_run"

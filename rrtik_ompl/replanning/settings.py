@@ -6,19 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.arrays import Vector, finite_array, whole_number
+from rrtik_ompl.arrays import TAU, Vector, finite_array, whole_number
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.fast.connect_lengths import connect_lengths
-from rrtik_ompl.moving_world import MovingWorld
+from rrtik_ompl.fast.search.connect_lengths import connect_lengths
 from rrtik_ompl.replanning.connecting import KernelCuts, PlainConnect, has_kernels
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
 from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
 from rrtik_ompl.replanning.single_tree import SingleTree
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.trajectory.limits import RateLimits
+from rrtik_ompl.world.moving_world import MovingWorld
 
 PLANNERS = ("drrt-con", "rrt-connect", "drrt")
-TURN = 2.0 * np.pi
 FASTEST = 1e5  # [Hz]
 SHORTEST = 1e-3  # of the usual eps: a path is looked at in pieces of half of it, which must fit into memory
 COPIES = 3  # places of an obstacle that are heeded at once where its motion is predicted
@@ -82,7 +81,7 @@ def settings(
     if distance < 0.0:
         raise InputError(f"margin must not be negative, got {distance:g} m")
     rates = RateLimits.of(robot) if limits is None else limits.for_joints(robot.dof)
-    lower, upper = (np.clip(ends, -TURN, TURN) for ends in (robot.lower, robot.upper))
+    lower, upper = (np.clip(ends, -TAU, TAU) for ends in (robot.lower, robot.upper))
     usual, _ = connect_lengths(lower, upper, None, None)
     return Settings(
         step=_above(step, "step", "how far to go in a tick [rad or m]"),

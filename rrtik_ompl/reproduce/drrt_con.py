@@ -7,14 +7,14 @@ from itertools import groupby
 import numpy as np
 
 from rrtik_ompl.goal import JointGoal
-from rrtik_ompl.moving_world import MovingWorld
 from rrtik_ompl.replanning import Run
 from rrtik_ompl.replanning.connecting import PlainConnect
+from rrtik_ompl.replanning.contact_check import judge
 from rrtik_ompl.replanning.drrt_con import DrrtCon
-from rrtik_ompl.replanning.judge import judge
+from rrtik_ompl.replanning.scenario import Scenario, load_scenario
 from rrtik_ompl.reproduce.rows import Row, Table, verdict
-from rrtik_ompl.scenario import Scenario, load_scenario
 from rrtik_ompl.transitions import route_length
+from rrtik_ompl.world.moving_world import MovingWorld
 
 SOURCE = "DRRT-Con paper"
 SCENE = "coordinates, speeds and steps chosen here: none is printed"

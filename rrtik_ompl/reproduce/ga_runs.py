@@ -9,8 +9,8 @@ import numpy as np
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.arrays import Vector
-from rrtik_ompl.ik.closed_form import solutions
-from rrtik_ompl.ik.form import wrapped
+from rrtik_ompl.ik.analytic.analytic_solver import wrapped
+from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.ik.genetic.options import GeneticOptions
 from rrtik_ompl.ik.genetic.search import GeneticRun, follow_targets
 from rrtik_ompl.reproduce.ga_published import INCH, POINTS, TOLERANCE, curve

@@ -54,7 +54,7 @@ def gripper(quick: bool) -> list[Row]:
 def accuracy(quick: bool) -> list[Row]:
     """Section 6: two markers 300 mm apart, the lens known or taken to be without distortion."""
     from rrtik_ompl.reproduce.sensing_runs import CAMERA, PLAIN, pair_at, pair_distances, seen_poses
-    from rrtik_ompl.sensing.synthetic_camera import published_camera
+    from rrtik_ompl.sensing.cameras.synthetic_camera import published_camera
 
     count, rows = 10 if quick else 100, []
     for distance, _, _, printed in ACCURACY:

@@ -13,10 +13,16 @@ import pinocchio as pin
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.reproduce.sensing import NOISE
-from rrtik_ompl.sensing.camera import Camera
-from rrtik_ompl.sensing.corner_pose import ALIGNED_SIGMA, ROUGH_SIGMA, CornerPose, pose_of_square, square_corners
-from rrtik_ompl.sensing.markers import find_markers, marker_cells
-from rrtik_ompl.sensing.synthetic_camera import clean_picture, marker_print, photograph, published_camera
+from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph, published_camera
+from rrtik_ompl.sensing.markers.corner_pose import (
+    ALIGNED_SIGMA,
+    ROUGH_SIGMA,
+    CornerPose,
+    pose_of_square,
+    square_corners,
+)
+from rrtik_ompl.sensing.markers.detection import find_markers, marker_cells
 
 DICTIONARY = "4x4_50"
 SIDE = 0.08  # of the published markers [m]

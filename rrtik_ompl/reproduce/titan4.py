@@ -6,8 +6,8 @@ import numpy as np
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.ik.closed_form import form_of, solutions
-from rrtik_ompl.ik.form import wrapped
+from rrtik_ompl.ik.analytic.analytic_solver import wrapped
+from rrtik_ompl.ik.analytic.closed_form import form_of, solutions
 from rrtik_ompl.reproduce.rows import Row, Table, verdict
 from rrtik_ompl.robot import Robot
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.sensing.camera import Camera
+from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.sight import Sighting
 
 GOOD, DOUBTFUL, REFUSED = (80, 200, 60), (0, 170, 255), (60, 60, 230)  # blue, green, red

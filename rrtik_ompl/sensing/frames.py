@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.sensing.marker_map import MarkerMap
+from rrtik_ompl.sensing.markers.marker_map import MarkerMap
 from rrtik_ompl.sensing.sight import Sighting
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.sensing.pictures import Picture
+from rrtik_ompl.sensing.cameras.pictures import Picture
 from rrtik_ompl.sensing.problem_from_view import scene_with
 from rrtik_ompl.sensing.sensor import Sensor
 

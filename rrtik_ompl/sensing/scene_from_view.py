@@ -12,9 +12,9 @@ from rrtik_ompl.arrays import Matrix, finite_array
 from rrtik_ompl.collision.extent import farthest
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.sensing.camera import Camera
+from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.frames import base_from_camera, place_in_base
-from rrtik_ompl.sensing.marker_map import MarkedObject, MarkerMap
+from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap
 from rrtik_ompl.sensing.sight import Sighting, look
 from rrtik_ompl.shapes import HalfSpace
 

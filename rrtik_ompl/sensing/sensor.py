@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from rrtik_ompl.poses import quaternion_xyzw
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.sensing.annotate import annotated
-from rrtik_ompl.sensing.camera import Camera
-from rrtik_ompl.sensing.corner_pose import CornerPose
+from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.sensing.cameras.pictures import Picture, write_picture
 from rrtik_ompl.sensing.frames import NoBaseError
-from rrtik_ompl.sensing.marker_map import MarkerMap
-from rrtik_ompl.sensing.markers import dictionaries_seen
-from rrtik_ompl.sensing.pictures import Picture, write_picture
+from rrtik_ompl.sensing.markers.corner_pose import CornerPose
+from rrtik_ompl.sensing.markers.detection import dictionaries_seen
+from rrtik_ompl.sensing.markers.marker_map import MarkerMap
 from rrtik_ompl.sensing.scene_from_view import SIGMAS, SeenObject, checked_sigmas, objects_in_base
 from rrtik_ompl.sensing.sight import Sighting, as_gray, look
 from rrtik_ompl.sensing.tracker import PoseTracker

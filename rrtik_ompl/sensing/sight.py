@@ -11,11 +11,17 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.sensing.alignment import LEAST_LIKENESS
-from rrtik_ompl.sensing.camera import Camera
-from rrtik_ompl.sensing.corner_pose import ALIGNED_SIGMA, ROUGH_SIGMA, CornerPose, pose_of_points, pose_of_square
-from rrtik_ompl.sensing.marker_map import MarkedObject, MarkerMap
-from rrtik_ompl.sensing.markers import SeenMarker, find_markers
+from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.sensing.markers.alignment import LEAST_LIKENESS
+from rrtik_ompl.sensing.markers.corner_pose import (
+    ALIGNED_SIGMA,
+    ROUGH_SIGMA,
+    CornerPose,
+    pose_of_points,
+    pose_of_square,
+)
+from rrtik_ompl.sensing.markers.detection import SeenMarker, find_markers
+from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap
 
 LEAST_SIDE = 12.0  # pixels: two a cell of the coarsest dictionaries
 MOST_ERROR = 2.0  # pixels between a corner and where its pose puts it; more is a wrong map or a wrong number

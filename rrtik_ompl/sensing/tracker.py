@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.sensing.corner_pose import ALIGNED_SIGMA, CornerPose, turn_between
+from rrtik_ompl.sensing.markers.corner_pose import ALIGNED_SIGMA, CornerPose, turn_between
 from rrtik_ompl.sensing.sight import Sighting
 
 OUTLIER_LIMIT = 5.0  # standard deviations

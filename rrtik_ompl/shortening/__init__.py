@@ -12,15 +12,15 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, positive, whole_number
 from rrtik_ompl.errors import InputError, UnknownNameError, require
+from rrtik_ompl.moves.axis_cut import double_axis_cut
+from rrtik_ompl.moves.axis_cut_rounds import axis_cut_rounds
+from rrtik_ompl.moves.rules import MoveRules
 from rrtik_ompl.ompl_bridge.simplify import simplified
 from rrtik_ompl.path import SECOND_CHECK, JointPath
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.shortening.axis import double_axis_cut
-from rrtik_ompl.shortening.axis_rounds import axis_cut_rounds
 from rrtik_ompl.shortening.best import best_in_time
 from rrtik_ompl.shortening.corners import snap_corners
 from rrtik_ompl.shortening.fewest_moves import fewest_moves
-from rrtik_ompl.shortening.move_rules import MoveRules
 from rrtik_ompl.shortening.random_cut import random_cut, shortcut
 from rrtik_ompl.shortening.retraction import retract
 from rrtik_ompl.shortening.sequential import sequential_cut

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.shortening.axis_rounds import axis_cut_rounds
+from rrtik_ompl.moves.axis_cut_rounds import axis_cut_rounds
 from rrtik_ompl.shortening.random_cut import PULLS, WAYPOINTS, has_kernels, kernel_search, random_cut, run
 from rrtik_ompl.shortening.retraction import STEPS, retract
 from rrtik_ompl.shortening.sequential import sequential_cut

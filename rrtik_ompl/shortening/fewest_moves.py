@@ -7,18 +7,18 @@ from functools import partial
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector, finite_array
+from rrtik_ompl.arrays import TAU, Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import JointGoal
-from rrtik_ompl.problem import TURN, Problem
+from rrtik_ompl.moves.lattice import MoveLattice
+from rrtik_ompl.moves.lower_bounds import sharper_bound
+from rrtik_ompl.moves.rules import MoveRules
+from rrtik_ompl.moves.search import MoveSearch
+from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.shortening.move_lattice import MoveLattice
-from rrtik_ompl.shortening.move_proof import sharper_bound
-from rrtik_ompl.shortening.move_rules import MoveRules
-from rrtik_ompl.shortening.move_search import MoveSearch
-from rrtik_ompl.shortening.questions import Stop, never
 from rrtik_ompl.transitions import lower_bound, single_joint
 from rrtik_ompl.world import World
+from rrtik_ompl.world.motion_queries import Stop, never
 
 ROUNDS = 10
 MOST_CELLS = 2_000_000  # of a grid
@@ -148,6 +148,6 @@ def _ends(problem: Problem, what: str) -> Matrix:
 
 def turning_limits(robot: Robot, rows: Matrix) -> tuple[Vector, Vector]:
     """Limits of the joints, shapes (n,); of those that turn for ever, one turn more than rows, shape (k, n), go."""
-    lower = np.where(np.isfinite(robot.lower), robot.lower, rows.min(axis=0) - TURN)
-    upper = np.where(np.isfinite(robot.upper), robot.upper, rows.max(axis=0) + TURN)
+    lower = np.where(np.isfinite(robot.lower), robot.lower, rows.min(axis=0) - TAU)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, rows.max(axis=0) + TAU)
     return lower, upper

@@ -1,7 +1,7 @@
 """Random cut: straight from one random place of the route to another. Post-processing paper, method 2.
 
-Where the world has kernels the whole loop runs in one (:mod:`rrtik_ompl.fast.shortcut`): first without the shortcuts
-that the kernels cannot decide, for those take a hundred times as long, then with them.
+Where the world has kernels the whole loop runs in one (:mod:`rrtik_ompl.fast.search.shortcut`): first without the
+shortcuts that the kernels cannot decide, for those take a hundred times as long, then with them.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.fast.library import library
-from rrtik_ompl.fast.shortcut import ShortcutSearch
-from rrtik_ompl.fast.shortcut_layout import KERNELS
+from rrtik_ompl.fast.search.shortcut import ShortcutSearch
+from rrtik_ompl.fast.search.shortcut_layout import KERNELS
+from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.shortening.task import Task
 from rrtik_ompl.transitions import without_repeats
 

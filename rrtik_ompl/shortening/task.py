@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.shortening.axis import axis_moves
-from rrtik_ompl.shortening.move_rules import MoveRules
-from rrtik_ompl.transitions import route_length, transitions
+from rrtik_ompl.moves.axis_cut import axis_moves
+from rrtik_ompl.moves.rules import MoveRules
+from rrtik_ompl.transitions import edge_keys, route_length, transitions
 
 
 class Motions(Protocol):
@@ -145,8 +144,3 @@ class Task:
         if self._on_better is not None and self.rank(route) < self._told:
             self._told = self.rank(route)
             self._on_better(route)
-
-
-def edge_keys(route: Matrix) -> list[tuple[bytes, bytes]]:
-    """The edges of a route as keys."""
-    return list(pairwise(row.tobytes() for row in route))

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
 from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.files.text import read_text, write_text
 from rrtik_ompl.path import SECOND_CHECK, JointPath
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.text_file import read_text, write_text
 from rrtik_ompl.trajectory.text import decoded, encoded, trajectory_format
 from rrtik_ompl.world import World
 

@@ -10,8 +10,8 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.path_text import json_object, table_rows
-from rrtik_ompl.text_file import file_name
+from rrtik_ompl.files.tables import json_object, table_rows
+from rrtik_ompl.files.text import file_name
 
 FORMATS = (".json", ".csv")
 KIND = "joint_trajectory"

@@ -13,7 +13,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.text_file import write_text
+from rrtik_ompl.files.text import write_text
 
 __all__ = ["view"]
 
@@ -40,7 +40,7 @@ def view(
             drawn too.
         ghosts: Configurations at which the arm is drawn like tinted glass, shape (k, dof), such as the solutions of
             inverse kinematics; they take the place of the ghosts of start and goal.
-        marks: What else stands in the world: see ``rrtik_ompl.viewer.marks``.
+        marks: What else stands in the world: see ``rrtik_ompl.viewer.drawing.marks``.
         run: A ``Run`` of :func:`rrtik_ompl.replanning.replan` to replay, in place of a path.
         html: File to write. If None, the page is served on 127.0.0.1 until Ctrl-C is pressed.
         title: Heading of the page; made from the problem's or the robot's name if None.

@@ -14,7 +14,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.replanning.run import Run
-from rrtik_ompl.viewer.marks import Mark
+from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.story import story_of
 from rrtik_ompl.viewer.subject import Subject, subject_of, subject_of_run

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.goal import Goal, JointGoal, as_task_region, parts_of
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.viewer.framing import Frame, frame_around
-from rrtik_ompl.viewer.marks import draw_marks
-from rrtik_ompl.viewer.meshes import thickened
-from rrtik_ompl.viewer.robot_picture import (
+from rrtik_ompl.viewer.drawing.framing import Frame, frame_around
+from rrtik_ompl.viewer.drawing.marks import draw_marks
+from rrtik_ompl.viewer.drawing.meshes import thickened
+from rrtik_ompl.viewer.drawing.robot_picture import (
     GHOST_TRIANGLES,
     Part,
     attached_parts,
@@ -25,9 +25,9 @@ from rrtik_ompl.viewer.robot_picture import (
     link_parts,
     swept_points,
 )
-from rrtik_ompl.viewer.scene_picture import draw_goal, draw_scene, draw_triad, goal_frames
+from rrtik_ompl.viewer.drawing.scene_picture import draw_goal, draw_scene, draw_triad, goal_frames
+from rrtik_ompl.viewer.drawing.trail import draw_before, draw_trail
 from rrtik_ompl.viewer.subject import Subject
-from rrtik_ompl.viewer.trail import draw_before, draw_trail
 from rrtik_ompl.viewer.window import RecordingWindow
 
 FRAMED_POSTURES = 100

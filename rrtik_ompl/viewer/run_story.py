@@ -13,9 +13,9 @@ from rrtik_ompl.poses import quaternion_xyzw
 from rrtik_ompl.replanning.run import Run, Tick
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.viewer.framing import Frame
-from rrtik_ompl.viewer.robot_picture import node_name
-from rrtik_ompl.viewer.scene_picture import obstacle_look
+from rrtik_ompl.viewer.drawing.framing import Frame
+from rrtik_ompl.viewer.drawing.robot_picture import node_name
+from rrtik_ompl.viewer.drawing.scene_picture import obstacle_look
 
 POINTS = 40  # of a path's line at most
 SHOWN = 0.5  # [s] that a path is seen after it was replaced

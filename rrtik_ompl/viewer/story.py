@@ -13,15 +13,15 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.shapes import HalfSpace
 from rrtik_ompl.transitions import moved, route_length, transitions
-from rrtik_ompl.viewer import palette
-from rrtik_ompl.viewer.framing import Frame
-from rrtik_ompl.viewer.marks import Mark
-from rrtik_ompl.viewer.meshes import look_of_margin
-from rrtik_ompl.viewer.robot_picture import joint_nodes, node_name
+from rrtik_ompl.viewer.drawing import palette
+from rrtik_ompl.viewer.drawing.framing import Frame
+from rrtik_ompl.viewer.drawing.marks import Mark
+from rrtik_ompl.viewer.drawing.meshes import look_of_margin
+from rrtik_ompl.viewer.drawing.robot_picture import joint_nodes, node_name
+from rrtik_ompl.viewer.drawing.trail import pieces
+from rrtik_ompl.viewer.drawing.viewpoint import overview
 from rrtik_ompl.viewer.run_story import run_story
 from rrtik_ompl.viewer.subject import Subject
-from rrtik_ompl.viewer.trail import pieces
-from rrtik_ompl.viewer.viewpoint import overview
 
 PLAY_SPEED = np.deg2rad(30.0)  # [rad/s] of the joint that travels farthest in a move
 PLAY_SECONDS = (3.0, 60.0)  # shortest and longest playing time of a whole path

@@ -14,7 +14,7 @@ from rrtik_ompl.goal import Goal, JointGoal
 from rrtik_ompl.replanning.run import Run
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
-from rrtik_ompl.viewer.marks import Mark
+from rrtik_ompl.viewer.drawing.marks import Mark
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.fast.branch_layout import REACH_TOLERANCE, SHOULDER_ROOT, SINGULAR
-from rrtik_ompl.ik.form import Branches, ClosedFormSolver, two_links, wrapped
+from rrtik_ompl.fast.ik.branch_layout import REACH_TOLERANCE, SHOULDER_ROOT, SINGULAR
+from rrtik_ompl.ik.analytic.analytic_solver import Branches, ClosedFormSolver, two_links, wrapped
 
 Numbers = NDArray[np.float64]
 MISFIT = 1e-9  # sine of the angle between axis 5 and where a pose wants it; more is out of reach for five joints

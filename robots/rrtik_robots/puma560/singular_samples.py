@@ -6,7 +6,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import UnknownNameError
-from rrtik_ompl.ik.form import wrapped
+from rrtik_ompl.ik.analytic.analytic_solver import wrapped
 from rrtik_ompl.robot import Robot
 from rrtik_robots.puma560 import ROWS_560
 

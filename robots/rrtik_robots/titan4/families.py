@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.fast.branch_layout import REACH_TOLERANCE, SINGULAR
-from rrtik_ompl.ik.form import wrapped
+from rrtik_ompl.fast.ik.branch_layout import REACH_TOLERANCE, SINGULAR
+from rrtik_ompl.ik.analytic.analytic_solver import wrapped
 from rrtik_robots.titan4.geometry import TitanGeometry
 
 Numbers = NDArray[np.float64]

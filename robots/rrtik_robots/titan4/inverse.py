@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.fast.branch_layout import NORMAL, ROUNDING, SINGULAR, UNSURE
-from rrtik_ompl.ik.form import Branches, ClosedFormSolver, two_links, wrapped
+from rrtik_ompl.fast.ik.branch_layout import NORMAL, ROUNDING, SINGULAR, UNSURE
+from rrtik_ompl.ik.analytic.analytic_solver import Branches, ClosedFormSolver, two_links, wrapped
 from rrtik_robots.titan4.families import nearest_azimuth, nearest_psi, psi_within_rounding
 from rrtik_robots.titan4.geometry import TitanGeometry
 from rrtik_robots.titan4.singularities import nearness

@@ -6,7 +6,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import UnknownNameError
-from rrtik_ompl.ik.form import wrapped
+from rrtik_ompl.ik.analytic.analytic_solver import wrapped
 from rrtik_robots.titan4.geometry import TitanGeometry
 
 RIGHT = np.pi / 2

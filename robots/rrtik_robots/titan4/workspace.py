@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.ik.closed_form import solutions
+from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.reach.grid_map import Slice
 from rrtik_ompl.robot import Robot
 

@@ -10,8 +10,8 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.ik.genetic.options import REFINED
 from rrtik_ompl.ik.genetic.search import follow_targets
-from rrtik_ompl.ik.question import Answer, Question
-from rrtik_ompl.ik.restarts import nearest_posture
+from rrtik_ompl.ik.method_interface import Answer, Question
+from rrtik_ompl.ik.numeric.restarts import nearest_posture
 
 ROUNDS = 64  # populations, after which it gives up
 GENERATIONS = 40  # of each; most that reach the goal do so in ten

@@ -10,7 +10,7 @@ import numpy as np
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.goal import PositionGoal, joint_difference, pose_errors
 from rrtik_ompl.ik.genetic.options import GeneticOptions
-from rrtik_ompl.ik.question import Target
+from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.tip_distance import reach_of
 

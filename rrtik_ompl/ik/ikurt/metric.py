@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.goal import PoseGoal, PositionGoal, pose_errors
-from rrtik_ompl.ik.question import Target
+from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.residual import twist
 from rrtik_ompl.ik.tip_columns import tip_columns
 from rrtik_ompl.robot import Robot

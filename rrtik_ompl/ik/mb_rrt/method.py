@@ -6,8 +6,8 @@ import numpy as np
 
 from rrtik_ompl.ik.mb_rrt.axes import misfit
 from rrtik_ompl.ik.mb_rrt.search import ROUNDS, search
-from rrtik_ompl.ik.question import Answer, Question, Target
-from rrtik_ompl.ik.restarts import nearest_posture
+from rrtik_ompl.ik.method_interface import Answer, Question, Target
+from rrtik_ompl.ik.numeric.restarts import nearest_posture
 from rrtik_ompl.robot import Robot
 
 ALL_ROUNDS = 8  # of the workspace tree where every solution is wanted

@@ -15,10 +15,10 @@ import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.goal import PoseGoal, PositionGoal
-from rrtik_ompl.ik.descent import descend
 from rrtik_ompl.ik.mb_rrt.axes import Axes, axes_of, misfit
-from rrtik_ompl.ik.mb_rrt.axis_tree import AxisTree
 from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
+from rrtik_ompl.ik.mb_rrt.workspace_tree import AxisTree
+from rrtik_ompl.ik.numeric.descent import descend
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 

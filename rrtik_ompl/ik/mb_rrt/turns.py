@@ -8,10 +8,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Vector
+from rrtik_ompl.arrays import TAU, Mask, Vector
 from rrtik_ompl.ik.mb_rrt.axes import Axes
 
-TURN = 2.0 * np.pi
 SLACK = 1e-12  # in cosines and angles: what rounding may add where an interval is a single value
 FLAT = 1e-24  # [m^2] a circle this small is a point
 
@@ -57,8 +56,8 @@ def _draw(
     centre: Vector, inner: Vector, outer: Vector, lower: float, upper: float, rng: np.random.Generator
 ) -> tuple[Vector, Mask]:
     """Uniform angles on centre +- inner..outer inside the limits, shape (m,); where there are none the nearest."""
-    turns = TURN * np.arange(np.floor((lower - np.pi) / TURN) - 1.0, np.ceil((upper + np.pi) / TURN) + 2.0)
-    centre = (centre + np.pi) % TURN - np.pi
+    turns = TAU * np.arange(np.floor((lower - np.pi) / TAU) - 1.0, np.ceil((upper + np.pi) / TAU) + 2.0)
+    centre = (centre + np.pi) % TAU - np.pi
     begins = np.stack([centre + inner, centre - outer], axis=1)[:, :, None] + turns
     widths = (outer - inner)[:, None, None]
     starts = np.clip(begins, lower, upper).reshape(len(centre), -1)

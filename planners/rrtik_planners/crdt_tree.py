@@ -1,0 +1,191 @@
+"""The tree of C-RDT, every edge of which moves one coordinate. Source: the C-RDT paper, EXTEND and REWRITE."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum, auto
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.fast.search.crdt.rules import AxisRules
+from rrtik_ompl.ompl_bridge import MotionChecker
+from rrtik_planners.crdt_stream import Random
+
+ROOT = -1
+FIRST_CAPACITY = 256
+
+
+class Outcome(Enum):
+    """What an extension achieved: nothing, a part of the way, or the target exactly."""
+
+    TRAPPED = auto()
+    ADVANCED = auto()
+    REACHED = auto()
+
+
+class Turn(Enum):
+    """How the first leg of an extension goes on after the edge that led to its vertex."""
+
+    ONWARD = auto()
+    BETWEEN = auto()  # back into that edge
+    BEYOND = auto()  # back beyond its beginning
+    BACK = auto()  # exactly to its beginning
+
+
+@dataclass(frozen=True, slots=True)
+class Extension:
+    """The outcome of an extension and the vertex at which it ended."""
+
+    outcome: Outcome
+    vertex: int
+
+
+class AxisTree:
+    """A growing tree (or forest, if there are several roots) in preallocated arrays.
+
+    Every edge has itself been found free, those that come from rewriting parents included.
+
+    Attributes:
+        size: Number of vertices.
+    """
+
+    def __init__(self, roots: Matrix, rules: AxisRules) -> None:
+        """Plant a tree.
+
+        Args:
+            roots: Shape (r, n).
+            rules: How it grows.
+        """
+        capacity = max(FIRST_CAPACITY, len(roots))
+        self._coordinates = np.empty((roots.shape[1], capacity))
+        self._parents: NDArray[np.int64] = np.full(capacity, ROOT, dtype=np.int64)
+        self._coordinates[:, : len(roots)] = roots.T
+        self._rules, self._axes = rules, rules.axes.tolist()
+        self.size = len(roots)
+
+    def vertex(self, i: int) -> Vector:
+        """Coordinates of vertex i, shape (n,)."""
+        return self._coordinates[:, i].copy()
+
+    def nearest(self, q: Vector) -> int:
+        """The vertex nearest to q, shape (n,), in the scaled Euclidean metric; among equals the oldest."""
+        difference = (self._coordinates[:, : self.size] - q[:, None]) * self._rules.scale[:, None]
+        return int(np.add.reduce(difference * difference, axis=0).argmin())  # adds up in the order of the kernels
+
+    def branch(self, i: int) -> Matrix:
+        """The way from the root to vertex i, shape (k, n)."""
+        way = [i]
+        while self._parents[way[-1]] != ROOT:
+            way.append(int(self._parents[way[-1]]))
+        return np.ascontiguousarray(self._coordinates[:, way[::-1]].T)
+
+    def extend(self, target: Vector, checker: MotionChecker, rng: Random, *, exactly: bool = True) -> Extension:
+        """Grow from the vertex nearest to ``target`` towards it, one axis after the other (algorithm 10)."""
+        near = self.nearest(target)
+        target = target if exactly else self._held(near, target, rng)
+        return self.extend_from(near, target, checker, rng, exactly=exactly)
+
+    def extend_from(
+        self, near: int, target: Vector, checker: MotionChecker, rng: Random, *, exactly: bool = True
+    ) -> Extension:
+        """Grow from vertex ``near`` towards ``target``, shape (n,).
+
+        The axis that led to ``near`` goes first, which lengthens straight runs and so saves transitions; the others
+        follow in random order. The leading part that is free is kept.
+
+        Args:
+            near: Number of a vertex.
+            target: Where to go.
+            checker: Asked about motions.
+            rng: Gives the order of the axes.
+            exactly: Whether a leg that is shorter than the smallest move ends the way, for the target would be missed;
+                otherwise it is left out.
+        """
+        current, known = near, self.size
+        for axis in self._axis_order(near, rng):
+            here = self.vertex(current)
+            start, end = float(here[axis]), float(target[axis])
+            came_from = self._came_from(near, axis) if current == near else start
+            turn = _turn(came_from, start, end)
+            if start == end:
+                continue
+            too_short = _shortest_piece(turn, came_from, start, end) < self._rules.smallest_move[axis]
+            if too_short and not exactly:
+                continue
+            step = _moved(here, axis, end)
+            if too_short or not _free(turn, _moved(here, axis, came_from), here, step, checker):
+                return Extension(Outcome.TRAPPED if self.size == known else Outcome.ADVANCED, current)
+            current = self._attach(step, turn, current)
+        return Extension(Outcome.REACHED, current)
+
+    def _held(self, near: int, target: Vector, rng: Random) -> Vector:
+        """The target, but as at a vertex in the coordinates that do not take part this time."""
+        chance = self._rules.chance
+        stays = np.array([c < 1.0 and rng.random() >= c for c in chance.tolist()])
+        held: Vector = np.where(stays, self._coordinates[:, near], target)
+        return held
+
+    def _axis_order(self, near: int, rng: Random) -> list[int]:
+        order = [int(axis) for axis in rng.permutation(self._axes)]
+        parent = self._parents[near]
+        if parent != ROOT:  # a root has no direction to remember
+            memory = int((self._coordinates[:, near] != self._coordinates[:, parent]).argmax())
+            order.remove(memory)
+            order.insert(0, memory)
+        return order
+
+    def _came_from(self, vertex: int, axis: int) -> float:
+        """Where the edge to a vertex began, along an axis; the vertex itself if it is a root."""
+        parent = int(self._parents[vertex])
+        return float(self._coordinates[axis, vertex if parent == ROOT else parent])
+
+    def _attach(self, step: Vector, turn: Turn, current: int) -> int:
+        """Add the end of a leg; where it turns back along the edge to its vertex, rewrite parents."""
+        if turn is Turn.ONWARD:
+            return self._add(step, current)
+        parent = int(self._parents[current])
+        if turn is Turn.BACK:
+            return parent
+        new = self._add(step, parent)
+        if turn is Turn.BETWEEN:
+            self._parents[current] = new
+        return new
+
+    def _add(self, q: Vector, parent: int) -> int:
+        if self.size == len(self._parents):
+            self._coordinates = np.hstack([self._coordinates, np.empty_like(self._coordinates)])
+            self._parents = np.concatenate([self._parents, np.full_like(self._parents, ROOT)])
+        self._coordinates[:, self.size] = q
+        self._parents[self.size] = parent
+        self.size += 1
+        return self.size - 1
+
+
+def _turn(came_from: float, start: float, end: float) -> Turn:
+    """How a leg goes on after a move that came from ``came_from``."""
+    if start == came_from or (start - came_from) * (end - start) > 0.0:
+        return Turn.ONWARD
+    beyond = end - came_from
+    if beyond == 0.0:
+        return Turn.BACK
+    return Turn.BETWEEN if (start - came_from) * beyond > 0.0 else Turn.BEYOND
+
+
+def _shortest_piece(turn: Turn, came_from: float, start: float, end: float) -> float:
+    """Length of the shortest edge that a leg would leave in the tree."""
+    length = abs(end - start)
+    return min(length, abs(end - came_from)) if turn in (Turn.BETWEEN, Turn.BEYOND) else length
+
+
+def _free(turn: Turn, parent: Vector, here: Vector, step: Vector, checker: MotionChecker) -> bool:
+    """Whether the edges are free that a leg leaves in the tree."""
+    onward = turn not in (Turn.ONWARD, Turn.BETWEEN) or checker.motion_valid(here, step)
+    return onward and (turn not in (Turn.BETWEEN, Turn.BEYOND) or checker.motion_valid(parent, step))
+
+
+def _moved(q: Vector, axis: int, value: float) -> Vector:
+    copy = q.copy()
+    copy[axis] = value
+    return copy

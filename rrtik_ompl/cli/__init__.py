@@ -1,0 +1,1 @@
+"""The command ``rrtik``: the app, the entry point, and one module a command."""

@@ -1,0 +1,258 @@
+"""The command line `rrtik`. Exit 0: found or valid; 1: not found or not valid; 2: bad input; 130: interrupted."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rrtik_ompl.cli.bench import bench
+from rrtik_ompl.cli.ik import inverse_kinematics
+from rrtik_ompl.cli.markers import markers
+from rrtik_ompl.cli.motion import list_moves, time_path
+from rrtik_ompl.cli.overlay import overlay
+from rrtik_ompl.cli.pilot import pilot
+from rrtik_ompl.cli.plan import plan
+from rrtik_ompl.cli.reach import reach
+from rrtik_ompl.cli.replan import replan_scenario
+from rrtik_ompl.cli.reproduce import reproduce
+from rrtik_ompl.cli.terminal import drop_output, note, prepare_streams, say, warn
+from rrtik_ompl.errors import RrtikError
+from rrtik_ompl.fast.simd import announce
+from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
+from rrtik_ompl.files.text import check_target
+
+FOUND, NOT_FOUND, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+UsageError: Any = typer.BadParameter.__bases__[0]  # click's, which typer carries under a private name
+
+app = typer.Typer(
+    help="Plan collision-free paths for robot arms.\n\nExit 0: found or valid; 1: not; 2: bad input; 130: interrupted.",
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+ProblemName = Annotated[str, typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.")]
+PathFile = Annotated[Path | None, typer.Argument(help="A path file: .json, .csv or .txt.")]
+HtmlFile = Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")]
+
+
+class Kind(str, Enum):
+    """What `rrtik list` can list."""
+
+    robots = "robots"
+    planners = "planners"
+    problems = "problems"
+    ik = "ik"
+    suites = "suites"
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        from rrtik_ompl import __version__
+
+        print(f"rrtik {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", is_eager=True, callback=_print_version)
+    ] = False,
+) -> None:
+    del version
+
+
+def check(problem: ProblemName, path: PathFile = None) -> int:
+    """Check a problem, and a path for it.
+
+    The check is denser than a planner's and independent of it. Exit code 1 if the path is not valid.
+    """
+    from rrtik_ompl import JointGoal, load_path, load_problem
+    from rrtik_ompl.path import SECOND_CHECK
+
+    question = load_problem(problem)
+    world = question.world
+    route = None if path is None else load_path(path, world.robot)
+    kept = " beyond the margins" if any(obstacle.margin for obstacle in world.scene.obstacles) else ""
+    say(f"{question.name}: start is free, clearance {_millimetres(world.clearance(question.start))}{kept}")
+    if isinstance(question.goal, JointGoal):
+        say(f"{question.name}: goal is free, clearance {_millimetres(world.clearance(question.goal.q))}{kept}")
+    if route is None:
+        return FOUND
+    faults = [f"edge {v.edge + 1}: {v.reason}" for v in route.violations(world)]
+    if abs(route.start - question.start).max() > 1e-6:
+        faults.append("the path does not begin at the start of the problem")
+    if not question.reached(route.end):
+        faults.append("the path does not end at the goal of the problem")
+    for fault in faults:
+        say(f"{path}: {fault}")
+    if faults:
+        return NOT_FOUND
+    step = world.motion_resolution / SECOND_CHECK
+    size = f"{len(route.waypoints)} waypoints, {route.transitions} moves, length {route.length:.2f} {route.unit}"
+    say(f"{path}: valid, checked every {step:g} m; {size}")
+    return FOUND
+
+
+def show(
+    problem: ProblemName,
+    path: PathFile = None,
+    before: Annotated[Path | None, typer.Option(help="Another path file, to compare with.")] = None,
+    html: HtmlFile = None,
+    port: Annotated[int, typer.Option(help="Port on 127.0.0.1; 0 takes a free one.", min=0, max=65535)] = 0,
+) -> int:
+    """Show a problem, and a path for it, in 3-D.
+
+    A live page on 127.0.0.1, or a file.
+    """
+    check_target(html, (".html", ".htm"))
+    from rrtik_ompl import load_path, load_problem
+    from rrtik_ompl.viewer import view
+
+    question = load_problem(problem)
+    route = None if path is None else load_path(path, question.world.robot)
+    earlier = None if before is None else load_path(before, question.world.robot)
+    if html is not None:
+        view(question, route, html=html, before=earlier)
+        say(f"wrote {html}")
+        return FOUND
+    view(question, route, before=earlier, port=port, on_ready=lambda url: say(f"open {url} in a browser; Ctrl-C ends"))
+    return FOUND
+
+
+def list_names(kind: Annotated[Kind | None, typer.Argument(help="All kinds if left out.")] = None) -> int:
+    """List what is there by name."""
+    from rrtik_ompl import list_ik_methods, list_planners, list_problems, list_robots
+    from rrtik_ompl.catalog import list_suites
+
+    sources = {
+        Kind.robots: list_robots,
+        Kind.planners: list_planners,
+        Kind.problems: list_problems,
+        Kind.ik: list_ik_methods,
+        Kind.suites: list_suites,
+    }
+    for each in Kind if kind is None else (kind,):
+        if kind is None:
+            say(f"{each.value}:")
+        say(*(name if kind else f"  {name}" for name in sources[each]()))
+    return FOUND
+
+
+def convert(
+    source: Annotated[str, typer.Argument(metavar="IN", help="A path file, or a problem (MotionBenchMaker too).")],
+    target: Annotated[Path, typer.Argument(metavar="OUT", help="The ending says which format.")],
+    robot: Annotated[str | None, typer.Option(help="Robot that the file is for, where the file does not say.")] = None,
+) -> int:
+    """Convert a path or a problem to another format.
+
+    Paths: .json, .csv, .txt (OMPL's matrix). Problems, MotionBenchMaker's too, become problem files (.yaml).
+    """
+    from rrtik_ompl import load_path, load_problem, load_robot, save_problem
+
+    if Path(source).suffix.lower() in PATH_FORMATS:
+        check_target(target, PATH_FORMATS)
+        load_path(source, None if robot is None else load_robot(robot)).save(target)
+    else:
+        check_target(target, (".yaml", ".yml"))
+        save_problem(load_problem(source, robot=robot), target)
+    say(f"wrote {target}")
+    return FOUND
+
+
+def warmup() -> int:
+    """Compile all kernels now, once per machine.
+
+    No later command waits for them then.
+    """
+    from rrtik_ompl.fast import warm_up
+
+    return FOUND if warm_up(say) else NOT_FOUND
+
+
+COMMANDS: dict[str, Callable[..., int]] = {
+    "plan": plan,
+    "check": check,
+    "show": show,
+    "moves": list_moves,
+    "time": time_path,
+    "replan": replan_scenario,
+    "ik": inverse_kinematics,
+    "reach": reach,
+    "overlay": overlay,
+    "pilot": pilot,
+    "reproduce": reproduce,
+    "bench": bench,
+    "list": list_names,
+    "warmup": warmup,
+    "convert": convert,
+}
+for _name, _command in COMMANDS.items():
+    app.command(_name)(_command)
+app.add_typer(markers, name="markers")
+
+
+def main() -> None:
+    """Run the command line and exit with its code."""
+    sys.exit(run())
+
+
+def run(arguments: list[str] | None = None) -> int:
+    """Run the command line with ``arguments`` (the process's own if None) and return the exit code."""
+    warnings.showwarning = warn
+    announce.on_compile = note
+    prepare_streams()
+    given = sys.argv[1:] if arguments is None else arguments
+    try:
+        if not given:  # the help, but no success: nothing was asked
+            with redirect_stdout(sys.stderr):
+                app(args=["--help"], prog_name="rrtik", standalone_mode=False)
+            return BAD_INPUT
+        code = app(args=given, prog_name="rrtik", standalone_mode=False)
+        sys.stdout.flush()
+        if code == INTERRUPTED:  # what typer makes of KeyboardInterrupt
+            raise KeyboardInterrupt
+        return int(code or 0)
+    except RrtikError as error:
+        return _fail(str(error))
+    except UsageError as error:
+        return _usage(error, given)
+    except (KeyboardInterrupt, typer.Abort):
+        print("rrtik: interrupted; no file is half-written", file=sys.stderr)
+        return INTERRUPTED
+    except (BrokenPipeError, SystemExit):  # the reader has gone, nobody is left to tell; typer makes an exit of it
+        drop_output()
+        return FOUND
+    except OSError as error:
+        drop_output()
+        return _fail(f"standard output cannot be written: {error.strerror or error}")
+
+
+def _fail(message: str) -> int:
+    print(f"rrtik: {message}", file=sys.stderr)
+    return BAD_INPUT
+
+
+def _usage(error: Any, given: list[str]) -> int:
+    """Say in one line what is wrong with a command."""
+    text = error.format_message()
+    context = getattr(error, "ctx", None)
+    named = [word for word in given[:1] if not word.startswith("-")]  # an option with too few words has no context
+    command = " ".join(["rrtik", *named]) if context is None else context.command_path
+    return _fail(f"{' '.join(text.replace('Value error, ', '').split())} (see: {command} --help)")
+
+
+def _millimetres(distance: float) -> str:
+    return "unlimited" if distance == float("inf") else f"{1e3 * distance:.1f} mm"
+
+
+if __name__ == "__main__":
+    main()

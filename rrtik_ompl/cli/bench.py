@@ -1,0 +1,71 @@
+"""The command `rrtik bench`: planners of a suite on its problems, guarded, resumable, with reports."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rrtik_ompl.cli.terminal import counter, note, progress, say
+
+
+def bench(
+    suite: Annotated[str, typer.Argument(help="A shipped suite (see: rrtik list suites) or a YAML file.")],
+    runs: Annotated[
+        int | None, typer.Option(help="Of each planner on each problem, in place of the suite's.", min=1)
+    ] = None,
+    jobs: Annotated[int, typer.Option(help="Runs at a time; more than one make the times longer.", min=1)] = 1,
+    out: Annotated[Path | None, typer.Option(help="Folder for records and reports; bench-SUITE if left out.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted campaign.")] = False,
+    problems: Annotated[
+        Path | None, typer.Option(help="Folder of further problems: files, MotionBenchMaker pairs.")
+    ] = None,
+    scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to do the runs.")] = None,
+    views: Annotated[int, typer.Option(help="3-D views at most.", min=0)] = 12,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of a table.")] = False,
+) -> int:
+    """Run planners beside each other on many problems.
+
+    A run that crashes, hangs or takes too much memory is a failed run and no more. Exit code 1 if every run of some
+    planner ended with an error, as with a parameter that it cannot use.
+    """
+    from rrtik_ompl.benchmark.campaign import Progress, run_campaign
+    from rrtik_ompl.benchmark.report import write_report
+    from rrtik_ompl.benchmark.statistics import always_refused
+    from rrtik_ompl.benchmark.suite import load_suite
+    from rrtik_ompl.benchmark.tables import failures, terminal_table
+    from rrtik_ompl.fast import warm_up
+
+    campaign = load_suite(suite, folder=problems, runs=runs)
+    folder = Path(f"bench-{campaign.name}") if out is None else out
+    if scheduler is None:
+        warm_up(lambda _: None)  # once, before processes that work side by side would all compile
+    total = campaign.total
+    outcomes: Counter[str] = Counter()
+    so_far = Progress(0, total)
+    with counter(campaign.name, total) as show:
+
+        def on_run(now: Progress, record: Any) -> None:
+            nonlocal so_far
+            so_far = now
+            outcomes.update([] if record is None else [record["status"]])
+            show(now.done)
+
+        try:
+            file = run_campaign(campaign, folder, jobs=jobs, scheduler=scheduler, resume=resume, on_run=on_run)
+        except KeyboardInterrupt:
+            note(f"{so_far.done} of {total} runs are kept in {folder}; continue with --resume")
+            raise
+    with progress("reports"):
+        results, files = write_report(file, views=views)
+    if as_json:
+        print(json.dumps({"runs": total, "outcomes": dict(outcomes), "files": [str(each) for each in files]}))
+    else:
+        counts = ", ".join(f"{number} {status}" for status, number in outcomes.items())
+        say(terminal_table(results), f"this round: {counts or 'no runs were left'}")
+        say(*(f"{problem}, {planner}: {number} x {why}" for problem, planner, number, why in failures(results)))
+        say(*(f"wrote {each}" for each in files))
+    return 1 if always_refused(results) else 0

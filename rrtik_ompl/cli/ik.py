@@ -1,0 +1,298 @@
+"""The command `rrtik ik`: inverse kinematics of a pose, of a problem's goal, of many poses, or of a trajectory."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+import typer
+
+from rrtik_ompl.cli.terminal import note, progress, say
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.text import check_target, comma_numbers
+
+FOUND, NOT_FOUND = 0, 1
+MOST_ROWS = 40  # of a table; CSV and JSON have them all
+
+Triple = tuple[float, float, float]
+
+
+class Asked(NamedTuple):
+    """The arm and what surrounds it: ``goal`` and ``near`` come from a problem, and are None without one."""
+
+    robot: Any
+    world: Any
+    goal: Any
+    near: Any
+
+
+class Output(NamedTuple):
+    """In which form the answer is wanted."""
+
+    as_json: bool
+    as_csv: bool
+    html: Path | None
+
+
+def inverse_kinematics(
+    robot: Annotated[
+        str | None, typer.Argument(help="A name (see: rrtik list robots), a URDF or a DH table; left out if --problem.")
+    ] = None,
+    position: Annotated[Triple | None, typer.Option(metavar="X Y Z", help="Of the tip in the world [m].")] = None,
+    quaternion: Annotated[
+        tuple[float, float, float, float] | None,
+        typer.Option(metavar="X Y Z W", help="Orientation; any if left out."),
+    ] = None,
+    rpy_deg: Annotated[
+        Triple | None, typer.Option(metavar="R P Y", help="Roll, pitch and yaw about fixed axes [deg].")
+    ] = None,
+    problem: Annotated[
+        str | None, typer.Option(help="Take robot, scene, start (as --near) and, without --position, goal from it.")
+    ] = None,
+    scene: Annotated[Path | None, typer.Option(help="Obstacles: a YAML file with a scene; answers are free.")] = None,
+    near: Annotated[str | None, typer.Option(help="A named posture of the robot; answers near it come first.")] = None,
+    near_deg: Annotated[
+        str | None, typer.Option(metavar="Q1,Q2,..", help="The same in joint values, with commas [deg; m if sliding].")
+    ] = None,
+    everything: Annotated[
+        bool, typer.Option("--all", help="All solutions, not just one; those that differ by full turns once.")
+    ] = False,
+    method: Annotated[str, typer.Option(help="auto, or see: rrtik list ik.")] = "auto",
+    tolerance_mm: Annotated[float | None, typer.Option(help="Of the position [mm]; 1 if left out.")] = None,
+    tolerance_deg: Annotated[float | None, typer.Option(help="Of the orientation [deg]; 0.57 if left out.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Time for a numeric method [s]; per pose with --poses.")] = None,
+    seed: Annotated[int, typer.Option(help="The same seed gives the same answer.")] = 0,
+    poses: Annotated[Path | None, typer.Option(help="Many poses or points: .csv, .json or .yaml.")] = None,
+    trajectory: Annotated[
+        bool, typer.Option("--trajectory", help="Follow --poses from one to the next without jumps.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, in radians and metres.")] = False,
+    as_csv: Annotated[bool, typer.Option("--csv", help="Print CSV, in degrees and millimetres.")] = False,
+    html: Annotated[Path | None, typer.Option(help="Write a 3-D page with the solutions as ghosts.")] = None,
+) -> int:
+    """Find joint values for a pose or a point of the tip. Exit code 1 if there are none."""
+    if as_json and as_csv:
+        raise InputError("give one of --json and --csv, not both")
+    if trajectory and poses is None:
+        raise InputError("--trajectory follows the rows of a file: give --poses FILE too")
+    if poses is not None and (position or quaternion or rpy_deg or everything):
+        raise InputError("--poses brings its own poses, one answer each: leave out --position, orientation and --all")
+    check_target(html, (".html", ".htm"))
+    asked = _asked(robot, problem, scene, near, near_deg)
+    output = Output(as_json, as_csv, html)
+    tolerances = _tolerances(tolerance_mm, tolerance_deg)
+    common = {"method": method, "near": asked.near, "world": asked.world, "seed": seed}
+    common |= {} if seconds is None else {"seconds": seconds}
+    if poses is not None:
+        return _many(asked, poses, trajectory, tolerances, common, output)
+    goal = _goal(asked, position, quaternion, rpy_deg, tolerances)
+    return _one(asked, goal, everything, common, output)
+
+
+def _asked(robot: str | None, problem: str | None, scene: Path | None, near: str | None, near_deg: str | None) -> Asked:
+    from rrtik_ompl import World, load_problem, load_robot, load_scene
+
+    if (robot is None) == (problem is None):
+        raise InputError("give a robot, or --problem NAME, which brings its own: one of the two")
+    if problem is not None:
+        if scene is not None:
+            raise InputError("--problem brings its own scene: leave out --scene")
+        question = load_problem(problem)
+        asked = Asked(question.robot, question.world, question.goal, question.start)
+    else:
+        arm = load_robot(str(robot))
+        asked = Asked(arm, None if scene is None else World(arm, load_scene(scene)), None, None)
+    return asked._replace(near=_posture(asked, near, near_deg))
+
+
+def _tolerances(millimetres: float | None, degrees: float | None) -> dict[str, float]:
+    """Those that are given, by the names of `PoseGoal`, in metres and radians."""
+    for option, value in (("--tolerance-mm", millimetres), ("--tolerance-deg", degrees)):
+        if value is not None and not value > 0.0:
+            raise InputError(f"{option} must be greater than 0, got {value:g}")
+    found = {} if millimetres is None else {"position_tolerance": 1e-3 * millimetres}
+    return found if degrees is None else {**found, "orientation_tolerance": math.radians(degrees)}
+
+
+def _posture(asked: Asked, near: str | None, near_deg: str | None) -> Any:
+    if near is not None and near_deg is not None:
+        raise InputError("give one of --near and --near-deg, not both")
+    if near is not None:
+        return asked.robot.posture(near)
+    if near_deg is None:
+        return asked.near
+    return asked.robot.configuration_deg(comma_numbers(near_deg, "--near-deg"), "--near-deg")
+
+
+def _goal(asked: Asked, position: Any, quaternion: Any, rpy_deg: Any, tolerances: dict[str, float]) -> Any:
+    """The goal that is asked for; of a problem whose goal is joint values, the pose of the tip there."""
+    import numpy as np
+
+    from rrtik_ompl import JointGoal, PoseGoal
+    from rrtik_ompl.poses import pose, pose_from_rpy
+
+    if quaternion and rpy_deg:
+        raise InputError("give one of --quaternion and --rpy-deg, not both")
+    if position is None:
+        if quaternion or rpy_deg or asked.goal is None:
+            raise InputError("where to? give --position X Y Z, --problem NAME with a goal, or --poses FILE")
+        if isinstance(asked.goal, JointGoal):
+            return PoseGoal(asked.robot.fk(asked.goal.q), **tolerances)
+        if tolerances:
+            raise InputError("the goal of --problem has tolerances of its own: leave out --tolerance-mm and -deg")
+        return asked.goal
+    if quaternion:
+        return PoseGoal(pose(position, quaternion, "--position, --quaternion"), **tolerances)
+    if rpy_deg:
+        return PoseGoal(pose_from_rpy(position, np.radians(rpy_deg), "--position, --rpy-deg"), **tolerances)
+    return _point(position, tolerances)
+
+
+def _point(position: Any, tolerances: dict[str, float]) -> Any:
+    from rrtik_ompl import PositionGoal
+
+    _refuse_orientation(tolerances, "give --quaternion or --rpy-deg, or leave it out")
+    return PositionGoal(position, tolerances.get("position_tolerance", 1e-3))
+
+
+def _refuse_orientation(tolerances: dict[str, float], remedy: str) -> None:
+    if "orientation_tolerance" in tolerances:
+        raise InputError(f"--tolerance-deg is of an orientation, and a point has none: {remedy}")
+
+
+def _one(asked: Asked, goal: Any, everything: bool, common: dict[str, Any], output: Output) -> int:
+    from rrtik_ompl import solve_ik
+    from rrtik_ompl.cli import ik_report
+
+    robot, world = asked.robot, asked.world
+    with progress(f"inverse kinematics of {robot.name}"):
+        result, turns = ik_report.fold_full_turns(robot, solve_ik(robot, goal, all=everything, **common), asked.near)
+    names = ik_report.branch_names(robot, goal, result.solutions)
+    if output.as_json:
+        print(json.dumps(ik_report.document(robot, result, names, turns)))
+    elif output.as_csv:
+        reasons, notes = [""] * len(result.solutions), ik_report.solution_notes(names, turns)
+        print(ik_report.rows_csv(robot, result.solutions, result.residuals, reasons, notes), end="")
+    elif result.found:
+        obstacles = () if world is None else world.scene.obstacles
+        clearances = [world.clearance(q) for q in result.solutions] if obstacles else []
+        more = f" and {sum(turns)} more by full turns of joints" if any(turns) else ""
+        say(f"{robot.name}, {result.method}: {_count(len(result.solutions), 'solution')}{more}, {_time(result)}")
+        say(ik_report.solutions_table(robot, result, names, turns, clearances, MOST_ROWS))
+        say(*_more(len(result.solutions)))
+    if not result.found and not output.as_json:
+        tell = note if output.as_csv else say
+        tell(f"{robot.name}, {result.method}: no solution, {result.reason}: {result.detail}")
+    if result.found:
+        _draw(asked, goal, result.solutions, output)
+    return FOUND if result.found else NOT_FOUND
+
+
+def _many(
+    asked: Asked,
+    file: Path,
+    trajectory: bool,
+    tolerances: dict[str, float],
+    common: dict[str, Any],
+    output: Output,
+) -> int:
+    import numpy as np
+
+    from rrtik_ompl.cli import ik_report
+    from rrtik_ompl.problem_files.poses import load_poses
+
+    robot, rows = asked.robot, load_poses(file)
+    if rows.ndim == 2:
+        _refuse_orientation(tolerances, "leave it out")
+    with progress(f"inverse kinematics of {_count(len(rows), 'pose')}"):
+        if trajectory:
+            q, residuals, reasons, details, notes, line = _followed(robot, rows, tolerances, common)
+        else:
+            q, residuals, reasons, details = _each(robot, rows, tolerances, common)
+            notes, line = [""] * len(rows), ""
+    found = sum(not reason for reason in reasons)
+    line += next((f"; no. {k + 1}: {detail}" for k, detail in enumerate(details) if detail), "")
+    if output.as_json:
+        more = {"jumps": [k for k, note in enumerate(notes) if "jump" in note]} if trajectory else {}
+        print(json.dumps({**ik_report.rows_document(robot, q, residuals, reasons, details), **more}))
+    elif output.as_csv:
+        print(ik_report.rows_csv(robot, q, residuals, reasons, notes), end="")
+    else:
+        shown = slice(MOST_ROWS)
+        say(f"{robot.name}: {found} of {_count(len(rows), 'pose')} solved{line}")
+        say(ik_report.rows_table(robot, q[shown], residuals[shown], reasons[shown], notes[shown]))
+        say(*_more(len(rows)))
+    good = q[~np.isnan(q[:, 0])]
+    if len(good):
+        _draw(asked, None, good, output, moving=trajectory)
+    return FOUND if found == len(rows) else NOT_FOUND
+
+
+def _each(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[str, Any]) -> Any:
+    """Joint values, residuals, reasons and details: poses as one batch unless tolerances are given, else singly."""
+    import numpy as np
+
+    from rrtik_ompl import PoseGoal, solve_ik, solve_ik_batch
+
+    if rows.ndim == 3 and not tolerances:
+        batch = solve_ik_batch(robot, rows, **common)
+        return batch.q, batch.residuals, list(batch.reasons), list(batch.details)
+    q, residuals = np.full((len(rows), robot.dof), np.nan), np.full((len(rows), 2), np.nan)
+    reasons, details = [], []
+    for k, row in enumerate(rows):
+        goal = _point(row, tolerances) if rows.ndim == 2 else PoseGoal(row, **tolerances)
+        result = solve_ik(robot, goal, **{**common, "seed": common["seed"] + k})
+        reasons.append(result.reason)
+        details.append(result.detail)
+        if result.found:
+            q[k], residuals[k] = result.solutions[0], result.residuals[0]
+    return q, residuals, reasons, details
+
+
+def _followed(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[str, Any]) -> Any:
+    """The same, details of the first point without a solution alone, with a note for each: a jump, a collision."""
+    from rrtik_ompl import solve_ik_trajectory
+
+    options: dict[str, Any] = dict(tolerances)
+    done = solve_ik_trajectory(robot, rows, **common, **options)
+    notes, details = [""] * len(rows), [""] * len(rows)
+    for text, where in (("jump", done.jumps), ("collision on the way", done.blocked)):
+        for k in where:
+            notes[k] = f"{notes[k]}, {text}" if notes[k] else text
+    line = f", {_count(len(done.jumps), 'jump')}, {done.method}, {_time(done)}"
+    if done.detail:  # which names its point, counted from 0
+        first = next(k for k, reason in enumerate(done.reasons) if reason)
+        details[first] = done.detail.partition(": ")[2]
+    return done.q, done.residuals, list(done.reasons), details, notes, line
+
+
+def _draw(asked: Asked, goal: Any, q: Any, output: Output, *, moving: bool = False) -> None:
+    """The page: the first solution as the arm and the others as ghosts, or the arm moving through all of them."""
+    if output.html is None:
+        return
+    from rrtik_ompl import Scene
+    from rrtik_ompl.viewer import view
+    from rrtik_ompl.viewer.subject import Shown
+
+    shown = Shown(asked.robot, Scene() if asked.world is None else asked.world.scene, goal, q[0])
+    with progress("drawing"):
+        if moving and len(q) > 1:
+            view(shown, q, html=output.html, title=f"{asked.robot.name}: trajectory of {_count(len(q), 'point')}")
+        else:
+            view(shown, ghosts=q, html=output.html, title=f"{asked.robot.name}: {_count(len(q), 'solution')}")
+    if not output.as_json and not output.as_csv:
+        say(f"wrote {output.html}")
+
+
+def _more(rows: int) -> list[str]:
+    return [] if rows <= MOST_ROWS else [f"... {rows - MOST_ROWS} more: see --csv or --json"]
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def _time(result: Any) -> str:
+    return f"{1e3 * result.seconds:.3g} ms"

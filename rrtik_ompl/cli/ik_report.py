@@ -1,0 +1,191 @@
+"""Answers of inverse kinematics in words and tables for a person (degrees, millimetres), as CSV, and for machines."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich import box
+from rich.table import Table
+
+from rrtik_ompl.arrays import TAU, Matrix, Vector, frozen
+from rrtik_ompl.goal import PoseGoal, PositionGoal, joint_difference
+from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form, solutions
+from rrtik_ompl.ik.analytic.reference_branches import tip_fault
+from rrtik_ompl.ik.solve import IkResult, different_rows, usual_posture
+from rrtik_ompl.robot import Robot
+
+SAME = 1e-5  # [rad] or [m]; a double root is known to the square root of the rounding
+MILLIMETRES = 1e3
+DEGREES = 180.0 / np.pi
+
+
+def branch_names(robot: Robot, goal: Any, Q: Matrix) -> list[str]:
+    """What the arm's closed form calls each configuration, shape (k, dof); "" where it has no name for it.
+
+    A branch such as ``front near up``; of a singular pose, which has a curve of solutions, its families too.
+    """
+    targets = _targets(robot, goal)
+    if targets is None or len(Q) == 0:
+        return [""] * len(Q)
+    form = form_of(robot)
+    found = solutions(robot, np.repeat(targets, len(Q), axis=0), near=Q, check=False)
+    off = np.abs(joint_difference(robot, found.branches, Q[:, None])).max(axis=2)
+    nearest = np.argmin(np.where(found.real, off, np.inf), axis=1)
+    names = []
+    for k, branch in enumerate(nearest):
+        families = [name for bit, name in enumerate(form.families) if int(found.singular[k]) >> bit & 1]
+        known = found.real[k, branch] and off[k, branch] < SAME
+        singular = f"singular: {', '.join(families)}" if families else ""
+        names.append(", ".join(part for part in (form.branches[branch] if known else "", singular) if part))
+    return names
+
+
+def fold_full_turns(robot: Robot, result: IkResult, near: Vector | None) -> tuple[IkResult, list[int]]:
+    """The result with one solution of those that differ by full turns of joints: the arm looks the same in all.
+
+    Args:
+        robot: The arm.
+        result: What inverse kinematics found.
+        near: Joints are turned as near to this posture, shape (dof,), as the limits allow; their middle if None.
+
+    Returns:
+        The result, nearest first, and for each of its solutions how many more there are inside the limits by full
+        turns, found or not. Joints that turn without limits are not counted.
+    """
+    posture = usual_posture(robot) if near is None else near
+    counted = ~(robot.prismatic | robot.continuous)
+    turned = result.solutions - TAU * np.round((result.solutions - posture) / TAU)
+    Q = np.where(counted & (robot.lower <= turned) & (turned <= robot.upper), turned, result.solutions)
+    looks = np.hstack([np.where(robot.prismatic, Q, np.cos(Q)), np.where(robot.prismatic, 0.0, np.sin(Q))])
+    kept = different_rows(looks, np.linalg.norm(Q - posture, axis=1).argsort(kind="stable"))
+    q, lower, upper = Q[kept][:, counted], robot.lower[counted], robot.upper[counted]
+    fitting = 1.0 + np.floor((upper - q) / TAU) + np.floor((q - lower) / TAU)
+    folded = replace(result, solutions=frozen(Q[kept]), residuals=frozen(result.residuals[kept]))
+    return folded, [int(number) - 1 for number in fitting.prod(axis=1)]
+
+
+def _targets(robot: Robot, goal: Any) -> NDArray[np.float64] | None:
+    """The target of a goal as the robot's closed form takes it; None if there is no such form or it does not fit."""
+    if not has_closed_form(robot) or tip_fault(robot, form_of(robot)):
+        return None
+    if isinstance(goal, PoseGoal):
+        pose: NDArray[np.float64] = goal.T_world_tip.homogeneous
+        return pose[None]
+    if isinstance(goal, PositionGoal) and form_of(robot).kind == "position":
+        return goal.position[None]
+    return None
+
+
+def joint_heads(robot: Robot) -> list[str]:
+    """Names of the joints with the unit in which a person reads them."""
+    return [
+        f"{name} [{'m' if slides else 'deg'}]" for name, slides in zip(robot.joint_names, robot.prismatic, strict=True)
+    ]
+
+
+def solutions_table(
+    robot: Robot,
+    result: IkResult,
+    names: Sequence[str],
+    turns: Sequence[int],
+    clearances: Sequence[float],
+    most: int,
+) -> Table:
+    """One row per solution, nearest first, at most so many: branch, joints, residuals, full turns, clearance.
+
+    Columns that have nothing to say are left out.
+    """
+    named, turned, cleared = any(names), any(turns), len(clearances) > 0
+    heads = ["no.", *(["branch"] if named else []), *joint_heads(robot), "off [mm]", "off [deg]"]
+    heads += ["by full turns"] * turned + ["clearance [mm]"] * cleared
+    table = Table(*heads, box=box.SIMPLE_HEAD, pad_edge=False)
+    for number, column in enumerate(table.columns):
+        column.justify = "left" if named and number == 1 else "right"
+    for k, (q, residual) in enumerate(zip(result.solutions[:most], result.residuals[:most], strict=True)):
+        cells = [str(k + 1), *([names[k]] if named else []), *_joint_cells(robot, q), *_residual_cells(residual)]
+        cells += [f"+{turns[k]}"] if turned else []
+        table.add_row(*cells, *([f"{MILLIMETRES * clearances[k]:.1f}"] if cleared else []))
+    return table
+
+
+def rows_table(robot: Robot, q: Matrix, residuals: Matrix, reasons: Sequence[str], notes: Sequence[str]) -> Table:
+    """One row per pose of many: joints and residuals, or the reason why there is no solution; and notes."""
+    noted = any(notes)
+    heads = ["no.", *joint_heads(robot), "off [mm]", "off [deg]", "no solution", *(["note"] if noted else [])]
+    table = Table(*heads, box=box.SIMPLE_HEAD, pad_edge=False)
+    for column in table.columns[: robot.dof + 3]:
+        column.justify = "right"
+    for k, (row, residual) in enumerate(zip(q, residuals, strict=True)):
+        found = not reasons[k]
+        cells = [*_joint_cells(robot, row), *_residual_cells(residual)] if found else [""] * (robot.dof + 2)
+        table.add_row(str(k + 1), *cells, reasons[k], *([notes[k]] if noted else []))
+    return table
+
+
+def rows_csv(robot: Robot, q: Matrix, residuals: Matrix, reasons: Sequence[str], notes: Sequence[str]) -> str:
+    """The same as CSV; joints in degrees (metres if they slide), residuals in millimetres and degrees."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["number", *joint_heads(robot), "off [mm]", "off [deg]", "no solution", "note"])
+    scale = np.where(robot.prismatic, 1.0, DEGREES)
+    for k, (row, residual) in enumerate(zip(q * scale, residuals * [MILLIMETRES, DEGREES], strict=True)):
+        found = not reasons[k]
+        cells = [f"{value:.9g}" if found else "" for value in (*row, *residual)]
+        writer.writerow([k + 1, *cells, reasons[k], notes[k]])
+    return text.getvalue()
+
+
+def solution_notes(names: Sequence[str], turns: Sequence[int]) -> list[str]:
+    """The branch of each solution, and how many more there are by full turns."""
+    more = [f"{number} more by full turns" if number else "" for number in turns]
+    return [", ".join(filter(None, parts)) for parts in zip(names, more, strict=True)]
+
+
+def document(robot: Robot, result: IkResult, names: Sequence[str], turns: Sequence[int]) -> dict[str, Any]:
+    """One answer for machines: rad, m, s; ``by_full_turns`` says how many more there are by full turns of joints."""
+    return {
+        "robot": robot.name,
+        "method": result.method,
+        "found": result.found,
+        "reason": result.reason,
+        "detail": result.detail,
+        "joint_names": list(robot.joint_names),
+        "solutions": result.solutions.tolist(),
+        "branches": list(names),
+        "by_full_turns": list(turns),
+        "residuals": result.residuals.tolist(),
+        "iterations": result.iterations,
+        "seconds": result.seconds,
+    }
+
+
+def rows_document(
+    robot: Robot, q: Matrix, residuals: Matrix, reasons: Sequence[str], details: Sequence[str]
+) -> dict[str, Any]:
+    """Answers for many poses for machines: rad and m; null where there is none."""
+    return {
+        "robot": robot.name,
+        "joint_names": list(robot.joint_names),
+        "found": [not reason for reason in reasons],
+        "reasons": list(reasons),
+        "details": list(details),
+        "solutions": [None if reason else row.tolist() for row, reason in zip(q, reasons, strict=True)],
+        "residuals": [None if reason else row.tolist() for row, reason in zip(residuals, reasons, strict=True)],
+    }
+
+
+def _joint_cells(robot: Robot, q: NDArray[np.float64]) -> list[str]:
+    return [
+        f"{round(float(value), 4) + 0.0:.4f}" if slides else f"{round(DEGREES * float(value), 2) + 0.0:.2f}"
+        for value, slides in zip(q, robot.prismatic, strict=True)
+    ]
+
+
+def _residual_cells(residual: NDArray[np.float64]) -> list[str]:
+    return [f"{MILLIMETRES * residual[0]:.4f}", f"{DEGREES * residual[1]:.4f}"]

@@ -1,0 +1,174 @@
+"""The commands `rrtik markers print | calibrate | sense`."""
+
+from __future__ import annotations
+
+import json
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rrtik_ompl.cli.terminal import progress, say
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.text import check_target
+
+markers = typer.Typer(help="Print markers, calibrate a camera, sense what it sees.")
+
+Dictionary = Annotated[str, typer.Option(help="4x4_50 sees farthest; aruco_mip_36h12 confuses least; apriltag_36h11.")]
+PICTURES, SCENES = (".png", ".jpg"), (".yaml", ".yml")
+
+
+class Kind(str, Enum):
+    """What can be printed."""
+
+    markers = "markers"
+    board = "board"
+
+
+@markers.command("print")
+def print_sheet(
+    out: Annotated[Path, typer.Argument(help="Where to: .pdf (true to size) or .png.")],
+    kind: Annotated[Kind, typer.Option(help="Single markers, or a ChArUco board for calibration.")] = Kind.markers,
+    ids: Annotated[str, typer.Option(help="Numbers: 0,1,7 or 0-5.")] = "0-3",
+    side: Annotated[float, typer.Option(help="Of a marker's black square; on a board, of a chess square [mm].")] = 80.0,
+    marker: Annotated[float | None, typer.Option(help="On a board: of its markers [mm]; 0.73 of a square.")] = None,
+    columns: Annotated[int, typer.Option(help="Chess squares of a board across.")] = 6,
+    rows: Annotated[int, typer.Option(help="Chess squares of a board down.")] = 8,
+    dictionary: Dictionary = "4x4_50",
+    paper: Annotated[str, typer.Option(help="a4, a3 or letter.")] = "a4",
+) -> int:
+    """Write sheets of markers, or a calibration board.
+
+    At their true size: print at 100 % and measure the rule on the sheet.
+    """
+    from rrtik_ompl.sensing.markers import sheets
+
+    if kind is Kind.board:
+        small = 0.73 * side if marker is None else marker
+        square, inner = 1e-3 * side, 1e-3 * small
+        sheets.print_board(
+            out, columns=columns, rows=rows, square=square, marker=inner, dictionary=dictionary, paper=paper
+        )
+        count = 1
+    else:
+        count = sheets.print_markers(out, _numbers(ids), side=1e-3 * side, dictionary=dictionary, paper=paper)
+    say(f"wrote {out}: {count} sheet{'s' if count > 1 else ''}; print at 100 % and measure the rule")
+    return 0
+
+
+@markers.command("calibrate")
+def calibrate_camera(
+    photographs: Annotated[Path, typer.Argument(help="Folder of photographs of the board, or a video.")],
+    out: Annotated[Path, typer.Option(help="The camera file to write: .yaml.")],
+    columns: Annotated[int, typer.Option(help="Chess squares of the board across.")] = 6,
+    rows: Annotated[int, typer.Option(help="Chess squares of the board down.")] = 8,
+    square: Annotated[float, typer.Option(help="Side of a chess square as printed [mm].")] = 30.0,
+    marker: Annotated[float, typer.Option(help="Side of a marker as printed [mm].")] = 22.0,
+    dictionary: Dictionary = "4x4_50",
+) -> int:
+    """Find out a camera's intrinsics.
+
+    From photographs of a printed board; writes the camera file.
+    """
+    check_target(out, SCENES)
+    from rrtik_ompl.sensing.cameras.calibration import calibrate
+    from rrtik_ompl.sensing.cameras.camera_file import save_camera
+    from rrtik_ompl.sensing.cameras.pictures import pictures_from
+    from rrtik_ompl.sensing.markers.detection import charuco_board
+
+    board = charuco_board(columns, rows, 1e-3 * square, 1e-3 * marker, dictionary)
+    with progress("looking for the board"):
+        taken = list(pictures_from(photographs))
+        found = calibrate([picture.pixels for picture in taken], board)
+    save_camera(found, out)
+    for picture, error, unused in zip(taken, found.view_errors, found.unused, strict=True):
+        say(f"{picture.name}: {unused or f'{error:.3f} px'}")
+    names = ("fx", "fy", "cx", "cy")
+    values = found.camera.matrix[[0, 1, 0, 1], [0, 1, 2, 2]]
+    say(", ".join(f"{n} {v:.2f} +- {s:.2f}" for n, v, s in zip(names, values, found.sigmas, strict=True)))
+    say(f"error {found.error:.3f} px over {sum(not r for r in found.unused)} photographs; wrote {out}")
+    return 0
+
+
+@markers.command("sense")
+def sense(
+    source: Annotated[str, typer.Argument(help="An image, a folder of images, a video, or a camera's number.")],
+    camera: Annotated[Path, typer.Option(help="Camera file (see: rrtik markers calibrate).")],
+    marker_map: Annotated[Path, typer.Option("--map", help="Which marker sits on which object: .yaml.")],
+    frames: Annotated[int, typer.Option(help="So many pictures at most; 0: all, of a camera device 1.", min=0)] = 0,
+    scene: Annotated[Path | None, typer.Option(help="Write the scene in the frame of the base: .yaml.")] = None,
+    task: Annotated[
+        Path | None, typer.Option(help="Write a problem with what was seen: .yaml. Needs --problem and --grasp.")
+    ] = None,
+    problem: Annotated[str | None, typer.Option(help="Robot, start and further obstacles of --task.")] = None,
+    grasp: Annotated[
+        str | None, typer.Option(metavar="OBJECT:TYPE:LEVEL", help="Goal of --task; levels from 1.")
+    ] = None,
+    picture: Annotated[Path | None, typer.Option(help="Write the last picture with what was seen: .png, .jpg.")] = None,
+    sigmas: Annotated[float, typer.Option(help="Margins of the scene's obstacles: so many deviations; 0: none.")] = 3.0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object a picture.")] = False,
+) -> int:
+    """Say where the marked objects are, from pictures."""
+    check_target(scene, SCENES)
+    check_target(task, SCENES)
+    check_target(picture, PICTURES)
+    goal = _task_goal(task, problem, grasp)
+    from rrtik_ompl.sensing.cameras.camera_file import load_camera
+    from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
+    from rrtik_ompl.sensing.sensor import Sensor
+
+    sensor = Sensor(load_camera(camera), load_marker_map(marker_map), sigmas=sigmas)
+    view = None
+    for view in _views(sensor, source, frames):
+        say(json.dumps(view.document())) if as_json else say(*view.lines())
+    if view is None or not view.seen:
+        raise InputError(sensor.why_nothing(source))
+    if picture is not None:
+        view.save_picture(picture)
+    if scene is not None:
+        from rrtik_ompl.problem_files.scene import save_scene
+
+        save_scene(view.scene(), scene)
+    if task is not None:
+        from rrtik_ompl import load_problem, save_problem
+        from rrtik_ompl.sensing.problem_from_view import grasp_problem
+
+        save_problem(grasp_problem(load_problem(str(problem)), view.usable(), *goal), task)
+    return 0
+
+
+def _task_goal(task: Path | None, problem: str | None, grasp: str | None) -> tuple[str, str, int]:
+    """Object, grasp type and level of a task."""
+    if len({task is None, problem is None, grasp is None}) > 1:
+        raise InputError("--task FILE, --problem PROBLEM and --grasp OBJECT:TYPE:LEVEL go together; give all or none")
+    if grasp is None:
+        return "", "", 0
+    name, _, rest = grasp.partition(":")
+    kind, _, level = rest.partition(":")
+    if not (name and kind and level.isdecimal()):
+        raise InputError(f"--grasp {grasp}: expected OBJECT:TYPE:LEVEL, for instance valve:aslant:2")
+    return name, kind, int(level)
+
+
+def _views(sensor: Any, source: str, frames: int) -> Any:
+    from rrtik_ompl.sensing.cameras.pictures import pictures_from
+
+    most = frames or (1 if source.isdecimal() else None)
+    for count, picture in enumerate(pictures_from(source)):
+        if count == most:
+            return
+        yield sensor.view(picture)
+
+
+def _numbers(text: str) -> list[int]:
+    """``0-3,7`` as [0, 1, 2, 3, 7]."""
+    found: list[int] = []
+    for word in text.split(","):
+        first, dash, last = word.strip().partition("-")
+        if not first.isdecimal() or (dash and not last.isdecimal()):
+            raise InputError(f"--ids {text}: expected numbers like 0,1,7 or ranges like 0-5")
+        found.extend(range(int(first), int(last or first) + 1))
+        if len(found) > 1000:
+            raise InputError(f"--ids {text}: more than 1000 markers")
+    return found

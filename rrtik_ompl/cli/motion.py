@@ -1,0 +1,156 @@
+"""The commands of `rrtik` that follow a path: its list of single-joint moves, and its times."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rrtik_ompl.cli.terminal import progress, say
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
+from rrtik_ompl.files.text import check_target, comma_numbers
+
+TRAJECTORY_FORMATS, PLOT_FORMATS = (".json", ".csv"), (".png", ".svg")
+
+Problem = Annotated[str, typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.")]
+GivenPath = Annotated[Path, typer.Argument(help="A path file: .json, .csv or .txt.")]
+UNITS = "One number, or one per joint with commas [deg/s{0}; m/s{0} if it slides]."
+
+
+def list_moves(
+    path: GivenPath,
+    problem: Annotated[
+        str | None, typer.Option(help="What the path is for; if it moves several joints at once, it is converted.")
+    ] = None,
+    shorten: Annotated[
+        str | None,
+        typer.Option(metavar="METHOD", help="Then make fewer moves, as in rrtik plan: fewest-moves, axis, ..."),
+    ] = None,
+    as_csv: Annotated[bool, typer.Option("--csv", help="Print CSV, in degrees.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, in radians.")] = False,
+    spoken: Annotated[bool, typer.Option("--spoken", help="Print sentences, to be read aloud.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Save the path of moves: .json, .csv or .txt.")] = None,
+) -> int:
+    """List the single-joint moves of a path.
+
+    As a table, CSV, JSON or sentences.
+    """
+    if as_csv + as_json + spoken > 1:
+        raise InputError("give one of --csv, --json and --spoken, not several")
+    check_target(out, PATH_FORMATS)
+    route = _path_of_moves(path, problem, shorten)
+    if out is not None:
+        route.save(out)
+    from rrtik_ompl.cli import plan_report as report
+    from rrtik_ompl.moves import text as moves_text
+
+    if as_csv:
+        print(moves_text.moves_csv(route), end="")
+    elif as_json:
+        print(json.dumps({"robot": route.robot_name, "moves": moves_text.moves_document(route)}))
+    elif spoken:
+        say(*moves_text.spoken_moves(route))
+    else:
+        say(report.moves_table(route), f"{route.transitions} moves, length {route.length:.2f} {route.unit}")
+    return 0
+
+
+def time_path(
+    problem: Problem,
+    path: GivenPath,
+    velocity: Annotated[str | None, typer.Option(help=UNITS.format(""))] = None,
+    acceleration: Annotated[str | None, typer.Option(help=UNITS.format("^2"))] = None,
+    jerk: Annotated[str | None, typer.Option(help=f"{UNITS.format('^3')} inf: no limit.")] = None,
+    share: Annotated[float, typer.Option(help="Of all limits, above 0 to 1: 0.5 is half as fast.")] = 1.0,
+    blend: Annotated[float, typer.Option(help="Round corners from this far before them [deg]; 0 stops there.")] = 0.0,
+    out: Annotated[Path | None, typer.Option(help="Save the trajectory: .json (JointTrajectory) or .csv.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw the joints over time: .png or .svg.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
+) -> int:
+    """Give a path its times, under the robot's limits or those given."""
+    check_target(out, TRAJECTORY_FORMATS)
+    check_target(plot, PLOT_FORMATS)
+    texts = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
+    given = {name: None if text is None else _rates(text, f"--{name}") for name, text in texts.items()}
+    if not blend >= 0.0:
+        raise InputError(f"--blend: expected 0 degrees or more, got {blend:g}")
+    import numpy as np
+
+    from rrtik_ompl import RateLimits, load_problem, plot_joints, timed
+    from rrtik_ompl.cli import plan_report as report
+
+    question = load_problem(problem)
+    robot = question.robot
+    route = _valid_path(path, question)
+    factors = np.where(robot.prismatic, 1.0, np.pi / 180.0)
+    limits = RateLimits.of(
+        robot, share=share, **{name: None if row is None else _scaled(row, factors) for name, row in given.items()}
+    )
+    with progress("timing"):
+        found = timed(route, limits, blend=float(np.deg2rad(blend)), world=question.world)
+    if out is not None:
+        found.save(out)
+    if plot is not None:
+        plot_joints(found, plot)
+    if as_json:
+        print(json.dumps(report.timing_document(question, found)))
+    else:
+        say(f"{question.name}: {found.duration:.3f} s", report.peaks_table(found, limits))
+        say(*(f"wrote {file}" for file in (out, plot) if file is not None))
+    return 0
+
+
+def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> Any:
+    """The path as single-joint moves."""
+    from rrtik_ompl import load_path, load_problem, one_joint_moves
+    from rrtik_ompl.shortening import shorten as shortened
+
+    if problem is None:
+        route = load_path(path)
+        _check_waypoints(path, route)
+        if shorten is not None:
+            raise InputError("--shorten needs to know what stands in the way: give --problem too")
+        if not route.one_joint_at_a_time:
+            raise InputError(f"{path}: moves several joints at once; give --problem NAME, and it is converted")
+        return route
+    question = load_problem(problem)
+    route = _valid_path(path, question)
+    _check_waypoints(path, route)
+    with progress("converting"):
+        if not route.one_joint_at_a_time:
+            route = one_joint_moves(route, question)
+        if shorten is not None:
+            route = shortened(route, question, method=shorten)
+    return route
+
+
+def _valid_path(path: Path, question: Any) -> Any:
+    """A path of a file, checked against its problem."""
+    from rrtik_ompl import load_path
+
+    route = load_path(path, question.robot)
+    faults = route.violations(question.world)
+    if faults:
+        raise InputError(f"{path}: not valid for {question.name}: edge {faults[0].edge + 1}: {faults[0].reason}")
+    return route
+
+
+def _check_waypoints(path: Path, route: Any) -> None:
+    if len(route.waypoints) < 2:
+        raise InputError(f"{path}: it has one waypoint, so there are no moves to list")
+
+
+def _rates(text: str, option: str) -> list[float]:
+    """Numbers greater than 0."""
+    row = comma_numbers(text, option)
+    if not all(number > 0.0 for number in row):
+        raise InputError(f"{option}: expected numbers greater than 0, got {text}")
+    return row
+
+
+def _scaled(row: list[float], factors: Any) -> Any:
+    """Degrees as radians; a row of the wrong length is left for the limits to refuse."""
+    return row if len(row) not in (1, len(factors)) else row * factors

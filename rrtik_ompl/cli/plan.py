@@ -1,0 +1,115 @@
+"""The command `rrtik plan`: a path for a problem, shortened, printed, saved and drawn."""
+
+from __future__ import annotations
+
+import json
+import time
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rrtik_ompl.cli.terminal import progress, say
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
+from rrtik_ompl.files.text import check_target
+
+RULES = ("joint_costs", "frozen_joints", "last_joints", "smallest_move")  # of single-joint moves, see MoveRules
+
+
+class Shorten(str, Enum):
+    """What `rrtik plan` does to the raw path; `auto` is fewest-moves for a path of single-joint moves."""
+
+    auto = "auto"
+    axis = "axis"
+    axis_rounds = "axis-rounds"
+    sequential = "sequential"
+    random = "random"
+    shortcut = "shortcut"
+    retraction = "retraction"
+    corners = "corners"
+    ompl = "ompl"
+    fewest_moves = "fewest-moves"
+    none = "none"
+
+
+def plan(
+    problem: Annotated[str, typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.")],
+    planner: Annotated[str, typer.Option(help="See: rrtik list planners.")] = "bicrdt",
+    seconds: Annotated[float, typer.Option(help="Time limit [s].")] = 5.0,
+    seed: Annotated[int | None, typer.Option(help="The same seed gives the same path; drawn if left out.")] = None,
+    restarts: Annotated[int, typer.Option(help="New attempts at most, if one gives up early.")] = 20,
+    parameter: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="An option of the planner, in JSON; repeatable."),
+    ] = None,
+    shorten: Annotated[
+        Shorten, typer.Option(help="How the path is made shorter; auto: fewest-moves for single-joint moves.")
+    ] = Shorten.auto,
+    out: Annotated[Path | None, typer.Option(help="Save the path: .json, .csv or .txt (OMPL matrix).")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
+) -> int:
+    """Find a path and print its moves.
+
+    One that moves several joints at once is printed as waypoints. Exit code 1 if no path was found.
+    """
+    check_target(out, PATH_FORMATS)
+    check_target(html, (".html", ".htm"))
+    from rrtik_ompl import load_problem
+    from rrtik_ompl.cli import plan_report as report
+    from rrtik_ompl.planning import find_planner
+    from rrtik_ompl.planning import plan as find_path
+
+    find_planner(planner)
+    options = _parameters(parameter or [])
+    question = load_problem(problem)
+    with progress(f"planning {question.name} with {planner}"):
+        found = find_path(question, planner, seconds=seconds, seed=seed, restarts=restarts, parameters=options)
+    with progress("shortening"):
+        rules = {name: value for name, value in options.items() if name in RULES}
+        path, shorten_seconds = _shortened(found.path, question, shorten, found.seed, rules)
+    if path is not None and out is not None:
+        path.save(out)
+    if path is not None and html is not None:
+        from rrtik_ompl.viewer import view
+
+        with progress("drawing"):
+            view(question, path, html=html, before=None if path is found.path else found.path)
+    if as_json:
+        print(json.dumps(report.document(question, found, path, shorten_seconds)))
+    else:
+        say(*report.summary(question, found, path, shorten_seconds))
+        if path is not None:
+            say(report.moves_table(path) if path.one_joint_at_a_time else report.waypoints_table(path))
+        say(*(f"wrote {file}" for file in (out, html) if path is not None and file is not None))
+    return 0 if found.found else 1
+
+
+def _shortened(path: Any, problem: Any, method: Shorten, seed: int, rules: dict[str, Any]) -> tuple[Any, float]:
+    """The path made shorter, keeping to what the planner was told of single-joint moves; and the time [s]."""
+    from rrtik_ompl.shortening import MoveRules, shorten
+
+    if path is None or method is Shorten.none or len(path.waypoints) < 2:
+        return path, 0.0
+    begin = time.perf_counter()
+    wanted = Shorten.fewest_moves if method is Shorten.auto and path.one_joint_at_a_time else method
+    kept = MoveRules(problem.robot.joint_names, **rules) if rules and path.one_joint_at_a_time else None
+    return shorten(path, problem, method=wanted.value, seed=seed, rules=kept), time.perf_counter() - begin
+
+
+def _parameters(pairs: list[str]) -> dict[str, Any]:
+    """``--set range=0.5`` as {"range": 0.5}: JSON values, anything else is text."""
+    found = {}
+    for pair in pairs:
+        name, equals, value = pair.partition("=")
+        if not equals or not name:
+            raise InputError(f"--set {pair}: expected NAME=VALUE, for example --set range=0.5")
+        try:
+            found[name] = json.loads(value)
+        except json.JSONDecodeError:
+            if value[:1] in ("[", "{"):
+                raise InputError(f"--set {pair}: names stand in quotes: --set 'frozen_joints=[\"elbow\"]'") from None
+            found[name] = value
+    return found

@@ -1,0 +1,143 @@
+"""Plans and paths in words and tables for a person: degrees, millimetres, one row per move."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from rich import box
+from rich.table import Table
+
+from rrtik_ompl.goal import JointGoal, PositionGoal
+from rrtik_ompl.moves.text import COLUMNS, moves_document, reading
+from rrtik_ompl.path import SECOND_CHECK, JointPath
+from rrtik_ompl.planning import Plan
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.trajectory import RateLimits, Trajectory
+from rrtik_ompl.transitions import lower_bound
+
+
+def moves_table(path: JointPath) -> Table:
+    """One row per single-joint move: joint, from, to, change; degrees, or metres for a prismatic joint."""
+    table = Table(*COLUMNS, box=box.SIMPLE_HEAD, pad_edge=False)
+    for column in (0, 2, 3, 4):
+        table.columns[column].justify = "right"
+    for number, move in enumerate(path.moves(), start=1):
+        (start, unit), (end, _) = reading(move.start, move.unit), reading(move.end, move.unit)
+        digits = 4 if unit == "m" else 2
+        values = (f"{start:.{digits}f}", f"{end:.{digits}f}", f"{end - start:+.{digits}f}")
+        table.add_row(str(number), move.joint, *values, unit)
+    return table
+
+
+def waypoints_table(path: JointPath) -> Table:
+    """One row per waypoint, one column per joint; degrees, or metres for a prismatic joint."""
+    units = ["m" if sliding else "deg" for sliding in path.prismatic]
+    heads = [f"{name} [{unit}]" for name, unit in zip(path.joint_names, units, strict=True)]
+    table = Table("waypoint", *heads, box=box.SIMPLE_HEAD, pad_edge=False)
+    for column in table.columns:
+        column.justify = "right"
+    scale = np.where(path.prismatic, 1.0, 180.0 / np.pi)
+    for number, row in enumerate(path.waypoints * scale, start=1):
+        table.add_row(
+            str(number),
+            *(f"{value:.4f}" if m else f"{value:.2f}" for value, m in zip(row, path.prismatic, strict=False)),
+        )
+    return table
+
+
+def peaks_table(trajectory: Trajectory, limits: RateLimits) -> Table:
+    """One row per joint: its largest velocity, acceleration and jerk beside their limits; degrees, or metres."""
+    heads = (f"{what}{end}" for what in ("velocity", "acceleration", "jerk") for end in ("", " limit"))
+    table = Table("joint", *heads, "unit", box=box.SIMPLE_HEAD, pad_edge=False)
+    for column in table.columns[1:-1]:
+        column.justify = "right"
+    peaks, words = trajectory.peaks(), ("jumps", "none")  # said of a peak, of a limit, that is infinite
+    pairs = ((peaks.velocity, limits.velocity), (peaks.acceleration, limits.acceleration), (peaks.jerk, limits.jerk))
+    for k, name in enumerate(trajectory.joint_names):
+        factor, unit = (1.0, "m") if trajectory.prismatic[k] else (180.0 / np.pi, "deg")
+        cells = (_rate(factor * float(row[k]), word) for pair in pairs for row, word in zip(pair, words, strict=True))
+        table.add_row(name, *cells, unit)
+    return table
+
+
+def _rate(value: float, word: str) -> str:
+    return f"{value:.4g}" if np.isfinite(value) else word
+
+
+def fewest_moves(problem: Problem, plan: Plan) -> int | None:
+    """A lower bound of the number of moves of any path of the problem; None if the goal is no configuration.
+
+    It is c, the number of joints that differ, or what the planner has proven beyond that.
+    """
+    if not isinstance(problem.goal, JointGoal):
+        return None
+    return max(lower_bound(problem.start, problem.goal.q), int(plan.statistics.get("lower_bound", 0)))
+
+
+def summary(problem: Problem, plan: Plan, path: JointPath | None, shorten_seconds: float) -> list[str]:
+    """A few lines that say what was found, how good it is, and how long it took."""
+    lines = [f"problem {problem.name}, robot {problem.world.robot.name}, planner {plan.planner}, seed {plan.seed}"]
+    if plan.path is None or path is None:
+        return [*lines, f"not found: {plan.reason}"]
+    bound = fewest_moves(problem, plan)
+    if path.one_joint_at_a_time:
+        least = "" if bound is None else f" (no path can have fewer than {bound})"
+        raw = plan.path
+        same = (raw.transitions, raw.length) == (path.transitions, path.length)
+        before = "" if same else f"; {raw.transitions} moves and {raw.length:.2f} {raw.unit} before shortening"
+        lines.append(f"{path.transitions} moves{least}, length {path.length:.2f} {path.unit}{before}")
+    else:
+        size = f"{len(path.waypoints)} waypoints, length {path.length:.2f} {path.unit}"
+        lines.append(f"{size}, several joints move at once")
+    if "position_error" in plan.statistics:
+        angle = np.degrees(plan.statistics["orientation_error"])
+        turned = "" if isinstance(problem.goal, PositionGoal) else f" and {angle:.2g} deg"
+        lines.append(f"the tip ends {plan.statistics['position_error']:.2g} m{turned} from the goal")
+    step = problem.world.motion_resolution / SECOND_CHECK
+    lines.append(
+        f"planning {plan.seconds:.3f} s, shortening {shorten_seconds:.3f} s; checked again every {step:g} m: valid"
+    )
+    return lines
+
+
+def document(problem: Problem, plan: Plan, path: JointPath | None, shorten_seconds: float) -> dict[str, Any]:
+    """The same for machines: plain values that json can write; rad, m, s."""
+    found: dict[str, Any] = {
+        "problem": problem.name,
+        "robot": problem.world.robot.name,
+        "planner": plan.planner,
+        "seed": plan.seed,
+        "found": plan.found,
+        "reason": plan.reason,
+        "seconds": {"plan": plan.seconds, "shorten": shorten_seconds},
+        "statistics": dict(plan.statistics),
+    }
+    if path is None:
+        return found
+    found |= {
+        "length": path.length,
+        "transitions": path.transitions,
+        "lower_bound": fewest_moves(problem, plan),
+        "joint_names": list(path.joint_names),
+        "waypoints": path.waypoints.tolist(),
+    }
+    if path.one_joint_at_a_time:
+        found["moves"] = moves_document(path)
+    return found
+
+
+def timing_document(problem: Problem, trajectory: Trajectory) -> dict[str, Any]:
+    """A timed motion for machines: duration and each joint's peaks (a jerk of null is a jump of acceleration)."""
+    peaks = trajectory.peaks()
+    return {
+        "problem": problem.name,
+        "robot": trajectory.robot_name,
+        "duration": trajectory.duration,
+        "knots": len(trajectory.times),
+        "joint_names": list(trajectory.joint_names),
+        "peaks": {
+            name: [float(x) if np.isfinite(x) else None for x in row]
+            for name, row in zip(peaks._fields, peaks, strict=True)
+        },
+    }

@@ -1,0 +1,119 @@
+"""The command `rrtik reach`: where an arm can bring its tip, as numbers, slices, a file, and bodies in the 3-D page."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rrtik_ompl.cli.terminal import progress, say
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.text import check_target
+
+MAP_FORMATS, PLOT_FORMATS, PAGE_FORMATS = (".npz", ".csv"), (".png", ".svg"), (".html", ".htm")
+LABELS = {
+    "orientations": "share of 64 directions in which the tip was seen to point",
+    "manipulability": "largest manipulability seen",
+    "samples": "samples",
+}
+
+
+def reach(
+    robot: Annotated[str, typer.Argument(help="A name (see: rrtik list robots), a URDF or a DH table.")],
+    measure: Annotated[str, typer.Option(help="orientations, manipulability or samples.")] = "orientations",
+    cell: Annotated[float | None, typer.Option(help="Side of a cell [m]; an 18th of the reach if left out.")] = None,
+    samples: Annotated[int, typer.Option(help="Postures to draw.")] = 200_000,
+    axis: Annotated[
+        str | None, typer.Option(help="Of the tip's frame that points: x, y or z; z if left out, of planar arms x.")
+    ] = None,
+    scene: Annotated[Path | None, typer.Option(help="Obstacles: only free postures count. A YAML file.")] = None,
+    free: Annotated[bool, typer.Option("--free", help="Leave out postures in which the arm hits itself.")] = False,
+    effective: Annotated[
+        bool, typer.Option("--effective", help="The robot's effective workspace: cameras, vehicle, margins (titan4).")
+    ] = False,
+    seed: Annotated[int, typer.Option(help="The same seed gives the same map.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="Save the map: .npz, or .csv with a row per cell.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw two slices: .png or .svg.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a 3-D page with the cells, a quarter cut away.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
+) -> int:
+    """Map where an arm can bring its tip."""
+    for target, endings in ((out, MAP_FORMATS), (plot, PLOT_FORMATS), (html, PAGE_FORMATS)):
+        check_target(target, endings)
+    if effective:
+        if out is not None or html is not None or as_json or scene is not None:
+            raise InputError("--effective draws slices: give --plot FILE, and none of --out, --html, --json, --scene")
+        return _effective(robot, plot)
+    from rrtik_ompl import Scene, World, load_robot, load_scene
+    from rrtik_ompl.reach.sampling import reach_map
+
+    arm = load_robot(robot)
+    surroundings = load_scene(scene) if scene is not None else Scene() if free else None
+    world = None if surroundings is None else World(arm, surroundings)
+    with progress(f"sampling {samples} postures of {arm.name}"):
+        found = reach_map(arm, measure=measure, cell=cell, samples=samples, world=world, axis=axis, seed=seed)
+    if out is not None:
+        found.save(out)
+    _draw(arm if world is None else world, found, plot, html)
+    if as_json:
+        print(json.dumps(_document(found)))
+    else:
+        say(*_summary(found), *(f"wrote {file}" for file in (out, plot, html) if file is not None))
+    return 0
+
+
+def _effective(robot: str, plot: Path | None) -> int:
+    from rrtik_ompl.catalog import find_workspace
+    from rrtik_ompl.plots.reach import plot_slices
+
+    with progress(f"effective workspace of {robot}"):
+        slices = find_workspace(robot)()
+    if plot is not None:
+        plot_slices(slices, plot, title=f"{robot}: effective workspace", colors="Blues")
+    say(*(f"{robot}, {each.title}" for each in slices), *([] if plot is None else [f"wrote {plot}"]))
+    return 0
+
+
+def _draw(shown: Any, found: Any, plot: Path | None, html: Path | None) -> None:
+    title = f"{found.robot}: {LABELS[found.measure]}"
+    if plot is not None:
+        from rrtik_ompl.plots.reach import plot_slices
+
+        plot_slices(found.slices(), plot, title=title, label=found.measure)
+    if html is not None:
+        from rrtik_ompl.viewer import view
+        from rrtik_ompl.viewer.drawing.reach_marks import reach_marks
+
+        with progress("drawing"):
+            view(shown, html=html, marks=reach_marks(found), title=f"{found.robot}: {found.measure} in reach")
+
+
+def _document(found: Any) -> dict[str, Any]:
+    values = found.values[found.reached]
+    return {
+        "robot": found.robot,
+        "measure": found.measure,
+        "cell": found.size,
+        "cells": int(found.reached.sum()),
+        "volume": found.volume,
+        "area": found.area,
+        "samples": found.samples,
+        "mean": float(values.mean()) if len(values) else 0.0,
+        "most": float(values.max(initial=0.0)),
+        "best": found.best.tolist(),
+    }
+
+
+def _summary(found: Any) -> list[str]:
+    told = _document(found)
+    if told["cells"] == 0:
+        return [f"{found.robot}: no posture counted: all of them collide"]
+    size = f"{found.area:.3g} m2" if found.flat else f"{found.volume:.3g} m3"
+    place = ", ".join(f"{value:.2f}" for value in told["best"])
+    return [
+        f"{found.robot}: {told['cells']} cells of {1e3 * found.size:.0f} mm reached, {size}, "
+        f"by {found.samples} samples",
+        f"{LABELS[found.measure]}: mean {told['mean']:.3g}, most {told['most']:.3g} at ({place}) m",
+    ]

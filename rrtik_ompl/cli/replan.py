@@ -1,0 +1,76 @@
+"""The command of `rrtik` that moves a robot among moving obstacles, and replays what happened."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rrtik_ompl.cli.terminal import note, progress, say
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.text import check_target
+
+Scenario = Annotated[str, typer.Argument(help="A problem with a run: section, shipped or a YAML file.")]
+
+
+def replan_scenario(
+    scenario: Scenario,
+    planner: Annotated[str, typer.Option(help="drrt-con, or to compare with: rrt-connect, drrt.")] = "drrt-con",
+    seed: Annotated[int, typer.Option(help="The same seed gives the same run.")] = 0,
+    predict: Annotated[int | None, typer.Option(help="Heed where obstacles will be, so many ticks ahead.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Simulated time at most [s].")] = None,
+    record: Annotated[Path | None, typer.Option(help="Keep everything, on Ctrl-C too: .json.")] = None,
+    replay: Annotated[Path | None, typer.Option(help="Show this record instead of a new run.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a self-contained page that replays the run.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
+) -> int:
+    """Move a robot to its goal while obstacles move.
+
+    Look, repair, step, again and again. Exit code 1 if it did not arrive.
+    """
+    check_target(html, (".html", ".htm"))
+    check_target(record, (".json",))
+    options = {"predict": predict, "seconds": seconds, "record": record}
+    given = {name: value for name, value in options.items() if value is not None}
+    if replay is not None and given:
+        raise InputError(f"--replay shows a run that is over: leave out --{next(iter(given))}, or --replay")
+    from rrtik_ompl.replanning.scenario import load_scenario
+
+    chosen = load_scenario(scenario)
+    if replay is None:
+        try:
+            with progress(f"{chosen.problem.name} with {planner}"):
+                run = chosen.run(planner=planner, seed=seed, **given)
+        except KeyboardInterrupt:
+            if record is not None:
+                note(f"{record} holds the run as far as it went, if it had begun")
+            raise
+    else:
+        run = _recorded(replay, chosen.problem.name)
+    if html is not None:
+        from rrtik_ompl.viewer import view
+
+        with progress("drawing"):
+            view(chosen.problem, run=run, html=html)
+    if as_json:
+        print(json.dumps(run.figures()))
+    else:
+        say(run.summary())
+        say(*(f"wrote {file}" for file in (record, html) if file is not None))
+    return 0 if run.arrived else 1
+
+
+def _recorded(file: Path, problem: str) -> Any:
+    """The run of a record, which must be one of the problem.
+
+    Raises:
+        InputError: If it is not, or is no record.
+    """
+    from rrtik_ompl.replanning import load_run
+
+    run = load_run(file)
+    if run.problem != problem:
+        raise InputError(f"{file}: a run of '{run.problem}', not of '{problem}'; give the scenario that was run")
+    return run

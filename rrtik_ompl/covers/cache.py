@@ -1,0 +1,121 @@
+"""Covers kept on disk, so that a geometry is covered once per machine. Nothing here ever fails: no cache, no gain.
+
+One file per geometry, parameters and algorithm, named by a hash of all three.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import zipfile
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import coal
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.collision.solids import is_mesh, mesh_arrays
+from rrtik_ompl.files.cache import cache_folder, write_whole
+
+LAYOUT = 1
+ALGORITHM = 3  # counts up when rrtik_ompl.covers.spheres makes other spheres of the same geometry
+PIECES = 2  # counts up when rrtik_ompl.covers.mesh_pieces makes other pieces of the same mesh
+
+
+def cached_outer_cover(geometry: Any, *, protrusion: float | None = None) -> Matrix:
+    """``outer_cover``, from the cache if it is there."""
+
+    def make() -> Matrix:
+        from rrtik_ompl.covers.spheres import outer_cover  # with scipy, which takes longer to load than covers to read
+
+        return outer_cover(geometry, protrusion=protrusion)
+
+    return _cached(geometry, f"outer {protrusion!r}", make)
+
+
+def cached_inner_spheres(geometry: Any, *, count: int | None = None) -> Matrix:
+    """``inner_spheres``, from the cache if they are there."""
+
+    def make() -> Matrix:
+        from rrtik_ompl.covers.spheres import inner_spheres
+
+        return inner_spheres(geometry, count=count)
+
+    return _cached(geometry, f"inner {count!r}", make)
+
+
+def cached_convex_pieces(mesh: Any) -> tuple[list[Matrix], ...]:
+    """``convex_pieces``, from the cache if they are there; as rows of a corner and a number of piece and kind."""
+
+    def make() -> Matrix:
+        from rrtik_ompl.covers.mesh_pieces import convex_pieces
+
+        kinds = convex_pieces(mesh)
+        numbered = [(len(kinds) * k + kind, p) for kind, pieces in enumerate(kinds) for k, p in enumerate(pieces)]
+        rows = [np.column_stack([corners, np.full(len(corners), float(number))]) for number, corners in numbered]
+        return np.concatenate([np.empty((0, 4)), *rows])
+
+    rows = _cached(mesh, f"convex pieces {PIECES}", make)
+    numbers = np.unique(rows[:, 3])
+    return tuple([rows[rows[:, 3] == k, :3] for k in numbers if k % 3 == kind] for kind in range(3))
+
+
+def geometry_bytes(geometry: Any) -> bytes | None:
+    """All that a cover depends on, or None for a kind that is not cached."""
+    numbers: list[Any]
+    if isinstance(geometry, coal.Box):
+        numbers = [np.array(geometry.halfSide, dtype=np.float64)]
+    elif isinstance(geometry, coal.Sphere):
+        numbers = [np.array([geometry.radius])]
+    elif isinstance(geometry, (coal.Capsule, coal.Cylinder)):
+        numbers = [np.array([geometry.radius, geometry.halfLength])]
+    elif isinstance(geometry, coal.ConvexBase):
+        numbers = [np.array(geometry.points(), dtype=np.float64)]
+    elif is_mesh(geometry):
+        numbers = [*mesh_arrays(geometry)]
+    else:
+        return None
+    swept = geometry.getSweptSphereRadius() if hasattr(geometry, "getSweptSphereRadius") else 0.0
+    parts = [f"{type(geometry).__name__} {swept!r}".encode()]
+    for array in numbers:
+        parts += [f"{array.dtype} {array.shape}".encode(), np.ascontiguousarray(array).tobytes()]
+    return b"\0".join(parts)
+
+
+def _cached(geometry: Any, parameters: str, make: Callable[[], Matrix]) -> Matrix:
+    folder, data = cache_folder("covers"), geometry_bytes(geometry)
+    if folder is None or data is None:
+        return make()
+    head = f"layout {LAYOUT} algorithm {ALGORITHM} {parameters}\0".encode()
+    key = hashlib.sha256(head + data).hexdigest()
+    file = folder / f"{key}.npz"
+    found = _read(file, key)
+    if found is None:
+        found = make()
+        _write(file, key, found)
+    return found
+
+
+def _read(file: Path, key: str) -> Matrix | None:
+    """The spheres in a file, or None if it is absent, damaged or another's."""
+    try:
+        with np.load(file, allow_pickle=False) as stored:
+            spheres, name, check = stored["spheres"], str(stored["key"]), str(stored["check"])
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError, MemoryError):
+        return None
+    whole = spheres.dtype == np.float64 and spheres.ndim == 2 and spheres.shape[1] == 4
+    if not whole or name != key or check != _check(spheres):
+        return None
+    sound = np.isfinite(spheres[:, :3]).all() and (spheres[:, 3] >= 0.0).all()
+    return np.asarray(spheres) if sound else None
+
+
+def _check(spheres: Matrix) -> str:
+    return hashlib.sha256(np.ascontiguousarray(spheres).tobytes()).hexdigest()
+
+
+def _write(file: Path, key: str, spheres: Matrix) -> None:
+    name, check = np.array(key), np.array(_check(spheres))
+    write_whole(file, lambda stream: np.savez(stream, spheres=spheres, key=name, check=check))

@@ -1,0 +1,288 @@
+"""Batched collision checks on plain tables, many configurations at a time, with three answers.
+
+``FREE``: spheres that contain the moving bodies, or convex solids that do, are clear of all they are checked against.
+``COLLIDING``: spheres inside them hit, or solids do. ``UNDECIDED``: neither; only an exact check can tell. Rounding is
+covered by a margin, so the first two answers are certain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.fast.checks import reference_distances as plain_distances
+from rrtik_ompl.fast.checks.clearance import Clearance, rounded
+from rrtik_ompl.fast.checks.reference import PlainChecks
+from rrtik_ompl.fast.simd.library import library
+from rrtik_ompl.fast.tables.layout import INNER_LAST, MARKS, OUTER_ROWS, STANDING_SOLIDS, UNDECIDED
+from rrtik_ompl.fast.tables.packing import (
+    ArmTables,
+    PlacedRows,
+    alike,
+    arm_tables,
+    checked_table,
+    flag_places,
+    standing_solids,
+    standing_tables,
+)
+from rrtik_ompl.fast.tables.robot_tables import Spheres, Table, table
+from rrtik_ompl.fast.tables.scene_tables import rows_table
+from rrtik_ompl.fast.tables.scratch import probe_table, workspace
+from rrtik_ompl.fast.tables.solid_tables import NO_SOLIDS, Solids
+from rrtik_ompl.robot import Chain
+
+LARGEST_ANGLE = 1e8  # [rad]; float64 cannot hold larger ones to the precision of the margin
+STROKE = 4.0  # [m] a sliding joint may go this far from its zero unless told otherwise
+MOST_STEPS = 2**30
+MARKED_ROWS = 8  # at a time; every width has that many lanes
+
+
+class FastWorld:
+    """Bodies carried by a tree of joints, and the pairs of them that must not touch, packed for the kernels.
+
+    Joint values are those of the chain's own joints: mimic joints resolved, one value for a continuous joint. A value
+    beyond what the margin covers (``LARGEST_ANGLE``, ``strokes``) makes a configuration undecided.
+
+    A world is meant for one thread at a time.
+
+    Attributes:
+        address: Of the tables in memory, for other kernels; 0 without kernels. Valid as long as this object lives.
+
+    Args:
+        chain: The tree of joints.
+        bodies: Things with ``joint`` (0 stands still), ``placement`` in the joint's frame, coal ``geometry``, and the
+            ``margin`` [m] that is to be kept from what stands still.
+        pairs: Numbers of the bodies that must not touch; pairs that both stand still are left out.
+        outer: For each body spheres (x, y, z, r) in its own frame whose union contains it, shape (n, 4); none stand
+            for the bounding ball.
+        inner: For each body spheres inside it, shape (n, 4), possibly none.
+        solids: For each body convex solids around and inside it; None leaves what spheres cannot tell undecided.
+        strokes: Largest value of sliding joints [m], a number or shape (joints,).
+        like: A world of the same arm in another scene: what has not changed is not packed again.
+        compiled: Whether to use the kernels; False for plain numpy.
+
+    Raises:
+        InputError: If ``strokes`` are not numbers of metres.
+    """
+
+    def __init__(
+        self,
+        chain: Chain,
+        bodies: Sequence[Any],
+        pairs: Sequence[tuple[int, int]],
+        *,
+        outer: Sequence[Spheres],
+        inner: Sequence[Spheres],
+        solids: Sequence[Solids] | None = None,
+        strokes: ArrayLike = STROKE,
+        like: FastWorld | None = None,
+        compiled: bool = True,
+    ) -> None:
+        self._joints = len(chain.parent)
+        self._limits = _limits(chain, strokes)
+        self._smallest_limit = float(self._limits.min(initial=LARGEST_ANGLE))
+        kept = [(i, j) for i, j in pairs if bodies[i].joint > 0 or bodies[j].joint > 0]
+        concerned = sorted({k for pair in kept for k in pair})
+        moving = alike(bodies, kept)
+        standing = [k for k in concerned if bodies[k].joint == 0]
+        self._pairs = kept
+        solids = [NO_SOLIDS] * len(bodies) if solids is None else solids
+        same = like._arm if like is not None and like._joints == self._joints else None
+        self._arm: ArmTables = arm_tables(chain, bodies, moving, kept, outer, inner, solids, self._limits, same)
+        self._checked = checked_table(moving, standing, kept)
+        self._rows = standing_tables(bodies, standing, self._checked, outer, inner)
+        self._standing, self._outer, self._placed = standing, outer, PlacedRows()
+        self._flagged = flag_places(kept, self._arm, moving, standing)
+        self._plain = PlainChecks(self._arm.arm, self._arm.balls, self._rows)
+        self._kernels = library("checks.check_kernels") if compiled else None
+        self._probe: Table | None = None
+        self._moved = False
+        self.address = 0
+        if self._kernels is not None:
+            self._work = workspace(self._arm.arm, self._arm.balls, self._rows)
+            self._solids = standing_solids(bodies, standing, solids)
+            tables = (self._arm.arm, *self._arm.balls, *self._rows, self._work, self._arm.solids, self._solids)
+            self._world = table({k: t.address for k, t in enumerate(tables)})
+            self.address = self._world.address
+            self._marks = self._work[MARKS]
+
+    def move(self, bodies: Sequence[Any], rooms: Sequence[float]) -> None:
+        """Put what stands still elsewhere, in place: the arm, the pairs and addresses stay as they are.
+
+        From then on no contact with them is proven, only freedom from it.
+
+        Args:
+            bodies: As at the beginning, those that stand still with other placements. One that is the same object
+                as before is not packed again.
+            rooms: For each body how far from it, beyond its margin, the arm must stay to be FREE [m]; read for those
+                that stand still.
+        """
+        around = self._placed.rows(bodies, self._standing, self._outer, rooms)
+        first = not self._moved
+        self._moved = True
+        self._rows = rows_table(around, self._checked), rows_table([], self._checked) if first else self._rows[1]
+        self._plain = PlainChecks(self._arm.arm, self._arm.balls, self._rows)
+        self._probe = None
+        if self._kernels is not None:
+            self._world.header[OUTER_ROWS : OUTER_ROWS + 2] = [rows.address for rows in self._rows]
+            if first:  # the solids stand where nothing is any more; that none is known holds wherever bodies go
+                self._solids = standing_solids(bodies, self._standing, [NO_SOLIDS] * len(bodies))
+                self._world.header[STANDING_SOLIDS] = self._solids.address
+            self._work[INNER_LAST][:] = -1  # what met last is there no more
+
+    @property
+    def margin(self) -> float:
+        """What is added to outer and taken from inner radii against rounding [m]."""
+        return self._arm.margin
+
+    @property
+    def limits(self) -> Vector:
+        """Largest absolute value of each joint for which kernels can be asked directly [rad or m], shape (joints,)."""
+        return self._limits
+
+    def classify(self, V: ArrayLike, *, prove: bool = True) -> NDArray[np.int8]:
+        """Judge rows of joint values V, shape (m, joints): FREE, UNDECIDED or COLLIDING each. Shape (m,).
+
+        Args:
+            V: Joint values [rad or m].
+            prove: False to be content with FREE and UNDECIDED.
+
+        Raises:
+            InputError: If V has the wrong shape or a value that is not finite.
+        """
+        rows, beyond = self._values(V, "joint values")
+        if self._kernels is None:
+            answers = self._plain.classify(rows, prove=prove)
+        else:
+            judged = np.empty(len(rows), dtype=np.int32)
+            self._kernels.classify(self.address, rows.ctypes.data, len(rows), judged.ctypes.data, prove)
+            answers = judged.astype(np.int8)
+        return answers if beyond is None else np.where(beyond, np.int8(UNDECIDED), answers)
+
+    def classify_edges(self, A: ArrayLike, B: ArrayLike, counts: ArrayLike, *, prove: bool = True) -> NDArray[np.int8]:
+        """Judge straight motions A[k] -> B[k] by their configurations (1 - s) A + s B, s = 0, 1 / count, ..., 1.
+
+        A motion is COLLIDING as soon as one of them is, FREE if all are, UNDECIDED otherwise.
+
+        Args:
+            A: Starts, shape (m, joints).
+            B: Ends, shape (m, joints).
+            counts: Numbers of steps, whole and at least 1, shape (m,).
+            prove: False to be content with FREE and UNDECIDED.
+
+        Raises:
+            InputError: If shapes do not fit, a value is not finite or a number of steps is not a positive integer.
+        """
+        (starts, first), (ends, second) = self._values(A, "starts"), self._values(B, "ends")
+        steps = _steps(counts, len(starts))
+        if len(starts) != len(ends):
+            raise InputError(f"motions need as many starts as ends, got {len(starts)} and {len(ends)}")
+        if self._kernels is None:
+            answers = self._plain.classify_edges(starts, ends, steps, prove=prove)
+        else:
+            judged = np.empty(len(starts), dtype=np.int32)
+            places = (starts.ctypes.data, ends.ctypes.data, steps.ctypes.data)
+            self._kernels.classify_edges(self.address, *places, len(starts), judged.ctypes.data, prove)
+            answers = judged.astype(np.int8)
+        for beyond in (first, second):
+            answers = answers if beyond is None else np.where(beyond, np.int8(UNDECIDED), answers)
+        return answers
+
+    def covered(self, V: ArrayLike) -> bool:
+        """Whether the margin covers all joint values V, shape (m, joints): only then may kernels be given them.
+
+        Raises:
+            InputError: If V has the wrong shape or a value that is not finite.
+        """
+        return self._values(V, "joint values")[1] is None
+
+    def clearance(self, V: ArrayLike, *, upper: bool = False) -> Clearance:
+        """Bounds of the distance to contact for rows of joint values V, shape (m, joints).
+
+        Args:
+            V: Joint values [rad or m].
+            upper: Whether to look for an upper bound too, which takes as long again.
+
+        Raises:
+            InputError: If V has the wrong shape or a value that is not finite.
+        """
+        rows, beyond = self._values(V, "joint values")
+        lowest, nearest = self._measured(rows, 0)
+        highest = self._measured(rows, 1)[0] if upper else np.full(len(rows), np.inf)
+        if beyond is not None:
+            lowest, highest = np.where(beyond, -np.inf, lowest), np.where(beyond, np.inf, highest)
+            nearest = np.where(beyond, -1, nearest)
+        pairs = [self._flagged[flag][0] if flag >= 0 else (-1, -1) for flag in nearest.tolist()]
+        return Clearance(rounded(lowest, -1.0), rounded(highest, 1.0), np.array(pairs, dtype=np.int64).reshape(-1, 2))
+
+    def _measured(self, rows: Matrix, level: int) -> tuple[Vector, NDArray[np.int32]]:
+        """Distances between outer (0) or inner (1) solids and the flags of the nearest pairs, -1 for none."""
+        balls, scene = self._arm.balls[level], self._rows[level]
+        kernels = None if self._kernels is None else library("checks.distance_kernels")
+        if kernels is None:
+            return plain_distances.measure(self._arm.arm, balls, scene, rows)
+        if self._probe is None:
+            self._probe = probe_table(self._rows)
+        found, pairs = np.empty(len(rows)), np.empty(len(rows), dtype=np.int32)
+        tables = (self.address, balls.address, scene.address, rows.ctypes.data, len(rows), self._probe.address)
+        kernels.measure(*tables, found.ctypes.data, pairs.ctypes.data)
+        return np.where(pairs < 0, np.inf, found), pairs
+
+    def undecided_pairs(self, V: ArrayLike) -> list[list[tuple[int, int]]]:
+        """For each row of joint values V, shape (m, joints), the pairs that nothing here proves free.
+
+        Raises:
+            InputError: If V has the wrong shape or a value that is not finite.
+        """
+        rows, beyond = self._values(V, "joint values")
+        found: list[list[tuple[int, int]]] = []
+        for start in range(0, len(rows), MARKED_ROWS):
+            marks = self._marked(rows[start : start + MARKED_ROWS])
+            pairs: list[list[tuple[int, int]]] = [[] for _ in marks]
+            for row, flag in np.argwhere(marks).tolist():
+                pairs[row] += self._flagged[flag]
+            found += pairs
+        for far in np.flatnonzero(beyond) if beyond is not None else ():
+            found[far] = list(self._pairs)
+        return found
+
+    def _marked(self, rows: Matrix) -> Mask:
+        """Flags of the pairs that are not proven free, shape (m, flags), for a few rows."""
+        if self._kernels is None:
+            return self._plain.marks(rows)
+        count = self._kernels.mark_pairs(self.address, rows.ctypes.data, len(rows))
+        lanes = np.arange(len(rows), dtype=np.int32)[:, None]
+        return np.asarray((self._marks[:count] >> lanes) & 1, dtype=bool)
+
+    def _values(self, V: ArrayLike, what: str) -> tuple[Matrix, Mask | None]:
+        """Rows of values as the kernels want them, and which of them lie beyond the limits, if any."""
+        rows = V if isinstance(V, np.ndarray) and V.dtype == np.float64 else None
+        if rows is None or rows.ndim != 2 or rows.shape[1] != self._joints:
+            rows = finite_array(V, (None, self._joints), what)
+        rows = np.ascontiguousarray(rows)
+        if not rows.size or (rows.max() <= self._smallest_limit and rows.min() >= -self._smallest_limit):
+            return rows, None
+        rows = finite_array(rows, (None, self._joints), what)
+        beyond: Mask = np.any(np.abs(rows) > self._limits, axis=1)
+        return (np.where(beyond[:, None], 0.0, rows), beyond) if beyond.any() else (rows, None)
+
+
+def _limits(chain: Chain, strokes: ArrayLike) -> Vector:
+    """Largest absolute value of each joint that the margin covers, shape (joints,)."""
+    given = np.asarray(strokes, dtype=np.float64)
+    if given.shape not in ((), chain.prismatic.shape) or not (np.isfinite(given) & (given >= 0.0)).all():
+        raise InputError(f"strokes: expected one number of metres or {len(chain.parent)}, none negative")
+    return np.where(chain.prismatic, given, LARGEST_ANGLE)
+
+
+def _steps(counts: ArrayLike, count: int) -> NDArray[np.int32]:
+    """Numbers of steps, checked."""
+    values = finite_array(counts, (count,), "steps of motions")
+    if len(values) and (values.min() < 1.0 or values.max() > MOST_STEPS or not np.array_equal(values, values.round())):
+        raise InputError(f"steps of motions: expected whole numbers from 1 to {MOST_STEPS}")
+    return values.astype(np.int32)

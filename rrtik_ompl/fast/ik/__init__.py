@@ -1,0 +1,1 @@
+"""Inverse kinematics in kernels: Levenberg-Marquardt, and the branches of closed forms."""

@@ -1,0 +1,1 @@
+"""C-RDT and BiCRDT in kernels: trees whose every edge moves one joint."""

@@ -1,0 +1,49 @@
+"""Random numbers of searches in kernels, the same as those of the search in Python."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rrtik_ompl.fast.search.crdt import layout as table
+from rrtik_ompl.fast.simd.compiled import inlined, kernel
+from rrtik_ompl.fast.simd.lanes import double_at, field, int_at, set_double, set_int
+from rrtik_ompl.fast.simd.random_kernels import next_share
+
+
+@inlined
+def draw(search: int) -> Any:
+    """The next number of the stream, from 0 to 1, less than 1."""
+    return next_share(search, table.RANDOM)
+
+
+@inlined
+def sample(search: int) -> None:
+    """Draw a target within the bounds."""
+    for axis in range(field(search, table.DOF)):
+        low, high = double_at(field(search, table.LOWER), axis), double_at(field(search, table.UPPER), axis)
+        share = draw(search)
+        set_double(field(search, table.TARGET), axis, min(low + share * (high - low), high))
+
+
+@kernel
+def shuffle(search: int) -> None:
+    """The axes that may move, in random order."""
+    order, count = field(search, table.ORDER), field(search, table.AXIS_COUNT)
+    for k in range(count):
+        set_int(order, k, int_at(field(search, table.AXES), k))
+    for k in range(count - 1, 0, -1):
+        other = int(draw(search) * (k + 1))
+        axis = int_at(order, k)
+        set_int(order, k, int_at(order, other))
+        set_int(order, other, axis)
+
+
+@inlined
+def to_front(search: int, axis: int) -> None:
+    """Let an axis go first and the others keep their order."""
+    order, k = field(search, table.ORDER), 0
+    while int_at(order, k) != axis:
+        k += 1
+    for place in range(k, 0, -1):
+        set_int(order, place, int_at(order, place - 1))
+    set_int(order, 0, axis)

@@ -1,0 +1,95 @@
+"""A kernel module as one piece of LLVM bitcode: numba compiles its functions, plain C functions lead to them.
+
+Bitcode is the same for every processor of a kind; code for one processor is made of it by LLVM alone.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding as llvm
+from llvmlite import ir
+from numba import types
+from numba.core.registry import cpu_target
+
+from rrtik_ompl.fast.simd import compiled
+from rrtik_ompl.fast.simd.code_files import PREFIX, Code, bitcode_key, bitcode_name, kernel_modules, write_code
+
+WHOLE = ir.IntType(64)
+RUNTIMES = ("Py", "_Py", "NRT_", "numba_", "__svml")  # beginnings of names that only Python or numba can provide
+
+
+def compiled_module(name: str) -> Code:
+    """Compile the functions of a module of this package that Python calls.
+
+    Raises:
+        RuntimeError: If a kernel needs Python or numba to run.
+    """
+    module = import_module(f"rrtik_ompl.fast.{name}")
+    functions = compiled.entries(module.__name__)
+    linked = llvm.parse_assembly(str(_doors(functions)))
+    for function in functions.values():
+        overload = _overload(function)
+        code = overload.library._get_module_for_linking().clone()
+        code.get_function(overload.fndesc.llvm_func_name).linkage = "external"  # or it is dropped as not called
+        linked.triple, linked.data_layout = code.triple, code.data_layout
+        linked.link_in(code)
+    _hide_all_but(linked, {PREFIX + entry for entry in functions})
+    foreign = sorted(f.name for f in linked.functions if f.is_declaration and f.name.startswith(RUNTIMES))
+    if foreign:
+        raise RuntimeError(f"{name}: kernels may not allocate, raise or use objects, but need {', '.join(foreign)}")
+    return Code({entry: _count(function) for entry, function in functions.items()}, linked.as_bitcode())
+
+
+def _count(function: Any) -> int:
+    return int(function.py_func.__code__.co_argcount)
+
+
+def _overload(function: Any) -> Any:
+    """Numba's result for whole numbers as arguments."""
+    kinds = (types.int64,) * _count(function)
+    function.compile(kinds)
+    return function.overloads[kinds]
+
+
+def _doors(functions: dict[str, Any]) -> Any:
+    """C functions of whole numbers that call those of numba, which return a status and the result at an address."""
+    module = ir.Module("doors")
+    for entry, function in functions.items():
+        overload, count = _overload(function), _count(function)
+        convention = cpu_target.target_context.call_conv
+        kind = convention.get_function_type(types.int64, (types.int64,) * count)
+        inner = ir.Function(module, kind, overload.fndesc.llvm_func_name)
+        door = ir.Function(module, ir.FunctionType(WHOLE, [WHOLE] * count), PREFIX + entry)
+        builder = ir.IRBuilder(door.append_basic_block())
+        result, trouble = builder.alloca(WHOLE), builder.alloca(kind.args[1].pointee)
+        builder.store(ir.Constant(WHOLE, 0), result)
+        builder.call(inner, [result, trouble, *door.args])
+        builder.ret(builder.load(result))
+    return module
+
+
+def _hide_all_but(module: Any, shown: set[str]) -> None:
+    """Make all else private to the module, and drop what nobody needs."""
+    for item in (*module.functions, *module.global_variables):
+        if not item.is_declaration and item.name not in shown:
+            item.linkage = "internal"
+    machine = llvm.Target.from_triple(module.triple).create_target_machine()
+    builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options())
+    passes = llvm.create_new_module_pass_manager()
+    passes.add_global_dead_code_eliminate_pass()
+    passes.add_strip_dead_prototype_pass()
+    passes.run(module, builder)
+
+
+def write_bitcode(folder: Path) -> None:
+    """Compile all kernels into files that :mod:`rrtik_ompl.fast.simd.library` takes instead of compiling."""
+    for name in kernel_modules():
+        write_code(folder / bitcode_name(name), bitcode_key(name), compiled_module(name))
+
+
+if __name__ == "__main__":
+    write_bitcode(Path(sys.argv[1]))

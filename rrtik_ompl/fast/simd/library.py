@@ -1,0 +1,165 @@
+"""Kernels as libraries of machine code: made once for a processor, kept in the user's cache, loaded by LLVM alone.
+
+Each module with functions that Python calls (``@entry``) is a library of its own, so nobody waits for kernels that he
+does not use. Numba takes part only in making one, and not even then if the package brings it as bitcode.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import warnings
+from collections.abc import Callable
+from functools import cache
+from itertools import count
+from pathlib import Path
+from threading import RLock
+from typing import TYPE_CHECKING, Any
+
+from rrtik_ompl.fast.simd.announce import announce_compiling
+from rrtik_ompl.fast.simd.code_files import (
+    FOLDER,
+    PREFIX,
+    Code,
+    bitcode_key,
+    bitcode_name,
+    file_name,
+    kernel_modules,
+    machine_key,
+    read_code,
+    write_code,
+)
+from rrtik_ompl.fast.simd.processor import target_machine
+from rrtik_ompl.files.cache import cache_folder
+
+
+class Library:
+    """The functions of a kernel module that Python calls, as attributes.
+
+    They take ``int`` alone (64 bits, ``bool`` too, numbers of numpy not) and return one; a call costs 0.7 us. Other
+    threads run meanwhile. They work as long as the process lives.
+    """
+
+    def __init__(self, name: str, code: Code) -> None:
+        for entry, address in _addresses(name, code).items():
+            kind = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * code.entries[entry])
+            setattr(self, entry, kind(address))
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Callable[..., int]: ...
+
+
+_libraries: dict[str, Library | None] = {}
+_lock = RLock()
+
+
+def library(name: str) -> Library | None:
+    """The kernels of a module of this package (``"kernels"``), or None, and one warning, if there cannot be any."""
+    with _lock:
+        if name not in _libraries:
+            _libraries[name] = _tried(name)
+        return _libraries[name]
+
+
+def warm_up(report: Callable[[str], None]) -> bool:
+    """Make or load all kernels, so that nobody waits for them later.
+
+    Args:
+        report: Is told what is done, line by line.
+
+    Returns:
+        Whether there are compiled kernels now; if not, a warning has said why.
+    """
+    names = kernel_modules()
+    for name in names:
+        if library(name) is not None:
+            report(f"{name}: ready")
+    return all(library(name) is not None for name in names)
+
+
+_warned = False
+
+
+def _tried(name: str) -> Library | None:
+    global _warned
+    try:
+        return _kept(name) or _made(name)
+    except Exception as error:  # another version of a compiler may fail in any way, and numpy has the same answers
+        if not _warned:
+            reason = f"{error}; install numba" if isinstance(error, ImportError) else f"{type(error).__name__}: {error}"
+            message = f"collision checks run in plain numpy, many times slower: {reason}"
+            warnings.warn(message, RuntimeWarning, stacklevel=4)
+        _warned = True
+        return None
+
+
+def _file(name: str) -> Path | None:
+    folder = cache_folder("kernels")
+    return None if folder is None else folder / file_name(name, machine_key(name))
+
+
+def _kept(name: str) -> Library | None:
+    """The library from the user's cache, if it is there."""
+    file = _file(name)
+    code = None if file is None else read_code(file, machine_key(name))
+    if code is None:
+        return None
+    try:
+        return Library(name, code)
+    except (RuntimeError, KeyError):  # not what LLVM takes for machine code with these functions
+        return None
+
+
+def _made(name: str) -> Library:
+    """The library from the package's bitcode or else its source; kept in the user's cache if that can be written."""
+    packaged = read_code(FOLDER / bitcode_name(name), bitcode_key(name))
+    code = None if packaged is None else machine_code(packaged)
+    if code is None:
+        from rrtik_ompl.fast.simd.bitcode import compiled_module
+
+        announce_compiling()
+        code = machine_code(compiled_module(name))
+    if code is None:
+        raise RuntimeError("LLVM does not take the code that numba made")
+    made = Library(name, code)
+    file = _file(name)
+    if file is not None:
+        write_code(file, machine_key(name), code)
+    return made
+
+
+def machine_code(bitcode: Code) -> Code | None:
+    """Bitcode as code of this processor; None if it was made for another kind of processor or a newer LLVM."""
+    import llvmlite.binding as llvm
+
+    machine = target_machine()
+    try:
+        module = llvm.parse_bitcode(bitcode.code)
+    except RuntimeError:
+        return None
+    if module.triple != machine.triple or module.data_layout != str(machine.target_data):
+        return None
+    return Code(bitcode.entries, machine.emit_object(module))
+
+
+@cache
+def _linker() -> Any:
+    import llvmlite.binding as llvm
+
+    return llvm.create_lljit_compiler(target_machine(), use_jit_link=True, suppress_errors=True)
+
+
+_loaded: list[Any] = []  # machine code goes away with LLVM's handle of it
+_numbers = count()
+
+
+def _addresses(name: str, code: Code) -> dict[str, int]:
+    """Load machine code; where its functions are."""
+    import llvmlite.binding as llvm
+
+    builder = llvm.JITLibraryBuilder().add_object_img(code.code).add_current_process()
+    for entry in code.entries:
+        builder.export_symbol(PREFIX + entry)
+    handle = builder.link(_linker(), f"{name}-{next(_numbers)}")
+    _loaded.append(handle)
+    return {entry: handle[PREFIX + entry] for entry in code.entries}

@@ -1,0 +1,66 @@
+"""Random numbers inside kernels, all from one whole number: uniform shares, and points that cover a box evenly."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.fast.simd.compiled import kernel
+from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field
+
+# Constants of splitmix64, without signs: LLVM may assume that a signed number never overflows.
+GOLDEN, FIRST_FACTOR, SECOND_FACTOR = (
+    np.uint64(x) for x in (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB)
+)
+SHIFT_30, SHIFT_27, SHIFT_31, SHIFT_11 = (np.uint64(x) for x in (30, 27, 31, 11))
+SHARE_OF_BIT = 2.0**-53
+LEAST_REST = 1e-12
+
+
+@kernel
+def next_share(table: int, place: int) -> float:
+    """The next number in [0, 1); the state is a field of a table. Source: splitmix64 (Steele, Lea, Flood 2014)."""
+    state: Any = np.uint64(field(table, place)) + GOLDEN
+    set_field(table, place, np.int64(state))
+    mixed = (state ^ (state >> SHIFT_30)) * FIRST_FACTOR
+    mixed = (mixed ^ (mixed >> SHIFT_27)) * SECOND_FACTOR
+    return float(np.int64((mixed ^ (mixed >> SHIFT_31)) >> SHIFT_11)) * SHARE_OF_BIT
+
+
+@kernel
+def next_in_base(x: float, inverse: float) -> float:
+    """The successor of x in the van der Corput sequence of base 1 / inverse: 1 is added to its first digit.
+
+    The carry runs towards the later digits. From a random first point it is a randomised Halton sequence (Struckmeier
+    1995; Wang and Hickernell 2000).
+    """
+    rest = max(1.0 - x - LEAST_REST, LEAST_REST)  # less, as x is rounded
+    if inverse < rest:
+        return x + inverse
+    digit = inverse
+    previous = digit
+    while digit >= rest:
+        previous = digit
+        digit *= inverse
+    return max(x + previous + digit - 1.0, 0.0)
+
+
+@kernel
+def start_points(table: int, place: int, points: int, count: int) -> int:
+    """Set the first point of a sequence in ``count`` dimensions."""
+    for k in range(count):
+        set_double(points, k, next_share(table, place))
+    return count
+
+
+@kernel
+def next_point(table: int, place: int, points: int, inverses: int, count: int) -> int:
+    """Replace a point by the next one: of the Halton sequence, or uniformly random where the inverse base is 0."""
+    for k in range(count):
+        inverse = double_at(inverses, k)
+        if inverse > 0.0:
+            set_double(points, k, next_in_base(double_at(points, k), inverse))
+        else:
+            set_double(points, k, next_share(table, place))
+    return count

@@ -1,0 +1,198 @@
+"""Bodies, pairs and covers as the tables that checks read: what depends on the arm alone, and what on the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Vector
+from rrtik_ompl.fast.tables.layout import PAIRS
+from rrtik_ompl.fast.tables.robot_tables import (
+    MovingBody,
+    Spheres,
+    Table,
+    arm_table,
+    axis_turns,
+    ball_table,
+    moving_body,
+    rounding_margin,
+    usable_cover,
+)
+from rrtik_ompl.fast.tables.scene_tables import Row, inner_rows, outer_rows, rows_table
+from rrtik_ompl.fast.tables.solid_tables import Solids, solid_table
+from rrtik_ompl.robot import Chain
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ArmTables:
+    """All that depends on the moving bodies alone."""
+
+    bodies: tuple[Any, ...]
+    sizes: tuple[int, ...]
+    covers: tuple[Spheres, ...]
+    solids_of: tuple[Solids, ...]
+    pairs: tuple[tuple[int, int], ...]
+    strokes: Vector
+    margin: float
+    arm: Table
+    balls: tuple[Table, Table]
+    solids: Table
+
+    def serves(
+        self,
+        bodies: Sequence[Any],
+        sizes: Sequence[int],
+        covers: Sequence[Spheres],
+        solids_of: Sequence[Solids],
+        pairs: Sequence[tuple[int, int]],
+        strokes: Vector,
+    ) -> bool:
+        """Whether the tables of these bodies would be the same."""
+        return (
+            len(bodies) == len(self.bodies)
+            and tuple(sizes) == self.sizes
+            and tuple(solids_of) == self.solids_of
+            and tuple(pairs) == self.pairs
+            and np.array_equal(strokes, self.strokes)
+            and all(np.array_equal(a, b) for a, b in zip(covers, self.covers, strict=True))
+            and all(_same(a, b) for a, b in zip(bodies, self.bodies, strict=True))
+        )
+
+
+def alike(bodies: Sequence[Any], pairs: Sequence[tuple[int, int]]) -> list[tuple[int, ...]]:
+    """Numbers of the moving bodies in sets that one joint carries and that have the same bodies to keep clear of.
+
+    To the kernels a set is one body: a link of many small solids costs no more than one with a cover of as many balls.
+    """
+    partners: dict[int, set[int]] = {k: set() for pair in pairs for k in pair}
+    for i, j in pairs:
+        partners[i].add(j)
+        partners[j].add(i)
+    sets: dict[tuple[int, frozenset[int]], list[int]] = {}
+    for k in sorted(partners):
+        if bodies[k].joint > 0:
+            sets.setdefault((bodies[k].joint, frozenset(partners[k])), []).append(k)
+    return [tuple(members) for members in sets.values()]
+
+
+def arm_tables(
+    chain: Chain,
+    bodies: Sequence[Any],
+    moving: Sequence[tuple[int, ...]],
+    pairs: Sequence[tuple[int, int]],
+    outer: Sequence[Spheres],
+    inner: Sequence[Spheres],
+    solids: Sequence[Solids],
+    limits: Vector,
+    like: ArmTables | None,
+) -> ArmTables:
+    """Tables of the moving bodies (see :func:`alike`); those of ``like`` if they are the same."""
+    place = {body: k for k, members in enumerate(moving) for body in members}
+    own = tuple(dict.fromkeys((place[i], place[j]) for i, j in map(sorted, pairs) if i in place and j in place))
+    carried, sizes = tuple(bodies[k] for members in moving for k in members), tuple(map(len, moving))
+    covers = tuple(np.asarray(s[k], dtype=np.float64) for members in moving for k in members for s in (outer, inner))
+    solids_of = tuple(solids[k] for members in moving for k in members)
+    if like is not None and like.serves(carried, sizes, covers, solids_of, own, limits):
+        return like
+    reaches = [(bodies[k].joint, _reach(bodies[k], outer[k])) for members in moving for k in members]
+    margin = rounding_margin(chain, reaches, limits)
+    packed = [
+        as_one([moving_body(chain, bodies[k], outer[k], inner[k], margin) for k in members]) for members in moving
+    ]
+    balls = (ball_table(packed, own, inner=False), ball_table(packed, own, inner=True))
+    placed = [(bodies[m[0]].joint, [_carried(chain, bodies[k], solids[k], margin) for k in m]) for m in moving]
+    tables = (arm_table(chain), balls, solid_table(placed))
+    return ArmTables(carried, sizes, covers, solids_of, own, limits, margin, *tables)
+
+
+def _carried(chain: Chain, body: Any, solids: Solids, margin: float) -> Solids:
+    """A body's solids in the turned frame of its joint."""
+    turn = axis_turns(chain)[body.joint - 1].T
+    return solids.placed(turn @ np.array(body.placement.rotation), turn @ np.array(body.placement.translation), margin)
+
+
+def as_one(parts: Sequence[MovingBody]) -> MovingBody:
+    """Bodies that one joint carries as a single one."""
+    outer, inner = np.concatenate([p.outer for p in parts]), np.concatenate([p.inner for p in parts])
+    return MovingBody(parts[0].frame, outer, inner)
+
+
+def checked_table(
+    moving: Sequence[tuple[int, ...]], standing: Sequence[int], pairs: Sequence[tuple[int, int]]
+) -> NDArray[np.bool_]:
+    """Which moving bodies must not touch which standing ones, shape (moving, standing)."""
+    listed = {frozenset(pair) for pair in pairs}
+    checked = np.array([[frozenset((members[0], j)) in listed for j in standing] for members in moving], dtype=bool)
+    return checked.reshape(len(moving), len(standing))
+
+
+def standing_tables(
+    bodies: Sequence[Any],
+    standing: Sequence[int],
+    checked: NDArray[np.bool_],
+    outer: Sequence[Spheres],
+    inner: Sequence[Spheres],
+) -> tuple[Table, Table]:
+    """Rows that contain what stands still, and rows inside it."""
+    around = [(s, row) for s, k in enumerate(standing) for row in outer_rows(bodies[k], outer[k])]
+    inside = [(s, row) for s, k in enumerate(standing) for row in inner_rows(bodies[k], inner[k])]
+    return rows_table(around, checked), rows_table(inside, checked)
+
+
+class PlacedRows:
+    """Rows around standing bodies; those of a body that has not changed are kept."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, tuple[Any, float, list[Row]]] = {}
+
+    def rows(
+        self, bodies: Sequence[Any], standing: Sequence[int], outer: Sequence[Spheres], rooms: Sequence[float]
+    ) -> list[tuple[int, Row]]:
+        """Rows that contain all points within margin and ``rooms`` [m] of bodies, with their places in ``standing``."""
+        for k in standing:
+            known = self._known.get(k)
+            if known is None or known[0] is not bodies[k] or known[1] != rooms[k]:
+                self._known[k] = bodies[k], rooms[k], outer_rows(bodies[k], outer[k], rooms[k])
+        return [(place, row) for place, k in enumerate(standing) for row in self._known[k][2]]
+
+
+def standing_solids(bodies: Sequence[Any], standing: Sequence[int], solids: Sequence[Solids]) -> Table:
+    """Solids of what stands still, each with its margin around it."""
+    poses = [(np.array(bodies[k].placement.rotation), np.array(bodies[k].placement.translation)) for k in standing]
+    grown = [solids[k].grown(bodies[k].margin) for k in standing]
+    return solid_table([(0, [each.placed(*pose, 0.0)]) for each, pose in zip(grown, poses, strict=True)])
+
+
+def flag_places(
+    pairs: Sequence[tuple[int, int]], arm: ArmTables, moving: Sequence[tuple[int, ...]], standing: Sequence[int]
+) -> dict[int, list[tuple[int, int]]]:
+    """For each flag that the kernels can set the pairs that it stands for."""
+    listed = {frozenset(pair): pair for pair in pairs}
+
+    def between(first: Sequence[int], second: Sequence[int]) -> list[tuple[int, int]]:
+        both = (frozenset((i, j)) for i in first for j in second)
+        return [listed[pair] for pair in both if pair in listed]
+
+    crossing = [between(members, (j,)) for members in moving for j in standing]
+    own = [between(moving[i], moving[j]) for i, j in arm.balls[0][PAIRS].reshape(-1, 2)]
+    return dict(enumerate(crossing + own))
+
+
+def _reach(body: Any, outer: Spheres) -> float:
+    """Distance of the farthest point of a body's outer spheres from its joint's frame [m]."""
+    spheres = usable_cover(body.geometry, outer)
+    centres = spheres[:, :3] @ np.array(body.placement.rotation).T + np.array(body.placement.translation)
+    return float((np.linalg.norm(centres, axis=1) + spheres[:, 3]).max())
+
+
+def _same(first: Any, second: Any) -> bool:
+    """Whether two bodies are the same solid carried in the same way."""
+    return (
+        first.joint == second.joint
+        and first.geometry is second.geometry
+        and np.array_equal(first.placement.homogeneous, second.placement.homogeneous)
+    )

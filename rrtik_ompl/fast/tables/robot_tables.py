@@ -1,0 +1,264 @@
+"""The arm as flat tables for the kernels: joints, and balls grouped by joint, body and neighbourhood.
+
+Places of fields: :mod:`rrtik_ompl.fast.tables.layout`. A table owns the float32 and int32 arrays whose addresses it
+holds. Every joint frame is turned so that its axis is z; the balls and the frames of the next joints are turned along.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.fast.tables.layout import (
+    ALIGNMENT,
+    BALLS,
+    BODIES,
+    BODY_BALLS,
+    BODY_COUNT,
+    CLUSTER_BALLS,
+    CLUSTER_COUNT,
+    CLUSTERS,
+    GROUP_BALLS,
+    GROUP_COUNT,
+    GROUPS,
+    JOINT_COUNT,
+    PAIR_COUNT,
+    PAIR_GROUP_COUNT,
+    PAIR_GROUPS,
+    PAIRS,
+    PARENTS,
+    PLACEMENTS,
+    SLIDING,
+)
+from rrtik_ompl.robot import Chain
+
+Spheres: TypeAlias = NDArray[np.float64]  # shape (n, 4): centre and radius [m]
+Header: TypeAlias = NDArray[np.int64]
+
+CLUSTER_SIZE = 8  # balls in the smallest neighbourhood, at most
+FAR = 1e6  # [m] radius of the ball that stands for a body without end
+
+SMALLEST_MARGIN = 2e-5  # [m]
+MARGIN_PER_LEVER = 1e-6  # a joint's rotation in float32 errs by less than this angle [rad]
+MARGIN_PER_METRE = 5e-6  # relative error of a coordinate in float32, with room for all that is added up
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Table:
+    """Fields for the kernels, where they are, and the arrays whose addresses they hold."""
+
+    header: Header
+    arrays: dict[int, NDArray[Any]]
+    address: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "address", int(self.header.ctypes.data))
+
+    def __getitem__(self, place: int) -> NDArray[Any]:
+        return self.arrays[place]
+
+
+def table(fields: Mapping[int, int | NDArray[Any]]) -> Table:
+    """A table from its fields; every place from 0 up has one."""
+    arrays = {place: aligned(value) for place, value in fields.items() if isinstance(value, np.ndarray)}
+    header = [arrays[place].ctypes.data if place in arrays else fields[place] for place in range(len(fields))]
+    return Table(np.array(header, dtype=np.int64), arrays)
+
+
+def aligned(array: NDArray[Any]) -> NDArray[Any]:
+    """A copy that starts on a multiple of ``ALIGNMENT`` bytes and is never empty (so that it has an address)."""
+    memory = np.zeros(array.nbytes + 2 * ALIGNMENT, dtype=np.uint8)
+    start = -memory.ctypes.data % ALIGNMENT
+    copy = memory[start : start + array.nbytes].view(array.dtype)
+    copy[:] = array.ravel()
+    return copy
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MovingBody:
+    """What the kernels know of a body: the frame that carries it and its balls in that (turned) frame."""
+
+    frame: int
+    outer: Spheres
+    inner: Spheres
+
+
+def arm_table(chain: Chain) -> Table:
+    """The joints of a tree."""
+    turns = axis_turns(chain)
+    placements = np.empty((len(chain.parent), 12))
+    for row, parent in enumerate(chain.parent):
+        back = turns[parent].T if parent >= 0 else np.eye(3)
+        placements[row, :9] = (back @ chain.placement[row][:3, :3] @ turns[row]).ravel()
+        placements[row, 9:] = back @ chain.placement[row][:3, 3]
+    return table(
+        {
+            JOINT_COUNT: len(chain.parent),
+            PARENTS: chain.parent.astype(np.int32) + np.int32(1),
+            SLIDING: chain.prismatic.astype(np.int32),
+            PLACEMENTS: placements.astype(np.float32),
+        }
+    )
+
+
+def axis_turns(chain: Chain) -> NDArray[np.float64]:
+    """For each joint a rotation that takes z to the joint's axis, shape (n, 3, 3)."""
+    turns = np.empty((len(chain.parent), 3, 3))
+    for row, axis in enumerate(chain.axis):
+        helper = np.eye(3)[np.argmin(np.abs(axis))]
+        x = np.cross(helper, axis) / np.linalg.norm(np.cross(helper, axis))
+        turns[row] = np.column_stack([x, np.cross(axis, x), axis])
+    return turns
+
+
+def moving_body(chain: Chain, body: Any, outer: Spheres, inner: Spheres, margin: float) -> MovingBody:
+    """A body's balls in the turned frame of its joint, the outer ones grown and the inner ones shrunk by ``margin``.
+
+    A body without outer cover is given its bounding ball.
+    """
+    turn = axis_turns(chain)[body.joint - 1].T
+    cover = usable_cover(body.geometry, outer)
+    grown, shrunk = (_moved(body.placement, spheres, turn) for spheres in (cover, inner))
+    grown[:, 3] += margin
+    shrunk[:, 3] -= margin
+    return MovingBody(body.joint, grown, shrunk[shrunk[:, 3] > 0.0])
+
+
+def usable_cover(geometry: Any, outer: Spheres) -> Spheres:
+    """The outer spheres of a body, or its bounding ball if there are none or they have no end."""
+    spheres = np.asarray(outer, dtype=np.float64).reshape(-1, 4)
+    return spheres if len(spheres) and np.abs(spheres).max() < FAR else bounding_ball(geometry)
+
+
+def _moved(placement: Any, spheres: Spheres, turn: Matrix) -> Spheres:
+    moved = np.array(spheres, dtype=np.float64).reshape(-1, 4)
+    moved[:, :3] = (moved[:, :3] @ placement.rotation.T + placement.translation) @ turn.T
+    return moved
+
+
+def bounding_ball(geometry: Any) -> Spheres:
+    """A ball that contains a coal geometry, shape (1, 4); a huge one if the geometry has no end."""
+    radius = float(geometry.aabb_radius)
+    if not (0.0 <= radius < FAR and np.abs(geometry.aabb_center).max() < FAR):
+        return np.array([[0.0, 0.0, 0.0, FAR]])
+    return np.array([[*geometry.aabb_center, radius]])
+
+
+def rounding_margin(chain: Chain, reaches: Sequence[tuple[int, float]], strokes: Vector) -> float:
+    """How far float32 may misplace a ball [m], with room to spare.
+
+    Each joint turns all that it carries by a rotation that errs by less than ``MARGIN_PER_LEVER``, so it contributes
+    that angle times the farthest point that it carries; coordinates err in proportion to their size.
+
+    Args:
+        chain: The tree.
+        reaches: For each moving body its joint number and the distance of its farthest point from the joint's frame.
+        strokes: Largest value of each sliding joint [m], shape (n,).
+    """
+    count = len(chain.parent)
+    levers, extent = np.zeros(count), 0.0
+    for joint, reach in reaches:
+        levers[joint - 1] = max(levers[joint - 1], reach)
+    for row in range(count - 1, -1, -1):  # children come after their parents, so they are done first
+        parent = chain.parent[row]
+        reach = levers[row] + float(np.linalg.norm(chain.placement[row][:3, 3]))
+        reach += strokes[row] if chain.prismatic[row] else 0.0
+        extent = max(extent, reach)
+        if parent >= 0:
+            levers[parent] = max(levers[parent], reach)
+    return max(SMALLEST_MARGIN, MARGIN_PER_LEVER * float(levers.sum()), MARGIN_PER_METRE * extent)
+
+
+def ball_table(bodies: Sequence[MovingBody], pairs: Sequence[tuple[int, int]], *, inner: bool) -> Table:
+    """Balls of the moving bodies in three levels, and the pairs of bodies (numbers in ``bodies``) to test.
+
+    Args:
+        bodies: The moving bodies.
+        pairs: Pairs of them that must not touch.
+        inner: Whether to take the inner balls; bodies without balls take no part.
+    """
+    shapes = [body.inner if inner else body.outer for body in bodies]
+    frames = sorted({b.frame for b, balls in zip(bodies, shapes, strict=True) if len(balls)}, reverse=True)
+    groups: list[tuple[int, int, int]] = []
+    clusters: list[tuple[int, int, int, int]] = []
+    balls: list[Spheres] = []
+    spans = np.zeros((len(bodies), 3), dtype=np.int32)
+    for frame in frames:
+        start = len(clusters)
+        for number, body in enumerate(bodies):
+            if body.frame == frame and len(shapes[number]):
+                parts = neighbourhoods(shapes[number])
+                spans[number] = frame, len(clusters), len(clusters) + len(parts)
+                for part in parts:
+                    first = sum(len(b) for b in balls)
+                    clusters.append((number, frame, first, first + len(part)))
+                    balls.append(part)
+        groups.append((frame, start, len(clusters)))
+    stacked = np.concatenate([np.zeros((0, 4)), *balls])
+    group_of = {frame: k for k, frame in enumerate(frames)}
+    body_balls = [enclosing_ball(s) if len(s) else np.zeros(4) for s in shapes]
+    present = [(i, j) for i, j in pairs if len(shapes[i]) and len(shapes[j])]
+    present.sort(key=lambda p: sorted(group_of[bodies[k].frame] for k in p))
+    pair_groups = _pair_groups([(group_of[bodies[i].frame], group_of[bodies[j].frame]) for i, j in present])
+    group_balls = [enclosing_ball(stacked[clusters[a][2] : clusters[b - 1][3]]) for _, a, b in groups]
+    return table(
+        {
+            GROUP_COUNT: len(groups),
+            GROUPS: np.array(groups, dtype=np.int32),
+            GROUP_BALLS: np.array(group_balls, dtype=np.float32),
+            CLUSTERS: np.array(clusters, dtype=np.int32),
+            CLUSTER_BALLS: np.array([enclosing_ball(b) for b in balls], dtype=np.float32),
+            BALLS: stacked.astype(np.float32),
+            BODIES: spans,
+            BODY_BALLS: np.array(body_balls, dtype=np.float32),
+            PAIR_GROUP_COUNT: len(pair_groups),
+            PAIR_GROUPS: np.array(pair_groups, dtype=np.int32),
+            PAIRS: np.array(present, dtype=np.int32),
+            CLUSTER_COUNT: len(clusters),
+            BODY_COUNT: len(bodies),
+            PAIR_COUNT: len(present),
+        }
+    )
+
+
+def _pair_groups(groups: Sequence[tuple[int, int]]) -> list[tuple[int, int, int, int]]:
+    """Runs of pairs between the same two groups: group, group, first pair, end."""
+    runs: list[tuple[int, int, int, int]] = []
+    for k, (first, second) in enumerate(groups):
+        if runs and {first, second} == set(runs[-1][:2]):
+            runs[-1] = (*runs[-1][:3], k + 1)
+        else:
+            runs.append((first, second, k, k + 1))
+    return runs
+
+
+def neighbourhoods(spheres: Spheres) -> list[Spheres]:
+    """Split balls in halves across their widest spread until no part has more than ``CLUSTER_SIZE``; large first."""
+    if len(spheres) <= CLUSTER_SIZE:
+        return [spheres[np.argsort(-spheres[:, 3])]]
+    axis = int(np.argmax(np.ptp(spheres[:, :3], axis=0)))
+    order = np.argsort(spheres[:, axis], kind="stable")
+    middle = len(spheres) // 2
+    return neighbourhoods(spheres[order[:middle]]) + neighbourhoods(spheres[order[middle:]])
+
+
+def enclosing_ball(spheres: Spheres) -> Vector:
+    """A small ball around balls, shape (4,): steps towards the farthest one (Badoiu and Clarkson 2003), best kept."""
+    if len(spheres) == 1:
+        return np.array(spheres[0])
+    centres, radii = spheres[:, :3], spheres[:, 3]
+    centre = 0.5 * ((centres - radii[:, None]).min(axis=0) + (centres + radii[:, None]).max(axis=0))
+    best, radius = centre, np.inf
+    for step in range(1, 41):
+        depths = np.linalg.norm(centres - centre, axis=1) + radii
+        farthest = int(np.argmax(depths))
+        if depths[farthest] < radius:
+            best, radius = centre, float(depths[farthest])
+        centre = centre + (centres[farthest] - centre) / (step + 3)
+    slack = MARGIN_PER_LEVER * (radius + float(np.abs(best).max()))
+    return np.array([*best, radius + slack])

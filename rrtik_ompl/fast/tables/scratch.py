@@ -1,0 +1,51 @@
+"""Memory that kernels compute in."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rrtik_ompl.fast.simd.processor import WIDTH
+from rrtik_ompl.fast.tables import layout
+from rrtik_ompl.fast.tables.robot_tables import Table, table
+
+
+def workspace(arm: Table, balls: tuple[Table, ...], rows: tuple[Table, ...]) -> Table:
+    """Memory for one thread that checks with these tables; the frame of the world is in place."""
+
+    def most(tables: tuple[Table, ...], place: int) -> int:
+        return max(int(t.header[place]) for t in tables)
+
+    frames = np.zeros((int(arm.header[layout.JOINT_COUNT]) + 1, 12, WIDTH), dtype=np.float32)
+    frames[0, [0, 4, 8]] = 1.0
+    ball_count = max(len(t[layout.BALLS]) // 4 for t in balls)
+    row_list = np.zeros(most(rows, layout.PADDED_COUNT), dtype=np.int32)
+    crossing = most(balls, layout.BODY_COUNT) * most(rows, layout.STANDING_COUNT)
+    return table(
+        {
+            layout.VALUES: np.zeros((len(frames), WIDTH)),
+            layout.FRAMES: frames,
+            layout.GROUP_CENTRES: np.zeros((most(balls, layout.GROUP_COUNT), 3, WIDTH), dtype=np.float32),
+            layout.CENTRES: np.zeros((ball_count, 3, WIDTH), dtype=np.float32),
+            layout.PLACED: np.zeros(most(balls, layout.CLUSTER_COUNT), dtype=np.int32),
+            layout.FOUND: row_list,
+            layout.NEAR: row_list,
+            layout.MET: row_list,
+            layout.WAITING: np.zeros(WIDTH, dtype=np.int32),
+            layout.OUTER_LAST: np.full(3, -1, dtype=np.int32),
+            layout.INNER_LAST: np.full(3, -1, dtype=np.int32),
+            layout.NOTE: np.zeros(WIDTH, dtype=np.float32),
+            layout.MARKS: np.zeros(crossing + most(balls, layout.PAIR_COUNT), dtype=np.int32),
+        }
+    )
+
+
+def probe_table(rows: tuple[Table, ...]) -> Table:
+    """Memory for measuring distances against any of these tables of rows."""
+    listed = max(int(t.header[layout.PADDED_COUNT]) for t in rows)
+    return table(
+        {
+            layout.BEST: np.zeros(WIDTH, dtype=np.float32),
+            layout.WHICH: np.zeros(WIDTH, dtype=np.int32),
+            layout.GAPS: np.zeros((listed, WIDTH), dtype=np.float32),
+        }
+    )

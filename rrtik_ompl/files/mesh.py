@@ -1,0 +1,111 @@
+"""Mesh files (STL text and binary, OBJ, DAE) -> `shapes.Mesh`, read by assimp through coal."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import coal
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix, positive
+from rrtik_ompl.errors import InputError, MeshWarning
+from rrtik_ompl.files.text import file_name, read_bytes
+from rrtik_ompl.shapes import Mesh
+
+SUFFIXES = (".stl", ".obj", ".dae")
+MAX_BYTES = 256 * 1024 * 1024
+
+
+def load_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
+    """Read a triangle mesh.
+
+    Polygons are cut into triangles, equal vertices merged, triangles without area dropped. A closed mesh whose
+    triangles all look inwards is turned inside out. The unit that a DAE file states is honoured, its up axis is not.
+
+    Args:
+        path: File whose name ends in .stl, .obj or .dae.
+        scale: Metres per unit of the file.
+
+    Raises:
+        InputError: If the file cannot be read, is broken, or holds no triangle.
+
+    Warns:
+        MeshWarning: If the surface is not closed (or not manifold): it is then treated as a surface, not as a solid.
+    """
+    file_name(path)
+    factor = positive(scale, f"{path}: scale")
+    if Path(path).suffix.lower() not in SUFFIXES:
+        raise InputError(f"{path}: unknown kind of mesh; have {', '.join(SUFFIXES)}; export it as STL")
+    data = read_bytes(path, MAX_BYTES)
+    if not data:
+        raise InputError(f"{path}: the file is empty; export the mesh again")
+    vertices, triangles = _read(path, factor * _stated_unit(path, data))
+    mesh = Mesh(vertices, triangles, source=os.path.abspath(path), scale=factor)
+    if not mesh.closed:
+        message = f"{path}: {mesh.open_edges} open edges; the mesh is treated as a surface, not as a solid"
+        warnings.warn(message, MeshWarning, stacklevel=2)
+    elif _volume(mesh) < 0.0:
+        mesh = Mesh(mesh.vertices, mesh.triangles[:, ::-1], source=mesh.source, scale=factor)
+    return mesh
+
+
+def _read(path: str | os.PathLike[str], scale: float) -> tuple[Matrix, NDArray[np.int64]]:
+    try:
+        with _silent_stderr():  # coal prints on numbers that are not finite before we can refuse them
+            model = coal.MeshLoader().load(os.fspath(path), np.full(3, scale))
+    except (ValueError, RuntimeError) as error:
+        raise InputError(f"{path}: not a usable mesh: {_reason(error)}; export it again as STL, OBJ or DAE") from error
+    corners: list[Any] = [model.tri_indices(k) for k in range(model.num_tris)]
+    triangles = np.array([(t[0], t[1], t[2]) for t in corners], dtype=np.int64).reshape(-1, 3)
+    return np.array(model.vertices(), dtype=np.float64), triangles
+
+
+def _reason(error: Exception) -> str:
+    """What assimp says, without paths, hints and places in its source."""
+    lines = [line.strip().removeprefix("message: ") for line in str(error).splitlines() if line.strip()]
+    noise = ("From file:", "in function:", "at line:", "Could not load resource", "Hint:")
+    said = [line for line in lines if not line.startswith(noise)]
+    if not said or any("No meshes" in line for line in lines):
+        return "no triangles in it"
+    return said[-1].rstrip(".")
+
+
+def _stated_unit(path: str | os.PathLike[str], data: bytes) -> float:
+    """Metres per unit as a COLLADA file states it, which coal does not look at; 1 for the other formats."""
+    if Path(path).suffix.lower() != ".dae":
+        return 1.0
+    try:
+        root = ElementTree.fromstring(data)
+        unit = root.find("{*}asset/{*}unit")
+        metres = 1.0 if unit is None else float(unit.get("meter", "1"))
+    except (ElementTree.ParseError, ValueError, LookupError) as error:  # LookupError: an encoding nobody knows
+        raise InputError(f"{path}: not a usable mesh: {error}; export it again as STL, OBJ or DAE") from error
+    if not 0.0 < metres < float("inf"):
+        raise InputError(f"{path}: its unit must be greater than 0 metres, found {metres:g}; export it again")
+    return metres
+
+
+def _volume(mesh: Mesh) -> float:
+    """Signed volume [m^3] by the divergence theorem: positive if the triangles look outwards."""
+    a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
+
+
+@contextmanager
+def _silent_stderr() -> Iterator[None]:
+    """Send what C++ writes to file descriptor 2 to nowhere."""
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)

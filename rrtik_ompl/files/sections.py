@@ -1,0 +1,181 @@
+"""What the sections of our YAML files are made of, and how a pydantic complaint becomes one line for a person."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from difflib import get_close_matches
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, ValidationError, model_validator
+from pydantic_core import PydanticCustomError
+
+from rrtik_ompl.files.strict_yaml import Location, YamlDocument, describe
+from rrtik_ompl.files.text import is_number
+
+LARGEST, SMALLEST = 1e6, 1e-6  # [m]; geometry beyond is a slip of the pen and breaks collision checking
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=LARGEST)]
+NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=LARGEST)]
+Length = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=SMALLEST, le=LARGEST)]
+Name = Annotated[str, Field(min_length=1)]
+Sizes3 = Annotated[list[Length], Field(min_length=3, max_length=3)]
+Vector2 = Annotated[list[Number], Field(min_length=2, max_length=2)]
+Vector3 = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Vector4 = Annotated[list[Number], Field(min_length=4, max_length=4)]
+Numbers = Annotated[list[Number], Field(min_length=1)]
+
+
+def _one(value: Any) -> Any:
+    if value is True:  # equal to 1 in Python, but not what a file should say
+        raise PydanticCustomError("version", "must be 1, found true")
+    return value
+
+
+Version = Annotated[Literal[1], BeforeValidator(_one)]
+
+_TAG = "<"  # tags of unions begin with it, so that they can be told from the keys in an error's location
+
+
+class Section(BaseModel):
+    """A group of keys in a file; a key that it does not know is an error that lists those it knows."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _only_known_keys(cls, data: Any) -> Any:
+        for key in data if isinstance(data, dict) else ():
+            if key not in cls.model_fields and cls.model_config.get("extra") == "forbid":
+                near = get_close_matches(str(key), cls.model_fields, n=1)
+                raise PydanticCustomError(
+                    "unknown_key",
+                    "unknown key '{key}'; {hint}allowed keys: {allowed}",
+                    {
+                        "key": str(key),
+                        "hint": f"did you mean '{near[0]}'? " if near else "",
+                        "allowed": ", ".join(cls.model_fields),
+                    },
+                )
+            if data[key] is None:
+                message = "nothing stands after the colon; give a value or delete the key"
+                raise PydanticCustomError("empty_key", message, {"key": str(key)})
+        return data
+
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def told_apart_by(*keys: str, what: str, text: str | None = None) -> Discriminator:
+    """Choose the member of a union by which of ``keys`` is there; members are tagged ``tag(key)``.
+
+    Args:
+        keys: The keys that tell the members apart.
+        what: Name of the union in the message if none of them is there.
+        text: Tag word of the member that is plain text, if there is one.
+    """
+
+    def choose(data: Any) -> str | None:
+        if isinstance(data, BaseModel):
+            return next((tag(key) for key in keys if key in type(data).model_fields), None)
+        if text is not None and isinstance(data, str):
+            return tag(text)
+        return next((tag(key) for key in keys if key in data), None) if isinstance(data, dict) else None
+
+    message = f"needs one of the keys {', '.join(keys)}" + (f", or {text}" if text else "")
+    return Discriminator(choose, custom_error_type="no_kind", custom_error_message=f"{what} {message}")
+
+
+def tag(key: str) -> str:
+    """Tag of the union member that is known by ``key``."""
+    return f"{_TAG}{key}>"
+
+
+def exactly_one(section: BaseModel, keys: Iterable[str], what: str) -> str:
+    """The only one of ``keys`` that has a value in a validated section.
+
+    Raises:
+        PydanticCustomError: If none or several have one.
+    """
+    wanted = tuple(keys)
+    given = [key for key in wanted if getattr(section, key) is not None]
+    if len(given) == 1:
+        return given[0]
+    found = " and ".join(given) if given else "none of them"
+    raise PydanticCustomError("kind", f"{what} needs exactly one of {', '.join(wanted)}; found {found}")
+
+
+def parse(document: YamlDocument, model: type[Model], data: Any = None) -> Model:
+    """Check a document against a model.
+
+    Args:
+        document: The file.
+        model: Its pydantic model.
+        data: What to check instead of the document's top level (same locations).
+
+    Raises:
+        InputError: One line with file, line, key, what was found and the remedy; further errors are counted.
+    """
+    try:
+        return model.model_validate(document.data if data is None else data)
+    except ValidationError as error:
+        first, *others = error.errors(include_url=False)
+        more = f" (and {len(others)} more)" if others else ""
+        raise document.error(_location(first), _message(first) + more) from None
+
+
+def without_null(schema: Any) -> Any:
+    """A JSON schema in which an absent key is absent, never null (pydantic writes ``anyOf: [.., null]``)."""
+    if isinstance(schema, list):
+        return [without_null(item) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    cleaned = {k: without_null(v) for k, v in schema.items() if not (k == "default" and v is None)}
+    choices = [choice for choice in cleaned.get("anyOf", ()) if choice != {"type": "null"}]
+    if len(choices) == 1:
+        del cleaned["anyOf"]
+        return {**choices[0], **cleaned}
+    return cleaned | ({"anyOf": choices} if choices else {})
+
+
+def _location(error: Any) -> Location:
+    parts = tuple(part for part in error["loc"] if not (isinstance(part, str) and part.startswith(_TAG)))
+    key = error.get("ctx", {}).get("key")
+    return parts if key is None else (*parts, key)
+
+
+def _message(error: Any) -> str:
+    write = _MESSAGES.get(error["type"])
+    found = describe(error["input"])
+    if write is not None:
+        return write(error.get("ctx", {}), found)
+    return str(error["msg"])
+
+
+def _must_be(what: str) -> Callable[[dict[str, Any], str], str]:
+    def write(_context: dict[str, Any], found: str) -> str:
+        quoted = "number" in what and is_number(found.removeprefix("text '").removesuffix("'"))
+        return f"must be {what}, found {found}" + ("; write it without quotes" if quoted else "")
+
+    return write
+
+
+_MESSAGES: dict[str, Callable[[dict[str, Any], str], str]] = {
+    "missing": lambda _context, _found: "missing; add this key",
+    "float_type": _must_be("a number"),
+    "int_type": _must_be("a whole number"),
+    "bool_type": _must_be("true or false"),
+    "string_type": lambda _context, found: f"must be text, found {found}; put it in quotes if it is a name",
+    "list_type": _must_be("a list in square brackets"),
+    "model_type": _must_be("a group of keys"),
+    "model_attributes_type": _must_be("a group of keys"),
+    "dict_type": _must_be("a group of keys"),
+    "finite_number": _must_be("a finite number"),
+    "greater_than": lambda context, found: f"must be greater than {context['gt']:g}, found {found}",
+    "less_than_equal": lambda context, found: f"must be {context['le']:g} or less, found {found}",
+    "greater_than_equal": lambda context, found: f"must be {context['ge']:g} or more, found {found}",
+    "too_short": lambda context, found: f"needs at least {context['min_length']} entries, found {found}",
+    "too_long": lambda context, found: f"takes at most {context['max_length']} entries, found {found}",
+    "string_too_short": lambda _context, _found: "must not be empty",
+    "literal_error": lambda context, found: f"must be {context['expected']}, found {found}",
+}

@@ -1,0 +1,118 @@
+"""The text of a path file: JSON (complete), CSV with a header of joint names, OMPL's matrix text; written and read."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from typing import Any
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.text import file_name, is_number
+
+FORMATS = (".json", ".csv", ".txt")
+
+
+def path_format(path: str | os.PathLike[str]) -> str:
+    """Ending of a path file, one of ``FORMATS``.
+
+    Raises:
+        InputError: If it is another one.
+    """
+    ending = file_name(path).suffix.lower()
+    if ending not in FORMATS:
+        raise InputError(f"{path}: unknown ending '{ending}' for a path; use {', '.join(FORMATS)}")
+    return ending
+
+
+def encoded(document: dict[str, Any], ending: str) -> str:
+    """Text of a path: ``document`` holds ``waypoints``, ``joint_names`` and whatever else JSON shall keep."""
+    if ending == ".json":
+        return json.dumps(document, indent=1) + "\n"
+    text = io.StringIO()
+    table = csv.writer(text, delimiter="," if ending == ".csv" else " ", lineterminator="\n")
+    if ending == ".csv":
+        table.writerow(document["joint_names"])
+    table.writerows([repr(value) for value in row] for row in document["waypoints"])
+    return text.getvalue()
+
+
+def decoded(text: str, ending: str) -> dict[str, Any]:
+    """What :func:`encoded` wrote: ``waypoints``, and ``joint_names``, ``units`` and so on if the text says them.
+
+    Raises:
+        InputError: If the text is malformed; the message names the line or the key.
+    """
+    if ending == ".json":
+        return json_object(text, "joint_path", "waypoints")
+    return _from_table(text, "," if ending == ".csv" else None)
+
+
+def json_object(text: str, kind: str, key: str) -> dict[str, Any]:
+    """The JSON object of a file of version 1 and of this kind, that has this key; names and units are checked.
+
+    Raises:
+        InputError: If the text is something else; the message names the line or the key.
+    """
+    file = f"is this a {kind.partition('_')[2]} file?"
+    try:
+        document = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise InputError(f"line {error.lineno}: not JSON: {error.msg}") from None
+    except RecursionError:
+        raise InputError(f"lists are nested too deeply; {file}") from None
+    except ValueError:
+        raise InputError(f"holds a number of thousands of digits; {file}") from None
+    if not isinstance(document, dict) or key not in document:
+        raise InputError(f"expected an object with the key '{key}'; {file}")
+    _check_heads(document, kind)
+    return document
+
+
+def _check_heads(document: dict[str, Any], kind: str) -> None:
+    for key, expected in (("version", 1), ("kind", kind)):
+        if document.get(key, expected) != expected:
+            raise InputError(f"{key}: expected {expected!r}, got {document[key]!r}")
+    for key in ("units", "joint_names", "continuous"):
+        words = document.get(key)
+        if words is not None and not (isinstance(words, list) and all(isinstance(word, str) for word in words)):
+            kind = "names of joints" if key == "continuous" else "text, one per joint"
+            raise InputError(f"{key}: expected a list of {kind}")
+    for unit in document.get("units") or ():
+        if unit not in ("rad", "m"):
+            raise InputError(f"units: expected 'rad' or 'm' for each joint, got {unit!r}; convert the waypoints")
+
+
+def _from_table(text: str, separator: str | None) -> dict[str, Any]:
+    names, rows = table_rows(text, separator)
+    return {"waypoints": rows} if names is None else {"waypoints": rows, "joint_names": names}
+
+
+def table_rows(text: str, separator: str | None) -> tuple[list[str] | None, list[list[float]]]:
+    """Names (if there is a separator, then they stand in the first line) and numbers of a table.
+
+    Raises:
+        InputError: If a line is malformed; the message names it.
+    """
+    lines = [(k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip()]
+    if not lines:
+        raise InputError("the file is empty; expected one configuration a line")
+    names = None
+    if separator is not None:
+        names = [name.strip() for name in next(csv.reader(io.StringIO(lines[0][1])))]
+        if all(is_number(name) for name in names):
+            raise InputError("line 1: expected the names of the joints, found numbers; add a line of names")
+        lines = lines[1:]
+    rows: list[list[float]] = []
+    for number, line in lines:
+        cells = line.split(separator)
+        try:
+            rows.append([float(cell) for cell in cells])
+        except ValueError:
+            raise InputError(f"line {number}: expected numbers, got {line.strip()[:60]!r}") from None
+        if len(rows[-1]) != len(names or rows[0]):
+            raise InputError(f"line {number}: expected {len(names or rows[0])} numbers, got {len(cells)}")
+    if not rows:
+        raise InputError("the file holds joint names only; expected one configuration a line below them")
+    return names, rows

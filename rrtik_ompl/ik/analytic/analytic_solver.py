@@ -1,0 +1,100 @@
+"""What a robot brings that knows its own inverse kinematics: a function from poses to branches, and what to call them.
+
+A robot's folder makes one `ClosedFormSolver` and hands it to `Robot` as ``closed_form``;
+`rrtik_ompl.ik.analytic.closed_form` places it in the world, applies the joint limits and checks the answers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.fast.ik.branch_layout import DOUBLE_ROOT, REACH_TOLERANCE
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Branches:
+    """All postures for m poses, b of them each.
+
+    Attributes:
+        q: Joint values, angles in (-pi, pi], shape (m, b, dof). A branch that is not real holds the posture that
+            comes nearest on that branch, so that its residual says how far the pose is out of reach.
+        real: Which branches reach the pose, joint limits aside, shape (m, b).
+        singular: Bit k is set if the pose belongs to family k of `ClosedFormSolver.families`: it has a whole curve of
+            solutions, of which ``q`` holds representatives. Shape (m,).
+    """
+
+    q: NDArray[np.float64]
+    real: NDArray[np.bool_]
+    singular: NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ClosedFormSolver:
+    """The inverse kinematics of one arm in formulas.
+
+    Attributes:
+        frame: The frame that the targets refer to.
+        kind: ``"pose"``; or ``"position"`` if the orientation of the targets is ignored.
+        branches: A label for each branch.
+        families: Names of the kinds of singular poses.
+        free: The joints that tell where on a family's curve a configuration lies (see ``solve``).
+        solve: From T_base_frame, shape (m, 4, 4), ``near``, shape (m, dof) or None, and a slack, to `Branches`. The
+            representatives of a singular pose are the members of its curve nearest to the values that the free joints
+            have in ``near`` (0 if None), and to these values turned by half a turn. The number is the slack [m, sine]:
+            a pose that near to a singular one is answered as if it were singular, off by at most about that.
+        nearness: From Q, shape (m, dof), to the named singular cases: 0 at the singularity, in [0, 1] or metres.
+        kernel: The function of `rrtik_ompl.fast.ik.branch_kernels` that gives the same for poses that are not singular,
+            "" if there is none; and the ``numbers`` that it takes.
+    """
+
+    frame: str
+    kind: str
+    branches: tuple[str, ...]
+    families: tuple[str, ...]
+    free: tuple[int, ...]
+    solve: Callable[[NDArray[np.float64], Matrix | None, float], Branches]
+    nearness: Callable[[Matrix], Mapping[str, Vector]]
+    kernel: str = ""
+    numbers: tuple[float, ...] = ()
+
+    def __call__(self, poses: NDArray[np.float64], near: Matrix | None = None, slack: float = 0.0) -> Branches:
+        """All branches for T_base_frame, shape (m, 4, 4); see ``solve``."""
+        return self.solve(poses, near, slack)
+
+
+def wrapped(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Angles moved by full turns into (-pi, pi]."""
+    turned: NDArray[np.float64] = angle - 2.0 * np.pi * np.ceil(angle / (2.0 * np.pi) - 0.5)
+    return turned
+
+
+def two_links(
+    first: float, second: float, x: NDArray[np.float64], y: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], Mask]:
+    """Both ways in which two links in a plane reach a point (law of cosines).
+
+    Args:
+        first: Length of the link at the origin [m].
+        second: Length of the other [m].
+        x: Of the point [m], any shape.
+        y: Of the point [m], same shape.
+
+    Returns:
+        The angle of the first link and the turn of the second against it, a leading axis of 2 added, positive turn
+        first; and whether the point is in reach. Out of reach the links point at it, stretched or folded.
+    """
+    cosine = (x * x + y * y - (first * first + second * second)) / (2.0 * first * second)
+    real = np.abs(cosine) <= 1.0 + REACH_TOLERANCE
+    np.clip(cosine, -1.0, 1.0, out=cosine)
+    square = (1.0 - cosine) * (1.0 + cosine)
+    square[square < DOUBLE_ROOT] = 0.0
+    sine = np.sqrt(square)
+    along, across = first + second * cosine, second * sine
+    ax, ay, cx, cy = along * x, along * y, across * x, across * y
+    turn = np.arctan2(sine, cosine)
+    return np.stack([np.arctan2(ay - cx, ax + cy), np.arctan2(ay + cx, ax - cy)]), np.stack([turn, -turn]), real

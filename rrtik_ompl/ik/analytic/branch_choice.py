@@ -1,0 +1,209 @@
+"""Which branch of a closed form to take: the one nearest to a posture, or one after another along a trajectory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector, finite_array, frozen
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.goal import joint_difference
+from rrtik_ompl.ik.analytic.closed_form import SWEEP, ClosedForm, form_of, solutions
+from rrtik_ompl.robot import Robot
+
+JUMP = 0.2  # [rad] or [m] of any joint between two points of a trajectory: more is another branch, not motion
+JUMP_COST = 1e3  # more than any motion can cost
+TIE = 1e-9  # distances this near count as equal
+MOST = 32  # candidates kept of a singular point
+REFINEMENTS = 6  # sweeps along the curve of a singular pose, each 18 times finer than the one before
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """Configurations along a trajectory.
+
+    Attributes:
+        q: Shape (k, dof); NaN where no branch reaches the target inside the limits.
+        branch: Label of the branch of each point, "" where there is none.
+        jumps: Points at which a joint moves by more than the jump that was asked for, or that follow a gap.
+        changes: Points at which the label changes. Past a singularity that is no jump.
+        gaps: Points without a configuration.
+    """
+
+    q: Matrix
+    branch: tuple[str, ...]
+    jumps: tuple[int, ...]
+    changes: tuple[int, ...]
+    gaps: tuple[int, ...]
+
+
+def nearest(
+    robot: Robot, targets: ArrayLike, near: ArrayLike, *, weights: ArrayLike | None = None
+) -> tuple[Matrix, Mask]:
+    """For each target the solution inside the limits that is nearest to a posture; of equals, the farthest from limits.
+
+    Of a singular target the whole curve of solutions is looked at, not only its representatives.
+
+    Args:
+        robot: An arm with a closed form.
+        targets: T_world_tip, shape (m, 4, 4), or points, shape (m, 3).
+        near: Posture, shape (dof,), or one per target, shape (m, dof).
+        weights: Of the joints in the distance, shape (dof,); ones if None.
+
+    Returns:
+        Configurations, shape (m, dof), NaN where there is none, and whether there is one, shape (m,).
+    """
+    goals = np.asarray(targets, dtype=np.float64)
+    hints = np.broadcast_to(np.asarray(near, dtype=np.float64), (len(goals), robot.dof))
+    scale = np.ones(robot.dof) if weights is None else finite_array(weights, (robot.dof,), "weights")
+    found = solutions(robot, goals, near=hints, check=False)
+    cost = np.where(found.valid, _distance(robot, found.branches, hints[:, None], scale), np.inf)
+    margin = np.min(np.minimum(found.branches - robot.lower, robot.upper - found.branches), axis=2)
+    least = cost.min(axis=1)
+    best = np.argmax(np.where(cost <= least[:, None] + TIE, margin, -np.inf), axis=1)
+    q, reached = found.branches[np.arange(len(goals)), best].copy(), np.isfinite(least)
+    for k in np.flatnonzero(found.singular):  # few: singular poses are rare, and each has a curve to search
+        member, distance = _nearest_member(robot, goals[k], hints[k], scale)
+        if distance < least[k]:
+            q[k], reached[k] = member, True
+    q[~reached] = np.nan
+    return q, reached
+
+
+def _distance(robot: Robot, q: NDArray[np.float64], near: NDArray[np.float64], scale: Vector) -> NDArray[np.float64]:
+    distance: NDArray[np.float64] = np.linalg.norm(joint_difference(robot, q, near) * scale, axis=-1)
+    return distance
+
+
+def _nearest_member(robot: Robot, goal: Matrix, near: Vector, scale: Vector) -> tuple[Vector, float]:
+    """Of a singular target's curve the member inside the limits nearest to a posture, and its distance (inf: none).
+
+    A sweep over the whole curve, then ever finer sweeps around the best value of the free angle.
+    """
+    free = list(form_of(robot).free)
+    member, least, centre, width = near, np.inf, 0.0, np.pi
+    for _ in range(REFINEMENTS):
+        hints = np.tile(near, (SWEEP + 1, 1))
+        values = centre + width * np.linspace(-1.0, 1.0, SWEEP + 1)
+        hints[:, free] = values[:, None]
+        hints[:, [j for j in range(robot.dof) if j not in free]] = 0.0
+        found = solutions(robot, np.broadcast_to(goal, (len(hints), *goal.shape)), near=hints, check=False)
+        distance = np.where(found.valid, _distance(robot, found.branches, near, scale), np.inf)
+        row, branch = np.unravel_index(int(np.argmin(distance)), distance.shape)
+        if distance[row, branch] < least:
+            member, least = found.branches[row, branch], float(distance[row, branch])
+        centre, width = values[row], 4.0 * width / SWEEP
+    return member, least
+
+
+def follow(
+    robot: Robot,
+    targets: ArrayLike,
+    near: ArrayLike | None = None,
+    *,
+    jump: float = JUMP,
+    accept: Callable[[Matrix], Mask] | None = None,
+) -> Track:
+    """One solution per point of a trajectory, such that the joints jump as seldom and move as little as they can.
+
+    The shortest way through the layers of branches (dynamic programming), so that a branch that would run into a limit
+    later is not taken in the first place. Singular points are answered near each solution of the point before.
+
+    Args:
+        robot: An arm with a closed form.
+        targets: T_world_tip, shape (k, 4, 4), or points, shape (k, 3).
+        near: Posture before the first point; any if None.
+        jump: Motion of one joint between two points [rad or m] from which on it counts as a jump.
+        accept: Which of some solutions, shape (k, dof), will do; all inside the limits if None.
+
+    Raises:
+        InputError: If the robot has no closed form, or a target is no pose.
+    """
+    goals = np.asarray(targets, dtype=np.float64)
+    if len(goals) == 0:
+        raise InputError("targets: a trajectory needs at least one point")
+    found = solutions(robot, goals, near=near, check=False)
+    before = np.zeros((1, robot.dof)) if near is None else robot.configuration(near)[None]
+    cost = np.zeros(1)
+    layers: list[_Layer] = []
+    for k in range(len(goals)):
+        q, tags = _candidates(robot, goals[k], found, k, before)
+        if accept is not None and len(q):
+            good = accept(q)
+            q, tags = q[good], tags[good]
+        parent = np.zeros(len(q), dtype=np.int64)
+        if len(q):
+            price = _price(robot, q, before, jump) if near is not None or any(len(each.q) for each in layers) else 0.0
+            total = price + np.broadcast_to(cost, (len(q), len(before)))
+            parent = np.argmin(total, axis=1)
+            before, cost = q, total[np.arange(len(q)), parent]
+        layers.append(_Layer(q, tags, parent))
+    return _track(robot, layers, int(np.argmin(cost)), None if near is None else robot.configuration(near), jump)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Layer:
+    """The candidates of one point: configurations, branch numbers, and the best candidate before each (past gaps)."""
+
+    q: Matrix
+    tags: NDArray[np.int64]
+    parent: NDArray[np.int64]
+
+
+def _price(robot: Robot, q: Matrix, before: Matrix, jump: float) -> Matrix:
+    """Cost of the motion from each of the rows ``before`` to each of the rows q; a jump costs more than any motion."""
+    step = np.abs(joint_difference(robot, q[:, None], before[None]))
+    price: Matrix = np.linalg.norm(step, axis=2) + JUMP_COST * (step.max(axis=2) > jump)
+    return price
+
+
+def _candidates(
+    robot: Robot, goal: Matrix, found: ClosedForm, k: int, before: Matrix
+) -> tuple[Matrix, NDArray[np.int64]]:
+    """Solutions of point k inside the limits, in every full turn; of a singular point, those near ``before``."""
+    if not found.singular[k]:
+        tags = np.flatnonzero(found.valid[k])
+        return _in_every_turn(robot, found.branches[k, tags], tags)
+    close = solutions(robot, np.broadcast_to(goal, (len(before), *goal.shape)), near=before, check=False)
+    hints, tags = np.nonzero(close.valid)
+    q = close.branches[hints, tags]
+    nearest_first = np.argsort(np.linalg.norm(q - before[hints], axis=1), kind="stable")[:MOST]
+    return q[nearest_first], tags[nearest_first]
+
+
+def _in_every_turn(robot: Robot, q: Matrix, tags: NDArray[np.int64]) -> tuple[Matrix, NDArray[np.int64]]:
+    """The same postures also with joints a full turn further, where the limits have room for that."""
+    for joint in np.flatnonzero(~robot.prismatic & ~robot.continuous & (robot.upper - robot.lower >= TAU)):
+        for turn in (TAU, -TAU):
+            other = q.copy()
+            other[:, joint] += turn
+            fits = robot.within_limits(other)
+            q, tags = np.vstack([q, other[fits]]), np.concatenate([tags, tags[fits]])
+    return q, tags
+
+
+def _track(robot: Robot, layers: list[_Layer], last: int, near: Vector | None, jump: float) -> Track:
+    """Read the way backwards from its last candidate, then say where it jumps, changes the branch or has a gap."""
+    labels = form_of(robot).branches
+    q, branch = np.full((len(layers), robot.dof), np.nan), [""] * len(layers)
+    for k in range(len(layers) - 1, -1, -1):
+        if len(layers[k].q):
+            q[k], branch[k] = layers[k].q[last], labels[layers[k].tags[last]]
+            last = int(layers[k].parent[last])
+    gaps = [k for k, label in enumerate(branch) if not label]
+    jumps, changes, previous, label = [], [], near, ""
+    for k in range(len(layers)):
+        if not branch[k]:
+            continue
+        if previous is not None:
+            step = joint_difference(robot, q[k], previous)
+            q[k] = np.where(robot.continuous, previous + step, q[k])
+            if np.abs(step).max() > jump or k - 1 in gaps:
+                jumps.append(k)
+        if label not in ("", branch[k]):
+            changes.append(k)
+        previous, label = q[k], branch[k]
+    return Track(frozen(q), tuple(branch), tuple(jumps), tuple(changes), tuple(gaps))

@@ -1,0 +1,174 @@
+"""Closed-form inverse kinematics of a robot that brings it: placed in the world, held to the limits, checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.arrays import Matrix, finite_array
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.ik.analytic.analytic_solver import ClosedFormSolver
+from rrtik_ompl.ik.analytic.kernel_branches import kernel_branches
+from rrtik_ompl.ik.analytic.planar import planar_form
+from rrtik_ompl.ik.analytic.reference_branches import plain_branches, tip_fault
+from rrtik_ompl.poses import LAST_ROW, LAST_ROW_TOLERANCE, NOT_RIGID, left_handed
+from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
+
+SWEEP = 72  # samples of a singular pose's curve of solutions
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ClosedForm:
+    """All postures for m targets, b branches each; labels in ``form_of(robot).branches``.
+
+    Attributes:
+        branches: Joint values, shape (m, b, dof), turned into the joint limits where a full turn does that. A branch
+            that is not real holds the posture that comes nearest on it.
+        real: Which branches reach the target, shape (m, b).
+        valid: Which do so inside the joint limits, shape (m, b).
+        singular: Bit k is set where the target belongs to family k of ``form_of(robot).families`` and has a whole
+            curve of solutions, of which ``branches`` holds representatives. Shape (m,).
+        residuals: Distance [m] and angle [rad] of the robot's forward kinematics from the target, shape (m, b, 2);
+            the angle is 0 for a position. None if not asked for.
+    """
+
+    branches: NDArray[np.float64]
+    real: NDArray[np.bool_]
+    valid: NDArray[np.bool_]
+    singular: NDArray[np.uint8]
+    residuals: NDArray[np.float64] | None
+
+
+def form_of(robot: Robot) -> ClosedFormSolver:
+    """What the robot brings, or the form of planar arms if it is one.
+
+    Raises:
+        InputError: If there is none; it names the methods that fit.
+    """
+    if isinstance(robot.closed_form, ClosedFormSolver):
+        return robot.closed_form
+    form = planar_form(robot)
+    if form is None:
+        raise InputError(
+            f"robot '{robot.name}' brings no closed-form inverse kinematics and is no planar arm of two or three "
+            "joints; the method that fits every robot is 'numeric'"
+        )
+    return form
+
+
+def has_closed_form(robot: Robot) -> bool:
+    """Whether `form_of` finds a closed form."""
+    return isinstance(robot.closed_form, ClosedFormSolver) or planar_form(robot) is not None
+
+
+def solutions(
+    robot: Robot, targets: ArrayLike, *, near: ArrayLike | None = None, slack: float = 0.0, check: bool = True
+) -> ClosedForm:
+    """All branches for many targets.
+
+    Args:
+        robot: An arm with a closed form.
+        targets: T_world_tip, shape (m, 4, 4); or points [m], shape (m, 3), if the robot's form is one of positions.
+        near: Configuration or configurations, shape (dof,) or (m, dof): singular targets are answered by the members
+            of their curve nearest to it, and full turns are chosen to lie near it. Zeros if None.
+        slack: A target that is this near to a singular one [m, sine of an angle] is answered as if it were singular,
+            with residuals up to about that; for targets that are only known so well.
+        check: Whether forward kinematics judges every answer (``residuals``); that takes most of the time.
+
+    Raises:
+        InputError: If the robot has no closed form, or a target is no pose or lies beyond numbers.
+    """
+    poses = _poses(robot, form_of(robot), targets)
+    return branches_of(robot, poses, None if near is None else _hints(robot, near, len(poses)), slack, check)
+
+
+def branches_of(
+    robot: Robot, poses: NDArray[np.float64], hints: Matrix | None = None, slack: float = 0.0, check: bool = True
+) -> ClosedForm:
+    """As `solutions`, for poses and configurations near them, one for each, that need no check any more."""
+    form = form_of(robot)
+    fault = tip_fault(robot, form)
+    if fault:
+        raise InputError(f"robot '{robot.name}': {fault}; method 'numeric' fits every tip")
+    answers = kernel_branches(robot, form, poses, hints, slack, check)
+    if answers is None:
+        answers = plain_branches(robot, form, poses, hints, slack, check)
+    for array in answers:
+        array.setflags(write=False)
+    q, real, valid, singular, residuals = answers
+    return ClosedForm(q.T, real.T, valid.T, singular, residuals.T if check else None)
+
+
+def family(robot: Robot, target: ArrayLike, *, samples: int = SWEEP, slack: float = 0.0) -> Matrix:
+    """The solutions inside the joint limits of one target, singular or not: of a curve, samples along it.
+
+    Args:
+        robot: An arm with a closed form.
+        target: T_world_tip, shape (4, 4), or a point, shape (3,).
+        samples: Values of the free angle over a full turn.
+        slack: See `solutions`.
+
+    Returns:
+        Configurations, shape (k, dof), branch by branch in the order of the free angle.
+    """
+    form = form_of(robot)
+    near = np.zeros((samples, robot.dof))
+    near[:, list(form.free)] = np.linspace(-np.pi, np.pi, samples, endpoint=False)[:, None]
+    goal = np.asarray(target, dtype=np.float64)
+    found = solutions(robot, goal[None], slack=slack, check=False)
+    if found.singular[0]:
+        many = np.broadcast_to(goal, (samples, *goal.shape))
+        found = solutions(robot, many, near=near, slack=slack, check=False)
+    rows: Matrix = found.branches.transpose(1, 0, 2)[found.valid.T]
+    new = np.abs(np.diff(rows, axis=0, prepend=np.full((1, robot.dof), np.inf))).max(axis=1) > LIMIT_TOLERANCE
+    different: Matrix = rows[new]
+    return different
+
+
+def _poses(robot: Robot, form: ClosedFormSolver, targets: ArrayLike) -> NDArray[np.float64]:
+    if form.kind == "position" and np.ndim(targets) == 2:
+        points = finite_array(targets, (None, 3), "targets")
+        poses = np.tile(np.eye(4), (len(points), 1, 1))
+        poses[:, :3, 3] = points
+        return poses
+    poses = finite_array(targets, (None, 4, 4), "targets")
+    if form.kind == "pose":
+        check_poses(poses, "targets")
+    return poses
+
+
+def check_poses(poses: NDArray[np.float64], what: str) -> None:
+    """Refuse matrices, shape (m, 4, 4), that are no poses.
+
+    Raises:
+        InputError: It says which one and how far it is from orthonormal.
+    """
+    if len(poses) == 0:
+        return
+    columns = np.ascontiguousarray(poses[:, :3, :3].transpose(2, 1, 0))  # products of these beat small matrices
+    off = np.zeros(len(poses))
+    with np.errstate(over="ignore", invalid="ignore"):
+        for j, k in combinations_with_replacement(range(3), 2):
+            np.maximum(off, np.abs((columns[j] * columns[k]).sum(axis=0) - (j == k)), out=off)
+    worst = int(np.argmax(off))
+    if not off[worst] <= NOT_RIGID:
+        raise InputError(
+            f"{what}: entry {worst} is no rotation: its columns are {off[worst]:.3g} away from orthonormal "
+            f"(at most {NOT_RIGID:g}); make it orthonormal"
+        )
+    mirrored = np.flatnonzero(left_handed(*columns))
+    if len(mirrored):
+        raise InputError(f"{what}: entry {mirrored[0]} mirrors (determinant -1); a rotation is right-handed")
+    odd = np.flatnonzero((np.abs(poses[:, 3] - LAST_ROW) > LAST_ROW_TOLERANCE).any(axis=1))
+    if len(odd):
+        raise InputError(f"{what}: the last row of entry {odd[0]} must be 0 0 0 1, got {poses[odd[0], 3].tolist()}")
+
+
+def _hints(robot: Robot, near: ArrayLike, count: int) -> Matrix:
+    """One configuration for every target, shape (count, dof)."""
+    if np.ndim(near) < 2:
+        return np.broadcast_to(robot.configuration(near, "near"), (count, robot.dof))
+    return finite_array(near, (count, robot.dof), "near")

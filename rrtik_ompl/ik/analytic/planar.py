@@ -1,0 +1,92 @@
+"""Closed form of planar arms, which belongs to no robot: two links reach a point, three links a pose, in two ways."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.ik.analytic.analytic_solver import Branches, ClosedFormSolver, two_links, wrapped
+from rrtik_ompl.robot import Robot
+
+BRANCHES = ("left", "right")
+IN_PLANE = 1e-9  # [m] or sine of an angle: how well an arm or a target must lie in the plane
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlanarArm:
+    """Two or three links in a plane.
+
+    Attributes:
+        to_plane: T_plane_base; the plane's origin is the first joint, its z axis the axis of all joints.
+        links: From joint to joint and to the tip, in the plane, with all joints at zero [m], shape (dof, 2).
+        tip: T_plane_tip with all joints at zero.
+    """
+
+    to_plane: NDArray[np.float64]
+    links: Matrix
+    tip: NDArray[np.float64]
+
+    def solve(self, poses: NDArray[np.float64], near: Matrix | None = None, slack: float = 0.0) -> Branches:
+        """Both branches for T_base_tip, shape (m, 4, 4); ``near`` and ``slack`` are not used: no pose is singular."""
+        del near, slack
+        targets = self.to_plane @ poses
+        point, real = targets[:, :2, 3], np.abs(targets[:, 2, 3] - self.tip[2, 3]) <= IN_PLANE
+        heading = np.zeros(len(poses))
+        if len(self.links) == 3:
+            turn = targets[:, :3, :3] @ self.tip[:3, :3].T
+            real &= np.linalg.norm(turn[:, :2, 2], axis=1) <= IN_PLANE
+            heading = np.arctan2(turn[:, 1, 0] - turn[:, 0, 1], turn[:, 0, 0] + turn[:, 1, 1])
+            point = point - _turned(self.links[2], heading)
+        lengths, angles = np.linalg.norm(self.links, axis=1), np.arctan2(self.links[:, 1], self.links[:, 0])
+        first, second, reached = two_links(float(lengths[0]), float(lengths[1]), *point.T)
+        joints = [first - angles[0], second - angles[1] + angles[0]]
+        if len(self.links) == 3:
+            joints.append(heading - joints[0] - joints[1])
+        q = wrapped(np.stack(joints)).transpose(2, 1, 0)
+        return Branches(q, np.repeat((real & reached)[:, None], 2, axis=1), np.zeros(len(poses), dtype=np.uint8))
+
+    def nearness(self, Q: Matrix) -> dict[str, Vector]:
+        """``elbow``: sine of the angle between the first two links, for Q of shape (m, dof)."""
+        angles = np.arctan2(self.links[:, 1], self.links[:, 0])
+        return {"elbow": np.abs(np.sin(Q[:, 1] + angles[1] - angles[0]))}
+
+
+@lru_cache(maxsize=64)
+def planar_form(robot: Robot) -> ClosedFormSolver | None:
+    """The closed form of a robot whose two or three joints turn about parallel axes, one after another; else None."""
+    chain = robot.chain
+    plain = np.array_equal(chain.gain, np.eye(robot.dof)) and not chain.offset.any() and not robot.prismatic.any()
+    if robot.dof not in (2, 3) or not plain or (chain.parent != np.arange(-1, robot.dof - 1)).any():
+        return None
+    zero = np.zeros(robot.dof)
+    T_base_world = np.linalg.inv(robot.fk_batch(zero, robot.link_names[0])[0])
+    frames = T_base_world @ robot.joint_frames(zero)[0, 1:]
+    axes = np.einsum("kij,kj->ki", frames[:, :3, :3], chain.axis)
+    if np.abs(axes - axes[0]).max() > IN_PLANE:
+        return None
+    to_plane = np.asarray(np.linalg.inv(_plane(frames[0, :3, 3], axes[0])), dtype=np.float64)
+    places = to_plane @ np.concatenate([frames, T_base_world @ robot.fk_batch(zero)])
+    links = np.diff(places[:, :2, 3], axis=0)
+    if (np.linalg.norm(links[:2], axis=1) < IN_PLANE).any():
+        return None
+    arm = PlanarArm(to_plane, links, places[-1])
+    kind = "position" if robot.dof == 2 else "pose"
+    return ClosedFormSolver(robot.tip, kind, BRANCHES, (), (), arm.solve, arm.nearness)
+
+
+def _plane(origin: Vector, axis: Vector) -> NDArray[np.float64]:
+    """T_base_plane: at the first joint, z along its axis."""
+    across = np.cross(np.eye(3)[int(np.argmin(np.abs(axis)))], axis)
+    x = across / np.linalg.norm(across)
+    plane = np.eye(4)
+    plane[:3, :3], plane[:3, 3] = np.column_stack([x, np.cross(axis, x), axis]), origin
+    return plane
+
+
+def _turned(link: Vector, angle: Vector) -> Matrix:
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.column_stack([link[0] * cosine - link[1] * sine, link[0] * sine + link[1] * cosine])

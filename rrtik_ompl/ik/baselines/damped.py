@@ -1,0 +1,88 @@
+"""Steps by the Jacobian: damped least squares for many starts at once, and Pinocchio's iteration for one.
+
+Sources: C. W. Wampler, "Manipulator inverse kinematic solutions based on vector formulations and damped least-squares
+methods", IEEE Transactions on Systems, Man and Cybernetics 16 (1986), 93-101; the inverse kinematics example in
+Pinocchio's documentation (step 0.1, damping 1e-12, at most 1000 steps), in which joints know no limits.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.arrays import TAU, Matrix, Vector
+from rrtik_ompl.goal import PositionGoal
+from rrtik_ompl.ik.method_interface import Target
+from rrtik_ompl.ik.residual import shortened, twist, walked
+from rrtik_ompl.robot import Robot
+
+ITERATIONS = 200
+DAMPING = 0.05  # [m] or [rad]; constant, squared where it is used
+LARGEST_STEP = 0.5  # [rad] or [m] of any joint
+STEPS, STEP, TINY, CLOSE = 1000, 0.1, 1e-12, 1e-4  # of Pinocchio's iteration
+
+
+def damped_least_squares(
+    robot: Robot, goal: Target, starts: Matrix, *, iterations: int = ITERATIONS, enough: int | None = None
+) -> tuple[Matrix, int]:
+    """Steps dq = J^T (J J^T + damping^2)^-1 e from many starts, cut off at the limits.
+
+    Args:
+        robot: The arm.
+        goal: A pose, or a position with any orientation.
+        starts: Shape (m, dof).
+        iterations: At most.
+        enough: Stop when so many starts have arrived; all of them if None.
+
+    Returns:
+        Where each start has led to, shape (m, dof), and the steps taken.
+    """
+    rows = slice(0, 3) if isinstance(goal, PositionGoal) else slice(0, 6)
+
+    def step(Q: Matrix) -> Matrix:
+        e = twist(goal, robot.fk_batch(Q))[:, rows, None]
+        J = robot.jacobian_batch(Q)[:, rows]
+        square = J @ J.transpose(0, 2, 1) + DAMPING**2 * np.eye(J.shape[1])
+        dq = (J.transpose(0, 2, 1) @ np.linalg.solve(square, e))[..., 0]
+        return robot.clamp(Q + shortened(dq, LARGEST_STEP))
+
+    return walked(robot, goal, starts, step, iterations, enough)
+
+
+def pinocchio_iteration(robot: Robot, goal: Target, starts: Matrix) -> tuple[Matrix, int]:
+    """Pinocchio's own loop, start after start; angles are brought into the limits by full turns where that helps.
+
+    Returns:
+        Where each start has led to, inside the limits or not, shape (m, dof), and the steps taken.
+    """
+    walked = [_one_start(robot, goal, q) for q in starts]
+    return np.array([q for q, _ in walked]), sum(steps for _, steps in walked)
+
+
+def _one_start(robot: Robot, goal: Target, q: Vector) -> tuple[Vector, int]:
+    model, data = robot.model, robot.model.createData()
+    frame = model.getFrameId(robot.tip)
+    steps = 0
+    while steps < STEPS:
+        full = robot.lift(q)[0]
+        pin.framesForwardKinematics(model, data, full)
+        J = np.reshape(pin.computeFrameJacobian(model, data, full, frame, pin.ReferenceFrame.LOCAL), (6, -1))
+        J = J @ robot.chain.gain
+        here = data.oMf[frame]
+        if isinstance(goal, PositionGoal):
+            error, J = here.actInv(goal.position), J[:3]
+        else:
+            away = here.actInv(goal.T_world_tip)
+            error, J = pin.log6(away).vector, pin.Jlog6(away.inverse()) @ J
+        if np.linalg.norm(error) < CLOSE:
+            break
+        q = q + STEP * (J.T @ np.linalg.solve(J @ J.T + TINY * np.eye(len(J)), error))
+        steps += 1
+    return _into_limits(robot, q), steps
+
+
+def _into_limits(robot: Robot, q: Vector) -> Vector:
+    """Turning joints moved by full turns to the lowest value above their lower limit."""
+    turning = ~robot.prismatic & np.isfinite(robot.lower)
+    moved: Vector = np.where(turning, q + TAU * np.ceil((np.where(turning, robot.lower, 0.0) - q) / TAU), q)
+    return moved

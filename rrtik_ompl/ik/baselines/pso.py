@@ -1,0 +1,90 @@
+"""Particle swarms: several at once, with velocities, or fully resampled: every particle drawn anew each time.
+
+Sources: M. Clerc and J. Kennedy, "The particle swarm - explosion, stability, and convergence in a multidimensional
+complex space", IEEE Transactions on Evolutionary Computation 6 (2002), 58-73 (constriction); J. Kennedy, "Bare bones
+particle swarms", IEEE Swarm Intelligence Symposium 2003, 80-87 (no velocity: a particle is drawn from the normal
+distribution between its own best place and the swarm's).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.goal import PositionGoal, pose_errors
+from rrtik_ompl.ik.method_interface import Target
+from rrtik_ompl.robot import Robot
+
+PARTICLES = 32  # of a swarm
+ITERATIONS = 400
+CONSTRICTION, ATTRACTION = 0.7298, 1.49618
+ORIENTATION_WEIGHT = 0.3  # [m/rad]; with 0.1 or 1 swarms of TITAN-4 and Panda arrived half as often
+
+Swarms: TypeAlias = NDArray[np.float64]  # shape (swarms, particles, dof)
+Move: TypeAlias = Callable[[np.random.Generator, Swarms, Swarms, Swarms, Swarms], Swarms]
+
+
+def pso(robot: Robot, goal: Target, starts: Matrix) -> tuple[Matrix, int]:
+    """Swarms with velocities. As `swarm`."""
+    return swarm(robot, goal, starts, _with_velocity)
+
+
+def resampled_pso(robot: Robot, goal: Target, starts: Matrix) -> tuple[Matrix, int]:
+    """Swarms without velocities, all particles drawn anew each iteration. As `swarm`."""
+    return swarm(robot, goal, starts, _drawn)
+
+
+def swarm(
+    robot: Robot, goal: Target, starts: Matrix, move: Move, *, iterations: int = ITERATIONS
+) -> tuple[Matrix, int]:
+    """Let swarms look for a goal, until one of them is there.
+
+    Args:
+        robot: The arm.
+        goal: A pose, or a position with any orientation.
+        starts: First places, shape (m, dof); `PARTICLES` of them make a swarm. The random numbers follow from them.
+        move: From random numbers, places, places before, own best places and the swarms' best to the next places.
+        iterations: At most.
+
+    Returns:
+        The best place of each swarm, shape (swarms, dof), and the iterations taken.
+    """
+    rng = np.random.default_rng(np.frombuffer(np.ascontiguousarray(starts).tobytes(), dtype=np.uint32))
+    swarms = max(1, len(starts) // PARTICLES)
+    place = robot.clamp(starts[: len(starts) // swarms * swarms]).reshape(swarms, -1, robot.dof)
+    before, own = place, place
+    least = np.full(place.shape[:2], np.inf)
+    each = np.arange(swarms)
+    for iteration in range(iterations):
+        cost = _cost(robot, goal, place.reshape(-1, robot.dof)).reshape(least.shape)
+        better = cost < least
+        own, least = np.where(better[..., None], place, own), np.minimum(cost, least)
+        leader = own[each, np.argmin(least, axis=1)]
+        if goal.satisfied(robot, leader).any():
+            return leader, iteration
+        moved = robot.clamp(move(rng, place, before, own, leader[:, None]))
+        before, place = place, moved
+    return leader, iterations
+
+
+def _with_velocity(rng: np.random.Generator, place: Swarms, before: Swarms, own: Swarms, leader: Swarms) -> Swarms:
+    to_own, to_leader = rng.uniform(0.0, ATTRACTION, (2, *place.shape))
+    moved: Swarms = place + CONSTRICTION * (place - before) + to_own * (own - place) + to_leader * (leader - place)
+    return moved
+
+
+def _drawn(rng: np.random.Generator, place: Swarms, before: Swarms, own: Swarms, leader: Swarms) -> Swarms:
+    del before
+    drawn: Swarms = 0.5 * (own + leader) + np.abs(own - leader) * rng.standard_normal(place.shape)
+    return drawn
+
+
+def _cost(robot: Robot, goal: Target, Q: Matrix) -> NDArray[np.float64]:
+    if isinstance(goal, PositionGoal):
+        return goal.distance(robot, Q)
+    distance, angle = pose_errors(robot.fk_batch(Q), goal.T_world_tip)
+    return distance + ORIENTATION_WEIGHT * angle

@@ -1,0 +1,200 @@
+"""Which configurations a planner may aim at: the goal's own, or free ones that inverse kinematics finds for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrtik_ompl.arrays import TAU, Matrix, Vector, frozen
+from rrtik_ompl.goal import (
+    GoalRegion,
+    JointGoal,
+    PoseGoal,
+    TipGoal,
+    as_task_region,
+    joint_difference,
+    parts_of,
+    tip_errors,
+)
+from rrtik_ompl.ik.method_interface import Target
+from rrtik_ompl.ik.methods import METHODS
+from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric_ik
+from rrtik_ompl.ik.numeric.projection import project, projected
+from rrtik_ompl.ik.solve import DRAWS, solve_ik
+from rrtik_ompl.ik.targets import leaves_freedom, targets
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.task_region import TaskRegion
+
+STARTS = 48  # of inverse kinematics in one round
+FEWEST = 4  # for each part, to tell how near the arm came
+PARTS = 6  # of a grasp set, among which the starts of a round are shared out
+ROUNDS = 4  # at most, until one free configuration is found
+LAST_ROUND = 64
+TREE_SECONDS = 0.3  # that MB-RRT may take
+MOST = 16  # configurations that one round adds
+LARGEST = 96  # configurations altogether
+SAME_POSTURE = 1e-3  # [rad] or [m]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GoalConfigurations:
+    """Free configurations at the goal, nearest to the start first, shape (k, dof); if there is none, the reason."""
+
+    rows: Matrix
+    reason: str = ""
+
+
+def goal_configurations(problem: Problem, rng: np.random.Generator, *, all_turns: bool = True) -> GoalConfigurations:
+    """Free configurations that satisfy the goal of a problem: those of the first round that finds any.
+
+    Args:
+        problem: The problem.
+        rng: Random numbers for the starts of inverse kinematics.
+        all_turns: For a goal in joint values: whether continuous joints may also reach it the long way round.
+    """
+    search = GoalSearch(problem, rng, all_turns=all_turns)
+    return GoalConfigurations(search.first(), search.reason)
+
+
+class GoalSearch:
+    """Free configurations at the goal of a problem, more of them round after round, the same for the same generator.
+
+    The first round asks the closed form for all branches, or numeric inverse kinematics from many starts; the second
+    the tree of MB-RRT; further ones draw further targets from a goal that leaves freedom, and start anew from random
+    postures.
+
+    Attributes:
+        rows: Those found so far, each round's nearest to the start first, shape (k, dof).
+        exhausted: Whether no more will come: all branches of the goal are known, or the limits are reached of rounds
+            and configurations.
+    """
+
+    def __init__(self, problem: Problem, rng: np.random.Generator, *, all_turns: bool = True) -> None:
+        """Prepare the search; see :func:`goal_configurations`."""
+        self.rows: Matrix = frozen(np.zeros((0, problem.world.robot.dof)))
+        self.exhausted = isinstance(problem.goal, JointGoal)
+        self._problem, self._rng, self._rounds, self._found = problem, rng, 0, self.rows
+        if isinstance(problem.goal, JointGoal):
+            self.rows = frozen(_turns(problem, problem.goal.q) if all_turns else problem.goal.q[None])
+
+    def first(self) -> Matrix:
+        """Search until there is a free configuration, for a few rounds; all rows."""
+        for _ in range(ROUNDS):
+            if len(self.rows) == 0:
+                self.more()
+        return self.rows
+
+    def more(self) -> bool:
+        """Search for one round more; whether it found any that is new."""
+        goal, world, known = self._problem.goal, self._problem.world, len(self.rows)
+        if self.exhausted or isinstance(goal, JointGoal):
+            return False
+        found = self._round(goal)
+        self._rounds += 1
+        free = found[world.valid_batch(found)]
+        free = free[world.certify(free)]
+        self._found = np.vstack([self._found, found])
+        self.rows = frozen(np.vstack([self.rows, _chosen(self._problem, free, self.rows)])[:LARGEST])
+        self.exhausted |= self._rounds >= LAST_ROUND or len(self.rows) >= LARGEST
+        return len(self.rows) > known
+
+    @property
+    def reason(self) -> str:
+        """Why there is no free configuration, in a line; "" if there is one."""
+        goal = self._problem.goal
+        if len(self.rows) or isinstance(goal, JointGoal):
+            return ""
+        if len(self._found):
+            why = self._problem.world.explain(self._found[0])
+            return f"{len(self._found)} configurations reach the goal, all in collision: for instance {why}"
+        distance, angle = nearest_miss(self._problem.world.robot, goal)
+        rounds = f"{self._rounds} round{'s' * (self._rounds != 1)}"
+        return (
+            f"inverse kinematics found no configuration at the goal in {rounds}; "
+            f"the nearest one misses it by {1e3 * distance:.1f} mm and {np.degrees(angle):.1f} degrees; is it in reach?"
+        )
+
+    def _round(self, goal: TipGoal) -> Matrix:
+        """Configurations at the goal, in collision or not, by the method whose turn it is, shape (m, dof)."""
+        problem, rng, number = self._problem, self._rng, self._rounds
+        robot, parts = problem.world.robot, parts_of(goal)
+        drawn = targets(goal, DRAWS, rng)
+        seed = int(rng.integers(2**31))
+        free = any(leaves_freedom(part) for part in parts)
+        if _fits("closed-form", robot, drawn) and (number == 0 or (free and number % 2 == 0)):
+            self.exhausted = not free and len(parts) <= DRAWS
+            return solve_ik(robot, goal, method="closed-form", near=problem.start, all=True, seed=seed).solutions
+        if number == 1 and _fits("mb-rrt", robot, drawn):
+            return solve_ik(
+                robot, goal, method="mb-rrt", near=problem.start, world=problem.world, seconds=TREE_SECONDS, seed=seed
+            ).solutions
+        starts = rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
+        starts[0] = problem.start
+        return _walked(robot, goal, starts, number, rng)
+
+
+def nearest_miss(robot: Robot, goal: TipGoal) -> tuple[float, float]:
+    """How near the arm came to a goal within its limits: distance [m] and angle [rad]."""
+    parts = parts_of(goal)
+    count = max(STARTS // len(parts), FEWEST)
+    starts = np.random.default_rng(0).uniform(*robot.finite_range(), (count, robot.dof))
+    ends = np.vstack([project(robot, as_task_region(part), starts) for part in parts])
+    distance, angle = tip_errors(goal, robot, ends)
+    best = np.argmin(goal.distance(robot, ends))
+    return float(distance[best]), float(angle[best])
+
+
+def _fits(method: str, robot: Robot, drawn: list[Target]) -> bool:
+    return not any(METHODS[method].misfit(robot, target) for target in drawn)
+
+
+def _walked(robot: Robot, goal: TipGoal, starts: Matrix, number: int, rng: np.random.Generator) -> Matrix:
+    """Configurations at the goal to which numeric inverse kinematics leads; of many parts some take turns."""
+    parts = parts_of(goal)
+    some = [(number * PARTS + k) % len(parts) for k in range(min(len(parts), PARTS))]
+    shares = np.array_split(starts, len(some))
+    return np.vstack([_walked_to(robot, goal, part, share, rng) for part, share in zip(some, shares, strict=True)])
+
+
+def _walked_to(robot: Robot, goal: TipGoal, number: int, starts: Matrix, rng: np.random.Generator) -> Matrix:
+    """The same for one of its parts. Walks end on the rim of ranges, so that these are projected onto, spread out."""
+    part = parts_of(goal)[number]
+    if isinstance(goal, GoalRegion) and isinstance(goal.members[number], PoseGoal) and not goal.box.any():
+        return numeric_ik(robot, GoalRegion([goal.members[number]], goal.free_rotation_axis), starts)
+    if not isinstance(part, TaskRegion):
+        return numeric_ik(robot, part, starts)
+    rows = projected(robot, part, starts, rng)
+    return rows[part.satisfied(robot, rows)]
+
+
+def _turns(problem: Problem, q: Vector) -> Matrix:
+    """The configuration and, for each continuous joint, the same posture reached the other way round."""
+    rows = [np.array(q)]
+    for joint in np.flatnonzero(problem.world.robot.continuous):
+        other = np.array(q)
+        other[joint] += -TAU if other[joint] > problem.start[joint] else TAU
+        rows.append(other)
+    return np.array(rows)
+
+
+def _chosen(problem: Problem, rows: Matrix, known: Matrix) -> Matrix:
+    """At most ``MOST`` rows unlike each other and the known ones, turned to lie near the start, nearest first.
+
+    Half of them are the nearest to the start; the others lie farthest from all that were chosen before, for what is
+    near to the start and to each other may all be blocked by the same thing.
+    """
+    robot = problem.world.robot
+    away = joint_difference(robot, rows, problem.start)
+    turned = np.where(robot.continuous, problem.start + away, rows)
+    distance = np.linalg.norm(away, axis=1)
+    apart = np.full(len(rows), np.inf)  # largest joint difference from the nearest of those chosen
+    for row in known:
+        apart = np.minimum(apart, np.abs(joint_difference(robot, turned, row)).max(axis=1))
+    kept: list[int] = []
+    while len(kept) < MOST and (apart > SAME_POSTURE).any():
+        value = -distance if len(kept) < MOST // 2 else apart
+        kept.append(int(np.argmax(np.where(apart > SAME_POSTURE, value, -np.inf))))
+        apart = np.minimum(apart, np.abs(joint_difference(robot, turned, turned[kept[-1]])).max(axis=1))
+    return turned[sorted(kept, key=lambda k: (distance[k], k))]

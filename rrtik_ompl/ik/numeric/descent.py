@@ -1,0 +1,114 @@
+"""Levenberg-Marquardt from many starts to many goals: in kernels, or in numpy where there are none."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.arrays import Mask, Matrix
+from rrtik_ompl.fast.ik.ik_layout import KERNELS
+from rrtik_ompl.fast.simd.library import library
+from rrtik_ompl.goal import TipGoal
+from rrtik_ompl.ik.goal_rows import goal_rows
+from rrtik_ompl.ik.numeric.kernel_call import KernelCall
+from rrtik_ompl.ik.numeric.reference_descent import farness, walk_plainly
+from rrtik_ompl.ik.serial_chain import SEEDS, limb_of, seeded_limb_of, seeds_of
+from rrtik_ompl.robot import Robot
+
+STEPS = 60  # of one start
+AT_A_TIME = 4096  # goals in one call of a kernel, which nothing can interrupt
+PATIENCE = 5  # steps after which a start that has not come nearer is given up
+
+
+def walk(
+    robot: Robot, aims: Matrix, starts: Matrix, *, steps: int = STEPS, patience: int | None = None
+) -> tuple[Matrix, Mask, int]:
+    """Walk from each start towards its goal inside the joint limits.
+
+    Args:
+        robot: The arm.
+        aims: Goals, see `rrtik_ompl.ik.goal_rows`, one for each start or one for all, shape (m, 18) or (1, 18).
+        starts: Shape (m, dof).
+        steps: At most.
+        patience: Steps after which a start that has not come nearer is given up; never if None.
+
+    Returns:
+        Where the starts have led to, shape (m, dof), whether that is at the goal, shape (m,), and the most steps taken.
+    """
+    patience = steps + 1 if patience is None else patience
+    kernels, limb = library(KERNELS), limb_of(robot)
+    if kernels is None or limb is None:
+        return walk_plainly(robot, aims, starts, steps, patience)
+    call = KernelCall(limb, aims, np.clip(starts, robot.lower, robot.upper), steps, patience)
+    most = kernels.walk(limb.address, call.address)
+    return call.q, call.reached, most
+
+
+def descend(robot: Robot, goal: TipGoal, starts: Matrix, *, iterations: int = STEPS) -> tuple[Matrix, int]:
+    """Where every start leads to in at most so many steps, at the goal or not: shape (m, dof), and the steps taken.
+
+    The goal has one member, such as a pose whose turn about an axis is free.
+    """
+    Q, _, taken = walk(robot, goal_rows(goal), starts, steps=iterations)
+    return Q, taken
+
+
+class Search:
+    """Solutions of many goals, one after the other for each: first from a posture, then from the seeds nearest to it.
+
+    The same arguments give the same solutions, whatever else is asked in between.
+
+    Args:
+        robot: The arm.
+        aims: Goals, see `rrtik_ompl.ik.goal_rows`, shape (m, 18).
+        near: Posture to start from, shape (dof,) or (m, dof).
+
+    Attributes:
+        q: The last solution of each goal, shape (m, dof).
+        steps: Taken by all starts together.
+    """
+
+    def __init__(self, robot: Robot, aims: Matrix, near: ArrayLike) -> None:
+        self._robot, self._aims = robot, aims
+        self._near = np.empty((len(aims), robot.dof))
+        self._near[:] = robot.clamp(np.asarray(near))
+        self._next = np.zeros(len(aims), dtype=np.int64)
+        self.q: Matrix = self._near.copy()
+        self.steps = 0
+
+    def advance(self, rows: NDArray[np.int64]) -> Mask:
+        """Find the next solution of some goals by their numbers, shape (k,); which of them have one, shape (k,).
+
+        A goal without one has come to the end of its starts, 513 of them.
+        """
+        if len(rows) <= AT_A_TIME:
+            return self._advance(rows)
+        return np.concatenate([self._advance(rows[k : k + AT_A_TIME]) for k in range(0, len(rows), AT_A_TIME)])
+
+    def _advance(self, rows: NDArray[np.int64]) -> Mask:
+        kernels, limb = library(KERNELS), seeded_limb_of(self._robot)
+        if kernels is None or limb is None:
+            return self._advance_plainly(rows)
+        call = KernelCall(limb, self._aims[rows], self.q[rows], STEPS, PATIENCE, self._near[rows], self._next[rows])
+        kernels.solve(limb.address, call.address)
+        self.steps += call.steps
+        self.q[rows], self._next[rows] = call.q, call.next
+        return call.reached
+
+    def _advance_plainly(self, rows: NDArray[np.int64]) -> Mask:
+        """The same in numpy, all goals side by side."""
+        seeds, reached = seeds_of(self._robot), np.zeros(len(rows), dtype=bool)
+        order = np.argsort(farness(self._robot, self._aims[rows], seeds.tips), axis=1, kind="stable")
+        while True:
+            open_rows = np.flatnonzero(~reached & (self._next[rows] <= SEEDS))
+            if len(open_rows) == 0:
+                return reached
+            going = rows[open_rows]
+            number = self._next[going]
+            starts = np.where(
+                (number == 0)[:, None], self._near[going], seeds.q[order[open_rows, np.maximum(number, 1) - 1]]
+            )
+            q, there, taken = walk_plainly(self._robot, self._aims[going], starts, STEPS, PATIENCE)
+            self.q[going], reached[open_rows] = q, there
+            self._next[going] += 1
+            self.steps += taken

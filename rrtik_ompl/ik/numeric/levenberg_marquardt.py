@@ -1,0 +1,80 @@
+"""Numeric inverse kinematics of any arm: Levenberg-Marquardt from a posture and then from seeds near the goal."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.goal import TipGoal
+from rrtik_ompl.ik.goal_rows import goal_rows
+from rrtik_ompl.ik.method_interface import Answer, Question
+from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS, Search, walk
+from rrtik_ompl.ik.numeric.restarts import ROUNDS, STARTS, aims_of, nearest_posture
+from rrtik_ompl.robot import Robot
+
+AT_ONCE = 32  # members of a goal, before the clock is looked at and others have their turn
+
+
+def numeric_ik(robot: Robot, goal: TipGoal, starts: Matrix, *, iterations: int = STEPS) -> Matrix:
+    """Move configurations towards a goal, each from its own start, inside the joint limits.
+
+    Args:
+        robot: The arm.
+        goal: A pose, a position with any orientation, or a region of these; its members take turns.
+        starts: Shape (m, dof).
+        iterations: Steps at most.
+
+    Returns:
+        The rows that satisfy the goal, in the order of their starts, shape (k, dof), k <= m.
+
+    Raises:
+        InputError: If the goal is a task-space region or has one: `rrtik_ompl.ik.numeric.projection` is for these.
+    """
+    aims = goal_rows(goal)
+    if len(aims) > 1:
+        aims = aims[np.arange(len(starts)) % len(aims)]
+    Q, _, _ = walk(robot, aims, starts, steps=iterations, patience=PATIENCE)
+    return Q[goal.satisfied(robot, Q)]
+
+
+def numeric(question: Question) -> Answer:
+    """The method of `solve_ik`: solutions of many members of the goal side by side until one will do."""
+    if question.all:
+        return _many(question)
+    aims, timed_out = aims_of(question), False
+    search, waiting = Search(question.robot, aims, question.near), np.arange(len(aims))
+    found = []
+    while len(waiting):
+        going, waiting = waiting[:AT_ONCE], waiting[AT_ONCE:]
+        going = going[search.advance(going)]
+        found.append(search.q[going])
+        timed_out = time.monotonic() > question.deadline
+        if timed_out or question.accept(found[-1]).any():
+            break
+        waiting = np.concatenate([waiting, going])
+    return _answered(question, np.concatenate(found), search.steps, timed_out)
+
+
+def _many(question: Question) -> Answer:
+    """Solutions from many random starts, as different as they come."""
+    robot, steps, timed_out = question.robot, 0, False
+    found = [np.zeros((0, robot.dof))]
+    aims = aims_of(question)
+    for number in range(ROUNDS):
+        Q = question.rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
+        if number == 0:
+            Q[0] = question.near
+        Q, reached, taken = walk(robot, aims[(number * STARTS + np.arange(STARTS)) % len(aims)], Q, patience=PATIENCE)
+        found.append(Q[reached])
+        steps, timed_out = steps + taken, time.monotonic() > question.deadline
+        if timed_out:
+            break
+    return _answered(question, np.vstack(found), steps, timed_out)
+
+
+def _answered(question: Question, found: Matrix, steps: int, timed_out: bool) -> Answer:
+    if len(found):
+        return Answer(found, question.near, steps, timed_out)
+    return Answer(found, nearest_posture(question, searched=not question.all and not timed_out), steps, timed_out)

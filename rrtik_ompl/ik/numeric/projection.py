@@ -1,0 +1,136 @@
+"""Inverse kinematics of regions: configurations walk to the nearest pose of a region, which is found anew each step.
+
+What the region leaves free asks nothing of the joints, so that arms of fewer joints than a pose needs fit as well.
+
+Sources: M. Stilman, "Global manipulation planning in robot joint space with task constraints", IEEE Transactions on
+Robotics 26 (2010), 576-584, for steps that leave free directions out; damping after Sugihara, as in
+`rrtik_ompl.ik.numeric.reference_descent`.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector
+from rrtik_ompl.goal import as_task_region, parts_of
+from rrtik_ompl.ik.method_interface import Answer, Question
+from rrtik_ompl.ik.residual import SHARE, shortened, twist_between
+from rrtik_ompl.poses import rpy_matrices
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.task_region import TaskRegion
+from rrtik_ompl.tip_distance import PER_RADIAN, reach_of
+
+ITERATIONS = 60
+PATIENCE, STALLED = 10, 0.5  # a walk is given up whose squared residual is not down to this share in so many steps
+DAMPING = 1e-6  # the constant part, in units of the squared residual (1 is the reach)
+LARGEST_STEP = 0.5  # [rad] or [m] of any joint in one iteration
+STARTS, ROUNDS = 32, 16
+
+
+def project(robot: Robot, region: TaskRegion, starts: Matrix, *, places: Matrix | None = None) -> Matrix:
+    """Move configurations onto a region, each from its own start, inside the joint limits.
+
+    Args:
+        robot: The arm.
+        region: Where its tip shall be.
+        starts: Shape (m, dof).
+        places: Positions of the displacement that each row has to reach [m], shape (m, 3), the angles being as free as
+            the region leaves them; NaN, or None for all, where any position of the region will do.
+
+    Returns:
+        Where each start has led to, in the region or not, shape (m, dof).
+    """
+    Q, left = robot.clamp(starts), np.arange(len(starts))
+    places = np.full((len(Q), 3), np.nan) if places is None else places
+    scale = np.repeat([1.0 / reach_of(robot), PER_RADIAN], 3)[:, None]
+    mark = np.full(len(Q), np.inf)
+    for step in range(ITERATIONS):
+        tips = robot.fk_batch(Q[left])
+        aims = region.nearest(tips)
+        slides = np.isnan(places[left, 0])
+        aims[:, :3] = np.where(slides[:, None], aims[:, :3], places[left])
+        poses = region.poses(aims)
+        twist = twist_between(tips, poses[:, :3, :3], poses[:, :3, 3])
+        square = ((twist * scale[:, 0]) ** 2).sum(axis=1)
+        kept = ~_arrived(region, twist)
+        if step % PATIENCE == 0:
+            kept &= square <= STALLED * mark[left]
+            mark[left] = square
+        left, aims, twist, square = left[kept], aims[kept], twist[kept], square[kept]
+        if len(left) == 0:
+            break
+        held = _held(region, aims, scale, slides[kept])
+        J = held @ (robot.jacobian_batch(Q[left]) * scale)
+        Q[left] = robot.clamp(Q[left] + _step(J, held @ (twist[:, :, None] * scale), square))
+    return Q
+
+
+def projected(robot: Robot, region: TaskRegion, starts: Matrix, rng: np.random.Generator) -> Matrix:
+    """As `project`, every second row to a place drawn from the region: walks alone would end on its rim.
+
+    Returns:
+        Shape (m, dof).
+    """
+    places = region.drawn(len(starts), rng)[:, :3]
+    places[::2] = np.nan
+    return project(robot, region, starts, places=places)
+
+
+def projection(question: Question) -> Answer:
+    """The method of `solve_ik`: from random postures onto one part of the goal after the other."""
+    robot, rng = question.robot, question.rng
+    regions = [as_task_region(part) for part in parts_of(question.goal)]
+    found, nearest, least = np.zeros((0, robot.dof)), question.near, np.inf
+    timed_out = False
+    for number in range(max(ROUNDS, len(regions))):
+        region = regions[number % len(regions)]
+        starts = rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
+        starts[0] = question.near
+        rows = projected(robot, region, starts, rng)
+        distance = region.distance(robot, rows)
+        if distance.min() < least:
+            nearest, least = rows[distance.argmin()], distance.min()
+        found = np.vstack([found, rows[region.satisfied(robot, rows)]])
+        if question.accept(found).any() and not question.all:
+            break
+        timed_out = time.monotonic() > question.deadline
+        if timed_out:
+            break
+    return Answer(found, nearest, number + 1, timed_out)
+
+
+def _arrived(region: TaskRegion, twist: Matrix) -> Mask:
+    """Which rows are at most a hundredth of the tolerance away."""
+    position, angle = (np.linalg.norm(part, axis=1) for part in (twist[:, :3], twist[:, 3:]))
+    arrived: Mask = (position <= SHARE * region.position_tolerance) & (angle <= SHARE * region.orientation_tolerance)
+    return arrived
+
+
+def _held(region: TaskRegion, aims: Matrix, scale: Matrix, slides: Mask) -> NDArray[np.float64]:
+    """Projectors of scaled twists of the tip onto what the region holds at aims, shape (m, 6): (m, 6, 6).
+
+    Free are the twists of coordinates that lie inside their range; of positions only in rows that ``slides`` marks.
+    """
+    low, high = region.bounds.T
+    inside = ((low < aims) & (aims < high)) | (high - low >= TAU) & region.free
+    inside[:, :3] &= slides[:, None]
+    R, tips = region.T_world_w.rotation, region.poses(aims)[:, :3, 3]
+    about = tips - (region.T_world_w.translation + aims[:, :3] @ R.T)
+    pitched, rolled = (rpy_matrices(aims[:, 3:] * part)[:, :, k] for part, k in (([0, 0, 1], 1), ([0, 1, 1], 0)))
+    axes = np.stack([rolled, pitched, np.tile([0.0, 0.0, 1.0], (len(aims), 1))], axis=2)
+    freed = np.zeros((len(aims), 6, 6))
+    freed[:, :3, :3] = R
+    freed[:, 3:, 3:] = R @ axes
+    freed[:, :3, 3:] = np.cross(freed[:, 3:, 3:], about[:, :, None], axis=1)
+    freed = freed * scale * inside[:, None, :]
+    held: NDArray[np.float64] = np.eye(6) - freed @ np.linalg.pinv(freed)
+    return held
+
+
+def _step(J: NDArray[np.float64], e: NDArray[np.float64], square: Vector) -> Matrix:
+    """J^T (J J^T + (|e|^2 / 2 + DAMPING) I)^-1 e, no joint too far; shapes (m, 6, n), (m, 6, 1), (m,) -> (m, n)."""
+    damped = J @ np.swapaxes(J, 1, 2) + (0.5 * square + DAMPING)[:, None, None] * np.eye(6)
+    return shortened((np.swapaxes(J, 1, 2) @ np.linalg.solve(damped, e))[..., 0], LARGEST_STEP)

@@ -1,0 +1,91 @@
+"""Methods that walk from a start towards a goal, made into methods of `solve_ik`: many starts, round after round."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from typing import TypeAlias
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.goal import has_task_regions, tip_errors
+from rrtik_ompl.ik.goal_rows import goal_rows
+from rrtik_ompl.ik.method_interface import Answer, Question, Target
+from rrtik_ompl.ik.numeric.descent import Search, walk
+from rrtik_ompl.robot import Robot
+
+STARTS = 32  # in one round
+ROUNDS = 16  # after which it gives up
+MEMBERS = 4  # of a region, that are searched once more to say why there is no solution
+
+# From (robot, goal, starts of shape (m, dof)) to where each start has led to, shape (m, dof), and the steps taken.
+Walk: TypeAlias = Callable[[Robot, Target, Matrix], tuple[Matrix, int]]
+
+
+def restarted(method: Walk, question: Question, *, starts: int = STARTS, rounds: int = ROUNDS) -> Answer:
+    """Walk from the posture and from random ones, round after round until a solution will do.
+
+    Args:
+        method: What walks; what it leads to outside the joint limits is left out.
+        question: What is asked.
+        starts: In one round.
+        rounds: At most, but one for each target; these take turns.
+    """
+    robot = question.robot
+    found, steps = np.zeros((0, robot.dof)), 0
+    for number in range(max(rounds, len(question.targets))):
+        target = question.targets[number % len(question.targets)]
+        Q = question.rng.uniform(*robot.finite_range(), (starts, robot.dof))
+        if number < len(question.targets):
+            Q[0] = question.near
+        Q, taken = method(robot, target, Q)
+        good = target.satisfied(robot, Q) & robot.within_limits(Q)
+        found, steps = np.vstack([found, Q[good]]), steps + taken
+        if question.accept(found).any() and not question.all:
+            break
+        if time.monotonic() > question.deadline:
+            return Answer(found, nearest_posture(question), steps, timed_out=True)
+    return Answer(found, question.near if len(found) else nearest_posture(question), steps)
+
+
+def nearest_posture(question: Question, *, searched: bool = False) -> Vector:
+    """The posture that comes nearest to the goal, for the reason of a failure, shape (dof,).
+
+    It is one inside the limits if such a one reaches the goal; otherwise the joints may turn without limits.
+
+    Args:
+        question: What was asked.
+        searched: Whether `Search` is known to find nothing inside the limits.
+    """
+    robot, aims = question.robot, aims_of(question)
+    if not searched:
+        search = Search(robot, aims[:MEMBERS], question.near)
+        inside = search.q[search.advance(np.arange(len(search.q)))]
+        if len(inside):
+            first: Vector = inside[0]
+            return first
+    starts = question.rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
+    anywhere, _, _ = walk(_turning_freely(robot), aims[np.arange(STARTS) % len(aims)], starts)
+    nearest: Vector = anywhere[int(np.argmin(np.add(*tip_errors(question.goal, robot, anywhere))))]
+    return nearest
+
+
+def aims_of(question: Question) -> Matrix:
+    """Rows of the goal, see `rrtik_ompl.ik.goal_rows`; of targets drawn from it if it has task-space regions."""
+    if has_task_regions(question.goal):
+        return np.vstack([goal_rows(target) for target in question.targets])
+    return goal_rows(question.goal)
+
+
+@lru_cache(maxsize=64)
+def _turning_freely(robot: Robot) -> Robot:
+    """The robot with a full turn to either side in place of its limits."""
+    turning = ~robot.prismatic
+    return replace(
+        robot,
+        lower=np.where(turning, -2.0 * np.pi, robot.lower),
+        upper=np.where(turning, 2.0 * np.pi, robot.upper),
+    )

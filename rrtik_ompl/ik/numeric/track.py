@@ -1,0 +1,108 @@
+"""A trajectory followed by numeric steps, from several solutions of its first point at once."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.goal import TipGoal, joint_difference
+from rrtik_ompl.ik.numeric.descent import descend
+from rrtik_ompl.ik.numeric.restarts import STARTS
+from rrtik_ompl.robot import Robot
+
+ROUNDS = 4  # of random starts at a point that no motion leads to
+CARRIED = 8  # solutions that are followed side by side, those nearest to the posture before
+SAME_POSTURE = 1e-3  # [rad] or [m]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tracker:
+    """What a numeric tracker is told.
+
+    Attributes:
+        robot: The arm.
+        targets: Of the points: poses, positions, or poses whose turn about an axis is free.
+        accept: Which of some configurations, shape (k, dof), will do.
+        jump: Motion of one joint between two points [rad or m] from which on it counts as a jump.
+        rng: Random numbers.
+        deadline: Time of ``time.monotonic`` at which to stop.
+    """
+
+    robot: Robot
+    targets: Sequence[TipGoal]
+    accept: Callable[[Matrix], Mask]
+    jump: float
+    rng: np.random.Generator
+    deadline: float
+
+    def follow(self, near: Vector | None) -> tuple[Matrix, int]:
+        """Configurations of all points, shape (k, dof), NaN where none was found, and the steps taken.
+
+        Solutions of the first point are carried on side by side; the one that comes farthest, with the least motion,
+        is taken. Where none can go on, the next point is solved afresh.
+        """
+        q = np.full((len(self.targets), self.robot.dof), np.nan)
+        point, last, steps = 0, near, 0
+        while point < len(q) and time.monotonic() <= self.deadline:
+            begun, taken = self.fresh(self.targets[point], last)
+            steps += taken
+            if len(begun):
+                ways, taken = self.carry(begun, point)
+                steps += taken
+                travel = np.abs(joint_difference(self.robot, ways[1:], ways[:-1])).sum(axis=(0, 2))
+                if last is not None:
+                    travel += np.abs(joint_difference(self.robot, ways[0], last)).sum(axis=1)
+                best = ways[:, int(np.argmin(travel))]
+                q[point : point + len(best)] = best
+                point, last = point + len(best), best[-1]
+            else:
+                point += 1
+        return q, steps
+
+    def fresh(self, target: TipGoal, last: Vector | None) -> tuple[Matrix, int]:
+        """Different solutions of one point, at most `CARRIED`, nearest to the posture before first, and the steps."""
+        steps = 0
+        for number in range(ROUNDS):
+            starts = self.rng.uniform(*self.robot.finite_range(), (STARTS, self.robot.dof))
+            if number == 0 and last is not None:
+                starts[0] = last
+            Q, taken = descend(self.robot, target, starts)
+            steps += taken
+            Q = self.good(target, Q)
+            if len(Q) or time.monotonic() > self.deadline:
+                break
+        away = np.zeros(len(Q)) if last is None else np.linalg.norm(joint_difference(self.robot, Q, last), axis=1)
+        kept: list[Vector] = []
+        for q in Q[np.argsort(away, kind="stable")]:
+            if len(kept) < CARRIED and all(np.abs(q - other).max() > SAME_POSTURE for other in kept):
+                kept.append(q)
+        return np.array(kept).reshape(-1, self.robot.dof), steps
+
+    def carry(self, begun: Matrix, point: int) -> tuple[NDArray[np.float64], int]:
+        """Follow the trajectory from solutions of a point until none can go on; shape (points, survivors, dof)."""
+        ways, steps = begun[None], 0
+        for target in self.targets[point + 1 :]:
+            if time.monotonic() > self.deadline:
+                break
+            now = ways[-1]
+            ahead = 2.0 * now - ways[-2] if len(ways) > 1 else now
+            Q, taken = descend(self.robot, target, ahead)
+            steps += taken
+            moved = np.abs(joint_difference(self.robot, Q, now)).max(axis=1)
+            alive = target.satisfied(self.robot, Q) & (moved <= self.jump)
+            alive[alive] = self.accept(Q[alive])
+            if not alive.any():
+                break
+            ways = np.concatenate([ways[:, alive], Q[None, alive]])
+        return ways, steps
+
+    def good(self, target: TipGoal, Q: Matrix) -> Matrix:
+        """The rows that are at the target and will do."""
+        Q = Q[target.satisfied(self.robot, Q)]
+        good: Matrix = Q[self.accept(Q)]
+        return good

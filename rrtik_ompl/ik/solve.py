@@ -1,0 +1,240 @@
+"""Inverse kinematics by one call: from a goal to configurations that were checked, or the reason why there is none."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen, not_negative
+from rrtik_ompl.errors import InputError, UnknownNameError, require
+from rrtik_ompl.goal import PositionGoal, TipGoal, has_task_regions, joint_difference, parts_of, tip_errors
+from rrtik_ompl.ik.mb_rrt.search import out_of_reach
+from rrtik_ompl.ik.method_interface import Answer, Question, Target, tolerances
+from rrtik_ompl.ik.methods import METHODS, load_kernels
+from rrtik_ompl.ik.random_stream import RandomStream
+from rrtik_ompl.ik.targets import leaves_freedom, targets
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.world import World, check_world
+
+SECONDS = 1.0
+DRAWS = 32  # targets drawn from a goal that leaves freedom; one for each part if it has more parts
+DIGITS = 9  # of metres and degrees in a message: less is rounding
+SAME_POSTURE = 1e-3  # [rad] or [m]; solutions of a numeric method this near are one
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IkResult:
+    """What inverse kinematics found.
+
+    Attributes:
+        solutions: Configurations at the goal, inside the limits, free if a world was given, nearest first; shape
+            (k, dof). At most one unless all were asked for.
+        residuals: Distance [m] and angle [rad] of each from the goal by forward kinematics, shape (k, 2).
+        reason: "" or why there is none: ``unreachable``, ``limits``, ``collision``, ``time`` (or the method gave up,
+            or tried a part of a region alone).
+        detail: The same in a line: by how much, which joint, what touches.
+        iterations: Steps of a numeric method.
+        method: The method that answered.
+        seconds: Time taken.
+    """
+
+    solutions: Matrix
+    residuals: Matrix
+    reason: str
+    detail: str
+    iterations: int
+    method: str
+    seconds: float
+
+    @property
+    def found(self) -> bool:
+        """Whether there is a solution."""
+        return len(self.solutions) > 0
+
+
+def list_ik_methods() -> tuple[str, ...]:
+    """Names that `solve_ik` takes as a method, beside "auto"."""
+    return tuple(METHODS)
+
+
+def solve_ik(
+    robot: Robot,
+    goal: TipGoal,
+    *,
+    method: str = "auto",
+    near: ArrayLike | None = None,
+    all: bool = False,
+    world: World | None = None,
+    seconds: float = SECONDS,
+    seed: int = 0,
+) -> IkResult:
+    """Find configurations at a goal.
+
+    Args:
+        robot: The arm.
+        goal: A pose, a position, or a region with some freedom (of which targets are drawn).
+        method: A name from `list_ik_methods`; "auto" is the closed form where it fits, else (and where the targets
+            drawn from a region bring none) numeric, or projection onto task-space regions; the others are there to
+            be compared.
+        near: Posture near which a solution is wanted, shape (dof,); the middle of the limits if None. A closed form
+            gives the nearest one there is, a numeric method the first that it finds on its way from there.
+        all: Every solution that the method finds, not just one: a closed form gives all there are (of a singular
+            pose representatives), a numeric one those it comes across, full turns of a joint counted apart.
+        world: If given, solutions in collision are left out. Its robot must be this one.
+        seconds: Time that a numeric method may take; it is looked at between rounds, of which the first is done.
+        seed: Of the random numbers; the same seed gives the same answer as long as the time does not cut in.
+
+    Raises:
+        UnknownNameError: If there is no such method.
+        InputError: If the method does not fit the robot and the goal, or an argument makes no sense.
+    """
+    check_world(world, robot)
+    load_kernels(robot)
+    begin = time.monotonic()
+    require(goal, TipGoal, "goal", "inverse kinematics needs a goal of the tip, such as PoseGoal(T_world_tip)")
+    limit, random = not_negative(seconds, "seconds"), RandomStream(seed)
+    posture = usual_posture(robot) if near is None else robot.configuration(near, "near")
+    drawn = (goal,) if isinstance(goal, Target) else tuple(targets(goal, max(DRAWS, len(parts_of(goal))), random.rng))
+    name = chosen_method(robot, drawn, method)
+    if method == "auto" and name == "numeric":
+        name = _walker(goal)
+
+    def accept(Q: Matrix) -> Mask:
+        return free_of_collision(world, Q)
+
+    question = Question(robot, goal, drawn, posture, accept, all, begin + limit, random, world)
+    answer, q, residuals, free = _tried(question, name)
+    if method == "auto" and not free.any() and _draws(name, goal):
+        name = _walker(goal)
+        answer, q, residuals, free = _tried(question, name)
+    turned = joint_difference(robot, q, posture)
+    (rows,) = free.nonzero()
+    order = rows[np.vecdot(turned, turned)[rows].argsort(kind="stable")]
+    kept = different_rows(turned, order) if all else order[:1]
+    reason, detail = ("", "") if len(kept) else _why(question, answer, name, q)
+    return IkResult(
+        solutions=frozen(np.where(robot.continuous, posture + turned[kept], q[kept])),
+        residuals=frozen(residuals[kept]),
+        reason=reason,
+        detail=detail,
+        iterations=answer.iterations,
+        method=name,
+        seconds=time.monotonic() - begin,
+    )
+
+
+@lru_cache(maxsize=64)
+def usual_posture(robot: Robot) -> Vector:
+    """Where a search begins if nobody says: the middle of the limits, shape (dof,)."""
+    return frozen(0.5 * np.sum(robot.finite_range(), axis=0))
+
+
+def chosen_method(robot: Robot, drawn: tuple[Target, ...], method: str) -> str:
+    """The name of the method for targets: the first that fits if it is "auto".
+
+    Raises:
+        UnknownNameError: If there is no such method.
+        InputError: If it does not fit.
+    """
+
+    def misfit(name: str) -> str:
+        return next((m for m in (METHODS[name].misfit(robot, target) for target in drawn) if m), "")
+
+    if method == "auto":
+        return next(name for name in METHODS if not misfit(name))
+    if method not in METHODS:
+        raise UnknownNameError("inverse kinematics method", method, ("auto", *METHODS))
+    fault = misfit(method)
+    if fault:
+        raise InputError(
+            f"method '{method}' does not fit robot '{robot.name}' and this goal: {fault}; "
+            f"what fits: {', '.join(name for name in METHODS if not misfit(name))}"
+        )
+    return method
+
+
+def free_of_collision(world: World | None, Q: Matrix) -> Mask:
+    """Which configurations, shape (k, dof), are free: by the fast check first, then by the independent one.
+
+    All are if there is no world.
+    """
+    if world is None or len(Q) == 0:
+        return np.ones(len(Q), dtype=bool)
+    free = np.array(world.valid_batch(Q))
+    free[free] = world.certify(Q[free])
+    return free
+
+
+def _tried(question: Question, name: str) -> tuple[Answer, Matrix, Matrix, Mask]:
+    """What a method answers: of that the rows at the goal, shape (k, dof), their residuals, and which are accepted.
+
+    If one is enough, the nearest is looked at first and alone: mostly it will do.
+    """
+    robot, answer = question.robot, METHODS[name].run(question)
+    inside = robot.clamp(answer.q[robot.within_limits(answer.q)])
+    if not question.all and len(inside) > 1:
+        away = joint_difference(robot, inside, question.near)
+        nearest = int(np.vecdot(away, away).argmin())
+        q, residuals = _at_goal(robot, question.goal, inside[nearest : nearest + 1])
+        if len(q) and question.accept(q)[0]:
+            return answer, q, residuals, np.ones(1, dtype=bool)
+    q, residuals = _at_goal(robot, question.goal, inside)
+    return answer, q, residuals, question.accept(q)
+
+
+def different_rows(rows: Matrix, order: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Numbers of the rows, taken in that order, without those that repeat an earlier one to `SAME_POSTURE`."""
+    kept: list[int] = []
+    for k in order.tolist():
+        if not kept or np.abs(rows[k] - rows[kept]).max(axis=1).min() > SAME_POSTURE:
+            kept.append(k)
+    return np.array(kept, dtype=np.intp)
+
+
+def _at_goal(robot: Robot, goal: TipGoal, q: Matrix) -> tuple[Matrix, Matrix]:
+    """The rows of q at the goal, and their residuals, shape (k, 2): of a region from the part a row is nearest to."""
+    if len(q) == 0:
+        return q, np.zeros((0, 2))
+    residuals = np.array(tip_errors(goal, robot, q)).T
+    at = (residuals <= tolerances(goal)).all(axis=1) if isinstance(goal, Target) else goal.satisfied(robot, q)
+    return q[at], residuals[at]
+
+
+def _why(question: Question, answer: Answer, name: str, q: Matrix) -> tuple[str, str]:
+    """Reason and detail of a failure of a method that found q, shape (k, dof), all in collision."""
+    robot, goal = question.robot, question.goal
+    if len(q) and question.world is not None:
+        return "collision", f"{len(q)} configurations reach the goal, all in collision: {question.world.explain(q[0])}"
+    fault = robot.limit_fault(answer.nearest)
+    reached = bool(goal.satisfied(robot, answer.nearest[None])[0])
+    if reached and not fault:
+        return "time", f"the goal is in reach, but the method gave up after {answer.iterations} steps"
+    if _draws(name, goal):
+        return "time", f"none of {len(question.targets)} targets drawn from the goal is reached inside the limits"
+    if reached:
+        return "limits", f"the arm could reach the goal, but {fault}"
+    away = f"the nearest posture is {_away(robot, goal, answer.nearest)}"
+    if answer.timed_out and not all(out_of_reach(robot, target) for target in question.targets):
+        return "time", f"no solution in time; {away}"
+    return "unreachable", f"{away} from the goal"
+
+
+def _walker(goal: TipGoal) -> str:
+    """The method for goals with freedom that walks to all of them, not to targets drawn from them."""
+    return "projection" if has_task_regions(goal) else "numeric"
+
+
+def _draws(name: str, goal: TipGoal) -> bool:
+    """Whether the targets that a method takes are not all there is of a goal."""
+    return name not in ("projection", _walker(goal)) and any(map(leaves_freedom, parts_of(goal)))
+
+
+def _away(robot: Robot, goal: TipGoal, q: Vector) -> str:
+    """How far a posture is from a goal, in metres and, unless it is a position, degrees."""
+    ((distance,), (angle,)) = tip_errors(goal, robot, q[None])
+    turned = "" if isinstance(goal, PositionGoal) else f" and {round(np.degrees(angle), DIGITS):.4g} deg"
+    return f"{round(distance, DIGITS):.4g} m{turned} away"

@@ -1,0 +1,1 @@
+"""Single-joint moves: the staircase of a path, the search for the fewest moves and its lower bounds, words."""

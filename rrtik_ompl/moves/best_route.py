@@ -1,0 +1,113 @@
+"""The best route of single-joint moves so far, and the ways in which a better one takes its place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.moves.axis_cut import cut_parts, double_axis_cut
+from rrtik_ompl.moves.lattice import MoveLattice
+from rrtik_ompl.moves.rules import long_enough
+from rrtik_ompl.moves.values import Values, lattice_size
+from rrtik_ompl.transitions import edge_keys, merge_moves, transitions
+from rrtik_ompl.world.motion_queries import Questions, never
+
+DIGITS = 9  # of the travel after the point; the rest is rounding
+NONE = 2**31  # moves, if there is no route
+
+
+class BestRoute:
+    """The route with the fewest moves that is known, the least travel among those.
+
+    Attributes:
+        route: Shape (k, n), or None.
+
+    Args:
+        ask: Judges motions.
+        costs: Cost of each joint's travel, shape (n,).
+        order: All joints; among equal routes on a lattice the one whose last moves come first here.
+        smallest_move: A route with a shorter move is not kept, shape (n,).
+    """
+
+    def __init__(self, ask: Questions, costs: Vector, order: Sequence[int], smallest_move: Vector) -> None:
+        self._ask, self._costs, self._order, self._smallest_move = ask, costs, order, smallest_move
+        self.route: Matrix | None = None
+
+    @property
+    def moves(self) -> int:
+        """Of the route; more than any number if there is none."""
+        return NONE if self.route is None else transitions(self.route)
+
+    def take(self, route: Matrix) -> None:
+        """Take in a free route, shape (k, n); it is kept if it is better."""
+        if self._gains(route):
+            self.route = route
+
+    def rank(self, route: Matrix | None) -> tuple[int, float]:
+        """What is to be made small: moves, then travel; a gain of rounding is none."""
+        if route is None:
+            return NONE, np.inf
+        travel = float((np.abs(np.diff(route, axis=0)) @ self._costs).sum())
+        return transitions(route), round(travel, DIGITS)
+
+    def cut(self, route: Matrix, axes: Sequence[int] | None = None) -> Matrix:
+        """The published double axis cut of a free route: on long ones it gains much more in a second than a lattice.
+
+        As far as it comes in time; what has been cut by then stays cut.
+        """
+        return self._confirmed_cut(double_axis_cut(route, self._ask.in_time, axes=axes, stop=self._ask.stop), route)
+
+    def cut_parts(self, route: Matrix) -> Matrix:
+        """Cuts of parts of a free route that get longer: much of what the cut of the whole gains, much sooner."""
+        return self._confirmed_cut(cut_parts(route, self._ask.in_time, stop=self._ask.stop), route)
+
+    def search(self, values: Values, start: Vector, goal: Vector) -> Matrix | None:
+        """The best route between a start and a goal on a lattice of values, if there is one.
+
+        Raises:
+            OutOfTime: If it is time to stop.
+        """
+        found = self._lattice_route(values, start, goal)
+        if found is not None:
+            self.take(found)
+        return found
+
+    def replace(self, route: Matrix, first: int, last: int, values: Values) -> None:
+        """Take in a free route whose waypoints from ``first`` to ``last`` give way to the best part on a lattice.
+
+        Raises:
+            OutOfTime: If it is time to stop.
+        """
+        part = self._lattice_route(values, route[first], route[last])
+        if part is not None:
+            whole = merge_moves(np.vstack([route[:first], part, route[last + 1 :]]), tolerance=0.0)
+            if self._gains(whole) and self._confirmed(whole, route):
+                self.route = whole
+
+    def _gains(self, route: Matrix) -> bool:
+        return self.rank(route) < self.rank(self.route) and long_enough(route, self._smallest_move)
+
+    def _confirmed_cut(self, found: Matrix, route: Matrix) -> Matrix:
+        """The cut of a route if it is free, else the route. That is found out even when it is time to stop."""
+        stop, self._ask.stop = self._ask.stop, never
+        confirmed = self._confirmed(found, route)
+        self._ask.stop = stop
+        if not confirmed:
+            return route
+        self.take(found)
+        return found
+
+    def _lattice_route(self, values: Values, start: Vector, goal: Vector) -> Matrix | None:
+        if lattice_size(values) < 2:
+            return None
+        lattice = MoveLattice(values, self._ask, self._costs)
+        found = lattice.best_route(start, goal, self._order)
+        return found if found is not None and self._confirmed(found, start[None]) else None
+
+    def _confirmed(self, route: Matrix, known: Matrix) -> bool:
+        """Whether every edge of a route is free; those of the known one are. A run is asked about in pieces before."""
+        old = set(edge_keys(known))
+        fresh = [k for k, edge in enumerate(edge_keys(route)) if edge not in old]
+        return not fresh or bool(self._ask(route[fresh], route[np.add(fresh, 1)]).all())

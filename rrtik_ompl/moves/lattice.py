@@ -1,0 +1,152 @@
+"""A lattice of joint values, and the best single-joint moves on it: fewest moves first, least travel second.
+
+Source: the C-RDT paper's level sets of free runs, on values that may stand at any distance from each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.world.motion_queries import MotionsFree
+
+Costs: TypeAlias = NDArray[np.float64]  # one number for each configuration of a lattice
+Index: TypeAlias = tuple[int, ...]  # the place of a configuration in a lattice
+
+ROUNDING = 1e-12  # of a sum of travels, relative
+
+
+class MoveLattice:
+    """All configurations whose every joint takes one of the values given for it.
+
+    A run is a stretch of the lattice along one joint without collision; a move goes from any configuration of a run to
+    any other.
+
+    Attributes:
+        values: For each joint the values it may take, ascending.
+        size: Number of configurations.
+
+    Args:
+        values: For each joint the values it may take, in any order.
+        motions_free: Which straight motions are free, for batches of shape (m, n). Asked about
+            all configurations, as motions of no length, and about those between free neighbours.
+        costs: Cost of each joint's travel, shape (n,).
+    """
+
+    def __init__(self, values: Sequence[Vector], motions_free: MotionsFree, costs: Vector) -> None:
+        self.values = [np.unique(v) for v in values]
+        self._shape = tuple(len(v) for v in self.values)
+        self.size = int(np.prod(self._shape))
+        self._places = [v * cost for v, cost in zip(self.values, costs, strict=True)]
+        self._open = self._open_segments(motions_free)
+
+    def best_route(self, start: Vector, goal: Vector, order: Sequence[int]) -> Matrix | None:
+        """The route with the fewest moves between two configurations of the lattice, the least travel among those.
+
+        Args:
+            start: Shape (n,).
+            goal: Shape (n,).
+            order: All joints; among equal routes the one whose last moves come first here.
+
+        Returns:
+            Shape (moves + 1, n), or None if there is no route.
+        """
+        end = self._index(goal)
+        levels = [np.full(self._shape, np.inf)]
+        levels[0][self._index(start)] = 0.0
+        while not np.isfinite(levels[-1][end]):
+            levels.append(self._after_a_move(levels[-1]))
+            if (np.isfinite(levels[-1]) == np.isfinite(levels[-2])).all():
+                return None
+        return self._traced(levels, end, order)
+
+    def _open_segments(self, motions_free: MotionsFree) -> list[Mask]:
+        """For each joint which motions from one value to the next are free, in the shape of the lattice less one."""
+        corners = np.indices(self._shape).reshape(len(self._shape), -1)
+        rows = np.stack([v[places] for v, places in zip(self.values, corners, strict=True)], axis=1)
+        inside = motions_free(rows, rows).reshape(self._shape)
+        numbers = np.arange(self.size).reshape(self._shape)
+        found = [_both_ends(inside, joint) for joint in range(len(self._shape))]
+        tails = [_without_last(numbers, joint)[open_] for joint, open_ in enumerate(found)]
+        heads = [_without_first(numbers, joint)[open_] for joint, open_ in enumerate(found)]
+        free = motions_free(rows[np.concatenate(tails)], rows[np.concatenate(heads)])
+        parts = np.split(free, np.cumsum([len(part) for part in tails])[:-1])
+        for open_, part in zip(found, parts, strict=True):
+            open_[open_] = part
+        return found
+
+    def _index(self, q: Vector) -> Index:
+        return tuple(int(np.searchsorted(v, x)) for v, x in zip(self.values, q, strict=True))
+
+    def _after_a_move(self, costs: Costs) -> Costs:
+        """The least costs after one more move, or as before where no move helps."""
+        best = costs.copy()
+        for joint in range(len(self._shape)):
+            if self._shape[joint] > 1:
+                self._spread(costs, best, joint)
+        return best
+
+    def _spread(self, costs: Costs, best: Costs, joint: int) -> None:
+        """Carry costs along the runs of a joint, both ways."""
+        source, sink = np.moveaxis(costs, joint, 0), np.moveaxis(best, joint, 0)
+        open_, gaps = np.moveaxis(self._open[joint], joint, 0), np.diff(self._places[joint])
+        count = len(source)
+        for forward in (True, False):
+            carried = np.full(source.shape[1:], np.inf)
+            for k in range(count - 1) if forward else range(count - 1, 0, -1):
+                segment, head = (k, k + 1) if forward else (k - 1, k - 1)
+                carried = np.where(open_[segment], np.minimum(carried, source[k]) + gaps[segment], np.inf)
+                np.minimum(sink[head], carried, out=sink[head])
+
+    def _traced(self, levels: list[Costs], end: Index, order: Sequence[int]) -> Matrix:
+        """The route to a configuration, from the last move to the first."""
+        indices = [end]
+        for level in range(len(levels) - 1, 0, -1):
+            here, wanted = indices[-1], float(levels[level][indices[-1]])
+            indices.append(next(self._origins(levels[level - 1], here, wanted, order)))
+        return np.array([[v[k] for v, k in zip(self.values, index, strict=True)] for index in reversed(indices)])
+
+    def _origins(self, before: Costs, here: Index, wanted: float, order: Sequence[int]) -> Iterator[Index]:
+        """Where a move to a configuration may come from."""
+        for joint in order:
+            low, high = self._run(joint, here)
+            travel = np.abs(self._places[joint][low : high + 1] - self._places[joint][here[joint]])
+            sums = _line(before, here, joint)[low : high + 1] + travel
+            for k in np.flatnonzero(sums <= wanted * (1.0 + ROUNDING) + ROUNDING):
+                if low + k != here[joint]:
+                    yield (*here[:joint], low + int(k), *here[joint + 1 :])
+
+    def _run(self, joint: int, here: Index) -> tuple[int, int]:
+        """First and last place of the run of a joint that contains a configuration."""
+        open_ = _line(self._open[joint], here, joint)
+        blocked = np.flatnonzero(~open_)
+        after = int(np.searchsorted(blocked, here[joint]))
+        low = int(blocked[after - 1]) + 1 if after > 0 else 0
+        return low, int(blocked[after]) if after < len(blocked) else len(open_)
+
+
+def _line(cells: NDArray[Any], here: Index, joint: int) -> NDArray[Any]:
+    """The cells along a joint through a place."""
+    place: tuple[Any, ...] = (*here[:joint], slice(None), *here[joint + 1 :])
+    line: NDArray[Any] = cells[place]
+    return line
+
+
+def _without_last(cells: NDArray[Any], joint: int) -> NDArray[Any]:
+    """All but the last of the cells along a joint."""
+    return cells.take(range(cells.shape[joint] - 1), axis=joint)
+
+
+def _without_first(cells: NDArray[Any], joint: int) -> NDArray[Any]:
+    """All but the first of the cells along a joint."""
+    return cells.take(range(1, cells.shape[joint]), axis=joint)
+
+
+def _both_ends(inside: NDArray[np.bool_], joint: int) -> NDArray[np.bool_]:
+    """Which segments along a joint have two free ends."""
+    open_: NDArray[np.bool_] = _without_last(inside, joint) & _without_first(inside, joint)
+    return open_

@@ -1,0 +1,1 @@
+"""What a session talks to: the arm, the camera, and simulations of both."""

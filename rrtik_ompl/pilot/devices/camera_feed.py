@@ -1,0 +1,91 @@
+"""Pictures from a camera that may be slow, stop, or come back: read aside, so that nobody waits for them."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Protocol
+
+from rrtik_ompl.errors import RrtikError
+from rrtik_ompl.sensing.cameras.pictures import CameraLostError, Picture
+
+TRY_AGAIN = 2.0  # [s] after a camera was lost
+ENDED = "no more pictures: the last one stays"
+
+
+class PictureSource(Protocol):
+    """Where pictures come from, one at a time."""
+
+    def latest(self) -> Picture | None:
+        """The newest picture, None if there is none since the last call.
+
+        Raises:
+            CameraLostError: While there is no camera.
+        """
+
+    def close(self) -> None:
+        """Let the camera go."""
+
+
+class Feed:
+    """The newest picture of a camera, a video or a folder; older ones that nobody took are dropped."""
+
+    def __init__(self, open_pictures: Callable[[], Iterator[Picture]], *, paced: bool = False) -> None:
+        """Begin to read.
+
+        Args:
+            open_pictures: Opens the source; called again after a camera was lost.
+            paced: Pictures are of the past: give them out as far apart as they were taken, and end with the last.
+
+        Raises:
+            InputError: If not even the first picture can be read.
+        """
+        self._open, self._paced = open_pictures, paced
+        pictures = open_pictures()
+        self._newest: Picture | None = next(pictures, None)
+        self._lost = ""
+        self._lock, self._ended = threading.Lock(), threading.Event()
+        self._thread = threading.Thread(target=self._read, args=(pictures,), daemon=True)
+        self._thread.start()
+
+    def latest(self) -> Picture | None:
+        """The newest picture, None if there is none since the last call.
+
+        Raises:
+            CameraLostError: While there is no camera.
+        """
+        with self._lock:
+            picture, self._newest = self._newest, None
+            if picture is None and self._lost:
+                raise CameraLostError(self._lost)
+        return picture
+
+    def close(self) -> None:
+        """Let the camera go."""
+        self._ended.set()
+        self._thread.join(timeout=5.0)
+
+    def _read(self, pictures: Iterator[Picture]) -> None:
+        while not self._ended.is_set():
+            self._lose(self._read_until_lost(pictures))
+            if self._paced or self._ended.wait(TRY_AGAIN):
+                return
+            pictures = self._open()
+
+    def _read_until_lost(self, pictures: Iterator[Picture]) -> str:
+        """Hand out pictures; the answer says why there are no more."""
+        begin = time.monotonic()
+        try:
+            for picture in pictures:
+                if self._ended.wait(max(begin + picture.time - time.monotonic(), 0.0) if self._paced else 0.0):
+                    break
+                with self._lock:
+                    self._newest, self._lost = picture, ""
+        except RrtikError as error:
+            return str(error)
+        return ENDED
+
+    def _lose(self, reason: str) -> None:
+        with self._lock:
+            self._lost = reason

@@ -1,0 +1,238 @@
+"""An arm on the other side of a TCP connection, and the server that offers one.
+
+The protocol is one JSON object a line, UTF-8, at most 64 kB. Joints are in the robot's order, values in rad or m.
+
+- the server greets: ``{"protocol": "rrtik-arm", "version": 1, "joints": ["azimuth", ..]}``
+- ``{"do": "read"}`` is answered by ``{"q": [..]}``
+- ``{"do": "move", "joint": 2, "target": 0.5}`` sends one joint (counted from 0) on its way; a new move takes the place
+  of the last; answered by ``{"q": [..]}``
+- ``{"do": "stop"}`` stands still at once; answered by ``{"q": [..]}``
+- what cannot be done is answered by ``{"error": "one line"}``
+
+The client asks for the joints about 30 times a second. A server stops the arm when its client has gone, or has said
+nothing for half a second.
+"""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+import time
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.arrays import Vector
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.pilot.devices.arm import SimulatedArm
+from rrtik_ompl.robot import Robot
+
+PROTOCOL, VERSION = "rrtik-arm", 1
+PERIOD = 1.0 / 30.0  # [s] between two questions for the joints
+PATIENCE = 0.5  # [s] for an answer
+TRY_AGAIN = 1.0  # [s]
+LONGEST_LINE = 64 * 1024
+
+
+class Line:
+    """Whole JSON objects over a socket."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        """Take a connection."""
+        connection.settimeout(PATIENCE)
+        self._socket = connection
+        self._rest = b""
+
+    def send(self, **words: Any) -> None:
+        """Send an object."""
+        self._socket.sendall(json.dumps(words).encode() + b"\n")
+
+    def receive(self) -> dict[str, Any]:
+        """The next object.
+
+        Raises:
+            OSError: If the connection ends, nothing comes in time, or what comes is none.
+        """
+        while b"\n" not in self._rest:
+            more = self._socket.recv(4096)
+            self._rest += more
+            if not more or len(self._rest) > LONGEST_LINE:
+                raise ConnectionError("the other side has closed the connection" if not more else "an endless line")
+        line, _, self._rest = self._rest.partition(b"\n")
+        try:
+            found = json.loads(line)
+        except ValueError:
+            found = None
+        if not isinstance(found, dict):
+            raise ConnectionError("the other side does not speak JSON lines")
+        return found
+
+    def close(self) -> None:
+        """End the connection."""
+        self._socket.close()
+
+
+class LineArm:
+    """An arm that a server offers. When the connection is lost it keeps the last known joints, and tries again."""
+
+    def __init__(self, robot: Robot, host: str, port: int) -> None:
+        """Connect.
+
+        Args:
+            robot: What the arm should be.
+            host: Of the server.
+            port: Of the server.
+
+        Raises:
+            InputError: If there is no server, or it offers another arm.
+        """
+        self.robot, self._address, self.lost = robot, (host, port), ""
+        self._wanted: dict[str, Any] | None = None
+        self._lock, self._ended, self._wake = threading.Lock(), threading.Event(), threading.Event()
+        try:
+            self._line = self._connect()
+            self._q = self._ask({"do": "read"})
+        except (OSError, OverflowError) as error:
+            raise InputError(f"arm at {host}:{port}: {error}; is its server running?") from None
+        self._thread = threading.Thread(target=self._talk, daemon=True)
+        self._thread.start()
+
+    def read(self) -> Vector:
+        """Where the joints were when they were last heard of. Shape (dof,), rad or m."""
+        with self._lock:
+            return self._q.copy()
+
+    def move(self, joint: int, target: float) -> None:
+        """Send one joint to a value [rad or m].
+
+        Raises:
+            InputError: If the connection is lost.
+        """
+        if self.lost:
+            raise InputError(self.lost)
+        self._want({"do": "move", "joint": int(joint), "target": float(target)})
+
+    def stop(self) -> None:
+        """Stand still at once; without connection the server sees to that itself."""
+        self._want({"do": "stop"})
+
+    def close(self) -> None:
+        """Stop, and end the connection."""
+        self.stop()
+        self._ended.set()
+        self._thread.join(timeout=5.0)
+        self._line.close()
+
+    def _want(self, message: dict[str, Any]) -> None:
+        with self._lock:
+            self._wanted = message
+        self._wake.set()
+
+    def _connect(self) -> Line:
+        line = Line(socket.create_connection(self._address, timeout=PATIENCE))
+        greeting = line.receive()
+        if greeting.get("protocol") != PROTOCOL or greeting.get("version") != VERSION:
+            raise ConnectionError(f"the other side does not greet as {PROTOCOL} {VERSION}")
+        if greeting.get("joints") != list(self.robot.joint_names):
+            raise ConnectionError(f"it has the joints {greeting.get('joints')}, not those of '{self.robot.name}'")
+        return line
+
+    def _ask(self, message: dict[str, Any]) -> Vector:
+        """Send a message; the answer says where the joints are."""
+        self._line.send(**message)
+        answer = self._line.receive()
+        if "error" in answer:
+            raise ConnectionError(str(answer["error"]))
+        try:
+            return self.robot.configuration(np.asarray(answer["q"], dtype=float), "q")
+        except (KeyError, TypeError, ValueError, InputError) as error:
+            raise ConnectionError(f"an answer without the joints: {error}") from None
+
+    def _talk(self) -> None:
+        """Ask for the joints and pass on what is wanted, until the end; connect again when the connection is lost."""
+        while True:
+            self._wake.wait(PERIOD)
+            self._wake.clear()
+            with self._lock:
+                message, self._wanted = self._wanted or {"do": "read"}, None
+            try:
+                if self.lost:
+                    self._line, message = self._connect(), {"do": "read"}  # what was wanted before is out of date
+                q = self._ask(message)
+                with self._lock:
+                    self._q, self.lost = q, ""
+            except OSError as error:
+                self._line.close()
+                self.lost = f"the connection to the arm is lost: {error}; the joints are the last known ones"
+                self._ended.wait(TRY_AGAIN)
+            if self._ended.is_set() and self._wanted is None:
+                return
+
+
+class LineServer:
+    """Offers a simulated arm to one client at a time, on this machine; use it as a context manager."""
+
+    def __init__(self, arm: SimulatedArm, port: int = 0, host: str = "127.0.0.1") -> None:
+        """Take a port; a free one if 0.
+
+        Raises:
+            InputError: If it cannot be used.
+        """
+        self.arm = arm
+        try:
+            self._listening = socket.create_server((host, port))
+        except (OSError, OverflowError) as error:
+            raise InputError(f"port {port}: cannot be used: {getattr(error, 'strerror', None) or error}") from None
+        self.port = int(self._listening.getsockname()[1])
+        self._listening.settimeout(0.1)
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+
+    def __enter__(self) -> LineServer:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        self._thread.join(timeout=5.0)
+        self._listening.close()
+
+    def _serve(self) -> None:
+        while not self._ended.is_set():
+            try:
+                connection, _ = self._listening.accept()
+            except TimeoutError:
+                continue
+            line = Line(connection)
+            try:
+                line.send(protocol=PROTOCOL, version=VERSION, joints=list(self.arm.robot.joint_names))
+                self._answer(line)
+            except OSError:
+                pass  # the client has gone, or is silent
+            self.arm.stop()
+            line.close()
+
+    def _answer(self, line: Line) -> None:
+        before = time.monotonic()
+        while not self._ended.is_set():
+            asked = line.receive()
+            now = time.monotonic()
+            self.arm.advance(now - before)
+            before = now
+            fault = self._obey(asked)
+            line.send(**({"error": fault} if fault else {"q": self.arm.read().tolist()}))
+
+    def _obey(self, asked: dict[str, Any]) -> str:
+        """Do what is asked; the answer says what is wrong with it, "" if nothing is."""
+        what, joint, target = asked.get("do"), asked.get("joint"), asked.get("target")
+        if what == "stop":
+            self.arm.stop()
+        elif what == "move":
+            good = isinstance(joint, int) and 0 <= joint < self.arm.robot.dof and isinstance(target, int | float)
+            if not good or not abs(target) < 1e6:  # type: ignore[arg-type]
+                return f"move needs a joint from 0 to {self.arm.robot.dof - 1} and a finite target"
+            self.arm.move(int(joint), float(target))  # type: ignore[arg-type]
+        elif what != "read":
+            return "do must be read, move or stop"
+        return ""

@@ -1,0 +1,109 @@
+"""Who looks for a session: a camera and a sensor, live or simulated."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.errors import RrtikError
+from rrtik_ompl.pilot.devices.arm import Arm
+from rrtik_ompl.pilot.devices.camera_feed import PictureSource
+from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
+from rrtik_ompl.pilot.session import Session
+from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.sensing.cameras.pictures import Picture
+from rrtik_ompl.sensing.frames import base_from_camera
+from rrtik_ompl.sensing.sensor import Sensor, View
+
+EXPLAIN_EVERY = 5.0  # [s]
+
+
+class Eyes(Protocol):
+    """What the engine needs of them.
+
+    Attributes:
+        camera: The lens.
+        picture: The last picture, shape (height, width, 3).
+        T_base_camera: Where the camera is, None if that is not known yet.
+        arm_in_picture: The arm itself is to be seen.
+        lost: Why there are no pictures any more; "" if there are.
+        hint: Why no object can be placed by the last picture; "" if one can.
+    """
+
+    camera: Camera
+    picture: NDArray[np.uint8]
+    T_base_camera: Any | None
+    arm_in_picture: bool
+    lost: str
+    hint: str
+
+    def look(self, session: Session, time: float) -> None:
+        """Look once, and tell the session what there is to be seen."""
+
+    def close(self) -> None:
+        """Look no more."""
+
+
+class LiveEyes:
+    """A camera and the sensor behind it."""
+
+    def __init__(self, sensor: Sensor, source: PictureSource, *, arm_in_picture: bool = False) -> None:
+        """Take the parts; see `Eyes`."""
+        self.camera, self.arm_in_picture = sensor.camera, arm_in_picture
+        self.picture = np.zeros((self.camera.height, self.camera.width, 3), dtype=np.uint8)
+        self.T_base_camera: Any | None = sensor.marker_map.T_base_camera
+        self.lost = self.hint = ""
+        self._explain_again = -np.inf
+        self._sensor, self._source = sensor, source
+
+    def look(self, session: Session, time: float) -> None:
+        """Look once, and tell the session what there is to be seen."""
+        try:
+            taken = self._source.latest()
+            if taken is None:
+                return
+            view = self._sensor.view(Picture(taken.pixels, taken.name, time))
+        except RrtikError as error:
+            self.lost = str(error)
+            return
+        self.lost, self.picture = "", taken.pixels
+        session.see(view.placed, time)
+        self.hint = self._why_nothing(view, time, known=bool(session.surroundings.seen))
+        if not view.why_not_placed:
+            self.T_base_camera, _ = base_from_camera(self._sensor.marker_map, view.seen)
+
+    def close(self) -> None:
+        """Let the camera go."""
+        self._source.close()
+
+    def _why_nothing(self, view: View, time: float, known: bool) -> str:
+        """Why an object cannot be placed. Looking for unknown markers is slow: only while none was ever seen."""
+        if view.placed:
+            return ""
+        if view.seen:
+            refused = next((f"{each.object.name}: {each.refused}" for each in view.seen if each.refused), "")
+            return refused or view.why_not_placed
+        if known:
+            return "no marker in view"
+        if time >= self._explain_again:
+            self._explain_again = time + EXPLAIN_EVERY
+            return self._sensor.why_nothing("camera")
+        return self.hint
+
+
+class SimulatedSource:
+    """Pictures of a simulated camera, made when they are asked for."""
+
+    def __init__(self, camera: SimulatedCamera, arm: Arm) -> None:
+        """Look at an arm."""
+        self._camera, self._arm, self._count = camera, arm, 0
+
+    def latest(self) -> Picture:
+        """The scene with the arm as it stands."""
+        self._count += 1
+        return self._camera.picture(self._arm.read(), float(self._count))
+
+    def close(self) -> None:
+        """Nothing to let go."""

@@ -1,0 +1,96 @@
+"""A simulated vehicle <-> its YAML file: camera, marker map, and where everything really is."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from rrtik_ompl.catalog import problem_folders
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.sections import Name, Section, Version, parse
+from rrtik_ompl.files.strict_yaml import read_yaml
+from rrtik_ompl.problem_files.scene import PoseEntry
+from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.sensing.cameras.camera_file import load_camera
+from rrtik_ompl.sensing.markers.marker_map import MarkerMap
+from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
+
+FOLDER = "pilot"  # beside the shipped problems
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scenario:
+    """What a simulated camera looks at.
+
+    Attributes:
+        camera: The lens.
+        marker_map: The objects.
+        places: ``T_base_object`` by name.
+        T_base_camera: From where it looks.
+    """
+
+    camera: Camera
+    marker_map: MarkerMap
+    places: Mapping[str, Any]
+    T_base_camera: Any
+
+
+class PlaceEntry(Section):
+    """Where an object of the map is."""
+
+    name: Name
+    pose: PoseEntry = Field(description="in the frame of the arm's base")
+
+
+class ScenarioFile(Section):
+    """A file with one scenario; camera and map are files, relative to its folder."""
+
+    version: Version
+    camera: Name
+    map: Name
+    camera_pose: PoseEntry = Field(description="T_base_camera")
+    places: Annotated[list[PlaceEntry], Field(min_length=1)]
+
+
+def load_scenario(path: str | os.PathLike[str]) -> Scenario:
+    """Read a scenario file.
+
+    Raises:
+        InputError: If the file, its camera file or its map cannot be used; one line with file, line, key and remedy.
+    """
+    document = read_yaml(path)
+    entry = parse(document, ScenarioFile)
+    folder = document.path.parent
+    marker_map = load_marker_map(folder / entry.map)
+    places = {}
+    for number, each in enumerate(entry.places):
+        with document.at(("places", number, "name")):
+            places[marker_map.named(each.name).name] = each.pose.build()
+    return Scenario(load_camera(folder / entry.camera), marker_map, places, entry.camera_pose.build())
+
+
+def find_scenario(problem: str) -> Path:
+    """The shipped scenario for a shipped problem.
+
+    Raises:
+        InputError: If there is none.
+    """
+    shipped = {file.stem: file for folder in problem_folders() for file in _scenarios(folder)}
+    if problem not in shipped:
+        there = ", ".join(sorted(shipped)) or "no problem"
+        raise InputError(
+            f"no simulated vehicle ships for '{problem}' (but for {there}); give one with --scenario FILE, or "
+            "show a record with its own --camera-file and --map"
+        )
+    return shipped[problem]
+
+
+def _scenarios(folder: Path) -> list[Path]:
+    """Files in a folder that are scenarios; camera files and maps lie beside them."""
+    problems = {file.stem for file in folder.glob("*.yaml")}
+    return [file for file in sorted((folder / FOLDER).glob("*.yaml")) if file.stem in problems]

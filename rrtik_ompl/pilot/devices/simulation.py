@@ -1,0 +1,139 @@
+"""A vehicle that is not there: what its camera would see of the marked objects, the surroundings and the arm.
+
+Pictures are made as fast as a camera makes them: solids by the rasteriser, markers as pictures laid into their plane.
+For measurements of the markers themselves use `sensing.synthetic_camera`, which is exact and slow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.overlay.augment import Augmenter
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.sensing.cameras.pictures import Picture
+from rrtik_ompl.sensing.markers.detection import marker_cells
+from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap
+
+FINE = 24  # pixels a cell of a marker's picture
+WATER = ((96, 84, 60), (60, 52, 40))  # blue, green, red above and below
+NOISE, NOISES = 2.0, 4  # grey levels; pictures of noise, taken in turn
+RATE = 30.0  # pictures a second
+TRIANGLES = 8_000  # of the arm
+
+
+class SimulatedCamera:
+    """Looks at a scene that is known, with an arm in it that moves."""
+
+    def __init__(
+        self,
+        camera: Camera,
+        marker_map: MarkerMap,
+        robot: Robot,
+        scene: Scene,
+        places: Mapping[str, Any],
+        T_base_camera: Any,
+        seed: int = 0,
+    ) -> None:
+        """Put everything in its place.
+
+        Args:
+            camera: The lens; without distortion the picture is exact.
+            marker_map: The objects.
+            robot: The arm in the picture.
+            scene: What else stands there.
+            places: ``T_base_object`` of objects, by name; those that are not named are not there.
+            T_base_camera: From where the camera looks.
+            seed: Of the noise.
+        """
+        self.camera, self.marker_map, self.T_base_camera = camera, marker_map, T_base_camera
+        self.places = dict(places)
+        self._scene, self._arm = scene, Augmenter(robot, camera, TRIANGLES)
+        rng, size = np.random.default_rng(seed), (camera.height, camera.width, 1)
+        grey = [np.rint(rng.normal(0.0, NOISE, size)).astype(np.int16) for _ in range(NOISES)]
+        self._noise = [np.repeat(each, 3, axis=2) for each in grey]
+        self._kept: Any = (None, None, None)
+        self._kept_arm: Any = (None, None, None)
+
+    def picture(self, q: NDArray[np.float64], time: float) -> Picture:
+        """What it sees with the arm at a configuration, shape (dof,)."""
+        noise = self._noise[int(time * RATE) % NOISES]
+        noisy = cv2.add(self._clean(q), noise, dtype=cv2.CV_8U)
+        return Picture(np.asarray(noisy, dtype=np.uint8), "simulated camera", time)
+
+    def _clean(self, q: NDArray[np.float64]) -> NDArray[np.uint8]:
+        """The picture without noise; made anew only when the arm or an object moved."""
+        still, solids = self._still()
+        before, there, clean = self._kept_arm
+        if before is not still or not np.array_equal(there, q):
+            clean = self._arm.draw(still, self.T_base_camera, q, real=solids, opacity=1.0)
+            self._kept_arm = (still, np.array(q), clean)
+        return np.asarray(clean)
+
+    def _still(self) -> tuple[NDArray[np.uint8], list[Obstacle]]:
+        """The picture without the arm, and the solids in it; made anew only when an object moved."""
+        key = tuple((name, T.homogeneous.tobytes()) for name, T in sorted(self.places.items()))
+        if key != self._kept[0]:
+            solids = [*self._scene.obstacles, *self._object_solids()]
+            drawn = self._arm.draw(_water(self.camera), self.T_base_camera, obstacles=solids, opacity=1.0)
+            depths, T_camera_base = self._arm.depths(), self.T_base_camera.inverse()
+            for thing in self.marker_map.objects:
+                if thing.name in self.places:
+                    self._lay_markers(drawn, depths, thing, T_camera_base * self.places[thing.name])
+            self._kept = (key, drawn, solids)
+        return self._kept[1], self._kept[2]
+
+    def _object_solids(self) -> list[Obstacle]:
+        return [
+            Obstacle(f"{thing.name} {k}", solid.shape, self.places[thing.name] * solid.pose)
+            for thing in self.marker_map.objects
+            if thing.name in self.places
+            for k, solid in enumerate(thing.solids)
+        ]
+
+    def _lay_markers(self, drawn: Any, depths: Any, thing: MarkedObject, T_camera_object: Any) -> None:
+        """Lay the pictures of an object's markers into the picture, where nothing stands before them."""
+        for marker in thing.markers:
+            T = T_camera_object * marker.T_object_marker
+            if float(T.rotation[:, 2] @ T.translation) >= 0.0:
+                continue  # seen from behind
+            sheet = np.pad(marker_cells(self.marker_map.dictionary, marker.number), 1, constant_values=255)
+            half = 0.5 * marker.side * len(sheet) / (len(sheet) - 2)
+            corners = np.array([[-half, half, 0], [half, half, 0], [half, -half, 0], [-half, -half, 0]])
+            around = corners @ T.rotation.T + T.translation
+            if (around[:, 2] > 0.05).all():
+                self._lay(drawn, depths, sheet, self.camera.project(around), T)
+
+    def _lay(self, drawn: Any, depths: Any, sheet: NDArray[np.uint8], pixels: Any, T: Any) -> None:
+        fine = np.kron(30 + (sheet // 255) * 190, np.ones((FINE, FINE), dtype=np.uint8)).astype(np.uint8)
+        size = len(fine)
+        square = np.array([[0, 0], [size, 0], [size, size], [0, size]], dtype=np.float32) - 0.5
+        low = np.maximum(np.floor(pixels.min(axis=0)).astype(int) - 2, 0)
+        high = np.minimum(np.ceil(pixels.max(axis=0)).astype(int) + 3, (self.camera.width, self.camera.height))
+        if (high <= low).any():
+            return
+        ss = 3  # rays through a pixel, squared
+        shape = (ss * (high - low)).tolist()
+        target = ((pixels - low + 0.5) * ss - 0.5).astype(np.float32)
+        bend = cv2.getPerspectiveTransform(square, target)
+        laid = cv2.warpPerspective(fine, bend, shape, flags=cv2.INTER_AREA, borderValue=(0.0,))
+        there = cv2.warpPerspective(np.full_like(fine, 255), bend, shape, flags=cv2.INTER_LINEAR, borderValue=(0.0,))
+        small = tuple((high - low).tolist())
+        share = cv2.resize(there, small, interpolation=cv2.INTER_AREA).astype(np.float32)[..., None] / 255.0
+        value = cv2.resize(laid, small, interpolation=cv2.INTER_AREA).astype(np.float32)[..., None]
+        box = np.s_[low[1] : high[1], low[0] : high[0]]
+        share[depths[box] < T.translation[2] - 0.02 - 0.5 * np.ptp(pixels) / self.camera.matrix[0, 0]] = 0.0
+        piece = drawn[box].astype(np.float32)
+        drawn[box] = np.clip(value + (1.0 - share) * piece, 0, 255) * (share > 0) + piece * (share == 0)
+
+
+def _water(camera: Camera) -> NDArray[np.uint8]:
+    share = np.linspace(0.0, 1.0, camera.height)[:, None]
+    rows = (1.0 - share) * np.array(WATER[0]) + share * np.array(WATER[1])
+    return np.repeat(np.rint(rows).astype(np.uint8)[:, None], camera.width, axis=1)

@@ -1,0 +1,136 @@
+"""Following a list of single-joint moves: which move is next, how far it is, when to let go, when the way is lost.
+
+Source: shared-control tool, section 6.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.moves.text import joint_unit, reading
+from rrtik_ompl.path import JointPath, Move
+from rrtik_ompl.world import World
+
+TOLERANCE = np.deg2rad(1.0)  # [rad]; a move is done this near to its end
+SLIDING_TOLERANCE = 0.002  # [m]
+REACTION = 0.3  # [s] from the advice to stop until the pilot's hand does
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Progress:
+    """Where the arm is on its way.
+
+    Attributes:
+        move: Number of the current move, from 0; as many as there are moves when all is done.
+        share: Of the current move that is done, 0 to 1.
+        remaining: To the current move's end, with its sign [rad or m].
+        advice: "move", "stop" (now, for the hand is slow), "done" or "lost".
+        fault: If lost: which joint is off and by how much.
+    """
+
+    move: int
+    share: float
+    remaining: float
+    advice: str
+    fault: str = ""
+
+
+class Follower:
+    """Watches an arm follow a path of single-joint moves."""
+
+    def __init__(self, path: JointPath, rates: Vector, tolerance: float = TOLERANCE) -> None:
+        """Stand at the first move.
+
+        Args:
+            path: One joint at a time.
+            rates: Of the joints when they are driven, shape (dof,) [rad/s or m/s].
+            tolerance: Within which a joint is where it should be [rad].
+
+        Raises:
+            InputError: If the path moves several joints at once.
+        """
+        self.path, self.moves = path, path.moves()
+        self._corners = _corners(path, self.moves)
+        self._rates = rates
+        self._slack = slack(path, tolerance)
+        self._names = list(path.joint_names)
+        self.current = 0
+
+    @property
+    def done(self) -> bool:
+        """Whether the last move is made."""
+        return self.current == len(self.moves)
+
+    @property
+    def target(self) -> Vector:
+        """Where the arm is after the current move. Shape (dof,)."""
+        return np.array(self._corners[min(self.current + 1, len(self.moves))])
+
+    def joint(self) -> int | None:
+        """Number of the joint that the current move turns; None when all is done."""
+        return None if self.done else self._names.index(self.moves[self.current].joint)
+
+    def update(self, q: Vector) -> Progress:
+        """Where an arm at q stands."""
+        joint = self.joint()
+        if joint is None:
+            return self._lost(q, self._corners[-1], None) or Progress(self.current, 1.0, 0.0, "done")
+        begin, end = self._corners[self.current][joint], self._corners[self.current + 1][joint]
+        lost = self._lost(q, self._corners[self.current], joint)
+        if lost is not None:
+            return lost
+        remaining = float(end - q[joint])
+        if abs(remaining) <= min(self._slack[joint], 0.5 * abs(end - begin)):  # a short move has to be made, too
+            self.current += 1
+            return self.update(q)
+        inside = min(begin, end) - self._slack[joint] <= q[joint] <= max(begin, end) + self._slack[joint]
+        if not inside:
+            return self._off(joint, float(q[joint]), float(end))
+        share = float(np.clip(1.0 - remaining / (end - begin), 0.0, 1.0))
+        ending = abs(remaining) <= self._rates[joint] * REACTION + self._slack[joint]
+        return Progress(self.current, share, remaining, "stop" if ending else "move")
+
+    def rest(self, q: Vector) -> JointPath:
+        """The remaining moves from where the arm really is: straight to the end of the current one, then as planned."""
+        rows = np.vstack([q, self._corners[self.current + 1 :]]) if not self.done else np.vstack([q, q])
+        return self.path.with_waypoints(rows)
+
+    def back(self, q: Vector) -> JointPath:
+        """The way back to the beginning: what was done, reversed."""
+        return self.path.with_waypoints(np.vstack([q, self._corners[: self.current + 1][::-1]]))
+
+    def _lost(self, q: Vector, planned: Vector, moving: int | None) -> Progress | None:
+        away = np.abs(q - planned)
+        if moving is not None:
+            away[moving] = 0.0
+        off = np.flatnonzero(away > self._slack)
+        return self._off(int(off[0]), float(q[off[0]]), float(planned[off[0]])) if len(off) else None
+
+    def _off(self, joint: int, value: float, planned: float) -> Progress:
+        (here, unit), (there, _) = (reading(v, joint_unit(self.path.prismatic[joint])) for v in (value, planned))
+        fault = f"{self._names[joint]} is at {here:.2f} {unit} instead of {there:.2f}"
+        return Progress(self.current, 0.0, 0.0, "lost", fault)
+
+
+def slack(path: JointPath, tolerance: float = TOLERANCE) -> Vector:
+    """How far beside its place each joint may be [rad or m]. Shape (dof,)."""
+    return np.where(path.prismatic, SLIDING_TOLERANCE, tolerance)
+
+
+def still_free(world: World, path: JointPath) -> str:
+    """Why a path is not free any more; "" if it is."""
+    faults = path.violations(world)
+    return faults[0].reason if faults else ""
+
+
+def _corners(path: JointPath, moves: tuple[Move, ...]) -> Matrix:
+    """Configurations before and after each move. Shape (moves + 1, dof)."""
+    names, rows = list(path.joint_names), [np.array(path.start)]
+    for move in moves:
+        row = rows[-1].copy()
+        row[names.index(move.joint)] = move.end
+        rows.append(row)
+    return np.array(rows)

@@ -1,0 +1,221 @@
+"""Assisted manoeuvre: what a move of one joint would do, before it is made. Preventive: what must not be is refused.
+
+Source: shared-control tool, section 2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form
+from rrtik_ompl.moves.text import joint_unit, reading
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.pilot.routes.clearance import tightest
+from rrtik_ompl.pilot.routes.follower import slack
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.world import World
+
+NEAR_SINGULAR = 0.05  # sines of the angles that vanish in a singular posture, metres of a lever
+LITTLE_ROOM = 0.02  # [m]
+LOOKS = 20  # along the move, for the clearance
+SINGULAR_LOOKS = 60  # along the whole way of a joint
+WAYS_OUT = (1, 2, 3, 4, 6, 8)  # small errors, by which a joint is driven to get out of contact
+
+
+Stretch = tuple[float, float, str]  # from, to [rad or m], name of the singular case
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Room:
+    """How far one joint can be driven while the others stand still.
+
+    Attributes:
+        low: The least value [rad or m].
+        high: The largest value.
+        below: What ends the way at ``low``: "limit", "full turn" or the pair that touches.
+        above: What ends it at ``high``.
+        singular: Stretches in between on which the arm is near a singular posture; its name is "" if it has none.
+    """
+
+    low: float
+    high: float
+    below: str
+    above: str
+    singular: tuple[Stretch, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Verdict:
+    """What is to be said about a move.
+
+    Attributes:
+        allowed: Whether it may be made.
+        reason: Why not: the limit, or the pair that would touch and where; "" if it may.
+        warnings: What to look out for.
+        clearance: The least distance to anything along the way, at a few looks [m]; -inf if it collides.
+    """
+
+    allowed: bool
+    reason: str
+    warnings: tuple[str, ...]
+    clearance: float
+
+
+def judge_move(world: World, q: Vector, joint: int, target: float) -> Verdict:
+    """Judge a move of one joint.
+
+    Args:
+        world: Robot and surroundings.
+        q: Where the arm is, shape (dof,).
+        joint: Number of the joint.
+        target: Where it is to go [rad or m].
+
+    Raises:
+        InputError: If there is no such joint or the target is not finite.
+    """
+    robot = world.robot
+    if not 0 <= joint < robot.dof:
+        raise InputError(f"joint must be a number from 0 to {robot.dof - 1}, got {joint}")
+    if not np.isfinite(target):
+        raise InputError(f"target of {robot.joint_names[joint]} must be a finite number, got {target}")
+    start, end = robot.configuration(q), robot.configuration(q).copy()
+    end[joint] = target
+    fault = robot.limit_fault(end)
+    if fault:
+        return Verdict(False, fault, (), -np.inf)
+    end = robot.clamp(end)
+    if not world.valid(start):
+        return _out_of_contact(world, start, end)
+    if not world.motion_valid(start, end):
+        return Verdict(False, _obstruction(world, start, end, joint), (), -np.inf)
+    share = np.linspace(0.0, 1.0, LOOKS)[:, None]
+    looks = start + share * (end - start)
+    tight = tightest(world, looks)
+    room = np.inf if tight is None else tight.distance
+    warnings = [*_singular(world, end)]
+    if tight is not None and room < LITTLE_ROOM:
+        warnings.append(f"only {1e3 * max(room, 0.0):.0f} mm between {tight.first} and {tight.second}")
+    return Verdict(True, "", tuple(warnings), float(room))
+
+
+def free_until(world: World, q: Vector, joint: int, target: float) -> float:
+    """How far towards a target a joint can go without touching anything or leaving its limits [rad or m].
+
+    By bisection of the way; the arm must be free where it is.
+    """
+    robot, start = world.robot, world.robot.configuration(q)
+    end = start.copy()
+    end[joint] = min(max(target, float(robot.lower[joint])), float(robot.upper[joint]))
+    if world.motion_valid(start, end):
+        return float(end[joint])
+    low, high = 0.0, 1.0
+    for _ in range(12):
+        middle = 0.5 * (low + high)
+        if world.motion_valid(start, start + middle * (end - start)):
+            low = middle
+        else:
+            high = middle
+    return float(start[joint] + low * (end[joint] - start[joint]))
+
+
+def room_of(world: World, q: Vector, joint: int) -> Room:
+    """How far a joint can be driven; nowhere if the arm touches something, a full turn if it is endless and free."""
+    robot, here = world.robot, float(q[joint])
+    if not world.valid(q):
+        why = world.explain(q)
+        return Room(here, here, why, why, ())
+    low, below = _way(world, q, joint, float(robot.lower[joint]), here - 2.0 * np.pi)
+    high, above = _way(world, q, joint, float(robot.upper[joint]), here + 2.0 * np.pi)
+    return Room(low, high, below, above, _singular_stretches(robot, q, joint, low, high))
+
+
+def _way(world: World, q: Vector, joint: int, limit: float, turn: float) -> tuple[float, str]:
+    """How far a joint goes towards its limit, or round once, and what ends it: that, or the pair that touches."""
+    end, name = (limit, "limit") if np.isfinite(limit) else (turn, "full turn")
+    reached = free_until(world, q, joint, end)
+    if reached == end:
+        return end, name
+    start, last = q.copy(), q.copy()
+    start[joint], last[joint] = reached, end
+    touching = world.contacts(_first_stuck(world, start, last))
+    return reached, f"{touching[0].first} meets {touching[0].second}" if touching else "too close to tell"
+
+
+def _singular_stretches(robot: Robot, q: Vector, joint: int, low: float, high: float) -> tuple[Stretch, ...]:
+    """Where along the way of a joint the arm is near a singular posture."""
+    values = np.linspace(low, high, SINGULAR_LOOKS)
+    rows = np.tile(q, (len(values), 1))
+    rows[:, joint] = values
+    found: list[Stretch] = []
+    for case, near in _near_singular(robot, rows).items():
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], near, [False]]).astype(int)))
+        found += [(float(values[a]), float(values[b - 1]), case) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return tuple(found)
+
+
+def way_out(world: World, q: Vector) -> tuple[int, float] | None:
+    """The joint, and where to drive it [rad or m], that gets an arm that touches something free again; None if none.
+
+    Of all single joints the one that has to go least far, a few small errors' width at most.
+    """
+    small = slack(JointPath.of(world.robot, q[None]))
+    for far in WAYS_OUT:
+        for joint, step in enumerate(far * small):
+            for target in (q[joint] + step, q[joint] - step):
+                if judge_move(world, q, joint, float(target)).allowed:
+                    return joint, float(target)
+    return None
+
+
+def advice_to_get_free(world: World, q: Vector) -> str:
+    """What a pilot is told whose arm touches something; "" if it does not."""
+    if world.valid(q):
+        return ""
+    out = way_out(world, q)
+    if out is None:
+        return "drive the arm out of it first"
+    value, unit = reading(out[1], joint_unit(world.robot.prismatic[out[0]]))
+    return f"{world.robot.joint_names[out[0]]} to {value:.4g} {unit} gets it free"
+
+
+def _out_of_contact(world: World, start: Vector, end: Vector) -> Verdict:
+    """An arm that touches something may go where it touches ever less, and then nothing."""
+    rows = start + np.linspace(0.0, 1.0, LOOKS)[:, None] * (end - start)
+    room = np.array([world.clearance(row) for row in rows])
+    free = int(np.argmax(room > 0.0))
+    if room[-1] <= 0.0 or (np.diff(room[: free + 1]) <= 0.0).any() or not world.motion_valid(rows[free], end):
+        return Verdict(False, f"the arm touches something, and this does not get it free: {world.explain(start)}", (),
+                       -np.inf)  # fmt: skip
+    return Verdict(True, "", ("out of contact",), float(room[-1]))
+
+
+def _first_stuck(world: World, start: Vector, end: Vector) -> Vector:
+    """The first configuration along a motion that is not free; its end if none is seen. Shape (dof,)."""
+    rows = start + np.linspace(0.0, 1.0, world.steps(start, end) + 1)[:, None] * (end - start)
+    stuck = np.flatnonzero(~world.valid_batch(rows))
+    return np.array(rows[stuck[0]] if len(stuck) else end)
+
+
+def _obstruction(world: World, start: Vector, end: Vector, joint: int) -> str:
+    """Which pair touches first along a move that is not free, and at which value of the joint."""
+    first = _first_stuck(world, start, end)
+    value, unit = reading(float(first[joint]), joint_unit(world.robot.prismatic[joint]))
+    why = world.explain(first) or "too close to tell"
+    return f"{world.robot.joint_names[joint]} at {value:.3g} {unit}: {why}"
+
+
+def _singular(world: World, q: Vector) -> list[str]:
+    near = [case for case, there in _near_singular(world.robot, q[None]).items() if there[0]]
+    return [f"near the singular posture '{case}'" if case else "near a singular posture" for case in near]
+
+
+def _near_singular(robot: Robot, rows: Matrix) -> dict[str, Mask]:
+    """Which configurations are near each singular case, shape (m,); by the Jacobian, "", if the robot names none."""
+    if has_closed_form(robot):
+        return {case: np.asarray(size < NEAR_SINGULAR) for case, size in form_of(robot).nearness(rows).items()}
+    least = np.linalg.svd(robot.jacobian_batch(rows), compute_uv=False)[:, -1]
+    return {"": np.asarray(least < NEAR_SINGULAR)}

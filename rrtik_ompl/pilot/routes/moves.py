@@ -1,0 +1,88 @@
+"""Routes of few single-joint moves between two configurations, and how to leave room along them.
+
+They are looked for on small lattices of joint values: the corners between start and goal, then further values of one
+joint after the other. Only where those hold no route a planner is asked.
+Source: shared-control tool, section 6; C-RDT paper (lists of single-joint moves).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.moves.lattice import MoveLattice
+from rrtik_ompl.moves.values import Values, lattice_size, spread_values, values_of
+from rrtik_ompl.planning import plan
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.shortening.fewest_moves import turning_limits
+from rrtik_ompl.world import World
+
+SECONDS = 5.0
+BRIEF = {"searches": 1, "rounds": 0}  # of the planner
+MOST_CORNERS = 256
+FURTHER_VALUES = 24  # of a joint
+ASIDE = (-16.0, -8.0, -4.0, 4.0, 8.0, 16.0)  # small errors, by which a detour is made larger or smaller
+
+
+def direct_routes(world: World, start: Vector, goal: Vector, orders: Sequence[Sequence[int]]) -> list[Matrix]:
+    """Routes in which every joint moves once at most, shape (moves + 1, dof); none if that is not free.
+
+    Args:
+        world: In which they are to be free.
+        start: Shape (dof,).
+        goal: Shape (dof,).
+        orders: For each route all joints; of several as good the one whose last moves come first here.
+    """
+    values = values_of(np.array([start, goal]))
+    return _routes(world, start, goal, values, orders) if lattice_size(values) <= MOST_CORNERS else []
+
+
+def detours(world: World, start: Vector, goal: Vector, order: Sequence[int], rng: np.random.Generator) -> list[Matrix]:
+    """Routes in which one joint takes further values on its way, for each joint the best; see `direct_routes`."""
+    ends = np.array([start, goal])
+    if lattice_size(values_of(ends)) > MOST_CORNERS:
+        return []
+    lower, upper = turning_limits(world.robot, ends)
+    found: list[Matrix] = []
+    for joint in range(world.robot.dof):
+        values = values_of(ends)
+        further = spread_values(float(lower[joint]), float(upper[joint]), FURTHER_VALUES, rng)
+        values[joint] = np.union1d(values[joint], further)
+        found += _routes(world, start, goal, values, [order])
+    return found
+
+
+def planned(world: World, start: Vector, goal: Vector, seed: int) -> Matrix | str:
+    """A planner's route, shape (moves + 1, dof), or the reason why there is none.
+
+    Raises:
+        ProblemError: If the start or the goal is not free.
+    """
+    found = plan(Problem(world, start, goal), "fewest-moves", seconds=SECONDS, seed=seed, parameters=BRIEF)
+    return found.reason if found.path is None else found.path.waypoints
+
+
+def moved_aside(world: World, route: Matrix, slack: Vector) -> Iterator[Matrix]:
+    """The same route with another value where a joint makes a detour, as far as it is free. Shape (moves + 1, dof).
+
+    Args:
+        world: In which they are to be free.
+        route: Shape (moves + 1, dof).
+        slack: Small errors of the joints, shape (dof,) [rad or m].
+    """
+    for joint, column in enumerate(route.T):
+        for value in np.setdiff1d(column, column[[0, -1]]):
+            for step in ASIDE:
+                other = route.copy()
+                other[column == value, joint] = value + step * slack[joint]
+                if world.motion_valid_batch(other[:-1], other[1:]).all():
+                    yield other
+
+
+def _routes(world: World, start: Vector, goal: Vector, values: Values, orders: Sequence[Sequence[int]]) -> list[Matrix]:
+    lattice = MoveLattice(values, world.motion_valid_batch, np.ones(world.robot.dof))
+    found = [lattice.best_route(start, goal, order) for order in orders]
+    different = {route.tobytes(): route for route in found if route is not None}
+    return list(different.values())

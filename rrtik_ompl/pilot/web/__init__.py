@@ -1,0 +1,1 @@
+"""The web server of the pilot's page, its clients, and the page itself."""

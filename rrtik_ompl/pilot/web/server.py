@@ -1,0 +1,250 @@
+"""The page's web server: one process, one WebSocket a page, for this machine only unless told otherwise.
+
+It answers only requests that name its own address (a web site elsewhere that makes its name point here is refused) and
+that come from its own page (Host and Origin), and where a token is set only those that know it.
+
+A WebSocket carries to the page: pictures as binary messages (a letter for the kind, the time as 8 bytes little-endian
+float [s], a JPEG) and JSON texts of the kinds "state", "role" and "refused"; from the page: JSON texts, either
+``{"shown": "frame" | "state"}`` for everything that was shown, or a command ``{"name": .., "seq": .., arguments}``.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hmac
+import itertools
+import json
+import logging
+import queue
+import struct
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import tornado.httpserver
+import tornado.netutil
+import tornado.web
+import tornado.websocket
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.pilot.web.clients import Client, Clients, Message
+
+LOOPBACK = "127.0.0.1"
+PAGE = Path(__file__).parent / "page"
+LARGEST_MESSAGE = 16 * 1024  # bytes, from a page
+MOST_WAITING = 200  # commands that were not obeyed yet
+SHORTEST_TOKEN = 16
+LONGEST_NAME = 40
+GOING_AWAY, FAREWELL_SECONDS = 1001, 0.1  # code of a WebSocket that is closed, and time for it to arrive
+PING_SECONDS, PONG_SECONDS = 5.0, 5.0
+NO_TOKEN = "the token is missing or wrong: open the address as rrtik pilot printed it"
+NOT_FROM_HERE = "asked for under another name, or from another page: open the address as rrtik pilot printed it"
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+SCRIPTS = ("keys.js", "link.js", "pilot.js")
+FILES = {"/": ("index.html", "text/html"), "/pilot.css": ("pilot.css", "text/css")}
+FILES |= {f"/{name}": (name, "text/javascript") for name in SCRIPTS}
+
+
+class PilotServer:
+    """Serves the page from a thread of its own until it is left; use it as a context manager.
+
+    Attributes:
+        commands: What the pilot's page wants, as pairs of the page's number and the command.
+    """
+
+    def __init__(self, port: int = 0, host: str = LOOPBACK, token: str = "", title: str = "") -> None:
+        """Take a port.
+
+        Args:
+            port: A free one if 0.
+            host: Address of this machine under which pages may reach it.
+            token: Word that a page has to know; needed for any address but this machine's own.
+            title: Of the page.
+
+        Raises:
+            InputError: If the port or the address cannot be used, or the token is missing or short.
+        """
+        self.host, self.token, self.title = host, token, title
+        self._check_token()
+        try:
+            self._sockets = tornado.netutil.bind_sockets(port, host)
+        except (OSError, OverflowError, UnicodeError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise InputError(f"port {port} on {host}: cannot be used: {reason}; choose another, or 0 for any") from None
+        self.port = int(self._sockets[0].getsockname()[1])
+        self.commands: queue.Queue[tuple[int, dict[str, Any]]] = queue.Queue()
+        self.clients = Clients(self._pilot_left)
+        self.numbers = itertools.count(1)
+        self.open_sockets: set[Any] = set()
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    @property
+    def url(self) -> str:
+        """Where a browser finds the page; with the token, if there is one."""
+        return f"http://{self._name}:{self.port}/" + (f"?token={self.token}" if self.token else "")
+
+    def __enter__(self) -> PilotServer:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._loop.call_soon_threadsafe(self._end)
+        self._thread.join(timeout=10.0)
+
+    def show_state(self, state: dict[str, Any], answered: dict[int, int]) -> None:
+        """Send a state to all pages, with the number of the last command of each page that it is the answer to."""
+        text = json.dumps({"kind": "state", "answered": answered, **state}, allow_nan=False)
+        self._call(lambda: self.clients.show_state(text))
+
+    def show_frame(self, kind: str, time: float, jpeg: bytes) -> None:
+        """Send a picture to all pages: kind "C" from the camera, "O" from outside; its time [s]."""
+        frame = kind.encode() + struct.pack("<d", time) + jpeg
+        self._call(lambda: self.clients.show_frame(kind, frame))
+
+    def may(self, request: Any) -> bool:
+        """Whether a request names this server, and comes from its own page or from none."""
+        hosts = {f"{name}:{self.port}" for name in (self._name, *(("localhost",) if self.host == LOOPBACK else ()))}
+        host, origin = request.headers.get("Host"), request.headers.get("Origin")
+        return host in hosts and (origin is None or origin == f"http://{host}")
+
+    def knows_token(self, word: str) -> bool:
+        """Whether a word is the token; takes the same time however much of it is right."""
+        return hmac.compare_digest(word.encode(), self.token.encode())
+
+    def receive(self, client: Client, text: str) -> None:
+        """Do what a page says: it has shown something, changes its role, or commands."""
+        try:
+            said = json.loads(text)
+        except ValueError:
+            return
+        if not isinstance(said, dict):
+            return
+        if "shown" in said:
+            (client.frames if said["shown"] == "frame" else client.states).arrived()
+        elif said.get("name") == "take":
+            refused = self.clients.take_over(client)
+            if refused:
+                client.tell(kind="refused", text=refused)
+        elif client is not self.clients.pilot:
+            client.tell(kind="refused", text="you are watching: T takes over when the pilot has left or handed over")
+        elif said.get("name") == "hand_over":
+            self.clients.hand_over(client)
+        elif self.commands.qsize() < MOST_WAITING:
+            self.commands.put((client.number, said))
+
+    def _check_token(self) -> None:
+        if self.host in ("", "0.0.0.0", "::"):
+            raise InputError(f"--host '{self.host}': name the one address under which pages shall reach this machine")
+        if self.host != LOOPBACK and len(self.token) < SHORTEST_TOKEN:
+            raise InputError(f"--host {self.host} needs --token with a secret of at least {SHORTEST_TOKEN} letters")
+
+    @property
+    def _name(self) -> str:
+        return f"[{self.host}]" if ":" in self.host else self.host
+
+    def _pilot_left(self) -> None:
+        self.commands.put((0, {"name": "halt"}))
+
+    def _end(self) -> None:
+        for each in self.open_sockets:
+            each.close(GOING_AWAY)
+        self._loop.call_later(FAREWELL_SECONDS, self._loop.stop)
+
+    def _call(self, act: Callable[[], None]) -> None:
+        if len(self.clients):
+            self._loop.call_soon_threadsafe(act)
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        logging.getLogger("tornado").addHandler(logging.NullHandler())  # what goes wrong is the page's to show
+        handlers: list[Any] = [(path, _PageHandler, {"server": self, "file": file}) for path, file in FILES.items()]
+        application = tornado.web.Application(
+            [*handlers, ("/ws", _SocketHandler, {"server": self})],
+            log_function=lambda _: None,
+            websocket_max_message_size=LARGEST_MESSAGE,
+            websocket_ping_interval=PING_SECONDS,
+            websocket_ping_timeout=PONG_SECONDS,
+        )
+        http = tornado.httpserver.HTTPServer(application, max_body_size=LARGEST_MESSAGE)
+        http.add_sockets(self._sockets)
+        self._loop.run_forever()
+        http.stop()
+        self._loop.run_until_complete(http.close_all_connections())
+        self._loop.close()
+
+
+class _Guarded(tornado.web.RequestHandler):
+    """Refuses what does not come from the own page."""
+
+    server: PilotServer
+
+    def prepare(self) -> None:
+        if not self.server.may(self.request):
+            raise tornado.web.HTTPError(403, reason=NOT_FROM_HERE)
+
+    def set_default_headers(self) -> None:
+        for name, value in (
+            ("Content-Security-Policy", POLICY),
+            ("X-Content-Type-Options", "nosniff"),
+            ("Referrer-Policy", "no-referrer"),
+            ("Cross-Origin-Resource-Policy", "same-origin"),
+            ("Cross-Origin-Opener-Policy", "same-origin"),
+            ("Cache-Control", "no-store"),
+        ):
+            self.set_header(name, value)
+
+    def write_error(self, status_code: int, **_: Any) -> None:
+        self.set_header("Content-Type", "text/plain; charset=utf-8")
+        self.finish(f"{status_code} {self._reason}\n")
+
+
+class _PageHandler(_Guarded):
+    def initialize(self, server: PilotServer, file: tuple[str, str]) -> None:
+        self.server, self._file = server, file
+
+    def get(self) -> None:
+        if self._file[0] == "index.html" and not self.server.knows_token(self.get_argument("token", "")):
+            raise tornado.web.HTTPError(403, reason=NO_TOKEN)
+        self.set_header("Content-Type", f"{self._file[1]}; charset=utf-8")
+        self.finish((PAGE / self._file[0]).read_bytes())
+
+
+class _SocketHandler(_Guarded, tornado.websocket.WebSocketHandler):
+    def initialize(self, server: PilotServer) -> None:
+        self.server = server
+        self._client: Client | None = None
+
+    def prepare(self) -> None:
+        super().prepare()
+        if not self.server.knows_token(self.get_argument("token", "")):
+            raise tornado.web.HTTPError(403, reason=NO_TOKEN)
+
+    def check_origin(self, origin: str) -> bool:
+        return self.server.may(self.request)
+
+    def open(self, *_: str, **__: str) -> None:
+        self.set_nodelay(True)
+        name = self.get_argument("page", "")[:LONGEST_NAME]
+        self._client = Client(next(self.server.numbers), name, self._send)
+        self._client.tell(kind="title", title=self.server.title)
+        self.server.open_sockets.add(self)
+        self.server.clients.join(self._client)
+
+    def on_message(self, message: Message) -> None:
+        if self._client is not None and isinstance(message, str):
+            self.server.receive(self._client, message)
+
+    def on_close(self) -> None:
+        self.server.open_sockets.discard(self)
+        if self._client is not None:
+            self.server.clients.leave(self._client)
+
+    def _send(self, message: Message) -> None:
+        with suppress(tornado.websocket.WebSocketClosedError):  # `on_close` follows
+            self.write_message(message, binary=isinstance(message, bytes))

@@ -1,0 +1,1 @@
+"""Plots of joint values, of the genetic algorithm, of reachability maps and of the tree of MB-RRT (matplotlib)."""

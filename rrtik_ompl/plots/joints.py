@@ -1,0 +1,109 @@
+"""Joints over time, or over the waypoints of a path that has no times yet: a picture as a PNG or SVG file."""
+
+from __future__ import annotations
+
+import os
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.files.text import file_name, write_bytes
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.trajectory import Trajectory
+
+FORMATS = (".png", ".svg")
+SAMPLES = 2000  # times at which a motion is drawn, beside its knots
+# Told apart by colour-blind people too: Okabe and Ito, Color Universal Design, 2008; black and grey for the rest.
+COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#1d2733", "#8494a5")
+DASHES = ("solid", (0, (5, 2)), (0, (1, 1.5)))  # for the ninth joint and those after it
+
+
+def plot_joints(motion: Trajectory | JointPath, file: str | os.PathLike[str]) -> None:
+    """Draw the joints of a motion over time: positions, velocities and accelerations; of a path, its positions.
+
+    Degrees for turning joints, metres for sliding ones, in rows of their own. The same input gives the same file.
+
+    Args:
+        motion: A trajectory, or a path, whose waypoints are then drawn at equal distances.
+        file: A .png or .svg file; written whole or not at all.
+
+    Raises:
+        InputError: If the ending is another one, the file cannot be written, or ``motion`` is something else.
+    """
+    plot_format(file)
+    require(motion, Trajectory | JointPath, "motion to plot")
+    over, label, rows = _rows(motion)
+    from matplotlib.figure import Figure
+
+    kinds = [(mask, unit) for mask, unit in ((~motion.prismatic, "deg"), (motion.prismatic, "m")) if mask.any()]
+    figure = Figure(figsize=(9.0, 0.9 + 2.4 * len(rows) * len(kinds)), layout="constrained")
+    panels = figure.subplots(len(rows) * len(kinds), 1, sharex=True, squeeze=False)[:, 0]
+    pairs = [(name, power, values, kind) for name, power, values in rows for kind in kinds]
+    for panel, (name, power, values, (mask, unit)) in zip(panels, pairs, strict=True):
+        _draw(panel, over, np.rad2deg(values) if unit == "deg" else values, mask, motion)
+        panel.set_ylabel(f"{name} [{unit}{power}]")
+    panels[-1].set_xlabel(label)
+    lines = {line.get_label(): line for panel in panels for line in panel.get_lines()}
+    handles = [lines[name] for name in motion.joint_names]
+    figure.legend(handles, motion.joint_names, loc="outside upper center", ncols=min(len(handles), 6), frameon=False)
+    save_figure(figure, file)
+
+
+def plot_format(file: str | os.PathLike[str]) -> str:
+    """Ending of a picture, one of ``FORMATS``.
+
+    Raises:
+        InputError: If it is another one.
+    """
+    ending = file_name(file).suffix.lower()
+    if ending not in FORMATS:
+        raise InputError(f"{file}: unknown ending '{ending}' for a plot; use {', '.join(FORMATS)}")
+    return ending
+
+
+def save_figure(figure: Any, file: str | os.PathLike[str], *, dpi: int = 150) -> None:
+    """Write a matplotlib figure so that the same figure gives the same file, whole or not at all.
+
+    Raises:
+        InputError: If the ending is none of ``FORMATS``, or the file cannot be written.
+    """
+    import matplotlib
+
+    ending, picture = plot_format(file), BytesIO()
+    metadata = {"Date": None} if ending == ".svg" else {}
+    with matplotlib.rc_context({"svg.hashsalt": "rrtik", "svg.fonttype": "none"}):
+        figure.savefig(picture, format=ending[1:], dpi=dpi, metadata=metadata)
+    write_bytes(file, picture.getvalue())
+
+
+def tidy(panel: Any, *, grid: bool = True) -> None:
+    """Leave out the frame's upper and right side; a pale grid behind everything."""
+    if grid:
+        panel.grid(color="#e3e9ef", linewidth=0.8)
+        panel.set_axisbelow(True)
+    for side in ("top", "right"):
+        panel.spines[side].set_visible(False)
+
+
+def _rows(motion: Trajectory | JointPath) -> tuple[Vector, str, list[tuple[str, str, Matrix]]]:
+    """What is drawn: over what, what that is called, and the rows of panels with name, power of time and values."""
+    if isinstance(motion, JointPath):
+        return np.arange(len(motion.waypoints), dtype=float), "waypoint", [("position", "", motion.waypoints)]
+    # a jump of acceleration is a vertical line: each knot is drawn from both sides
+    knots = np.concatenate([motion.times, np.nextafter(motion.times[1:], 0.0)])
+    clock = np.unique(np.concatenate([np.linspace(0.0, motion.duration, SAMPLES), knots]))
+    state = motion(clock)
+    values = (("position", "", state.positions), ("velocity", "/s", state.velocities))
+    return clock, "time [s]", [*values, ("acceleration", "/s²", state.accelerations)]
+
+
+def _draw(panel: Any, over: Vector, values: Matrix, mask: Any, motion: Trajectory | JointPath) -> None:
+    for k in np.flatnonzero(mask):
+        style = {"color": COLORS[k % len(COLORS)], "linestyle": DASHES[k // len(COLORS) % len(DASHES)]}
+        marker = {"marker": "o", "markersize": 3} if isinstance(motion, JointPath) else {}
+        panel.plot(over, values[:, k], label=motion.joint_names[k], linewidth=1.6, **style, **marker)
+    tidy(panel)
+    panel.margins(x=0.01)

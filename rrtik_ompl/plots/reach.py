@@ -1,0 +1,65 @@
+"""Slices of a map of reach, or of an effective workspace: a picture as a PNG or SVG file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.plots.joints import plot_format, save_figure, tidy
+from rrtik_ompl.reach.grid_map import Slice
+
+INK, CAMERA = "#1d2733", "#d55e00"
+
+
+def plot_slices(
+    slices: Sequence[Slice], file: str | os.PathLike[str], *, title: str = "", label: str = "", colors: str = "viridis"
+) -> None:
+    """Draw slices side by side to the same scale; 0 is left white.
+
+    Args:
+        slices: At least one.
+        file: A .png or .svg file; written whole or not at all.
+        title: Of the picture.
+        label: Of the colour bar; no bar if "".
+        colors: matplotlib's name of a colour map.
+
+    Raises:
+        InputError: If there is no slice, the ending is another one, or the file cannot be written.
+    """
+    plot_format(file)
+    if not slices:
+        raise InputError("slices to plot: there is none")
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Rectangle
+
+    figure = Figure(figsize=(5.6 * len(slices), 5.0), layout="constrained")
+    panels = figure.subplots(1, len(slices), squeeze=False)[0]
+    drawn: list[Any] = []
+    most = max(float(each.values.max(initial=0.0)) for each in slices) or 1.0
+    for panel, each in zip(panels, slices, strict=True):
+        steps = [float(axis[1] - axis[0]) if len(axis) > 1 else 1.0 for axis in (each.x, each.y)]
+        extent = tuple(
+            float(axis[end] + side * step / 2)
+            for axis, step in zip((each.x, each.y), steps, strict=True)
+            for end, side in ((0, -1), (-1, 1))
+        )
+        values = np.ma.masked_equal(each.values, 0.0)
+        drawn.append(
+            panel.imshow(values, origin="lower", extent=extent, cmap=colors, vmin=0.0, vmax=most, aspect="equal")
+        )
+        for x, y, right, top in each.boxes:
+            panel.add_patch(Rectangle((x, y), right - x, top - y, fill=False, hatch="//", edgecolor="#7f8a96"))
+        if each.points:
+            panel.plot(*np.array(each.points).T, linestyle="none", marker="^", color=CAMERA, markersize=8)
+        panel.plot(*each.base, marker="o", color=INK, markersize=4)
+        panel.set(xlabel=each.across, ylabel=each.up, xlim=extent[:2], ylim=extent[2:])
+        panel.set_title(each.title, fontsize=10)
+        tidy(panel, grid=False)
+    if label:
+        figure.colorbar(drawn[0], ax=panels, label=label, shrink=0.8)
+    figure.suptitle(title, fontsize=11)
+    save_figure(figure, file, dpi=110)

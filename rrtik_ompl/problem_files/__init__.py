@@ -1,0 +1,1 @@
+"""The YAML of problems, scenes, goals and robots; MotionBenchMaker; messages of MoveIt."""

@@ -1,0 +1,138 @@
+"""Problem files (YAML, ``version: 1``): robot, scene, start and goal <-> `Problem`, and the JSON schema of the format.
+
+A MotionBenchMaker file (scene or request) is recognised by its keys and read as well.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field
+
+from rrtik_ompl.catalog import find_problem, load_robot, robot_from_entry
+from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError, require
+from rrtik_ompl.files.sections import Positive, Section, Version, parse, without_null
+from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml, write_yaml
+from rrtik_ompl.files.text import file_name
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.problem_files.goal import GoalSection, StartSection, build_goal, goal_data
+from rrtik_ompl.problem_files.motion_bench_maker import is_motion_bench_maker, load_motion_bench_maker
+from rrtik_ompl.problem_files.robot import RobotEntry, robot_data
+from rrtik_ompl.problem_files.run import RunSection
+from rrtik_ompl.problem_files.scene import SceneEntry, scene_data
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.world import FINEST_RESOLUTION, MOTION_RESOLUTION, World
+
+FilePath = str | os.PathLike[str]
+
+
+ONLY_PATHS = (".csv", ".txt")  # endings; a .json may be either
+OF_PATHS = ("waypoints", "points")  # keys of files of paths and of trajectories
+
+
+class ProblemFile(Section):
+    """A motion planning problem. Lengths in metres; angles in radians, in degrees where a key ends in _deg."""
+
+    version: Version
+    robot: RobotEntry
+    scene: SceneEntry = Field(default=SceneEntry())
+    start: StartSection
+    goal: GoalSection
+    motion_resolution: Positive = Field(
+        MOTION_RESOLUTION,
+        ge=FINEST_RESOLUTION,
+        description="largest step of any point of the arm between two checked configurations [m]",
+    )
+    run: RunSection | None = Field(None, description="how to replan while the obstacles move (rrtik replan)")
+
+
+def load_problem(name_or_file: FilePath, *, robot: Robot | FilePath | None = None) -> Problem:
+    """Load a shipped problem by name, a problem file, or a MotionBenchMaker pair by one of its two files.
+
+    Args:
+        name_or_file: A name without ending and folder, or a path.
+        robot: Plan for this robot (or its name, or its URDF) in place of the one that the file names.
+
+    Raises:
+        InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
+        ProblemError: If start or goal is in collision or outside the limits.
+    """
+    path = problem_path(name_or_file)
+    document = _read(path)
+    if is_motion_bench_maker(document.data):
+        return load_motion_bench_maker(path, robot=robot)
+    entry = parse(document, ProblemFile)
+    world = _world(document, entry, robot)
+    with document.at(("start",)):
+        start = entry.start.configuration(world.robot)
+    with document.at(("goal",)):
+        goal = build_goal(entry.goal, world.robot)
+    try:
+        return Problem(world, start, goal, name=path.stem)
+    except ProblemError as error:
+        line = document.lines[("goal",) if str(error).startswith("goal") else ("start",)]
+        error.args = (f"{path}:{line}: {error}",)
+        raise
+
+
+def _read(path: Path) -> YamlDocument:
+    """The content of a problem file; whoever names a path alone is told what is missing."""
+    document = None if path.suffix.lower() in ONLY_PATHS and path.is_file() else read_yaml(path)
+    if document is None or (isinstance(document.data, dict) and not document.data.keys().isdisjoint(OF_PATHS)):
+        name = path.name
+        raise InputError(f"{path}: a path, not a problem; name its problem before it: rrtik check PROBLEM {name}")
+    return document
+
+
+def save_problem(problem: Problem, path: FilePath) -> None:
+    """Write a problem as YAML, whole or not at all; numbers read back bit for bit, rotations to the last digit or two.
+
+    Angles are written in radians. Files (meshes, URDF) are named relative to the new file's folder.
+
+    Raises:
+        InputError: If the file cannot be written, or the format has no words for something in the problem.
+    """
+    require(problem, Problem, "problem to save")
+    folder = file_name(path).parent
+    world = problem.world
+    data: dict[str, Any] = {"version": 1, "robot": robot_data(world.robot.source, folder)}
+    scene = scene_data(world.scene, folder)
+    data |= {"scene": scene} if scene else {}
+    data |= {"start": {"joints": problem.start.tolist()}, "goal": goal_data(problem.goal)}
+    write_yaml(path, data | {"motion_resolution": float(world.motion_resolution)})
+
+
+def problem_schema() -> dict[str, Any]:
+    """JSON schema of the problem file, made from the same models that check it."""
+    schema: dict[str, Any] = without_null(ProblemFile.model_json_schema())
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def problem_path(name_or_file: FilePath) -> Path:
+    """The file of a problem: a bare word is the name of a shipped one, or a file if there is no such name.
+
+    Raises:
+        UnknownNameError: If it is a bare word, and neither.
+    """
+    path = file_name(name_or_file)
+    if not isinstance(name_or_file, str) or path.suffix or len(path.parts) > 1:
+        return path
+    try:
+        return Path(find_problem(name_or_file))
+    except UnknownNameError:
+        if path.is_file():
+            return path
+        raise
+
+
+def _world(document: YamlDocument, entry: ProblemFile, robot: Robot | FilePath | None) -> World:
+    if robot is None:
+        with document.at(("robot",)):
+            robot = robot_from_entry(document.data["robot"], document.path.parent)
+    elif not isinstance(robot, Robot):
+        robot = load_robot(robot)
+    scene = entry.scene.build(document)
+    with document.at(("scene",)):
+        return World(robot, scene, motion_resolution=entry.motion_resolution)

@@ -1,0 +1,117 @@
+"""The ``robot:`` entry of a problem file: what it may say. `catalog.robot_from_entry` turns it into a robot."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, TypeAlias
+
+import pinocchio as pin
+from pydantic import ConfigDict, Field, Tag
+
+from rrtik_ompl.files.sections import (
+    Length,
+    Name,
+    NotNegative,
+    Number,
+    Section,
+    Vector2,
+    tag,
+    told_apart_by,
+)
+from rrtik_ompl.problem_files.scene import PoseEntry, pose_data
+
+PATH_KEYS = ("urdf", "srdf", "joint_limits", "dh", "packages")
+
+
+class _Mounted(Section):
+    """What every kind of robot may say besides."""
+
+    base_pose: PoseEntry | None = Field(None, description="pose of the base in the world; identity if absent")
+    tip: Name | None = Field(None, description="link or frame that goals refer to")
+
+
+class NamedRobot(_Mounted):
+    """A robot of the registry, by name (see ``rrtik list robots``); further keys are options of that robot."""
+
+    model_config = ConfigDict(extra="allow")
+
+    name: Name
+    limits: Name | None = Field(None, description="name of one of the robot's sets of joint limits")
+    locked: dict[Name, Number] | None = Field(None, description="values of joints that are held still [rad or m]")
+
+
+class PlanarMeasures(Section):
+    """Measures of an arm in the xy-plane."""
+
+    lengths: Annotated[list[Length], Field(min_length=1)] = Field(description="of the links, base first [m]")
+    limits_deg: list[Vector2] | None = Field(None, description="lower and upper limit per joint [deg]")
+    radius: NotNegative = Field(0.0, description="of the links [m]; 0 means as thin as possible")
+
+
+class PlanarRobot(_Mounted):
+    """An arm of revolute joints in the xy-plane; its links do not collide with each other."""
+
+    planar: PlanarMeasures
+
+
+class Point2dMeasures(Section):
+    """A disc that moves in the xy-plane."""
+
+    radius: NotNegative = Field(0.0, description="[m]; 0 means as small as possible")
+    bounds: Annotated[list[Vector2], Field(min_length=2, max_length=2)] | None = Field(
+        None, description="lower and upper limit of x and of y [m]"
+    )
+
+
+class Point2dRobot(_Mounted):
+    """A disc or point in the plane; its two joints slide, so its configurations are in metres."""
+
+    point2d: Point2dMeasures
+
+
+class UrdfRobot(_Mounted):
+    """An arm described by a URDF file; file names are relative to the folder of the problem file."""
+
+    urdf: Name
+    srdf: Name | None = Field(None, description="groups, named postures, allowed collisions")
+    group: Name | None = Field(None, description="group of the SRDF whose joints move")
+    joints: Annotated[list[Name], Field(min_length=1)] | None = Field(None, description="joints that move, in order")
+    joint_limits: Name | None = Field(None, description="file in the format of joint_limits.yaml")
+    packages: list[Name] | Name | None = Field(None, description="folders in which package:// names are looked for")
+    locked: dict[Name, Number] | None = Field(None, description="values of joints that are held still [rad or m]")
+
+
+class DhRobot(_Mounted):
+    """An arm described by a file with a Denavit-Hartenberg table."""
+
+    dh: Name
+
+
+RobotEntry: TypeAlias = Annotated[
+    Annotated[Name, Tag("<a name>")]
+    | Annotated[NamedRobot, Tag(tag("name"))]
+    | Annotated[PlanarRobot, Tag(tag("planar"))]
+    | Annotated[Point2dRobot, Tag(tag("point2d"))]
+    | Annotated[UrdfRobot, Tag(tag("urdf"))]
+    | Annotated[DhRobot, Tag(tag("dh"))],
+    told_apart_by("name", "planar", "point2d", "urdf", "dh", what="robot", text="a name"),
+]
+
+
+def robot_data(source: Mapping[str, Any], folder: Path) -> dict[str, Any] | str:
+    """What the ``robot:`` entry of a file in ``folder`` says about a robot with this source; paths made relative."""
+    data: dict[str, Any] = {}
+    for key, value in source.items():
+        if isinstance(value, pin.SE3):
+            data[key] = pose_data(value)
+        elif key in PATH_KEYS:
+            data[key] = [_relative(v, folder) for v in value] if isinstance(value, list) else _relative(value, folder)
+        else:
+            data[key] = value
+    return str(data["name"]) if set(data) == {"name"} else data
+
+
+def _relative(path: str, folder: Path) -> str:
+    return Path(os.path.relpath(os.path.realpath(path), os.path.realpath(folder))).as_posix()

@@ -1,0 +1,86 @@
+"""The ``run:`` section of a problem file: how to replan while its obstacles move."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from rrtik_ompl.arrays import Matrix, Vector, frozen
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.sections import NotNegative, Numbers, Positive, Section
+from rrtik_ompl.robot import Robot
+
+
+class GoalWaypoint(Section):
+    """Where a moving goal is at a time [s], in joint values."""
+
+    time: NotNegative
+    joints: Numbers | None = None
+    joints_deg: Numbers | None = None
+
+    @model_validator(mode="after")
+    def _one_unit(self) -> GoalWaypoint:
+        if (self.joints is None) == (self.joints_deg is None):
+            raise PydanticCustomError("units", "give either joints or joints_deg")
+        return self
+
+    def configuration(self, robot: Robot) -> Vector:
+        """Shape (dof,), rad or m.
+
+        Raises:
+            InputError: If it has the wrong number of joints or is outside the limits.
+        """
+        what = f"goal at {self.time:g} s"
+        if self.joints is None:
+            q = robot.configuration_deg(self.joints_deg or [], what)
+        else:
+            q = robot.configuration(self.joints, what)
+        if fault := robot.limit_fault(q):
+            raise InputError(f"{what}: {fault}")
+        return q
+
+
+class RunSection(Section):
+    """Steps, ticks and distances of a run; what is left out is as in ``rrtik_ompl.replanning``."""
+
+    step: Positive = Field(description="how far the robot goes in a tick [rad or m]")
+    rate: Positive = Field(description="ticks a second [Hz]")
+    margin: NotNegative = Field(0.0, description="distance to obstacles that is always kept [m]")
+    speed_bound: Positive | None = Field(None, description="no point of an obstacle is faster [m/s]")
+    eps: Positive | None = Field(None, description="longest motion of the trees [rad or m]")
+    predict: Annotated[int, Field(strict=True, ge=0)] = Field(0, description="ticks ahead that motions are heeded")
+    seconds: Positive = Field(60.0, description="simulated time at most [s]")
+    velocity: Numbers | None = Field(None, description="joint speeds, one or one a joint [rad/s or m/s]")
+    goal: Annotated[list[GoalWaypoint], Field(min_length=1)] | None = Field(None, description="a goal that moves")
+
+    def options(self) -> dict[str, Any]:
+        """The keyword arguments of :func:`rrtik_ompl.replanning.replan` that are numbers."""
+        names = ("step", "rate", "margin", "speed_bound", "eps", "predict", "seconds")
+        return {name: getattr(self, name) for name in names}
+
+    def goal_motion(self, robot: Robot) -> GoalMotion | None:
+        """The goal's way, or None if it stands still.
+
+        Raises:
+            InputError: If times go backwards, or a row has the wrong number of joints or is outside the limits.
+        """
+        if self.goal is None:
+            return None
+        rows = [waypoint.configuration(robot) for waypoint in self.goal]
+        return GoalMotion(np.array([w.time for w in self.goal]), np.array(rows))
+
+
+class GoalMotion:
+    """A goal that moves in straight lines between configurations; at rest before and after."""
+
+    def __init__(self, times: Vector, rows: Matrix) -> None:
+        if (np.diff(times) <= 0.0).any():
+            raise InputError(f"run: goal: times must increase, got {times.tolist()}")
+        self._times, self._rows = frozen(times), frozen(rows)
+
+    def __call__(self, time: float) -> Vector:
+        """The configuration at ``time`` [s], shape (n,)."""
+        return np.array([np.interp(time, self._times, column) for column in self._rows.T])

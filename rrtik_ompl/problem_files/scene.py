@@ -1,0 +1,295 @@
+"""The ``scene:`` section of our YAML files <-> `Scene`: obstacles, attached objects, allowed collisions."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import pinocchio as pin
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.files.mesh import load_mesh
+from rrtik_ompl.files.sections import (
+    Length,
+    Name,
+    NotNegative,
+    Number,
+    Positive,
+    Section,
+    Sizes3,
+    Vector2,
+    Vector3,
+    Vector4,
+    Version,
+    exactly_one,
+    parse,
+)
+from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml, write_yaml
+from rrtik_ompl.files.text import file_name
+from rrtik_ompl.poses import pose, pose_from_rpy, quaternion_xyzw
+from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, Waypoints
+from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
+
+SHAPE_KEYS = ("box", "sphere", "cylinder", "capsule", "half_space", "polygon", "mesh")
+_ONE_SHAPE = {"oneOf": [{"required": [key]} for key in SHAPE_KEYS]}
+
+
+class PoseEntry(Section):
+    """A pose: position [m], and the orientation as a quaternion x, y, z, w or as fixed-axis roll, pitch, yaw."""
+
+    xyz: Vector3 = Field(description="position [m]")
+    quat_xyzw: Vector4 | None = Field(None, description="unit quaternion x, y, z, w; no rotation if absent")
+    rpy_deg: Vector3 | None = Field(None, description="roll, pitch, yaw about the fixed x, y, z axes [deg]")
+
+    @model_validator(mode="after")
+    def _one_orientation(self) -> PoseEntry:
+        if self.quat_xyzw is not None and self.rpy_deg is not None:
+            raise PydanticCustomError("two_orientations", "give quat_xyzw or rpy_deg, not both")
+        return self
+
+    def build(self) -> Any:
+        """The pose as ``pinocchio.SE3``."""
+        if self.rpy_deg is not None:
+            return pose_from_rpy(self.xyz, np.radians(self.rpy_deg))
+        return pose(self.xyz) if self.quat_xyzw is None else pose(self.xyz, self.quat_xyzw)
+
+
+class RoundEntry(Section):
+    """Measures of a cylinder or a capsule along z. A capsule's length is the distance between its cap centres."""
+
+    radius: Length = Field(description="[m]")
+    length: Length = Field(description="[m]")
+
+
+class HalfSpaceEntry(Section):
+    """The filled side of a plane: points with normal . x <= offset; the free side is normal . x > offset."""
+
+    normal: Vector3
+    offset: Number = Field(0.0, description="[m]")
+
+
+class WaypointEntry(Section):
+    """Where a moving obstacle is at a time [s]."""
+
+    time: Number = Field(description="[s]")
+    pose: PoseEntry
+
+
+class MotionEntry(Section):
+    """How an obstacle moves: a constant velocity [m/s], or poses at times with straight motions in between."""
+
+    velocity: Vector3 | None = None
+    waypoints: Annotated[list[WaypointEntry], Field(min_length=1)] | None = None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> MotionEntry:
+        exactly_one(self, ("velocity", "waypoints"), "a motion")
+        return self
+
+    def build(self) -> Motion:
+        """The motion."""
+        if self.velocity is not None:
+            return ConstantVelocity(self.velocity)
+        stations = self.waypoints or []
+        return Waypoints([w.time for w in stations], [w.pose.build() for w in stations])
+
+
+class SolidEntry(Section):
+    """A named solid: exactly one shape and a pose."""
+
+    name: Name
+    box: Sizes3 | None = Field(None, description="full side lengths [m]")
+    sphere: Length | None = Field(None, description="radius [m]")
+    cylinder: RoundEntry | None = None
+    capsule: RoundEntry | None = None
+    half_space: HalfSpaceEntry | None = None
+    polygon: Annotated[list[Vector2], Field(min_length=3)] | None = Field(
+        None, description="vertices in the xy-plane [m], in order; extruded along z, centred about z = 0"
+    )
+    height: Length | None = Field(None, description="of a polygon, along z [m]; 1 if absent")
+    mesh: Name | None = Field(None, description="STL, OBJ or DAE file, relative to the folder of this file")
+    scale: Positive | None = Field(None, description="of a mesh: metres per unit of its file; 1 if absent")
+    pose: PoseEntry | None = None
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> SolidEntry:
+        kind = exactly_one(self, SHAPE_KEYS, f"'{self.name}'")
+        for key, owner in (("height", "polygon"), ("scale", "mesh")):
+            if getattr(self, key) is not None and kind != owner:
+                raise PydanticCustomError("stray_key", f"'{key}' belongs to a {owner}, but '{self.name}' is a {kind}")
+        return self
+
+    def build_shape(self, folder: Path) -> Shape:
+        """The shape; meshes are looked for relative to ``folder``."""
+        if self.box is not None:
+            return Box(self.box)
+        if self.sphere is not None:
+            return Sphere(self.sphere)
+        if self.cylinder is not None:
+            return Cylinder(self.cylinder.radius, self.cylinder.length)
+        if self.capsule is not None:
+            return Capsule(self.capsule.radius, self.capsule.length)
+        if self.half_space is not None:
+            return HalfSpace(self.half_space.normal, self.half_space.offset)
+        if self.polygon is not None:
+            return Prism(self.polygon, 1.0 if self.height is None else self.height)
+        return load_mesh(folder / str(self.mesh), 1.0 if self.scale is None else self.scale)
+
+    def build_pose(self) -> Any:
+        """The pose; identity if none is given."""
+        return pin.SE3.Identity() if self.pose is None else self.pose.build()
+
+
+class ObstacleEntry(SolidEntry, json_schema_extra=_ONE_SHAPE):
+    """An obstacle in the world."""
+
+    motion: MotionEntry | None = None
+    margin: NotNegative | None = Field(None, description="[m] that the arm keeps from it; that of the scene if absent")
+
+    def build(self, folder: Path, margin: float = 0.0) -> Obstacle:
+        """The obstacle. One that moves through waypoints and has no pose of its own stands where it is at time 0.
+
+        Args:
+            folder: Where meshes are looked for.
+            margin: That of an obstacle that states none [m].
+        """
+        motion = None if self.motion is None else self.motion.build()
+        place = self.build_pose()
+        if self.pose is None and motion is not None:
+            place = motion.pose_at(place, 0.0)
+        own = margin if self.margin is None else self.margin
+        return Obstacle(self.name, self.build_shape(folder), place, motion, own)
+
+
+class AttachedEntry(SolidEntry, json_schema_extra=_ONE_SHAPE):
+    """A solid that a link holds; ``pose`` is in the frame of the link."""
+
+    link: Name
+    allow: list[Name] = Field(default=[], description="further links that it may touch")
+
+    def build(self, folder: Path) -> AttachedObject:
+        """The attached object."""
+        return AttachedObject(self.name, self.link, self.build_shape(folder), self.build_pose(), tuple(self.allow))
+
+
+class SceneEntry(Section):
+    """What surrounds the arm."""
+
+    margin: NotNegative = Field(default=0.0, description="[m] kept from obstacles that state none of their own")
+    obstacles: list[ObstacleEntry] = Field(default=[])
+    attached: list[AttachedEntry] = Field(default=[])
+    allowed_collisions: list[Annotated[list[Name], Field(min_length=2, max_length=2)]] = Field(
+        default=[], description="pairs of names of links, obstacles or attached objects that may touch"
+    )
+
+    def build(self, document: YamlDocument, location: Location = ("scene",)) -> Scene:
+        """The scene; errors name the line of the obstacle.
+
+        Raises:
+            InputError: If a shape or pose makes no sense, a mesh cannot be read, or a name stands twice.
+        """
+        folder = document.path.parent
+        obstacles, attached = [], []
+        for k, entry in enumerate(self.obstacles):
+            with document.at((*location, "obstacles", k)):
+                obstacles.append(entry.build(folder, self.margin))
+        for k, held in enumerate(self.attached):
+            with document.at((*location, "attached", k)):
+                attached.append(held.build(folder))
+        with document.at(location):
+            return Scene(tuple(obstacles), tuple(attached), tuple((a, b) for a, b in self.allowed_collisions))
+
+
+class SceneFile(Section):
+    """A file with a scene alone; a whole problem file will do as well, what else it says is not looked at."""
+
+    version: Version
+    scene: SceneEntry
+    robot: Any = None
+    start: Any = None
+    goal: Any = None
+    motion_resolution: Any = None
+
+
+def load_scene(path: str | os.PathLike[str]) -> Scene:
+    """Read the scene of a YAML file: ``version: 1`` and ``scene:``, or a whole problem file.
+
+    Raises:
+        InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
+    """
+    document = read_yaml(path)
+    return parse(document, SceneFile).scene.build(document)
+
+
+def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
+    """Write a scene as YAML, whole or not at all. Mesh files are named relative to the new file's folder.
+
+    Raises:
+        InputError: If the file cannot be written, or a mesh does not come from a file.
+    """
+    require(scene, Scene, "scene to save")
+    write_yaml(path, {"version": 1, "scene": scene_data(scene, file_name(path).parent)})
+
+
+def scene_data(scene: Scene, folder: Path) -> dict[str, Any]:
+    """What the ``scene:`` section of a file in ``folder`` says about a scene."""
+    data: dict[str, Any] = {}
+    if scene.obstacles:
+        data["obstacles"] = [_obstacle_data(o, folder) for o in scene.obstacles]
+    if scene.attached:
+        data["attached"] = [_attached_data(a, folder) for a in scene.attached]
+    if scene.allowed_collisions:
+        data["allowed_collisions"] = [list(pair) for pair in scene.allowed_collisions]
+    return data
+
+
+def pose_data(placement: Any) -> dict[str, Any]:
+    """What a file says about a pose; the orientation is left out if there is none."""
+    data: dict[str, Any] = {"xyz": placement.translation.tolist()}
+    if not np.array_equal(placement.rotation, np.eye(3)):
+        data["quat_xyzw"] = quaternion_xyzw(placement).tolist()
+    return data
+
+
+def _obstacle_data(obstacle: Obstacle, folder: Path) -> dict[str, Any]:
+    data = {"name": obstacle.name, **_shape_data(obstacle.name, obstacle.shape, folder)}
+    data["pose"] = pose_data(obstacle.pose)
+    if isinstance(obstacle.motion, ConstantVelocity):
+        data["motion"] = {"velocity": obstacle.motion.velocity.tolist()}
+    elif obstacle.motion is not None:
+        stations = zip(obstacle.motion.times.tolist(), obstacle.motion.poses, strict=True)
+        data["motion"] = {"waypoints": [{"time": time, "pose": pose_data(T)} for time, T in stations]}
+    return data | ({"margin": obstacle.margin} if obstacle.margin else {})
+
+
+def _attached_data(held: AttachedObject, folder: Path) -> dict[str, Any]:
+    data = {"name": held.name, "link": held.link, **_shape_data(held.name, held.shape, folder)}
+    data["pose"] = pose_data(held.pose)
+    return data | ({"allow": list(held.allow)} if held.allow else {})
+
+
+def _shape_data(name: str, shape: Shape, folder: Path) -> dict[str, Any]:
+    if isinstance(shape, Box):
+        return {"box": shape.size.tolist()}
+    if isinstance(shape, Sphere):
+        return {"sphere": float(shape.radius)}
+    if isinstance(shape, Cylinder):
+        return {"cylinder": {"radius": float(shape.radius), "length": float(shape.length)}}
+    if isinstance(shape, Capsule):
+        return {"capsule": {"radius": float(shape.radius), "length": float(shape.length)}}
+    if isinstance(shape, HalfSpace):
+        return {"half_space": {"normal": shape.normal.tolist(), "offset": float(shape.offset)}}
+    if isinstance(shape, Prism):
+        return {"polygon": shape.polygon.tolist(), "height": float(shape.height)}
+    return _mesh_data(name, shape, folder)
+
+
+def _mesh_data(name: str, mesh: Mesh, folder: Path) -> dict[str, Any]:
+    if not mesh.source:
+        raise InputError(f"'{name}': a mesh made in memory cannot be written; save it as STL and use load_mesh")
+    file = os.path.relpath(os.path.realpath(mesh.source), os.path.realpath(folder))
+    return {"mesh": Path(file).as_posix()} | ({} if mesh.scale == 1.0 else {"scale": mesh.scale})

@@ -1,0 +1,1 @@
+"""Cameras: the pinhole model, its file, calibration, pictures, and a synthetic camera."""

@@ -1,0 +1,87 @@
+"""Intrinsics of a camera from photographs of a ChArUco board, with the uncertainty of every number."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Vector, frozen
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.sensing.markers.detection import charuco_corners
+from rrtik_ompl.sensing.sight import as_gray
+
+LEAST_CORNERS, LEAST_VIEWS = 8, 5
+MOST_ERROR = 1.0  # pixels; a view above it is blurred, bent or mismatched
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibration:
+    """A calibrated camera and how good it is.
+
+    Attributes:
+        camera: The camera.
+        sigmas: Standard deviations of fx, fy, cx, cy [pixels]. Shape (4,).
+        error: Root mean square reprojection error over all views [pixels].
+        view_errors: Of each photograph; NaN where it was not used. Shape (m,).
+        unused: For each photograph, why it was not used; empty if it was.
+    """
+
+    camera: Camera
+    sigmas: Vector
+    error: float
+    view_errors: Vector
+    unused: tuple[str, ...]
+
+
+def calibrate(pictures: Sequence[NDArray[np.uint8]], board: Any) -> Calibration:
+    """Calibrate from photographs of one board (`markers.charuco_board`) under different angles.
+
+    The third radial coefficient stays 0: with it the second one is not stable.
+
+    Raises:
+        InputError: If the photographs differ in size, or fewer than five show the board well enough.
+    """
+    grays = [as_gray(picture) for picture in pictures]
+    if len({gray.shape for gray in grays}) > 1:
+        raise InputError("the photographs differ in size; take all of them with the same camera and settings")
+    found = [charuco_corners(gray, board) for gray in grays]
+    unused = ["" if len(points) >= LEAST_CORNERS else _too_few(len(points)) for points, _ in found]
+    used = [k for k, reason in enumerate(unused) if not reason]
+    result = None
+    while len(used) >= LEAST_VIEWS:
+        result = _solve([found[k] for k in used], grays[0].shape)
+        errors = np.ravel(result[7])
+        worst = int(errors.argmax())
+        if errors[worst] <= MOST_ERROR:
+            break
+        unused[used.pop(worst)] = f"corners lie {errors[worst]:.1f} pixels off: blurred, or the board is bent"
+        result = None
+    if result is None:
+        reasons = "; ".join(sorted({reason for reason in unused if reason})) or "there are no more"
+        raise InputError(
+            f"{len(used)} of {len(grays)} photographs show the board well, at least {LEAST_VIEWS} must ({reasons}); "
+            "take more, the board filling a third of the picture or more, sharp, under different angles"
+        )
+    error, matrix, distortion, _, _, sigmas, _, each = result
+    view_errors = np.full(len(grays), np.nan)
+    view_errors[used] = np.ravel(each)
+    height, width = grays[0].shape
+    camera = Camera(matrix, width, height, np.ravel(distortion)[:5])
+    return Calibration(camera, frozen(np.ravel(sigmas)[:4]), float(error), frozen(view_errors), tuple(unused))
+
+
+def _solve(views: Sequence[tuple[Any, Any]], shape: tuple[int, ...]) -> Any:
+    points = [np.ascontiguousarray(p, dtype=np.float32) for p, _ in views]
+    pixels = [np.ascontiguousarray(q, dtype=np.float32) for _, q in views]
+    solve: Any = cv2.calibrateCameraExtended  # its type wants first guesses where None does
+    return solve(points, pixels, shape[::-1], None, None, flags=cv2.CALIB_FIX_K3)
+
+
+def _too_few(count: int) -> str:
+    return f"{count} corners of the board seen, {LEAST_CORNERS} are needed: too small, blurred, or another board"

@@ -1,0 +1,73 @@
+"""A calibrated camera <-> its YAML file."""
+
+from __future__ import annotations
+
+import os
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.sections import NotNegative, Number, Numbers, Positive, Section, Vector4, Version, parse
+from rrtik_ompl.files.strict_yaml import read_yaml, write_yaml
+from rrtik_ompl.sensing.cameras.calibration import Calibration
+from rrtik_ompl.sensing.cameras.camera import Camera
+
+Pixels = Annotated[int, Field(strict=True, gt=0, le=100_000)]
+
+
+class CameraEntry(Section):
+    """Intrinsics in OpenCV's conventions; all in pixels, distortion as k1, k2, p1, p2, k3."""
+
+    size: Annotated[list[Pixels], Field(min_length=2, max_length=2, description="width, height")]
+    fx: Positive
+    fy: Positive
+    cx: Number
+    cy: Number
+    distortion: Annotated[list[Number], Field(min_length=4, max_length=5)] = [0.0] * 5
+    error_px: NotNegative | None = Field(None, description="root mean square reprojection error of the calibration")
+    sigmas_px: Vector4 | None = Field(None, description="standard deviations of fx, fy, cx, cy")
+    view_errors_px: Numbers | None = Field(None, description="of each photograph that was used")
+
+    def build(self) -> Camera:
+        """The camera."""
+        matrix = [[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]]
+        return Camera(matrix, self.size[0], self.size[1], (*self.distortion, 0.0)[:5])
+
+
+class CameraFile(Section):
+    """A file with one camera."""
+
+    version: Version
+    camera: CameraEntry
+
+
+def load_camera(path: str | os.PathLike[str]) -> Camera:
+    """Read a camera file.
+
+    Raises:
+        InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
+    """
+    document = read_yaml(path)
+    entry = parse(document, CameraFile).camera
+    with document.at(("camera",)):
+        return entry.build()
+
+
+def save_camera(camera: Camera | Calibration, path: str | os.PathLike[str]) -> None:
+    """Write a camera, with what its calibration found out if that is given.
+
+    Raises:
+        InputError: If the file cannot be written.
+    """
+    lens = camera.camera if isinstance(camera, Calibration) else camera
+    (fx, _, cx), (_, fy, cy), _ = lens.matrix.tolist()
+    data: dict[str, Any] = {"size": [lens.width, lens.height], "fx": fx, "fy": fy, "cx": cx, "cy": cy}
+    data["distortion"] = lens.distortion.tolist()
+    if isinstance(camera, Calibration):
+        data["error_px"] = camera.error
+        data["sigmas_px"] = camera.sigmas.tolist()
+        data["view_errors_px"] = [e for e in camera.view_errors.tolist() if e == e]
+    elif not isinstance(camera, Camera):
+        raise InputError(f"camera to save must be a Camera or a Calibration, got {type(camera).__name__}")
+    write_yaml(path, {"version": 1, "camera": data})

@@ -1,0 +1,148 @@
+"""Where pictures come from: an image file, a folder of them, a video file, a camera device."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.text import write_bytes
+
+IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
+VIDEO_ENDINGS = (".mp4", ".avi", ".webm", ".mkv", ".mov", ".m4v")
+LARGEST_FILE = 512 * 1024 * 1024
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """One picture: blue, green, red, shape (height, width, 3), where it comes from, and its time [s]."""
+
+    pixels: NDArray[np.uint8]
+    name: str
+    time: float
+
+
+def read_picture(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
+    """An image file as blue, green, red. Shape (height, width, 3).
+
+    Raises:
+        InputError: If the file is missing or not an image.
+    """
+    file = Path(path)
+    try:
+        size = file.stat().st_size
+        if not file.is_file() or size > LARGEST_FILE:
+            raise InputError(f"{path}: is not an image file of at most 512 MiB")
+        data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
+    except OSError as error:
+        raise InputError(f"{path}: {(error.strerror or str(error)).lower()}; check the name") from None
+    picture = None
+    if size:
+        try:
+            picture = cv2.imdecode(data, cv2.IMREAD_COLOR)
+        except cv2.error:  # a header that promises more than memory holds
+            picture = None
+    if picture is None:
+        raise InputError(f"{path}: is not an image that can be read; use {', '.join(IMAGE_ENDINGS)}")
+    return np.asarray(picture, dtype=np.uint8)
+
+
+def write_picture(picture: NDArray[np.uint8], path: Path) -> None:
+    """Write an image file; its ending says which kind.
+
+    Raises:
+        InputError: If it cannot be written.
+    """
+    if path.suffix.lower() not in IMAGE_ENDINGS:
+        raise InputError(f"{path}: an image ends in {', '.join(IMAGE_ENDINGS)}")
+    write_bytes(path, cv2.imencode(path.suffix, picture)[1].tobytes())
+
+
+def pictures_from(source: str | os.PathLike[str] | int) -> Iterator[Picture]:
+    """Pictures of an image file, of all images in a folder (by name), of a video file, or of a camera.
+
+    Args:
+        source: A path, or the number of a camera device (also as text: "0").
+
+    Raises:
+        InputError: If there is nothing that can be read. A camera that is lost ends with `CameraLostError`.
+    """
+    if isinstance(source, int) or str(source).isdecimal():
+        yield from _device(int(str(source)))
+        return
+    path = Path(source)
+    if path.is_dir():
+        files = sorted(f for f in path.iterdir() if f.suffix.lower() in IMAGE_ENDINGS)
+        if not files:
+            raise InputError(f"{source}: no images in this folder; they end in {', '.join(IMAGE_ENDINGS)}")
+        yield from (Picture(read_picture(file), file.name, float(k)) for k, file in enumerate(files))
+    elif path.suffix.lower() in VIDEO_ENDINGS:
+        yield from _video(path)
+    else:
+        yield Picture(read_picture(path), path.name, 0.0)
+
+
+class CameraLostError(InputError):
+    """A camera that gave pictures gives none any more."""
+
+
+def _video(path: Path) -> Iterator[Picture]:
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; check the name")
+    with _opened(str(path)) as capture:
+        if not capture.isOpened():
+            raise InputError(f"{path}: is not a video that can be read")
+        rate = capture.get(cv2.CAP_PROP_FPS) or 30.0
+        count = 0
+        while (frame := _next(capture)) is not None:
+            yield Picture(frame, f"{path.name}[{count}]", count / rate)
+            count += 1
+        if count == 0:
+            raise InputError(f"{path}: no picture in this video can be read")
+
+
+def _device(number: int) -> Iterator[Picture]:
+    with _opened(number) as capture:
+        if not capture.isOpened():
+            raise InputError(f"camera {number} cannot be opened; is it plugged in, free, and yours to read?")
+        begin = time.monotonic()
+        while True:
+            frame = _next(capture)
+            if frame is None:
+                raise CameraLostError(f"camera {number} gives no more pictures; is it still plugged in?")
+            yield Picture(frame, f"camera {number}", time.monotonic() - begin)
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Let OpenCV keep its warnings: why something cannot be opened is said in one line, not in three."""
+    log: Any = cv2.utils.logging
+    before = log.setLogLevel(log.LOG_LEVEL_ERROR)
+    try:
+        yield
+    finally:
+        log.setLogLevel(before)
+
+
+@contextmanager
+def _opened(source: str | int) -> Iterator[Any]:
+    with quiet():
+        capture = cv2.VideoCapture(source)
+    try:
+        yield capture
+    finally:
+        capture.release()
+
+
+def _next(capture: Any) -> NDArray[np.uint8] | None:
+    good, frame = capture.read()
+    return np.asarray(frame, dtype=np.uint8) if good else None

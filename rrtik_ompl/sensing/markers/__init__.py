@@ -1,0 +1,1 @@
+"""Square markers: detection, corners below a pixel, poses, marker maps, sheets to print."""

@@ -1,0 +1,141 @@
+"""The pose of an object from pixels of points that are known on it, and how far it can be trusted.
+
+A single square seen almost from the front has two poses that explain its picture nearly as well (Collins and Bartoli,
+IPPE, IJCV 2014): both are kept. Where perspective is strong, or by chance, only one of the two is a minimum of the
+error: then the second one is what the closed form gives, for a long valley may lead from there to the minimum, with the
+true pose somewhere on its way. Covariance: first-order propagation of the error of a corner.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.arrays import Matrix, frozen
+from rrtik_ompl.sensing.cameras.camera import Camera
+
+RATIO_TO_TRUST = 6.0  # of the two errors of a square; below it 27 % of near-frontal views, and every wrong choice
+LUCKY_ERROR = 0.015  # [pixels]: four corners that agree better do so by chance, which proves nothing
+ALIGNED_SIGMA = 0.02  # error of a corner [pixels]: a quarter is noise of 1 %, the rest lens and blur
+ROUGH_SIGMA = 0.2  # blur pulls corners that were not aligned inwards by as much
+FARTHEST = 1e4  # [m]
+SAME_TURN = 1e-3  # [rad]: minima that are nearer to each other are one; distinct ones are 0.03 apart and more
+_STEPS = 40
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CornerPose:
+    """A pose that explains the pixels of some points.
+
+    Attributes:
+        T_camera_object: The pose that explains them best.
+        other: The second pose of a single square, None if there is none.
+        error: Root mean square distance of a point from its pixel, in pixels.
+        other_error: That of the second pose; infinite if there is none.
+        covariance: Of (position [m], small rotation about the axes of the camera [rad]). Shape (6, 6).
+    """
+
+    T_camera_object: Any
+    other: Any | None
+    error: float
+    other_error: float
+    covariance: Matrix
+
+    @property
+    def ambiguous(self) -> bool:
+        """The second pose explains the picture almost as well, so that the first may be the wrong one."""
+        return self.other_error < RATIO_TO_TRUST * max(self.error, LUCKY_ERROR)
+
+    @property
+    def position_sigma(self) -> float:
+        """Standard deviation of the position along its worst direction [m]."""
+        return float(np.sqrt(np.linalg.eigvalsh(self.covariance[:3, :3])[-1]))
+
+    @property
+    def rotation_sigma(self) -> float:
+        """Standard deviation of the rotation about its worst axis [rad]."""
+        return float(np.sqrt(np.linalg.eigvalsh(self.covariance[3:, 3:])[-1]))
+
+
+def turn_between(first: Any, second: Any) -> float:
+    """Angle between the rotations of two poses [rad]."""
+    return float(np.linalg.norm(pin.log3(first.rotation.T @ second.rotation)))
+
+
+def square_corners(side: float) -> Matrix:
+    """Corners of a marker in its own frame: x right, y up, z out of it; in the order they are found. Shape (4, 3)."""
+    half = 0.5 * side
+    return np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
+
+
+def pose_of_square(camera: Camera, pixels: Matrix, side: float, sigma: float = ALIGNED_SIGMA) -> CornerPose:
+    """Pose of one marker of a given side [m] from its four corners. Shape of ``pixels``: (4, 2)."""
+    points = square_corners(side)
+    # Exactly in front of the camera the closed form fails: not a number, or a marker that faces away.
+    guesses = _guesses(camera, points, pixels, cv2.SOLVEPNP_IPPE_SQUARE) or _guesses(camera, points, pixels)
+    refined = [_refined(camera, points, pixels, guess) for guess in guesses]
+    errors = [_error(camera, points, pixels, pose) for pose in refined]
+    best = int(np.argmin(errors))
+    first, error, other, other_error = refined[best], errors[best], None, np.inf
+    if len(guesses) > 1:
+        merged = turn_between(first, refined[1 - best]) < SAME_TURN
+        other = max(guesses, key=lambda guess: turn_between(first, guess)) if merged else refined[1 - best]
+        other_error = _error(camera, points, pixels, other)
+    return CornerPose(first, other, error, other_error, _covariance(camera, points, first, max(sigma, error)))
+
+
+def pose_of_points(camera: Camera, pixels: Matrix, points: Matrix, sigma: float = ALIGNED_SIGMA) -> CornerPose:
+    """Pose of an object from points on it that are known in its frame. Shapes (m, 2) and (m, 3), m at least 4."""
+    best = _refined(camera, points, pixels, _guesses(camera, points, pixels)[0])
+    error = _error(camera, points, pixels, best)
+    return CornerPose(best, None, error, np.inf, _covariance(camera, points, best, max(sigma, error)))
+
+
+def _guesses(camera: Camera, points: Matrix, pixels: Matrix, method: int = cv2.SOLVEPNP_SQPNP) -> list[Any]:
+    """Poses in closed form that explain the pixels, best first."""
+    rows, seen = np.ascontiguousarray(points), np.ascontiguousarray(pixels)
+    _, turns, shifts, _ = cv2.solvePnPGeneric(rows, seen, camera.matrix, camera.distortion, flags=method)
+    found = [pin.SE3(cv2.Rodrigues(r)[0], t.ravel()) for r, t in zip(turns, shifts, strict=True)]
+    return [T for T in found if _sensible(T, method == cv2.SOLVEPNP_IPPE_SQUARE)]
+
+
+def _sensible(pose: Any, facing: bool) -> bool:
+    """Finite, before the camera, and with its z axis towards it if it has to face it."""
+    if not (np.isfinite(pose.homogeneous).all() and 0.0 < pose.translation[2] < FARTHEST):
+        return False
+    return not facing or float(pose.rotation[:, 2] @ pose.translation) < 0.0
+
+
+def _refined(camera: Camera, points: Matrix, pixels: Matrix, pose: Any) -> Any:
+    """The nearby pose of least error: Levenberg's steps about the axes of the camera, kept where they help."""
+    damping, error = 1e-6, _error(camera, points, pixels, pose)
+    for _ in range(_STEPS):
+        turned = points @ pose.rotation.T
+        slopes = camera.jacobian(turned, pose.translation)
+        away = (pixels - camera.project(turned + pose.translation)).ravel()
+        normal = slopes.T @ slopes
+        step = np.linalg.solve(normal + damping * np.diag(normal.diagonal()), slopes.T @ away)
+        tried = pin.SE3(pin.exp3(step[3:]) @ pose.rotation, pose.translation + step[:3])
+        better = _error(camera, points, pixels, tried)
+        gain = error - better
+        if gain > 0.0:
+            pose, error, damping = tried, better, 0.1 * damping
+        else:
+            damping *= 100.0
+        if abs(gain) <= 1e-9 * error or damping > 1e3:
+            break
+    return pose
+
+
+def _error(camera: Camera, points: Matrix, pixels: Matrix, pose: Any) -> float:
+    away = camera.project(points @ pose.rotation.T + pose.translation) - pixels
+    return float(np.sqrt((away**2).sum(axis=1).mean()))
+
+
+def _covariance(camera: Camera, points: Matrix, pose: Any, sigma: float) -> Matrix:
+    slopes = camera.jacobian(points @ pose.rotation.T, pose.translation)
+    return frozen(sigma**2 * np.linalg.pinv(slopes.T @ slopes))

@@ -1,0 +1,122 @@
+"""Square markers: their dictionaries, their pictures, and finding them. All of OpenCV's ``aruco`` stands in here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix, frozen
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.sensing.markers.alignment import aligned_corners
+
+DICTIONARIES = {
+    **{f"{bits}x{bits}_{size}": f"DICT_{bits}X{bits}_{size}" for bits in (4, 5, 6, 7) for size in (50, 100, 250, 1000)},
+    **{f"apriltag_{family}": f"DICT_APRILTAG_{family}" for family in ("16h5", "25h9", "36h10", "36h11")},
+    "aruco_original": "DICT_ARUCO_ORIGINAL",
+    "aruco_mip_36h12": "DICT_ARUCO_MIP_36h12",
+}
+SMALLEST_SHARE = 0.01  # of a marker's outline, of the picture's longer side; OpenCV's own 0.03 drops distant ones
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SeenMarker:
+    """A marker in a picture.
+
+    Attributes:
+        dictionary: Its dictionary.
+        number: Its number in there.
+        corners: Top left, top right, bottom right, bottom left as printed. Shape (4, 2), pixels.
+        likeness: Correlation of the ideal marker with the picture, 1 at best; below `LEAST_LIKENESS` the corners
+            are as they were found; NaN if nobody asked for better ones.
+    """
+
+    dictionary: str
+    number: int
+    corners: Matrix
+    likeness: float
+
+    @property
+    def side(self) -> float:
+        """Mean length of its edges, in pixels."""
+        return float(np.linalg.norm(np.roll(self.corners, -1, 0) - self.corners, axis=1).mean())
+
+
+def marker_cells(dictionary: str, number: int) -> NDArray[np.uint8]:
+    """The ideal marker, one number a cell: 0 black, 255 white, its black border included. Shape (n, n).
+
+    Raises:
+        InputError: If there is no such marker.
+    """
+    table = _table(dictionary)
+    count = len(table.bytesList)
+    if not 0 <= number < count:
+        raise InputError(f"dictionary {dictionary} has markers 0 to {count - 1}, not {number}")
+    return np.asarray(cv2.aruco.generateImageMarker(table, number, table.markerSize + 2), dtype=np.uint8)
+
+
+def find_markers(gray: NDArray[np.uint8], dictionary: str, *, align: bool = True) -> tuple[SeenMarker, ...]:
+    """All markers of a dictionary in a grey picture, in the order of their numbers.
+
+    Args:
+        gray: Shape (height, width).
+        dictionary: One of `DICTIONARIES`.
+        align: Bring the ideal marker to coincide with the picture (`aligned_corners`); else corners are as sharp as
+            their own neighbourhood makes them.
+    """
+    corners, numbers, _ = _detector(dictionary).detectMarkers(gray)
+    found: list[SeenMarker] = []
+    if numbers is None:
+        return ()
+    for k in np.argsort(np.ravel(numbers), kind="stable"):
+        number, rough = int(np.ravel(numbers)[k]), corners[k].reshape(4, 2).astype(np.float64)
+        better, likeness = aligned_corners(gray, rough, marker_cells(dictionary, number)) if align else (rough, np.nan)
+        found.append(SeenMarker(dictionary, number, frozen(better), likeness))
+    return tuple(found)
+
+
+def dictionaries_seen(gray: NDArray[np.uint8]) -> tuple[str, ...]:
+    """Which dictionaries have markers in a picture; to say what is wrong where the expected one has none."""
+    return tuple(name for name in DICTIONARIES if _detector(name).detectMarkers(gray)[1] is not None)
+
+
+def charuco_board(columns: int, rows: int, square: float, marker: float, dictionary: str) -> Any:
+    """A chessboard with markers in its white squares; sides of squares and markers in metres.
+
+    Raises:
+        InputError: If a side is not positive, a marker does not fit its square, or the dictionary is too small.
+    """
+    if columns < 3 or rows < 3 or not 0.0 < marker < square:
+        raise InputError("a board needs at least 3 x 3 squares, and markers smaller than the squares")
+    if columns * rows // 2 > len(_table(dictionary).bytesList):
+        raise InputError(f"dictionary {dictionary} has too few markers for a board of {columns} x {rows} squares")
+    return cv2.aruco.CharucoBoard((columns, rows), square, marker, _table(dictionary))
+
+
+def charuco_corners(gray: NDArray[np.uint8], board: Any) -> tuple[Matrix, Matrix]:
+    """Corners of a board in a picture: points on the board [m], shape (k, 3), and their pixels, shape (k, 2)."""
+    pixels, numbers, _, _ = cv2.aruco.CharucoDetector(board).detectBoard(gray)
+    if numbers is None or len(numbers) == 0:
+        return np.zeros((0, 3)), np.zeros((0, 2))
+    points, seen = board.matchImagePoints(np.asarray(pixels).reshape(-1, 1, 2), np.ravel(numbers))
+    return np.reshape(points, (-1, 3)).astype(np.float64), np.reshape(seen, (-1, 2)).astype(np.float64)
+
+
+@lru_cache
+def _table(dictionary: str) -> Any:
+    if dictionary not in DICTIONARIES:
+        raise UnknownNameError("dictionary of markers", dictionary, DICTIONARIES)
+    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, DICTIONARIES[dictionary]))
+
+
+@lru_cache
+def _detector(dictionary: str) -> Any:
+    parameters = cv2.aruco.DetectorParameters()
+    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+    parameters.minMarkerPerimeterRate = SMALLEST_SHARE
+    parameters.minDistanceToBorder = 0  # else markers that fill half of the picture are lost, though wholly in view
+    return cv2.aruco.ArucoDetector(_table(dictionary), parameters)

@@ -1,0 +1,154 @@
+"""Which marker sits where on which object, what the object is, and how it can be grasped. Frozen."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import pinocchio as pin
+
+from rrtik_ompl.arrays import Matrix, frozen, not_negative
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.scene import Obstacle
+from rrtik_ompl.sensing.markers.corner_pose import square_corners
+
+ROLES = ("base", "target", "obstacle")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MountedMarker:
+    """A marker on an object: its number, the side of its black square [m], and ``T_object_marker``.
+
+    The marker's frame has x to its right, y to its top and z out of the paper, the origin in its middle.
+    """
+
+    number: int
+    side: float
+    T_object_marker: Any = field(default_factory=pin.SE3.Identity)
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.side < 100.0:
+            raise InputError(f"marker {self.number}: side must be between 0 and 100 m, got {self.side:g}")
+
+    @property
+    def corners(self) -> Matrix:
+        """Its corners in the frame of the object [m], in the order in which they are found. Shape (4, 3)."""
+        return frozen(square_corners(self.side) @ self.T_object_marker.rotation.T + self.T_object_marker.translation)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GraspType:
+    """A family of grasps: one orientation, and the places along the object (levels) where it is tried.
+
+    Attributes:
+        name: How the pilot calls it.
+        levels: ``T_object_tip`` of each level.
+        approach: How far before the grasp the tip stops first, against its own z axis [m].
+        lift: How far the object is taken up after it, along the world's z axis [m].
+    """
+
+    name: str
+    levels: tuple[Any, ...]
+    approach: float = 0.1
+    lift: float = 0.1
+
+    def __init__(self, name: str, levels: Iterable[Any], approach: float = 0.1, lift: float = 0.1) -> None:
+        object.__setattr__(self, "name", name)
+        object.__setattr__(self, "levels", tuple(levels))
+        for word, value in (("approach", approach), ("lift", lift)):
+            object.__setattr__(self, word, not_negative(value, f"grasp type '{name}': {word}"))
+        if not self.levels:
+            raise InputError(f"grasp type '{name}' needs at least one level")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MarkedObject:
+    """A rigid thing with markers on it.
+
+    Attributes:
+        name: Its name.
+        role: "base" (of the arm: its frame is the world of the scene), "target" or "obstacle".
+        markers: Where they sit; several are used together.
+        solids: What it is made of, with poses ``T_object_solid``.
+        grasps: The ways to take hold of it.
+    """
+
+    name: str
+    role: str
+    markers: tuple[MountedMarker, ...]
+    solids: tuple[Obstacle, ...] = ()
+    grasps: tuple[GraspType, ...] = ()
+
+    def __post_init__(self) -> None:
+        for word in ("markers", "solids", "grasps"):
+            object.__setattr__(self, word, tuple(getattr(self, word)))
+        if self.role not in ROLES:
+            raise UnknownNameError("role of an object", self.role, ROLES, where=self.name)
+        if not self.markers:
+            raise InputError(f"object '{self.name}' needs at least one marker")
+
+    @property
+    def solid_names(self) -> tuple[str, ...]:
+        """Names of its solids in a scene: its own, with that of the solid if there are several."""
+        several = len(self.solids) > 1
+        return tuple(f"{self.name}.{each.name}" if several else self.name for each in self.solids)
+
+    def grasp(self, name: str) -> GraspType:
+        """The grasp type of a name.
+
+        Raises:
+            UnknownNameError: If there is none.
+        """
+        for each in self.grasps:
+            if each.name == name:
+                return each
+        raise UnknownNameError("grasp type", name, [g.name for g in self.grasps], where=self.name)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MarkerMap:
+    """All objects that a camera may see, and how the camera is held.
+
+    Attributes:
+        dictionary: Of the markers.
+        objects: What they sit on.
+        T_base_camera: Where the camera is mounted, if arm and camera are held by one body (as on a vehicle); None if
+            the base has markers of its own and the camera may be anywhere.
+    """
+
+    dictionary: str
+    objects: tuple[MarkedObject, ...]
+    T_base_camera: Any | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "objects", tuple(self.objects))
+        for what, names in (
+            ("object", [o.name for o in self.objects]),
+            ("marker", [m.number for o in self.objects for m in o.markers]),
+        ):
+            twice = [name for name, count in Counter(names).items() if count > 1]
+            if twice:
+                raise InputError(f"{what} {twice[0]} stands twice in the marker map; every one needs its own")
+        bases = [o.name for o in self.objects if o.role == "base"]
+        if len(bases) > 1:
+            raise InputError(f"two objects are the base: {bases[0]} and {bases[1]}; there is one arm")
+        if not bases and self.T_base_camera is None:
+            raise InputError("nothing says where the base is: give an object the role base, or say camera_pose")
+
+    @property
+    def base(self) -> MarkedObject | None:
+        """The object that is the base of the arm, if it has markers."""
+        return next((o for o in self.objects if o.role == "base"), None)
+
+    def named(self, name: str) -> MarkedObject:
+        """The object of a name.
+
+        Raises:
+            UnknownNameError: If there is none.
+        """
+        for each in self.objects:
+            if each.name == name:
+                return each
+        raise UnknownNameError("object", name, [o.name for o in self.objects])

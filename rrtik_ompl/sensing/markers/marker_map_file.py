@@ -1,0 +1,93 @@
+"""A marker map <-> its YAML file: which marker sits on which object, its solids, its grasps."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated, Literal
+
+import pinocchio as pin
+from pydantic import Field
+
+from rrtik_ompl.files.sections import Length, Name, NotNegative, Section, Version, parse
+from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
+from rrtik_ompl.problem_files.scene import PoseEntry, SolidEntry
+from rrtik_ompl.scene import Obstacle
+from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject, MarkerMap, MountedMarker
+
+
+class MarkerEntry(Section):
+    """A marker on an object; x to its right, y to its top, z out of the paper."""
+
+    id: Annotated[int, Field(strict=True, ge=0)]
+    side: Length = Field(description="of the black square [m]; measure the print")
+    pose: PoseEntry | None = Field(None, description="in the frame of the object; its origin if absent")
+
+    def build(self) -> MountedMarker:
+        """The marker."""
+        return MountedMarker(self.id, self.side, pin.SE3.Identity() if self.pose is None else self.pose.build())
+
+
+class GraspEntry(Section):
+    """A family of grasps: poses of the tip in the frame of the object, one a level."""
+
+    type: Name
+    levels: Annotated[list[PoseEntry], Field(min_length=1)]
+    approach: NotNegative = Field(
+        0.1, description="distance of the pose before the grasp, against the tip's z axis [m]"
+    )
+    lift: NotNegative = Field(0.1, description="how far the object is taken up, along the world's z axis [m]")
+
+    def build(self) -> GraspType:
+        """The grasp type."""
+        return GraspType(self.type, [level.build() for level in self.levels], self.approach, self.lift)
+
+
+class ObjectEntry(Section):
+    """A thing with markers."""
+
+    name: Name
+    role: Literal["base", "target", "obstacle"]
+    markers: Annotated[list[MarkerEntry], Field(min_length=1)]
+    solids: list[SolidEntry] = Field(default=[], description="with poses in the frame of the object")
+    grasps: list[GraspEntry] = Field(default=[])
+
+    def build(self, folder: Path) -> MarkedObject:
+        """The object; meshes are looked for relative to ``folder``."""
+        solids = [Obstacle(each.name, each.build_shape(folder), each.build_pose()) for each in self.solids]
+        grasps = [each.build() for each in self.grasps]
+        return MarkedObject(self.name, self.role, tuple(m.build() for m in self.markers), tuple(solids), tuple(grasps))
+
+
+class MarkerMapFile(Section):
+    """A file with one marker map."""
+
+    version: Version
+    dictionary: Name
+    camera_pose: PoseEntry | None = Field(None, description="T_base_camera, if one body holds arm and camera")
+    objects: Annotated[list[ObjectEntry], Field(min_length=1)]
+
+    def build(self, document: YamlDocument) -> MarkerMap:
+        """The map; errors name the line of the object."""
+        from rrtik_ompl.sensing.markers.detection import marker_cells
+
+        objects = []
+        for k, entry in enumerate(self.objects):
+            with document.at(("objects", k)):
+                objects.append(entry.build(document.path.parent))
+                for marker in entry.markers:
+                    marker_cells(self.dictionary, marker.id)  # raises where there is no such marker
+        with document.at(()):
+            return MarkerMap(
+                self.dictionary, tuple(objects), None if self.camera_pose is None else self.camera_pose.build()
+            )
+
+
+def load_marker_map(path: str | os.PathLike[str]) -> MarkerMap:
+    """Read a marker map.
+
+    Raises:
+        InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
+    """
+    document = read_yaml(path)
+    return parse(document, MarkerMapFile).build(document)

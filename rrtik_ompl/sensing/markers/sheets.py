@@ -1,0 +1,149 @@
+"""Sheets to print: markers and boards at their true size, as PDF (vector) or PNG, with a rule to check the printer."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.text import check_target
+from rrtik_ompl.sensing.markers.detection import charuco_board, marker_cells
+
+PAPERS = {"a4": (0.210, 0.297), "a3": (0.297, 0.420), "letter": (0.2159, 0.2794)}  # width, height [m]
+EDGE, GAP, CAPTION = 0.010, 0.008, 0.006  # [m]
+RULE = 0.100  # length of the printed rule [m]
+SHEET_FORMATS = (".pdf", ".png")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Tile:
+    """A picture of cells on the paper: lower left corner, size of a cell, height of the caption's place [m]."""
+
+    cells: NDArray[np.uint8]
+    x: float
+    y: float
+    cell: float
+    caption: str
+    caption_y: float
+
+
+def print_markers(
+    path: str | os.PathLike[str],
+    numbers: Sequence[int],
+    *,
+    side: float,
+    dictionary: str,
+    paper: str = "a4",
+    dots_per_inch: int = 600,
+) -> int:
+    """Write sheets with markers of a side [m] (that of the black square), as many as fit on each.
+
+    Returns:
+        Number of sheets. Several as PNG are numbered: ``name-1.png``, ``name-2.png``.
+
+    Raises:
+        InputError: If a marker does not exist or does not fit the paper, or the file cannot be written.
+    """
+    width, height = _paper(paper)
+    cells = [marker_cells(dictionary, number) for number in numbers]
+    if not cells:
+        raise InputError("no marker was asked for; name at least one number")
+    if not 0.002 <= side <= 1.0:
+        raise InputError(f"side of a marker must be between 0.002 and 1 m, got {side:g}")
+    cell = side / len(cells[0])
+    outer = side + 2.0 * cell  # with its white rim
+    columns = int((width - 2 * EDGE + GAP) // (outer + GAP))
+    rows = int((height - 2 * EDGE - 2 * CAPTION + GAP) // (outer + CAPTION + GAP))
+    if columns < 1 or rows < 1:
+        raise InputError(f"a marker of {side:g} m does not fit on {paper}; the rim takes {2 * cell:.3f} m more")
+    tiles = []
+    for place, (number, each) in enumerate(zip(numbers, cells, strict=True)):
+        row, column = divmod(place % (rows * columns), columns)
+        x = EDGE + column * (outer + GAP) + cell
+        y = height - EDGE - (row + 1) * (outer + CAPTION) - row * GAP + CAPTION + cell
+        caption = f"{dictionary}  id {number}  side {1e3 * side:g} mm"
+        tiles.append(_Tile(each, x, y, cell, caption, y - cell - 0.5 * CAPTION))
+    pages = [tiles[k : k + rows * columns] for k in range(0, len(tiles), rows * columns)]
+    _write(path, pages, (width, height), dots_per_inch)
+    return len(pages)
+
+
+def print_board(
+    path: str | os.PathLike[str],
+    *,
+    columns: int = 6,
+    rows: int = 8,
+    square: float = 0.030,
+    marker: float = 0.022,
+    dictionary: str = "4x4_50",
+    paper: str = "a4",
+    dots_per_inch: int = 600,
+) -> None:
+    """Write a ChArUco board for calibration; sides of squares and markers in metres.
+
+    Raises:
+        InputError: If the board makes no sense or does not fit the paper, or the file cannot be written.
+    """
+    board = charuco_board(columns, rows, square, marker, dictionary)
+    width, height = _paper(paper)
+    if columns * square > width - 2 * EDGE or rows * square > height - 2 * EDGE - 2 * CAPTION:
+        raise InputError(f"a board of {columns * square:.3f} x {rows * square:.3f} m does not fit on {paper}")
+    fine = 100  # cells a square: a marker's side becomes a whole number of them to 1 %
+    picture = np.asarray(board.generateImage((columns * fine, rows * fine), marginSize=0, borderBits=1), dtype=np.uint8)
+    caption = f"ChArUco {columns} x {rows}, {dictionary}, squares {1e3 * square:g} mm, markers {1e3 * marker:g} mm"
+    x, y = 0.5 * (width - columns * square), height - EDGE - rows * square
+    _write(path, [[_Tile(picture, x, y, square / fine, caption, y - CAPTION)]], (width, height), dots_per_inch)
+
+
+def _paper(name: str) -> tuple[float, float]:
+    if name.lower() not in PAPERS:
+        raise InputError(f"no paper '{name}'; have {', '.join(PAPERS)}")
+    return PAPERS[name.lower()]
+
+
+def _write(path: Any, pages: list[list[_Tile]], size: tuple[float, float], dots_per_inch: int) -> None:
+    from pathlib import Path
+
+    from matplotlib.backends.backend_pdf import PdfPages
+
+    file = Path(path)
+    check_target(file, SHEET_FORMATS)
+    figures = [_page(page, size) for page in pages]
+    try:
+        if file.suffix.lower() == ".pdf":
+            with PdfPages(file) as book:
+                for figure in figures:
+                    book.savefig(figure)
+            return
+        for k, figure in enumerate(figures):
+            target = file if len(figures) == 1 else file.with_stem(f"{file.stem}-{k + 1}")
+            figure.savefig(target, dpi=dots_per_inch)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def _page(tiles: list[_Tile], size: tuple[float, float]) -> Any:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(size[0] / 0.0254, size[1] / 0.0254))
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, size[0]), ylim=(0.0, size[1]))
+    axes.axis("off")
+    for tile in tiles:
+        rows, columns = tile.cells.shape
+        box = (tile.x, tile.x + columns * tile.cell, tile.y, tile.y + rows * tile.cell)
+        axes.imshow(tile.cells, cmap="gray", vmin=0, vmax=255, extent=box, interpolation="none", aspect="auto")
+        axes.text(tile.x, tile.caption_y, tile.caption, fontsize=7, va="center")
+    axes.plot([EDGE, EDGE + RULE], [EDGE, EDGE], color="black", linewidth=0.8)
+    axes.text(
+        EDGE + RULE + 0.003, EDGE, "100 mm: measure it; print at 100 %, not fitted to the page", fontsize=6, va="center"
+    )
+    axes.set_xlim(0.0, size[0])
+    axes.set_ylim(0.0, size[1])
+    return figure

@@ -1,0 +1,108 @@
+"""What else a page can show beside arm and scene: bodies of triangles with a name, each with a switch of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import meshcat.geometry as mg
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.arrays import Matrix, frozen
+from rrtik_ompl.viewer.drawing import palette
+from rrtik_ompl.viewer.drawing.meshes import look_of_triangles
+from rrtik_ompl.viewer.drawing.triangles import Faces, capsule, tube
+
+SIDES = 6  # of the tubes of a line: there may be thousands
+ROUND = 48  # segments of a ball
+CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])  # of a square face, in its plane
+HALVES = np.array([[0, 1, 2, 0, 2, 3]])  # its triangles
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mark:
+    """Something drawn in the world.
+
+    Attributes:
+        name: What the legend calls it.
+        color: '#rrggbb'.
+        vertices: Shape (k, 3) [m].
+        faces: Rows of ``vertices``, shape (m, 3).
+        opacity: 1 is solid.
+        shown: Whether the page shows it at first.
+    """
+
+    name: str
+    color: str
+    vertices: Matrix
+    faces: Faces
+    opacity: float = 1.0
+    shown: bool = True
+
+
+def tubes(name: str, color: str, lines: Iterable[ArrayLike], radius: float, **options: Any) -> Mark:
+    """Lines as thin tubes, because WebGL draws lines one pixel wide.
+
+    Args:
+        name: For the legend.
+        color: '#rrggbb'.
+        lines: Each of shape (k, 3) with k at least 2 [m].
+        radius: Of the tubes [m].
+        **options: ``opacity`` and ``shown`` of the `Mark`.
+    """
+    return _joined(name, color, (tube(np.asarray(line, dtype=np.float64), radius, SIDES) for line in lines), options)
+
+
+def balls(name: str, color: str, centres: ArrayLike, radius: float, **options: Any) -> Mark:
+    """Balls of one radius [m] at points, shape (k, 3)."""
+    vertices, faces = capsule(radius, 0.0, ROUND)
+    points = np.asarray(centres, dtype=np.float64)
+    return _joined(name, color, ((vertices + point, faces) for point in points), options)
+
+
+def cubes(name: str, color: str, inside: NDArray[np.bool_], corner: ArrayLike, size: float, **options: Any) -> Mark:
+    """Cells of a grid, without the faces between two of them.
+
+    Args:
+        name: For the legend.
+        color: '#rrggbb'.
+        inside: Which cells, shape (x, y, z).
+        corner: Of the first cell, shape (3,) [m].
+        size: Side of a cell [m].
+        **options: ``opacity`` and ``shown`` of the `Mark`.
+    """
+    origin, pieces = np.asarray(corner, dtype=np.float64), []
+    filled = np.pad(inside, 1)
+    for axis in range(3):
+        for side in (0, 1):
+            neighbour = np.roll(filled, 1 - 2 * side, axis=axis)
+            places = np.argwhere(filled & ~neighbour) - 1.0
+            square = np.zeros((len(places), 4, 3))
+            square[..., axis] = side
+            for k in (0, 1):
+                square[..., (axis + 1 + k) % 3] = CORNERS[:, k]
+            pieces.append(origin + size * (places[:, None] + square))
+    corners = np.concatenate(pieces)
+    faces = (4 * np.arange(len(corners))[:, None] + HALVES).reshape(-1, 3)
+    return Mark(name, color, frozen(corners.reshape(-1, 3)), frozen(faces, np.int64), **options)
+
+
+def draw_marks(vis: Any, marks: Iterable[Mark]) -> None:
+    """Draw marks under ``marks/<number>``."""
+    for number, mark in enumerate(marks):
+        solid = mark.opacity == 1.0
+        material = mg.MeshPhongMaterial(
+            color=palette.number(mark.color), opacity=mark.opacity, shininess=10, depthWrite=solid
+        )
+        vis["marks"][f"{number}"].set_object(look_of_triangles(mark.vertices, mark.faces).geometry, material)
+
+
+def _joined(name: str, color: str, bodies: Iterable[tuple[Matrix, Faces]], options: dict[str, Any]) -> Mark:
+    vertices, faces, count = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int64)], 0
+    for points, triangles in bodies:
+        vertices.append(points)
+        faces.append(np.asarray(triangles, dtype=np.int64) + count)
+        count += len(points)
+    return Mark(name, color, frozen(np.concatenate(vertices)), frozen(np.concatenate(faces), np.int64), **options)

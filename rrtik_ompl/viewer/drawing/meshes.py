@@ -1,0 +1,155 @@
+"""What a shape or a coal geometry looks like: a meshcat geometry, its placement, and the box around it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import coal
+import meshcat.geometry as mg
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.collision.shape_of import shape_of
+from rrtik_ompl.collision.solids import is_mesh
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
+from rrtik_ompl.viewer.drawing.triangles import (
+    Faces,
+    box_corners,
+    capsule,
+    extruded,
+    rounded,
+    split_creases,
+    thin_out,
+    tube,
+)
+
+MAX_OBSTACLE_TRIANGLES = 30_000  # a drawn mesh above this is thinned out; the one that is checked stays as it is
+BEAD = 0.9  # radius of the bead that stands for a robot that is a mere point, in thicknesses of a line
+_Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # three.js has its cylinders along y
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """How one solid is drawn.
+
+    Attributes:
+        geometry: ``meshcat.geometry.Geometry``.
+        placement: Pose (or pose and scale) of that geometry in the solid's frame, shape (4, 4).
+        corners: Corners of a box around the solid in its frame, shape (8, 3) [m].
+    """
+
+    geometry: Any
+    placement: NDArray[np.float64]
+    corners: Matrix
+
+
+def look_of_shape(shape: Shape, limit: int = MAX_OBSTACLE_TRIANGLES) -> Look:
+    """How a bounded shape is drawn; a mesh with at most ``limit`` triangles.
+
+    Raises:
+        InputError: For a half-space, which has no end: see :func:`half_space_plate`.
+    """
+    if isinstance(shape, Sphere):
+        return _primitive(mg.Sphere(shape.radius), np.eye(4), np.full(3, shape.radius))
+    if isinstance(shape, Cylinder):
+        half = [shape.radius, shape.radius, 0.5 * shape.length]
+        return _primitive(mg.Cylinder(shape.length, shape.radius), _Y_TO_Z, half)
+    if isinstance(shape, Box):
+        return _primitive(mg.Box(shape.size.tolist()), np.eye(4), 0.5 * shape.size)
+    if isinstance(shape, Capsule):
+        return look_of_triangles(*capsule(shape.radius, shape.length))
+    if isinstance(shape, Prism):
+        return look_of_triangles(*split_creases(*extruded(shape.polygon, shape.height)))
+    if isinstance(shape, Mesh):
+        return look_of_triangles(*split_creases(*thin_out(shape.vertices, shape.triangles, limit)))
+    raise InputError(f"a {type(shape).__name__} cannot be drawn as a bounded solid")
+
+
+def look_of_margin(shape: Shape, margin: float) -> Look | None:
+    """How everything within a margin [m] of a shape is drawn; None for half-spaces, polygons and meshes."""
+    if isinstance(shape, Sphere):
+        return look_of_shape(Sphere(shape.radius + margin))
+    if isinstance(shape, Capsule):
+        return look_of_shape(Capsule(shape.radius + margin, shape.length))
+    if isinstance(shape, Cylinder):
+        turn = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
+        circle = shape.radius * np.stack([np.cos(turn), np.sin(turn)], 1)
+        return look_of_triangles(*rounded(circle, turn, shape.length, margin))
+    if isinstance(shape, Box):
+        turn = np.concatenate([np.linspace(0.0, 0.5 * np.pi, 7) + 0.5 * np.pi * k for k in range(4)])
+        corners = np.repeat(0.5 * shape.size[:2] * [[1, 1], [-1, 1], [-1, -1], [1, -1]], 7, axis=0)
+        return look_of_triangles(*rounded(corners, turn, float(shape.size[2]), margin))
+    return None
+
+
+def look_of_triangles(vertices: Matrix, faces: Faces) -> Look:
+    """How a triangle mesh is drawn, as it is."""
+    return Look(mg.TriangularMeshGeometry(vertices, faces), np.eye(4), box_corners(vertices))
+
+
+def half_space_plate(shape: HalfSpace, centre: ArrayLike, size: float) -> tuple[Look, NDArray[np.float64]]:
+    """A thin plate whose upper side lies in the plane of a half-space, and its pose in the half-space's frame.
+
+    Args:
+        shape: The half-space.
+        centre: Point in the half-space's frame near which the plate is wanted, shape (3,) [m].
+        size: Side length of the plate [m].
+    """
+    thickness = 0.002 * size
+    near = np.asarray(centre, dtype=np.float64)
+    foot = near - (shape.normal @ near - shape.offset + 0.5 * thickness) * shape.normal
+    pose = np.eye(4)
+    pose[:3, :3] = _frame_along(shape.normal)
+    pose[:3, 3] = foot
+    return look_of_shape(Box([size, size, thickness])), pose
+
+
+def thickened(look: Look, least: float) -> Look:
+    """The same, or for what is too thin to be seen a rod of thickness ``least`` [m], or for a point a larger bead."""
+    sides = np.ptp(look.corners, axis=0)
+    if np.median(sides) >= least:
+        return look
+    middle = look.corners.mean(axis=0)
+    half = 0.5 * np.where(sides == sides.max(), sides, 0.0)
+    if sides.max() >= 2.0 * least:
+        return look_of_triangles(*tube(np.stack([middle - half, middle + half]), 0.5 * least))
+    place = np.eye(4)
+    place[:3, 3] = middle
+    return Look(mg.Sphere(BEAD * least), place, look.corners)
+
+
+def triangle_count(geometry: Any) -> int:
+    """Triangles of a coal mesh; 0 for every other geometry."""
+    return int(geometry.num_tris) if is_mesh(geometry) else 0
+
+
+def look_of_coal(geometry: Any, limit: int = MAX_OBSTACLE_TRIANGLES) -> Look | None:
+    """How a coal geometry is drawn, with at most ``limit`` triangles; None if it has no bounded surface (a plane)."""
+    if isinstance(geometry, coal.Ellipsoid):
+        stretch = np.diag([*geometry.radii, 1.0])
+        return Look(mg.Sphere(1.0), stretch, box_corners([-geometry.radii, geometry.radii]))
+    if isinstance(geometry, coal.Cone):
+        half = [geometry.radius, geometry.radius, geometry.halfLength]
+        cone = mg.Cylinder(2.0 * geometry.halfLength, radiusTop=0.0, radiusBottom=geometry.radius)
+        return _primitive(cone, _Y_TO_Z, half)
+    try:
+        shape = shape_of(geometry)
+        return None if shape is None else look_of_shape(shape, limit)
+    except InputError:  # a link's mesh without area: nothing to see
+        return None
+
+
+def _primitive(geometry: Any, placement: NDArray[np.float64], half: ArrayLike) -> Look:
+    sides = np.asarray(half, dtype=np.float64)
+    return Look(geometry, placement, box_corners([-sides, sides]))
+
+
+def _frame_along(normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A rotation whose z axis is ``normal``, shape (3, 3)."""
+    aside = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    x = np.cross(aside, normal)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(normal, x), normal], 1)

@@ -1,0 +1,115 @@
+"""The arm in the scene tree: one node per joint, the links and what they carry below it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import meshcat.geometry as mg
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.errors import UnknownNameError
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import AttachedObject
+from rrtik_ompl.viewer.drawing import palette
+from rrtik_ompl.viewer.drawing.meshes import Look, look_of_coal, look_of_shape, triangle_count
+
+ROBOT_TRIANGLES = 100_000  # drawn for the whole arm at most; its meshes are thinned out above that
+GHOST_TRIANGLES = 15_000  # of each ghost
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """One solid that moves with a joint.
+
+    Attributes:
+        name: Its name in the scene tree.
+        joint: Pinocchio joint number, 0 for the base.
+        placement: Pose in the joint's frame, shape (4, 4).
+        look: How it is drawn.
+        color: '#rrggbb'.
+    """
+
+    name: str
+    joint: int
+    placement: NDArray[np.float64]
+    look: Look
+    color: str
+
+
+def node_name(name: str) -> str:
+    """A name that is one step of a path in the scene tree."""
+    return name.replace("/", "|") or "|"
+
+
+def joint_nodes(robot: Robot) -> list[str]:
+    """Names of the nodes that move, one per Pinocchio joint, the world first."""
+    return [node_name(name) for name in robot.model.names]
+
+
+def link_parts(robot: Robot, triangles: int = ROBOT_TRIANGLES) -> list[Part]:
+    """The links in at most about so many triangles: the visual geometry, or the collision geometry if there is none."""
+    drawn = _link_parts(robot.visual.geometryObjects, triangles)
+    return drawn or _link_parts(robot.collision.geometryObjects, triangles)
+
+
+def _link_parts(bodies: Any, triangles: int) -> list[Part]:
+    total = max(sum(triangle_count(body.geometry) for body in bodies), 1)
+    parts = []
+    for body in bodies:
+        share = triangles * triangle_count(body.geometry) // total
+        look = look_of_coal(body.geometry, max(share, 200))
+        if look is not None:
+            parts.append(
+                Part(node_name(body.name), body.parentJoint, body.placement.homogeneous, look, _link_color(body))
+            )
+    return parts
+
+
+def _link_color(body: Any) -> str:
+    """The colour that the robot's description gives, or one of two greys in turn, so that the joints can be seen."""
+    if body.overrideMaterial:
+        return palette.hexadecimal(body.meshColor[:3])
+    return palette.ROBOT_ALTERNATE if body.parentJoint % 2 else palette.ROBOT
+
+
+def attached_parts(robot: Robot, attached: tuple[AttachedObject, ...]) -> list[Part]:
+    """The objects that links hold.
+
+    Raises:
+        UnknownNameError: If one of them hangs on a link that the robot does not have.
+    """
+    parts = []
+    for item in attached:
+        if item.link not in robot.link_names:
+            raise UnknownNameError(
+                f"link of robot '{robot.name}'", item.link, robot.link_names, where=f"attached '{item.name}'"
+            )
+        frame = robot.model.frames[robot.model.getFrameId(item.link, pin.FrameType.BODY)]
+        placement = (frame.placement * item.pose).homogeneous
+        name = node_name(f"attached {item.name}")
+        parts.append(Part(name, frame.parentJoint, placement, look_of_shape(item.shape), palette.ATTACHED))
+    return parts
+
+
+def draw_parts(node: Any, robot: Robot, parts: list[Part], frames: NDArray[np.float64]) -> None:
+    """Draw the arm below a node, at the joint frames of one configuration, shape (joints + 1, 4, 4)."""
+    names = joint_nodes(robot)
+    for name, placement in zip(names, frames, strict=True):
+        node[name].set_transform(placement)
+    for part in parts:
+        leaf = node[names[part.joint]][part.name]
+        leaf.set_object(part.look.geometry, mg.MeshPhongMaterial(color=palette.number(part.color), shininess=40))
+        leaf.set_transform(part.placement @ part.look.placement)
+
+
+def swept_points(parts: list[Part], frames: NDArray[np.float64]) -> Matrix:
+    """Corners in the world of boxes around all parts, for frames of shape (m, joints + 1, 4, 4). Shape (p, 3)."""
+    corners = []
+    for part in parts:
+        poses = frames[:, part.joint] @ part.placement
+        corners.append(np.einsum("mij,pj->mpi", poses[:, :3, :3], part.look.corners) + poses[:, None, :3, 3])
+    return np.concatenate([c.reshape(-1, 3) for c in corners]) if corners else np.empty((0, 3))

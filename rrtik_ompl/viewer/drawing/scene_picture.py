@@ -1,0 +1,125 @@
+"""What stands around the arm: obstacles, moving ones with a hint of their way, and the goal's frame or point."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import meshcat.geometry as mg
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import TAU, Matrix
+from rrtik_ompl.goal import Goal, JointGoal, PoseGoal, parts_of
+from rrtik_ompl.scene import ConstantVelocity, Motion, Obstacle, Scene
+from rrtik_ompl.shapes import Box, HalfSpace, Sphere
+from rrtik_ompl.task_region import TaskRegion
+from rrtik_ompl.viewer.drawing import palette
+from rrtik_ompl.viewer.drawing.framing import Frame
+from rrtik_ompl.viewer.drawing.meshes import Look, half_space_plate, look_of_margin, look_of_shape, look_of_triangles
+from rrtik_ompl.viewer.drawing.robot_picture import node_name
+from rrtik_ompl.viewer.drawing.triangles import tube
+
+MAX_GOALS_DRAWN = 20
+FRAMES_OF_A_RANGE = 7
+LATER_SECONDS = (1.0, 2.0, 3.0)  # when an obstacle of constant velocity is drawn again, faintly
+
+
+def draw_scene(vis: Any, scene: Scene, frame: Frame) -> None:
+    """Draw obstacles and their margins under ``obstacles``, the later places of moving ones under ``later``."""
+    for obstacle in scene.at(0.0).obstacles:
+        _draw_obstacle(vis["obstacles"][node_name(obstacle.name)], obstacle, frame)
+    for obstacle in scene.obstacles:
+        if obstacle.motion is not None and not isinstance(obstacle.shape, HalfSpace):
+            _draw_motion(vis["later"][node_name(obstacle.name)], obstacle, obstacle.motion, frame)
+
+
+def obstacle_look(obstacle: Obstacle, frame: Frame) -> tuple[Look, Matrix]:
+    """How an obstacle is drawn, and where that is in the obstacle's own frame, shape (4, 4)."""
+    if isinstance(obstacle.shape, HalfSpace):
+        look, local = half_space_plate(obstacle.shape, obstacle.pose.actInv(frame.centre), 1.5 * frame.size)
+        return look, local @ look.placement
+    look = look_of_shape(obstacle.shape)
+    return look, look.placement
+
+
+def _draw_obstacle(node: Any, obstacle: Obstacle, frame: Frame) -> None:
+    look, placement = obstacle_look(obstacle, frame)
+    opacity = 0.2 if isinstance(obstacle.shape, HalfSpace) else 1.0
+    node.set_object(look.geometry, _material(palette.OBSTACLE, opacity))
+    node.set_transform(obstacle.pose.homogeneous @ placement)
+    _draw_margin(node["margin"], obstacle, placement)
+
+
+def _draw_margin(node: Any, obstacle: Obstacle, placement: Matrix) -> None:
+    """Draw what lies within an obstacle's margin under its node, which has ``placement`` in the obstacle's frame."""
+    look = look_of_margin(obstacle.shape, obstacle.margin) if obstacle.margin else None
+    if look is not None:
+        node.set_object(look.geometry, _material(palette.OBSTACLE, opacity=0.2))
+        node.set_transform(np.linalg.solve(placement, look.placement))
+
+
+def _draw_motion(node: Any, obstacle: Obstacle, motion: Motion, frame: Frame) -> None:
+    times = LATER_SECONDS if isinstance(motion, ConstantVelocity) else tuple(motion.times[motion.times > 0.0])
+    look = look_of_shape(obstacle.shape)
+    for k, time in enumerate(times):
+        node[f"at {k}"].set_object(look.geometry, _material(palette.OBSTACLE, opacity=0.2))
+        node[f"at {k}"].set_transform(motion.pose_at(obstacle.pose, time).homogeneous @ look.placement)
+    stations = np.array([motion.pose_at(obstacle.pose, time).translation for time in np.linspace(0.0, times[-1], 40)])
+    draw_tube(node["way"], stations, 0.003 * frame.arm, palette.OBSTACLE)
+
+
+def draw_goal(vis: Any, goal: Goal | None, frame: Frame) -> None:
+    """Draw under ``goal`` the frame of a pose, the point of a position, or all parts of a region."""
+    if goal is None or isinstance(goal, JointGoal):
+        return
+    for k, part in enumerate(parts_of(goal)[:MAX_GOALS_DRAWN]):
+        node = vis["goal"][f"{k}"]
+        if isinstance(part, PoseGoal):
+            draw_triad(node["frame"], part.T_world_tip, 0.12 * frame.arm)
+        elif isinstance(part, TaskRegion):
+            _draw_region(node, part, frame)
+        else:
+            look = look_of_shape(Sphere(max(part.tolerance, 0.012 * frame.arm)))
+            node["point"].set_object(look.geometry, _material(palette.GOAL))
+            node["point"].set_transform(pin.SE3(np.eye(3), np.array(part.position)).homogeneous)
+
+
+def _draw_region(node: Any, region: TaskRegion, frame: Frame) -> None:
+    """Draw the box of a region's positions and frames of the tip along each of its ranges."""
+    low, high = region.bounds.T
+    if (low < high)[:3].any():
+        look = look_of_shape(Box(np.maximum((high - low)[:3], 0.002 * frame.arm)))
+        node["region"].set_object(look.geometry, _material(palette.GOAL, opacity=0.3))
+        middle = pin.SE3(np.eye(3), 0.5 * (low + high)[:3] + region.T_w_tip.translation)
+        node["region"].set_transform((region.T_world_w * middle).homogeneous)
+    for k, pose in enumerate(goal_frames(region)):
+        draw_triad(node["frame" if k == 0 else f"frame {k}"], pin.SE3(pose), (0.12 if k == 0 else 0.05) * frame.arm)
+
+
+def goal_frames(region: TaskRegion) -> NDArray[np.float64]:
+    """Poses of the tip that show a region: the one of least displacement, and others along each range; (k, 4, 4)."""
+    low, high = region.bounds.T
+    least = np.clip(np.zeros(6), low, high)
+    rows = [least]
+    for k in np.flatnonzero(region.free):
+        for value in np.linspace(low[k], min(high[k], low[k] + TAU), FRAMES_OF_A_RANGE):
+            rows.append(np.where(np.arange(6) == k, value, least))
+    return region.poses(np.array(rows))
+
+
+def draw_triad(node: Any, pose: Any, length: float) -> None:
+    """Draw a frame: x, y and z axes of a given length [m] in three colours."""
+    node.set_transform(pose.homogeneous)
+    for axis, color, direction in zip("xyz", palette.AXES, np.eye(3), strict=True):
+        draw_tube(node[axis], np.stack([0.0 * direction, length * direction]), 0.035 * length, color)
+
+
+def draw_tube(node: Any, points: Matrix, radius: float, color: str) -> None:
+    """Draw a line through points, shape (k, 3), as a tube, because WebGL draws lines one pixel wide."""
+    look = look_of_triangles(*tube(points, radius))
+    node.set_object(look.geometry, _material(color))
+
+
+def _material(color: str, opacity: float = 1.0) -> Any:
+    return mg.MeshPhongMaterial(color=palette.number(color), opacity=opacity, shininess=10, depthWrite=opacity == 1.0)

@@ -1,0 +1,68 @@
+"""The way of the tip: one tube per move, so that the page can highlight the move that is being made."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import meshcat.geometry as mg
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.viewer.drawing import palette
+from rrtik_ompl.viewer.drawing.scene_picture import draw_tube
+
+STEP = np.deg2rad(3.0)  # [rad], or a share of the way for sliding joints: between two rings of the tube
+MAX_RINGS = 1500  # of all tubes together, about
+MAX_PIECES = 150  # a path of more moves is drawn in this many pieces of several moves each
+
+
+def pieces(waypoints: Matrix) -> NDArray[np.int64]:
+    """Number of the trail's piece to which each move of a path, shape (k, dof), belongs. Shape (k - 1,)."""
+    moves = len(waypoints) - 1
+    return np.arange(moves) * min(moves, MAX_PIECES) // max(moves, 1)
+
+
+def draw_before(vis: Any, robot: Robot, waypoints: Matrix, radius: float) -> None:
+    """Draw the tip's way on another path, thinner, under ``before``; arguments as of :func:`draw_trail`."""
+    tips = robot.fk_batch(_dense(robot, waypoints, len(waypoints)))[:, :3, 3]
+    tips = tips[np.insert(np.linalg.norm(np.diff(tips, axis=0), axis=1) > 0.05 * radius, 0, True)]
+    if len(tips) > 1:
+        draw_tube(vis["before"], tips, 0.6 * radius, palette.BEFORE)
+
+
+def draw_trail(vis: Any, robot: Robot, waypoints: Matrix, radius: float, *, beads: bool = True) -> None:
+    """Draw the tip's way under ``trail/piece N`` and a bead at every waypoint under ``beads``.
+
+    Args:
+        vis: ``meshcat.Visualizer``.
+        robot: The arm.
+        waypoints: Shape (k, dof) with k at least 2.
+        radius: Of the tube [m].
+        beads: Whether to draw them.
+    """
+    piece = pieces(waypoints)
+    for k in np.unique(piece):
+        first, last = np.flatnonzero(piece == k)[[0, -1]]
+        tips = robot.fk_batch(_dense(robot, waypoints[first : last + 2], len(waypoints)))[:, :3, 3]
+        tips = tips[np.insert(np.linalg.norm(np.diff(tips, axis=0), axis=1) > 0.05 * radius, 0, True)]
+        if len(tips) > 1:  # a turning wrist need not move the tip
+            draw_tube(vis["trail"][f"piece {k}"], tips, radius, palette.TRAIL)
+    if beads and len(waypoints) <= MAX_PIECES:
+        for k, tip in enumerate(robot.fk_batch(waypoints)):
+            bead = vis["beads"][f"waypoint {k}"]
+            bead.set_object(mg.Sphere(2.0 * radius), mg.MeshPhongMaterial(color=palette.number(palette.TRAIL)))
+            bead.set_transform(tip)
+
+
+def _dense(robot: Robot, waypoints: Matrix, total: int) -> Matrix:
+    """Configurations along some moves, close enough for the tip's arcs to look round. Shape (m, dof)."""
+    most = max(MAX_RINGS // total, 2)
+    rows = [waypoints[:1]]
+    for a, b in pairwise(waypoints):
+        turn = float(np.abs(b - a)[~robot.prismatic].max(initial=0.0))
+        steps = int(np.clip(np.ceil(turn / STEP), 1, most))
+        rows.append(a + (b - a) * np.linspace(0.0, 1.0, steps + 1)[1:, None])
+    return np.concatenate(rows)

@@ -1,0 +1,242 @@
+"""A robot in a scene: which configurations and motions are free, how far from contact, and what touches."""
+
+from __future__ import annotations
+
+import copy
+import warnings
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import Mask, Matrix, finite_array
+from rrtik_ompl.collision.bodies import colliding_pairs, link_bodies, scene_bodies
+from rrtik_ompl.collision.certificate import Certificate, standing_contact
+from rrtik_ompl.collision.contacts import Contact as Contact
+from rrtik_ompl.collision.contacts import inside, measured
+from rrtik_ompl.collision.motion_bound import displacement_weights, step_counts
+from rrtik_ompl.errors import InputError, MeshWarning, UnknownNameError, require
+from rrtik_ompl.fast import FastWorld
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import Scene
+from rrtik_ompl.world.exact_checks import CollisionChecks
+
+MOTION_RESOLUTION = 0.01  # [m]
+ACCURACIES = ("exact", "conservative")
+FINEST_RESOLUTION = 1e-5  # [m]; a motion across an arm's reach is then some hundred thousand checks
+
+
+def check_world(world: World | None, robot: Robot) -> None:
+    """Refuse what is no robot, no world, or the world of another robot.
+
+    Raises:
+        InputError: It says how to make what is needed.
+    """
+    require(robot, Robot, "robot", "use load_robot(name or file)")
+    if world is None:
+        return
+    require(world, World, "world", "make it with World(robot, scene)")
+    if world.robot is not robot:
+        raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
+
+
+class World:
+    """Exact collision checks of a robot in a scene.
+
+    Answers are coal's, on the robot's and the scene's own geometry; kernels give most of them without asking coal
+    (:mod:`rrtik_ompl.world.exact_checks`). A conservative world never asks coal: what the kernels cannot prove free is
+    refused.
+
+    Motions are straight lines in configuration space, checked at both ends and at equal steps in between, so many that
+    no point of the arm moves more than ``motion_resolution`` between two checks. The same configurations are checked
+    in both directions.
+
+    What moves of the arm has to stay farther from an obstacle than its margin; the base, which no posture moves, must
+    only not touch it.
+
+    A world is meant for one thread at a time.
+
+    Attributes:
+        robot, scene, motion_resolution, accuracy: As given.
+        bodies: The solids of the robot and the scene.
+        pairs: Numbers of the bodies that must not touch.
+        weights: No point of the arm moves farther than ``weights @ |b - a|`` [m] from a to b, shape (dof,).
+
+    Args:
+        robot: The arm.
+        scene: Its surroundings; empty if None. Moving obstacles stand where they are at time 0.
+        motion_resolution: Largest step of any point of the arm between two checked configurations [m].
+        accuracy: "exact" or "conservative".
+
+    Raises:
+        InputError: If the scene names links that do not exist, or the resolution is not positive.
+        UnknownNameError: If there is no such accuracy.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        scene: Scene | None = None,
+        *,
+        motion_resolution: float = MOTION_RESOLUTION,
+        accuracy: str = "exact",
+    ) -> None:
+        self.robot = robot
+        self.scene = Scene() if scene is None else scene
+        require(robot, Robot, "robot of a world", "use load_robot(name or file)")
+        require(self.scene, Scene, "scene of a world", "use Scene(obstacles) or load_scene(file)")
+        self.motion_resolution = float(finite_array(motion_resolution, (), "motion_resolution"))
+        if self.motion_resolution < FINEST_RESOLUTION:
+            raise InputError(
+                f"motion_resolution must be {FINEST_RESOLUTION:g} metres or more, got {self.motion_resolution:g}"
+            )
+        if not robot.collision.geometryObjects:
+            message = f"robot '{robot.name}' has no collision geometry: every configuration counts as free"
+            warnings.warn(MeshWarning(message), stacklevel=2)
+        self.bodies = link_bodies(robot) + scene_bodies(robot, self.scene.at(0.0))
+        self.weights = displacement_weights(robot, [b for b in self.bodies if b.kind != "obstacle"])
+        pairs = colliding_pairs(robot, self.scene, self.bodies)
+        moving = tuple(p for p in pairs if any(self.bodies[i].joint > 0 for i in p))
+        self.pairs = pairs
+        self.accuracy = _accuracy(accuracy)
+        self._certificate = Certificate(robot, self.bodies, pairs)
+        self._checks = CollisionChecks(robot, self.bodies, moving, conservative=accuracy == "conservative")
+        standing = tuple(p for p in pairs if all(self.bodies[i].joint == 0 for i in p))
+        self._always_colliding = standing_contact(robot, self.bodies, standing) is not None
+
+    def __repr__(self) -> str:
+        return f"World({self.robot.name}, {self.scene}, motion_resolution={self.motion_resolution:g} m)"
+
+    @property
+    def fast(self) -> FastWorld | None:
+        """The world's tables, for planners that run in kernels; None without kernels or where nothing is ever free."""
+        tables = self._checks.fast
+        return tables if tables.address and not self._always_colliding else None
+
+    def with_accuracy(self, accuracy: str) -> World:
+        """The same world, "exact" or "conservative"; shares everything else.
+
+        Raises:
+            UnknownNameError: If there is no such accuracy.
+        """
+        other = copy.copy(self)
+        other.accuracy = _accuracy(accuracy)
+        other._checks = self._checks.as_conservative(accuracy == "conservative")
+        return other
+
+    def refined(self, factor: float) -> World:
+        """The same world, its motions checked in steps ``factor`` times as fine; shares everything else."""
+        finer = copy.copy(self)
+        finer.motion_resolution = self.motion_resolution / factor
+        return finer
+
+    def valid(self, q: ArrayLike) -> bool:
+        """Whether q, shape (dof,), is inside the limits and free of collision.
+
+        Raises:
+            InputError: If q has the wrong length or a value that is not finite.
+        """
+        return bool(self._free(self._rows(q, 1))[0])
+
+    def valid_batch(self, Q: ArrayLike) -> Mask:
+        """Which rows of Q, shape (m, dof), are inside the limits and free of collision. Shape (m,).
+
+        Raises:
+            InputError: If Q has the wrong shape or a value that is not finite.
+        """
+        return self._free(self._rows(Q, 2))
+
+    def motion_valid(self, a: ArrayLike, b: ArrayLike) -> bool:
+        """Whether the straight motion from a to b, shape (dof,) each, is valid; the same answer from b to a."""
+        return bool(self._motions_free(self._rows(a, 1), self._rows(b, 1))[0])
+
+    def motion_valid_batch(self, A: ArrayLike, B: ArrayLike) -> Mask:
+        """Which straight motions A[k] -> B[k], shape (m, dof) each, are valid. Shape (m,)."""
+        starts, ends = self._rows(A, 2), self._rows(B, 2)
+        if len(starts) != len(ends):
+            raise InputError(f"motions need as many starts as ends, got {len(starts)} and {len(ends)}")
+        return self._motions_free(starts, ends)
+
+    def steps(self, a: ArrayLike, b: ArrayLike, resolution: float | None = None) -> int:
+        """Number of steps in which a motion is checked: the bound on the arm's displacement over the resolution."""
+        travel = float(self.weights @ np.abs(np.asarray(b, dtype=np.float64) - np.asarray(a, dtype=np.float64)))
+        return max(1, int(np.ceil(travel / (self.motion_resolution if resolution is None else resolution) - 1e-9)))
+
+    def contacts(self, q: ArrayLike) -> tuple[Contact, ...]:
+        """Every pair of bodies that touches or is within its margin at q, deepest first; empty if q is free."""
+        rows = self._rows(q, 1)
+        found = list(measured(self.bodies, self.pairs, self.robot.joint_frames(rows)[0], near_only=True))
+        if not found:
+            found = [inside(*names) for names in self._certificate.first_pairs(rows) if names is not None]
+        return tuple(sorted(found, key=lambda c: c.clearance))
+
+    def closest(self, q: ArrayLike, *, known_free: bool = False) -> Contact | None:
+        """The pair of bodies that is nearest to contact or to its margin at q, or deepest in it; None if there is none.
+
+        ``known_free`` leaves out the look for contacts, where they were ruled out before.
+        """
+        touching = () if known_free else self.contacts(q)
+        if touching:
+            return touching[0]
+        frames = self.robot.joint_frames(self._rows(q, 1))[0]
+        found = measured(self.bodies, self.pairs, frames, near_only=False)
+        return min(found, key=lambda c: c.clearance, default=None)
+
+    def clearance(self, q: ArrayLike) -> float:
+        """Smallest signed distance less its margin at q [m]: negative in collision, +inf if nothing can collide."""
+        nearest = self.closest(q)
+        return float("inf") if nearest is None else nearest.clearance
+
+    def explain(self, q: ArrayLike) -> str:
+        """A line that says why q is not valid: the joint outside its limit, or the pair in collision; "" if it is."""
+        row = self._rows(q, 1)[0]
+        fault = self.robot.limit_fault(row)
+        if fault:
+            return fault
+        touching = self.contacts(row)
+        if not touching:
+            return ""
+        more = len(touching) - 1
+        return f"{touching[0]}" + (f" (and {more} more pair{'s' * (more > 1)})" if more else "")
+
+    def certify(self, Q: ArrayLike) -> Mask:
+        """A second opinion on the rows of Q, independent of the checks that planners use. Shape (m,)."""
+        rows = self._rows(Q, 2)
+        mask = self.robot.within_limits(rows)
+        mask[mask] = self._certificate.free(rows[mask])
+        return mask
+
+    def _rows(self, Q: ArrayLike, dimensions: int) -> Matrix:
+        """Checked configurations as rows, shape (m, dof)."""
+        rows = np.asarray(Q, dtype=np.float64) if isinstance(Q, np.ndarray) and Q.dtype.kind in "fiub" else None
+        if rows is None or rows.ndim != dimensions or rows.shape[-1] != self.robot.dof or not np.isfinite(rows).all():
+            if dimensions == 1:
+                return self.robot.configuration(Q)[None]
+            rows = finite_array(Q, (None, self.robot.dof), f"configurations of robot '{self.robot.name}'")
+        return np.atleast_2d(rows)
+
+    def _free(self, rows: Matrix) -> Mask:
+        mask = self.robot.within_limits(rows) & (not self._always_colliding)
+        if mask.all():
+            return self._checks.free(rows)
+        mask[mask] = self._checks.free(rows[mask])
+        return mask
+
+    def _motions_free(self, starts: Matrix, ends: Matrix) -> Mask:
+        mask = self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self._always_colliding)
+        starts, ends = _one_way(starts[mask], ends[mask])
+        steps = step_counts(starts, ends, self.weights, self.motion_resolution)
+        mask[mask] = self._checks.motions_free(starts, ends, steps)
+        return mask
+
+
+def _one_way(starts: Matrix, ends: Matrix) -> tuple[Matrix, Matrix]:
+    """Motions turned so that both directions of one are the same to the bit: the lexically smaller end first."""
+    first_difference = (starts != ends).argmax(axis=1)[:, None]
+    turned = np.take_along_axis(starts, first_difference, axis=1) > np.take_along_axis(ends, first_difference, axis=1)
+    return np.where(turned, ends, starts), np.where(turned, starts, ends)
+
+
+def _accuracy(name: str) -> str:
+    if name not in ACCURACIES:
+        raise UnknownNameError("accuracy", str(name), ACCURACIES)
+    return name

@@ -1,0 +1,168 @@
+"""A robot among obstacles that move: checks that keep a room around each obstacle, and follow a scene within a tick.
+
+What is free is proven by the kernels alone (:mod:`rrtik_ompl.fast`); what they cannot prove is refused, so that an
+answer never waits for coal. When the scene changes, only the obstacles that moved are packed again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import Mask, Vector, finite_array
+from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.certificate import standing_contact
+from rrtik_ompl.collision.motion_bound import step_counts
+from rrtik_ompl.errors import InputError, UnknownNameError, require
+from rrtik_ompl.fast import FREE, FastWorld
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.shapes import same_shape
+from rrtik_ompl.world import World
+from rrtik_ompl.world.exact_checks import fast_world
+
+
+class MovingWorld:
+    """Checks of a robot among obstacles that may be moved; stands in for a conservative ``World``.
+
+    A configuration is free if it is within the limits, proven free of self-collision, and proven to be farther than
+    margin and ``rooms`` from every obstacle. Motions are looked at as a ``World`` does. While an obstacle stands in the
+    arm's fixed base nothing is free.
+
+    Attributes:
+        robot, weights, motion_resolution: Those of the world.
+        accuracy: "conservative".
+        scene: Where the obstacles are now.
+        fast: The tables, for searches in kernels; None without kernels or while ``blocked``. Moved in place, their
+            address stays.
+        blocked: Which obstacle stands in which fixed part of the arm, as a line for a person; "" if none does.
+        checked: Configurations looked at so far, counted as if no motion had been refused early.
+
+    Args:
+        world: The robot and the scene, obstacles at their first places.
+        moving: Names of the obstacles that may be moved; all of them if None.
+        copies: In how many places at once each of these may stand (where it is, and where it will be).
+        self_collision: False leaves out what does not concern obstacles, so that :meth:`clearance` is of them alone.
+    """
+
+    accuracy = "conservative"
+
+    def __init__(
+        self, world: World, *, moving: Sequence[str] | None = None, copies: int = 1, self_collision: bool = True
+    ) -> None:
+        require(world, World, "world of a moving world", "use World(robot, scene)")
+        self.robot: Robot = world.robot
+        self.weights, self.motion_resolution = world.weights, world.motion_resolution
+        self.scene, self.checked = world.scene, 0
+        names = {o.name for o in self.scene.obstacles} if moving is None else set(moving)
+        self._bodies, pairs, self._copy = _with_copies(world, names, copies)
+        self._known = {o.name: o for o in self.scene.obstacles}
+        kept = tuple(p for p in pairs if any(self._bodies[i].joint > 0 for i in p))
+        if not self_collision:
+            kept = tuple(p for p in kept if any(self._bodies[i].kind == "obstacle" for i in p))
+        self._fast = fast_world(self.robot, self._bodies, kept, share=self_collision)
+        self._rooms = [0.0] * len(self._bodies)
+        self._fixed = tuple(p for p in world.pairs if all(self._bodies[i].joint == 0 for i in p))
+        self.blocked = self._contact_of_base()
+
+    @property
+    def fast(self) -> FastWorld | None:
+        """See the class."""
+        return self._fast if self._fast.address and not self.blocked else None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the obstacles."""
+        return tuple(o.name for o in self.scene.obstacles)
+
+    def move(self, *scenes: Scene, rooms: Mapping[str, float] | None = None) -> None:
+        """Put the obstacles where they are now, and their copies where they will be.
+
+        Args:
+            *scenes: The scene now, then one for each further copy; the last one stands for those that are missing.
+            rooms: How far the arm has to stay from obstacles beyond their margins [m]; what is not named keeps its
+                room.
+
+        Raises:
+            InputError: If a scene has other obstacles than the world began with, or a room is not 0 or more.
+            UnknownNameError: If a room is given for what is no obstacle.
+        """
+        places = [{o.name: (o.pose, o.margin) for o in scene.obstacles} for scene in scenes]
+        for scene in scenes:
+            _check_obstacles(scene, self._known)
+        for name, room in (rooms or {}).items():
+            if name not in self._known:
+                raise UnknownNameError("obstacle", name, self._known, where="rooms")
+            if not room >= 0.0:
+                raise InputError(f"rooms: that of '{name}' must be 0 metres or more, got {room}")
+        for k, body in enumerate(self._bodies):
+            if body.kind == "obstacle":
+                pose, margin = places[min(self._copy[k], len(places) - 1)][body.name]
+                if margin != body.margin or not np.array_equal(pose.homogeneous, body.placement.homogeneous):
+                    self._bodies[k] = replace(body, placement=pose.copy(), margin=margin)
+                if rooms is not None and body.name in rooms:
+                    self._rooms[k] = float(rooms[body.name])
+        self.scene = scenes[0]
+        self.blocked = self._contact_of_base()
+        self._fast.move(self._bodies, self._rooms)
+
+    def clearance(self, Q: ArrayLike) -> Vector:
+        """Lower bounds of the distance to contact of rows of Q, less margins and rooms [m]. (m, dof) -> (m,)."""
+        return self._fast.clearance(self.robot.joint_values(Q)).lower
+
+    def valid(self, q: ArrayLike) -> bool:
+        """Whether q, shape (dof,), is free."""
+        return bool(self.valid_batch(np.atleast_2d(np.asarray(q, dtype=np.float64)))[0])
+
+    def valid_batch(self, Q: ArrayLike) -> Mask:
+        """Which rows of Q, shape (m, dof), are free. Shape (m,)."""
+        rows = finite_array(Q, (None, self.robot.dof), "configurations")
+        self.checked += len(rows)
+        free: Mask = self._fast.classify(self.robot.joint_values(rows), prove=False) == FREE
+        return free & self.robot.within_limits(rows) & (not self.blocked)
+
+    def motion_valid(self, a: ArrayLike, b: ArrayLike) -> bool:
+        """Whether the straight motion from a to b, shapes (dof,), is free."""
+        ends = (np.atleast_2d(np.asarray(q, dtype=np.float64)) for q in (a, b))
+        return bool(self.motion_valid_batch(*ends)[0])
+
+    def motion_valid_batch(self, A: ArrayLike, B: ArrayLike) -> Mask:
+        """Which straight motions A[k] -> B[k], shapes (m, dof), are free. Shape (m,)."""
+        starts, ends = (finite_array(Q, (None, self.robot.dof), "ends of motions") for Q in (A, B))
+        steps = step_counts(starts, ends, self.weights, self.motion_resolution)
+        self.checked += int(steps.sum()) + len(steps)
+        sides = self.robot.joint_values(starts), self.robot.joint_values(ends)
+        free: Mask = self._fast.classify_edges(*sides, steps, prove=False) == FREE
+        return free & self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self.blocked)
+
+    def _contact_of_base(self) -> str:
+        """See ``blocked``; predicted places do not count, for nothing can be done about them."""
+        found = standing_contact(self.robot, tuple(self._bodies), self._fixed)
+        return "" if found is None else f"'{found[0]}' and '{found[1]}' overlap, and the base cannot give way"
+
+
+def _check_obstacles(scene: Scene, known: Mapping[str, Obstacle]) -> None:
+    """Raise unless a scene has the obstacles that are known: their names and shapes."""
+    if {o.name for o in scene.obstacles} != known.keys():
+        raise InputError(f"scene: expected the obstacles {', '.join(sorted(known))}, got {scene}")
+    for obstacle in scene.obstacles:
+        if not same_shape(obstacle.shape, known[obstacle.name].shape):
+            raise InputError(f"scene: '{obstacle.name}' has another shape than before; make a new world")
+
+
+def _with_copies(
+    world: World, names: set[str], copies: int
+) -> tuple[list[Body], list[tuple[int, int]], dict[int, int]]:
+    """Bodies and pairs of a world with further copies of some obstacles, and which copy each body is."""
+    bodies, pairs = list(world.bodies), list(world.pairs)
+    number = dict.fromkeys(range(len(bodies)), 0)
+    for k, body in enumerate(world.bodies):
+        if body.kind == "obstacle" and body.name in names:
+            for copy in range(1, copies):
+                number[len(bodies)] = copy
+                pairs += [(i, len(bodies)) for pair in world.pairs if k in pair for i in pair if i != k]
+                bodies.append(body)
+    return bodies, pairs, number
