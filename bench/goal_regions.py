@@ -45,14 +45,14 @@ def goals(tip: Any) -> dict[str, Goal]:
     return {
         "a pose": rrtik.PoseGoal(tip),
         "a position": rrtik.PositionGoal(tip.translation),
-        "four poses": rrtik.GoalRegion([rrtik.PoseGoal(T) for T in turned]),
-        "free turn about the tool": rrtik.GoalRegion([rrtik.PoseGoal(tip)], free_rotation_axis="z"),
+        "four poses": rrtik.GoalSet([rrtik.PoseGoal(T) for T in turned]),
+        "free turn about the tool": rrtik.GoalSet([rrtik.PoseGoal(tip)], free_rotation_axis="z"),
         "free turn about an upright line 0.1 m away": rrtik.TaskRegion.about_axis(
             tip, up, through=tip.translation + np.array([0.1, 0.0, 0.0])
         ),
         "a line of 0.3 m": rrtik.TaskRegion(tip, line),
         "a box, roll and pitch within 0.2 rad, yaw free": rrtik.TaskRegion(tip, box),
-        "a grasp set: a pose out of reach, a line, a free turn": rrtik.GoalRegion(
+        "a grasp set: a pose out of reach, a line, a free turn": rrtik.GoalSet(
             [rrtik.PoseGoal(far), rrtik.TaskRegion(tip, line), rrtik.TaskRegion.about_axis(tip, up)]
         ),
     }

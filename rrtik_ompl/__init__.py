@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.errors import RrtikError as RrtikError
     from rrtik_ompl.errors import UnknownNameError as UnknownNameError
     from rrtik_ompl.files.mesh import load_mesh as load_mesh
-    from rrtik_ompl.goal import GoalRegion as GoalRegion
+    from rrtik_ompl.goal import GoalSet as GoalSet
     from rrtik_ompl.goal import JointGoal as JointGoal
     from rrtik_ompl.goal import PoseGoal as PoseGoal
     from rrtik_ompl.goal import PositionGoal as PositionGoal
@@ -98,7 +98,7 @@ else:
         "catalog": ("list_problems", "list_robots", "load_robot"),
         "benchmark.batch": ("plan_batch",),
         "errors": ("InputError", "PlannerError", "ProblemError", "RrtikError", "UnknownNameError"),
-        "goal": ("GoalRegion", "JointGoal", "PoseGoal", "PositionGoal"),
+        "goal": ("GoalSet", "JointGoal", "PoseGoal", "PositionGoal"),
         "ik.batch": ("IkBatch", "solve_ik_batch"),
         "ik.solve": ("IkResult", "list_ik_methods", "solve_ik"),
         "ik.trajectory": ("IkTrajectory", "solve_ik_trajectory"),

@@ -102,7 +102,7 @@ GoalPart: TypeAlias = PoseGoal | PositionGoal | TaskRegion
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class GoalRegion:
+class GoalSet:
     """Any of several goals: a grasp set. Poses may be given freedom: a turn about an axis, a box of positions.
 
     Attributes:
@@ -161,18 +161,18 @@ class GoalRegion:
         return np.array([part.errors(robot, Q) for part in self.parts]).transpose(0, 2, 1)
 
 
-TipGoal: TypeAlias = PoseGoal | PositionGoal | TaskRegion | GoalRegion
+TipGoal: TypeAlias = PoseGoal | PositionGoal | TaskRegion | GoalSet
 Goal: TypeAlias = JointGoal | TipGoal
 
 
 def parts_of(goal: TipGoal) -> tuple[GoalPart, ...]:
     """The goals of which one is enough: those of a region, or the goal alone."""
-    return goal.parts if isinstance(goal, GoalRegion) else (goal,)
+    return goal.parts if isinstance(goal, GoalSet) else (goal,)
 
 
 def has_task_regions(goal: TipGoal) -> bool:
     """Whether a goal is a task-space region or has one among its members."""
-    members = goal.members if isinstance(goal, GoalRegion) else (goal,)
+    members = goal.members if isinstance(goal, GoalSet) else (goal,)
     return any(isinstance(member, TaskRegion) for member in members)
 
 
@@ -189,7 +189,7 @@ def as_task_region(part: GoalPart) -> TaskRegion:
 
 def tip_errors(goal: TipGoal, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
     """Distance [m] and angle [rad] of the tip from the nearest part of a goal, for each row of Q, shapes (m,)."""
-    if not isinstance(goal, GoalRegion):
+    if not isinstance(goal, GoalSet):
         return goal.errors(robot, Q)
     each = goal.member_errors(robot, Q)
     best = np.argmin(each[..., 0] + metres_per_radian(robot) * each[..., 1], axis=0)

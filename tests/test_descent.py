@@ -11,7 +11,7 @@ from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.fast.ik.ik_layout import KERNELS
 from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal
+from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal
 from rrtik_ompl.ik.batch import solve_ik_batch
 from rrtik_ompl.ik.goal_rows import goal_rows, pose_rows
 from rrtik_ompl.ik.numeric.descent import Search, walk
@@ -49,7 +49,7 @@ def goals(robot, kind):
         return PositionGoal(tips[0].translation)
     if kind == "pose":
         return PoseGoal(tips[0])
-    return GoalRegion([*map(PoseGoal, tips)], free_rotation_axis=kind, box=[0.1, 0.0, 0.05])
+    return GoalSet([*map(PoseGoal, tips)], free_rotation_axis=kind, box=[0.1, 0.0, 0.05])
 
 
 @pytest.mark.parametrize("kind", ["pose", "position", "x", "y", "z"])
@@ -138,7 +138,7 @@ def test_an_arm_of_five_joints_reaches_poses_whose_turn_about_an_axis_is_free():
     robot = rrtik.load_robot("so100")
     for k, q in enumerate(random_rows(robot, 10, seed=6)):
         turn = pin.SE3(pin.exp3(np.array([0.0, 0.0, 1.0 + 0.1 * k])), np.zeros(3))
-        goal = GoalRegion([PoseGoal(robot.fk(q) * turn)], free_rotation_axis="z")
+        goal = GoalSet([PoseGoal(robot.fk(q) * turn)], free_rotation_axis="z")
         result = rrtik.solve_ik(robot, goal)
         assert result.found
         assert goal.satisfied(robot, result.solutions).all()
@@ -150,7 +150,7 @@ def test_an_arm_of_three_joints_moves_inside_a_box_to_point_where_it_is_asked_to
     monkeypatch.setattr(descent, "library", kernels)
     robot, found = rrtik.load_robot("puma560_3dof"), []
     for q in random_rows(robot, 12, seed=5):
-        goal = GoalRegion([PoseGoal(robot.fk(q), 1e-4, 1e-4)], free_rotation_axis="z", box=[0.05, 0.05, 0.05])
+        goal = GoalSet([PoseGoal(robot.fk(q), 1e-4, 1e-4)], free_rotation_axis="z", box=[0.05, 0.05, 0.05])
         result = rrtik.solve_ik(robot, goal, method="numeric", seconds=20.0)
         found.append(result.found)
         assert goal.satisfied(robot, result.solutions).all()
@@ -161,7 +161,7 @@ def test_residuals_of_a_region_count_what_its_freedom_does_not_cover():
     robot = rrtik.load_robot("ur5")
     q = np.radians([20.0, -70.0, 80.0, -60.0, 40.0, 30.0])
     moved = robot.fk(q) * pin.SE3(pin.exp3(np.array([0.0, 0.3, 0.0])), np.array([0.2, 0.0, 0.0]))
-    region = GoalRegion([PoseGoal(moved), PositionGoal([9.0, 0.0, 0.0])], "x", [0.1, 0.1, 0.1])
+    region = GoalSet([PoseGoal(moved), PositionGoal([9.0, 0.0, 0.0])], "x", [0.1, 0.1, 0.1])
     errors = region.member_errors(robot, q)
     seen = moved.actInv(robot.fk(q)).translation
     np.testing.assert_allclose(errors[0, 0], [np.linalg.norm(np.maximum(np.abs(seen) - 0.05, 0.0)), 0.3], atol=1e-12)
@@ -201,5 +201,5 @@ def test_forward_kinematics_of_few_and_of_many_agree():
 
 
 def test_a_region_without_starts_has_no_solutions():
-    goal = GoalRegion((PoseGoal(pin.SE3.Identity()), PoseGoal(pin.SE3.Identity())))
+    goal = GoalSet((PoseGoal(pin.SE3.Identity()), PoseGoal(pin.SE3.Identity())))
     assert numeric_ik(rrtik.load_robot("puma560"), goal, np.zeros((0, 6))).shape == (0, 6)

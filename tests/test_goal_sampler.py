@@ -12,7 +12,7 @@ from ompl import geometric as og
 
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal, joint_difference
+from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal, joint_difference
 from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.ompl_bridge import GoalSampler, StateIO
 from rrtik_ompl.ompl_bridge.attempt import ANYTIME_PLANNERS, ONE_GOAL_PLANNERS, ompl_planners
@@ -260,7 +260,7 @@ def test_plan_draws_others_when_what_it_aimed_at_is_out_of_its_reach(name):
     world = World(robot, Scene(cage), motion_resolution=0.05)
     inside = TaskRegion(pose([4, 5, 0]), [[-0.7, 0.7], [-1.2, 1.2], [0, 0], [0, 0], [0, 0], [-4, 4]])
     outside = TaskRegion(pose([9, 9, 0]), [[-0.5, 0.5], [-0.5, 0.5], [0, 0], [0, 0], [0, 0], [-4, 4]])
-    problem = Problem(world, [1, 5], GoalRegion([inside] * 6 + [outside]))  # the first round asks six parts
+    problem = Problem(world, [1, 5], GoalSet([inside] * 6 + [outside]))  # the first round asks six parts
     one, two = (plan(problem, name, seconds=30.0, seed=2) for _ in range(2))
     assert one.found, one.reason
     assert np.linalg.norm(one.path.end - [9, 9]) < 1.0

@@ -12,7 +12,7 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.cli.plan_report import summary
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal
+from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal
 from rrtik_ompl.ik.ikurt.descent import descend
 from rrtik_ompl.ik.ikurt.metric import TipMetric, reach
 from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
@@ -220,7 +220,7 @@ def test_the_same_seed_gives_the_same_path(planner: Any) -> None:
 
 def test_a_region_of_several_poses_is_reached_at_one_of_them(puma: Any) -> None:
     out_of_reach = PoseGoal(pose([5.0, 0.0, 0.0]))
-    problem = rrtik.Problem(puma.world, puma.start, GoalRegion([out_of_reach, puma.goal]))
+    problem = rrtik.Problem(puma.world, puma.start, GoalSet([out_of_reach, puma.goal]))
     plan = rrtik.plan(problem, IKURT, seconds=5.0, seed=1)
     assert plan.found, plan.reason
     assert puma.goal.satisfied(puma.robot, plan.path.end[None])[0]
@@ -229,9 +229,7 @@ def test_a_region_of_several_poses_is_reached_at_one_of_them(puma: Any) -> None:
 def test_a_region_with_a_free_rotation_and_a_box_is_reached() -> None:
     robot = rrtik.load_robot("panda_primitives")
     start = robot.posture("default")
-    region = GoalRegion(
-        [PoseGoal(robot.fk(start) * pose([0.1, 0.1, -0.1]))], free_rotation_axis="z", box=[0.1, 0.1, 0.0]
-    )
+    region = GoalSet([PoseGoal(robot.fk(start) * pose([0.1, 0.1, -0.1]))], free_rotation_axis="z", box=[0.1, 0.1, 0.0])
     problem = rrtik.Problem(rrtik.World(robot), start, region)
     plan = rrtik.plan(problem, IKURT, seconds=5.0, seed=1)
     assert plan.found, plan.reason

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal
+from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal
 from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric_ik
 from rrtik_ompl.ik.targets import targets
@@ -57,7 +57,7 @@ def test_batched_jacobians_agree_with_finite_differences(name):
 def test_a_region_gives_different_poses_that_all_satisfy_it():
     robot = load_robot("panda")
     tip = robot.fk(robot.posture("default"))
-    region = GoalRegion([PoseGoal(tip)], free_rotation_axis="z", box=[0.1, 0.0, 0.0])
+    region = GoalSet([PoseGoal(tip)], free_rotation_axis="z", box=[0.1, 0.0, 0.0])
     drawn = targets(region, 8, np.random.default_rng(0))
     assert len({tuple(g.T_world_tip.translation) for g in drawn}) == 8
     starts = np.random.default_rng(1).uniform(robot.lower, robot.upper, (16, 7))

@@ -6,7 +6,7 @@ import pytest
 
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError, ProblemError
-from rrtik_ompl.goal import GoalRegion, JointGoal, PoseGoal, PositionGoal
+from rrtik_ompl.goal import GoalSet, JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.scene import Obstacle, Scene
@@ -118,4 +118,4 @@ def test_a_goal_pose_that_is_no_rigid_pose_is_refused(matrix):
 
 def test_a_region_takes_no_goal_in_joint_values():
     with pytest.raises(InputError, match="pose or position"):
-        GoalRegion([JointGoal([0.0, 0.0])])
+        GoalSet([JointGoal([0.0, 0.0])])

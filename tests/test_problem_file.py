@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rrtik_ompl.catalog import list_problems
 from rrtik_ompl.errors import InputError, ProblemError, RrtikError, UnknownNameError
 from rrtik_ompl.files.strict_yaml import read_yaml, write_yaml
-from rrtik_ompl.goal import GoalRegion, JointGoal, PoseGoal, PositionGoal
+from rrtik_ompl.goal import GoalSet, JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.poses import pose
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_files.problem import load_problem, problem_schema, save_problem
@@ -84,7 +84,7 @@ def test_every_kind_of_goal_is_read(tmp_path):
     assert isinstance(goal, PositionGoal)
     assert (goal.position.tolist(), goal.tolerance) == ([1, 1, 0], 0.005)
     goal = load(tmp_path, text(goal=f"{{any_of: [{{{place}}}, {{position: [1, 0, 0]}}]}}")).goal
-    assert isinstance(goal, GoalRegion)
+    assert isinstance(goal, GoalSet)
     assert [type(member) for member in goal.members] == [PoseGoal, PositionGoal]
     goal = load(tmp_path, text(goal=f"{{region: {{{place}, free_rotation_axis: z, box: [0.1, 0, 0]}}}}")).goal
     assert (goal.free_rotation_axis, goal.box.tolist()) == ("z", [0.1, 0, 0])
@@ -113,12 +113,12 @@ GOALS = [
     JointGoal([0.1, 1 / 3, -1e-17]),
     PositionGoal([0.1, 0.2, 0.3], 1e-5),
     PoseGoal(pose([0.1, 0.2, 0.3], [0.1, 0.7, 0.5, 0.5]), 1e-4, 0.2),
-    GoalRegion([PoseGoal(pose([1, 0, 0])), PositionGoal([0, 1, 0])]),
-    GoalRegion([PoseGoal(pose([1, 0, 0]), 0.01)], "y", [0, 0.1, 0]),
-    GoalRegion([PoseGoal(pose([1, 0, 0]), 0.01), PoseGoal(pose([0, 1, 0])), PositionGoal([0, 1, 0])], "z"),
+    GoalSet([PoseGoal(pose([1, 0, 0])), PositionGoal([0, 1, 0])]),
+    GoalSet([PoseGoal(pose([1, 0, 0]), 0.01)], "y", [0, 0.1, 0]),
+    GoalSet([PoseGoal(pose([1, 0, 0]), 0.01), PoseGoal(pose([0, 1, 0])), PositionGoal([0, 1, 0])], "z"),
     TaskRegion(pose([1, 0, 0], [0.1, 0.7, 0.5, 0.5]), BOUNDS, pose([0, 0.1, 0]), 0.01, 0.02),
     TaskRegion.about_axis(pose([1, 0, 0.2]), [0, 0.6, 0.8], through=[1, 0.1, 0], slide=[-0.1, 1 / 3]),
-    GoalRegion([TaskRegion.about_axis(pose([1, 0, 0.2]), [0, 0, 1]), PoseGoal(pose([1, 0, 0]))]),
+    GoalSet([TaskRegion.about_axis(pose([1, 0, 0.2]), [0, 0, 1]), PoseGoal(pose([1, 0, 0]))]),
 ]
 
 

@@ -68,7 +68,7 @@ def test_a_position_leaves_the_orientation_free():
 
 def test_a_region_is_reached_at_any_of_its_targets():
     robot = rrtik.load_robot("titan4")
-    region = rrtik.GoalRegion([pose_goal(robot, Q_TITAN)], free_rotation_axis="z", box=[0.1, 0.0, 0.0])
+    region = rrtik.GoalSet([pose_goal(robot, Q_TITAN)], free_rotation_axis="z", box=[0.1, 0.0, 0.0])
     result = solve_ik(robot, region, all=True)
     assert result.method == "closed-form"
     assert len(result.solutions) > 5
@@ -206,7 +206,7 @@ def test_a_closed_form_looks_at_every_grasp_of_a_large_set():
     far = [rrtik.PoseGoal(pose_from_rpy([5.0 + k, 0.0, 0.0], [0.0, 0.0, 0.0])) for k in range(200)]
     near = pose_goal(robot, Q_TITAN)
     for place in (0, 100, 200):
-        result = solve_ik(robot, rrtik.GoalRegion([*far[:place], near, *far[place:]]))
+        result = solve_ik(robot, rrtik.GoalSet([*far[:place], near, *far[place:]]))
         assert (result.method, near.satisfied(robot, result.solutions).tolist()) == ("closed-form", [True])
 
 
@@ -220,7 +220,7 @@ def test_methods_that_walk_from_random_starts_give_every_target_a_round():
         return Q, 1
 
     rest = {"near": np.zeros(6), "accept": lambda Q: np.ones(len(Q), dtype=bool), "all": False, "deadline": np.inf}
-    restarted(stay, Question(robot, rrtik.GoalRegion(goals), goals, random=RandomStream(0), **rest))
+    restarted(stay, Question(robot, rrtik.GoalSet(goals), goals, random=RandomStream(0), **rest))
     assert asked == list(goals)
 
 
@@ -307,7 +307,7 @@ def test_numeric_looks_at_every_grasp_of_a_large_set():
     robot = rrtik.load_robot("ur5")
     far = [rrtik.PoseGoal(pose_from_rpy([5.0 + k, 0.0, 0.0], [0.0, 0.0, 0.0])) for k in range(70)]
     near = pose_goal(robot, Q_TITAN)
-    result = solve_ik(robot, rrtik.GoalRegion([*far, near]), method="numeric", seconds=20.0)
+    result = solve_ik(robot, rrtik.GoalSet([*far, near]), method="numeric", seconds=20.0)
     assert result.found
     assert near.satisfied(robot, result.solutions).all()
 
@@ -315,7 +315,7 @@ def test_numeric_looks_at_every_grasp_of_a_large_set():
 def test_numeric_takes_targets_drawn_from_task_regions():
     robot = rrtik.load_robot("ur5")
     bar = rrtik.TaskRegion.about_axis(robot.fk(Q_TITAN), [0.0, 0.0, 1.0], slide=[-0.1, 0.1])
-    goal = rrtik.GoalRegion([rrtik.PositionGoal([5.0, 0.0, 0.0]), bar])
+    goal = rrtik.GoalSet([rrtik.PositionGoal([5.0, 0.0, 0.0]), bar])
     result = solve_ik(robot, goal, method="numeric", seconds=20.0)
     assert result.found
     assert bar.satisfied(robot, result.solutions).all()

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal, as_task_region, has_task_regions, tip_errors
+from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal, as_task_region, has_task_regions, tip_errors
 from rrtik_ompl.ik.numeric.projection import project
 from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.ik.targets import targets
@@ -73,7 +73,7 @@ def test_drawn_poses_lie_in_the_region_and_the_nearest_pose_of_the_region_is_no_
 def test_a_pose_with_a_box_and_a_free_axis_and_the_same_task_region_agree():
     robot, rng = load_robot("ur5"), np.random.default_rng(0)
     place = pose_from_rpy([0.3, 0.2, 0.5], [0.4, -0.8, 1.0])
-    freed = GoalRegion([PoseGoal(place)], "y", [0.2, 0.0, 0.1])
+    freed = GoalSet([PoseGoal(place)], "y", [0.2, 0.0, 0.1])
     same = TaskRegion(place, [[-0.1, 0.1], [0, 0], [-0.05, 0.05], [0, 0], FREE, [0, 0]])
     Q = rng.uniform(-3, 3, (50, 6))
     np.testing.assert_allclose(freed.distance(robot, Q), same.distance(robot, Q))
@@ -99,7 +99,7 @@ def test_positions_poses_and_regions_are_measured_in_the_same_metres():
         assert part.distance(robot, q) == pytest.approx([distance])
     for names in (("position", "pose"), ("position", "turned"), ("pose", "turned", "region"), ("region", "position")):
         _, distance, errors = min((parts[name] for name in names), key=lambda part: part[1])
-        goal = GoalRegion([parts[name][0] for name in names])
+        goal = GoalSet([parts[name][0] for name in names])
         assert goal.distance(robot, q) == pytest.approx([distance])
         assert np.ravel(tip_errors(goal, robot, q)) == pytest.approx(errors, abs=1e-7)
 
@@ -152,7 +152,7 @@ def test_solve_ik_takes_grasp_sets_by_whatever_method_fits(name):
     robot = load_robot(name)
     q = robot.clamp(np.full(robot.dof, -0.4))
     handle = TaskRegion.about_axis(robot.fk(q), [0, 0, 1], slide=[-0.05, 0.05])
-    goal = GoalRegion([PoseGoal(pose([9, 0, 0])), handle])
+    goal = GoalSet([PoseGoal(pose([9, 0, 0])), handle])
     assert has_task_regions(goal)
     found = solve_ik(robot, goal, seconds=20.0)
     assert found.found, found.detail
@@ -170,7 +170,7 @@ def test_a_region_out_of_reach_is_unreachable_and_says_by_how_much():
 
 
 def test_of_a_large_grasp_set_any_member_may_be_drawn():
-    goal = GoalRegion([PoseGoal(pose([k, 0, 0])) for k in range(100)])
+    goal = GoalSet([PoseGoal(pose([k, 0, 0])) for k in range(100)])
     drawn = {t.T_world_tip.translation[0] for seed in range(20) for t in targets(goal, 32, np.random.default_rng(seed))}
     assert len(drawn) > 90
 
@@ -190,8 +190,8 @@ BAD = {
         lambda: TaskRegion.about_axis(AT, [0, 0, 1], slide=[0.1, 0]),
         "slide goes from 0.1 up to 0",
     ),
-    "an empty set": (lambda: GoalRegion([]), "at least one pose"),
-    "a pose that is no list": (lambda: GoalRegion(PoseGoal(AT)), "a list of at least one pose"),
+    "an empty set": (lambda: GoalSet([]), "at least one pose"),
+    "a pose that is no list": (lambda: GoalSet(PoseGoal(AT)), "a list of at least one pose"),
 }
 
 

@@ -23,7 +23,7 @@ from scipy.spatial import ConvexHull
 
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import GoalRegion, JointGoal, PoseGoal, PositionGoal
+from rrtik_ompl.goal import GoalSet, JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.poses import pose
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, Waypoints
@@ -230,7 +230,7 @@ def test_goals_are_drawn_as_frames_and_points(crane: Robot) -> None:
     for goal, part in [
         (reach, "0/frame/x"),
         (PositionGoal([0.5, 0.5, 0.5]), "0/point"),
-        (GoalRegion([reach, reach], box=[0.1, 0.1, 0.0]), "1/region"),
+        (GoalSet([reach, reach], box=[0.1, 0.1, 0.0]), "1/region"),
         (TaskRegion.about_axis(reach.T_world_tip, [0.0, 0.0, 1.0]), "0/frame 7/y"),
         (TaskRegion(reach.T_world_tip, [[0.0, 0.1]] + 5 * [[0.0, 0.0]]), "0/region"),
     ]:

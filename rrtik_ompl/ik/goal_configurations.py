@@ -8,7 +8,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import TAU, Matrix, Vector, frozen
 from rrtik_ompl.goal import (
-    GoalRegion,
+    GoalSet,
     JointGoal,
     PoseGoal,
     TipGoal,
@@ -161,8 +161,8 @@ def _walked(robot: Robot, goal: TipGoal, starts: Matrix, number: int, rng: np.ra
 def _walked_to(robot: Robot, goal: TipGoal, number: int, starts: Matrix, rng: np.random.Generator) -> Matrix:
     """The same for one of its parts. Walks end on the rim of ranges, so that these are projected onto, spread out."""
     part = parts_of(goal)[number]
-    if isinstance(goal, GoalRegion) and isinstance(goal.members[number], PoseGoal) and not goal.box.any():
-        return numeric_ik(robot, GoalRegion([goal.members[number]], goal.free_rotation_axis), starts)
+    if isinstance(goal, GoalSet) and isinstance(goal.members[number], PoseGoal) and not goal.box.any():
+        return numeric_ik(robot, GoalSet([goal.members[number]], goal.free_rotation_axis), starts)
     if not isinstance(part, TaskRegion):
         return numeric_ik(robot, part, starts)
     rows = projected(robot, part, starts, rng)

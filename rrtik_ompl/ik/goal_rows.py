@@ -16,7 +16,7 @@ from rrtik_ompl.fast.ik.ik_layout import (
     NO_TURN,
     POSITION_TOLERANCE,
 )
-from rrtik_ompl.goal import GoalPart, GoalRegion, PoseGoal, PositionGoal, TipGoal
+from rrtik_ompl.goal import GoalPart, GoalSet, PoseGoal, PositionGoal, TipGoal
 from rrtik_ompl.ik.residual import SHARE
 from rrtik_ompl.task_region import TaskRegion
 
@@ -31,7 +31,7 @@ def goal_rows(goal: TipGoal) -> Matrix:
     Raises:
         InputError: If the goal is a task-space region or has one, whose freedom no row can hold.
     """
-    if not isinstance(goal, GoalRegion):
+    if not isinstance(goal, GoalSet):
         return _row(goal)[None]
     rows = np.array([_row(member) for member in goal.members])
     posed = rows[:, FREE_TURN] == NO_TURN

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, not_negative, positive
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.goal import GoalRegion, PoseGoal, PositionGoal, TipGoal, joint_difference, tip_errors
+from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal, TipGoal, joint_difference, tip_errors
 from rrtik_ompl.ik.analytic.branch_choice import JUMP, follow
 from rrtik_ompl.ik.analytic.closed_form import check_poses, form_of
 from rrtik_ompl.ik.genetic.options import PRESETS, GeneticOptions
@@ -179,7 +179,7 @@ def _freed(targets: tuple[Target, ...], axis: str | None) -> tuple[TipGoal, ...]
         return targets
     if isinstance(targets[0], PositionGoal):
         raise InputError("free_rotation_axis: points leave every turn free; give poses, or leave it out")
-    return tuple(GoalRegion([target], free_rotation_axis=axis) for target in targets)
+    return tuple(GoalSet([target], free_rotation_axis=axis) for target in targets)
 
 
 def _options(options: GeneticOptions | str) -> GeneticOptions:

@@ -21,7 +21,7 @@ from rrtik_ompl.files.sections import (
     tag,
     told_apart_by,
 )
-from rrtik_ompl.goal import JOINT_TOLERANCE, Goal, GoalPart, GoalRegion, JointGoal, PoseGoal, PositionGoal
+from rrtik_ompl.goal import JOINT_TOLERANCE, Goal, GoalPart, GoalSet, JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.poses import pose
 from rrtik_ompl.problem_files.scene import PoseEntry, pose_data
 from rrtik_ompl.robot import Robot
@@ -169,9 +169,9 @@ class AnyOf(Section):
 
     any_of: Annotated[list[Member], Field(min_length=1)]
 
-    def build(self) -> GoalRegion:
+    def build(self) -> GoalSet:
         """The goal."""
-        return GoalRegion(member.build() for member in self.any_of)
+        return GoalSet(member.build() for member in self.any_of)
 
 
 class RegionEntry(PoseTarget):
@@ -188,9 +188,9 @@ class Region(Section):
 
     region: RegionEntry
 
-    def build(self) -> GoalRegion:
+    def build(self) -> GoalSet:
         """The goal."""
-        return GoalRegion([self.region.build()], self.region.free_rotation_axis, self.region.box)
+        return GoalSet([self.region.build()], self.region.free_rotation_axis, self.region.box)
 
 
 JOINT_KEYS = ("joints_deg", "joints", "posture")
@@ -238,7 +238,7 @@ def goal_data(goal: Goal) -> dict[str, Any]:
         if goal.tolerance != JOINT_TOLERANCE:
             raise InputError(f"goal: a problem file cannot say the tolerance {goal.tolerance:g} of a joint goal")
         return {"joints": goal.q.tolist()}
-    if not isinstance(goal, GoalRegion):
+    if not isinstance(goal, GoalSet):
         return _part_data(goal)
     freed = goal.free_rotation_axis is not None or bool(goal.box.any())
     if not freed or len(goal.members) > 1 or not isinstance(goal.members[0], PoseGoal):

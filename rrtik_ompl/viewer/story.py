@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.goal import Goal, GoalRegion, JointGoal, PoseGoal, PositionGoal
+from rrtik_ompl.goal import Goal, GoalSet, JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.shapes import HalfSpace
@@ -173,7 +173,7 @@ def _obstacles(scene: Scene) -> list[dict[str, Any]]:
 def _goal_text(goal: Goal | None) -> str:
     if goal is None:
         return ""
-    if isinstance(goal, GoalRegion):
+    if isinstance(goal, GoalSet):
         return "one of several" if len(goal.members) > 1 else "tip region"
     if isinstance(goal, JointGoal):
         return "joint values"
