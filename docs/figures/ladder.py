@@ -2,7 +2,8 @@
 
     python docs/figures/ladder.py
 
-The floors are the table of ARCHITECTURE.md between its two marks, the number of modules and the arrows are counted. Writes
+The floors are the table of ARCHITECTURE.md between its two marks; modules and imports are counted.
+Writes ``ladder.svg`` beside this file.
 """
 
 from __future__ import annotations
