@@ -34,7 +34,7 @@ def reproduce(
     Exit code 1 if a figure is missed.
     """
     check_target(markdown, (".md",))
-    from rrtik_ompl.reproduce.registry import NOT_HERE, TABLES, chosen
+    from rrtik_bench.registry import NOT_HERE, TABLES, chosen
 
     if listed:
         say(_list(list(TABLES.values())), *NOT_HERE)

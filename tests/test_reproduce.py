@@ -6,12 +6,13 @@ from functools import partial
 import numpy as np
 import pytest
 
+from rrtik_bench import registry
+from rrtik_bench.mb_rrt import tables as mb_rrt
+from rrtik_bench.mb_rrt.runs import PUBLISHED, Measured
+from rrtik_bench.registry import TABLES, chosen
+from rrtik_bench.report.rows import DIFFERS, HELD, MISSED, Row, Table, verdict, within
 from rrtik_ompl.cli import run
 from rrtik_ompl.errors import UnknownNameError
-from rrtik_ompl.reproduce import mb_rrt, registry
-from rrtik_ompl.reproduce.mb_rrt_runs import PUBLISHED, Measured
-from rrtik_ompl.reproduce.registry import TABLES, chosen
-from rrtik_ompl.reproduce.rows import DIFFERS, HELD, MISSED, Row, Table, verdict, within
 
 FAST = ("titan4", "sensing-arithmetic", "sensing-noise", "sensing-accuracy", "crdt-routes", "mb-rrt-example",
         "mb-rrt-10", "ikurt-solutions", "drrt-con-arm")  # fmt: skip
@@ -126,8 +127,8 @@ def test_bad_input_is_one_line_and_exit_2(capsys, arguments, said):
 
 
 def test_singular_titan_postures_are_on_the_axis_they_are_named_for():
+    from rrtik_bench.titan4 import D6, _singular
     from rrtik_ompl.catalog import load_robot
-    from rrtik_ompl.reproduce.titan4 import D6, _singular
 
     Q = _singular("shoulder and wrist", 50, np.random.default_rng(0))
     tips = load_robot("titan4").fk_batch(Q)
