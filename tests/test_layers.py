@@ -65,7 +65,13 @@ def test_a_module_imports_only_from_the_rungs_below(room, file):
 
 def test_the_core_knows_no_robot_and_no_planner():
     reached = {name.split(".")[0] for _, file in _modules() for name in _imports(file)}
-    assert not reached & {"rrtik_planners", "rrtik_robots"}
+    assert not reached & {"rrtik_planners", "rrtik_robots", "rrtik_bench"}
+
+
+def test_the_published_tables_know_no_planner_no_robot_and_no_script():
+    files = (ROOT / "bench" / "rrtik_bench").rglob("*.py")
+    reached = {name.split(".")[0] for file in files for name in _imports(file)}
+    assert not reached & {"rrtik_planners", "rrtik_robots", "bench"}
 
 
 def test_robots_and_planners_do_not_know_each_other():

@@ -10,19 +10,19 @@ Speed: process CPU time of one thread in batches of 10,000 poses, median of inte
 from __future__ import annotations
 
 import argparse
-import platform
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from bench.peers.libraries.eaik import eaik_robot, turned_back
+from bench.shared.pages import add_out
+from rrtik_bench.report.machine import versions
+from rrtik_bench.report.page import Report
 from rrtik_ompl import load_robot
 from rrtik_ompl.ik.closed_form import form_of, solutions
 from rrtik_ompl.ik.form import wrapped
@@ -55,6 +55,7 @@ def round_trip(robot: Robot, Q: np.ndarray) -> RoundTrip:
     poses = robot.fk_batch(Q)
     found, near = solutions(robot, poses), solutions(robot, poses, near=Q, check=False)
     errors, asked = nearest_branch(found, Q), nearest_branch(near, Q) < SAME
+    assert found.residuals is not None
     return RoundTrip(
         len(Q),
         float(found.real.any(axis=1).mean()),
@@ -69,7 +70,8 @@ def round_trip(robot: Robot, Q: np.ndarray) -> RoundTrip:
 
 def nearest_branch(found: Any, Q: np.ndarray) -> np.ndarray:
     errors = np.abs(wrapped(found.branches - Q[:, None])).max(axis=2)
-    return np.where(found.real, errors, np.inf).min(axis=1)
+    least: np.ndarray = np.where(found.real, errors, np.inf).min(axis=1)
+    return least
 
 
 def cases(count: int, rng: np.random.Generator) -> list[tuple[Robot, str, np.ndarray]]:
@@ -125,66 +127,50 @@ def agreement(robot: Robot, count: int, rng: np.random.Generator) -> str:
     return f"{count} poses: {missed} solutions of EAIK that we do not have, {extra} of ours that EAIK does not have"
 
 
-def report(quick: bool) -> list[str]:
+def report(quick: bool) -> Report:
     rng = np.random.default_rng(0)
-    packages = [f"numpy {np.__version__}"]
-    try:
-        packages.append(f"eaik {version('eaik')}")
-    except PackageNotFoundError:
-        packages.append("eaik not installed")
-    lines = [
-        "# Closed-form inverse kinematics",
-        "",
-        f"Made by `python bench/ik/closed_form_report.py`. {platform.machine()}, Python {platform.python_version()}, "
-        f"{', '.join(packages)}; seed 0.",
-        "",
-        "## Round trip",
-        "",
-        "Solved: a branch reaches the pose. Exact: the configuration is among the branches within 1e-8 rad. Same or",
-        "flagged: it is among them within 1e-5 rad (at a stretched elbow, a double root, an angle is known to the",
-        "square root of the rounding), or the pose is flagged as singular and answered by its representatives. Asked",
-        "near: with `near=` the original that itself is found, within 1e-5 rad. The residuals are the worst of all",
-        "real branches.",
-        "",
-        "| robot | case | configurations | solved | exact | same or flagged | flagged | asked near | [m] | [rad] |",
-        "|---|---|---|---|---|---|---|---|---|---|",
-    ]
+    about = f"{versions('numpy', 'eaik')}; seed 0."
+    page = Report("Closed-form inverse kinematics", "python bench/ik/closed_form_report.py", intro=about)
+    shown = ("robot", "case", "configurations", "solved", "exact", "same or flagged", "flagged", "asked near")
+    rows = []
     for robot, case, Q in cases(5_000 if quick else COUNT, rng):
         done = round_trip(robot, Q)
-        lines.append(
-            f"| {robot.name} | {case} | {done.count} | {done.solved:.3%} | {done.exact:.3%} | {done.original:.3%} | "
-            f"{done.flagged:.3%} | {done.asked_near:.3%} | {done.position:.1e} | {done.angle:.1e} |"
-        )
-    lines += ["", "## Speed", "", f"Poses per second of CPU time, one thread, batches of {BATCH}.", ""]
-    lines += [
-        "Of arms with six joints kernels do the work; beside them the same in numpy, which arms without a kernel use.",
-        "",
-    ]
-    lines += [
-        "| robot | branches | all branches, limits | and residuals of all | this in numpy | EAIK |",
-        "|---|---|---|---|---|---|",
-    ]
+        shares = (done.solved, done.exact, done.original, done.flagged, done.asked_near)
+        worst = f"{done.position:.1e}", f"{done.angle:.1e}"
+        rows.append([robot.name, case, str(done.count), *(f"{share:.3%}" for share in shares), *worst])
+    page.table("Round trip", (*shown, "[m]", "[rad]"), rows, text=ROUND_TRIP)
+    rows = []
     for name, branches in (("titan4", 8), ("puma560", 8), ("puma560_3dof", 4), ("planar3", 2)):
         got = speeds(load_robot(name), 3 if quick else 9, rng)
-        other = f"{got['EAIK']:,.0f}" if "EAIK" in got else "-"
-        bare, checked, plain = got["all branches, limits"], got["and residuals of all"], got["in numpy"]
-        lines.append(f"| {name} | {branches} | {bare:,.0f} | {checked:,.0f} | {plain:,.0f} | {other} |")
+        rows.append([name, str(branches), *(f"{got[each]:,.0f}" if each in got else "-" for each in WORK)])
+    heads = ("robot", "branches", "all branches, limits", "and residuals of all", "this in numpy", "EAIK")
+    page.table("Speed", heads, rows, text=SPEED)
     if find_spec("eaik") is not None:
-        lines += ["", "## The same solutions as EAIK", ""]
-        for name in ("titan4", "puma560"):
-            lines.append(f"- {name}, {agreement(load_robot(name), 500 if quick else 5_000, rng)}.")
-    return lines
+        count = 500 if quick else 5_000
+        lines = [f"- {name}, {agreement(load_robot(name), count, rng)}." for name in ("titan4", "puma560")]
+        page.note("The same solutions as EAIK", "\n".join(lines))
+    return page
+
+
+ROUND_TRIP = (
+    "Solved: a branch reaches the pose. Exact: the configuration is among the branches within 1e-8 rad. Same or "
+    "flagged: it is among them within 1e-5 rad (at a stretched elbow, a double root, an angle is known to the square "
+    "root of the rounding), or the pose is flagged as singular and answered by its representatives. Asked near: with "
+    "`near=` the original that itself is found, within 1e-5 rad. The residuals are the worst of all real branches."
+)
+WORK = ("all branches, limits", "and residuals of all", "in numpy", "EAIK")
+SPEED = (
+    f"Poses per second of CPU time, one thread, batches of {BATCH}.\n\nOf arms with six joints kernels do the work; "
+    "beside them the same in numpy, which arms without a kernel use."
+)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="fewer configurations")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "reports" / "closed_form.md")
+    add_out(parser, "closed_form.md")
     options = parser.parse_args()
-    lines = report(options.quick)
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    options.out.write_text("\n".join(lines) + "\n")
-    print("\n".join(lines))
+    report(options.quick).finish(options.out)
 
 
 if __name__ == "__main__":

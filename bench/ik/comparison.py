@@ -10,12 +10,10 @@ A method that has used up its budget takes no more poses: the column "poses" say
 from __future__ import annotations
 
 import argparse
-import platform
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -23,7 +21,9 @@ import pinocchio as pin
 import rrtik_ompl as rrtik
 from bench.peers.ik import Solver, solvers
 from bench.peers.libraries.eaik import eaik_robot, turned_back
-from rrtik_bench.report.page import Report, package_version
+from bench.shared.pages import add_out
+from rrtik_bench.report.machine import versions
+from rrtik_bench.report.page import Report
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.ik_layout import KERNELS
 from rrtik_ompl.fast.library import library
@@ -34,6 +34,7 @@ from rrtik_ompl.ik.kernel_call import KernelCall
 from rrtik_ompl.ik.limb import seeded_limb_of
 from rrtik_ompl.robot import Robot
 
+PACKAGES = ("numpy", "pin", "numba", "pytracik", "ikpy", "eaik", "roboticstoolbox-python")
 ARMS = ("ur5", "panda", "puma560", "titan4")
 METRES, RADIANS = 1e-3, 1e-2  # a configuration this near to the pose and inside the limits solves it
 BLOCK = 50  # poses before the next method takes its turn
@@ -92,6 +93,8 @@ class Runs:
 def kernel_alone(robot: Robot, start: np.ndarray) -> Solver:
     """The kernel without the face around it: one call for one pose, restarts included."""
     limb, kernels = seeded_limb_of(robot), library(KERNELS)
+    assert limb is not None
+    assert kernels is not None
     call = KernelCall(limb, pose_rows(np.eye(4)[None]), start[None], STEPS, PATIENCE, start[None], np.zeros(1, int))
     aims, limb_address, address = call.aims, limb.address, call.address
 
@@ -194,16 +197,11 @@ def _percent(share: float) -> str:
     return "not judged" if np.isnan(share) else f"{share:.1%}"
 
 
-def versions() -> str:
-    packages = ("numpy", "pin", "numba", "pytracik", "ikpy", "eaik", "roboticstoolbox-python")
-    return ", ".join([f"Python {platform.python_version()}", *map(package_version, packages)])
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--poses", type=int, default=1000)
     parser.add_argument("--budget", type=float, default=1.2, help="seconds a method, seven times as many a peer")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "reports" / "ik_comparison.md")
+    add_out(parser, "ik_comparison.md")
     options = parser.parse_args()
     report = Report("Inverse kinematics beside other libraries", "python bench/ik/comparison.py")
     missing: list[str] = []
@@ -221,13 +219,12 @@ def main() -> None:
     solved = f"Solved: inside the limits, at most {METRES:g} m and {RADIANS:g} rad away by Pinocchio's kinematics."
     report.note(
         "How",
-        f"{versions()}. {solved} Starts: the middle of the limits. EAIK gives all branches without "
+        f"{versions(*PACKAGES)}. {solved} Starts: the middle of the limits. EAIK gives all branches without "
         "limits; its first inside them is taken. Peers get the arm as a plain URDF of its joints; "
         "TRAC-IK has 0.1 s by the clock.",
     )
     report.note("Not asked", "\n".join(f"- {line}" for line in missing))
-    options.out.write_text(report.markdown())
-    print(report.markdown())
+    report.finish(options.out)
 
 
 if __name__ == "__main__":

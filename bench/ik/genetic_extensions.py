@@ -172,7 +172,7 @@ def obstacles(report: Report, seeds: int) -> None:
     robot = arm(5, 8.0)
     begun = run(robot, 1, FREE, 0).result.q
     elbow = robot.fk_batch(begun[len(begun) // 2][None], "link3")[0, :3, 3]
-    world = rrtik.World(robot, rrtik.Scene([rrtik.Obstacle("ball", Sphere(0.12), pin.SE3(np.eye(3), elbow))]))
+    world = rrtik.World(robot, rrtik.Scene((rrtik.Obstacle("ball", Sphere(0.12), pin.SE3(np.eye(3), elbow)),)))
     rows = []
     for label, given in (("not told", None), ("told", world)):
         done = [

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.ik.genetic_extensions import extensions
+from bench.shared.pages import add_out
 from rrtik_bench.genetic.published import FIRST_POINT, INCH, REFERENCE, TABLE_4, TABLE_5, curve, expanded_tip
 from rrtik_bench.genetic.runs import JUMP, TRAJECTORIES, Run, arm, mean, median, run, runs
 from rrtik_bench.report.page import Report
@@ -36,6 +37,7 @@ def kinematics(report: Report) -> None:
     residual, branches = 0.0, []
     for number in TRAJECTORIES:
         found = solutions(arm(3), curve(number) * INCH)
+        assert found.residuals is not None
         residual = max(residual, float(found.residuals[found.real][:, 0].max()) / INCH)
         branches.append(int(found.valid.all(axis=0).sum()))
     report.bar("closed form: residual [in]", "< 1e-9", f"{residual:.1e}", residual < 1e-9)
@@ -229,7 +231,7 @@ def picture(file: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="two runs of everything")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "reports" / "genetic.md")
+    add_out(parser, "genetic.md")
     options = parser.parse_args()
     many, few = (2, 1) if options.quick else (10, 5)
     report = Report("Genetic algorithm with range reduction (GA-REB)", "python bench/ik/genetic_report.py")
@@ -242,8 +244,7 @@ def main() -> None:
     five_joints(report, many)
     divergence(report, max(1, few - 2))
     extensions(report, few)
-    options.out.write_text(report.markdown())
-    print(report.markdown())
+    report.finish(options.out)
 
 
 if __name__ == "__main__":

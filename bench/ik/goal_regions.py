@@ -1,19 +1,20 @@
 """Every kind of goal of the tip, 100 seeds each: the share that is solved, and the time it takes.
 
-python bench/ik/goal_regions.py [SEEDS [SEEDS_OF_UR5]]  writes bench/reports/goal_regions.md
+python bench/ik/goal_regions.py [SEEDS [SEEDS_OF_UR5]] [--out bench/reports/goal_regions.md]
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import rrtik_ompl as rrtik
+from bench.shared.pages import add_out
+from rrtik_bench.report.page import Report
 from rrtik_ompl.goal import Goal
 from rrtik_ompl.poses import pose
 from rrtik_ompl.shapes import Box
@@ -21,17 +22,16 @@ from rrtik_ompl.shapes import Box
 PLANNERS = ("RRTConnect", "bicrdt", "fastrrtconnect")
 SECONDS = 5.0
 FREE, NONE = (-np.pi, np.pi), (0.0, 0.0)
-REPORT = Path(__file__).parent.parent / "reports" / "goal_regions.md"
 UR5_START, UR5_GOAL = (-0.9, -1.2, 1.6, -1.9, -1.5, 0.0), (0.8, -1.0, 1.5, -2.0, -1.5, 0.0)
 
 
 def cell() -> rrtik.World:
     """A UR5 on a table, a post and a beam between its two sides."""
-    obstacles = [
+    obstacles = (
         rrtik.Obstacle("table", Box([1.6, 1.6, 0.04]), pose([0, 0, -0.05])),
         rrtik.Obstacle("post", Box([0.1, 0.1, 0.8]), pose([0.5, 0.0, 0.4])),
         rrtik.Obstacle("beam", Box([0.9, 0.08, 0.08]), pose([0.55, 0.0, 0.8])),
-    ]
+    )
     return rrtik.World(rrtik.load_robot("ur5"), rrtik.Scene(obstacles))
 
 
@@ -58,8 +58,8 @@ def goals(tip: Any) -> dict[str, Goal]:
     }
 
 
-def measured(problem: rrtik.Problem, planner: str, seeds: int) -> str:
-    """A row of the table: share solved, median and 95th percentile of the processor time [ms], attempts at most."""
+def measured(problem: rrtik.Problem, planner: str, seeds: int) -> list[str]:
+    """Cells of the table: share solved, median and 95th percentile of the processor time [ms], attempts at most."""
     times, plans = [], []
     for seed in range(seeds):
         begin = time.process_time()
@@ -67,7 +67,7 @@ def measured(problem: rrtik.Problem, planner: str, seeds: int) -> str:
         times.append(1e3 * (time.process_time() - begin))
     solved = sum(each.found for each in plans)
     attempts = max(each.statistics["attempts"] for each in plans)
-    return f"{solved} of {seeds} | {np.median(times):.0f} | {np.percentile(times, 95):.0f} | {attempts}"
+    return [f"{solved} of {seeds}", f"{np.median(times):.0f}", f"{np.percentile(times, 95):.0f}", str(attempts)]
 
 
 def problems(seeds: int, seeds_of_ur5: int) -> Iterator[tuple[str, rrtik.Problem, int]]:
@@ -80,25 +80,34 @@ def problems(seeds: int, seeds_of_ur5: int) -> Iterator[tuple[str, rrtik.Problem
         yield f"UR5, {kind}", rrtik.Problem(side, np.array(UR5_START), goal), seeds_of_ur5
 
 
-def main(seeds: int = 100, seeds_of_ur5: int = 100) -> None:
+def main() -> None:
     """Measure all and write the report after each row."""
-    lines = [
-        "# Goals of the tip",
-        "",
-        "TITAN-4 (closed form) before the bar of `titan4_bar`, and a UR5 (numeric) between table, post and beam;",
-        f"{SECONDS:g} s each. The time is that of the processor in `plan()`, inverse kinematics included.",
-        f"Made by `python bench/ik/goal_regions.py {seeds} {seeds_of_ur5}`.",
-        "",
-        "| goal | planner | solved | median [ms] | 95 % [ms] | attempts, at most |",
-        "|---|---|---|---|---|---|",
-    ]
-    for name, problem, count in problems(seeds, seeds_of_ur5):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("seeds", type=int, nargs="?", default=100)
+    parser.add_argument("seeds_of_ur5", type=int, nargs="?", default=100)
+    add_out(parser, "goal_regions.md")
+    options = parser.parse_args()
+    rows: list[list[str]] = []
+    for name, problem, count in problems(options.seeds, options.seeds_of_ur5):
         for planner in PLANNERS:
             rrtik.plan(problem, planner, seed=0)  # what is loaded once
-            lines.append(f"| {name} | {planner} | {measured(problem, planner, count)} |")
-            print(lines[-1], flush=True)
-            REPORT.write_text("\n".join(lines) + "\n")
+            rows.append([name, planner, *measured(problem, planner, count)])
+            print(*rows[-1], sep=" | ", flush=True)
+            page(rows, f"python bench/ik/goal_regions.py {options.seeds} {options.seeds_of_ur5}").save(options.out)
+
+
+def page(rows: list[list[str]], command: str) -> Report:
+    """What has been measured so far."""
+    report = Report("Goals of the tip", command, intro=INTRODUCTION)
+    report.table("", ("goal", "planner", "solved", "median [ms]", "95 % [ms]", "attempts, at most"), rows)
+    return report
+
+
+INTRODUCTION = (
+    "TITAN-4 (closed form) before the bar of `titan4_bar`, and a UR5 (numeric) between table, post and beam; "
+    f"{SECONDS:g} s each. The time is that of the processor in `plan()`, inverse kinematics included."
+)
 
 
 if __name__ == "__main__":
-    main(*(int(text) for text in sys.argv[1:]))
+    main()

@@ -31,8 +31,9 @@ def examples() -> dict[str, Any]:
 def blocked() -> Any:
     """PUMA with a ball around the goal: every configuration that reaches it is in collision."""
     problem = rrtik.load_problem("puma_pose")
+    assert isinstance(problem.goal, PoseGoal)
     ball = rrtik.Obstacle("ball", Sphere(0.06), pin.SE3(np.eye(3), problem.goal.T_world_tip.translation))
-    return rrtik.Problem(rrtik.World(problem.robot, rrtik.Scene([ball])), problem.start, problem.goal, name="blocked")
+    return rrtik.Problem(rrtik.World(problem.robot, rrtik.Scene((ball,))), problem.start, problem.goal, name="blocked")
 
 
 def generated(arm: str, count: int) -> Iterator[Any]:
@@ -45,7 +46,7 @@ def generated(arm: str, count: int) -> Iterator[Any]:
             return
         balls = [_ball(f"ball{k}", reach(robot), rng) for k in range(OBSTACLES)]
         start, end = rng.uniform(*robot.finite_range(), (2, robot.dof))
-        world = rrtik.World(robot, rrtik.Scene(balls))
+        world = rrtik.World(robot, rrtik.Scene(tuple(balls)))
         if not world.valid_batch(np.array([start, end])).all():
             continue
         try:

@@ -30,7 +30,8 @@ from bench.ik.ikurt_runs import (
 )
 from bench.shared.parts import Parts, add_options
 from rrtik_bench.ikurt import EXAMPLES, METRIC
-from rrtik_bench.report.page import Report, processes
+from rrtik_bench.report.machine import processes
+from rrtik_bench.report.page import Report
 
 SECONDS = 10.0  # of an acceptance run
 SOON = 5.0  # [s] for the hundred seeds
@@ -175,8 +176,7 @@ def main() -> None:
         hundred(report, measure, seeds, options.stretch)
         poses(report, measure, problems, options.mbm, pandas, options.stretch)
         acceptance(report, measure, literal, improved, options.stretch)
-        options.out.write_text(report.markdown())
-    print(report.markdown())
+        report.finish(options.out)
 
 
 COUNTS = {

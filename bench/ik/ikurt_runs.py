@@ -14,6 +14,7 @@ from ompl import geometric as og
 import rrtik_ompl as rrtik
 from bench.ik import ikurt_cases as cases
 from rrtik_bench.ikurt import as_published, metric_of
+from rrtik_ompl.goal import PoseGoal
 from rrtik_ompl.ik.ikurt.metric import TipMetric
 from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
 from rrtik_ompl.ik.ikurt.search import BatchedSearch, Judge, Options
@@ -80,10 +81,10 @@ def literal_falls() -> tuple[bool, int]:
     """Whether every vertex that CONNECT has added is nearer than the one before it, and how many these are."""
     problem = as_published(rrtik.load_problem("planar6_c_pose"))
     metric, until = metric_of(problem), time.monotonic() + 2.0
-    bounds, rng = problem.robot.finite_range(), np.random.default_rng(0)
+    (lower, upper), rng = problem.robot.finite_range(), np.random.default_rng(0)
     steps = Steps(0.15, 0.5, metric.radius)
     search = PublishedSearch(
-        metric, steps, *bounds, problem.world.motion_valid, lambda: time.monotonic() > until, rng, problem.start
+        metric, steps, lower, upper, problem.world.motion_valid, lambda: time.monotonic() > until, rng, problem.start
     )
     return falls(search)
 
@@ -91,11 +92,12 @@ def literal_falls() -> tuple[bool, int]:
 def improved_falls() -> tuple[bool, int]:
     """The same of the improved one, without descents, which would need no CONNECT."""
     problem = rrtik.load_problem("planar6_c_pose")
+    assert isinstance(problem.goal, PoseGoal)
     metric, until = TipMetric(problem.robot, [problem.goal]), time.monotonic() + 2.0
-    bounds, rng = problem.robot.finite_range(), np.random.default_rng(0)
+    (lower, upper), rng = problem.robot.finite_range(), np.random.default_rng(0)
     judge = Judge(problem.world.valid_batch, problem.world.motion_valid_batch, lambda: time.monotonic() > until)
     options = Options(0.15, 0.6, jacobian=False, most_vertices=10_000)
-    return falls(BatchedSearch(metric, options, *bounds, judge, rng, problem.start[None]))
+    return falls(BatchedSearch(metric, options, lower, upper, judge, rng, problem.start[None]))
 
 
 def falls(search: Any) -> tuple[bool, int]:
@@ -149,11 +151,10 @@ def beside(problems: Iterable[Any], limit: float, stretch: float) -> tuple[int, 
             outcomes[name].append(taken if found and taken <= limit else np.inf)
     rows = []
     for name, each in outcomes.items():
-        taken = np.array(each)
-        found = int(np.isfinite(taken).sum())
-        share = f"{found} of {len(taken)} ({100 * found / len(taken):.1f} %)"
-        taken = np.minimum(taken, limit)
-        rows.append([name, share, f"{np.median(taken):.3f}", f"{taken.mean():.3f}"])
+        solved = int(np.isfinite(each).sum())
+        share = f"{solved} of {len(each)} ({100 * solved / len(each):.1f} %)"
+        capped = np.minimum(each, limit)
+        rows.append([name, share, f"{np.median(capped):.3f}", f"{capped.mean():.3f}"])
     return len(next(iter(outcomes.values()))), rows
 
 

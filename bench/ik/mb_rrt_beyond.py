@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 import rrtik_ompl as rrtik
 from bench.ik.planar_solvers import ccd, fabrik
+from rrtik_bench.report.page import Report
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.ik.descent import descend
 from rrtik_ompl.ik.face import solve_ik
 from rrtik_ompl.ik.mb_rrt.arc import arc_chains, grow_on_arcs
-from rrtik_ompl.ik.mb_rrt.axes import axes_of
+from rrtik_ompl.ik.mb_rrt.axes import Axes, axes_of
 from rrtik_ompl.ik.mb_rrt.axis_rule_b import grow_by_rule_b
 from rrtik_ompl.ik.mb_rrt.axis_tree import AxisTree
 from rrtik_ompl.ik.mb_rrt.c_space import grow_in_joint_space
@@ -29,12 +32,21 @@ from rrtik_robots.planar import planar
 
 MOST = 1000  # passes
 TIGHT = 1e-3  # [cm]
+RINGS = (
+    "The rings in which a joint is useful, and branches through them:\n\n"
+    "![published tree](mb_rrt_tree.png) ![arcs](mb_rrt_arcs.png)"
+)
+GROWTH = (
+    "Mean passes, sweeps or steps of those solved / CPU ms a goal / solved %. Links of 10 cm, the same 100 goals "
+    "(fewer for the slow ones); arcs, FABRIK and CCD work on all goals as one batch, the others goal by goal. LM: one "
+    "random start, no restarts. FABRIK, CCD: at most 1000 sweeps (200 above 20 joints). C-space: 1 % of the reach, "
+    "2,000 iterations."
+)
 
 
-def arcs(rng: np.random.Generator, goals: int = 200) -> tuple[list[str], float, int]:
+def arcs(report: Report, rng: np.random.Generator, goals: int = 200) -> tuple[float, int]:
     """Chains of 2 to 100 links: the worst error in reaches and the nodes outside."""
-    lines = ["| links | space | lengths | goals | solved in 1 pass | worst error / reach | nodes outside |"]
-    lines.append("|---|---|---|---|---|---|---|")
+    rows: list[list[str]] = []
     worst, outside = 0.0, 0
     for dimension, name in ((2, "plane"), (3, "space")):
         for count in (2, 3, 10, 30, 100):
@@ -48,22 +60,25 @@ def arcs(rng: np.random.Generator, goals: int = 200) -> tuple[list[str], float, 
                     errors.append(run.misses[0] / links.reach)
                     beyond += run.outside(1e-12)
                 share = 100.0 * np.mean(np.array(errors) < 1e-9)
-                lines.append(f"| {count} | {name} | {kind} | {goals} | {share:g} % | {max(errors):.1e} | {beyond} |")
+                cells = [str(count), name, kind, str(goals), f"{share:g} %", f"{max(errors):.1e}", str(beyond)]
+                rows.append(cells)
                 worst, outside = max(worst, *errors), outside + beyond
-    return lines, worst, outside
+    heads = ("links", "space", "lengths", "goals", "solved in 1 pass", "worst error / reach", "nodes outside")
+    report.table("Arcs of intersection", heads, rows, text=RINGS)
+    return worst, outside
 
 
-def passes_of(tree: AxisTree, done: Callable[..., bool], *more: object) -> int:
+def passes_of(tree: AxisTree, done: Callable[[np.ndarray], bool]) -> int:
     """Passes until the tree's new branches will do, one at a time; 0 if they never do."""
     while tree.passes < MOST:
-        if done(tree.grow(), *more):
+        if done(tree.grow()):
             return tree.passes
     return 0
 
 
-def limits(rng: np.random.Generator) -> tuple[list[str], dict[int, tuple[float, float]]]:
-    lines = ["| limits | goals | solved | mean passes | most | worst error [cm] |", "|---|---|---|---|---|---|"]
-    found = {}
+def limits(report: Report, rng: np.random.Generator) -> dict[int, tuple[float, float]]:
+    """Share solved and mean passes by the limit [deg]."""
+    rows, found = [], {}
     for bound in (90, 60, 45):
         robot = planar(lengths=[0.1] * 10, limits_deg=[(-180, 180)] + [(-bound, bound)] * 9)
         axes, passes, errors = axes_of(robot, False), [], [0.0]
@@ -75,11 +90,12 @@ def limits(rng: np.random.Generator) -> tuple[list[str], dict[int, tuple[float, 
                 errors.append(100 * float(np.linalg.norm(robot.fk(tree.nodes(10)[-1]).translation - goal)))
         solved = [p for p in passes if p]
         found[bound] = len(solved) / len(passes), float(np.mean(solved))
-        lines.append(
-            f"| +-{bound} | {len(passes)} | {100 * found[bound][0]:g} % | {found[bound][1]:.2f} | {max(solved)} "
-            f"| {max(errors):.1e} |"
-        )
-    return lines, found
+        share, mean = found[bound]
+        cells = [f"{100 * share:g} %", f"{mean:.2f}", str(max(solved)), f"{max(errors):.1e}"]
+        rows.append([f"+-{bound}", str(len(passes)), *cells])
+    title = "Joint limits: 10 links, first joint free, goals of random postures, one pass at a time"
+    report.table(title, ("limits", "goals", "solved", "mean passes", "most", "worst error [cm]"), rows, level=3)
+    return found
 
 
 def ring_of_discs() -> tuple[rrtik.World, np.ndarray]:
@@ -92,7 +108,8 @@ def ring_of_discs() -> tuple[rrtik.World, np.ndarray]:
     return rrtik.World(rrtik.load_robot("planar10"), rrtik.Scene(tuple(discs))), goals[clear]
 
 
-def obstacles(rng: np.random.Generator) -> tuple[str, tuple[float, float]]:
+def obstacles(report: Report, rng: np.random.Generator) -> tuple[float, float]:
+    """Share solved and mean passes."""
     world, goals = ring_of_discs()
     axes = axes_of(world.robot, False)
     check, passes, bad, begin = LinkWorlds(world, axes).free, [], 0, time.perf_counter()
@@ -108,7 +125,8 @@ def obstacles(rng: np.random.Generator) -> tuple[str, tuple[float, float]]:
         f"{took:.0f} ms a goal; {bad} rejected by the World's certificate. Published idea measured by the "
         f"specification: arcs 1.7 passes, rule B 95."
     )
-    return line, (share, float(np.mean(solved)))
+    report.note("Obstacles: 10 links of 10 cm, 7 discs of radius 10 cm in a ring of 35 cm", line, level=3)
+    return share, float(np.mean(solved))
 
 
 def one_axis_arm(count: int) -> rrtik.Robot:
@@ -116,32 +134,37 @@ def one_axis_arm(count: int) -> rrtik.Robot:
     return robot_from_dh(f"zigzag{count}", rows, convention="standard")
 
 
-def one_axis(rng: np.random.Generator) -> tuple[list[str], dict[int, tuple[float, int]]]:
-    lines = [
-        "| joints | goals | arcs and polish, 0.01 cm: solved | mean passes | most | first miss without polish [cm] "
-        "| rule B, 1 % of the reach, 600 passes: solved, mean passes |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    found = {}
+def _can_be_polished(robot: rrtik.Robot, axes: Axes, goal: rrtik.PositionGoal, rows: np.ndarray) -> bool:
+    return len(polished(robot, axes, goal, rows)) > 0
+
+
+def one_axis(report: Report, rng: np.random.Generator) -> dict[int, tuple[float, int]]:
+    """Share solved and most passes by the number of joints."""
+    rows, found = [], {}
     for count in (4, 7, 10):
         robot = one_axis_arm(count)
-        axes, passes, raw, plain = axes_of(robot, False), [], [], []
+        plain: list[int] = []
+        axes, passes, raw = axes_of(robot, False), [], []
         for q in rng.uniform(-np.pi, np.pi, (60, count)):
             goal = rrtik.PositionGoal(robot.fk(q).translation, tolerance=1e-4)
             tree = AxisTree(axes, goal.position, np.zeros(count), rng)
-            passes.append(passes_of(tree, lambda rows, *a: len(polished(*a, rows)) > 0, robot, axes, goal))
+            passes.append(passes_of(tree, partial(_can_be_polished, robot, axes, goal)))
             raw.append(100 * goal.distance(robot, tree.nodes(count)[:1])[0])
             if len(plain) < 30:
                 tol = 0.01 * axes.reach[0]
                 plain.append(grow_by_rule_b(axes, goal.position, tolerance=tol, passes=600, rng=rng).solved_in)
         solved = [p for p in passes if p]
         found[count] = len(solved) / len(passes), max(solved)
-        lines.append(
-            f"| {count} | {len(passes)} | {100 * found[count][0]:g} % | {np.mean(solved):.2f} | {max(solved)} "
-            f"| median {np.median(raw):.2f}, least {min(raw):.2f} "
-            f"| {100 * np.mean(np.array(plain) > 0):.0f} %, {np.mean([p for p in plain if p]):.0f} |"
-        )
-    return lines, found
+        cells = [f"{100 * found[count][0]:g} %", f"{np.mean(solved):.2f}", str(max(solved))]
+        cells.append(f"median {np.median(raw):.2f}, least {min(raw):.2f}")
+        cells.append(f"{100 * np.mean(np.array(plain) > 0):.0f} %, {np.mean([p for p in plain if p]):.0f}")
+        rows.append([str(count), str(len(passes)), *cells])
+    heads = (
+        *("joints", "goals", "arcs and polish, 0.01 cm: solved", "mean passes", "most"),
+        *("first miss without polish [cm]", "rule B, 1 % of the reach, 600 passes: solved, mean passes"),
+    )
+    report.table("Joints with one axis: a = 10 cm, alpha = +-90 degrees in turn", heads, rows, level=3)
+    return found
 
 
 def clocked(work: Callable[[], object], repeats: int = 3) -> float:
@@ -154,14 +177,13 @@ def clocked(work: Callable[[], object], repeats: int = 3) -> float:
     return min(times)
 
 
-def beside(rng: np.random.Generator) -> list[str]:
+def beside(report: Report, rng: np.random.Generator) -> None:
     """3 to 100 joints: passes or sweeps and time; arcs, FABRIK and CCD take 100 goals as one batch."""
-    lines = ["| joints | arcs | MB-RRT | closing two links | C-space (1 %, 2,000) | FABRIK | CCD | LM |"]
-    lines.append("|---|---|---|---|---|---|---|---|")
+    rows = []
     for count in (3, 6, 10, 20, 50, 100):
         links = Links([10.0] * count)
         goals, start = sunflower(links, 100), rng.uniform(-np.pi, np.pi, (100, count))
-        cells = [f"1 / {10 * clocked(lambda a=(links, goals): arc_chains(*a, rng)):.3f} / 100"]
+        cells = [f"1 / {10 * clocked(partial(arc_chains, links, goals, rng)):.3f} / 100"]
         cells += _one_by_one(links, goals, rng)
         for solver in (fabrik, ccd):
             begin = time.process_time()
@@ -170,19 +192,21 @@ def beside(rng: np.random.Generator) -> list[str]:
             solved = np.linalg.norm(nodes[:, -1] - goals, axis=1) < TIGHT
             cells.append(f"{sweeps[solved].mean():.1f} / {10 * took:.3f} / {100 * solved.mean():.0f}")
         cells.append(_lm(count, goals[:: 5 if count < 50 else 20], start))
-        lines.append(f"| {count} | " + " | ".join(cells) + " |")
-    return lines
+        rows.append([str(count), *cells])
+    heads = ("joints", "arcs", "MB-RRT", "closing two links", "C-space (1 %, 2,000)", "FABRIK", "CCD", "LM")
+    report.table("Growth from 3 to 100 joints, 0.001 cm", heads, rows, text=GROWTH)
 
 
 def _one_by_one(links: Links, goals: np.ndarray, rng: np.random.Generator) -> list[str]:
     """Cells of the trees, which take one goal at a time."""
     cells = []
-    for few, work in (
+    ways: tuple[tuple[Any, Callable[[np.ndarray], int]], ...] = (
         (goals[::5], lambda g: grow(links, g, tolerance=TIGHT, rng=rng, passes=3000).solved_in),
         (goals[::5] if links.count <= 20 else (), lambda g: _closed(links, g, rng)),
         (goals[::10], lambda g: grow_in_joint_space(
             links, g, tolerance=0.01 * links.reach, rng=rng, passes=2000).solved_in),
-    ):  # fmt: skip
+    )  # fmt: skip
+    for few, work in ways:
         begin = time.process_time()
         hits = np.array([work(goal) for goal in few])
         if len(hits) == 0:
@@ -229,10 +253,9 @@ def _lm(count: int, goals: np.ndarray, start: np.ndarray) -> str:
     return f"{np.mean(steps):.1f} / {took:.1f} / {100 * solved / len(steps):.0f}"
 
 
-def arms(count: int = 100) -> list[str]:
+def arms(report: Report, count: int = 100) -> None:
     """Poses and positions of real arms within 0.1 mm and 0.1 mrad, by the tree and by random starts."""
-    lines = ["| arm | goal | mb-rrt: found, median and p95 ms | numeric | worst residual of mb-rrt [m, rad] |"]
-    lines.append("|---|---|---|---|---|")
+    rows = []
     for name in ("planar10", "ur5", "panda", "puma560", "titan4"):
         robot = rrtik.load_robot(name)
         for kind in ("position", "pose"):
@@ -249,18 +272,21 @@ def arms(count: int = 100) -> list[str]:
                     if method == "mb-rrt" and result.found:
                         worst = max(worst, float(result.residuals.max()))
                 cells.append(f"{found} of {count}, {np.median(took):.1f}, {np.percentile(took, 95):.1f}")
-            lines.append(f"| {name} | {kind} | {cells[0]} | {cells[1]} | {worst:.1e} |")
-    return lines
+            rows.append([name, kind, *cells, f"{worst:.1e}"])
+    heads = ("arm", "goal", "mb-rrt: found, median and p95 ms", "numeric", "worst residual of mb-rrt [m, rad]")
+    text = "100 reachable goals each, 0.1 mm and 0.1 mrad."
+    report.table("Real arms through `solve_ik`", heads, rows, text=text)
 
 
-def plans(seeds: int = 10) -> list[str]:
+def plans(report: Report, seeds: int = 10) -> None:
     """MBRRT beside BiCRDT, which gets its goal configurations from `goal_configurations`."""
-    lines = ["| problem | MBRRT: found, median s | BiCRDT |", "|---|---|---|"]
+    rows = []
     for name in ("planar6_c_pose", "puma_pose", "puma_position"):
         problem, cells = rrtik.load_problem(name), []
         for planner in (MBRRT, BiCRDT):
             found = [rrtik.plan(problem, planner, seed=seed, seconds=5.0) for seed in range(seeds)]
             took = np.median([each.seconds for each in found])
             cells.append(f"{sum(each.found for each in found)} of {seeds}, {took:.3f}")
-        lines.append(f"| {name} | {cells[0]} | {cells[1]} |")
-    return lines
+        rows.append([name, *cells])
+    text = "To goals of the tip, 5 s, 10 seeds, goal configurations included."
+    report.table("The planner", ("problem", "MBRRT: found, median s", "BiCRDT"), rows, text=text)

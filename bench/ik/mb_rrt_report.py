@@ -8,15 +8,17 @@ Takes five to fifteen minutes; ``--quick`` leaves the published tables 6 to 9 ou
 from __future__ import annotations
 
 import argparse
-import platform
 from pathlib import Path
 
 import numpy as np
 
 from bench.ik import mb_rrt_beyond as beyond
 from bench.ik import mb_rrt_tables as published
-from rrtik_bench.mb_rrt.runs import arm
+from bench.shared.pages import add_out
+from rrtik_bench.mb_rrt.runs import Measured, arm
 from rrtik_bench.mb_rrt.runs import laws as laws_of
+from rrtik_bench.report.machine import versions
+from rrtik_bench.report.page import Report
 from rrtik_ompl.ik.mb_rrt.arc import grow_on_arcs
 from rrtik_ompl.ik.mb_rrt.growth import grow
 from rrtik_ompl.ik.mb_rrt.links import Links, headings_to_joints, joints_to_chain, sunflower
@@ -35,12 +37,8 @@ def structure(rng: np.random.Generator) -> float:
     return worst
 
 
-def row(bar: str, wanted: str, measured: str, kept: bool) -> str:
-    return f"| {bar} | {wanted} | {measured} | {'yes' if kept else '**no**'} |"
-
-
-def acceptance_of_tables(found: dict) -> list[str]:
-    """Rows of section 13 that tables 6 to 9 decide."""
+def acceptance_of_tables(report: Report, found: dict[int, dict[str, Measured]]) -> None:
+    """Acceptance rows that tables 6 to 9 decide."""
     three, ten = found[3], found[10]
     a, b = (three["surface-a"].converged, ten["surface-a"].converged), ("surface-b", "surface-a")
     uniform = ("uniform-a", "uniform-b", "uniform-a-star", "uniform-b-star")
@@ -51,98 +49,117 @@ def acceptance_of_tables(found: dict) -> list[str]:
     star = [(found[n]["uniform-b-star"].converged, found[n]["uniform-b-star"].mean) for n in (3, 10)]
     c = three["c-space"].converged, ten["c-space"].converged
     below = [found[n]["surface-b"].converged - found[n]["surface-a"].converged for n in (3, 10)]
-    return [
-        row("Surface-A", "10-50 % (3), 45-75 % (10), 25 points below B", f"{a[0]:.0f} %, {a[1]:.0f} %",
-            10 <= a[0] <= 50 and 45 <= a[1] <= 75 and min(below) >= 25),
-        row("Uniform-B; Uniform-A with 3 joints", "35-72 % (3), 40-68 % (10); 3-35 %",
-            f"{ub[0]:.0f} %, {ub[1]:.0f} %; {ua:.0f} %", 35 <= ub[0] <= 72 and 40 <= ub[1] <= 68 and 3 <= ua <= 35),
-        row("Uniform-B*", "100 %; mean 55-130 (3), 230-400 (10)", "; ".join(f"{r:.0f} %, {m:.0f}" for r, m in star),
-            all(r == 100 for r, _ in star) and 55 <= star[0][1] <= 130 and 230 <= star[1][1] <= 400),
-        row("C-space, 3 degrees", "30-75 % (3), 10-60 % (10)", f"{c[0]:.0f} %, {c[1]:.0f} %",
-            30 <= c[0] <= 75 and 10 <= c[1] <= 60),
-        row("rho_10000", "Uniform >= 0.55; B <= 0.22 (3), <= 0.20 (10), < A (3 joints); both below half of Uniform",
-            f"Uniform >= {least:.2f}; B {rho[3, b[0]]:.3f}, {rho[10, b[0]]:.3f}; A {rho[3, b[1]]:.3f}, "
-            f"{rho[10, b[1]]:.3f}",
-            least >= 0.55 and rho[3, b[0]] <= 0.22 and rho[10, b[0]] <= 0.20 and rho[3, b[0]] < rho[3, b[1]] and half),
-    ]  # fmt: skip
+    report.bar(
+        "Surface-A",
+        "10-50 % (3), 45-75 % (10), 25 points below B",
+        f"{a[0]:.0f} %, {a[1]:.0f} %",
+        10 <= a[0] <= 50 and 45 <= a[1] <= 75 and min(below) >= 25,
+    )
+    report.bar(
+        "Uniform-B; Uniform-A with 3 joints",
+        "35-72 % (3), 40-68 % (10); 3-35 %",
+        f"{ub[0]:.0f} %, {ub[1]:.0f} %; {ua:.0f} %",
+        35 <= ub[0] <= 72 and 40 <= ub[1] <= 68 and 3 <= ua <= 35,
+    )
+    report.bar(
+        "Uniform-B*",
+        "100 %; mean 55-130 (3), 230-400 (10)",
+        "; ".join(f"{r:.0f} %, {m:.0f}" for r, m in star),
+        all(r == 100 for r, _ in star) and 55 <= star[0][1] <= 130 and 230 <= star[1][1] <= 400,
+    )
+    report.bar(
+        "C-space, 3 degrees",
+        "30-75 % (3), 10-60 % (10)",
+        f"{c[0]:.0f} %, {c[1]:.0f} %",
+        30 <= c[0] <= 75 and 10 <= c[1] <= 60,
+    )
+    report.bar(
+        "rho_10000",
+        "Uniform >= 0.55; B <= 0.22 (3), <= 0.20 (10), < A (3 joints); both below half of Uniform",
+        f"Uniform >= {least:.2f}; B {rho[3, b[0]]:.3f}, {rho[10, b[0]]:.3f}; A {rho[3, b[1]]:.3f}, {rho[10, b[1]]:.3f}",
+        least >= 0.55 and rho[3, b[0]] <= 0.22 and rho[10, b[0]] <= 0.20 and rho[3, b[0]] < rho[3, b[1]] and half,
+    )
 
 
-def report(quick: bool, folder: Path) -> list[str]:
+def page(quick: bool, folder: Path) -> Report:
     rng = np.random.default_rng(0)
-    machine = f"{platform.machine()}, Python {platform.python_version()}, numpy {np.__version__}"
-    precision, exact = published.precision(rng)
-    rows = [*acceptance_of_precision(exact, structure(rng))]
-    tables: list[str] = []
+    about = (
+        f"{versions('numpy')}; seed 0. Goals of the published tables: a sunflower of points, since the paper does not "
+        "say which they were. Lengths in cm."
+    )
+    report, small = Report("MB-RRT", "python bench/ik/mb_rrt_report.py", intro=about), Report("", "")
+    exact = published.precision(small, rng)
+    acceptance_of_precision(report, exact, structure(rng))
+    report.note("The published tables", "")
     if not quick:
-        tables, found = published.tables()
-        rows += acceptance_of_tables(found)
-    further, more = beyond_the_paper(rng)
+        acceptance_of_tables(report, published.tables(report))
+    report.add(small)
+    further = beyond_the_paper(rng)
+    laws(report, rng, exact)
+    report.add(further)
     _pictures(folder)
-    return [
-        "# MB-RRT", "", f"Made by `python bench/ik/mb_rrt_report.py`. {machine}; seed 0.", "",
-        "Goals of the published tables: the sunflower of the specification, section 11, row 6. Lengths in cm.", "",
-        "## Acceptance (section 13 of the specification)", "",
-        "| bar | wanted | measured | kept |", "|---|---|---|---|", *rows, *laws(rng, exact), *more, "",
-        "## The published tables", "", *tables, *precision, *further,
-    ]  # fmt: skip
+    return report
 
 
-def acceptance_of_precision(exact: dict, fault: float) -> list[str]:
+def acceptance_of_precision(report: Report, exact: published.Exact, fault: float) -> None:
     """Rows that tables 10 and 11 decide, and the structure of the trees."""
     means = {n: [m[1].max() for m in exact[n].values()] for n in (3, 10)}
     everything = all(m[0] == 100.0 for n in (3, 10) for m in exact[n].values())
     longest = max(m[2] for n in (3, 10) for m in exact[n].values())
     short = np.all(np.array(means[3]) <= [8, 45, 130]) and np.all(np.array(means[10]) <= [12, 55, 140])
-    return [
-        row("structure: edges, parents, forward kinematics", "1e-9", f"{fault:.1e} cm", fault < 1e-9),
-        row("Surface-B, 5 random states", "100 %; mean <= 8 / 45 / 130 (3), 12 / 55 / 140 (10); none above 1,500",
-            f"{'100' if everything else 'less than 100'} %; largest mean {_slashed(means[3])}, {_slashed(means[10])}; "
-            f"longest run {longest}", everything and longest <= 1500 and bool(short)),
-    ]  # fmt: skip
+    report.bar("structure: edges, parents, forward kinematics", "1e-9", f"{fault:.1e} cm", fault < 1e-9)
+    report.bar(
+        "Surface-B, 5 random states",
+        "100 %; mean <= 8 / 45 / 130 (3), 12 / 55 / 140 (10); none above 1,500",
+        f"{'100' if everything else 'less than 100'} %; largest mean {_slashed(means[3])}, {_slashed(means[10])}; "
+        f"longest run {longest}",
+        everything and longest <= 1500 and bool(short),
+    )
 
 
-def laws(rng: np.random.Generator, exact: dict) -> list[str]:
+def laws(report: Report, rng: np.random.Generator, exact: published.Exact) -> None:
     ks, third = laws_of(rng)
     ratios = [exact[n][0.001][1].mean() / exact[n][0.01][1].mean() for n in (3, 10)]
     kept = ks < 0.01 and abs(third - 1 / 3) < 0.01 and all(2 <= r <= 5 for r in ratios)
     measured = f"{ks:.4f}; {third:.4f}; {ratios[0]:.2f}, {ratios[1]:.2f}"
     bar = "laws: arcsine KS, share outside, mu(0.001) / mu(0.01)"
-    return [row(bar, "< 0.01; 1/3 +- 0.01; 2 to 5", measured, kept)]
+    report.bar(bar, "< 0.01; 1/3 +- 0.01; 2 to 5", measured, kept)
 
 
-def beyond_the_paper(rng: np.random.Generator) -> tuple[list[str], list[str]]:
+def beyond_the_paper(rng: np.random.Generator) -> Report:
     """The sections on what the authors left open, and the acceptance rows that they decide."""
-    arc_lines, worst, outside = beyond.arcs(rng)
-    limit_lines, limited = beyond.limits(rng)
-    obstacle_line, (share, mean) = beyond.obstacles(rng)
-    axis_lines, axes = beyond.one_axis(rng)
+    report = Report("", "")
+    worst, outside = beyond.arcs(report, rng)
+    limited = beyond.limits(report, rng)
+    share, mean = beyond.obstacles(report, rng)
+    axes = beyond.one_axis(report, rng)
     times, faster = beyond.against_fabrik(rng)
-    rows = [
-        row("arcs, 2 to 100 links, plane and space", "1 pass, error < 1e-9 of the reach, rho = 0",
-            f"1 pass, {worst:.1e}, {outside} nodes outside", worst < 1e-9 and outside == 0),
-        row("arcs with limits of 60 degrees", ">= 95 %, mean <= 10 passes",
-            f"{100 * limited[60][0]:g} %, {limited[60][1]:.2f}", limited[60][0] >= 0.95 and limited[60][1] <= 10),
-        row("arcs with obstacles", "all solved", f"{100 * share:g} %, {mean:.2f} passes", share == 1.0),
-        row("7 one-axis joints in space, 0.01 cm, polish", "100 % in at most 3 passes",
-            f"{100 * axes[7][0]:g} %, at most {axes[7][1]}", axes[7][0] == 1.0 and axes[7][1] <= 3),
-        row("time, 10 joints, 0.001 cm, arcs", "below FABRIK's in the same run", "; ".join(times) + " a goal", faster),
-    ]  # fmt: skip
-    return [
-        "## Arcs of intersection", "", "The rings in which a joint is useful, and branches through them:", "",
-        "![published tree](mb_rrt_tree.png) ![arcs](mb_rrt_arcs.png)", "", *arc_lines, "",
-        "### Joint limits: 10 links, first joint free, goals of random postures, one pass at a time", "",
-        *limit_lines, "",
-        "### Obstacles: 10 links of 10 cm, 7 discs of radius 10 cm in a ring of 35 cm", "", obstacle_line, "",
-        "### Joints with one axis: a = 10 cm, alpha = +-90 degrees in turn", "", *axis_lines, "",
-        "## Growth from 3 to 100 joints, 0.001 cm", "",
-        "Mean passes, sweeps or steps of those solved / CPU ms a goal / solved %. Links of 10 cm, the same 100 goals",
-        "(fewer for the slow ones); arcs, FABRIK and CCD work on all goals as one batch, the others goal by goal.",
-        "LM: one random start, no restarts. FABRIK, CCD: at most 1000 sweeps (200 above 20 joints). C-space: 1 % of",
-        "the reach, 2,000 iterations.", "", *beyond.beside(rng), "",
-        "## Real arms through `solve_ik`", "", "100 reachable goals each, 0.1 mm and 0.1 mrad.", "", *beyond.arms(), "",
-        "## The planner", "", "To goals of the tip, 5 s, 10 seeds, goal configurations included.", "",
-        *beyond.plans(), "",
-    ], rows  # fmt: skip
+    report.bar(
+        "arcs, 2 to 100 links, plane and space",
+        "1 pass, error < 1e-9 of the reach, rho = 0",
+        f"1 pass, {worst:.1e}, {outside} nodes outside",
+        worst < 1e-9 and outside == 0,
+    )
+    report.bar(
+        "arcs with limits of 60 degrees",
+        ">= 95 %, mean <= 10 passes",
+        f"{100 * limited[60][0]:g} %, {limited[60][1]:.2f}",
+        limited[60][0] >= 0.95 and limited[60][1] <= 10,
+    )
+    report.bar("arcs with obstacles", "all solved", f"{100 * share:g} %, {mean:.2f} passes", share == 1.0)
+    report.bar(
+        "7 one-axis joints in space, 0.01 cm, polish",
+        "100 % in at most 3 passes",
+        f"{100 * axes[7][0]:g} %, at most {axes[7][1]}",
+        axes[7][0] == 1.0 and axes[7][1] <= 3,
+    )
+    report.bar(
+        "time, 10 joints, 0.001 cm, arcs", "below FABRIK's in the same run", "; ".join(times) + " a goal", faster
+    )
+    beyond.beside(report, rng)
+    beyond.arms(report)
+    beyond.plans(report)
+    return report
 
 
 def _slashed(values: list[float]) -> str:
@@ -160,9 +177,9 @@ def _pictures(folder: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "reports" / "mb_rrt.md")
+    add_out(parser, "mb_rrt.md")
     options = parser.parse_args()
-    options.out.write_text("\n".join(report(options.quick, options.out.parent)))
+    page(options.quick, options.out.parent).finish(options.out)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 
 from rrtik_bench.mb_rrt.runs import (
@@ -16,39 +18,39 @@ from rrtik_bench.mb_rrt.runs import (
     all_variants,
     precise,
 )
+from rrtik_bench.report.page import Report
 from rrtik_ompl.ik.mb_rrt.growth import PASSES
 
+Exact: TypeAlias = dict[int, dict[float, tuple[float, np.ndarray, int]]]
 
-def tables(seed: int = 0) -> tuple[list[str], dict[int, dict[str, Measured]]]:
-    """Tables 6 to 9 and the figures for the acceptance rows."""
-    lines, found = [], {}
+
+def tables(report: Report, seed: int = 0) -> dict[int, dict[str, Measured]]:
+    """Tables 6 to 9; the figures for the acceptance rows."""
+    found = {}
     measured = {count: all_variants(count, seed) for count in (3, 10)}
     for count, results in measured.items():
         found[count] = {name: rows[TOLERANCE[count]] for name, rows in results.items()}
-        lines += _table(count, results)
-    return [*lines, *READINGS], found
+        _table(report, count, results)
+    report.note("", "\n".join(READINGS))
+    return found
 
 
-def _table(count: int, results: dict[str, dict[float, Measured]]) -> list[str]:
-    which = "6 and 8" if count == 3 else "7 and 9"
-    extra = " | T_C, mu at 0.2 cm" if count == 3 else ""
-    lines = [
-        f"### Tables {which}: {count} joints, {GOALS[count]} goals, {TOLERANCE[count]:g} cm, limit {PASSES}",
-        "",
+def _table(report: Report, count: int, results: dict[str, dict[float, Measured]]) -> None:
+    which, extra = ("6 and 8", ("T_C, mu at 0.2 cm",)) if count == 3 else ("7 and 9", ())
+    title = f"Tables {which}: {count} joints, {GOALS[count]} goals, {TOLERANCE[count]:g} cm, limit {PASSES}"
+    text = (
         f"Published / measured. Measured rho: margin of 1 % of the reach (strict in brackets); rho_10000 over "
-        f"{LONG[count]} goals, over all where the tree does not know the goal ({GOALS_PER_TREE} goals share a tree).",
-        "",
-        f"| | T_C % | mu | rho | rho_10000{extra} |",
-        "|---|---|---|---|---|" + ("---|" if extra else ""),
-    ]
+        f"{LONG[count]} goals, over all where the tree does not know the goal ({GOALS_PER_TREE} goals share a tree)."
+    )
+    rows = []
     for name, label in NAMES.items():
         p, m = PUBLISHED[count][name], results[name][TOLERANCE[count]]
         cells = [f"{p[0]:.4g} / {m.converged:.4g}", f"{p[1]:.1f} / {m.mean:.1f}"]
         cells += [f"{p[2 + k]:.3f} / {r[0]:.3f} ({r[1]:.3f})" for k, r in enumerate((m.rho, m.rho_all))]
         if count == 3:
             cells.append(f"{results[name][0.2].converged:.4g}, {results[name][0.2].mean:.1f}")
-        lines.append(f"| {label} | {' | '.join(cells)} |")
-    return [*lines, ""]
+        rows.append([label, *cells])
+    report.table(title, ("", "T_C %", "mu", "rho", "rho_10000", *extra), rows, text=text, level=3)
 
 
 READINGS = [
@@ -69,24 +71,26 @@ READINGS = [
     "- rho is up to 0.12 above the print in the uniform rows and up to twice in Superficie B: the published goals were",
     "  probably denser near the base (they lower every rho), and the margin is not stated (rows 6, 7).",
     "- The other rates and means differ by what single goal clouds differ by (row 12).",
-    "",
 ]  # fmt: skip
 
 
-def precision(rng: np.random.Generator, repeats: int = 5) -> tuple[list[str], dict[int, dict[float, tuple]]]:
-    """Tables 10 and 11: MB-RRT at three tolerances, several random states."""
-    lines, found = [], {}
+def precision(report: Report, rng: np.random.Generator, repeats: int = 5) -> Exact:
+    """Tables 10 and 11: MB-RRT at three tolerances, several random states.
+
+    Returns:
+        By the number of joints and the tolerance [cm]: goals solved [%], mean passes of each state, passes of the
+        longest run.
+    """
+    found: Exact = {}
     for count in (3, 10):
-        lines += [f"### Table {10 if count == 3 else 11}: MB-RRT, {count} joints, {repeats} random states", ""]
-        lines += ["| tol (cm) | T_C % | mu | range of mu | largest run | rho |", "|---|---|---|---|---|---|"]
-        found[count] = {}
+        rows, found[count] = [], {}
         for tolerance, (rate, mu, rho, _) in PRECISION[count].items():
             hits, ours = precise(count, tolerance, repeats, rng)
             means, solved = hits.mean(axis=1), 100.0 * (hits > 0).mean()
             found[count][tolerance] = solved, means, int(hits.max())
-            lines.append(
-                f"| {tolerance:g} | {rate} / {solved:.4g} | {mu:.2f} / {means.mean():.2f} | "
-                f"{means.min():.1f} - {means.max():.1f} | {hits.max()} | {rho:.3f} / {ours:.3f} |"
-            )
-        lines.append("")
-    return lines, found
+            cells = [f"{tolerance:g}", f"{rate} / {solved:.4g}", f"{mu:.2f} / {means.mean():.2f}"]
+            cells += [f"{means.min():.1f} - {means.max():.1f}", str(hits.max()), f"{rho:.3f} / {ours:.3f}"]
+            rows.append(cells)
+        title = f"Table {10 if count == 3 else 11}: MB-RRT, {count} joints, {repeats} random states"
+        report.table(title, ("tol (cm)", "T_C %", "mu", "range of mu", "largest run", "rho"), rows, level=3)
+    return found

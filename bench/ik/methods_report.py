@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import argparse
 import time
-from pathlib import Path
 
 import numpy as np
 
 import rrtik_ompl as rrtik
+from bench.shared.pages import add_out
 from rrtik_bench.report.page import Report
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.ik.face import IkResult, list_ik_methods
@@ -71,15 +71,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--goals", type=int, default=15)
     parser.add_argument("--seconds", type=float, default=2.0)
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "reports" / "ik_methods.md")
+    add_out(parser, "ik_methods.md")
     options = parser.parse_args()
     report = Report("Methods of inverse kinematics side by side", "python bench/ik/methods_report.py")
     for title, names, points in (("Poses, 1 mm and 0.01 rad", POSES, False), ("Points, 1 mm", POINTS, True)):
         table = [row for name in names for row in rows(name, options.goals, options.seconds, points)]
         text = f"{title}: {options.goals} reachable goals, at most {options.seconds:g} s each, processor time"
         report.table(text, HEAD, table)
-    options.out.write_text(report.markdown())
-    print(report.markdown())
+    report.finish(options.out)
 
 
 if __name__ == "__main__":

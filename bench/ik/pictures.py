@@ -43,6 +43,7 @@ def photograph(page: Path, picture: Path) -> None:
         raw = Path(folder) / "page.png"
         subprocess.run([browser, *OPTIONS, f"--screenshot={raw}", page.as_uri()], capture_output=True, check=True)
         shot = cv2.imread(str(raw))
+    assert shot is not None
     small = cv2.resize(shot, (WIDTH, round(shot.shape[0] * WIDTH / shot.shape[1])), interpolation=cv2.INTER_AREA)
     cv2.imwrite(str(picture), small, [cv2.IMWRITE_PNG_COMPRESSION, 9])
 

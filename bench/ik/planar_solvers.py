@@ -7,7 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 
-def fabrik(lengths: np.ndarray, goals: np.ndarray, joints: np.ndarray, tolerance: float, most: int = 1000):
+def fabrik(
+    lengths: np.ndarray, goals: np.ndarray, joints: np.ndarray, tolerance: float, most: int = 1000
+) -> tuple[np.ndarray, np.ndarray]:
     """Chains of nodes, shape (m, n + 1, 2), and sweeps taken by each, shape (m,)."""
 
     def sweep(x: np.ndarray, goals: np.ndarray) -> None:
@@ -21,7 +23,9 @@ def fabrik(lengths: np.ndarray, goals: np.ndarray, joints: np.ndarray, tolerance
     return swept(sweep, chain(lengths, joints), goals, tolerance, most)
 
 
-def ccd(lengths: np.ndarray, goals: np.ndarray, joints: np.ndarray, tolerance: float, most: int = 1000):
+def ccd(
+    lengths: np.ndarray, goals: np.ndarray, joints: np.ndarray, tolerance: float, most: int = 1000
+) -> tuple[np.ndarray, np.ndarray]:
     """As `fabrik`, each joint from the last to the first turned so that the end points at the goal."""
 
     def sweep(x: np.ndarray, goals: np.ndarray) -> None:
@@ -60,4 +64,5 @@ def chain(lengths: np.ndarray, joints: np.ndarray) -> np.ndarray:
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    ends: np.ndarray = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    return ends

@@ -10,15 +10,15 @@ of the vehicle's box, and 5 degrees away from every joint limit. Limits: the env
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
+from bench.shared.pages import add_out
 from rrtik_ompl.plot_reach import plot_slices
 from rrtik_robots.titan4.workspace import effective_slices
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "reports" / "titan4_workspace.png")
+    add_out(parser, "titan4_workspace.png")
     plot_slices(effective_slices(), parser.parse_args().out, title="titan4: effective workspace", colors="Blues")
 
 

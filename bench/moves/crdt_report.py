@@ -9,12 +9,13 @@ import argparse
 from collections import Counter
 from dataclasses import astuple, dataclass, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 
 import rrtik_ompl as rrtik
+from bench.shared.pages import add_out
+from bench.shared.problems import goal_joints
 from rrtik_bench.crdt.baseline import TreeRun, crdt_run, rrt_run
 from rrtik_bench.crdt.published import CRDT_TABLE, PRISM_LIST, RRT_TABLE, SDU_LIST
 from rrtik_bench.crdt.runs import STAGES, RouteRun, best_of_groups, histogram, joints_of, route_run, share
@@ -104,7 +105,7 @@ def routes_table(report: Report, measured: list[Measured]) -> None:
             [
                 m.name,
                 str(len(m.runs)),
-                f"{lower_bound(m.problem.start, m.problem.goal.q)} / {OPTIMA[m.name]}",
+                f"{lower_bound(m.problem.start, goal_joints(m.problem))} / {OPTIMA[m.name]}",
                 f"{np.mean([run.iterations for run in m.runs]):.1f}",
                 " -> ".join(f"{v:.2f}" for v in m.moves.mean(axis=0)),
                 " -> ".join(f"{v:.2f}" for v in lengths),
@@ -207,7 +208,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=1000, help="runs in environment E")
     parser.add_argument("--arm-runs", type=int, default=200, help="runs of each arm problem")
     parser.add_argument("--quick", action="store_true", help="50 runs in E, 20 of each arm problem")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "reports" / "crdt.md")
+    add_out(parser, "crdt.md")
     options = parser.parse_args()
     count, arm_count = (50, 20) if options.quick else (options.runs, options.arm_runs)
     report = Report("C-RDT and BiCRDT: the published method, measured", "python bench/moves/crdt_report.py")
@@ -221,9 +222,7 @@ def main() -> None:
     route_bars(report, measured)
     routes_table(report, list(measured.values()))
     counter_bars(report)
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    options.out.write_text(report.markdown(), encoding="utf-8")
-    print(report.markdown())
+    report.finish(options.out)
 
 
 if __name__ == "__main__":

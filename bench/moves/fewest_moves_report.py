@@ -8,13 +8,14 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from dataclasses import dataclass
-from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
 import rrtik_ompl as rrtik
 from bench.moves.crdt_report import WITH_ROOM, case_a_with_room
+from bench.shared.pages import add_out
+from bench.shared.problems import goal_joints
 from rrtik_bench.crdt.runs import histogram, joints_of, share, sound
 from rrtik_bench.report.page import Report
 from rrtik_ompl.problem import Problem
@@ -171,7 +172,7 @@ def tables(report: Report, results: dict[str, Measured]) -> None:
                 ", ".join(f"{joints}: {times}" for joints, times in families.most_common(3)),
             ]
         )
-        c = lower_bound(m.problem.start, m.problem.goal.q)
+        c = lower_bound(m.problem.start, goal_joints(m.problem))
         proofs.append([name, str(c), str(m.bound), f"{m.proof_seconds:.2f}", m.grid, str(m.optimum)])
     head = ["problem", "runs", "moves", "gap to the bound as reported", "travel [rad or m]", "time, median / most [s]"]
     head += ["double axis cut: moves", "published", "its travel", "its time [s]", "joints in order (most frequent)"]
@@ -186,7 +187,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=100)
     parser.add_argument("--quick", action="store_true", help="5 runs of each problem")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "reports" / "fewest_moves.md")
+    add_out(parser, "fewest_moves.md")
     options = parser.parse_args()
     report = Report("Fewest moves, measured", "python bench/moves/fewest_moves_report.py")
     rrtik.plan(rrtik.load_problem("titan4_sdu"), FewestMoves, seed=0)  # compiles, if need be
@@ -194,9 +195,7 @@ def main() -> None:
     bars(report, results)
     tables(report, results)
     report.note("Case A", CASE_A)
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    options.out.write_text(report.markdown(), encoding="utf-8")
-    print(report.markdown())
+    report.finish(options.out)
 
 
 if __name__ == "__main__":

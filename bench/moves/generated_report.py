@@ -15,8 +15,10 @@ import numpy as np
 
 import rrtik_ompl as rrtik
 from bench.shared.parts import Parts, add_options
+from bench.shared.problems import goal_joints
 from rrtik_bench.crdt.runs import histogram, sound
-from rrtik_bench.report.page import Report, processes
+from rrtik_bench.report.machine import processes
+from rrtik_bench.report.page import Report
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
@@ -58,7 +60,7 @@ def measured(arm: str, family: str, seed: int) -> Scene:
     """All methods in one scene."""
     begin = perf_counter()
     problem = generated_problem(rrtik.load_robot(arm), family, seed)
-    scene = Scene(family, lower_bound(problem.start, problem.goal.q), perf_counter() - begin)
+    scene = Scene(family, lower_bound(problem.start, goal_joints(problem)), perf_counter() - begin)
     raw = rrtik.plan(problem, "bicrdt", seconds=LIMIT, seed=seed)
     if raw.path is not None:
         _chain(scene, problem, raw.path, raw.seconds, {BICRDT: lambda path: path, CUT: _fewer(problem, "axis", seed)})
@@ -149,12 +151,12 @@ def tables(report: Report, arm: str, found: list[Scene]) -> None:
     report.table(f"{arm}: moves and travel in the {len(common)} scenes that all methods solve", head, rows)
     rows = []
     for family in FAMILIES:
-        own = [scene for scene in found if scene.family == family]
-        if not own:
+        scenes = [scene for scene in found if scene.family == family]
+        if not scenes:
             continue
-        cells = [_of_family(own, name) for name in METHODS]
-        making = np.mean([scene.making for scene in own])
-        rows.append([family, f"{making:.2f}", f"{np.mean([scene.bound for scene in own]):.1f}", *cells])
+        cells = [_of_family(scenes, name) for name in METHODS]
+        making = np.mean([scene.making for scene in scenes])
+        rows.append([family, f"{making:.2f}", f"{np.mean([scene.bound for scene in scenes]):.1f}", *cells])
     report.table(
         f"{arm}: families; mean moves (solved)", ["family", "making [s]", "joints that differ", *METHODS], rows
     )
@@ -195,8 +197,7 @@ def write(report: Report, results: dict[str, list[Scene]], options: argparse.Nam
         f"clock and include all stages; {options.jobs} at a time."
     )
     report.note("What was done", text)
-    options.out.write_text(report.markdown(), encoding="utf-8")
-    print(report.markdown())
+    report.finish(options.out)
 
 
 if __name__ == "__main__":

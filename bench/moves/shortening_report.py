@@ -11,10 +11,11 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 
+from bench.shared.pages import add_out
+from rrtik_bench.report.page import Report
 from rrtik_bench.shortening.plane_worlds import PUBLISHED, Plane, generated, sampled_route
 from rrtik_ompl import load_problem, plan, shorten
 from rrtik_ompl.shortening import METHODS, Task
@@ -84,7 +85,7 @@ def _sound(plane: Plane, route: np.ndarray, found: np.ndarray) -> bool:
     return ends and route_length(found) <= route_length(route) and all(plane.free(a, b) for a, b in pairwise(found))
 
 
-def _questions_of_equal_random(plane: Plane, routes: list, optima: np.ndarray, wanted: float) -> float:
+def _questions_of_equal_random(plane: Plane, routes: list[np.ndarray], optima: np.ndarray, wanted: float) -> float:
     """Questions per route after which the mean of random cut is as good as ``wanted``, or that were not enough."""
     budget = np.arange(0, LONG_RANDOM + 1)
     total = np.zeros(len(budget))
@@ -160,12 +161,12 @@ def bars(worlds: list[Measured], others: list[Measured]) -> list[tuple[str, str,
     ]
 
 
-def arm_rows(name: str, count: int) -> tuple[list[str], int]:
+def arm_rows(name: str, count: int) -> tuple[list[list[str]], int]:
     """A scene with a 6R arm: mean length and seconds of every method on RRT-Connect's paths, and the faults."""
     problem = load_problem(name)
     found = [plan(problem, "RRTConnect", seconds=5.0, seed=seed).path for seed in range(count)]
     paths = [path for path in found if path is not None]
-    lines, faults = [f"| raw | {np.mean([path.length for path in paths]):.3f} | | |"], 0
+    lines, faults = [["raw", f"{np.mean([path.length for path in paths]):.3f}", "", ""]], 0
     for method, details in METHODS.items():
         if details.moves_only:
             continue  # these paths move all joints at once
@@ -179,7 +180,8 @@ def arm_rows(name: str, count: int) -> tuple[list[str], int]:
             for new, old in zip(short, paths, strict=True)
         )
         faults += wrong
-        lines.append(f"| {method} | {np.mean([path.length for path in short]):.3f} | {1e3 * seconds:.0f} | {wrong} |")
+        length = np.mean([path.length for path in short])
+        lines.append([method, f"{length:.3f}", f"{1e3 * seconds:.0f}", str(wrong)])
     return lines, faults
 
 
@@ -187,18 +189,23 @@ def _list(values: object) -> str:
     return ", ".join(f"{value:.4f}" for value in values)  # type: ignore[attr-defined]
 
 
-def world_table(worlds: list[Measured]) -> list[str]:
-    names = [world.plane.name for world in worlds]
-    lines = ["| method | " + " | ".join(f"{n}: mean, worst, questions, ms" for n in names) + " |"]
-    lines.append("|---" * (len(names) + 1) + "|")
+def world_table(report: Report, worlds: list[Measured]) -> None:
+    rows = []
     for method in METHODS_MEASURED:
         cells = [
             f"{w.ratios[method].mean():.4f}, {w.ratios[method].max():.4f}, {w.asked[method].mean():.0f}, "
             f"{1e3 * w.seconds[method].mean():.1f}"
             for w in worlds
         ]
-        lines.append("| " + " | ".join([method, *cells]) + " |")
-    return lines
+        rows.append([method, *cells])
+    heads = ("method", *(f"{world.plane.name}: mean, worst, questions, ms" for world in worlds))
+    report.table("Methods", heads, rows)
+    asked, prototype = ([f"{n:.0f}" for n in row] for row in ([w.asked["corners"].mean() for w in worlds], PROTOTYPE))
+    report.note(
+        "",
+        f"The page's prototype of retraction / 10 asked {', '.join(prototype)} times, on routes of its own; "
+        f"corners ask {', '.join(asked)} times here.",
+    )
 
 
 def main() -> int:
@@ -207,32 +214,24 @@ def main() -> int:
     parser.add_argument("--paths", type=int, default=40, help="routes in each published world")
     parser.add_argument("--worlds", type=int, default=50, help="generated worlds, two routes each")
     parser.add_argument("--arm-paths", type=int, default=10)
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "reports" / "shortening.md")
+    add_out(parser, "shortening.md")
     options = parser.parse_args()
     worlds = [measure(make(), options.paths, compare=True) for make in PUBLISHED.values()]
     others = [measure(generated(seed), 2, compare=False) for seed in range(options.worlds)]
-    rows = bars(worlds, others)
+    about = (
+        f"{options.paths} routes of RRT-Connect (step {STEP:g}) in each of three worlds of 26 x 20, two in each of "
+        f"{options.worlds} generated ones; seeds 0, 1, ... Ratio to the exact shortest route of the class; questions "
+        "are motions asked about (of retraction and corners those of the last check too); CPU time."
+    )
+    title = "Shortening: published methods against the shortest route of the class"
+    report = Report(title, "python bench/moves/shortening_report.py", intro=about)
+    for row in bars(worlds, others):
+        report.bar(*row)
+    world_table(report, worlds)
     arm, faults = arm_rows("titan4_sdu", options.arm_paths)
-    good = all(row[3] for row in rows) and faults == 0
-    lines = ["# Shortening: published methods against the shortest route of the class", ""]
-    lines += [f"{options.paths} routes of RRT-Connect (step {STEP:g}) in each of three worlds of 26 x 20, two in each"]
-    lines += [f"of {options.worlds} generated ones; seeds 0, 1, ... Ratio to the exact shortest route of the class;"]
-    lines += [
-        "questions are motions asked about (of retraction and corners those of the last check too); CPU time.",
-        "",
-    ]
-    lines += [*world_table(worlds), "", "| bar | wanted | measured | holds |", "|---|---|---|---|"]
-    lines += [f"| {what} | {bar} | {value} | {'yes' if holds else 'NO'} |" for what, bar, value, holds in rows]
-    asked, prototype = ([f"{n:.0f}" for n in row] for row in ([w.asked["corners"].mean() for w in worlds], PROTOTYPE))
-    lines += ["", f"The page's prototype of retraction / 10 asked {', '.join(prototype)} times, on routes of its own;"]
-    lines += [f"corners ask {', '.join(asked)} times here."]
-    lines += ["", "TITAN-4 at the SDU, paths of RRT-Connect, `shorten()` with both checks:", ""]
-    lines += ["| method | mean length [rad] | ms | faults |", "|---|---|---|---|", *arm]
-    lines += ["", "Made by `python bench/moves/shortening_report.py`."]
-    print("\n".join(lines))
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    options.out.write_text("\n".join(lines) + "\n")
-    return 0 if good else 1
+    text = "Paths of RRT-Connect, `shorten()` with both checks."
+    report.table("TITAN-4 at the SDU", ("method", "mean length [rad]", "ms", "faults"), arm, text=text)
+    return report.finish(options.out) or int(faults > 0)
 
 
 if __name__ == "__main__":

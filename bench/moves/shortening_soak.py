@@ -17,7 +17,8 @@ from functools import cache
 import numpy as np
 
 from bench.shared.parts import Parts, add_options
-from rrtik_bench.report.page import Report, processes
+from rrtik_bench.report.machine import processes
+from rrtik_bench.report.page import Report
 from rrtik_ompl import load_problem, load_robot, one_joint_moves, shorten
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.path import JointPath
@@ -99,7 +100,7 @@ def all_parts(paths: int, measure: Parts) -> dict[str, np.ndarray]:
 def page(counts: dict[str, np.ndarray], jobs: int) -> Report:
     """The report."""
     report = Report("Soak test of shortening", "python bench/moves/shortening_soak.py", processes(jobs))
-    total = sum(counts.values())
+    total = np.sum(list(counts.values()), axis=0)
     text = f"{total[1]:.0f} of {total[0]:.0f}"
     report.bar("shortened paths rejected by the dense check, or with other ends", "none", text, total[1] == 0)
     rows = [[m, *(f"{n:.0f}" for n in c[:4]), f"{c[4] / max(c[0], 1):.3f}"] for m, c in counts.items()]
@@ -120,9 +121,7 @@ def main() -> int:
     options = parser.parse_args()
     with Parts(options.out, options.jobs) as measure:
         report = page(all_parts(options.paths, measure), options.jobs)
-        options.out.write_text(report.markdown(), encoding="utf-8")
-    print(report.markdown())
-    return int(not all(bar[3] for bar in report.bars))
+        return report.finish(options.out)
 
 
 if __name__ == "__main__":

@@ -6,19 +6,20 @@ python bench/moves/titan4_sdu.py [--seeds 50] [--out bench/reports/titan4_sdu.md
 from __future__ import annotations
 
 import argparse
-import platform
 import time
-from pathlib import Path
 
 import numpy as np
 
+from bench.shared.pages import add_out
+from rrtik_bench.report.machine import versions
+from rrtik_bench.report.page import Report
 from rrtik_ompl import load_problem, plan, shorten
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=50)
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "reports" / "titan4_sdu.md")
+    add_out(parser, "titan4_sdu.md")
     options = parser.parse_args()
     problem = load_problem("titan4_sdu")
     rows, failed = [], []
@@ -40,24 +41,22 @@ def main() -> None:
         "search [s]",
         "all [s]",
     )
-    lines = [
-        "# TITAN-4 at the subsea distribution unit",
-        "",
-        f"BiCRDT and the double axis cut, seeds 1 to {options.seeds}: {len(rows)} of {options.seeds} solved, all",
-        f"checked again. {platform.machine()}, Python {platform.python_version()}.",
-        "Made by `python bench/moves/titan4_sdu.py`.",
-        "",
-        "| | mean | median | 95 % | min | max |",
-        "|---|---|---|---|---|---|",
-    ]
-    for name, column in zip(names, table.T, strict=True):
-        values = (column.mean(), np.median(column), np.quantile(column, 0.95), column.min(), column.max())
-        lines.append(f"| {name} | " + " | ".join(f"{v:.3g}" for v in values) + " |")
-    lines += ["", *failed] if failed else []
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    options.out.write_text("\n".join(lines) + "\n")
-    print("\n".join(lines))
+    report = Report(
+        "TITAN-4 at the subsea distribution unit",
+        "python bench/moves/titan4_sdu.py",
+        intro=f"BiCRDT and the double axis cut, seeds 1 to {options.seeds}: {len(rows)} of {options.seeds} solved, all "
+        f"checked again. {versions()}.",
+    )
+    lines = [[name, *(f"{value:.3g}" for value in spread(column))] for name, column in zip(names, table.T, strict=True)]
+    report.table("", ("", "mean", "median", "95 %", "min", "max"), lines)
+    report.note("", "\n".join(failed))
+    report.finish(options.out)
     raise SystemExit(1 if failed else 0)
+
+
+def spread(column: np.ndarray) -> tuple[float, ...]:
+    """Mean, median, 95th percentile, least and largest."""
+    return column.mean(), np.median(column), np.quantile(column, 0.95), column.min(), column.max()
 
 
 if __name__ == "__main__":

@@ -84,7 +84,7 @@ class Host:
 
     def _start(self) -> None:
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - kept open
-        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": self._errors}
+        pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": self._errors}
         places = os.pathsep.join(map(str, PLACES))
         self._process = subprocess.Popen(self._command, env={**os.environ, "PYTHONPATH": places}, text=True, **pipes)
         hello = self._answer(None)

@@ -17,6 +17,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -27,10 +28,13 @@ from bench.peers.description import task_of
 from bench.peers.host import Answer, Host, answered
 from bench.peers.serve import timed
 from bench.peers.task import PER_RADIAN, RANGE, Rows
+from bench.shared.pages import add_out
+from bench.shared.problems import goal_joints
 from bench.speed.cases import Options, exact_problem, family, panda_files
+from bench.speed.machine import machine
 from bench.speed.ours import our_search, warm_up
-from bench.speed.report import machine
-from rrtik_bench.report.page import Report, package_version
+from rrtik_bench.report.machine import package_version
+from rrtik_bench.report.page import Report
 from rrtik_ompl import JointPath, Problem
 from rrtik_ompl.scenarios import generated_problem
 
@@ -95,7 +99,7 @@ class Runs:
 
 def joins(problem: Problem, rows: Rows) -> bool:
     """Whether a path leads from the start to the goal, whole turns of a joint aside."""
-    off = np.abs(rows[[0, -1]] - (problem.start, problem.goal.q))  # type: ignore[union-attr]
+    off = np.abs(rows[[0, -1]] - np.array([problem.start, goal_joints(problem)]))
     turns = np.where(problem.robot.prismatic, 0.0, TURN * np.round(off / TURN))
     return bool(np.allclose(off, turns, atol=1e-6))
 
@@ -190,11 +194,11 @@ def main() -> None:
     parser.add_argument("--problems", type=int, default=3, help="of each family")
     parser.add_argument("--seeds", type=int, default=3, help="runs of each candidate on each problem")
     parser.add_argument("--seconds", type=float, default=10.0, help="for each run")
-    named = {"type": interpreter, "metavar": "NAME=INTERPRETER", "help": "of one peer; may be repeated"}
+    named: dict[str, Any] = {"type": interpreter, "metavar": "NAME=INTERPRETER", "help": "of one peer; may be repeated"}
     parser.add_argument("--python", action="append", default=[], **named)
     parser.add_argument("--poses", type=int, default=500)
     parser.add_argument("--budget", type=float, default=1.0, help="seconds for our method, seven times as many a peer")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "reports" / "peers.md")
+    add_out(parser, "peers.md")
     options = parser.parse_args()
     report = Report(
         "Beside the libraries of others", "python bench/peers/report.py FOLDER", "a process for each planner"
@@ -202,8 +206,7 @@ def main() -> None:
     report.note("Machine", machine())
     planning(options, report)
     inverse_kinematics(options, report)
-    options.out.write_text(report.markdown())
-    print(report.markdown())
+    report.finish(options.out)
 
 
 if __name__ == "__main__":

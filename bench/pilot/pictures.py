@@ -83,7 +83,7 @@ def stages(count: int = 60) -> list[tuple[str, float, float]]:
             act(k)
             if k >= 5:
                 spent[row] += time.process_time() - processor, time.perf_counter() - clock
-    return [(name, *(float(each) for each in row)) for (name, _), row in zip(acts, spent / count, strict=True)]
+    return [(name, float(row[0]), float(row[1])) for (name, _), row in zip(acts, spent / count, strict=True)]
 
 
 class Served(NamedTuple):
@@ -155,7 +155,8 @@ async def _click(socket: Any, number: int) -> float:
 
 def registration(count: int) -> list[float]:
     """How far small boxes in the picture are from the outline of their corners, projected one by one [px]."""
-    camera, rng, away = published_camera(), np.random.default_rng(5), []
+    away: list[float] = []
+    camera, rng = published_camera(), np.random.default_rng(5)
     augmenter = Augmenter(ROBOT, camera)
     T = eye_at([1.2, 0.2, 0.1], 1.3, np.deg2rad(-150), np.deg2rad(25))
     black = np.zeros((camera.height, camera.width, 3), dtype=np.uint8)

@@ -6,7 +6,6 @@ Usage: ``python bench/pilot/report.py [--quick] [--out bench/reports/pilot.md]``
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from bench.pilot.hulls import GROWTH, hulls_of_links
 from bench.pilot.pictures import registration, served, stages, state_rate
 from bench.pilot.routes import REACTION, REPLANNING, panel_routes, simulated_pilot, small_errors
 from bench.pilot.session import color_logic, preventive_checks, scripted_scenario
+from bench.shared.pages import add_out
 from rrtik_bench.report.page import Report
 from rrtik_ompl.pilot.way_search import STEADY
 
@@ -135,7 +135,7 @@ def main() -> None:
     """Run everything and write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="a tenth of every count")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "reports" / "pilot.md")
+    add_out(parser, "pilot.md")
     options = parser.parse_args()
     part = 10 if options.quick else 1
     report = Report("The pilot's tool, measured without a page", "python bench/pilot/report.py")
@@ -146,8 +146,7 @@ def main() -> None:
     for write in (write_session, write_routes, write_pilot, write_loop):
         write(report, part)
     write_hulls(report)
-    options.out.write_text(report.markdown(), encoding="utf-8")
-    print(report.markdown())
+    report.finish(options.out)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ import numpy as np
 
 import rrtik_ompl as rrtik
 from bench.pilot.scene import NAME, PROBLEM, ROBOT, WORLD, green_grasps
+from bench.shared.problems import goal_joints
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.pilot.arm import SimulatedArm, joint_rates
 from rrtik_ompl.pilot.clearance import executions, free_rows
@@ -52,7 +53,8 @@ def panel_routes(count: int) -> PanelRoutes:
 
 def small_errors(count: int) -> tuple[list[float], int]:
     """Routes between random free postures: which share of executions with errors is free; how many are warned of."""
-    rng, warned, free = np.random.default_rng(1), 0, []
+    free: list[float] = []
+    rng, warned = np.random.default_rng(1), 0
     while len(free) + warned < count:
         ends = rng.uniform(ROBOT.lower, ROBOT.upper, (2, ROBOT.dof))
         if not WORLD.valid_batch(ends).all():
@@ -90,7 +92,7 @@ def simulated_pilot(count: int) -> SimulatedPilot:
     """From the bay to the button, in all three ways."""
     rng, rates, rows = np.random.default_rng(3), joint_rates(ROBOT), []
     for seed in range(count):
-        route = route_to(WORLD, np.array(PROBLEM.start), np.array(PROBLEM.goal.q), rates, seed)
+        route = route_to(WORLD, np.array(PROBLEM.start), np.array(goal_joints(PROBLEM)), rates, seed)
         several = rrtik.plan(PROBLEM, "RRTConnect", seconds=5.0, seed=seed).path
         if isinstance(route, str) or several is None:
             continue

@@ -38,8 +38,9 @@ def _drive(record: Path) -> tuple[Any, list[str]]:
         now += 0.1
         engine.obey(command, now)
         modes.append(session.mode)
+    arm: Any = session.arm
     while session.mode == "following" and now < 600.0:
-        if session.arm.moving is None:
+        if arm.moving is None:
             engine.obey({"name": "next"}, now)
         now += 0.5
         engine.look(now)

@@ -11,6 +11,8 @@ import argparse
 import time
 from pathlib import Path
 
+from bench.shared.pages import add_out
+from rrtik_bench.report.page import Report
 from rrtik_ompl.errors import RrtikError
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.motion_bench_maker import load_motion_bench_maker
@@ -20,19 +22,17 @@ def main() -> int:
     """Check every family and print one row for each."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path, help="the unpacked set, for instance mbm_panda")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "reports" / "mbm_endpoints.md")
+    add_out(parser, "mbm_endpoints.md")
     options = parser.parse_args()
     folder = options.folder
     families = sorted(path for path in (folder / "problems").glob("*") if path.is_dir())
     rows = [check_family(family, folder / "panda.urdf") for family in families]
     total = ("all", *(sum(column) for column in list(zip(*rows, strict=True))[1:]))
-    lines = ["# Ends of the MotionBenchMaker problems for the Panda, exact meshes", ""]
-    lines += ["| family | problems | loaded | start free | goal free | seconds |", "|---|---|---|---|---|---|"]
-    lines += ["| " + " | ".join(str(cell) for cell in (*row[:-1], f"{row[-1]:.1f}")) + " |" for row in [*rows, total]]
-    lines += ["", "Made by `python bench/planning/mbm_endpoints.py FOLDER`."]
-    print("\n".join(lines))
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    options.out.write_text("\n".join(lines) + "\n")
+    title = "Ends of the MotionBenchMaker problems for the Panda, exact meshes"
+    report = Report(title, "python bench/planning/mbm_endpoints.py FOLDER")
+    cells = [[*map(str, row[:-1]), f"{row[-1]:.1f}"] for row in [*rows, total]]
+    report.table("", ("family", "problems", "loaded", "start free", "goal free", "seconds"), cells)
+    report.finish(options.out)
     good = bool(rows) and all(row[1] == row[2] == row[3] == row[4] for row in rows)
     print("all start and goal configurations are free" if good else "NOT all problems are loaded and free")
     return 0 if good else 1

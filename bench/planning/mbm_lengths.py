@@ -14,6 +14,7 @@ from time import perf_counter
 
 import numpy as np
 
+from bench.shared.pages import add_out
 from rrtik_bench.crdt.runs import sound
 from rrtik_bench.report.page import Report
 from rrtik_ompl import one_joint_moves, plan, shorten
@@ -116,7 +117,7 @@ def main() -> int:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--problems", type=int, default=20, help="of each family")
     parser.add_argument("--seconds", type=float, default=0.2, help="for auto")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "reports" / "mbm_lengths.md")
+    add_out(parser, "mbm_lengths.md")
     options = parser.parse_args()
     results: list[Measured] = []
     for family in sorted(path for path in (options.folder / "problems").glob("*") if path.is_dir()):
@@ -124,10 +125,7 @@ def main() -> int:
         chosen = [scenes[k * len(scenes) // options.problems] for k in range(min(options.problems, len(scenes)))]
         results += measured(chosen, options.folder / "panda.urdf", options.seconds)
     report = page(results, options.seconds)
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    options.out.write_text(report.markdown(), encoding="utf-8")
-    print(report.markdown())
-    return 0 if all(bar[3] for bar in report.bars) else 1
+    return report.finish(options.out)
 
 
 if __name__ == "__main__":

@@ -34,7 +34,7 @@ def arm_rows(report: Report, count: int, measure: Parts) -> None:
         done = measure(runs.arm_outcome, [piece for pieces in ways.values() for piece in pieces])
         found = {planner: [done.pop(0) for _ in pieces] for planner, pieces in ways.items()}
         rows += [[name, planner, *figures(some), contacts(some)] for planner, some in found.items()]
-        arm_bars(report, name, arm["count"], found["drrt-con"])
+        arm_bars(report, name, int(arm["count"]), found["drrt-con"])
     report.table("Six-joint arms among 20 obstacles that wander", ["arm", "planner", *HEAD, "runs with contact"], rows)
 
 

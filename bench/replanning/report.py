@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import time
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,9 @@ from bench.replanning import runs, scenes
 from bench.replanning.arms import HEAD, arm_rows, contacts, figures, repair_rows
 from bench.replanning.runs import outcome
 from bench.shared.parts import Parts, add_options
-from rrtik_bench.report.page import Report, processes
+from bench.shared.problems import goal_joints
+from rrtik_bench.report.machine import processes
+from rrtik_bench.report.page import Report
 from rrtik_bench.shortening.plane_worlds import Plane
 from rrtik_ompl.moving_world import MovingWorld
 from rrtik_ompl.replanning import Run, replan
@@ -30,7 +33,7 @@ from rrtik_ompl.replanning.judge import judge
 PLANNERS = ("drrt-con", "rrt-connect", "drrt")
 
 
-def plane_run(problem: rrtik.Problem, seed: int, **changes: object) -> Run:
+def plane_run(problem: rrtik.Problem, seed: int, **changes: Any) -> Run:
     return replan(
         problem,
         limits=scenes.limits(),
@@ -48,15 +51,16 @@ def static_rows(report: Report, count: int) -> None:
         ("pockets, frozen", scenes.pockets(moving=False), [scenes.POCKET, scenes.UPPER]),
     ):
         size = (scenes.SIZE, scenes.SIZE)
-        plane = Plane(name, [np.array(s, dtype=float) for s in shapes], size, problem.start, problem.goal.q)
+        plane = Plane(name, [np.array(s, dtype=float) for s in shapes], size, problem.start, goal_joints(problem))
         walked, once = [], []
         for seed in range(count):
             run = plane_run(problem, seed)
             best = plane.class_optimum(run.configurations)
             walked.append(run.length / best)
             planner = DrrtCon(PlainConnect(np.zeros(2), np.full(2, scenes.SIZE), scenes.EPS, seed), scenes.EPS)
-            planner.begin(problem.start, problem.goal.q[None], MovingWorld(problem.world))
+            planner.begin(problem.start, goal_joints(problem)[None], MovingWorld(problem.world))
             route = planner.path
+            assert route is not None
             once.append(float(np.linalg.norm(np.diff(route, axis=0), axis=1).sum()) / plane.class_optimum(route))
             shares.append(walked[-1] * best <= once[-1] * plane.class_optimum(route) + 1e-9)
         ratios.append(float(np.mean(walked)))
@@ -206,12 +210,11 @@ def main() -> None:
     parts = [("plane", given.repeats), ("repairs", max(given.repeats // 3, 2))]
     with Parts(given.out, given.jobs) as measure:
         for section in measure(part, parts):
-            report.bars += section.bars
-            report.lines += section.lines
-        given.out.write_text(report.markdown())
+            report.add(section)
+        report.save(given.out)
         arm_rows(report, given.runs, measure)
         report.note("How it is read", READING)
-        given.out.write_text(report.markdown())
+        report.save(given.out)
 
 
 READING = (

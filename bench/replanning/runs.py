@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.planning import plan
 from rrtik_ompl.replanning import Run, replan
-from rrtik_ompl.replanning.connecting import PlainConnect
+from rrtik_ompl.replanning.connecting import Motions, PlainConnect
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
 from rrtik_ompl.replanning.generate import moving_problem
 from rrtik_ompl.replanning.judge import Verdict, judge
@@ -30,10 +32,10 @@ PLANS = (("fastrrtconnect", "fastrrtconnect"), ("RRTConnect", "OMPL's RRT-Connec
 
 def arm_problem(name: str, seed: int) -> rrtik.Problem:
     arm = ARMS[name]
-    return moving_problem(rrtik.load_robot(name), arm["count"], arm["speed"], seed, seconds=LONGEST)
+    return moving_problem(rrtik.load_robot(name), int(arm["count"]), arm["speed"], seed, seconds=LONGEST)
 
 
-def arm_options(name: str) -> dict:
+def arm_options(name: str) -> dict[str, Any]:
     """A repair may take half a second, so that figures do not depend on how busy the machine is."""
     arm = ARMS[name]
     bound = {"margin": MARGIN, "speed_bound": arm["speed"], "seconds": LONGEST}
@@ -62,7 +64,9 @@ class Outcome:
 
 def outcome(run: Run, verdict: Verdict | None = None) -> Outcome:
     """A run in short, and what a judge says of it."""
-    seen = {} if verdict is None else {"contacts": tuple(c[1] for c in verdict.contacts), "nearest": verdict.nearest}
+    seen: dict[str, Any] = (
+        {} if verdict is None else {"contacts": tuple(c[1] for c in verdict.contacts), "nearest": verdict.nearest}
+    )
     counts = {event: run.count(event) for event in ("repair", "wait", "evade")}
     times = run.seconds("repair", "repair").tolist(), run.seconds("all").tolist()
     return Outcome(run.arrived, run.length, counts, *times, **seen)
@@ -133,7 +137,7 @@ def paired(name: str, seeds: range, slow_every: int = 8) -> tuple[Moments, Momen
 
 def _loop(name: str, seed: int) -> Loop:
     problem = arm_problem(name, seed)
-    usual = {"planner": "drrt-con", "eps": None, "limits": None, "predict": 0, "seed": seed}
+    usual: dict[str, Any] = {"planner": "drrt-con", "eps": None, "limits": None, "predict": 0, "seed": seed}
     return Loop(problem, problem.world.scene.at, settings(problem.robot, **usual, **arm_options(name)), None)
 
 
@@ -148,9 +152,10 @@ def with_pairs(loop: Loop, quick: Moments, slow: Moments, slow_every: int) -> No
         "from scratch as published, in Python": FromScratch(PlainConnect(lower, upper, eps, 1), eps),
     }
 
-    def timed(motions: object, stop: object) -> bool:
+    def timed(motions: Motions, stop: Callable[[], Any]) -> bool:
         nonlocal count
         count += 1
+        assert planner.path is not None
         path, often = planner.path.copy(), count % slow_every != 0
         found = {what: _repaired(other, path, motions) for what, other in (scratch if often else plain).items()}
         if not often:
@@ -160,13 +165,13 @@ def with_pairs(loop: Loop, quick: Moments, slow: Moments, slow_every: int) -> No
         ours = repair(motions, stop)
         found[OURS] = (time.process_time() - begin, _length(planner.path) / _length(path)) if ours else None
         if None not in found.values():
-            (quick if often else slow).add(found)
+            (quick if often else slow).add({what: each for what, each in found.items() if each is not None})
         return ours
 
-    planner.repair = timed
+    planner.repair = timed  # type: ignore[method-assign, assignment]
 
 
-def _repaired(other: DrrtCon, path: np.ndarray, motions: object) -> tuple[float, float] | None:
+def _repaired(other: DrrtCon, path: np.ndarray, motions: Motions) -> tuple[float, float] | None:
     """Seconds of another's repair and the share of the path's length that the new one has."""
     other.path = path
     other.look(motions)
@@ -175,11 +180,12 @@ def _repaired(other: DrrtCon, path: np.ndarray, motions: object) -> tuple[float,
     return (time.process_time() - begin, _length(other.path) / _length(path)) if found else None
 
 
-def _length(path: np.ndarray) -> float:
+def _length(path: np.ndarray | None) -> float:
+    assert path is not None
     return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
-def _after(deadline: float):
+def _after(deadline: float) -> Callable[[], bool]:
     return lambda: time.process_time() > deadline
 
 
@@ -189,7 +195,7 @@ def _by_plan(loop: Loop, planner: str) -> tuple[float, float] | None:
     world = rrtik.World(loop._problem.robot, still(loop._world.scene), accuracy="conservative")
     problem = rrtik.Problem(world, loop.q, loop._goals[0])
     found = plan(problem, planner, seconds=2.0, seed=1)
-    if not found.found:
+    if found.path is None:
         return None
     several = len(found.path.waypoints) > 2
     path = rrtik.shorten(found.path, problem, method="sequential", seed=1) if several else found.path

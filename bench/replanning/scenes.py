@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.replanning.generate import turning_points
@@ -32,7 +35,7 @@ def place(x: float, y: float) -> pin.SE3:
     return pin.SE3(np.eye(3), np.array([x, y, 0.0]))
 
 
-def problem(name: str, obstacles: list[Obstacle], start: tuple, goal: tuple) -> rrtik.Problem:
+def problem(name: str, obstacles: list[Obstacle], start: ArrayLike, goal: ArrayLike) -> rrtik.Problem:
     world = rrtik.World(point(), Scene(tuple(obstacles)), motion_resolution=0.05)
     return rrtik.Problem(world, start, goal, name=name)
 
@@ -91,7 +94,7 @@ def covered(seed: int) -> rrtik.Problem:
     return problem("covered_goal", [Obstacle("lid", square, away, motion)], (2, 2), goal)
 
 
-def moving_goal(seed: int):
+def moving_goal(seed: int) -> tuple[rrtik.Problem, Callable[[float], np.ndarray]]:
     """A static scene whose goal goes on a circle at 0.6 of the robot's speed; the problem and the goal's feed."""
     phase, speed = np.random.default_rng([seed, 5]).uniform(0.0, 2.0 * np.pi), 0.6 * STEP * RATE
     centre, radius = np.array([15.0, 14.0]), 2.5

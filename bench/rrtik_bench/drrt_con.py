@@ -6,7 +6,8 @@ from itertools import groupby
 
 import numpy as np
 
-from rrtik_bench.report.rows import Row, Table, verdict
+from rrtik_bench.report.rows import Row, verdict
+from rrtik_bench.tables import Table
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.moving_world import MovingWorld
 from rrtik_ompl.replanning import Run

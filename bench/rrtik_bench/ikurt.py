@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 import rrtik_ompl as rrtik
-from rrtik_bench.report.rows import Row, Table, verdict
+from rrtik_bench.report.rows import Row, verdict
+from rrtik_bench.tables import Table
 from rrtik_ompl.goal import PoseGoal, PositionGoal
 from rrtik_ompl.ik.ikurt.metric import TipMetric
 from rrtik_ompl.problem import Problem

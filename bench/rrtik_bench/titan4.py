@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import rrtik_ompl as rrtik
-from rrtik_bench.report.rows import Row, Table, verdict
+from rrtik_bench.report.rows import Row, verdict
+from rrtik_bench.tables import Table
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.ik.closed_form import form_of, solutions
 from rrtik_ompl.ik.form import wrapped

@@ -10,6 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from bench.shared.problems import goal_joints
 from rrtik_bench.report.page import Report
 from rrtik_ompl import load_problem, load_robot
 from rrtik_ompl.overlay.augment import Augmenter, Ghost
@@ -66,7 +67,7 @@ def frame_times(report: Report, count: int) -> None:
               for thing in scenario.marker_map.objects for marker in thing.markers]  # fmt: skip
     gray = photograph(clean_picture(scenario.camera, prints, rays=6), np.random.default_rng(0))
     taken = np.repeat(gray[..., None], 3, axis=2)
-    q, goal = np.array(problem.start), np.array(problem.goal.q)
+    q, goal = np.array(problem.start), np.array(goal_joints(problem))
     tips = problem.robot.fk_batch(q + np.linspace(0.0, 1.0, 40)[:, None] * (goal - q))[:, :3, 3]
     arm = partial(augmenter.draw, taken, scenario.T_base_camera)
     more: dict[str, Any] = {"trail": tips, "frames": [problem.robot.fk(goal)]}

@@ -17,7 +17,8 @@ from bench.sensing import overlay_frames, rendered_scenes
 from bench.sensing import rows as sensing_rows
 from bench.sensing import series as sensing_series
 from bench.shared.parts import Parts, add_options
-from rrtik_bench.report.page import Report, processes
+from rrtik_bench.report.machine import processes
+from rrtik_bench.report.page import Report
 
 PICTURES = (
     "The published camera (640 x 480, its matrix, skew left out) with the distortion of a usual web camera; one 4x4 "
@@ -57,10 +58,8 @@ def main() -> None:
     pieces = [(number, options.share) for number in range(len(SECTIONS))]
     with Parts(options.out, options.jobs) as measure:
         for part in (*measure(measured, pieces[:-1]), measured(*pieces[-1])):
-            report.lines += part.lines
-            report.bars += part.bars
-        options.out.write_text(report.markdown(), encoding="utf-8")
-    print(report.markdown())
+            report.add(part)
+        report.finish(options.out)
 
 
 def measured(number: int, share: float) -> Report:

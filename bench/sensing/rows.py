@@ -98,9 +98,10 @@ def statistics(report: Report, _: int) -> None:
 
 def simulated_accuracy(report: Report, _: int) -> None:
     """Section 6 without pictures: corners pulled inwards by blur, a lens whose distortion is not corrected."""
-    errors, published = [], [error for _, _, _, error in ACCURACY]
+    errors: list[float] = []
+    published = [error for _, _, _, error in ACCURACY]
     bent, straight = published_camera((0.3, 0.0, 0.0, 0.0, 0.0)), published_camera()
-    for distance, _, _, _ in ACCURACY:
+    for distance in (each[0] for each in ACCURACY):
         centres = []
         for aside in (-0.15, 0.15):
             T = facing(0.0, 0.0, 0.0, [aside, 0.0, 1e-3 * distance])
@@ -147,7 +148,9 @@ def jitter(report: Report, count: int) -> None:
 
 def end_to_end(report: Report, count: int) -> None:
     """Photograph, pose of the object, grasp, closed-form inverse kinematics, forward kinematics: error at the tip."""
-    robot, rng, errors, covered = load_robot("titan4"), np.random.default_rng(3), [], []
+    errors: list[float] = []
+    covered: list[bool] = []
+    robot, rng = load_robot("titan4"), np.random.default_rng(3)
     T_base_camera = eye_at([1.2, 0.0, 0.1], 0.8, np.deg2rad(-150.0), np.deg2rad(35.0))
     thing = MarkedObject("valve", "target", (MountedMarker(0, SIDE),))
     marker_map = MarkerMap(DICTIONARY, (thing,), T_base_camera)
@@ -163,10 +166,8 @@ def end_to_end(report: Report, count: int) -> None:
             continue
         picture = photograph(clean_picture(CAMERA, [(T, sheet)], rays=5), rng, **HARD)
         (placed,) = objects_in_base(look(picture, CAMERA, marker_map), marker_map)
-        covered.append(
-            np.linalg.norm(placed.T_base_object.translation - (T_base_camera * T).translation)
-            < placed.sigmas * placed.position_sigma
-        )
+        off = float(np.linalg.norm(placed.T_base_object.translation - (T_base_camera * T).translation))
+        covered.append(off < placed.sigmas * placed.position_sigma)
         found = solutions(robot, (placed.T_base_object * grasp).homogeneous[None])
         if found.valid.any():
             reached = robot.fk(found.branches[0][found.valid[0]][0]).translation

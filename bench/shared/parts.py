@@ -12,7 +12,9 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, TextIO, get_type_hints
 
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
+
+from bench.shared.pages import add_out
 
 Part = Sequence[Any]  # what the work is given: plain words and numbers, files, None
 
@@ -20,8 +22,7 @@ Part = Sequence[Any]  # what the work is given: plain words and numbers, files, 
 def add_options(parser: argparse.ArgumentParser, page: str) -> None:
     """``--jobs`` and ``--out`` of a script that writes this page of `bench/reports`."""
     parser.add_argument("--jobs", type=int, default=1, help="processes; more than one make wall times longer")
-    out = Path(__file__).parent.parent / "reports" / page
-    parser.add_argument("--out", type=Path, default=out, help="the page; what is done is kept beside it till the end")
+    add_out(parser, page, "the page; what is done is kept beside it till the end")
 
 
 class Parts:
@@ -63,6 +64,7 @@ class Parts:
         """
         kind: TypeAdapter[Any] = TypeAdapter(get_type_hints(work)["return"])
         keys = [_key(work, part) for part in parts]
+        self._forget_unreadable(kind, keys)
         left = [(key, part) for key, part in zip(keys, parts, strict=True) if key not in self._known]
         begin = perf_counter()
         for count, (key, result) in enumerate(_spread(work, left, self._jobs), start=1):
@@ -74,6 +76,14 @@ class Parts:
             to_go = seconds / count * (len(left) - count)
             print(f"{text}, {to_go:.0f} s to go", file=sys.stderr, flush=True)
         return [kind.validate_python(self._known[key]) for key in keys]
+
+    def _forget_unreadable(self, kind: TypeAdapter[Any], keys: Sequence[str]) -> None:
+        for key in self._known.keys() & set(keys):
+            try:
+                kind.validate_python(self._known[key])
+            except ValidationError:
+                del self._known[key]
+                print(f"{key}: kept by another version, measured again", file=sys.stderr)
 
 
 def _key(work: Callable[..., Any], part: Part) -> str:

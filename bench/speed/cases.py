@@ -58,7 +58,8 @@ def clutter(count: int, reach: float, rng: np.random.Generator) -> Scene:
     centres = np.column_stack([radius * np.cos(azimuth), radius * np.sin(azimuth), height])
     boxes = (Box(rng.uniform(0.05, 0.15, 3) * reach) for _ in range(count))
     poses = (pin.SE3(np.eye(3), centre) for centre in centres)
-    return Scene([Obstacle(f"box{k}", box, pose) for k, (box, pose) in enumerate(zip(boxes, poses, strict=True))])
+    parts = enumerate(zip(boxes, poses, strict=True))
+    return Scene(tuple(Obstacle(f"box{k}", box, pose) for k, (box, pose) in parts))
 
 
 def panda_files(options: Options, count: int) -> list[Path]:
@@ -100,7 +101,7 @@ def sphere_problem(options: Options, file: Path) -> Problem | None:
     assert options.folder is not None
     exact = exact_problem(options, file)
     in_box = family(file) == "box"
-    obstacles = (Obstacle(o.name, vamp_shape(o.shape, in_box), o.pose) for o in exact.world.scene.obstacles)
+    obstacles = tuple(Obstacle(o.name, vamp_shape(o.shape, in_box), o.pose) for o in exact.world.scene.obstacles)
     try:
         world = World(sphere_panda(options.folder), Scene(obstacles), accuracy="conservative")
         return Problem(world, exact.start, exact.goal, name=exact.name)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -102,7 +104,8 @@ def _along_free(world: World, options: Options) -> tuple[float, int] | None:
 
 def near_obstacles(options: Options, report: Report) -> None:
     """Rows 6 and 7: exact batches near obstacles against Pinocchio and coal, and what the kernels leave undecided."""
-    rows, found = [], {kind: [] for kind in KINDS}
+    rows: list[list[str]] = []
+    found: dict[str, list[Any]] = {kind: [] for kind in KINDS}
     for name, kind, world, Q in _near(options):
         cells, ratio, share = _exact_batch(world, Q)
         rows.append([name, kind, *cells])
@@ -129,7 +132,7 @@ def _exact_batch(world: World, Q: Matrix) -> tuple[list[str], float, float]:
     for _ in range(3):
         runs = [
             timed(lambda: world.valid_batch(Q)),
-            *(timed(lambda p=p: [p(full) for full in world.robot.lift(some)]) for p in peers),
+            *(timed(partial(_one_by_one, peer, world, some)) for peer in peers),
         ]
         costs.append([1e6 * seconds / len(rows) for (seconds, _), rows in zip(runs, (Q, some, some), strict=True)])
         answers = [found for _, found in runs]
@@ -139,6 +142,10 @@ def _exact_batch(world: World, Q: Matrix) -> tuple[list[str], float, float]:
     share = _undecided(world, Q)
     cells = [f"{len(Q)}", f"{answers[0].mean():.2f}", f"{ours:.2f}", f"{theirs:.1f}", f"{on_meshes:.1f}"]
     return [*cells, f"{theirs / ours:.3g}", *map(str, wrong), f"{100 * share:.1f}"], float(theirs / ours), share
+
+
+def _one_by_one(peer: Checker, world: World, rows: Matrix) -> list[bool]:
+    return [peer(full) for full in world.robot.lift(rows)]
 
 
 def plain_checks(world: World, *, as_loaded: bool) -> Checker:

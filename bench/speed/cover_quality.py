@@ -12,18 +12,21 @@ set: ``panda.urdf``, ``problems/``), exact solids, with segments between start, 
 from __future__ import annotations
 
 import argparse
-import platform
 import time
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 
+from bench.shared.pages import add_out
+from bench.shared.problems import goal_joints
+from rrtik_bench.report.machine import versions
+from rrtik_bench.report.page import Report
 from rrtik_ompl import Obstacle, Scene, World, load_robot
+from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.fast import FREE, UNDECIDED, FastWorld, needs_covers
 from rrtik_ompl.fast.covers import inner_spheres, outer_cover, protrusion_bound
 from rrtik_ompl.motion_bench_maker import load_motion_bench_maker
@@ -34,9 +37,9 @@ ROBOTS = ("titan4", "panda", "ur5", "puma560", "kinova", "so101", "so100", "xarm
 NEAR = 0.1  # [m]
 SCENES, OBSTACLES, SEGMENTS, PER_SEGMENT = 4, 8, 150, 24
 SHORTEST, LONGEST = 0.3, 2.0  # [rad] of a segment, longest joint
-COLUMNS = (
-    "robot | outer balls | inner balls | worst protrusion mm | first time s | undecided uniform % | near % "
-    "| of which free % | ns free | ns near"
+HEADS = (
+    *("robot", "outer balls", "inner balls", "worst protrusion mm", "first time s", "undecided uniform %", "near %"),
+    *("of which free %", "ns free", "ns near"),
 )
 
 
@@ -62,7 +65,7 @@ class Shares:
     near_ns: float
 
 
-def balls_of(bodies: Iterable[object]) -> Balls:
+def balls_of(bodies: Iterable[Body]) -> Balls:
     """Covers of the bodies that need them, made anew."""
     outer, inner = {}, {}
     begin = time.process_time()
@@ -95,7 +98,7 @@ def clutter(reach: float, rng: np.random.Generator, grow: float = 0.0) -> Scene:
         pose = pin.SE3(pin.Quaternion(*rng.normal(size=4)).normalized().matrix(), centre)
         box = Box(sizes + 2 * grow) if k % 2 else Cylinder(0.5 * sizes[0] + grow, sizes[1] + 2 * grow)
         found.append(Obstacle(f"solid{k}", box, pose))
-    return Scene(found)
+    return Scene(tuple(found))
 
 
 def grown(scene: Scene, by: float) -> Scene:
@@ -108,7 +111,7 @@ def grown(scene: Scene, by: float) -> Scene:
         elif isinstance(shape, Cylinder):
             shape = Cylinder(shape.radius + by, shape.length + 2 * by)
         found.append(Obstacle(item.name, shape, item.pose))
-    return Scene(found)
+    return Scene(tuple(found))
 
 
 def reach_of(robot: Robot) -> float:
@@ -174,7 +177,7 @@ def times(fast: FastWorld, robot: Robot, A: np.ndarray, B: np.ndarray, near: np.
     return 1e9 * min(on_edges) / max(128 * int(free.sum()), 1), 1e9 * min(alone) / max(len(rows), 1)
 
 
-def row(name: str, robot: Robot, known: Balls, found: list[Shares]) -> str:
+def row(name: str, robot: Robot, known: Balls, found: list[Shares]) -> list[str]:
     covered = [b.geometry for b in World(robot).bodies if id(b.geometry) in known.outer]
     worst = max(protrusion_bound(geometry, known.outer[id(geometry)]) for geometry in covered)
     counts = [sum(len(c) for c in balls.values()) for balls in (known.outer, known.inner)]
@@ -183,18 +186,17 @@ def row(name: str, robot: Robot, known: Balls, found: list[Shares]) -> str:
     near_share = 100 * total["near_undecided"] / max(total["near"], 1)
     free_share = 100 * total["near_undecided_free"] / max(total["near"], 1)
     times_ns = [np.median([s.free_ns for s in found]), np.median([s.near_ns for s in found])]
-    return (
-        f"| {name} | {counts[0]} | {counts[1]} | {1e3 * worst:.1f} | {known.seconds:.1f} | {uniform_share:.1f} "
-        f"| {near_share:.1f} | {free_share:.1f} | {times_ns[0]:.0f} | {times_ns[1]:.0f} |"
-    )
+    figures = (1e3 * worst, known.seconds, uniform_share, near_share, free_share)
+    return [name, *map(str, counts), *(f"{value:.1f}" for value in figures), *(f"{value:.0f}" for value in times_ns)]
 
 
-def random_scenes(name: str) -> str:
+def random_scenes(name: str) -> list[str]:
     robot = load_robot(name)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         known = balls_of(World(robot).bodies)
-    reach, found, seed = reach_of(robot), [], 0
+    found: list[Shares] = []
+    reach, seed = reach_of(robot), 0
     while len(found) < SCENES and seed < 40:
         seed += 1
         scene = clutter(reach, np.random.default_rng(seed))
@@ -204,8 +206,10 @@ def random_scenes(name: str) -> str:
     return row(name, robot, known, found)
 
 
-def benchmark_problems(folder: Path, each: int) -> str:
-    known, found, robot = None, [], None
+def benchmark_problems(folder: Path, each: int) -> list[str]:
+    found: list[Shares] = []
+    known: Balls | None = None
+    robot: Robot | None = None
     for family in sorted((folder / "problems").iterdir()):
         for file in sorted(family.glob("scene*.yaml"))[:each]:
             try:
@@ -215,9 +219,11 @@ def benchmark_problems(folder: Path, each: int) -> str:
                 continue
             world, robot = problem.world, problem.world.robot
             known = known or balls_of(World(robot).bodies)
-            ends = np.stack([problem.start, problem.goal.q])
+            ends = np.stack([problem.start, goal_joints(problem)])
             wide = grown(world.scene, NEAR)
             found.append(measured(world, known, wide, np.random.default_rng(0), ends))
+    assert robot is not None
+    assert known is not None
     return row("panda, MotionBenchMaker", robot, known, found)
 
 
@@ -226,28 +232,23 @@ def main() -> None:
     parser.add_argument("robots", nargs="*", default=ROBOTS)
     parser.add_argument("--mbm", type=Path, help="the unpacked set of MotionBenchMaker's Panda problems")
     parser.add_argument("--each", type=int, default=3, help="problems of every family")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "reports" / "cover_quality.md")
+    add_out(parser, "cover_quality.md")
     options = parser.parse_args()
-    packages = ", ".join(f"{p} {version(p)}" for p in ("pin", "coal", "numpy", "numba"))
-    lines = [
-        "# Balls around and inside the links",
-        "",
-        f"{SCENES} random scenes of {OBSTACLES} solids for each robot. {platform.machine()}, Python",
-        f"{platform.python_version()}, {packages}. Process CPU time. Made by `python bench/speed/cover_quality.py`;",
-        "its documentation says what the columns mean.",
-        "",
-        f"| {COLUMNS} |",
-        "|---" * (COLUMNS.count("|") + 1) + "|",
-    ]
-    print("\n".join(lines))
+    rows = []
     for name in options.robots:
-        lines.append(random_scenes(name))
-        print(lines[-1], flush=True)
+        rows.append(random_scenes(name))
+        print(*rows[-1], sep=" | ", flush=True)
     if options.mbm is not None:
-        lines.append(benchmark_problems(options.mbm, options.each))
-        print(lines[-1])
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    options.out.write_text("\n".join(lines) + "\n")
+        rows.append(benchmark_problems(options.mbm, options.each))
+    report = Report(
+        "Balls around and inside the links",
+        "python bench/speed/cover_quality.py",
+        intro=f"{SCENES} random scenes of {OBSTACLES} solids for each robot. "
+        f"{versions('pin', 'coal', 'numpy', 'numba')}. Process CPU time. "
+        "The documentation of the script says what the columns mean.",
+    )
+    report.table("", HEADS, rows)
+    report.finish(options.out)
 
 
 if __name__ == "__main__":

@@ -106,6 +106,7 @@ def _kernel_search(problem: Problem, goals: Matrix, seconds: float, per_radian: 
     ask = None if world.accuracy == "conservative" else world.motion_valid_batch
     chain, (lower, upper) = world.robot.chain, planning_bounds(problem, goals)
     weights = world.weights if per_radian is None else np.zeros(world.robot.dof)
+    assert world.fast is not None
     search = ConnectSearch(
         world.fast,
         lower,

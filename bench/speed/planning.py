@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import partial
 from importlib.util import find_spec
 from itertools import pairwise
@@ -55,7 +55,7 @@ def spheres(options: Options, report: Report) -> None:
         ours = our_search(problem, seconds=options.limit, per_radian=PER_RADIAN)
         if number == 0:
             warm_up(problem)
-        runs = [timed(lambda ours=ours: ours(options.seed)) for _ in range(REPEATS)]
+        runs = [timed(partial(ours, options.seed)) for _ in range(REPEATS)]
         times["ours"].append(min(seconds for seconds, _ in runs))
         rows = runs[0][1]
         found += rows is not None
@@ -63,13 +63,13 @@ def spheres(options: Options, report: Report) -> None:
         as_certified += _verified(problem, rows)
         if HAS_ROBOPLAN:
             peer = _peer(problem, options.limit, roboplan.search)
-            calls = [timed(lambda peer=peer: peer(options.seed))[0] for _ in range(REPEATS)]
+            calls = [timed(partial(peer, options.seed))[0] for _ in range(REPEATS)]
             times["roboplan"].append(min(calls))
         if HAS_VAMP:
             theirs = vamp.search(problem)
-            calls = [timed(theirs) for _ in range(REPEATS)]
-            times["VAMP, call"].append(min(seconds for seconds, _ in calls))
-            times["VAMP, inner"].append(min(inner for _, (_, inner) in calls))
+            inner_calls = [timed(theirs) for _ in range(REPEATS)]
+            times["VAMP, call"].append(min(seconds for seconds, _ in inner_calls))
+            times["VAMP, inner"].append(min(inner for _, (_, inner) in inner_calls))
     table = _rows(times, "ours")
     if not HAS_VAMP:
         table.append([STORED, "", *(f"{value:.1f}" for value in VAMP_STORED), ""])
@@ -101,7 +101,7 @@ def exact(options: Options, report: Report) -> None:
             warm_up(problem)
         for name, search in _exact_searches(problem, options).items():
             begin = time.perf_counter()
-            seconds, rows = timed(lambda search=search: search(options.seed))
+            seconds, rows = timed(partial(search, options.seed))
             wall += [time.perf_counter() - begin] if name == "plan()" else []
             times[name].append(seconds)
             by_family.setdefault(family(file), _times(*names))[name].append(seconds)
@@ -174,7 +174,7 @@ def callbacks(options: Options, report: Report) -> None:
             "plain": _peer(problem, CALLBACK_LIMIT, ompl_callback.search),
         }
         for name, search in searches.items():
-            seconds, rows = timed(lambda search=search: search(options.seed))
+            seconds, rows = timed(partial(search, options.seed))
             times[name].append(seconds)
             solved[name] += rows is not None
     rows = [[*row, str(solved[row[0]])] for row in _rows(times, "ours")]
@@ -224,7 +224,7 @@ def titan(options: Options, report: Report) -> None:
             "bicrdt": our_search(problem, seconds=options.limit, planner="bicrdt"),
         }
         for name, search in searches.items():
-            runs = [timed(lambda search=search, seed=seed: search(seed)) for seed in seeds]
+            runs = [timed(partial(search, seed)) for seed in seeds]
             verified = sum(_verified(problem, rows) for _, rows in runs)
             times = [seconds for seconds, _ in runs]
             medians += [float(np.median(times))] if name == "ours" else []
@@ -277,7 +277,8 @@ def _rows(times: Times, first: str) -> list[list[str]]:
 
 
 def _three(values: ArrayLike) -> str:
-    found: Iterable[float] = (np.median(values), np.mean(values), np.quantile(values, 0.95))
+    numbers = np.asarray(values, dtype=float)
+    found = (np.median(numbers), np.mean(numbers), np.quantile(numbers, 0.95))
     return " / ".join(f"{v:.1f}" for v in found) + " us"
 
 

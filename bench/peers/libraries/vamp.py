@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pinocchio as pin
 
 from rrtik_ompl import Problem
-from rrtik_ompl.shapes import Box, Capsule
+from rrtik_ompl.shapes import Box, Capsule, Sphere
 
 SAMPLES = 100_000  # its default, a million, costs 0.5 ms of allocation in every call
 
@@ -25,8 +25,10 @@ def search(problem: Problem) -> Callable[[], tuple[bool, float]]:
             scene.add_cuboid(vamp.Cuboid(place, turn, 0.5 * shape.size))
         elif isinstance(shape, Capsule):
             scene.add_capsule(vamp.Cylinder(place, turn, shape.radius, shape.length))
-        else:
+        elif isinstance(shape, Sphere):
             scene.add_sphere(vamp.Sphere(place, shape.radius))
+        else:
+            raise TypeError(f"VAMP has no {type(shape).__name__}")
     start, goal = problem.start, problem.goal.q  # type: ignore[union-attr]
 
     def solve() -> tuple[bool, float]:

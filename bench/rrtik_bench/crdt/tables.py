@@ -11,7 +11,8 @@ import rrtik_ompl as rrtik
 from rrtik_bench.crdt.baseline import TreeRun, crdt_run, rrt_run
 from rrtik_bench.crdt.published import CRDT_TABLE, PRISM_LIST, RRT_TABLE, SDU_LIST
 from rrtik_bench.crdt.runs import RouteRun, joints_of, route_run
-from rrtik_bench.report.rows import Row, Table, verdict, within
+from rrtik_bench.report.rows import Row, verdict, within
+from rrtik_bench.tables import Table
 from rrtik_ompl.transitions import lower_bound, route_length, routes, transitions
 
 SOURCE = "C-RDT paper"

@@ -9,7 +9,8 @@ import numpy as np
 
 from rrtik_bench.genetic.published import FIRST_POINT, TABLE_4, TABLE_5
 from rrtik_bench.genetic.runs import TRAJECTORIES, Run, arm, mean, median, runs
-from rrtik_bench.report.rows import Row, Table, verdict, within
+from rrtik_bench.report.rows import Row, verdict, within
+from rrtik_bench.tables import Table
 from rrtik_ompl.ik.genetic.options import HISTORICAL, STANDARD, GeneticOptions
 
 SOURCE = "GA-REB paper"

@@ -17,7 +17,8 @@ from rrtik_bench.mb_rrt.runs import (
     laws,
     precise,
 )
-from rrtik_bench.report.rows import HELD, Row, Table, verdict, within
+from rrtik_bench.report.rows import Row, Verdict, verdict, within
+from rrtik_bench.tables import Table
 from rrtik_ompl.ik.mb_rrt.links import Links
 
 SOURCE = "MB-RRT paper"
@@ -81,7 +82,7 @@ def _variant(count: int, name: str, found: Measured, goals: int) -> list[Row]:
     few = READINGS.get((count, name), f"a mean of {successes} successes anywhere in up to 10,000 passes")
     return [
         Row(f"{label}: goals solved", f"{rate:.4g} %", f"{found.converged:.4g} % of {goals}", solved, reading),
-        Row(f"{label}: mean passes", f"{mean:.1f}", _number(found.mean), cost, PASS if cost == HELD else few),
+        Row(f"{label}: mean passes", f"{mean:.1f}", _number(found.mean), cost, PASS if cost is Verdict.HELD else few),
         Row(
             f"{label}: rho, rho after 10,000",
             f"{rho:.3f}, {rho_all:.3f}",

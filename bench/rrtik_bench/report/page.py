@@ -1,53 +1,91 @@
-"""A Markdown page of acceptance rows (what was wanted, what was measured, held or missed) and tables."""
+"""A Markdown page: acceptance rows (what was wanted, what was measured, held or missed), tables and text."""
 
 from __future__ import annotations
 
 import platform
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 
+import numpy as np
 
-def processes(count: int) -> str:
-    """How many there were, as a page says it."""
-    return "one process" if count == 1 else f"{count} processes"
-
-
-def package_version(name: str) -> str:
-    """The version of an installed package, or that it is missing."""
-    try:
-        return f"{name} {version(name)}"
-    except PackageNotFoundError:
-        return f"{name} not installed"
+from rrtik_bench.report.machine import processes
+from rrtik_bench.report.rows import Row, Verdict, verdict
+from rrtik_ompl.benchmark.tables import markdown_table
 
 
 @dataclass
 class Report:
-    """Collects sections and bars."""
+    """Collects sections and acceptance rows.
+
+    Attributes:
+        title: Of the page.
+        command: Which writes it.
+        where: How many processes worked.
+        intro: A paragraph that stands before everything else.
+        lines: Of the sections.
+        bars: Acceptance rows; they stand before the sections.
+    """
 
     title: str
     command: str
     where: str = processes(1)
+    intro: str = ""
     lines: list[str] = field(default_factory=list)
-    bars: list[tuple[str, str, str, bool]] = field(default_factory=list)
+    bars: list[Row] = field(default_factory=list)
 
-    def table(self, title: str, head: list[str], rows: list[list[str]]) -> None:
-        """Add a section with one table."""
-        self.lines += [f"## {title}", "", "| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
-        self.lines += ["| " + " | ".join(row) + " |" for row in rows] + [""]
+    def table(
+        self, title: str, heads: Sequence[str], rows: Iterable[Sequence[str]], *, text: str = "", level: int = 2
+    ) -> None:
+        """Add a section with one table, below a text if there is one."""
+        self.note(title, text, level=level)
+        self.lines += [*markdown_table(heads, rows), ""]
 
-    def note(self, title: str, text: str) -> None:
-        """Add a section of text."""
-        self.lines += [f"## {title}", "", text, ""]
+    def note(self, title: str, text: str, *, level: int = 2) -> None:
+        """Add a section of text; without a title the text goes on where the last section ended."""
+        self.lines += [f"{'#' * level} {title}", ""] if title else []
+        self.lines += [text, ""] if text else []
 
-    def bar(self, what: str, wanted: str, measured: str, held: bool) -> None:
+    def bar(self, what: str, wanted: str, measured: str, held: bool | np.bool) -> None:
         """Add an acceptance row."""
-        self.bars.append((what, wanted, measured, bool(held)))
+        self.bars.append(Row(what, wanted, measured, verdict(bool(held))))
+
+    def add(self, part: Report) -> None:
+        """Add the sections and the acceptance rows of another report."""
+        self.lines += part.lines
+        self.bars += part.bars
+
+    @property
+    def passes(self) -> bool:
+        """Whether no acceptance row is missed."""
+        return all(row.verdict.passes for row in self.bars)
 
     def markdown(self) -> str:
         """The whole page."""
-        held = sum(bar[3] for bar in self.bars)
-        rows = [f"| {a} | {b} | {c} | {'held' if ok else '**missed**'} |" for a, b, c, ok in self.bars]
+        held = sum(row.verdict is Verdict.HELD for row in self.bars)
         head = [f"# {self.title}", "", f"Written by `{self.command}`, {platform.machine()}, {self.where}.", ""]
-        bars = [f"## Acceptance: {held} of {len(self.bars)} held", ""]
-        bars += ["| bar | wanted | measured | |", "|---|---|---|---|", *rows, ""]
-        return "\n".join([*head, *(bars if rows else []), *self.lines])
+        head += [self.intro, ""] if self.intro else []
+        if self.bars:
+            rows = [(row.name, row.published, row.measured, _shown(row.verdict)) for row in self.bars]
+            head += [f"## Acceptance: {held} of {len(self.bars)} held", ""]
+            head += [*markdown_table(("bar", "wanted", "measured", ""), rows), ""]
+        return "\n".join([*head, *self.lines])
+
+    def save(self, file: Path) -> None:
+        """Write the page; its folder is made if need be."""
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(self.markdown(), encoding="utf-8")
+
+    def finish(self, file: Path) -> int:
+        """Write the page and print it.
+
+        Returns:
+            Exit code of a script: 1 if an acceptance row is missed, else 0.
+        """
+        self.save(file)
+        print(self.markdown())
+        return int(not self.passes)
+
+
+def _shown(found: Verdict) -> str:
+    return found.value if found.passes else f"**{found.value}**"

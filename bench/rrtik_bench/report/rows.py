@@ -1,11 +1,26 @@
-"""One line of a comparison: what was printed, what was measured, how the text was read, and what to make of it."""
+"""One figure beside what was printed or wanted, and the verdict on it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from enum import Enum
 
-HELD, DIFFERS, MISSED = "held", "differs", "missed"
+
+class Verdict(str, Enum):
+    """What to make of a figure.
+
+    ``held``: as printed or wanted, within what chance or the statement allows; ``differs``: not so, and the reading
+    says why; ``missed``: outside what is expected too.
+    """
+
+    HELD = "held"
+    DIFFERS = "differs"
+    MISSED = "missed"
+
+    @property
+    def passes(self) -> bool:
+        """Whether a report with this verdict is a success."""
+        return self is not Verdict.MISSED
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,44 +29,22 @@ class Row:
 
     Attributes:
         name: What it is.
-        published: As printed.
+        published: As printed, or what is wanted.
         measured: As it comes out here.
-        verdict: ``held``: as printed, within what chance or the statement allows; ``differs``: not as printed, and the
-            reading says why; ``missed``: outside what is expected too.
+        verdict: What to make of it.
         reading: How the text was read, or why the figure differs.
     """
 
     name: str
     published: str
     measured: str
-    verdict: str
+    verdict: Verdict
     reading: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Table:
-    """A table or a figure with numbers.
-
-    Attributes:
-        name: What to call it on the command line.
-        title: What it shows.
-        source: Where it was published.
-        run: Measures it, quickly (fewer runs, the same rules) or in full.
-        seconds: About how long the full measurement takes on two cores, on its own; tables of a page may share runs.
-        quick_seconds: The same for the quick one.
-    """
-
-    name: str
-    title: str
-    source: str
-    run: Callable[[bool], list[Row]]
-    seconds: float
-    quick_seconds: float
-
-
-def verdict(close: bool, expected: bool = False) -> str:
-    """``held`` if a figure is as printed, ``differs`` if it is as the reading lets expect, else ``missed``."""
-    return HELD if close else DIFFERS if expected else MISSED
+def verdict(close: bool, expected: bool = False) -> Verdict:
+    """``held`` if a figure is as printed or wanted, ``differs`` if as the reading lets expect, else ``missed``."""
+    return Verdict.HELD if close else Verdict.DIFFERS if expected else Verdict.MISSED
 
 
 def within(factor: float, measured: float, published: float) -> bool:

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_bench.report.rows import Row, Table, verdict, within
+from rrtik_bench.report.rows import Row, verdict, within
 from rrtik_bench.sensing.tables import ACCURACY, GRIPPER, SERIES, SOURCE
+from rrtik_bench.tables import Table
 from rrtik_ompl.sensing.precision import NORMAL_QUARTILES, series_of
 
 TIMES_STEADIER = 3.0  # wanted of the depth of a marker; of a gripper only that it is not less steady

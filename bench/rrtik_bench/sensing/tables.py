@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from rrtik_bench.report.rows import Row, Table, verdict, within
+from rrtik_bench.report.rows import Row, verdict, within
+from rrtik_bench.tables import Table
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.sensing.precision import NORMAL_QUARTILES
 

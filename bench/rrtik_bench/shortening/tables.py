@@ -10,8 +10,9 @@ from typing import TypeAlias
 import numpy as np
 
 import rrtik_ompl as rrtik
-from rrtik_bench.report.rows import Row, Table, verdict
+from rrtik_bench.report.rows import Row, verdict
 from rrtik_bench.shortening.plane_worlds import PUBLISHED, Plane, sampled_route
+from rrtik_bench.tables import Table
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.shortening.random_cut import random_cut
 from rrtik_ompl.shortening.retraction import retract
