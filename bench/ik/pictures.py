@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 
 import rrtik_ompl as rrtik
+from bench.shared.pages import REPORTS
 from rrtik_ompl.ik.mb_rrt.growth import grow
 from rrtik_ompl.ik.mb_rrt.links import Links
 from rrtik_ompl.plot_reach import plot_slices
@@ -71,7 +72,7 @@ def reach(page: Path) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "reports")
+    parser.add_argument("--out", type=Path, default=REPORTS)
     folder = parser.parse_args().out
     with tempfile.TemporaryDirectory() as drawn:
         for name, draw in (("ik_ghosts", ghosts), ("mb_rrt_space", tree), ("reach_titan4", reach)):

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.shared.pages import REPORTS
 from rrtik_ompl.benchmark.records import NAME, read_records
 from rrtik_ompl.benchmark.report import read_campaign
 from rrtik_ompl.benchmark.statistics import Result, Spread
@@ -117,7 +118,7 @@ def main() -> None:
     """Read the campaigns and write the section."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", type=Path, nargs="+", help="of campaigns")
-    parser.add_argument("--readme", type=Path, default=Path(__file__).parent.parent / "README.md")
+    parser.add_argument("--readme", type=Path, default=REPORTS.parent.parent / "README.md")
     options = parser.parse_args()
     lines = [line for folder in options.folders for line in section(folder)]
     options.readme.write_text(replaced(options.readme.read_text(), lines))
