@@ -63,3 +63,11 @@ def test_the_reports_share_their_options():
     parts.add_options(parser, "ikurt.md")
     given = parser.parse_args(["--jobs", "3"])
     assert (given.jobs, given.out) == (3, BENCH / "reports" / "ikurt.md")
+
+
+def test_a_part_that_another_version_has_kept_is_measured_again(tmp_path, capsys):
+    page, kept = tmp_path / "page.md", tmp_path / "page.parts.jsonl"
+    kept.write_text('["cube 2", {"was": "a record"}]\n')
+    with parts.Parts(page, jobs=1) as measure:
+        assert measure(cube, [(2,)]) == [8]
+    assert "cube 2: kept by another version, measured again" in capsys.readouterr().err
