@@ -6,8 +6,8 @@
     rrtik bench soak
     python bench/planning/results_page.py bench-scenarios bench-titan4_families bench-scaling bench-soak
 
-Each folder is one that ``rrtik bench`` has written. The section of docs/results.md between its two marks is replaced, and
-nothing in it is typed by hand.
+Each folder is one that ``rrtik bench`` has written. The section of docs/results.md between its two marks is replaced,
+and nothing in it is typed by hand.
 """
 
 from __future__ import annotations
