@@ -161,7 +161,7 @@ def test_an_order_that_is_no_permutation_is_refused(axes: list[int]) -> None:
 @pytest.mark.parametrize("waypoints", [[], [1.0, 2.0], [[np.nan, 0.0]], "route"])
 def test_waypoints_that_are_no_route_are_refused(waypoints: object) -> None:
     with pytest.raises(InputError, match="waypoints"):
-        axis_cut(waypoints, free)  # type: ignore[arg-type]
+        axis_cut(waypoints, free)
 
 
 @settings(deadline=None)

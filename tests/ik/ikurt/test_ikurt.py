@@ -135,8 +135,8 @@ def rounds(most: int) -> Any:
 
 def published(problem: Any, seed: int) -> Any:
     metric = TipMetric.published(problem.robot, [problem.goal], problem.start)
-    bounds, rng = problem.robot.finite_range(), np.random.default_rng(seed)
-    return PublishedSearch(metric, STEPS, *bounds, problem.world.motion_valid, rounds(1500), rng, problem.start)
+    (low, high), rng = problem.robot.finite_range(), np.random.default_rng(seed)
+    return PublishedSearch(metric, STEPS, low, high, problem.world.motion_valid, rounds(1500), rng, problem.start)
 
 
 def improved(problem: Any, seed: int) -> Any:
@@ -144,7 +144,8 @@ def improved(problem: Any, seed: int) -> Any:
     metric, rng = TipMetric(problem.robot, [problem.goal]), np.random.default_rng(seed)
     options = Options(step=0.15, stride=0.6, jacobian=False, most_vertices=10_000)
     judge = Judge(problem.world.valid_batch, problem.world.motion_valid_batch, rounds(1500))
-    return BatchedSearch(metric, options, *problem.robot.finite_range(), judge, rng, problem.start[None])
+    low, high = problem.robot.finite_range()
+    return BatchedSearch(metric, options, low, high, judge, rng, problem.start[None])
 
 
 @pytest.mark.parametrize("search_of", [published, improved])
