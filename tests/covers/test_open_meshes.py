@@ -92,6 +92,7 @@ def _two_cubes():
     return points, number.reshape(-1, 3)
 
 
+@pytest.mark.kernels
 def test_kernels_and_world_agree_about_the_inside_of_cubes_that_share_an_edge():
     robot = load_robot("point2d")
     cubes = _two_cubes()[0] * 30.0 - [1.5, 1.5, 1.5], _two_cubes()[1]

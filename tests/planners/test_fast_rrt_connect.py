@@ -19,7 +19,7 @@ from rrtik_ompl.shapes import Box, Sphere
 from rrtik_ompl.world import World
 from rrtik_planners import FastRRTConnect
 
-pytestmark = pytest.mark.usefixtures("quiet_ompl")
+pytestmark = [pytest.mark.kernels, pytest.mark.usefixtures("quiet_ompl")]
 
 NONE = np.empty((0, 4))
 

@@ -11,6 +11,8 @@ from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
 from rrtik_ompl.world import World
 
+pytestmark = pytest.mark.kernels
+
 CONTACT = 2e-6  # [m]: nearer than this to contact, coal's own answer depends on the order of its arguments
 SWEEP = 64  # configurations along one short motion, so that many of them are near a contact
 ROBOTS = ("titan4", "panda", "puma560", "ur5", "planar3", "xarm7", "panda_primitives")

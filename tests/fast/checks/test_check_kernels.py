@@ -21,6 +21,8 @@ from rrtik_tests.random_cases import (
     random_solid,
 )
 
+pytestmark = pytest.mark.kernels
+
 
 @pytest.mark.parametrize("name", ARMS)
 def test_joint_frames_are_the_robots_own_far_within_the_margin(name):

@@ -10,6 +10,8 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast import COLLIDING, FREE, FastWorld
 from rrtik_tests.random_cases import ARMS, KINDS, Case, arm, distance, joint_values, random_pose, random_solid
 
+pytestmark = pytest.mark.kernels
+
 NEARLY = 1e-4  # [m] of margins and rounding
 
 

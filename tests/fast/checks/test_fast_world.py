@@ -11,6 +11,8 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast import FREE, UNDECIDED, FastWorld
 from rrtik_tests.random_cases import KINDS, Case, arm, joint_values, random_solid
 
+pytestmark = pytest.mark.kernels
+
 
 @pytest.mark.parametrize("name", ["titan4", "panda", "slider"])
 def test_undecided_pairs_are_all_those_whose_outer_spheres_touch(name):

@@ -14,6 +14,8 @@ from rrtik_ompl.fast.solid_tables import NO_SOLIDS, convex_solids
 from rrtik_ompl.robot import Robot
 from rrtik_tests.bent_meshes import KINDS
 
+pytestmark = pytest.mark.kernels
+
 ROWS = 300  # configurations of a case
 NOTHING = np.empty((0, 4))
 

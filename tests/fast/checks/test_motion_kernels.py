@@ -9,6 +9,8 @@ from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.fast import COLLIDING, FREE, UNDECIDED, FastWorld
 from rrtik_tests.random_cases import KINDS, Case, arm, joint_values
 
+pytestmark = pytest.mark.kernels
+
 
 @pytest.mark.parametrize("name", ["panda", "slider"])
 def test_a_motion_is_judged_by_its_configurations(name):

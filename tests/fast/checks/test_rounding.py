@@ -11,6 +11,8 @@ from rrtik_ompl.fast import COLLIDING, FREE, UNDECIDED, FastWorld
 from rrtik_ompl.fast import robot_tables as tables
 from rrtik_tests.random_cases import ARMS, KINDS, SLIDER, Case, arm, configurations, joint_values, kernel_frames
 
+pytestmark = pytest.mark.kernels
+
 
 @pytest.mark.parametrize("name", ARMS)
 def test_rounding_never_decides_at_the_very_contact(name):

@@ -19,6 +19,8 @@ from rrtik_ompl.poses import pose_from_rpy
 from rrtik_robots.puma560 import singular_samples as puma_samples
 from rrtik_robots.titan4 import singular_samples as titan_samples
 
+pytestmark = pytest.mark.kernels
+
 ARMS = ("titan4", "puma560")
 ROUNDING = 1e-12
 COUNT = 100_000

@@ -13,6 +13,8 @@ from rrtik_ompl.fast.random_kernels import next_point, next_share, start_points
 from rrtik_ompl.fast.robot_tables import table
 from rrtik_ompl.fast.tree_memory import grow, tree_table
 
+pytestmark = pytest.mark.kernels
+
 
 @entry
 def nearest(tree: int, query: int) -> int:

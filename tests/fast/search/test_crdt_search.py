@@ -22,6 +22,8 @@ from rrtik_planners.bicrdt import TreePair
 from rrtik_planners.crdt import SingleTree
 from rrtik_tests.slider_arm import NAMES, Plain, shipped
 
+pytestmark = pytest.mark.kernels
+
 SPHERE = '<collision><geometry><sphere radius="{}"/></geometry></collision>'
 SLIDER = f"""
 <robot name="slider"><link name="base"/><link name="a">{SPHERE.format(0.1)}</link>

@@ -17,6 +17,8 @@ from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box, Sphere
 from rrtik_ompl.world import World
 
+pytestmark = pytest.mark.kernels
+
 LOW, HIGH = np.zeros(2), np.full(2, 20.0)
 
 

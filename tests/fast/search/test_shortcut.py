@@ -14,6 +14,8 @@ from rrtik_ompl.fast.shortcut import ShortcutSearch
 from rrtik_ompl.transitions import route_length
 from rrtik_tests.random_cases import KINDS, Case, arm, joint_values
 
+pytestmark = pytest.mark.kernels
+
 RESOLUTION = 0.02
 
 

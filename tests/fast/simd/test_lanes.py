@@ -10,6 +10,8 @@ from rrtik_ompl.fast.compiled import WIDTH, kernel
 from rrtik_ompl.fast.kernels import ALL_LANES, sine_and_cosine
 from rrtik_ompl.fast.robot_tables import aligned
 
+pytestmark = pytest.mark.kernels
+
 UNITS = np.finfo(np.float32).eps
 
 

@@ -17,6 +17,8 @@ from rrtik_ompl import terminal
 from rrtik_ompl.cli import run
 from rrtik_ompl.fast import announce, bitcode, code_files, compiled, library, warm_up
 
+pytestmark = pytest.mark.kernels
+
 KERNELS = "kernels"
 PROGRAM = """
 import sys, warnings; warnings.simplefilter("error")

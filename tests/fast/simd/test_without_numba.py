@@ -5,7 +5,11 @@ import subprocess
 import sys
 import warnings
 
+import pytest
+
 from rrtik_tests.random_cases import Case
+
+pytestmark = pytest.mark.kernels
 
 
 def run(code, **environment):

@@ -2,12 +2,15 @@
 
 import numpy as np
 import pinocchio as pin
+import pytest
 
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.fast import FastWorld, layout
 from rrtik_ompl.fast import robot_tables as tables
 from rrtik_ompl.fast.processor import WIDTH
 from rrtik_tests.random_cases import Case, joint_values
+
+pytestmark = pytest.mark.kernels
 
 
 def test_a_new_scene_keeps_the_tables_of_the_arm():

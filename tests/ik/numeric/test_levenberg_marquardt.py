@@ -23,6 +23,8 @@ from rrtik_ompl.ik.plain_descent import walk_plainly
 from rrtik_ompl.shapes import Box
 from rrtik_tests.inverse_kinematics import random_rows
 
+pytestmark = pytest.mark.kernels
+
 MIXED = """
 <robot name="mixed"><link name="base"/><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
   <joint name="lift" type="prismatic"><parent link="base"/><child link="a"/><origin xyz="0 0.1 0.2" rpy="0.3 0 0"/>
