@@ -47,9 +47,9 @@ def test_a_damaged_file_is_made_anew(folder, damage):
     elif damage == "cut":
         file.write_bytes(whole[: len(whole) // 2])
     elif damage == "shape":
-        np.savez(file, spheres=true[:, :3], key=key, check=cover_cache.check_covers(true[:, :3]))
+        np.savez(file, spheres=true[:, :3], key=key, check=cover_cache._check(true[:, :3]))
     elif damage == "nan":
-        np.savez(file, spheres=true * np.nan, key=key, check=cover_cache.check_covers(true * np.nan))
+        np.savez(file, spheres=true * np.nan, key=key, check=cover_cache._check(true * np.nan))
     elif damage == "other":
         cached_outer_cover(SOLIDS["cylinder"])
         (other,) = set(folder.iterdir()) - {file}
@@ -57,7 +57,7 @@ def test_a_damaged_file_is_made_anew(folder, damage):
     elif damage == "pickle":
         np.savez(file, spheres=np.array([{}], dtype=object), key=key, check="")
     elif damage == "flipped":
-        np.savez(file, spheres=true * 0.5, key=key, check=cover_cache.check_covers(true))
+        np.savez(file, spheres=true * 0.5, key=key, check=cover_cache._check(true))
     else:
         file.unlink()
         file.mkdir()
