@@ -26,7 +26,7 @@ from peers.eaik import eaik_robot, turned_back
 from rrtik_ompl import load_robot
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
 from rrtik_ompl.ik.analytic.closed_form import form_of, solutions
-from rrtik_ompl.ik.analytic.reference_branches import plain_branches
+from rrtik_ompl.ik.analytic.reference_branches import reference_branches
 from rrtik_ompl.robot import Robot
 from rrtik_robots.puma560 import singular_samples as puma_samples
 from rrtik_robots.titan4 import singular_samples as titan_samples
@@ -94,7 +94,7 @@ def speeds(robot: Robot, repeats: int, rng: np.random.Generator) -> dict[str, fl
     work: dict[str, Callable[[], Any]] = {
         "all branches, limits": partial(solutions, robot, poses, check=False),
         "and residuals of all": partial(solutions, robot, poses),
-        "in numpy": partial(plain_branches, robot, form_of(robot), poses, None, 0.0, True),
+        "in numpy": partial(reference_branches, robot, form_of(robot), poses, None, 0.0, True),
     }
     if find_spec("eaik") is not None and robot.dof == 6:
         other, at_zero = eaik_robot(robot)

@@ -15,7 +15,7 @@ from rrtik_ompl import load_problem, load_robot
 from rrtik_ompl.overlay.augment import Augmenter, Ghost
 from rrtik_ompl.overlay.canvas import FAR, Canvas
 from rrtik_ompl.overlay.figure import figure_of, placed
-from rrtik_ompl.overlay.reference_z_buffer import ROUNDING, plain_z_buffer
+from rrtik_ompl.overlay.reference_z_buffer import ROUNDING, reference_z_buffer
 from rrtik_ompl.overlay.surfaces import robot_surfaces
 from rrtik_ompl.overlay.virtual_camera import eye_at
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_scenario, load_scenario
@@ -39,7 +39,7 @@ def silhouettes(report: Report, count: int) -> None:
             shown = placed(arm, eye.inverse().homogeneous @ robot.joint_frames(q[None])[0])
             canvas = Canvas(camera)
             canvas.draw(shown)
-            truth, doubt = plain_z_buffer(camera, shown)
+            truth, doubt = reference_z_buffer(camera, shown)
             both = canvas.drawn & (truth < FAR)
             drawn += int(both.sum())
             differ += int((canvas.drawn != (truth < FAR)).sum())

@@ -129,7 +129,7 @@ def _exact_batch(world: World, Q: Matrix) -> tuple[list[str], float, float]:
     for _ in range(3):
         runs = [
             timed(lambda: world.valid_batch(Q)),
-            *(timed(lambda p=p: [p(full) for full in world.robot.lift(some)]) for p in peers),
+            *(timed(lambda p=p: [p(full) for full in world.robot.pinocchio_configuration(some)]) for p in peers),
         ]
         costs.append([1e6 * seconds / len(rows) for (seconds, _), rows in zip(runs, (Q, some, some), strict=True)])
         answers = [found for _, found in runs]

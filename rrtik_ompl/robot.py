@@ -164,7 +164,7 @@ class Robot:
         values: Matrix = self._rows(Q) @ self.chain.gain.T + self.chain.offset
         return values
 
-    def lift(self, Q: ArrayLike) -> Matrix:
+    def pinocchio_configuration(self, Q: ArrayLike) -> Matrix:
         """Pinocchio's configuration vectors for Q: adds mimic joints and (cos, sin) of continuous ones.
 
         Args:
@@ -214,7 +214,7 @@ class Robot:
             placed: NDArray[np.float64] = frames[:, target.parentJoint] @ target.placement.homogeneous
             return placed
         data, poses = _data_of(self, get_ident()), np.empty((len(rows), 4, 4))
-        for k, full in enumerate(self.lift(rows)):
+        for k, full in enumerate(self.pinocchio_configuration(rows)):
             pin.forwardKinematics(self.model, data, full)
             poses[k] = pin.updateFramePlacement(self.model, data, frame).homogeneous
         return poses
@@ -225,7 +225,7 @@ class Robot:
 
     def jacobian(self, q: ArrayLike, frame: str | None = None) -> Matrix:
         """Geometric Jacobian at the tip in world axes, rows (linear; angular), shape (6, dof)."""
-        full = self.lift(self.configuration(q))[0]
+        full = self.pinocchio_configuration(self.configuration(q))[0]
         jacobian = pin.computeFrameJacobian(
             self.model, self.model.createData(), full, self._frame_id(frame), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         )

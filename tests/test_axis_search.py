@@ -13,8 +13,8 @@ from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.fast.search.crdt import search as axis_search
-from rrtik_ompl.fast.search.crdt.rules import AxisRules, runs_in_kernels
-from rrtik_ompl.fast.search.crdt.search import AxisSearch
+from rrtik_ompl.fast.search.crdt.rules import CrdtRules, runs_in_kernels
+from rrtik_ompl.fast.search.crdt.search import CrdtSearch
 from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.ompl_bridge import WorldChecker
 from rrtik_ompl.ompl_bridge.attempt import attempt
@@ -81,11 +81,11 @@ def slider() -> Problem:
 
 def rules_of(
     problem: Problem, *, smallest_move: float = 0.0, frozen: tuple[int, ...] = (), costly: int = -1
-) -> AxisRules:
+) -> CrdtRules:
     lower, upper = problem.robot.finite_range()
     lower[list(frozen)] = upper[list(frozen)] = problem.start[list(frozen)]
     scale, chance = np.linspace(1.0, 2.0, len(lower)), np.where(np.arange(len(lower)) == costly, 0.3, 1.0)
-    return AxisRules(lower, upper, scale, np.full(len(lower), smallest_move), chance)
+    return CrdtRules(lower, upper, scale, np.full(len(lower), smallest_move), chance)
 
 
 def ends(problem: Problem, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -96,9 +96,9 @@ def ends(problem: Problem, count: int, seed: int) -> tuple[np.ndarray, np.ndarra
     return np.vstack([problem.start, others[:count]]), np.vstack([problem.goal.q, others[count:]])
 
 
-def assert_same_pair(problem: Problem, rules: AxisRules, seed: int, starts: Any, goals: Any, limit: int = 60) -> None:
+def assert_same_pair(problem: Problem, rules: CrdtRules, seed: int, starts: Any, goals: Any, limit: int = 60) -> None:
     checker = WorldChecker(problem.world)
-    fast = AxisSearch(problem.world, rules, seed, limit, starts, goals)
+    fast = CrdtSearch(problem.world, rules, seed, limit, starts, goals)
     slow = TreePair(rules, seed, limit, starts, goals, checker)
     for _ in range(3):  # a search goes on after a solution
         found = slow.advance(lambda: False)
@@ -140,7 +140,7 @@ def test_frozen_joints_stay_and_the_others_are_the_same_to_the_bit() -> None:
     for seed in range(5):
         rules = rules_of(problem, frozen=(5,))
         assert_same_pair(problem, rules, seed, problem.start[None], goal)
-        search = AxisSearch(problem.world, rules, seed, 60, problem.start[None], goal)
+        search = CrdtSearch(problem.world, rules, seed, 60, problem.start[None], goal)
         search.advance(lambda: False)
         assert (search.tree(0)[:, 5] == problem.start[5]).all()
 
@@ -153,7 +153,7 @@ def test_a_single_tree_grows_as_in_python_to_the_bit(name: str) -> None:
     for seed in range(4):
         starts, goals = ends(problem, seed % 2, seed)
         checker, rules = WorldChecker(problem.world), rules_of(problem)
-        fast = AxisSearch(problem.world, rules, seed, 100, starts, goals=goals, tolerance=tolerance)
+        fast = CrdtSearch(problem.world, rules, seed, 100, starts, goals=goals, tolerance=tolerance)
         slow = SingleTree(rules, seed, 100, starts, goals, tolerance, checker)
         for _ in range(3):
             found = slow.advance(lambda: False)
@@ -167,7 +167,7 @@ def test_a_single_tree_grows_as_in_python_to_the_bit(name: str) -> None:
 
 
 def grown(problem: Problem, seed: int, limit: int = 300) -> list[np.ndarray]:
-    search = AxisSearch(problem.world, rules_of(problem), seed, limit, problem.start[None], problem.goal.q[None])
+    search = CrdtSearch(problem.world, rules_of(problem), seed, limit, problem.start[None], problem.goal.q[None])
     while search.advance(lambda: False):
         pass
     assert search.iterations == limit
@@ -191,7 +191,7 @@ def test_a_search_looks_up_between_its_pieces_of_work() -> None:
     boxed_in = World(problem.robot, problem.world.scene, motion_resolution=problem.world.motion_resolution)
     looks = iter([False] * 5 + [True])
     goal = np.array([[9.5, 12.0]])  # inside the letter
-    search = AxisSearch(boxed_in, rules_of(problem), 0, None, problem.start[None], goal)
+    search = CrdtSearch(boxed_in, rules_of(problem), 0, None, problem.start[None], goal)
     assert not search.advance(lambda: next(looks))
     assert next(looks, None) is None
     assert search.iterations >= 5
@@ -201,7 +201,7 @@ def test_a_conservative_world_is_never_asked() -> None:
     problem = shipped("planar3_boxes")
     careful: Any = problem.world.with_accuracy("conservative")
     for seed in range(5):
-        search = AxisSearch(Silent(careful), rules_of(problem), seed, 200, problem.start[None], problem.goal.q[None])
+        search = CrdtSearch(Silent(careful), rules_of(problem), seed, 200, problem.start[None], problem.goal.q[None])
         if search.advance(lambda: False):
             for branch in search.meeting():
                 assert careful.motion_valid_batch(branch[:-1], branch[1:]).all()
@@ -209,7 +209,7 @@ def test_a_conservative_world_is_never_asked() -> None:
 
 def test_every_edge_of_the_trees_is_free() -> None:
     for problem in (shipped("planar3_c"), shipped("titan4_sdu"), slider()):
-        search = AxisSearch(problem.world, rules_of(problem), 3, 300, problem.start[None], problem.goal.q[None])
+        search = CrdtSearch(problem.world, rules_of(problem), 3, 300, problem.start[None], problem.goal.q[None])
         while search.advance(lambda: False):
             pass
         for number in (0, 1):

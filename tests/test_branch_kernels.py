@@ -14,7 +14,7 @@ from rrtik_ompl.ik.analytic import kernel_branches as module
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
 from rrtik_ompl.ik.analytic.closed_form import form_of, solutions
 from rrtik_ompl.ik.analytic.kernel_branches import kernel_branches
-from rrtik_ompl.ik.analytic.reference_branches import plain_branches
+from rrtik_ompl.ik.analytic.reference_branches import reference_branches
 from rrtik_ompl.poses import pose_from_rpy
 from rrtik_robots.puma560 import singular_samples as puma_samples
 from rrtik_robots.titan4 import singular_samples as titan_samples
@@ -104,7 +104,7 @@ def test_kernels_give_the_branches_of_numpy(name, hinted):
     robot, Q = configurations(name, COUNT)
     poses, hints = robot.fk_batch(Q), Q if hinted else None
     fast = kernel_branches(robot, form_of(robot), poses, hints, 0.0, True)
-    plain = plain_branches(robot, form_of(robot), poses, hints, 0.0, True)
+    plain = reference_branches(robot, form_of(robot), poses, hints, 0.0, True)
     assert fast is not None
     assert (apart(fast, plain) <= ROUNDING * conditioning(robot, plain)).all()
     for ours, theirs in zip(fast[1:4], plain[1:4], strict=True):
@@ -116,7 +116,7 @@ def test_kernels_give_the_branches_of_numpy(name, hinted):
 def test_regular_poses_are_answered_by_the_kernel_alone(monkeypatch):
     robot = rrtik.load_robot("titan4")
     poses = robot.fk_batch(np.random.default_rng(0).uniform(robot.lower, robot.upper, (500, 6)))
-    monkeypatch.setattr(module, "plain_branches", lambda *rest: pytest.fail("numpy was asked"))
+    monkeypatch.setattr(module, "reference_branches", lambda *rest: pytest.fail("numpy was asked"))
     assert solutions(robot, poses).valid.any(axis=1).all()
 
 
@@ -140,7 +140,7 @@ def test_a_base_elsewhere_another_tip_and_slack_change_nothing(name, options):
     poses = robot.fk_batch(Q)
     for slack in (0.0, 1e-3):
         fast = kernel_branches(robot, form_of(robot), poses, Q, slack, True)
-        plain = plain_branches(robot, form_of(robot), poses, Q, slack, True)
+        plain = reference_branches(robot, form_of(robot), poses, Q, slack, True)
         assert (apart(fast, plain) <= 10 * ROUNDING * conditioning(robot, plain)).all()
         np.testing.assert_array_equal(fast[2], plain[2])
         np.testing.assert_array_equal(fast[3], plain[3])

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.search.crdt.rules import AxisRules
+from rrtik_ompl.fast.search.crdt.rules import CrdtRules
 from rrtik_ompl.ompl_bridge.contract import small_problem, solution_rows
 from rrtik_ompl.transitions import single_joint
 from rrtik_planners import CRDT, BiCRDT
@@ -37,8 +37,8 @@ class Interval:
         return np.array([self.motion_valid(a, b) for a, b in zip(A, B, strict=True)])
 
 
-def rules(dof: int, scale: Any = 1.0, smallest_move: float = 0.0) -> AxisRules:
-    return AxisRules(-np.ones(dof), np.ones(dof), np.full(dof, scale), np.full(dof, smallest_move), np.ones(dof))
+def rules(dof: int, scale: Any = 1.0, smallest_move: float = 0.0) -> CrdtRules:
+    return CrdtRules(-np.ones(dof), np.ones(dof), np.full(dof, scale), np.full(dof, smallest_move), np.ones(dof))
 
 
 def grown(*targets: Any, checker: Any = None, dof: int = 2, seed: int = 0) -> tuple[AxisTree, list[Any]]:

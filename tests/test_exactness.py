@@ -89,7 +89,7 @@ def test_a_conservative_world_calls_nothing_free_that_is_not(name, dented_cube):
     exact, careful = world.valid_batch(Q), world.with_accuracy("conservative").valid_batch(Q)
     assert not (careful & ~exact).any()
     assert 0.8 * exact.sum() < careful.sum() < exact.sum()
-    covered = world.fast.classify(robot.joint_values(Q), prove=False) == FREE
+    covered = world.fast.classify(robot.joint_values(Q), narrow_phase=False) == FREE
     np.testing.assert_array_equal(careful, covered)
 
 
@@ -127,7 +127,7 @@ def reused_answers(world, sweeps):
     return np.array(
         [
             not pin.computeCollisions(robot.model, data, geometry, geometry_data, full, True)
-            for full in robot.lift(sweeps)
+            for full in robot.pinocchio_configuration(sweeps)
         ]
     )
 

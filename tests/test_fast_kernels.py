@@ -204,9 +204,9 @@ def kernel_frames(robot, V):
         block = V[start : start + WIDTH]
         values = np.zeros((len(turns) + 1, WIDTH))
         values[:-1, : len(block)] = block.T
-        world._work[layout.VALUES][:] = values.ravel()
-        kernels.move(world._arm.arm.address, world._work.address)
-        frames = world._work[layout.FRAMES].reshape(-1, 12, WIDTH).transpose(2, 0, 1)[: len(block)]
+        world._scratch[layout.VALUES][:] = values.ravel()
+        kernels.forward_kinematics(world._arm.arm.address, world._scratch.address)
+        frames = world._scratch[layout.FRAMES].reshape(-1, 12, WIDTH).transpose(2, 0, 1)[: len(block)]
         found[start : start + WIDTH, :, :3, :3] = frames[..., :9].reshape(len(block), -1, 3, 3)
         found[start : start + WIDTH, :, :3, 3] = frames[..., 9:]
     found[:, 1:, :3, :3] = found[:, 1:, :3, :3] @ turns.transpose(0, 2, 1)
@@ -334,7 +334,7 @@ def test_a_motion_is_judged_by_its_configurations(name):
         for answer, a, b, count in zip(answers, VA, VB, counts, strict=True):
             share = (np.arange(count + 1) / count)[:, None]
             assert answer == case.world.classify((1.0 - share) * a + share * b).max()
-        cautious = case.world.classify_edges(VA, VB, counts, prove=False)
+        cautious = case.world.classify_edges(VA, VB, counts, narrow_phase=False)
         np.testing.assert_array_equal(cautious, np.minimum(answers, UNDECIDED))
         seen |= set(answers.tolist())
     assert seen == {FREE, UNDECIDED, COLLIDING}
@@ -548,7 +548,7 @@ def test_every_number_in_the_tables_points_into_them():
         assert balls[layout.GROUPS].reshape(-1, 3)[-1, 2] == len(clusters)
         assert balls[layout.PAIRS].max() < balls.header[layout.BODY_COUNT]
         assert balls[layout.PAIR_GROUPS].reshape(-1, 4)[-1, 3] == balls.header[layout.PAIR_COUNT]
-    for rows in case.world._rows:
+    for rows in case.world._primitives:
         numbers = rows[layout.NUMBERS].reshape(-1, 4)
         assert numbers[:, 1].max() < rows.header[layout.STANDING_COUNT]
         assert numbers[:, 3].max() <= len(rows[layout.PLANES]) // 4

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rrtik_ompl.cli.app import run, terminal
+from rrtik_ompl.cli import terminal
+from rrtik_ompl.cli.app import run
 from rrtik_ompl.fast import warm_up
 from rrtik_ompl.fast.simd import announce, bitcode, code_files, compiled, library
 

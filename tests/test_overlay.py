@@ -9,7 +9,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.overlay.augment import LAYERS_KEPT, Augmenter, Ghost
 from rrtik_ompl.overlay.canvas import FAR, Canvas
 from rrtik_ompl.overlay.figure import figure_of, placed
-from rrtik_ompl.overlay.reference_z_buffer import plain_z_buffer
+from rrtik_ompl.overlay.reference_z_buffer import reference_z_buffer
 from rrtik_ompl.overlay.surfaces import obstacle_surfaces, robot_surfaces, surface_of_shape
 from rrtik_ompl.overlay.virtual_camera import eye_at, imagined_camera, sky
 from rrtik_ompl.poses import pose
@@ -30,7 +30,7 @@ def test_silhouette_and_depth_are_those_of_a_z_buffer(name):
     shown = placed(arm, EYE.inverse().homogeneous @ robot.joint_frames(q[None])[0])
     canvas = Canvas(CAMERA)
     canvas.draw(shown)
-    truth, _ = plain_z_buffer(CAMERA, shown)
+    truth, _ = reference_z_buffer(CAMERA, shown)
     assert canvas.drawn.sum() > 3000
     assert np.array_equal(canvas.drawn, truth < FAR)
     assert np.abs(canvas.depths - truth)[canvas.drawn].max() < 1e-4

@@ -48,7 +48,7 @@ def test_forward_kinematics_of_every_link_equals_pinocchios(mixed):
     Q = np.random.default_rng(3).uniform(-2, 2, (50, 3))
     data = mixed.model.createData()
     for link in mixed.link_names:
-        for pose, full in zip(mixed.fk_batch(Q, link), mixed.lift(Q), strict=True):
+        for pose, full in zip(mixed.fk_batch(Q, link), mixed.pinocchio_configuration(Q), strict=True):
             pin.framesForwardKinematics(mixed.model, data, full)
             np.testing.assert_allclose(pose, data.oMf[mixed.model.getFrameId(link)].homogeneous, atol=1e-12)
 

@@ -37,7 +37,7 @@ def test_the_batch_of_forward_kinematics_equals_pinocchio(robot):
     _, low, high = middle(robot)
     Q = np.random.default_rng(0).uniform(low, high, (20, robot.dof))
     tips, data = robot.fk_batch(Q), robot.model.createData()
-    for tip, full in zip(tips, robot.lift(Q), strict=True):
+    for tip, full in zip(tips, robot.pinocchio_configuration(Q), strict=True):
         pin.framesForwardKinematics(robot.model, data, full)
         np.testing.assert_allclose(tip, data.oMf[robot.model.getFrameId(robot.tip)].homogeneous, atol=1e-12)
 

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.fast.search.crdt.rules import KERNELS, AxisRules, runs_in_kernels
-from rrtik_ompl.fast.search.crdt.search import AxisSearch
+from rrtik_ompl.fast.search.crdt.rules import KERNELS, CrdtRules, runs_in_kernels
+from rrtik_ompl.fast.search.crdt.search import CrdtSearch
 from rrtik_ompl.moves.rules import Joints, PerJoint, joint_numbers
 from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
 from rrtik_planners.crdt_endings import NO_ENDING, Endings
@@ -89,7 +89,7 @@ class BiCRDT(SafePlanner):
         limit, path = self.options.max_iterations, _common_row(starts, goals)
         trees: Any
         if runs_in_kernels(self._world, starts, goals, rules.lower[None], rules.upper[None]):
-            trees = AxisSearch(self._world, rules, seed, limit, starts, goals)
+            trees = CrdtSearch(self._world, rules, seed, limit, starts, goals)
         else:
             trees = TreePair(rules, seed, limit, starts, goals, checker)
         while path is None and trees.advance(ptc):
@@ -101,7 +101,7 @@ class BiCRDT(SafePlanner):
 
 
 class TreePair:
-    """The search in Python, for any checker, step by step as `rrtik_ompl.fast.search.crdt.search.AxisSearch`.
+    """The search in Python, for any checker, step by step as `rrtik_ompl.fast.search.crdt.search.CrdtSearch`.
 
     Attributes:
         iterations: Samples drawn so far.
@@ -111,7 +111,7 @@ class TreePair:
     motions = 0
 
     def __init__(
-        self, rules: AxisRules, seed: int, limit: int | None, starts: Matrix, goals: Matrix, checker: MotionChecker
+        self, rules: CrdtRules, seed: int, limit: int | None, starts: Matrix, goals: Matrix, checker: MotionChecker
     ) -> None:
         self._rules, self._limit, self._checker = rules, limit, checker
         self._stream = AxisStream(seed)

@@ -9,8 +9,8 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.search.crdt.rules import KERNELS, AxisRules, runs_in_kernels
-from rrtik_ompl.fast.search.crdt.search import AxisSearch
+from rrtik_ompl.fast.search.crdt.rules import KERNELS, CrdtRules, runs_in_kernels
+from rrtik_ompl.fast.search.crdt.search import CrdtSearch
 from rrtik_ompl.moves.rules import Joints, PerJoint
 from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
 from rrtik_planners.crdt_options import AxisOptions, joint_names
@@ -88,7 +88,7 @@ class CRDT(SafePlanner):
         limit, path = self.options.max_iterations, None
         tree: Any
         if runs_in_kernels(self._world, starts, goals, rules.lower[None], rules.upper[None]):
-            tree = AxisSearch(self._world, rules, seed, limit, starts, goals=goals, tolerance=tolerance)
+            tree = CrdtSearch(self._world, rules, seed, limit, starts, goals=goals, tolerance=tolerance)
         else:
             tree = SingleTree(rules, seed, limit, starts, goals, tolerance, checker)
         while path is None and tree.advance(ptc):
@@ -103,7 +103,7 @@ class CRDT(SafePlanner):
 
 
 class SingleTree:
-    """The search in Python, for any checker, step by step as `rrtik_ompl.fast.search.crdt.search.AxisSearch`.
+    """The search in Python, for any checker, step by step as `rrtik_ompl.fast.search.crdt.search.CrdtSearch`.
 
     Attributes:
         iterations: Samples drawn so far.
@@ -114,7 +114,7 @@ class SingleTree:
 
     def __init__(
         self,
-        rules: AxisRules,
+        rules: CrdtRules,
         seed: int,
         limit: int | None,
         starts: Matrix,

@@ -10,7 +10,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.search.crdt.rules import AxisRules
+from rrtik_ompl.fast.search.crdt.rules import CrdtRules
 from rrtik_ompl.moves.rules import (
     Joints,
     PerJoint,
@@ -78,13 +78,13 @@ class AxisOptions:
             f"start and at {goals[0, joint]:.9g} at the goal; let it move or change one of them"
         )
 
-    def rules(self, lower: Vector, upper: Vector, start: Vector, others: Sequence[int] = ()) -> AxisRules:
+    def rules(self, lower: Vector, upper: Vector, start: Vector, others: Sequence[int] = ()) -> CrdtRules:
         """How trees grow within bounds, shapes (n,), if frozen joints and ``others`` stay where they are at a start."""
         scale = self.joint_costs / (upper - lower) if self.scale_by_range else self.joint_costs
         lower, upper = lower.copy(), upper.copy()
         staying = [*self.frozen_joints, *others]
         lower[staying] = upper[staying] = start[staying]
-        return AxisRules(lower, upper, scale, self.smallest_move, self.joint_costs.min() / self.joint_costs)
+        return CrdtRules(lower, upper, scale, self.smallest_move, self.joint_costs.min() / self.joint_costs)
 
     def accepts(self, path: Matrix) -> bool:
         """Whether no move of a path, shape (k, n), is too short, once those of the same joint in a row are joined."""

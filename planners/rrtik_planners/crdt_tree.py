@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.fast.search.crdt.rules import AxisRules
+from rrtik_ompl.fast.search.crdt.rules import CrdtRules
 from rrtik_ompl.ompl_bridge import MotionChecker
 from rrtik_planners.crdt_stream import Random
 
@@ -51,7 +51,7 @@ class AxisTree:
         size: Number of vertices.
     """
 
-    def __init__(self, roots: Matrix, rules: AxisRules) -> None:
+    def __init__(self, roots: Matrix, rules: CrdtRules) -> None:
         """Plant a tree.
 
         Args:

@@ -40,7 +40,7 @@ class OverlapDepth:
 
         0 if there is no collision, or none whose depth is known.
         """
-        pin.forwardKinematics(self._robot.model, self._data, self._robot.lift(q[None])[0])
+        pin.forwardKinematics(self._robot.model, self._data, self._robot.pinocchio_configuration(q[None])[0])
         return max((self._pair_travel(*pair) for pair in self._pairs), default=0.0)
 
     def _pair_travel(self, i: int, j: int) -> float:

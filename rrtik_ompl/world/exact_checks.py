@@ -1,4 +1,4 @@
-"""Which configurations and motions are free of collision: kernels judge, coal settles what they leave undecided.
+"""Which configurations and motions are free of collision: kernels check, coal decides what they leave undecided.
 
 The kernels' "free" and "colliding" are certain (:mod:`rrtik_ompl.fast`), so every answer is coal's own, and coal is
 asked about few configurations and, of these, about few pairs. It is asked with fresh requests: reused collision data
@@ -63,20 +63,20 @@ class CollisionChecks:
 
     def free(self, rows: Matrix) -> Mask:
         """Which rows, shape (m, dof), are free of collision. Shape (m,)."""
-        answers = self.fast.classify(self._robot.joint_values(rows), prove=not self.conservative)
+        answers = self.fast.classify(self._robot.joint_values(rows), narrow_phase=not self.conservative)
         free: Mask = answers == FREE
         if not self.conservative:
             open_ = rows[answers == UNDECIDED]
             marked = self.fast.undecided_pairs(self._robot.joint_values(open_))
-            lifted = self._robot.lift(open_)
-            settled = [self._gaps(full, pairs) is not None for full, pairs in zip(lifted, marked, strict=True)]
-            free[answers == UNDECIDED] = settled
+            configurations = self._robot.pinocchio_configuration(open_)
+            apart = [self._gaps(full, pairs) is not None for full, pairs in zip(configurations, marked, strict=True)]
+            free[answers == UNDECIDED] = apart
         return free
 
     def motions_free(self, starts: Matrix, ends: Matrix, steps: NDArray[np.int64]) -> Mask:
         """Which straight motions, shape (m, dof), are free at all k / steps, k = 0..steps. Shape (m,)."""
         sides = self._robot.joint_values(starts), self._robot.joint_values(ends)
-        answers = self.fast.classify_edges(*sides, steps, prove=not self.conservative)
+        answers = self.fast.classify_edges(*sides, steps, narrow_phase=not self.conservative)
         free: Mask = answers == FREE
         if not self.conservative:
             for k in np.flatnonzero(answers == UNDECIDED):
@@ -96,7 +96,9 @@ class CollisionChecks:
         marked = self.fast.undecided_pairs(self._robot.joint_values(rows))
         travel = np.abs(end - start)
         cleared: dict[tuple[int, int], Mask] = {}
-        for place, full, pairs in zip(order.astype(int).tolist(), self._robot.lift(rows), marked, strict=True):
+        for place, full, pairs in zip(
+            order.astype(int).tolist(), self._robot.pinocchio_configuration(rows), marked, strict=True
+        ):
             left = [pair for pair in pairs if pair not in cleared or not cleared[pair][place]]
             gaps = self._gaps(full, left) if left else []
             if gaps is None:

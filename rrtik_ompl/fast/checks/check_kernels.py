@@ -1,4 +1,4 @@
-"""Kernels that judge configurations and motions: free, undecided or colliding, ``WIDTH`` configurations at a time.
+"""Kernels that check configurations and motions: free, undecided or colliding, ``WIDTH`` configurations at a time.
 
 Joint values stay in float64 until they are reduced to an eighth of a turn, so that neither large angles nor long
 motions cost precision: the configurations checked along a motion are those of :class:`rrtik_ompl.world.World`.
@@ -10,9 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.fast.checks.narrow_phase import settle
+from rrtik_ompl.fast.checks.narrow_phase import narrow_phase
 from rrtik_ompl.fast.checks.obstacle_kernels import along
-from rrtik_ompl.fast.checks.sphere_kernels import FRAME_BYTES, meets_itself, meets_surroundings, prepare, still_meets
+from rrtik_ompl.fast.checks.sphere_kernels import (
+    FRAME_BYTES,
+    prepare,
+    recheck_last_hit,
+    scene_collision,
+    self_collision,
+)
 from rrtik_ompl.fast.simd.compiled import WIDTH, entry, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import (
     absolute,
@@ -42,14 +48,14 @@ from rrtik_ompl.fast.tables.layout import (
     FREE,
     INNER,
     INNER_LAST,
-    INNER_ROWS,
+    INNER_PRIMITIVES,
     OUTER,
     OUTER_LAST,
-    OUTER_ROWS,
+    OUTER_PRIMITIVES,
+    SCRATCH,
     UNDECIDED,
     VALUES,
     WAITING,
-    WORK,
 )
 
 ALL_LANES = (1 << WIDTH) - 1
@@ -83,10 +89,10 @@ def sine_and_cosine(angle: Any) -> Any:
 
 
 @kernel
-def move(arm: int, work: int) -> None:
-    """Frames of all joints from the joint values in the workspace (the world's own frame is there already)."""
+def forward_kinematics(arm: int, scratch: int) -> None:
+    """Frames of all joints from the joint values in the scratch memory (the world's own frame is there already)."""
     parents, sliding = field(arm, layout.PARENTS), field(arm, layout.SLIDING)
-    values, frames = field(work, VALUES), field(work, FRAMES)
+    values, frames = field(scratch, VALUES), field(scratch, FRAMES)
     for joint in range(field(arm, layout.JOINT_COUNT)):
         parent = frames + FRAME_BYTES * int_at(parents, joint)
         frame = frames + FRAME_BYTES * (joint + 1)
@@ -136,54 +142,54 @@ def rotated(fixed: int, a: Any, b: Any, c: Any) -> Any:
 
 
 @kernel
-def meeting(world: int, balls: int, rows: int, wanted: int, last: int, one: bool) -> Any:
-    """Lanes among ``wanted`` in which these balls meet these rows or each other; if ``one`` is enough, not all."""
-    work = field(world, WORK)
+def in_collision(world: int, balls: int, primitives: int, wanted: int, last: int, one: bool) -> Any:
+    """Lanes among ``wanted`` in which these balls meet these primitives or each other; just one lane if ``one``."""
+    scratch = field(world, SCRATCH)
     if one:
-        found = still_meets(balls, rows, work, wanted, last)
+        found = recheck_last_hit(balls, primitives, scratch, wanted, last)
         if found != 0:
             return found
-    prepare(balls, work)
-    found = meets_surroundings(balls, rows, work, wanted, 0, one, last)
+    prepare(balls, scratch)
+    found = scene_collision(balls, primitives, scratch, wanted, 0, one, last)
     if found != wanted and not (one and found != 0):
-        found |= meets_itself(balls, work, wanted & ~found, 0, one)
+        found |= self_collision(balls, scratch, wanted & ~found, 0, one)
     return found
 
 
 @inlined
-def outer_meeting(world: int, wanted: int, one: bool) -> Any:
-    """Lanes that the outer balls cannot prove free, for the frames in the workspace."""
-    last = field(field(world, WORK), OUTER_LAST)
-    return meeting(world, field(world, OUTER), field(world, OUTER_ROWS), wanted, last, one)
+def outer_collision(world: int, wanted: int, one: bool) -> Any:
+    """Lanes that the outer balls cannot prove free, for the frames in the scratch memory."""
+    last = field(field(world, SCRATCH), OUTER_LAST)
+    return in_collision(world, field(world, OUTER), field(world, OUTER_PRIMITIVES), wanted, last, one)
 
 
 @inlined
-def inner_meeting(world: int, wanted: int, one: bool) -> Any:
-    """Lanes that the inner balls prove colliding, for the frames in the workspace."""
-    last = field(field(world, WORK), INNER_LAST)
-    return meeting(world, field(world, INNER), field(world, INNER_ROWS), wanted, last, one)
+def inner_collision(world: int, wanted: int, one: bool) -> Any:
+    """Lanes that the inner balls prove colliding, for the frames in the scratch memory."""
+    last = field(field(world, SCRATCH), INNER_LAST)
+    return in_collision(world, field(world, INNER), field(world, INNER_PRIMITIVES), wanted, last, one)
 
 
 @inlined
 def load_row(world: int, rows: int, row: int, lane: int) -> None:
     """Set the joint values of a lane to a row of an array of float64."""
     joints = field(field(world, ARM), layout.JOINT_COUNT)
-    values = field(field(world, WORK), VALUES)
+    values = field(field(world, SCRATCH), VALUES)
     for joint in range(joints):
         set_double(values, joint * WIDTH + lane, double_at(rows, row * joints + joint))
 
 
 @kernel
-def prove(world: int, rows: int, waiting: int, answers: int) -> None:
+def resolve_doubtful(world: int, rows: int, waiting: int, answers: int) -> None:
     """Answer what a second look finds for the rows that wait: by their inner balls, then by their solids."""
-    queue = field(field(world, WORK), WAITING)
+    queue = field(field(world, SCRATCH), WAITING)
     for lane in range(WIDTH):
         load_row(world, rows, int_at(queue, min(lane, waiting - 1)), lane)
-    move(field(world, ARM), field(world, WORK))
+    forward_kinematics(field(world, ARM), field(world, SCRATCH))
     wanted = ALL_LANES >> (WIDTH - waiting)
-    colliding, open_ = inner_meeting(world, wanted, waiting < 0), 0
+    colliding, open_ = inner_collision(world, wanted, waiting < 0), 0
     if colliding != wanted:
-        open_, overlapping = settle(world, wanted & ~colliding)
+        open_, overlapping = narrow_phase(world, wanted & ~colliding)
         colliding |= overlapping
     for lane in range(waiting):
         answer = COLLIDING if (colliding >> lane) & 1 else UNDECIDED if (open_ >> lane) & 1 else FREE
@@ -191,41 +197,41 @@ def prove(world: int, rows: int, waiting: int, answers: int) -> None:
 
 
 @entry
-def classify(world: int, rows: int, count: int, answers: int, proving: int) -> int:
-    """Judge ``count`` rows of joint values (float64) at an address; int32 answers go to another.
+def classify(world: int, rows: int, count: int, answers: int, resolve: int) -> int:
+    """Check ``count`` rows of joint values (float64) at an address; int32 answers go to another.
 
     Rows that are not proven free wait until there are enough of them to fill all lanes of a second look.
     """
-    queue, waiting = field(field(world, WORK), WAITING), 0
+    queue, waiting = field(field(world, SCRATCH), WAITING), 0
     for start in range(0, count, WIDTH):
         filled = min(WIDTH, count - start)
         for lane in range(WIDTH):
             load_row(world, rows, start + min(lane, filled - 1), lane)
-        move(field(world, ARM), field(world, WORK))
-        doubtful = outer_meeting(world, ALL_LANES >> (WIDTH - filled), filled < 0)
+        forward_kinematics(field(world, ARM), field(world, SCRATCH))
+        doubtful = outer_collision(world, ALL_LANES >> (WIDTH - filled), filled < 0)
         for lane in range(filled):
             open_ = (doubtful >> lane) & 1
             set_int(answers, start + lane, open_)
-            if open_ and proving != 0:
+            if open_ and resolve != 0:
                 set_int(queue, waiting, start + lane)
                 waiting += 1
                 if waiting == WIDTH:
-                    prove(world, rows, waiting, answers)
+                    resolve_doubtful(world, rows, waiting, answers)
                     waiting = 0
     if waiting:
-        prove(world, rows, waiting, answers)
+        resolve_doubtful(world, rows, waiting, answers)
     return count
 
 
 @kernel
-def judge_part(world: int, start: int, end: int, last: int, first: int, count: int, proving: bool) -> int:
-    """Judge ``count`` configurations of a motion between two rows of joint values: those at k / last, k = first, ...
+def check_part(world: int, start: int, end: int, last: int, first: int, count: int, resolve: bool) -> int:
+    """Check ``count`` configurations of a motion between two rows of joint values: those at k / last, k = first, ...
 
     The lanes are spread over the whole part, so that a collision anywhere shows early.
     """
     joints = field(field(world, ARM), layout.JOINT_COUNT)
-    work = field(world, WORK)
-    values, inner_last = field(work, VALUES), field(work, INNER_LAST)
+    scratch = field(world, SCRATCH)
+    values, inner_last = field(scratch, VALUES), field(scratch, INNER_LAST)
     blocks = (count + WIDTH - 1) // WIDTH
     every = bits(lane_numbers() >= 0.0)  # a number: for a constant numba would compile all that is called apart
     answer = FREE
@@ -234,20 +240,23 @@ def judge_part(world: int, start: int, end: int, last: int, first: int, count: i
         share = places / float(last)
         for joint in range(joints):
             set_wide_lanes(values, joint, (1.0 - share) * double_at(start, joint) + share * double_at(end, joint))
-        move(field(world, ARM), work)
-        if proving and still_meets(field(world, INNER), field(world, INNER_ROWS), work, every, inner_last) != 0:
+        forward_kinematics(field(world, ARM), scratch)
+        if (
+            resolve
+            and recheck_last_hit(field(world, INNER), field(world, INNER_PRIMITIVES), scratch, every, inner_last) != 0
+        ):
             answer = COLLIDING
             break
-        doubtful = outer_meeting(world, every, not proving)
+        doubtful = outer_collision(world, every, not resolve)
         if doubtful == 0:
             continue
-        if not proving:
+        if not resolve:
             answer = UNDECIDED
             break
-        if inner_meeting(world, doubtful, proving) != 0:
+        if inner_collision(world, doubtful, resolve) != 0:
             answer = COLLIDING
             break
-        open_, overlapping = settle(world, doubtful)
+        open_, overlapping = narrow_phase(world, doubtful)
         if overlapping != 0:
             answer = COLLIDING
             break
@@ -257,17 +266,17 @@ def judge_part(world: int, start: int, end: int, last: int, first: int, count: i
 
 
 @kernel
-def judge_edge(world: int, start: int, end: int, last: int, proving: bool) -> int:
-    """Judge the motion between two rows of joint values by its configurations at k / last, k = 0..last."""
-    return judge_part(world, start, end, last, 0, last + 1, proving)
+def check_edge(world: int, start: int, end: int, last: int, resolve: bool) -> int:
+    """Check the motion between two rows of joint values by its configurations at k / last, k = 0..last."""
+    return check_part(world, start, end, last, 0, last + 1, resolve)
 
 
 @entry
-def classify_edges(world: int, starts: int, ends: int, steps: int, count: int, answers: int, proving: int) -> int:
-    """Judge ``count`` motions between rows of two arrays in the given numbers of steps; int32 answers."""
+def classify_edges(world: int, starts: int, ends: int, steps: int, count: int, answers: int, resolve: int) -> int:
+    """Check ``count`` motions between rows of two arrays in the given numbers of steps; int32 answers."""
     stride = 8 * field(field(world, ARM), layout.JOINT_COUNT)
     for k in range(count):
-        answer = judge_edge(world, starts + k * stride, ends + k * stride, int_at(steps, k), proving != 0)
+        answer = check_edge(world, starts + k * stride, ends + k * stride, int_at(steps, k), resolve != 0)
         set_int(answers, k, answer)
     return count
 
@@ -275,12 +284,12 @@ def classify_edges(world: int, starts: int, ends: int, steps: int, count: int, a
 @entry
 def mark_pairs(world: int, row: int, count: int) -> int:
     """For up to ``WIDTH`` rows of joint values: in which of them a pair is not proven free, as bits; see ``mark``."""
-    work, wanted = field(world, WORK), ALL_LANES >> (WIDTH - count)
+    scratch, wanted = field(world, SCRATCH), ALL_LANES >> (WIDTH - count)
     for lane in range(WIDTH):
         load_row(world, row, min(lane, count - 1), lane)
-    move(field(world, ARM), work)
-    settle(world, wanted)
+    forward_kinematics(field(world, ARM), scratch)
+    narrow_phase(world, wanted)
     balls = field(world, OUTER)
-    crossing = field(balls, layout.BODY_COUNT) * field(field(world, OUTER_ROWS), layout.STANDING_COUNT)
+    crossing = field(balls, layout.BODY_COUNT) * field(field(world, OUTER_PRIMITIVES), layout.STANDING_COUNT)
     total: int = crossing + field(balls, layout.PAIR_COUNT)
     return total

@@ -15,14 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.checks import reference_distances as plain_distances
+from rrtik_ompl.fast.checks import reference_distances
 from rrtik_ompl.fast.checks.clearance import Clearance, rounded
-from rrtik_ompl.fast.checks.reference import PlainChecks
+from rrtik_ompl.fast.checks.reference import ReferenceChecks
 from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.fast.tables.layout import INNER_LAST, MARKS, OUTER_ROWS, STANDING_SOLIDS, UNDECIDED
+from rrtik_ompl.fast.tables.layout import INNER_LAST, MARKS, OUTER_PRIMITIVES, STANDING_SOLIDS, UNDECIDED
 from rrtik_ompl.fast.tables.packing import (
     ArmTables,
-    PlacedRows,
+    PlacedPrimitives,
     alike,
     arm_tables,
     checked_table,
@@ -31,8 +31,8 @@ from rrtik_ompl.fast.tables.packing import (
     standing_tables,
 )
 from rrtik_ompl.fast.tables.robot_tables import Spheres, Table, table
-from rrtik_ompl.fast.tables.scene_tables import rows_table
-from rrtik_ompl.fast.tables.scratch import probe_table, workspace
+from rrtik_ompl.fast.tables.scene_tables import primitive_table
+from rrtik_ompl.fast.tables.scratch import probe_table, scratch_table
 from rrtik_ompl.fast.tables.solid_tables import NO_SOLIDS, Solids
 from rrtik_ompl.robot import Chain
 
@@ -95,23 +95,23 @@ class FastWorld:
         same = like._arm if like is not None and like._joints == self._joints else None
         self._arm: ArmTables = arm_tables(chain, bodies, moving, kept, outer, inner, solids, self._limits, same)
         self._checked = checked_table(moving, standing, kept)
-        self._rows = standing_tables(bodies, standing, self._checked, outer, inner)
-        self._standing, self._outer, self._placed = standing, outer, PlacedRows()
+        self._primitives = standing_tables(bodies, standing, self._checked, outer, inner)
+        self._standing, self._outer, self._placed = standing, outer, PlacedPrimitives()
         self._flagged = flag_places(kept, self._arm, moving, standing)
-        self._plain = PlainChecks(self._arm.arm, self._arm.balls, self._rows)
+        self._reference = ReferenceChecks(self._arm.arm, self._arm.balls, self._primitives)
         self._kernels = library("checks.check_kernels") if compiled else None
         self._probe: Table | None = None
         self._moved = False
         self.address = 0
         if self._kernels is not None:
-            self._work = workspace(self._arm.arm, self._arm.balls, self._rows)
+            self._scratch = scratch_table(self._arm.arm, self._arm.balls, self._primitives)
             self._solids = standing_solids(bodies, standing, solids)
-            tables = (self._arm.arm, *self._arm.balls, *self._rows, self._work, self._arm.solids, self._solids)
+            tables = (self._arm.arm, *self._arm.balls, *self._primitives, self._scratch, self._arm.solids, self._solids)
             self._world = table({k: t.address for k, t in enumerate(tables)})
             self.address = self._world.address
-            self._marks = self._work[MARKS]
+            self._marks = self._scratch[MARKS]
 
-    def move(self, bodies: Sequence[Any], rooms: Sequence[float]) -> None:
+    def update_obstacles(self, bodies: Sequence[Any], inflation: Sequence[float]) -> None:
         """Put what stands still elsewhere, in place: the arm, the pairs and addresses stay as they are.
 
         From then on no contact with them is proven, only freedom from it.
@@ -119,21 +119,22 @@ class FastWorld:
         Args:
             bodies: As at the beginning, those that stand still with other placements. One that is the same object
                 as before is not packed again.
-            rooms: For each body how far from it, beyond its margin, the arm must stay to be FREE [m]; read for those
-                that stand still.
+            inflation: For each body how far from it, beyond its margin, the arm must stay to be FREE [m]; read for
+                those that stand still.
         """
-        around = self._placed.rows(bodies, self._standing, self._outer, rooms)
+        around = self._placed.primitives(bodies, self._standing, self._outer, inflation)
         first = not self._moved
         self._moved = True
-        self._rows = rows_table(around, self._checked), rows_table([], self._checked) if first else self._rows[1]
-        self._plain = PlainChecks(self._arm.arm, self._arm.balls, self._rows)
+        inside = primitive_table([], self._checked) if first else self._primitives[1]
+        self._primitives = primitive_table(around, self._checked), inside
+        self._reference = ReferenceChecks(self._arm.arm, self._arm.balls, self._primitives)
         self._probe = None
         if self._kernels is not None:
-            self._world.header[OUTER_ROWS : OUTER_ROWS + 2] = [rows.address for rows in self._rows]
+            self._world.header[OUTER_PRIMITIVES : OUTER_PRIMITIVES + 2] = [each.address for each in self._primitives]
             if first:  # the solids stand where nothing is any more; that none is known holds wherever bodies go
                 self._solids = standing_solids(bodies, self._standing, [NO_SOLIDS] * len(bodies))
                 self._world.header[STANDING_SOLIDS] = self._solids.address
-            self._work[INNER_LAST][:] = -1  # what met last is there no more
+            self._scratch[INNER_LAST][:] = -1  # what met last is there no more
 
     @property
     def margin(self) -> float:
@@ -145,27 +146,29 @@ class FastWorld:
         """Largest absolute value of each joint for which kernels can be asked directly [rad or m], shape (joints,)."""
         return self._limits
 
-    def classify(self, V: ArrayLike, *, prove: bool = True) -> NDArray[np.int8]:
-        """Judge rows of joint values V, shape (m, joints): FREE, UNDECIDED or COLLIDING each. Shape (m,).
+    def classify(self, V: ArrayLike, *, narrow_phase: bool = True) -> NDArray[np.int8]:
+        """Check rows of joint values V, shape (m, joints): FREE, UNDECIDED or COLLIDING each. Shape (m,).
 
         Args:
             V: Joint values [rad or m].
-            prove: False to be content with FREE and UNDECIDED.
+            narrow_phase: False to be content with FREE and UNDECIDED.
 
         Raises:
             InputError: If V has the wrong shape or a value that is not finite.
         """
         rows, beyond = self._values(V, "joint values")
         if self._kernels is None:
-            answers = self._plain.classify(rows, prove=prove)
+            answers = self._reference.classify(rows, narrow_phase=narrow_phase)
         else:
-            judged = np.empty(len(rows), dtype=np.int32)
-            self._kernels.classify(self.address, rows.ctypes.data, len(rows), judged.ctypes.data, prove)
-            answers = judged.astype(np.int8)
+            found = np.empty(len(rows), dtype=np.int32)
+            self._kernels.classify(self.address, rows.ctypes.data, len(rows), found.ctypes.data, narrow_phase)
+            answers = found.astype(np.int8)
         return answers if beyond is None else np.where(beyond, np.int8(UNDECIDED), answers)
 
-    def classify_edges(self, A: ArrayLike, B: ArrayLike, counts: ArrayLike, *, prove: bool = True) -> NDArray[np.int8]:
-        """Judge straight motions A[k] -> B[k] by their configurations (1 - s) A + s B, s = 0, 1 / count, ..., 1.
+    def classify_edges(
+        self, A: ArrayLike, B: ArrayLike, counts: ArrayLike, *, narrow_phase: bool = True
+    ) -> NDArray[np.int8]:
+        """Check straight motions A[k] -> B[k] by their configurations (1 - s) A + s B, s = 0, 1 / count, ..., 1.
 
         A motion is COLLIDING as soon as one of them is, FREE if all are, UNDECIDED otherwise.
 
@@ -173,7 +176,7 @@ class FastWorld:
             A: Starts, shape (m, joints).
             B: Ends, shape (m, joints).
             counts: Numbers of steps, whole and at least 1, shape (m,).
-            prove: False to be content with FREE and UNDECIDED.
+            narrow_phase: False to be content with FREE and UNDECIDED.
 
         Raises:
             InputError: If shapes do not fit, a value is not finite or a number of steps is not a positive integer.
@@ -183,12 +186,12 @@ class FastWorld:
         if len(starts) != len(ends):
             raise InputError(f"motions need as many starts as ends, got {len(starts)} and {len(ends)}")
         if self._kernels is None:
-            answers = self._plain.classify_edges(starts, ends, steps, prove=prove)
+            answers = self._reference.classify_edges(starts, ends, steps, narrow_phase=narrow_phase)
         else:
-            judged = np.empty(len(starts), dtype=np.int32)
+            found = np.empty(len(starts), dtype=np.int32)
             places = (starts.ctypes.data, ends.ctypes.data, steps.ctypes.data)
-            self._kernels.classify_edges(self.address, *places, len(starts), judged.ctypes.data, prove)
-            answers = judged.astype(np.int8)
+            self._kernels.classify_edges(self.address, *places, len(starts), found.ctypes.data, narrow_phase)
+            answers = found.astype(np.int8)
         for beyond in (first, second):
             answers = answers if beyond is None else np.where(beyond, np.int8(UNDECIDED), answers)
         return answers
@@ -222,12 +225,12 @@ class FastWorld:
 
     def _measured(self, rows: Matrix, level: int) -> tuple[Vector, NDArray[np.int32]]:
         """Distances between outer (0) or inner (1) solids and the flags of the nearest pairs, -1 for none."""
-        balls, scene = self._arm.balls[level], self._rows[level]
+        balls, scene = self._arm.balls[level], self._primitives[level]
         kernels = None if self._kernels is None else library("checks.distance_kernels")
         if kernels is None:
-            return plain_distances.measure(self._arm.arm, balls, scene, rows)
+            return reference_distances.measure(self._arm.arm, balls, scene, rows)
         if self._probe is None:
-            self._probe = probe_table(self._rows)
+            self._probe = probe_table(self._primitives)
         found, pairs = np.empty(len(rows)), np.empty(len(rows), dtype=np.int32)
         tables = (self.address, balls.address, scene.address, rows.ctypes.data, len(rows), self._probe.address)
         kernels.measure(*tables, found.ctypes.data, pairs.ctypes.data)
@@ -254,7 +257,7 @@ class FastWorld:
     def _marked(self, rows: Matrix) -> Mask:
         """Flags of the pairs that are not proven free, shape (m, flags), for a few rows."""
         if self._kernels is None:
-            return self._plain.marks(rows)
+            return self._reference.marks(rows)
         count = self._kernels.mark_pairs(self.address, rows.ctypes.data, len(rows))
         lanes = np.arange(len(rows), dtype=np.int32)[:, None]
         return np.asarray((self._marks[:count] >> lanes) & 1, dtype=bool)

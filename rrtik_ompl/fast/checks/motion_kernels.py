@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.fast.checks.check_kernels import judge_edge
+from rrtik_ompl.fast.checks.check_kernels import check_edge
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_double
 from rrtik_ompl.fast.tables.layout import ARM, JOINT_COUNT
@@ -25,7 +25,7 @@ def copy_row(count: int, source: int, sink: int) -> None:
 
 
 @kernel
-def lift(dof: int, joints: int, gain: int, offset: int, row: int, values: int) -> None:
+def joint_values(dof: int, joints: int, gain: int, offset: int, row: int, values: int) -> None:
     """Joint values ``gain @ q + offset`` of a configuration."""
     for joint in range(joints):
         total = 0.0
@@ -59,12 +59,12 @@ def descends(dof: int, start: int, end: int) -> Any:
 
 
 @kernel
-def judge_motion(
-    world: int, dof: int, gain: int, offset: int, start: int, end: int, steps: int, values: int, proving: bool
+def check_motion(
+    world: int, dof: int, gain: int, offset: int, start: int, end: int, steps: int, values: int, resolve: bool
 ) -> Any:
-    """Judge the motion between two configurations; ``values`` has room for the joint values of both."""
+    """Check the motion between two configurations; ``values`` has room for the joint values of both."""
     joints = field(field(world, ARM), JOINT_COUNT)
     first, second = (end, start) if descends(dof, start, end) else (start, end)
-    lift(dof, joints, gain, offset, first, values)
-    lift(dof, joints, gain, offset, second, values + 8 * joints)
-    return judge_edge(world, values, values + 8 * joints, steps, proving)
+    joint_values(dof, joints, gain, offset, first, values)
+    joint_values(dof, joints, gain, offset, second, values + 8 * joints)
+    return check_edge(world, values, values + 8 * joints, steps, resolve)

@@ -1,4 +1,4 @@
-"""Kernels that settle what balls leave open: body by body, in the lanes in doubt, by the solids around and inside them.
+"""The narrow phase: kernels that compare bodies that balls leave in doubt, by the solids around and inside them.
 
 Lanes are bits of an integer. Solids: see :mod:`rrtik_ompl.fast.tables.solid_tables`.
 """
@@ -9,8 +9,8 @@ from math import sqrt
 from typing import Any
 
 from rrtik_ompl.fast.checks.gjk import SHORTEST, carried, compare, dot, farthest, minus, scaled, size_of
-from rrtik_ompl.fast.checks.obstacle_kernels import row_gap
-from rrtik_ompl.fast.checks.sphere_kernels import FRAME_BYTES, meets_itself, meets_surroundings, prepare
+from rrtik_ompl.fast.checks.obstacle_kernels import primitive_gap
+from rrtik_ompl.fast.checks.sphere_kernels import FRAME_BYTES, prepare, scene_collision, self_collision
 from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, field, first_bit, float_at, int_at, lanes_at, lowest, set_int
 from rrtik_ompl.fast.tables import layout
@@ -18,15 +18,15 @@ from rrtik_ompl.fast.tables.layout import (
     COLLIDING,
     FRAMES,
     FREE,
-    INNER_ROWS,
+    INNER_PRIMITIVES,
     MARKS,
     MOVING_SOLIDS,
     OUTER,
     OUTER_LAST,
-    OUTER_ROWS,
+    OUTER_PRIMITIVES,
+    SCRATCH,
     STANDING_SOLIDS,
     UNDECIDED,
-    WORK,
 )
 
 
@@ -89,13 +89,13 @@ def compare_solids(mine: int, first: int, others: int, second: int, frames: Any,
 
 
 @kernel
-def compare_bodies(work: int, mine: int, first: int, others: int, second: int, wanted: int) -> Any:
+def compare_bodies(scratch: int, mine: int, first: int, others: int, second: int, wanted: int) -> Any:
     """As ``compare_solids``, for bodies: the solids around them, and then those inside them where they differ."""
     spans, other_spans = field(mine, layout.SPANS) + 20 * first, field(others, layout.SPANS) + 20 * second
     frames = (
-        field(work, FRAMES) + FRAME_BYTES * int_at(spans, 0),
-        field(work, FRAMES) + FRAME_BYTES * int_at(other_spans, 0),
-        field(work, layout.NOTE),
+        field(scratch, FRAMES) + FRAME_BYTES * int_at(spans, 0),
+        field(scratch, FRAMES) + FRAME_BYTES * int_at(other_spans, 0),
+        field(scratch, layout.NOTE),
     )
     open_, overlapping = 0, 0
     for one in range(int_at(spans, 1), int_at(spans, 2)):
@@ -115,19 +115,19 @@ def compare_bodies(work: int, mine: int, first: int, others: int, second: int, w
 @inlined
 def carried_axis(frame: int, lane: int, axis: int, a: Any, b: Any, c: Any) -> Any:
     """A coordinate in the world of points of a frame. Here lanes hold points; ``lane`` is that of the frame."""
-    row = 3 * axis * WIDTH + lane
-    turned = a * float_at(frame, row) + b * float_at(frame, row + WIDTH) + c * float_at(frame, row + 2 * WIDTH)
+    place = 3 * axis * WIDTH + lane
+    turned = a * float_at(frame, place) + b * float_at(frame, place + WIDTH) + c * float_at(frame, place + 2 * WIDTH)
     return turned + float_at(frame, (9 + axis) * WIDTH + lane)
 
 
 @kernel
-def corner_inside(mine: int, one: int, frame: int, lane: int, rows: int, row: int) -> bool:
-    """Whether a corner of a solid lies inside a row, in one lane."""
+def corner_inside(mine: int, one: int, frame: int, lane: int, primitives: int, primitive: int) -> bool:
+    """Whether a corner of a solid lies inside a primitive, in one lane."""
     numbers, corners = field(mine, layout.SOLIDS) + 16 * one, field(mine, layout.CORNERS)
     for block in range(int_at(numbers, 1), int_at(numbers, 2)):
         a, b, c = lanes_at(corners, 3 * block), lanes_at(corners, 3 * block + 1), lanes_at(corners, 3 * block + 2)
         x, y = carried_axis(frame, lane, 0, a, b, c), carried_axis(frame, lane, 1, a, b, c)
-        gap = row_gap(rows, row, x, y, carried_axis(frame, lane, 2, a, b, c), False)
+        gap = primitive_gap(primitives, primitive, x, y, carried_axis(frame, lane, 2, a, b, c), False)
         if lowest(gap) < -size_of(mine, one, layout.SLACK):
             return True
     return False
@@ -136,10 +136,10 @@ def corner_inside(mine: int, one: int, frame: int, lane: int, rows: int, row: in
 @kernel
 def corners_inside(world: int, body: int, standing: int, wanted: int) -> int:
     """Lanes among ``wanted`` in which a point of a moving body lies inside one that stands still."""
-    mine, rows, overlapping = field(world, MOVING_SOLIDS), field(world, INNER_ROWS), 0
-    row, spans = int_at(field(rows, layout.OWN), standing), field(mine, layout.SPANS) + 20 * body
-    frame = field(field(world, WORK), FRAMES) + FRAME_BYTES * int_at(spans, 0)
-    if row < 0:
+    mine, primitives, overlapping = field(world, MOVING_SOLIDS), field(world, INNER_PRIMITIVES), 0
+    primitive, spans = int_at(field(primitives, layout.OWN), standing), field(mine, layout.SPANS) + 20 * body
+    frame = field(field(world, SCRATCH), FRAMES) + FRAME_BYTES * int_at(spans, 0)
+    if primitive < 0:
         return 0
     for one in range(int_at(spans, 3), int_at(spans, 4)):
         if int_at(field(mine, layout.SOLIDS), 4 * one) == layout.MERE_CORNERS:
@@ -147,7 +147,7 @@ def corners_inside(world: int, body: int, standing: int, wanted: int) -> int:
             while left != 0:
                 lane = first_bit(left)
                 left &= left - 1
-                if corner_inside(mine, one, frame, lane, rows, row):
+                if corner_inside(mine, one, frame, lane, primitives, primitive):
                     overlapping |= 1 << lane
     return overlapping
 
@@ -158,20 +158,20 @@ def mark(world: int, wanted: int) -> int:
 
     The numbers of moving and standing bodies come first, then those of the pairs of moving bodies.
     """
-    work, balls, rows = field(world, WORK), field(world, OUTER), field(world, OUTER_ROWS)
-    prepare(balls, work)
-    marks = field(work, MARKS)
-    crossing = field(balls, layout.BODY_COUNT) * field(rows, layout.STANDING_COUNT)
+    scratch, balls, primitives = field(world, SCRATCH), field(world, OUTER), field(world, OUTER_PRIMITIVES)
+    prepare(balls, scratch)
+    marks = field(scratch, MARKS)
+    crossing = field(balls, layout.BODY_COUNT) * field(primitives, layout.STANDING_COUNT)
     total: int = crossing + field(balls, layout.PAIR_COUNT)
     for k in range(total):
         set_int(marks, k, 0)
-    meets_surroundings(balls, rows, work, wanted, marks, wanted < 0, field(work, OUTER_LAST))
-    meets_itself(balls, work, wanted, marks + 4 * crossing, wanted < 0)
+    scene_collision(balls, primitives, scratch, wanted, marks, wanted < 0, field(scratch, OUTER_LAST))
+    self_collision(balls, scratch, wanted, marks + 4 * crossing, wanted < 0)
     return total
 
 
 @kernel
-def settle(world: int, wanted: int) -> Any:
+def narrow_phase(world: int, wanted: int) -> Any:
     """Look at the pairs of bodies that the outer balls leave open in the lanes ``wanted``, solid by solid.
 
     The marks of what is proven apart are taken back. A lane in which something overlaps is not looked at further.
@@ -180,10 +180,10 @@ def settle(world: int, wanted: int) -> Any:
         Lanes in which something remains open, and lanes that are colliding.
     """
     total = mark(world, wanted)
-    work, balls, mine = field(world, WORK), field(world, OUTER), field(world, MOVING_SOLIDS)
-    standing = field(field(world, OUTER_ROWS), layout.STANDING_COUNT)
+    scratch, balls, mine = field(world, SCRATCH), field(world, OUTER), field(world, MOVING_SOLIDS)
+    standing = field(field(world, OUTER_PRIMITIVES), layout.STANDING_COUNT)
     crossing = field(balls, layout.BODY_COUNT) * standing
-    marks, pairs = field(work, MARKS), field(balls, layout.PAIRS)
+    marks, pairs = field(scratch, MARKS), field(balls, layout.PAIRS)
     open_, colliding = 0, 0
     for k in range(total):
         marked = int_at(marks, k) & ~colliding
@@ -193,7 +193,7 @@ def settle(world: int, wanted: int) -> Any:
             first, second, others = k // standing, k % standing, field(world, STANDING_SOLIDS)
         else:
             first, second, others = int_at(pairs, 2 * (k - crossing)), int_at(pairs, 2 * (k - crossing) + 1), mine
-        left, hit = compare_bodies(work, mine, first, others, second, marked)
+        left, hit = compare_bodies(scratch, mine, first, others, second, marked)
         if k < crossing and left != hit:
             hit |= corners_inside(world, first, second, left & ~hit)
         set_int(marks, k, left | int_at(marks, k) & colliding)

@@ -30,7 +30,7 @@ from rrtik_ompl.fast.simd.lanes import (
 from rrtik_ompl.fast.tables import layout
 
 ZERO, ONE = np.float32(0.0), np.float32(1.0)
-NOTHING = np.float32(1e18)  # [m] where there is nothing to measure; its square is a float32 still
+UNBOUNDED_DISTANCE = np.float32(1e18)  # [m] where there is nothing to measure; its square is a float32 still
 
 
 @inlined
@@ -85,15 +85,15 @@ def meets_convex(planes: int, start: int, end: int, share: Any, x: Any, y: Any, 
 
 
 @inlined
-def meets_row(rows: int, number: int, x: Any, y: Any, z: Any, radius: float, bound: bool) -> Any:
+def meets_primitive(primitives: int, number: int, x: Any, y: Any, z: Any, radius: float, bound: bool) -> Any:
     """Lanes in which a ball meets a row; ``bound`` tells that the ball only stands for balls inside it."""
-    row = field(rows, layout.ROWS) + 4 * layout.ROW_FLOATS * number
-    numbers = field(rows, layout.NUMBERS) + 16 * number
+    row = field(primitives, layout.PRIMITIVES) + 4 * layout.PRIMITIVE_FLOATS * number
+    numbers = field(primitives, layout.NUMBERS) + 16 * number
     kind = int_at(numbers, 0)
     if kind == layout.HALF_SPACE:
         return bits(along(row, 0, x, y, z) - float_at(row, 3) < radius)
     if kind == layout.CONVEX:
-        planes = field(rows, layout.PLANES)
+        planes = field(primitives, layout.PLANES)
         share = ONE if bound else float_at(row, 0)
         return meets_convex(planes, int_at(numbers, 2), int_at(numbers, 3), share, x, y, z, radius)
     x, y, z = x - float_at(row, 0), y - float_at(row, 1), z - float_at(row, 2)
@@ -118,18 +118,19 @@ def to_convex(planes: int, start: int, end: int, x: Any, y: Any, z: Any) -> Any:
 
 
 @kernel
-def row_gap(rows: int, number: int, x: Any, y: Any, z: Any, bound: bool) -> Any:
+def primitive_gap(primitives: int, number: int, x: Any, y: Any, z: Any, bound: bool) -> Any:
     """Signed distance of a point from a row, negative inside; ``bound`` tells that it stands for points near it."""
-    row = field(rows, layout.ROWS) + 4 * layout.ROW_FLOATS * number
-    numbers = field(rows, layout.NUMBERS) + 16 * number
+    row = field(primitives, layout.PRIMITIVES) + 4 * layout.PRIMITIVE_FLOATS * number
+    numbers = field(primitives, layout.NUMBERS) + 16 * number
     kind = int_at(numbers, 0)
     if kind == layout.HALF_SPACE:
         return along(row, 0, x, y, z) - float_at(row, 3)
     if kind == layout.CONVEX:
-        height = to_convex(field(rows, layout.PLANES), int_at(numbers, 2), int_at(numbers, 3), x, y, z)
+        height = to_convex(field(primitives, layout.PLANES), int_at(numbers, 2), int_at(numbers, 3), x, y, z)
         if bound or float_at(row, 0) != ZERO:
             return height
-        return choose(height < ZERO, height, spread(NOTHING))  # outside, the height is too small for an inner row
+        # Outside, the height is too small for an inner primitive.
+        return choose(height < ZERO, height, spread(UNBOUNDED_DISTANCE))
     x, y, z = x - float_at(row, 0), y - float_at(row, 1), z - float_at(row, 2)
     if kind == layout.BALL:
         return square_root(squared(x, y, z)) - float_at(row, 3)
@@ -149,8 +150,8 @@ def row_gap(rows: int, number: int, x: Any, y: Any, z: Any, bound: bool) -> Any:
 
 
 @kernel
-def meets_rows(
-    rows: int,
+def meets_primitives(
+    primitives: int,
     x: Any,
     y: Any,
     z: Any,
@@ -162,35 +163,35 @@ def meets_rows(
     sink: int,
     marks: int,
 ) -> Any:
-    """Lanes among ``wanted`` in which a ball meets one of the rows of a list; the rows that it meets go to ``sink``.
+    """Lanes among ``wanted`` in which a ball meets one of the primitives of a list; those that it meets go to ``sink``.
 
     Unless 0, ``marks`` is the address of one number for each standing body, which collects the lanes that meet it.
     """
     meeting, kept = 0, 0
     for k in range(count):
         number = int_at(source, k)
-        found = meets_row(rows, number, x, y, z, radius, bound) & wanted
+        found = meets_primitive(primitives, number, x, y, z, radius, bound) & wanted
         if found != 0:
             meeting |= found
             set_int(sink, kept, number)
             kept += 1
             if marks != 0:
-                body = int_at(field(rows, layout.NUMBERS), 4 * number + 1)
+                body = int_at(field(primitives, layout.NUMBERS), 4 * number + 1)
                 set_int(marks, body, int_at(marks, body) | found)
     return meeting, kept
 
 
 @kernel
-def rows_in_reach(rows: int, x: Any, y: Any, z: Any, radius: float, found: int) -> int:
-    """List the rows whose bounding box meets the box around a ball in all lanes; returns their number.
+def primitives_in_reach(primitives: int, x: Any, y: Any, z: Any, radius: float, found: int) -> int:
+    """List the primitives whose bounding box meets the box around a ball in all lanes; returns their number.
 
-    Here the lanes hold rows, not configurations.
+    Here the lanes hold primitives, not configurations.
     """
     low_x, high_x = lowest(x) - radius, highest(x) + radius
     low_y, high_y = lowest(y) - radius, highest(y) + radius
     low_z, high_z = lowest(z) - radius, highest(z) + radius
-    boxes = field(rows, layout.BOXES)
-    steps = field(rows, layout.PADDED_COUNT) // WIDTH
+    boxes = field(primitives, layout.BOXES)
+    steps = field(primitives, layout.PADDED_COUNT) // WIDTH
     count = 0
     for k in range(steps):
         inside_x = (lanes_at(boxes, k) < high_x) & (lanes_at(boxes, steps + k) > low_x)

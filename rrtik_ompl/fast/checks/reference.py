@@ -29,14 +29,14 @@ def frames(arm: Table, values: Matrix) -> NDArray[np.float64]:
     return found
 
 
-def meets_row(rows: Table, number: int, points: NDArray[np.float64], radii: NDArray[np.float64]) -> Mask:
+def meets_primitive(primitives: Table, number: int, points: NDArray[np.float64], radii: NDArray[np.float64]) -> Mask:
     """Which balls, centres of shape (..., 3), meet a row. Shape (...)."""
-    row = rows[layout.ROWS].reshape(-1, layout.ROW_FLOATS)[number].astype(np.float64)
-    kind, _, start, end = rows[layout.NUMBERS].reshape(-1, 4)[number]
+    row = primitives[layout.PRIMITIVES].reshape(-1, layout.PRIMITIVE_FLOATS)[number].astype(np.float64)
+    kind, _, start, end = primitives[layout.NUMBERS].reshape(-1, 4)[number]
     if kind == layout.HALF_SPACE:
         return np.asarray(points @ row[:3] - row[3] < radii)
     if kind == layout.CONVEX:
-        planes = rows[layout.PLANES].astype(np.float64).reshape(-1, 4)[start:end]
+        planes = primitives[layout.PLANES].astype(np.float64).reshape(-1, 4)[start:end]
         return np.asarray((points @ planes[:, :3].T - planes[:, 3]).max(axis=-1) < row[0] * radii)
     away = points - row[:3]
     if kind == layout.BOX:
@@ -52,49 +52,53 @@ def meets_row(rows: Table, number: int, points: NDArray[np.float64], radii: NDAr
     return np.asarray(np.hypot(np.maximum(np.abs(along) - row[6], 0.0), np.maximum(across - row[7], 0.0)) < radii)
 
 
-class PlainChecks:
+class ReferenceChecks:
     """The three-valued checks on the tables of a world."""
 
-    def __init__(self, arm: Table, balls: tuple[Table, Table], rows: tuple[Table, Table]) -> None:
-        self._arm, self._balls, self._rows = arm, balls, rows
+    def __init__(self, arm: Table, balls: tuple[Table, Table], primitives: tuple[Table, Table]) -> None:
+        self._arm, self._balls, self._primitives = arm, balls, primitives
 
-    def classify(self, values: Matrix, *, prove: bool) -> NDArray[np.int8]:
+    def classify(self, values: Matrix, *, narrow_phase: bool) -> NDArray[np.int8]:
         """See :meth:`rrtik_ompl.fast.FastWorld.classify`."""
         answers = np.zeros(len(values), dtype=np.int8)
         for start in range(0, len(values), CHUNK):
             part = slice(start, start + CHUNK)
             poses = frames(self._arm, values[part])
-            answers[part] = self._meeting(poses, 0).any(axis=1)
+            answers[part] = self._in_collision(poses, 0).any(axis=1)
             open_ = np.flatnonzero(answers[part])
-            if prove and len(open_):
-                answers[start + open_] += self._meeting(poses[open_], 1).any(axis=1)
+            if narrow_phase and len(open_):
+                answers[start + open_] += self._in_collision(poses[open_], 1).any(axis=1)
         return answers
 
     def classify_edges(
-        self, starts: Matrix, ends: Matrix, steps: NDArray[np.int32], *, prove: bool
+        self, starts: Matrix, ends: Matrix, steps: NDArray[np.int32], *, narrow_phase: bool
     ) -> NDArray[np.int8]:
         """See :meth:`rrtik_ompl.fast.FastWorld.classify_edges`."""
         answers = np.zeros(len(starts), dtype=np.int8)
         for edge, count in enumerate(steps):
             share = (np.arange(count + 1) / count)[:, None]
-            answers[edge] = self.classify((1.0 - share) * starts[edge] + share * ends[edge], prove=prove).max()
+            answers[edge] = self.classify(
+                (1.0 - share) * starts[edge] + share * ends[edge], narrow_phase=narrow_phase
+            ).max()
         return answers
 
     def marks(self, values: Matrix) -> Mask:
-        """Flags of the pairs that the outer balls cannot prove free, shape (m, flags)."""
-        return np.asarray(self._meeting(frames(self._arm, values), 0))
+        """Flags of the pairs that the outer balls cannot narrow_phase free, shape (m, flags)."""
+        return np.asarray(self._in_collision(frames(self._arm, values), 0))
 
-    def _meeting(self, poses: NDArray[np.float64], level: int) -> NDArray[np.bool_]:
+    def _in_collision(self, poses: NDArray[np.float64], level: int) -> NDArray[np.bool_]:
         """Which bodies meet, shape (m, moving * standing + pairs of moving bodies)."""
-        table, rows = self._balls[level], self._rows[level]
-        body_count, standing = int(table.header[layout.BODY_COUNT]), int(rows.header[layout.STANDING_COUNT])
+        table, primitives = self._balls[level], self._primitives[level]
+        body_count, standing = int(table.header[layout.BODY_COUNT]), int(primitives.header[layout.STANDING_COUNT])
         pairs = table[layout.PAIRS].reshape(-1, 2)
         found = np.zeros((len(poses), body_count * standing + len(pairs)), dtype=bool)
         points, radii = placed_balls(poses, table)
-        checked = rows[layout.CHECKED].reshape(body_count, standing)
-        for number, (_, stands, _, _) in enumerate(rows[layout.NUMBERS].reshape(-1, 4)):
+        checked = primitives[layout.CHECKED].reshape(body_count, standing)
+        for number, (_, stands, _, _) in enumerate(primitives[layout.NUMBERS].reshape(-1, 4)):
             for body in np.flatnonzero(checked[:, stands]):
-                found[:, body * standing + stands] |= meets_row(rows, number, points[body], radii[body]).any(axis=1)
+                found[:, body * standing + stands] |= meets_primitive(
+                    primitives, number, points[body], radii[body]
+                ).any(axis=1)
         for k, (i, j) in enumerate(pairs):
             gaps = np.linalg.norm(points[i][:, :, None] - points[j][:, None], axis=3)
             found[:, body_count * standing + k] = (gaps < radii[i][:, None] + radii[j]).any(axis=(1, 2))

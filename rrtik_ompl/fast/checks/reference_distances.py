@@ -11,12 +11,12 @@ from rrtik_ompl.fast.tables import layout
 from rrtik_ompl.fast.tables.robot_tables import Table
 
 
-def measure(arm: Table, balls: Table, rows: Table, values: Matrix) -> tuple[Vector, NDArray[np.int32]]:
+def measure(arm: Table, balls: Table, primitives: Table, values: Matrix) -> tuple[Vector, NDArray[np.int32]]:
     """See :func:`rrtik_ompl.fast.checks.distance_kernels.measure`; +inf where there is nothing to measure."""
     distances, pairs = np.full(len(values), np.inf), np.full(len(values), -1, dtype=np.int32)
     for start in range(0, len(values), CHUNK):
         part = slice(start, start + CHUNK)
-        gaps, numbers = _all_gaps(frames(arm, values[part]), balls, rows)
+        gaps, numbers = _all_gaps(frames(arm, values[part]), balls, primitives)
         if len(numbers):
             nearest = gaps.argmin(axis=1)
             distances[part] = gaps[np.arange(len(gaps)), nearest]
@@ -24,17 +24,17 @@ def measure(arm: Table, balls: Table, rows: Table, values: Matrix) -> tuple[Vect
     return distances, pairs
 
 
-def _all_gaps(poses: NDArray[np.float64], balls: Table, rows: Table) -> tuple[Matrix, NDArray[np.int32]]:
+def _all_gaps(poses: NDArray[np.float64], balls: Table, primitives: Table) -> tuple[Matrix, NDArray[np.int32]]:
     """Distance of every pair of a body and a row or of two bodies, shape (m, k), and the numbers of the pairs."""
-    body_count, standing = int(balls.header[layout.BODY_COUNT]), int(rows.header[layout.STANDING_COUNT])
-    checked = rows[layout.CHECKED].reshape(body_count, standing)
+    body_count, standing = int(balls.header[layout.BODY_COUNT]), int(primitives.header[layout.STANDING_COUNT])
+    checked = primitives[layout.CHECKED].reshape(body_count, standing)
     points, radii = placed_balls(poses, balls)
     gaps: list[Vector] = []
     numbers: list[int] = []
-    for number, (_, stands, _, _) in enumerate(rows[layout.NUMBERS].reshape(-1, 4)):
+    for number, (_, stands, _, _) in enumerate(primitives[layout.NUMBERS].reshape(-1, 4)):
         for body in np.flatnonzero(checked[:, stands]):
             if len(radii[body]):
-                gaps.append((row_gap(rows, number, points[body]) - radii[body]).min(axis=1))
+                gaps.append((primitive_gap(primitives, number, points[body]) - radii[body]).min(axis=1))
                 numbers.append(int(body) * standing + int(stands))
     for k, (i, j) in enumerate(balls[layout.PAIRS].reshape(-1, 2)):
         apart = np.linalg.norm(points[i][:, :, None] - points[j][:, None], axis=3)
@@ -43,14 +43,14 @@ def _all_gaps(poses: NDArray[np.float64], balls: Table, rows: Table) -> tuple[Ma
     return np.reshape(gaps, (-1, len(poses))).T, np.array(numbers, dtype=np.int32)
 
 
-def row_gap(rows: Table, number: int, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def primitive_gap(primitives: Table, number: int, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Signed distance of points, shape (..., 3), from a row, negative inside. Shape (...)."""
-    row = rows[layout.ROWS].reshape(-1, layout.ROW_FLOATS)[number].astype(np.float64)
-    kind, _, start, end = rows[layout.NUMBERS].reshape(-1, 4)[number]
+    row = primitives[layout.PRIMITIVES].reshape(-1, layout.PRIMITIVE_FLOATS)[number].astype(np.float64)
+    kind, _, start, end = primitives[layout.NUMBERS].reshape(-1, 4)[number]
     if kind == layout.HALF_SPACE:
         return np.asarray(points @ row[:3] - row[3])
     if kind == layout.CONVEX:
-        planes = rows[layout.PLANES].astype(np.float64).reshape(-1, 4)[start:end]
+        planes = primitives[layout.PLANES].astype(np.float64).reshape(-1, 4)[start:end]
         height = (points @ planes[:, :3].T - planes[:, 3]).max(axis=-1)
         return np.asarray(height if row[0] else np.where(height < 0.0, height, np.inf))
     away = points - row[:3]

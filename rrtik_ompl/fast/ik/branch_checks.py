@@ -24,40 +24,42 @@ from rrtik_ompl.fast.simd.lanes import (
 from rrtik_ompl.fast.simd.wide_angles import TAU, arc_sine, wide_sine_and_cosine, within_half_turn
 
 POSE_BYTES = 128
-FAR = 1e9  # [m] squares of what is farther away could leave the numbers; it is out of reach all the same
+MAX_COORDINATE = 1e9  # [m] squares of what is farther away could leave the numbers; it is out of reach all the same
 
 
 @kernel
 def load(arm: int, call: int, block: int) -> None:
     """Read a block of targets and place them; behind the last target come copies of it."""
-    work = field(call, table.WORK)
+    scratch = field(call, table.SCRATCH)
     for lane in range(WIDTH):
         row = min(WIDTH * block + lane, field(call, table.ROWS) - 1)
         pose = field(call, table.POSES) + POSE_BYTES * row
         for k in range(3):
             for column in range(3):
-                set_double(work, WIDTH * (3 * k + column) + lane, double_at(pose, 4 * k + column))
-            set_double(work, WIDTH * (9 + k) + lane, min(max(double_at(pose, 4 * k + 3), -FAR), FAR))
+                set_double(scratch, WIDTH * (3 * k + column) + lane, double_at(pose, 4 * k + column))
+            set_double(
+                scratch, WIDTH * (9 + k) + lane, min(max(double_at(pose, 4 * k + 3), -MAX_COORDINATE), MAX_COORDINATE)
+            )
         if field(call, table.NEAR) != 0:
             for joint in range(6):
                 value = double_at(field(call, table.NEAR), 6 * row + joint)
-                set_double(work, WIDTH * (table.HINT + joint) + lane, value)
-    place(arm, work)
+                set_double(scratch, WIDTH * (table.HINT + joint) + lane, value)
+    place(arm, scratch)
 
 
 @inlined
-def place(arm: int, work: int) -> None:
+def place(arm: int, scratch: int) -> None:
     """T_base_frame of T_world_tip."""
     before, after = field(arm, table.FROM_WORLD), field(arm, table.TO_FRAME)
     for row in range(3):
-        a, b, c = turned_row(before, row, work)
-        o = weighed(before, row, wide_lanes_at(work, 9), wide_lanes_at(work, 10), wide_lanes_at(work, 11))
+        a, b, c = turned_row(before, row, scratch)
+        o = weighed(before, row, wide_lanes_at(scratch, 9), wide_lanes_at(scratch, 10), wide_lanes_at(scratch, 11))
         o = o + double_at(before, 9 + row)
         for k in range(3):
             entry = a * double_at(after, k) + b * double_at(after, 3 + k) + c * double_at(after, 6 + k)
-            set_wide_lanes(work, table.FRAME + 3 * row + k, entry)
+            set_wide_lanes(scratch, table.FRAME + 3 * row + k, entry)
         lever = a * double_at(after, 9) + b * double_at(after, 10) + c * double_at(after, 11)
-        set_wide_lanes(work, table.FRAME + 9 + row, o + lever)
+        set_wide_lanes(scratch, table.FRAME + 9 + row, o + lever)
 
 
 @inlined
@@ -67,11 +69,11 @@ def weighed(frame: int, row: int, x: Any, y: Any, z: Any) -> Any:
 
 
 @inlined
-def turned_row(frame: int, row: int, work: int) -> Any:
+def turned_row(frame: int, row: int, scratch: int) -> Any:
     """A row of a rotation times the rotation of the target as given."""
-    x = weighed(frame, row, wide_lanes_at(work, 0), wide_lanes_at(work, 3), wide_lanes_at(work, 6))
-    y = weighed(frame, row, wide_lanes_at(work, 1), wide_lanes_at(work, 4), wide_lanes_at(work, 7))
-    z = weighed(frame, row, wide_lanes_at(work, 2), wide_lanes_at(work, 5), wide_lanes_at(work, 8))
+    x = weighed(frame, row, wide_lanes_at(scratch, 0), wide_lanes_at(scratch, 3), wide_lanes_at(scratch, 6))
+    y = weighed(frame, row, wide_lanes_at(scratch, 1), wide_lanes_at(scratch, 4), wide_lanes_at(scratch, 7))
+    z = weighed(frame, row, wide_lanes_at(scratch, 2), wide_lanes_at(scratch, 5), wide_lanes_at(scratch, 8))
     return x, y, z
 
 
@@ -82,7 +84,7 @@ def answer(call: int, joint: int, branch: int, block: int) -> Any:
 
 
 @kernel
-def judge(arm: int, call: int, block: int) -> None:
+def check_branches(arm: int, call: int, block: int) -> None:
     """Turn the branches of a block into the limits, say which fit, and measure them."""
     for branch in range(table.BRANCHES):
         hold(arm, call, branch, block)
@@ -101,7 +103,7 @@ def hold(arm: int, call: int, branch: int, block: int) -> None:
         if int_at(field(arm, table.TURNING), joint) != 0:
             near = spread_wide(0.0)
             if field(call, table.NEAR) != 0:
-                near = wide_lanes_at(field(call, table.WORK), table.HINT + joint)
+                near = wide_lanes_at(field(call, table.SCRATCH), table.HINT + joint)
             value = near + within_half_turn(value - near)
             value = value + TAU * floor(smaller(high - value, 0.0) * (1.0 / TAU))
             value = value - TAU * floor(smaller(value - low, 0.0) * (1.0 / TAU))
@@ -113,19 +115,19 @@ def hold(arm: int, call: int, branch: int, block: int) -> None:
 @inlined
 def measure(arm: int, call: int, branch: int, block: int) -> None:
     """Distance and angle between the target and where a branch brings the tip."""
-    limb, work = field(arm, table.LIMB), field(call, table.WORK)
+    limb, scratch = field(arm, table.LIMB), field(call, table.SCRATCH)
     for joint in range(6):
         column = int_at(field(limb, ik_layout.COLUMN), joint)
         value = wide_lanes_at(field(call, table.Q), answer(call, column, branch, block))
         value = value * double_at(field(limb, ik_layout.GAIN), joint) + double_at(field(limb, ik_layout.OFFSET), joint)
         sine, cosine = wide_sine_and_cosine(value)
-        set_wide_lanes(work, table.SINES + joint, sine)
-        set_wide_lanes(work, table.COSINES + joint, cosine)
+        set_wide_lanes(scratch, table.SINES + joint, sine)
+        set_wide_lanes(scratch, table.COSINES + joint, cosine)
     away, turned = spread_wide(0.0), spread_wide(0.0)
     for row in range(3):
-        x, y, z, o = row_of_tip(field(limb, ik_layout.FIXED), work, row)
-        x, y = x - wide_lanes_at(work, 3 * row), y - wide_lanes_at(work, 3 * row + 1)
-        z, o = z - wide_lanes_at(work, 3 * row + 2), o - wide_lanes_at(work, 9 + row)
+        x, y, z, o = row_of_tip(field(limb, ik_layout.FIXED), scratch, row)
+        x, y = x - wide_lanes_at(scratch, 3 * row), y - wide_lanes_at(scratch, 3 * row + 1)
+        z, o = z - wide_lanes_at(scratch, 3 * row + 2), o - wide_lanes_at(scratch, 9 + row)
         away, turned = away + o * o, turned + (x * x + y * y + z * z)
     angle = 2.0 * arc_sine(smaller(square_root(turned * 0.125), 1.0))
     set_wide_lanes(field(call, table.RESIDUALS), answer(call, 0, branch, block), square_root(away))
@@ -133,13 +135,13 @@ def measure(arm: int, call: int, branch: int, block: int) -> None:
 
 
 @inlined
-def row_of_tip(fixed: int, work: int, row: int) -> Any:
+def row_of_tip(fixed: int, scratch: int, row: int) -> Any:
     """A row of the tip's frame: of its three axes and its origin. All joints turn about their z."""
     x, y = spread_wide(double_at(fixed, 3 * row)), spread_wide(double_at(fixed, 3 * row + 1))
     z, o = spread_wide(double_at(fixed, 3 * row + 2)), spread_wide(double_at(fixed, 9 + row))
     for joint in range(6):
         fixed += ik_layout.FRAME_BYTES
-        sine, cosine = wide_lanes_at(work, table.SINES + joint), wide_lanes_at(work, table.COSINES + joint)
+        sine, cosine = wide_lanes_at(scratch, table.SINES + joint), wide_lanes_at(scratch, table.COSINES + joint)
         a, b = cosine * x + sine * y, cosine * y - sine * x
         o = o + (a * double_at(fixed, 9) + b * double_at(fixed, 10) + z * double_at(fixed, 11))
         x = a * double_at(fixed, 0) + b * double_at(fixed, 3) + z * double_at(fixed, 6)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from rrtik_ompl.fast.ik import branch_layout as table
-from rrtik_ompl.fast.ik.branch_checks import answer, judge, load
+from rrtik_ompl.fast.ik.branch_checks import answer, check_branches, load
 from rrtik_ompl.fast.simd.compiled import WIDTH, entry, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import (
     absolute,
@@ -37,7 +37,7 @@ def number(arm: int, k: int) -> float:
 @inlined
 def target(call: int, k: int) -> Any:
     """One of the 12 numbers of the placed targets."""
-    return wide_lanes_at(field(call, table.WORK), table.FRAME + k)
+    return wide_lanes_at(field(call, table.SCRATCH), table.FRAME + k)
 
 
 @inlined
@@ -171,7 +171,7 @@ def parallel_axes(arm: int, call: int) -> int:
     for block in range(field(call, table.BLOCKS)):
         load(arm, call, block)
         solve_parallel(arm, call, block)
-        judge(arm, call, block)
+        check_branches(arm, call, block)
     return 0
 
 
@@ -181,5 +181,5 @@ def ball_arm(arm: int, call: int) -> int:
     for block in range(field(call, table.BLOCKS)):
         load(arm, call, block)
         solve_ball(arm, call, block)
-        judge(arm, call, block)
+        check_branches(arm, call, block)
     return 0

@@ -14,13 +14,13 @@ FROM_WORLD, TO_FRAME, NUMBERS, LOWEST, HIGHEST, TURNING, LIMB = range(7)
 # configurations, 6 numbers each, 0: none · SLACK: one number, see `ClosedFormSolver` · the answers, targets last,
 # WIDTH times BLOCKS of them: Q: joint values, joint by joint of each branch; REAL, FITS: of each branch, whether it
 # reaches the target and whether it is inside the limits; ODD: whether the answer is not to be used; RESIDUALS: of each
-# branch its distance, then of each its angle (0: not wanted) · WORK: see below
-ROWS, BLOCKS, POSES, NEAR, SLACK, Q, REAL, FITS, ODD, RESIDUALS, WORK = range(11)
+# branch its distance, then of each its angle (0: not wanted) · SCRATCH: see below
+ROWS, BLOCKS, POSES, NEAR, SLACK, Q, REAL, FITS, ODD, RESIDUALS, SCRATCH = range(11)
 
-# Workspace, in wide lanes: TARGET as given and FRAME as the closed form wants it (12 each), the joint values of the
-# HINT (6), SINES and COSINES of the joints
+# Scratch memory, in wide lanes: TARGET as given and FRAME as the closed form wants it (12 each), the joint values of
+# the HINT (6), SINES and COSINES of the joints
 TARGET, FRAME, HINT, SINES, COSINES = 0, 12, 24, 30, 36
-WORK_LANES = 42
+SCRATCH_LANES = 42
 
 SINGULAR = 1e-10  # [m] or sine; nearer than this a pose counts as singular, and its answer is still good to 1e-9
 DOUBLE_ROOT = 4e-14  # of a squared sine: less is rounding, whose square root would spoil a stretched arm by 1e-8

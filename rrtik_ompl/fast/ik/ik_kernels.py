@@ -16,7 +16,7 @@ from rrtik_ompl.fast.ik.ik_kinematics import differentiate, measure, move_tip, n
 from rrtik_ompl.fast.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field, set_int
 
-FAR = 1e300
+UNBOUNDED_RESIDUAL = 1e300  # without unit
 
 
 @inlined
@@ -96,7 +96,12 @@ def step(limb: int, call: int, q: int) -> None:
 @kernel
 def descend(limb: int, call: int, aim: int, q: int) -> bool:
     """Walk from q towards the goal as :func:`see_from` has it; whether it is reached."""
-    mark, before, share, patience = FAR, FAR, number(limb, table.SHARE), field(call, table.PATIENCE)
+    mark, before, share, patience = (
+        UNBOUNDED_RESIDUAL,
+        UNBOUNDED_RESIDUAL,
+        number(limb, table.SHARE),
+        field(call, table.PATIENCE),
+    )
     for k in range(field(call, table.STEPS) + 1):
         tip = move_tip(limb, call, q)
         if measure(call, aim, tip):
@@ -160,7 +165,7 @@ def take_nearest(limb: int, call: int) -> int:
     for seed in range(1, field(limb, table.SEED_COUNT)):
         if double_at(farness, seed) < double_at(farness, best):
             best = seed
-    set_double(farness, best, FAR)
+    set_double(farness, best, UNBOUNDED_RESIDUAL)
     return best
 
 

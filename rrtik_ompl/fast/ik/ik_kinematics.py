@@ -9,7 +9,7 @@ from rrtik_ompl.fast.ik import ik_layout as table
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, field, int_at, set_double
 
-TINY = 1e-12  # cosine of half an angle, below which the turn is a half turn
+HALF_TURN_COSINE = 1e-12  # cosine of half an angle, below which the turn is a half turn
 
 
 @inlined
@@ -99,7 +99,7 @@ def measure(call: int, aim: int, tip: int) -> bool:
         away += outside * outside
     x, y, z, cosine = missing_turn(free, tip)
     half = math.sqrt(max(0.5 * (1.0 + cosine), 0.0))
-    if half < TINY:  # half a turn about an axis that rounding hides: any will do, the next step sees better
+    if half < HALF_TURN_COSINE:  # half a turn about an axis that rounding hides: any will do, the next step sees better
         x, y, z, half = (1.0 if free != 0 else 0.0), (1.0 if free == 0 else 0.0), 0.0, 0.5
     set_double(error, 3, x / half)
     set_double(error, 4, y / half)

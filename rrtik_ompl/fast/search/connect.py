@@ -80,7 +80,7 @@ class ConnectSearch:
         self._dof = dof = len(box[0])
         if dof == 0 or len(box[1]) != dof or (box[0] > box[1]).any():
             raise InputError(f"bounds: expected {dof} upper ones, none below its lower one, and at least one")
-        matrix, shift = _lifting(gain, offset, dof)
+        matrix, shift = _joint_map(gain, offset, dof)
         _require_certain(fast, matrix, shift, np.maximum(np.abs(box[0]), np.abs(box[1])))
         self.range, self.domain = connect_lengths(*box, range_, domain)
         span = positive(resolution, "resolution")
@@ -131,7 +131,7 @@ class ConnectSearch:
         header = self._search.header
         self._set_roots(0, starts)
         self._set_roots(1, goals)
-        header[layout.PROVING] = ask is not None
+        header[layout.RESOLVE] = ask is not None
         header[layout.LIMIT] = NO_LIMIT if max_iterations is None else max_iterations
         self._questions = 0
         outside = self._kernels.begin(self._search.address, len(starts), len(goals), int(seed) & (2**63 - 1))
@@ -146,7 +146,7 @@ class ConnectSearch:
         Such a search asks nothing and draws ``max_iterations`` samples at most; :meth:`go_on` continues it.
         """
         self._fit_trees(roots)
-        self._search.header[layout.PROVING], self._search.header[layout.LIMIT] = 0, max_iterations
+        self._search.header[layout.RESOLVE], self._search.header[layout.LIMIT] = 0, max_iterations
         return self._search.address
 
     def go_on(self, stop: Callable[[], Any]) -> bool:
@@ -161,7 +161,7 @@ class ConnectSearch:
     def statistics(self) -> dict[str, int | float]:
         """Counts of the last search.
 
-        Samples, vertices of both trees, motions judged, motions asked for, and paths that an answer has broken.
+        Samples, vertices of both trees, motions checked, motions asked for, and paths that an answer has broken.
         """
         iterations, rejected, motions = self._search.header[_COUNTS].tolist()
         vertices = sum(int(tree.header[SIZE]) for tree in self._trees)
@@ -229,7 +229,7 @@ class ConnectSearch:
 
 
 _QUESTIONS = (layout.QUESTION_STARTS, layout.QUESTION_ENDS)
-_COUNTS = slice(layout.ITERATIONS, layout.JUDGED + 1)
+_COUNTS = slice(layout.ITERATIONS, layout.CHECKED + 1)
 
 
 def _search_table(
@@ -257,7 +257,7 @@ def _search_table(
     return table(fields)
 
 
-def _lifting(gain: ArrayLike | None, offset: ArrayLike | None, dof: int) -> tuple[Matrix, Vector]:
+def _joint_map(gain: ArrayLike | None, offset: ArrayLike | None, dof: int) -> tuple[Matrix, Vector]:
     matrix = np.eye(dof) if gain is None else finite_array(gain, (None, dof), "gain")
     joints = len(matrix)
     return matrix, np.zeros(joints) if offset is None else finite_array(offset, (joints,), "offset")

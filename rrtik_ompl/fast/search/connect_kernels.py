@@ -14,19 +14,19 @@ from __future__ import annotations
 
 from typing import Any
 
-from rrtik_ompl.fast.checks.check_kernels import judge_part
+from rrtik_ompl.fast.checks.check_kernels import check_part
 from rrtik_ompl.fast.checks.motion_kernels import copy_row
 from rrtik_ompl.fast.search import connect_layout as table
 from rrtik_ompl.fast.search.connect_motions import (
     aim_at_sample,
     aim_at_vertex,
     aim_straight,
+    check_candidate,
     distance,
-    judge_candidate,
-    lift_row,
+    set_row_values,
     tree_of,
 )
-from rrtik_ompl.fast.search.connect_outcomes import NO_DOMAIN, accepted, answered, ask, blocked
+from rrtik_ompl.fast.search.connect_outcomes import NO_DOMAIN, ask, on_blocked, on_free, resume_after_answers
 from rrtik_ompl.fast.search.tree_kernels import add_vertex, clear_tree, parent_of, row_of
 from rrtik_ompl.fast.search.tree_layout import CAPACITY, CERTAIN, OPEN, SIZE
 from rrtik_ompl.fast.simd.compiled import entry, inlined, kernel
@@ -63,17 +63,17 @@ def advance(search: int) -> int:
     """Look at one motion; returns the status."""
     if not candidate(search):
         return table.RUNNING
-    answer = judge_candidate(search)
-    if answer == UNDECIDED and field(search, table.PROVING) != 0:
+    answer = check_candidate(search)
+    if answer == UNDECIDED and field(search, table.RESOLVE) != 0:
         if field(search, table.REJECTED) < field(search, table.PATIENCE):
-            return accepted(search, OPEN)
+            return on_free(search, OPEN)
         set_field(search, table.QUESTIONS, 0)
         start = row_of(tree_of(search, field(search, table.GROWING)), field(search, table.FROM))
         ask(search, table.MOTION, start, field(search, table.ROW), 0, -1)
         return table.ASKING
     if answer == FREE:
-        return accepted(search, CERTAIN)
-    blocked(search)
+        return on_free(search, CERTAIN)
+    on_blocked(search)
     return table.RUNNING
 
 
@@ -87,7 +87,7 @@ def resume(search: int, budget: int) -> int:
     if field(search, table.ASKED) != table.NOTHING:
         if is_full(search, 0) or is_full(search, 1):
             return table.FULL
-        status = answered(search)
+        status = resume_after_answers(search)
     while status == table.RUNNING and budget > 0:
         if is_full(search, 0) or is_full(search, 1):
             return table.FULL
@@ -107,7 +107,7 @@ def load_row(search: int, source: int) -> bool:
         if not (value >= low - OUTSIDE and value <= high + OUTSIDE):
             return False
         set_double(field(search, table.ROW), k, value)
-    lift_row(search)
+    set_row_values(search)
     return True
 
 
@@ -130,7 +130,7 @@ def rows_free(search: int, rows: int, count: int) -> int:
     for k in range(count):
         if not load_row(search, rows + 8 * dof * k):
             return 0
-        if judge_part(field(search, table.WORLD), values, values, 1, 1, 1, False) != FREE:
+        if check_part(field(search, table.WORLD), values, values, 1, 1, 1, False) != FREE:
             return 0
     return 1
 
@@ -141,7 +141,7 @@ def begin_between(search: int, start_rows: int, starts: int, goal_rows: int, goa
     for place in (
         table.ITERATIONS,
         table.REJECTED,
-        table.JUDGED,
+        table.CHECKED,
         table.STRAIGHT_TRIED,
         table.ASKED,
         table.QUESTIONS,

@@ -7,7 +7,7 @@ KERNELS = "search.connect_kernels"  # the library of these searches
 # Search: what it works on (the trees: from the starts, from the goals) ...
 WORLD, TREES, _, DOF, JOINTS, GAIN, OFFSET, LOWER, UPPER, WEIGHTS, NUMBERS, INVERSES = range(12)
 # ... its rules ...
-PROVING, PATIENCE, LIMIT, START_ROWS, GOAL_ROWS = range(12, 17)
+RESOLVE, PATIENCE, LIMIT, START_ROWS, GOAL_ROWS = range(12, 17)
 # ... the motion that it looks at: from vertex FROM of tree GROWING to ROW (joint values ROW_VALUES); a BRIDGE ends at
 # vertex TARGET of the other tree ...
 PHASE, GROWER, GROWING, FROM, TARGET, BRIDGE, ROW, ROW_VALUES, QUERY, POINT, RANDOM = range(17, 28)
@@ -15,7 +15,7 @@ PHASE, GROWER, GROWING, FROM, TARGET, BRIDGE, ROW, ROW_VALUES, QUERY, POINT, RAN
 MEETINGS, _MEETING, MEETING_OPEN, ASKED, QUESTIONS, QUESTION_STARTS, QUESTION_ENDS = range(28, 35)
 QUESTION_TREES, QUESTION_VERTICES, ANSWERS = range(35, 38)
 # ... and counts.
-ITERATIONS, REJECTED, JUDGED, ROOTS, STRAIGHT_TRIED = range(38, 43)
+ITERATIONS, REJECTED, CHECKED, ROOTS, STRAIGHT_TRIED = range(38, 43)
 # Samples lie in the box around CENTRE whose sides are twice the number SPREAD, which grows with every sample.
 CENTRE, FIELD_COUNT = range(43, 45)
 

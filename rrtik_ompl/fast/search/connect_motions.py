@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.fast.checks.check_kernels import judge_part
-from rrtik_ompl.fast.checks.motion_kernels import SLACK, copy_row, descends, lift, travel, whole_steps
+from rrtik_ompl.fast.checks.check_kernels import check_part
+from rrtik_ompl.fast.checks.motion_kernels import SLACK, copy_row, descends, joint_values, travel, whole_steps
 from rrtik_ompl.fast.search import connect_layout as table
 from rrtik_ompl.fast.search.tree_kernels import nearest_vertex, row_of, values_of
 from rrtik_ompl.fast.search.tree_layout import LIVE, RADII
@@ -38,12 +38,12 @@ def count_up(search: int, place: int) -> None:
 
 
 @kernel
-def lift_row(search: int) -> None:
+def set_row_values(search: int) -> None:
     """Joint values of ROW, unless they are the configuration itself."""
     row, values = field(search, table.ROW), field(search, table.ROW_VALUES)
     if row != values:
         gain, offset = field(search, table.GAIN), field(search, table.OFFSET)
-        lift(field(search, table.DOF), field(search, table.JOINTS), gain, offset, row, values)
+        joint_values(field(search, table.DOF), field(search, table.JOINTS), gain, offset, row, values)
 
 
 @kernel
@@ -76,7 +76,7 @@ def steer(search: int, start: int, aim: int, length: float) -> Any:
             here = double_at(start, k)
             there = here + (there - here) * (span / length)
         set_double(row, k, there)
-    lift_row(search)
+    set_row_values(search)
     return reached
 
 
@@ -91,21 +91,21 @@ def steps_of(search: int, start: int, end: int) -> Any:
 
 
 @kernel
-def judge_candidate(search: int) -> int:
-    """Judge the motion from FROM to ROW at the configurations that are checked in either direction.
+def check_candidate(search: int) -> int:
+    """Check the motion from FROM to ROW at the configurations that are checked in either direction.
 
-    The ends that are vertices are left out: they were judged with the motion that led to them, or as roots.
+    The ends that are vertices are left out: they were checked with the motion that led to them, or as roots.
     """
     tree, row = tree_of(search, field(search, table.GROWING)), field(search, table.ROW)
     start, values = row_of(tree, field(search, table.FROM)), values_of(tree, field(search, table.FROM))
     last = steps_of(search, start, row)
     count = last - field(search, table.BRIDGE)
-    proving = field(search, table.PROVING) != 0
-    count_up(search, table.JUDGED)
+    resolve = field(search, table.RESOLVE) != 0
+    count_up(search, table.CHECKED)
     there, first = field(search, table.ROW_VALUES), 1
     if descends(field(search, table.DOF), start, row):
         values, there, first = there, values, last - count
-    return judge_part(field(search, table.WORLD), values, there, last, first, count, proving)
+    return check_part(field(search, table.WORLD), values, there, last, first, count, resolve)
 
 
 @kernel
@@ -129,7 +129,7 @@ def aim_straight(search: int) -> bool:
     set_field(search, table.STRAIGHT_TRIED, goal + 1)
     target, row = row_of(tree_of(search, 1), goal), field(search, table.ROW)
     copy_row(field(search, table.DOF), target, row)
-    lift_row(search)
+    set_row_values(search)
     set_field(search, table.GROWING, 0)
     set_field(search, table.FROM, nearest_to(search, 0, target))
     set_field(search, table.TARGET, goal)

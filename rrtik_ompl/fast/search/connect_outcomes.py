@@ -1,4 +1,4 @@
-"""What becomes of a motion of RRT-Connect that was judged or answered for: a vertex, a meeting, questions, a path."""
+"""What becomes of a motion of RRT-Connect that was checked or answered for: a vertex, a meeting, questions, a path."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def shrink_domain(search: int, side: int, vertex: int) -> None:
 
 
 @kernel
-def blocked(search: int) -> None:
+def on_blocked(search: int) -> None:
     """The motion is not free."""
     if field(search, table.PHASE) == table.SAMPLE:
         shrink_domain(search, field(search, table.GROWING), field(search, table.FROM))
@@ -31,14 +31,14 @@ def blocked(search: int) -> None:
 
 
 @kernel
-def accepted(search: int, state: int) -> int:
+def on_free(search: int, state: int) -> int:
     """The motion is free, or taken to be for now; returns the status."""
     side = field(search, table.GROWING)
     if field(search, table.BRIDGE) != 0:
         set_field(search, table.MEETINGS + side, field(search, table.FROM))
         set_field(search, table.MEETINGS + 1 - side, field(search, table.TARGET))
         set_field(search, table.MEETING_OPEN, state)
-        return concluded(search)
+        return finish_or_ask(search)
     row, values = field(search, table.ROW), field(search, table.ROW_VALUES)
     vertex = add_vertex(tree_of(search, side), row, values, field(search, table.FROM), state, NO_DOMAIN)
     if field(search, table.PHASE) == table.SAMPLE:
@@ -64,7 +64,7 @@ def ask(search: int, kind: int, start: int, end: int, side: int, vertex: int) ->
 
 
 @kernel
-def concluded(search: int) -> int:
+def finish_or_ask(search: int) -> int:
     """The trees have met: SOLVED if all motions of the path are certain, else the open ones are asked for."""
     set_field(search, table.QUESTIONS, 0)
     for side in range(2):
@@ -80,7 +80,7 @@ def concluded(search: int) -> int:
 
 
 @kernel
-def settled(search: int) -> int:
+def apply_path_answers(search: int) -> int:
     """Use the answers for the motions of a path; returns the status."""
     rejected = 0
     for k in range(field(search, table.QUESTIONS)):
@@ -96,7 +96,7 @@ def settled(search: int) -> int:
             shrink_domain(search, side, parent_of(tree, vertex))
             cut_branch(tree, vertex)
     if rejected == 0:
-        return concluded(search)
+        return finish_or_ask(search)
     count_up(search, table.REJECTED)
     if field(search, table.PHASE) == table.CONNECT:
         set_field(search, table.PHASE, table.SAMPLE)
@@ -104,14 +104,14 @@ def settled(search: int) -> int:
 
 
 @kernel
-def answered(search: int) -> int:
+def resume_after_answers(search: int) -> int:
     """Go on from the answers to what was asked; returns the status."""
     kind = field(search, table.ASKED)
     set_field(search, table.ASKED, table.NOTHING)
     if kind == table.PATH:
-        return settled(search)
+        return apply_path_answers(search)
     if kind == table.MOTION:
         if int_at(field(search, table.ANSWERS), 0) != 0:
-            return accepted(search, CERTAIN)
-        blocked(search)
+            return on_free(search, CERTAIN)
+        on_blocked(search)
     return table.RUNNING

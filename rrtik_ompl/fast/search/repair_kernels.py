@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.fast.checks.check_kernels import judge_part
-from rrtik_ompl.fast.checks.motion_kernels import SLACK, copy_row, judge_motion, lift
+from rrtik_ompl.fast.checks.check_kernels import check_part
+from rrtik_ompl.fast.checks.motion_kernels import SLACK, check_motion, copy_row, joint_values
 from rrtik_ompl.fast.search import connect_layout, shortcut_layout
 from rrtik_ompl.fast.search import repair_layout as table
 from rrtik_ompl.fast.search.connect_kernels import begin_between, resume, write_path
@@ -61,7 +61,7 @@ def edge_free(repair: int, edge: int) -> bool:
     values = field(cuts, shortcut_layout.VALUES)
     gain, offset = field(cuts, shortcut_layout.GAIN), field(cuts, shortcut_layout.OFFSET)
     dof, steps = field(search, connect_layout.DOF), steps_of(search, a, b)
-    answer = judge_motion(field(search, connect_layout.WORLD), dof, gain, offset, a, b, steps, values, False)
+    answer = check_motion(field(search, connect_layout.WORLD), dof, gain, offset, a, b, steps, values, False)
     return answer == FREE  # type: ignore[no-any-return]
 
 
@@ -72,8 +72,8 @@ def point_free(repair: int, point: int) -> bool:
     world, dof = field(search, connect_layout.WORLD), field(search, connect_layout.DOF)
     values, joints = field(cuts, shortcut_layout.VALUES), field(field(world, ARM), JOINT_COUNT)
     gain, offset = field(cuts, shortcut_layout.GAIN), field(cuts, shortcut_layout.OFFSET)
-    lift(dof, joints, gain, offset, row_at(repair, table.POINTS, point), values)
-    return judge_part(world, values, values, 1, 1, 1, False) == FREE
+    joint_values(dof, joints, gain, offset, row_at(repair, table.POINTS, point), values)
+    return check_part(world, values, values, 1, 1, 1, False) == FREE
 
 
 @entry

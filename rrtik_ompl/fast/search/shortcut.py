@@ -42,7 +42,7 @@ class ShortcutSearch:
         asking: Whether shortcuts that the kernels cannot decide are asked about, or count as colliding.
 
     Raises:
-        InputError: If the route is none, a weight is negative, or the kernels cannot judge the route.
+        InputError: If the route is none, a weight is negative, or the kernels cannot check the route.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class ShortcutSearch:
             or not world.address
             or not world.covered(rows @ chain.gain.T + chain.offset)
         ):
-            raise InputError("waypoints to shorten: expected a route of two or more that kernels can judge")
+            raise InputError("waypoints to shorten: expected a route of two or more that kernels can check")
         if lengths.min(initial=0.0) < 0.0 or resolution <= 0.0:
             raise InputError("shortcut search: weights of the length and the resolution must not be negative")
         capacity = len(rows) + ROOM

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.fast.checks.motion_kernels import copy_row, judge_motion, travel, whole_steps
+from rrtik_ompl.fast.checks.motion_kernels import check_motion, copy_row, travel, whole_steps
 from rrtik_ompl.fast.search import shortcut_layout as table
 from rrtik_ompl.fast.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field
@@ -150,13 +150,13 @@ def propose_shortcut(search: int) -> bool:
 
 
 @kernel
-def judge(search: int, a: int, b: int) -> int:
-    """Judge a straight motion; one that is left undecided becomes a question. The same from both sides."""
+def check_edge(search: int, a: int, b: int) -> int:
+    """Check a straight motion; one that is left undecided becomes a question. The same from both sides."""
     world, dof, reach = field(search, table.WORLD), field(search, table.DOF), field(search, table.REACH)
     gain, offset = field(search, table.GAIN), field(search, table.OFFSET)
     steps = whole_steps(travel(dof, reach, a, b) / double_at(reach, dof))
-    proving = field(search, table.ASKS) != 0
-    answer: int = judge_motion(world, dof, gain, offset, a, b, steps, field(search, table.VALUES), proving)
+    resolve = field(search, table.ASKS) != 0
+    answer: int = check_motion(world, dof, gain, offset, a, b, steps, field(search, table.VALUES), resolve)
     if answer == UNDECIDED:
         number = field(search, table.QUESTIONS)
         copy_row(dof, a, field(search, table.STARTS) + 8 * dof * number)
@@ -183,14 +183,14 @@ def ends_of_part(search: int, part: int) -> Any:
 
 
 @kernel
-def judge_parts(search: int) -> int:
-    """Judge all motions that a shortcut or a pull would bring."""
+def check_parts(search: int) -> int:
+    """Check all motions that a shortcut or a pull would bring."""
     set_field(search, table.QUESTIONS, 0)
     worst = FREE
     for part in range(3):
         a, b = ends_of_part(search, part)
         if a != b:
-            worst = max(worst, judge(search, a, b))
+            worst = max(worst, check_edge(search, a, b))
         if worst == COLLIDING or (worst == UNDECIDED and field(search, table.ASKS) == 0):
             break
     return worst
@@ -222,7 +222,7 @@ def take_shortcut(search: int) -> None:
 
 
 @kernel
-def settle(search: int, free: bool) -> None:
+def accept_or_reject(search: int, free: bool) -> None:
     """Take the shortcut or the pull, or count a failure."""
     if not free:
         set_field(search, table.FAILURES, field(search, table.FAILURES) + 1)
@@ -246,7 +246,7 @@ def resume(search: int, budget: int) -> int:
         return table.ASKING
     if field(search, table.QUESTIONS) > 0:
         set_field(search, table.QUESTIONS, 0)
-        settle(search, field(search, table.ANSWERED) == table.ANSWER_YES)
+        accept_or_reject(search, field(search, table.ANSWERED) == table.ANSWER_YES)
     for _ in range(budget):
         spent = field(search, table.TRIES) >= field(search, table.MOST_TRIES)
         if spent or field(search, table.FAILURES) >= field(search, table.PATIENCE) or field(search, table.COUNT) < 3:
@@ -254,12 +254,12 @@ def resume(search: int, budget: int) -> int:
         set_field(search, table.TRIES, field(search, table.TRIES) + 1)
         pulling = next_share(search, table.RANDOM) < double_at(field(search, table.SHARE), 1)
         if not (propose_pull(search) if pulling else propose_shortcut(search)):
-            settle(search, False)
+            accept_or_reject(search, False)
             continue
-        answer = judge_parts(search)
+        answer = check_parts(search)
         if answer == UNDECIDED and field(search, table.ASKS) != 0:
             set_field(search, table.ANSWERED, table.NO_ANSWER)
             return table.ASKING
         set_field(search, table.QUESTIONS, 0)
-        settle(search, answer == FREE)
+        accept_or_reject(search, answer == FREE)
     return table.RUNNING

@@ -11,7 +11,7 @@ from rrtik_ompl.fast.simd.lanes import absolute, choose, floor, larger, nearest,
 TAU, HALF_TURN, QUARTER, EIGHTH = math.tau, math.pi, 0.5 * math.pi, 0.25 * math.pi
 QUARTER_HIGH, QUARTER_LOW = float.fromhex("0x1.921fb544p+0"), 6.077100506506192e-11  # multiples of the first are exact
 TANGENT = math.tan(math.pi / 8.0)
-TINY = 1e-300
+SMALLEST_DIVISOR = 1e-300
 
 # Taylor's series for |x| <= pi / 4: what is left out is less than 1e-16 of the last bit.
 SINE = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(1, 9))
@@ -62,7 +62,7 @@ def wide_sine_and_cosine(angle: Any) -> Any:
 def arc_tangent(y: Any, x: Any) -> Any:
     """The angle of points (x, y) in (-pi, pi]; 0 at the origin."""
     wide, high = absolute(x), absolute(y)
-    most, least = larger(larger(wide, high), TINY), smaller(wide, high)
+    most, least = larger(larger(wide, high), SMALLEST_DIVISOR), smaller(wide, high)
     steep = least > most * TANGENT
     t = choose(steep, least - most, least) / choose(steep, least + most, most)
     z = t * t

@@ -22,7 +22,7 @@ from rrtik_ompl.fast.tables.robot_tables import (
     rounding_margin,
     usable_cover,
 )
-from rrtik_ompl.fast.tables.scene_tables import Row, inner_rows, outer_rows, rows_table
+from rrtik_ompl.fast.tables.scene_tables import Primitive, inner_primitives, outer_primitives, primitive_table
 from rrtik_ompl.fast.tables.solid_tables import Solids, solid_table
 from rrtik_ompl.robot import Chain
 
@@ -137,27 +137,27 @@ def standing_tables(
     outer: Sequence[Spheres],
     inner: Sequence[Spheres],
 ) -> tuple[Table, Table]:
-    """Rows that contain what stands still, and rows inside it."""
-    around = [(s, row) for s, k in enumerate(standing) for row in outer_rows(bodies[k], outer[k])]
-    inside = [(s, row) for s, k in enumerate(standing) for row in inner_rows(bodies[k], inner[k])]
-    return rows_table(around, checked), rows_table(inside, checked)
+    """Primitives that contain what stands still, and primitives inside it."""
+    around = [(s, primitive) for s, k in enumerate(standing) for primitive in outer_primitives(bodies[k], outer[k])]
+    inside = [(s, primitive) for s, k in enumerate(standing) for primitive in inner_primitives(bodies[k], inner[k])]
+    return primitive_table(around, checked), primitive_table(inside, checked)
 
 
-class PlacedRows:
-    """Rows around standing bodies; those of a body that has not changed are kept."""
+class PlacedPrimitives:
+    """Primitives around standing bodies; those of a body that has not changed are kept."""
 
     def __init__(self) -> None:
-        self._known: dict[int, tuple[Any, float, list[Row]]] = {}
+        self._known: dict[int, tuple[Any, float, list[Primitive]]] = {}
 
-    def rows(
-        self, bodies: Sequence[Any], standing: Sequence[int], outer: Sequence[Spheres], rooms: Sequence[float]
-    ) -> list[tuple[int, Row]]:
-        """Rows that contain all points within margin and ``rooms`` [m] of bodies, with their places in ``standing``."""
+    def primitives(
+        self, bodies: Sequence[Any], standing: Sequence[int], outer: Sequence[Spheres], inflation: Sequence[float]
+    ) -> list[tuple[int, Primitive]]:
+        """Primitives around all within margin and ``inflation`` [m] of bodies, with their places in ``standing``."""
         for k in standing:
             known = self._known.get(k)
-            if known is None or known[0] is not bodies[k] or known[1] != rooms[k]:
-                self._known[k] = bodies[k], rooms[k], outer_rows(bodies[k], outer[k], rooms[k])
-        return [(place, row) for place, k in enumerate(standing) for row in self._known[k][2]]
+            if known is None or known[0] is not bodies[k] or known[1] != inflation[k]:
+                self._known[k] = bodies[k], inflation[k], outer_primitives(bodies[k], outer[k], inflation[k])
+        return [(place, primitive) for place, k in enumerate(standing) for primitive in self._known[k][2]]
 
 
 def standing_solids(bodies: Sequence[Any], standing: Sequence[int], solids: Sequence[Solids]) -> Table:

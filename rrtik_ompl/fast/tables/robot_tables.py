@@ -41,7 +41,7 @@ Spheres: TypeAlias = NDArray[np.float64]  # shape (n, 4): centre and radius [m]
 Header: TypeAlias = NDArray[np.int64]
 
 CLUSTER_SIZE = 8  # balls in the smallest neighbourhood, at most
-FAR = 1e6  # [m] radius of the ball that stands for a body without end
+UNBOUNDED_RADIUS = 1e6  # [m] radius of the ball that stands for a body without end
 
 SMALLEST_MARGIN = 2e-5  # [m]
 MARGIN_PER_LEVER = 1e-6  # a joint's rotation in float32 errs by less than this angle [rad]
@@ -132,7 +132,7 @@ def moving_body(chain: Chain, body: Any, outer: Spheres, inner: Spheres, margin:
 def usable_cover(geometry: Any, outer: Spheres) -> Spheres:
     """The outer spheres of a body, or its bounding ball if there are none or they have no end."""
     spheres = np.asarray(outer, dtype=np.float64).reshape(-1, 4)
-    return spheres if len(spheres) and np.abs(spheres).max() < FAR else bounding_ball(geometry)
+    return spheres if len(spheres) and np.abs(spheres).max() < UNBOUNDED_RADIUS else bounding_ball(geometry)
 
 
 def _moved(placement: Any, spheres: Spheres, turn: Matrix) -> Spheres:
@@ -144,8 +144,8 @@ def _moved(placement: Any, spheres: Spheres, turn: Matrix) -> Spheres:
 def bounding_ball(geometry: Any) -> Spheres:
     """A ball that contains a coal geometry, shape (1, 4); a huge one if the geometry has no end."""
     radius = float(geometry.aabb_radius)
-    if not (0.0 <= radius < FAR and np.abs(geometry.aabb_center).max() < FAR):
-        return np.array([[0.0, 0.0, 0.0, FAR]])
+    if not (0.0 <= radius < UNBOUNDED_RADIUS and np.abs(geometry.aabb_center).max() < UNBOUNDED_RADIUS):
+        return np.array([[0.0, 0.0, 0.0, UNBOUNDED_RADIUS]])
     return np.array([[*geometry.aabb_center, radius]])
 
 

@@ -9,7 +9,7 @@ from rrtik_ompl.fast.tables import layout
 from rrtik_ompl.fast.tables.robot_tables import Table, table
 
 
-def workspace(arm: Table, balls: tuple[Table, ...], rows: tuple[Table, ...]) -> Table:
+def scratch_table(arm: Table, balls: tuple[Table, ...], primitives: tuple[Table, ...]) -> Table:
     """Memory for one thread that checks with these tables; the frame of the world is in place."""
 
     def most(tables: tuple[Table, ...], place: int) -> int:
@@ -18,8 +18,8 @@ def workspace(arm: Table, balls: tuple[Table, ...], rows: tuple[Table, ...]) -> 
     frames = np.zeros((int(arm.header[layout.JOINT_COUNT]) + 1, 12, WIDTH), dtype=np.float32)
     frames[0, [0, 4, 8]] = 1.0
     ball_count = max(len(t[layout.BALLS]) // 4 for t in balls)
-    row_list = np.zeros(most(rows, layout.PADDED_COUNT), dtype=np.int32)
-    crossing = most(balls, layout.BODY_COUNT) * most(rows, layout.STANDING_COUNT)
+    numbers = np.zeros(most(primitives, layout.PADDED_COUNT), dtype=np.int32)
+    crossing = most(balls, layout.BODY_COUNT) * most(primitives, layout.STANDING_COUNT)
     return table(
         {
             layout.VALUES: np.zeros((len(frames), WIDTH)),
@@ -27,9 +27,9 @@ def workspace(arm: Table, balls: tuple[Table, ...], rows: tuple[Table, ...]) -> 
             layout.GROUP_CENTRES: np.zeros((most(balls, layout.GROUP_COUNT), 3, WIDTH), dtype=np.float32),
             layout.CENTRES: np.zeros((ball_count, 3, WIDTH), dtype=np.float32),
             layout.PLACED: np.zeros(most(balls, layout.CLUSTER_COUNT), dtype=np.int32),
-            layout.FOUND: row_list,
-            layout.NEAR: row_list,
-            layout.MET: row_list,
+            layout.FOUND: numbers,
+            layout.NEAR: numbers,
+            layout.MET: numbers,
             layout.WAITING: np.zeros(WIDTH, dtype=np.int32),
             layout.OUTER_LAST: np.full(3, -1, dtype=np.int32),
             layout.INNER_LAST: np.full(3, -1, dtype=np.int32),
@@ -39,9 +39,9 @@ def workspace(arm: Table, balls: tuple[Table, ...], rows: tuple[Table, ...]) -> 
     )
 
 
-def probe_table(rows: tuple[Table, ...]) -> Table:
-    """Memory for measuring distances against any of these tables of rows."""
-    listed = max(int(t.header[layout.PADDED_COUNT]) for t in rows)
+def probe_table(primitives: tuple[Table, ...]) -> Table:
+    """Memory for measuring distances against any of these tables of primitives."""
+    listed = max(int(t.header[layout.PADDED_COUNT]) for t in primitives)
     return table(
         {
             layout.BEST: np.zeros(WIDTH, dtype=np.float32),

@@ -34,7 +34,7 @@ from rrtik_ompl.fast.tables.layout import (
 from rrtik_ompl.fast.tables.robot_tables import Table, table
 
 BOX_CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
-LARGEST = 1e4  # [m]; what is larger or farther away is not compared
+MAX_COMPARED_SIZE = 1e4  # [m]; what is larger or farther away is not compared
 SLACK_PER_METRE = 2e-6  # rounding of corners and of their heights in float32, relative to the coordinates
 
 
@@ -74,7 +74,7 @@ class ConvexSolid:
             return replace(self, axis=axis, disc=offset, slack=slack + SLACK_PER_METRE * (1.0 + abs(offset)))
         corners = self.corners @ rotation.T + origin
         size = float(np.abs(corners).max()) + self.disc + self.radius
-        if not size < LARGEST:
+        if not size < MAX_COMPARED_SIZE:
             return UNKNOWN
         return replace(self, corners=corners, axis=axis, slack=slack + SLACK_PER_METRE * (1.0 + size))
 

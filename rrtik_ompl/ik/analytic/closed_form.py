@@ -13,7 +13,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.ik.analytic.analytic_solver import ClosedFormSolver
 from rrtik_ompl.ik.analytic.kernel_branches import kernel_branches
 from rrtik_ompl.ik.analytic.planar import planar_form
-from rrtik_ompl.ik.analytic.reference_branches import plain_branches, tip_fault
+from rrtik_ompl.ik.analytic.reference_branches import reference_branches, tip_fault
 from rrtik_ompl.poses import LAST_ROW, LAST_ROW_TOLERANCE, NOT_RIGID, left_handed
 from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
 
@@ -95,7 +95,7 @@ def branches_of(
         raise InputError(f"robot '{robot.name}': {fault}; method 'numeric' fits every tip")
     answers = kernel_branches(robot, form, poses, hints, slack, check)
     if answers is None:
-        answers = plain_branches(robot, form, poses, hints, slack, check)
+        answers = reference_branches(robot, form, poses, hints, slack, check)
     for array in answers:
         array.setflags(write=False)
     q, real, valid, singular, residuals = answers

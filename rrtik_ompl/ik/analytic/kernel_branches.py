@@ -17,18 +17,18 @@ from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.fast.tables.robot_tables import Table, table
 from rrtik_ompl.ik.analytic.analytic_solver import ClosedFormSolver
-from rrtik_ompl.ik.analytic.reference_branches import mountings, plain_branches
+from rrtik_ompl.ik.analytic.reference_branches import mountings, reference_branches
 from rrtik_ompl.ik.call_memory import WORD, CallLayout, CallMemory
 from rrtik_ompl.ik.serial_chain import limb_of, pose_numbers
 from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
 
-ENDLESS = 1e300  # limits of continuous joints: kernels know no infinity
+UNBOUNDED_ANGLE = 1e300  # limits of continuous joints: kernels know no infinity
 
 
 def kernel_branches(
     robot: Robot, form: ClosedFormSolver, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool
 ) -> list[NDArray[Any]] | None:
-    """As `plain_branches`, which answers the poses that are singular; None if there is no kernel for the arm."""
+    """As `reference_branches`, which answers the poses that are singular; None if there is no kernel for the arm."""
     kernels = library(layout.KERNELS) if form.kernel else None
     arm = None if kernels is None else _arm_of(robot, form)
     if kernels is None or arm is None:
@@ -38,7 +38,7 @@ def kernel_branches(
     answers = call.answers()
     (odd,) = call.odd.nonzero()
     if len(odd):
-        rest = plain_branches(robot, form, poses[odd], None if hints is None else hints[odd], slack, check)
+        rest = reference_branches(robot, form, poses[odd], None if hints is None else hints[odd], slack, check)
         for whole, part in zip(answers, rest, strict=True):
             whole[..., odd] = part
     return answers
@@ -64,8 +64,8 @@ def _arm_of(robot: Robot, form: ClosedFormSolver) -> _Arm | None:
         layout.FROM_WORLD: from_world,
         layout.TO_FRAME: to_frame,
         layout.NUMBERS: np.array(form.numbers),
-        layout.LOWEST: np.maximum(robot.lower - LIMIT_TOLERANCE, -ENDLESS),
-        layout.HIGHEST: np.minimum(robot.upper + LIMIT_TOLERANCE, ENDLESS),
+        layout.LOWEST: np.maximum(robot.lower - LIMIT_TOLERANCE, -UNBOUNDED_ANGLE),
+        layout.HIGHEST: np.minimum(robot.upper + LIMIT_TOLERANCE, UNBOUNDED_ANGLE),
         layout.TURNING: ((robot.lower < -np.pi) | (robot.upper > np.pi)).astype(np.int32),
         layout.LIMB: limb.address,
     }
@@ -91,7 +91,7 @@ class _Call:
         return self._memory[layout.ODD].view(np.bool_)[: self._count]
 
     def answers(self) -> list[NDArray[Any]]:
-        """As of `plain_branches`."""
+        """As of `reference_branches`."""
         memory, own = self._memory, slice(self._count)
         q = memory[layout.Q].reshape(DOF, *self._shape)[:, :, own]
         residuals = memory[layout.RESIDUALS].reshape(2 * self._checked, *self._shape)[:, :, own]
@@ -106,7 +106,7 @@ def _layout_of(count: int, hinted: bool, check: bool) -> CallLayout:
     arrays = {
         layout.Q: DOF * BRANCHES * lanes,
         layout.RESIDUALS: 2 * BRANCHES * lanes if check else 0,
-        layout.WORK: layout.WORK_LANES * WIDTH,
+        layout.SCRATCH: layout.SCRATCH_LANES * WIDTH,
         layout.POSES: 16 * count,
         layout.NEAR: DOF * count if hinted else 0,
         layout.SLACK: 1,

@@ -25,7 +25,7 @@ def tip_fault(robot: Robot, form: ClosedFormSolver) -> str:
     return f"its closed form places '{form.frame}', and the tip '{robot.tip}' does not move with that frame"
 
 
-def plain_branches(
+def reference_branches(
     robot: Robot, form: ClosedFormSolver, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool
 ) -> list[NDArray[Any]]:
     """What `rrtik_ompl.ik.analytic.closed_form.ClosedForm` holds, in its order, the targets in the last axis of each.

@@ -64,7 +64,7 @@ def _one_start(robot: Robot, goal: Target, q: Vector) -> tuple[Vector, int]:
     frame = model.getFrameId(robot.tip)
     steps = 0
     while steps < STEPS:
-        full = robot.lift(q)[0]
+        full = robot.pinocchio_configuration(q)[0]
         pin.framesForwardKinematics(model, data, full)
         J = np.reshape(pin.computeFrameJacobian(model, data, full, frame, pin.ReferenceFrame.LOCAL), (6, -1))
         J = J @ robot.chain.gain

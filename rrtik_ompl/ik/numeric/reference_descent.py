@@ -23,7 +23,7 @@ SHARE_GROWTH = (
 )
 LARGEST_STEP = 0.5  # [rad] or [m] of any joint in one step
 STALLED = 0.5  # a start whose squared residual has not fallen to this share in some steps is given up
-TINY = 1e-12
+HALF_TURN_COSINE = 1e-12
 
 
 def walk_plainly(robot: Robot, aims: Matrix, Q: Matrix, steps: int, patience: int) -> tuple[Matrix, Mask, int]:
@@ -79,7 +79,9 @@ def residuals(aims: Matrix, tips: NDArray[np.float64]) -> tuple[Matrix, NDArray[
         felt[rows] -= own[:, :, None] * own[:, None]
     skew[free == ANY_TURN], cosine[free == ANY_TURN], felt[free == ANY_TURN] = 0.0, 1.0, 0.0
     half = np.sqrt(np.maximum(0.5 * (1.0 + cosine), 0.0))
-    hidden = half < TINY  # half a turn about an axis that rounding hides: any will do, the next step sees better
+    hidden = (
+        half < HALF_TURN_COSINE
+    )  # half a turn about an axis that rounding hides: any will do, the next step sees better
     skew[hidden], half[hidden] = np.eye(3)[np.where(free[hidden] == 0, 1, 0)], 0.5
     error = np.hstack([np.clip(place, -room, room) - place, skew / half[:, None]])
     away, turn = np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1)

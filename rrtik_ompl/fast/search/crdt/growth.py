@@ -1,4 +1,4 @@
-"""Kernels that lay out, judge and keep an extension of a tree whose every edge moves one coordinate.
+"""Kernels that lay out, check and keep an extension of a C-RDT tree.
 
 The rules are those of the planners' own ``AxisTree``. Source: the C-RDT paper, EXTEND and REWRITE.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rrtik_ompl.fast.checks.motion_kernels import copy_row, judge_motion, travel, whole_steps
+from rrtik_ompl.fast.checks.motion_kernels import check_motion, copy_row, travel, whole_steps
 from rrtik_ompl.fast.search.crdt import layout as table
 from rrtik_ompl.fast.search.crdt.draws import draw, shuffle, to_front
 from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
@@ -171,8 +171,8 @@ def aim(search: int, tree: int, near: int, exactly: bool) -> None:
 
 
 @kernel
-def judge(search: int, start: int, end: int) -> int:
-    """Judge the motion between two configurations by the same configurations as the world, whatever its direction."""
+def check_edge(search: int, start: int, end: int) -> int:
+    """Check the motion between two configurations by the same configurations as the world, whatever its direction."""
     dof = field(search, table.DOF)
     for axis in range(dof):
         a, b = double_at(start, axis), double_at(end, axis)
@@ -182,17 +182,19 @@ def judge(search: int, start: int, end: int) -> int:
     way = travel(dof, field(search, table.WEIGHTS), start, end)
     steps = whole_steps(way / double_at(field(search, table.NUMBERS), table.RESOLUTION))
     world, gain, offset = field(search, table.WORLD), field(search, table.GAIN), field(search, table.OFFSET)
-    proving = field(search, table.ASKS) != 0
-    answer: int = judge_motion(world, dof, gain, offset, start, end, steps, field(search, table.VALUES), proving)
+    resolve = field(search, table.ASKS) != 0
+    answer: int = check_motion(world, dof, gain, offset, start, end, steps, field(search, table.VALUES), resolve)
     return answer
 
 
 @kernel
 def open_edges(search: int) -> int:
-    """Judge the edges of the extension up to the first that is not free; returns how many want an answer."""
+    """Check the edges of the extension up to the first that is not free; returns how many want an answer."""
     stride, count, open_ = 8 * field(search, table.DOF), field(search, table.EDGE_COUNT), 0
     for edge in range(count):
-        verdict = judge(search, field(search, table.STARTS) + edge * stride, field(search, table.ENDS) + edge * stride)
+        verdict = check_edge(
+            search, field(search, table.STARTS) + edge * stride, field(search, table.ENDS) + edge * stride
+        )
         if verdict == UNDECIDED:
             verdict = UNDECIDED if field(search, table.ASKS) != 0 else COLLIDING
             open_ += 1 if field(search, table.ASKS) != 0 else 0

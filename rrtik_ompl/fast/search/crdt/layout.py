@@ -17,7 +17,7 @@ SIZE, CAPACITY, COORDINATES, PARENTS = range(4)
 # Search, the motions: joint values = GAIN q + OFFSET, limits of a valid configuration, WEIGHTS of its travel. NUMBERS:
 # see below. ASKS: whether the world is asked about what is undecided; otherwise it counts as colliding.
 WORLD, DOF, GAIN, OFFSET, WEIGHTS, LEAST, MOST, NUMBERS, VALUES, ASKS = range(10)
-# Its rules, see AxisRules, and its progress.
+# Its rules, see CrdtRules, and its progress.
 LOWER, UPPER, SCALE, SMALLEST_MOVE, CHANCE, AXES, AXIS_COUNT = range(10, 17)
 RANDOM, ITERATIONS, ITERATION_LIMIT, NEXT, MOTIONS = range(17, 22)
 # Its trees: the addresses of two, which of them grows; where they met.

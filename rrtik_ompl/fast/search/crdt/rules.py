@@ -1,4 +1,4 @@
-"""The rules of trees whose every edge moves one coordinate, for those that grow in kernels and those in Python."""
+"""The rules of C-RDT trees, for those that grow in kernels and those in Python."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ KERNELS = "search.crdt.kernels"  # the library of these searches
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AxisRules:
+class CrdtRules:
     """How trees grow.
 
     Attributes:

@@ -1,4 +1,4 @@
-"""Searches with trees whose every edge moves one coordinate, run in kernels: their memory, and the talk with the world.
+"""Searches with C-RDT trees, run in kernels: their memory, and the talk with the world.
 
 The kernels decide what they can; the world is asked about the rest, all edges of an extension at once.
 """
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import PlannerError
 from rrtik_ompl.fast.search.crdt import layout as table
-from rrtik_ompl.fast.search.crdt.rules import KERNELS, AxisRules
+from rrtik_ompl.fast.search.crdt.rules import KERNELS, CrdtRules
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.fast.tables.layout import ALIGNMENT, COLLIDING, FREE, UNDECIDED
@@ -28,7 +28,7 @@ LEAST_PAUSE, MOST_PAUSE = 0.5e-3, 2e-3  # [s] between two looks at the clock, if
 NO_LIMIT = 2**62
 
 
-class AxisSearch:
+class CrdtSearch:
     """A search in progress. It stops at each solution and can be told to go on.
 
     Args:
@@ -44,7 +44,7 @@ class AxisSearch:
     def __init__(
         self,
         world: Any,
-        rules: AxisRules,
+        rules: CrdtRules,
         seed: int,
         limit: int | None,
         *roots: Matrix,
@@ -136,7 +136,7 @@ class AxisSearch:
         return status
 
     def _answer(self) -> None:
-        """Have the world settle the edges that the kernels left undecided."""
+        """Ask the world about the edges that the kernels left undecided."""
         verdicts = self._integers.of[table.VERDICTS][: self._field(table.EDGE_COUNT)]
         asked = np.flatnonzero(verdicts == UNDECIDED)
         free = self._world.motion_valid_batch(self._edges[0][asked], self._edges[1][asked])
@@ -218,7 +218,7 @@ def _room(count: int, kind: type) -> NDArray[Any]:
     return memory[start : start + count * np.dtype(kind).itemsize].view(kind)
 
 
-def _floats(world: Any, rules: AxisRules, tolerance: float, goals: Matrix) -> _Arrays:
+def _floats(world: Any, rules: CrdtRules, tolerance: float, goals: Matrix) -> _Arrays:
     """What decides about a motion and how trees grow, and room for one extension."""
     robot, dof = world.robot, len(rules.lower)
     return _Arrays(
@@ -246,7 +246,7 @@ def _floats(world: Any, rules: AxisRules, tolerance: float, goals: Matrix) -> _A
     )
 
 
-def _integers(rules: AxisRules) -> _Arrays:
+def _integers(rules: CrdtRules) -> _Arrays:
     """The axes that may move, and room for their order and for verdicts."""
     dof = len(rules.lower)
     return _Arrays(np.int32, {table.AXES: rules.axes, table.ORDER: dof, table.VERDICTS: dof + 1})

@@ -1,0 +1,238 @@
+"""What the README and the pages of the project show, works; what they name, is there."""
+
+import ast
+import importlib.util
+import inspect
+import json
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+from rrtik_tests.places import ROOT
+
+import rrtik_ompl
+from rrtik_ompl.benchmark import load_suite
+from rrtik_ompl.cli.app import run
+from rrtik_ompl.ik.solve import solve_ik
+from rrtik_ompl.path import load_path
+from rrtik_ompl.problem_files.problem import load_problem
+from rrtik_ompl.problem_files.run import RunSection
+
+LIBRARY = ROOT / "rrtik_ompl"
+PAGES = {file.stem: file.read_text() for file in (*ROOT.glob("*.md"), *sorted((ROOT / "docs").glob("[a-z]*.md")))}
+PLACES = {file.stem: file.parent for file in (*ROOT.glob("*.md"), *(ROOT / "docs").glob("[a-z]*.md"))}
+MOST_WORDS = 1500
+GONE = (
+    *("C-RDT paper", "GA-REB paper", "IKURT paper", "DRRT-Con paper", "MB-RRT paper", "post-processing paper"),
+    *("shared-control tool", "the specification", "kinematics specification", "Post-processing page"),
+)
+
+
+def blocks(page, language):
+    return re.findall(rf"^```{language}\n(.*?)^```", PAGES[page], re.MULTILINE | re.DOTALL)
+
+
+# --- README ------------------------------------------------------------------------------------------------------
+
+
+def test_there_are_two_commands_to_set_up_and_the_second_runs_the_tests():
+    commands = [line for block in blocks("README", "") for line in block.splitlines() if "pip install" in line]
+    assert [command.rpartition("&& ")[2].split()[0] for command in commands] == [".venv/bin/rrtik", ".venv/bin/python"]
+    assert "-m pytest" in commands[1]
+
+
+def test_the_readme_is_short():
+    assert len(PAGES["README"].split()) <= MOST_WORDS
+
+
+def test_the_main_job_writes_what_it_says(tmp_path, monkeypatch):
+    (job,) = re.findall(r"\.venv/bin/rrtik (.*)", PAGES["README"])
+    monkeypatch.chdir(tmp_path)
+    assert run(job.split()) == 0
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["titan4_sdu.html", "titan4_sdu.json"]
+
+
+def test_the_commands_of_the_readme_are_there(capsys):
+    verbs = set(re.findall(r"`rrtik (\w+)", PAGES["README"]))
+    assert {"plan", "check", "ik", "bench"} < verbs
+    for verb in sorted(verbs):
+        assert run([verb, "--help"]) == 0, verb
+    capsys.readouterr()
+
+
+# --- examples ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("page", ["README", "python"])
+def test_the_python_example_runs_from_top_to_bottom(page, tmp_path, monkeypatch):
+    (example,) = blocks(page, "python")
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec(compile(example, page, "exec"), names)
+    assert names["plan"].found, names["plan"].reason
+    assert load_path("path.json").transitions == names["path"].transitions
+    assert load_problem("reach.yaml").world.scene.names == ("post",)
+    assert Path("view.html").stat().st_size > 100_000
+
+
+HEADINGS = ["A robot", "A planner", "A shape", "A joint type", "A kernel", "An inverse kinematics method"]
+HEADINGS += ["A shortening method"]
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("heading", HEADINGS)
+def test_an_example_of_contributing_runs_as_it_stands(heading, tmp_path, monkeypatch, quiet_ompl):
+    _, _, section = PAGES["CONTRIBUTING"].partition(f"### {heading}\n")
+    (example,) = re.findall(r"^```python\n(.*?)^```", section.partition("\n### ")[0], re.MULTILINE | re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    exec(compile(example, heading, "exec"), {"__name__": "example"})
+
+
+def test_the_problem_file_loads_and_its_other_goals_can_be_reached(tmp_path):
+    text, goal = blocks("files", "yaml")
+    file = tmp_path / "task.yaml"
+    file.write_text(text)
+    assert load_problem(file).world.scene.names == ("panel", "seabed")
+    file.write_text(text[: text.index("goal:")] + goal)
+    problem = load_problem(file)
+    for member in problem.goal.members:
+        assert solve_ik(problem.robot, member, near=problem.start, world=problem.world).found
+
+
+def test_the_command_for_the_schema_prints_json(capsys):
+    (command,) = re.findall(r'python -c "(import json.*)"', PAGES["files"])
+    exec(command, {})
+    assert json.loads(capsys.readouterr().out)["$schema"].startswith("https://json-schema.org")
+
+
+def test_the_suite_of_benchmarks_loads(tmp_path):
+    (text,) = blocks("benchmarks", "yaml")
+    file = tmp_path / "three.yaml"
+    file.write_text(text)
+    suite = load_suite(file)
+    assert len(suite.sources) == 14
+    assert [entrant.label for entrant in suite.entrants] == ["bicrdt", "RRTConnect", "short steps"]
+
+
+def test_the_numbers_of_a_run_have_the_names_that_the_page_gives_them():
+    (text,) = blocks("replanning", "yaml")
+    RunSection.model_validate(yaml.safe_load(text)["run"])
+    named = set(re.findall(r"^\| `(\w+)` \|", PAGES["replanning"], re.MULTILINE))
+    assert named <= set(inspect.signature(rrtik_ompl.replan).parameters)
+    assert named - {"repair_budget"} <= set(RunSection.model_fields)
+
+
+@pytest.mark.parametrize("verb", re.findall(r"^rrtik (\w+)", "".join(blocks("cli", "")), re.MULTILINE))
+def test_every_option_that_the_page_of_the_command_line_names_is_there(verb, capsys):
+    usage, *_ = re.findall(rf"^rrtik {verb}\b[^\n]*", PAGES["cli"], re.MULTILINE)
+    words = usage.partition("    ")[0]
+    commands = [[verb, inner] for inner in ("print", "calibrate", "sense")] if verb == "markers" else [[verb]]
+    text = ""
+    for command in commands:
+        assert run([*command, "--help"]) == 0
+        text += capsys.readouterr().out
+    assert [option for option in re.findall(r"--[a-z-]+", words) if option not in text] == []
+
+
+# --- what pages name ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("page", sorted(PAGES))
+def test_what_a_page_links_to_is_there(page):
+    links = re.findall(r"\]\(([^)#][^)]*)\)", PAGES[page])
+    files = [link.partition("#")[0] for link in links if "://" not in link]
+    assert [file for file in files if not (PLACES[page] / file).exists()] == []
+
+
+@pytest.mark.parametrize("page", ["ARCHITECTURE", "CONTRIBUTING"])
+def test_the_files_and_folders_that_a_page_names_are_there(page):
+    named = {word for span in re.findall(r"`([^`\n]+)`", _prose(page)) for word in span.split()}
+    named = {name for name in named if re.fullmatch(r"[\w/.-]+(\.py|\.js|/)", name) and not name.startswith(".")}
+    named -= {"robots/rrtik_robots/NAME/"}
+    assert [name for name in sorted(named) if not (LIBRARY / name).exists() and not (ROOT / name).exists()] == []
+
+
+def test_the_functions_that_the_architecture_names_are_where_it_says():
+    pairs = re.findall(r"`(\w+)`(?: of `\w+`)? in\s+`([\w/]+\.py)`", _prose("ARCHITECTURE"))
+    assert len(pairs) > 20
+    assert [(name, file) for name, file in pairs if name not in _defined(LIBRARY / file)] == []
+
+
+@pytest.mark.parametrize("page", sorted(set(PAGES) - {"REFERENCES", "CHANGELOG"}))
+def test_what_a_page_cites_is_in_the_references(page):
+    cited = {int(number) for number in re.findall(r"\[(\d+)(?:, [^]]*)?\](?!\()", _prose(page))}
+    assert cited <= set(_references())
+
+
+def test_the_references_are_numbered_without_a_gap_and_say_what_comes_from_them():
+    numbers = _references()
+    assert numbers == list(range(1, len(numbers) + 1))
+    assert PAGES["REFERENCES"].count("**Here") == len(numbers)
+
+
+def test_every_number_of_a_release_is_the_same():
+    cff = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    (latest, day), *_ = re.findall(r"^## \[([\d.]+)\] - ([\d-]+)$", PAGES["CHANGELOG"], re.MULTILINE)
+    assert rrtik_ompl.__version__ == latest == cff["version"]
+    assert day == cff["date-released"]
+    assert f'license = "{cff["license"]}"' in (ROOT / "pyproject.toml").read_text()
+
+
+def test_nothing_is_left_to_verify():
+    assert [page for page, text in PAGES.items() if "VERIFY" in text] == []
+
+
+@pytest.mark.parametrize("folder", ["rrtik_ompl", "planners", "robots", "bench", "tests", "docs"])
+def test_citations_name_works_that_a_reader_can_get(folder):
+    kinds = (".py", ".md", ".yaml", ".js", ".html")
+    files = [file for file in (ROOT / folder).rglob("*") if file.suffix in kinds and file != Path(__file__)]
+    found = [(str(file.relative_to(ROOT)), words) for file in files for words in GONE if words in file.read_text()]
+    assert found == []
+
+
+# --- the ladder --------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def ladder():
+    spec = importlib.util.spec_from_file_location("ladder", ROOT / "docs" / "figures" / "ladder.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_ladder_of_the_architecture_has_every_room_on_a_floor(ladder):
+    listed = [name for floor in ladder.floors() for name in floor]
+    assert len(listed) == len(set(listed))
+    assert set(listed) == {room for room, _ in ladder.modules()}
+
+
+def test_the_ladder_of_the_architecture_holds(ladder):
+    order = [name for floor in ladder.floors() for name in floor]
+    upwards = [pair for pair in ladder.arrows(ladder.floors()) if order.index(pair[1]) > order.index(pair[0])]
+    assert upwards == []
+
+
+def test_the_picture_of_the_ladder_names_every_room(ladder):
+    picture = (ROOT / "docs" / "figures" / "ladder.svg").read_text()
+    assert [name for floor in ladder.floors() for name in floor if name not in picture] == []
+
+
+def _prose(page):
+    """A page without its blocks of code."""
+    return re.sub(r"^```.*?^```", "", PAGES[page], flags=re.MULTILINE | re.DOTALL)
+
+
+def _references():
+    return [int(number) for number in re.findall(r"^(\d+)\. ", PAGES["REFERENCES"], re.MULTILINE)]
+
+
+def _defined(file):
+    """Names that a module defines, those of its classes too."""
+    nodes = list(ast.walk(ast.parse(file.read_text())))
+    names = {n.name for n in nodes if isinstance(n, (ast.FunctionDef, ast.ClassDef))}
+    for node in nodes:
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+        names |= {target.id for target in targets if isinstance(target, ast.Name)}
+    return names
