@@ -17,7 +17,7 @@ Where what is, from below; each module imports only from those below it:
 - trajectory: from a path to a timed motion. replanning, scenario: replanning among moving obstacles.
 - viewer, ``plot*``, report: the 3-D page; plots; tables.
 - sensing, overlay: markers, cameras, poses of marked objects; the arm drawn over pictures.
-- reproduce: published tables, one module a page. benchmark: suites, guarded runs, records, OMPL's logs, reports.
+- benchmark: suites, guarded runs, records, OMPL's logs, reports.
 - pilot: the pilot's tool: session, engine, server, page; an arm over TCP.
 - cli, ``*_command``, ``*_commands``: the command line.
 """

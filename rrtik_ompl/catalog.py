@@ -2,7 +2,8 @@
 
 Another package adds its own by entry points in the groups ``rrtik_ompl.robots`` (name -> a function that takes keyword
 options and returns a `Robot`), ``rrtik_ompl.planners`` (name -> a class), ``rrtik_ompl.problems`` (any name -> the
-``Path`` of a folder of problem files), ``rrtik_ompl.suites`` (the same of suites for ``rrtik bench``) and
+``Path`` of a folder of problem files), ``rrtik_ompl.suites`` (the same of suites for ``rrtik bench``),
+``rrtik_ompl.tables`` (any name -> published tables for ``rrtik reproduce``, see `rrtik_bench.tables.Collection`) and
 ``rrtik_ompl.workspaces`` (name of a robot -> a function that returns slices of its effective workspace, see
 `rrtik_ompl.reach.grid_map.Slice`).
 """
@@ -94,6 +95,15 @@ def find_suite(name: str) -> Path:
     if name not in files:
         raise UnknownNameError("suite", name, files)
     return files[name]
+
+
+def find_tables() -> tuple[Any, ...]:
+    """Collections of published tables that packages offer, one a package.
+
+    Raises:
+        InputError: If one of them cannot be loaded.
+    """
+    return tuple(_load("published tables", "tables", name) for name in sorted(_offers("tables")))
 
 
 def problem_folders() -> tuple[Path, ...]:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import settings
 from ompl import util as ou
 
-from rrtik_ompl.reproduce import crdt_published
+from rrtik_bench.crdt import published as crdt_published
 from rrtik_ompl.shapes import Mesh
 
 # Machines differ and are shared: no example may fail for being slow, and an unattended run repeats the same examples.

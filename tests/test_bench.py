@@ -304,8 +304,7 @@ def test_the_page_needs_no_other_file_but_the_views_that_it_links_to(campaign):
 
 
 def test_the_results_of_the_readme_are_written_from_campaigns(campaign, tmp_path, monkeypatch, capsys):
-    monkeypatch.syspath_prepend(str(Path(__file__).parent.parent / "bench"))
-    import results_page
+    from bench.planning import results_page
 
     readme = tmp_path / "README.md"
     readme.write_text(f"before\n{results_page.BEGIN}\nold\n{results_page.END}\nafter\n")

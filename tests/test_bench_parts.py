@@ -1,11 +1,12 @@
 """Measurements in parts go on where they were interrupted."""
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+from bench.shared import parts
 
 BENCH = Path(__file__).parent.parent / "bench"
 
@@ -22,15 +23,7 @@ def cube(number: int) -> int:
     return number**3
 
 
-@pytest.fixture
-def parts(monkeypatch):
-    monkeypatch.setattr(sys, "path", [str(BENCH), *sys.path])
-    import parts
-
-    return parts
-
-
-def test_parts_that_are_done_are_not_done_again(tmp_path, parts):
+def test_parts_that_are_done_are_not_done_again(tmp_path):
     page, kept, asked = tmp_path / "page.md", tmp_path / "page.parts.jsonl", []
 
     def work(name: str, number: int) -> Square:
@@ -53,7 +46,7 @@ def test_parts_that_are_done_are_not_done_again(tmp_path, parts):
     assert not kept.exists()
 
 
-def test_several_processes_give_results_in_order_and_an_error_keeps_what_is_done(tmp_path, parts):
+def test_several_processes_give_results_in_order_and_an_error_keeps_what_is_done(tmp_path):
     page, kept = tmp_path / "page.md", tmp_path / "page.parts.jsonl"
     numbers = [(k,) for k in range(4)]
     with parts.Parts(page, jobs=2) as measure:
@@ -63,10 +56,18 @@ def test_several_processes_give_results_in_order_and_an_error_keeps_what_is_done
         assert len(kept.read_text().splitlines()) == 4
 
 
-def test_the_reports_share_their_options(parts):
+def test_the_reports_share_their_options():
     import argparse
 
     parser = argparse.ArgumentParser()
     parts.add_options(parser, "ikurt.md")
     given = parser.parse_args(["--jobs", "3"])
     assert (given.jobs, given.out) == (3, BENCH / "reports" / "ikurt.md")
+
+
+def test_a_part_that_another_version_has_kept_is_measured_again(tmp_path, capsys):
+    page, kept = tmp_path / "page.md", tmp_path / "page.parts.jsonl"
+    kept.write_text('["cube 2", {"was": "a record"}]\n')
+    with parts.Parts(page, jobs=1) as measure:
+        assert measure(cube, [(2,)]) == [8]
+    assert "cube 2: kept by another version, measured again" in capsys.readouterr().err

@@ -1,7 +1,6 @@
 """Peers are asked about exactly our problems, and whoever is absent or lost says so."""
 
 import sys
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -10,19 +9,12 @@ import pytest
 from rrtik_ompl import JointPath, load_problem, load_robot
 from rrtik_ompl.generated_problems import generated_problem
 
-BENCH = Path(__file__).parent.parent / "bench"
-
-
-@pytest.fixture(autouse=True)
-def _bench(monkeypatch):
-    monkeypatch.syspath_prepend(str(BENCH))
-
 
 @pytest.mark.parametrize("of_meshes", [False, True])
 def test_the_files_that_peers_read_hold_the_same_arm_among_the_same_obstacles(tmp_path, of_meshes):
-    from peers.description import task_of
-    from peers.ompl_callback import Checker
-    from peers.pinocchio_model import model_and_geometry
+    from bench.peers.description import task_of
+    from bench.peers.libraries.ompl_callback import Checker
+    from bench.peers.libraries.pinocchio_model import model_and_geometry
 
     problem = generated_problem(load_robot("ur5"), "clutter", 0) if of_meshes else load_problem("titan4_sdu")
     model, geometry = model_and_geometry(task_of(problem, tmp_path, 1.0))
@@ -36,15 +28,15 @@ def test_the_files_that_peers_read_hold_the_same_arm_among_the_same_obstacles(tm
 
 
 def test_a_problem_that_not_every_peer_can_read_is_refused(tmp_path):
-    from peers.description import NoTask, task_of
+    from bench.peers.description import NoTask, task_of
 
     with pytest.raises(NoTask, match="titan4_bar: peers take one goal configuration"):
         task_of(load_problem("titan4_bar"), tmp_path, 1.0)
 
 
 def test_a_peer_finds_a_path_in_its_own_process_and_is_started_again_when_lost(tmp_path):
-    from peers.description import task_of
-    from peers.host import Host
+    from bench.peers.description import task_of
+    from bench.peers.host import Host
 
     problem = load_problem("titan4_sdu")
     task = task_of(problem, tmp_path, 10.0)
@@ -62,11 +54,11 @@ def test_a_peer_finds_a_path_in_its_own_process_and_is_started_again_when_lost(t
     ("module", "python", "why"),
     [
         ("ompl_callback", "/nowhere/python", "/nowhere/python: No such file"),
-        ("nobody", sys.executable, "No module named peers.nobody"),
+        ("nobody", sys.executable, "No module named bench.peers.libraries.nobody"),
     ],
 )
 def test_an_absent_peer_says_why(module, python, why):
-    from peers.host import Host
+    from bench.peers.host import Host
 
     with Host(module, python) as host:
         assert why in host.absent

@@ -6,13 +6,18 @@ from functools import partial
 import numpy as np
 import pytest
 
+from rrtik_bench.mb_rrt import tables as mb_rrt
+from rrtik_bench.mb_rrt.runs import PUBLISHED, Measured
+from rrtik_bench.registry import COLLECTION
+from rrtik_bench.report.rows import Row, Verdict, verdict, within
+from rrtik_bench.tables import Collection, Table
+from rrtik_ompl import catalog
 from rrtik_ompl.cli.app import run
+from rrtik_ompl.cli.reproduce import chosen
 from rrtik_ompl.errors import UnknownNameError
-from rrtik_ompl.reproduce import mb_rrt, registry
-from rrtik_ompl.reproduce.mb_rrt_runs import PUBLISHED, Measured
-from rrtik_ompl.reproduce.registry import TABLES, chosen
-from rrtik_ompl.reproduce.rows import DIFFERS, HELD, MISSED, Row, Table, verdict, within
 
+HELD, DIFFERS, MISSED = Verdict
+TABLES = {table.name: table for table in COLLECTION.tables}
 FAST = ("titan4", "sensing-arithmetic", "sensing-noise", "sensing-accuracy", "crdt-routes", "mb-rrt-example",
         "mb-rrt-10", "ikurt-solutions", "drrt-con-arm")  # fmt: skip
 
@@ -23,7 +28,7 @@ def test_all_tables_of_the_quick_round_together_are_said_to_take_less_than_ten_m
 
 
 def test_the_beginning_of_names_chooses_all_tables_of_a_page():
-    assert [table.name for table in chosen(["sensing", "mb-rrt-8"])] == [
+    assert [table.name for table in chosen(TABLES, ["sensing", "mb-rrt-8"])] == [
         "mb-rrt-8",
         "sensing-arithmetic",
         "sensing-noise",
@@ -32,10 +37,10 @@ def test_the_beginning_of_names_chooses_all_tables_of_a_page():
         "sensing-accuracy",
     ]
     with pytest.raises(UnknownNameError, match="no table 'mbrrt'"):
-        chosen(["mbrrt"])
+        chosen(TABLES, ["mbrrt"])
 
 
-@pytest.mark.parametrize("table", chosen(FAST), ids=lambda table: table.name)
+@pytest.mark.parametrize("table", chosen(TABLES, FAST), ids=lambda table: table.name)
 def test_no_figure_is_missed_and_what_differs_has_a_reading(table):
     rows = table.run(True)
     assert rows
@@ -85,7 +90,7 @@ def test_the_list_names_every_table_and_what_is_not_there(capsys):
     code, out, _ = rrtik(capsys, "--list")
     assert code == 0
     assert all(name in out for name in TABLES)
-    assert all(line in out for line in registry.NOT_HERE)
+    assert all(line in out for line in COLLECTION.not_here)
 
 
 def test_published_stands_beside_measured_and_the_time_is_said_first(capsys, tmp_path):
@@ -103,7 +108,7 @@ def test_published_stands_beside_measured_and_the_time_is_said_first(capsys, tmp
 def test_a_missed_figure_is_exit_1(capsys, monkeypatch):
     rows = [Row("a", "1", "2", MISSED), Row("b", "1", "1", HELD)]
     table = Table("x-1", "made up", "nowhere", partial(lambda rows, quick: rows, rows), 1, 1)
-    monkeypatch.setattr(registry, "TABLES", {"x-1": table})
+    monkeypatch.setattr(catalog, "find_tables", lambda: (Collection((table,)),))
     code, out, _ = rrtik(capsys, "x")
     assert code == 1
     assert "1 missed, 1 held" in out
@@ -126,10 +131,20 @@ def test_bad_input_is_one_line_and_exit_2(capsys, arguments, said):
 
 
 def test_singular_titan_postures_are_on_the_axis_they_are_named_for():
+    from rrtik_bench.titan4 import D6, _singular
     from rrtik_ompl.catalog import load_robot
-    from rrtik_ompl.reproduce.titan4 import D6, _singular
 
     Q = _singular("shoulder and wrist", 50, np.random.default_rng(0))
     tips = load_robot("titan4").fk_batch(Q)
     np.testing.assert_allclose((tips[:, :3, 3] - D6 * tips[:, :3, 2])[:, :2], 0.0, atol=1e-9)
     np.testing.assert_allclose(np.cos(Q[:, 4]), 0.0, atol=1e-15)
+
+
+def test_tables_are_found_through_the_entry_points():
+    assert COLLECTION in catalog.find_tables()
+    assert len(TABLES) == len(COLLECTION.tables)
+
+
+def test_without_a_package_that_offers_tables_the_command_says_so(capsys, monkeypatch):
+    monkeypatch.setattr(catalog, "find_tables", lambda: ())
+    assert rrtik(capsys, "--all") == (2, "", "rrtik: no installed package offers published tables\n")

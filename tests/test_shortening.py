@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_bench.shortening import plane_worlds
 from rrtik_ompl.cli.plan import Shorten
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.path import JointPath
-from rrtik_ompl.reproduce import plane_worlds
 from rrtik_ompl.shortening import METHODS, Task
 from rrtik_ompl.shortening.corners import snap_corners
 from rrtik_ompl.shortening.random_cut import random_cut

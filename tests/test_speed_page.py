@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-SCRIPT = ROOT / "bench" / "speed.py"
-PACKAGES = os.pathsep.join(str(ROOT / folder) for folder in (".", "planners", "robots"))
+SCRIPT = ROOT / "bench" / "speed" / "report.py"
+PACKAGES = os.pathsep.join(str(ROOT / folder) for folder in (".", "planners", "robots", "bench"))
 
 
 def run(folder, *arguments):
@@ -49,9 +49,8 @@ def test_our_checks_are_never_wrong_near_obstacles(page):
     assert set(wrong) == {"0"}
 
 
-def test_a_process_of_another_copy_of_the_package_is_refused(tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(SCRIPT.parent))
-    from speed_process import same_source
+def test_a_process_of_another_copy_of_the_package_is_refused(tmp_path):
+    from bench.speed.process import same_source
 
     (tmp_path / "rrtik_ompl").mkdir()
     (tmp_path / "rrtik_ompl" / "__init__.py").touch()

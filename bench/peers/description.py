@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from peers.task import BASE, GROUP, TIP, Solid, Task
+from bench.peers.task import BASE, GROUP, TIP, Solid, Task
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.shape_of import shape_of
 from rrtik_ompl.goal import JointGoal

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from peers.task import Rows, Task
+from bench.peers.task import Rows, Task
 
-BENCH = Path(__file__).resolve().parent.parent
-PLACES = [BENCH, *(BENCH.parent / name for name in (".", "planners", "robots"))]
+ROOT = Path(__file__).resolve().parent.parent.parent
+PLACES = [ROOT, *(ROOT / name for name in ("planners", "robots", "bench"))]
 PATIENCE = 30.0  # [s] beyond the time limit before a process is killed
 
 
@@ -32,7 +32,7 @@ class Answer:
 
 
 def answered(data: dict[str, Any]) -> Answer:
-    """An answer as :mod:`peers.serve` writes it."""
+    """An answer as :mod:`bench.peers.serve` writes it."""
     if "failed" in data:
         return Answer(None, 0.0, 0.0, data["failed"])
     rows = None if data["path"] is None else np.array(data["path"])
@@ -43,7 +43,7 @@ class Host:
     """A peer's process, started again when it was lost.
 
     Args:
-        module: Of this package, with further words for its command line.
+        module: Of `bench.peers.libraries`, with further words for its command line.
         python: Interpreter in whose environment the peer is installed.
 
     Attributes:
@@ -53,7 +53,7 @@ class Host:
 
     def __init__(self, module: str, python: str) -> None:
         name, *words = module.split()
-        self._command = [python, "-m", f"peers.{name}", *words]
+        self._command = [python, "-m", f"bench.peers.libraries.{name}", *words]
         self.versions, self.absent = "", ""
         try:
             self._start()
@@ -84,7 +84,7 @@ class Host:
 
     def _start(self) -> None:
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - kept open
-        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": self._errors}
+        pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": self._errors}
         places = os.pathsep.join(map(str, PLACES))
         self._process = subprocess.Popen(self._command, env={**os.environ, "PYTHONPATH": places}, text=True, **pipes)
         hello = self._answer(None)

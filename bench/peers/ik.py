@@ -15,7 +15,7 @@ import numpy as np
 from rrtik_ompl.robot import Robot
 
 Solver: TypeAlias = Callable[[np.ndarray], np.ndarray | None]
-NAMES = ("pytracik", "ikpy", "eaik", "roboticstoolbox")  # modules of this package
+NAMES = ("pytracik", "ikpy", "eaik", "roboticstoolbox")  # modules of bench.peers.libraries
 
 
 def solvers(robot: Robot, start: np.ndarray) -> dict[str, Solver | str]:
@@ -25,7 +25,7 @@ def solvers(robot: Robot, start: np.ndarray) -> dict[str, Solver | str]:
 
 def _made(name: str, robot: Robot, start: np.ndarray) -> Solver | str:
     try:
-        made: Solver = import_module(f"peers.{name}").solver(robot, start)
+        made: Solver = import_module(f"bench.peers.libraries.{name}").solver(robot, start)
     except ImportError as error:
         return f"absent ({error})"
     except Exception as error:  # what another library makes of our chain is part of the comparison

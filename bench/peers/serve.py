@@ -12,7 +12,7 @@ from importlib import import_module
 from importlib.metadata import version
 from typing import Any
 
-from peers.task import Search, Task, from_plain
+from bench.peers.task import Search, Task, from_plain
 
 
 def serve(packages: tuple[str, ...], search: Callable[[Task], Search]) -> None:

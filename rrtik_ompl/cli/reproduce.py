@@ -5,18 +5,49 @@ from __future__ import annotations
 import json
 import time
 from collections import Counter
-from dataclasses import asdict
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Protocol
 
 import typer
 
 from rrtik_ompl.cli.terminal import note, progress, say
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.text import check_target
 
-HEADS = ("figure", "published", "measured", "verdict", "reading")
+KEYS = ("name", "published", "measured", "verdict", "reading")
+HEADS = ("figure", *KEYS[1:])
 WIDTH = 60  # of a reading in a table for a person
+
+
+class Verdict(Protocol):
+    """What to make of a figure: the word that is shown, and whether the comparison is a success."""
+
+    value: str
+    passes: bool
+
+
+class Row(Protocol):
+    """One figure, as printed and as measured, and how the text was read."""
+
+    name: str
+    published: str
+    measured: str
+    verdict: Verdict
+    reading: str
+
+
+class Table(Protocol):
+    """A published table as a package offers it; see `rrtik_bench.tables.Table`."""
+
+    name: str
+    title: str
+    source: str
+    seconds: float
+    quick_seconds: float
+
+    def run(self, quick: bool, /) -> Sequence[Row]:
+        """Measure it again."""
 
 
 def reproduce(
@@ -33,15 +64,19 @@ def reproduce(
 
     Exit code 1 if a figure is missed.
     """
-    check_target(markdown, (".md",))
-    from rrtik_ompl.reproduce.registry import NOT_HERE, TABLES, chosen
+    from rrtik_ompl.catalog import find_tables
 
+    check_target(markdown, (".md",))
+    offers = find_tables()
+    known: dict[str, Table] = {table.name: table for offer in offers for table in offer.tables}
+    if not known:
+        raise InputError("no installed package offers published tables")
     if listed:
-        say(_list(list(TABLES.values())), *NOT_HERE)
+        say(_list(known.values()), *(line for offer in offers for line in offer.not_here))
         return 0
     if everything == bool(tables):
         raise InputError("which tables? give their names, or --all; `rrtik reproduce --list` shows them")
-    wanted = list(TABLES.values()) if everything else chosen(tables or ())
+    wanted = list(known.values()) if everything else chosen(known, tables or ())
     note(f"{_count(len(wanted), 'table')}, about {_time(sum(_seconds(each, quick) for each in wanted))} on two cores")
     done = []
     for table in wanted:
@@ -53,20 +88,44 @@ def reproduce(
             say(f"{table.name}: {table.title} ({table.source}), {time.perf_counter() - begin:.1f} s", _table(rows))
     if markdown is not None:
         _write(markdown, done, quick)
-    counts = Counter(row.verdict for _, rows in done for row in rows)
+    verdicts = [row.verdict for _, rows in done for row in rows]
     if as_json:
-        print(json.dumps({table.name: [asdict(row) for row in rows] for table, rows in done}))
+        print(json.dumps({table.name: [_plain(row) for row in rows] for table, rows in done}))
     else:
-        say(", ".join(f"{number} {verdict}" for verdict, number in counts.items()))
+        counts = Counter(verdict.value for verdict in verdicts)
+        say(", ".join(f"{number} {word}" for word, number in counts.items()))
         say(*([] if markdown is None else [f"wrote {markdown}"]))
-    return 1 if counts["missed"] else 0
+    return 0 if all(verdict.passes for verdict in verdicts) else 1
 
 
-def _seconds(table: Any, quick: bool) -> float:
+def chosen(known: Mapping[str, Table], names: Iterable[str]) -> list[Table]:
+    """The tables of these names, in the order of ``known``; ``mb-rrt`` stands for all whose name begins so.
+
+    Raises:
+        UnknownNameError: If a name fits none.
+    """
+    wanted: set[str] = set()
+    for name in names:
+        fits = [each for each in known if each == name or each.startswith(f"{name}-")]
+        if not fits:
+            raise UnknownNameError("table", name, known)
+        wanted.update(fits)
+    return [table for name, table in known.items() if name in wanted]
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    return row.name, row.published, row.measured, row.verdict.value, row.reading
+
+
+def _plain(row: Row) -> dict[str, str]:
+    return dict(zip(KEYS, _cells(row), strict=True))
+
+
+def _seconds(table: Table, quick: bool) -> float:
     return float(table.quick_seconds if quick else table.seconds)
 
 
-def _list(tables: list[Any]) -> Any:
+def _list(tables: Iterable[Table]) -> Any:
     from rich import box
     from rich.table import Table
 
@@ -76,21 +135,22 @@ def _list(tables: list[Any]) -> Any:
     return shown
 
 
-def _table(rows: list[Any]) -> Any:
+def _table(rows: Sequence[Row]) -> Any:
     from rich import box
     from rich.table import Table
 
     shown = Table(*HEADS, box=box.SIMPLE_HEAD, pad_edge=False)
     shown.columns[-1].max_width = WIDTH
     for row in rows:
-        shown.add_row(row.name, row.published, row.measured, row.verdict, row.reading)
+        shown.add_row(*_cells(row))
     return shown
 
 
-def _write(file: Path, done: list[tuple[Any, list[Any]]], quick: bool) -> None:
+def _write(file: Path, done: Sequence[tuple[Table, Sequence[Row]]], quick: bool) -> None:
     import platform
 
     from rrtik_ompl import __version__
+    from rrtik_ompl.benchmark.tables import markdown_table
     from rrtik_ompl.files.text import write_text
 
     command = f"rrtik reproduce {'--all' if len(done) > 1 else done[0][0].name}{' --quick' if quick else ''}"
@@ -101,9 +161,7 @@ def _write(file: Path, done: list[tuple[Any, list[Any]]], quick: bool) -> None:
     ]
     for table, rows in done:
         lines += ["", f"## {table.title}", "", f"`{table.name}`, {table.source}", ""]
-        lines += ["| " + " | ".join(HEADS) + " |", "|" + "---|" * len(HEADS)]
-        cells = ([row.name, row.published, row.measured, row.verdict, row.reading] for row in rows)
-        lines += ["| " + " | ".join(text.replace("|", "\\|") for text in each) + " |" for each in cells]
+        lines += markdown_table(HEADS, map(_cells, rows))
     write_text(file, "\n".join([*lines, ""]))
 
 

@@ -1,0 +1,1 @@
+"""Inverse kinematics: every method, goals of the tip, reach."""

@@ -1,0 +1,88 @@
+"""Pictures of inverse kinematics: solutions as ghosts, MB-RRT's tree in space, maps of reach. Needs Chromium.
+
+    python bench/ik/pictures.py [--out bench/reports]
+
+Pages are drawn by a headless browser and made smaller with OpenCV; the slices by matplotlib.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+import rrtik_ompl as rrtik
+from bench.shared.pages import REPORTS
+from rrtik_ompl.ik.mb_rrt.growth import grow
+from rrtik_ompl.ik.mb_rrt.links import Links
+from rrtik_ompl.plots.reach import plot_slices
+from rrtik_ompl.poses import pose_from_rpy
+from rrtik_ompl.reach.sampling import reach_map
+from rrtik_ompl.viewer import view
+from rrtik_ompl.viewer.drawing.reach_marks import reach_marks
+from rrtik_ompl.viewer.drawing.tree_marks import tree_marks
+from rrtik_ompl.viewer.subject import Shown
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+OPTIONS = (
+    "--headless=new", "--no-sandbox", "--hide-scrollbars", "--window-size=1200,760", "--virtual-time-budget=8000",
+    "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+)  # fmt: skip
+WIDTH = 760  # of the pictures [px]
+
+
+def photograph(page: Path, picture: Path) -> None:
+    browser = next((found for found in map(shutil.which, BROWSERS) if found), None)
+    if browser is None:
+        raise SystemExit(f"none of {', '.join(BROWSERS)} is on PATH: the pages cannot be drawn")
+    with tempfile.TemporaryDirectory() as folder:
+        raw = Path(folder) / "page.png"
+        subprocess.run([browser, *OPTIONS, f"--screenshot={raw}", page.as_uri()], capture_output=True, check=True)
+        shot = cv2.imread(str(raw))
+    assert shot is not None
+    small = cv2.resize(shot, (WIDTH, round(shot.shape[0] * WIDTH / shot.shape[1])), interpolation=cv2.INTER_AREA)
+    cv2.imwrite(str(picture), small, [cv2.IMWRITE_PNG_COMPRESSION, 9])
+
+
+def ghosts(page: Path) -> None:
+    """All solutions of a pose of the UR5 that are not a full turn apart."""
+    robot = rrtik.load_robot("ur5_limited")
+    goal = rrtik.PoseGoal(pose_from_rpy([0.35, 0.35, 0.35], np.radians([180.0, 0.0, 30.0])))
+    found = rrtik.solve_ik(robot, goal, all=True).solutions
+    title = f"{robot.name}: {len(found)} solutions of one pose"
+    view(Shown(robot, rrtik.Scene(), goal, found[0]), ghosts=found, html=page, title=title)
+
+
+def tree(page: Path) -> None:
+    """Four links of 10 cm in space, grown by the published rules."""
+    run = grow(Links([0.1] * 4, dimension=3), [0.2, 0.1, 0.2], tolerance=0.001, rng=np.random.default_rng(5))
+    view(rrtik.Scene(), marks=tree_marks(run), html=page, title=f"MB-RRT in space: {run.passes} passes to 1 mm")
+
+
+def reach(page: Path) -> None:
+    robot = rrtik.load_robot("titan4", limits="envelope")
+    found = reach_map(robot)
+    view(robot, marks=reach_marks(found), html=page, title="titan4: share of directions in reach")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--out", type=Path, default=REPORTS)
+    folder = parser.parse_args().out
+    with tempfile.TemporaryDirectory() as drawn:
+        for name, draw in (("ik_ghosts", ghosts), ("mb_rrt_space", tree), ("reach_titan4", reach)):
+            page = Path(drawn) / f"{name}.html"
+            draw(page)
+            photograph(page, folder / f"{name}.png")
+    slices = reach_map(rrtik.load_robot("ur5_limited"), cell=0.05).slices()
+    title = "ur5: share of 64 directions in which the tip was seen to point"
+    plot_slices(slices, folder / "reach_ur5.png", title=title, label="orientations")
+
+
+if __name__ == "__main__":
+    main()

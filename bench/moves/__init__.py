@@ -1,0 +1,1 @@
+"""Single-joint moves and ways to shorten a path."""

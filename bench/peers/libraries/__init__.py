@@ -1,0 +1,1 @@
+"""One module a library; `bench.peers` says what it offers."""

@@ -1,0 +1,1 @@
+"""The pilot's tool without a page."""

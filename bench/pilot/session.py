@@ -1,0 +1,117 @@
+"""Measurements of a pilot's session without a page: its states and record, its lamps, what it refuses."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from bench.pilot.scene import NAME, PLACE, PROBLEM, ROBOT, VALVE, WORLD, seen_at
+from rrtik_ompl.ik.analytic.closed_form import solutions
+from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED, lamps, stage_poses
+from rrtik_ompl.pilot.routes.manoeuvre import judge_move
+from rrtik_ompl.pilot.setup import Wanted, open_session
+from rrtik_ompl.pilot.surroundings import Surroundings
+
+JUDGED, LOOKED_AT, LOOKS = 1000, 500, 25
+
+
+def scripted_scenario() -> tuple[list[str], bool]:
+    """From the first picture to the grasp by commands alone: the states visited, and whether a replay ends alike."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "session.jsonl"
+        first, modes = _drive(file)
+        again = open_session(Wanted(NAME, replay=file)).engine
+        again.look(1e6)
+        return modes, np.array_equal(again.session.q, first) and again.session.mode == "manoeuvre"
+
+
+def _drive(record: Path) -> tuple[Any, list[str]]:
+    opened = open_session(Wanted(NAME, record=record))
+    engine, now, modes = opened.engine, 0.0, ["manoeuvre"]
+    session = engine.session
+    engine.look(now)
+    for command in ({"name": "grasp", "type": "aslant", "level": 1}, {"name": "plan"}, {"name": "accept"}):
+        now += 0.1
+        engine.obey(command, now)
+        modes.append(session.mode)
+    arm: Any = session.arm
+    while session.mode == "following" and now < 600.0:
+        if arm.moving is None:
+            engine.obey({"name": "next"}, now)
+        now += 0.5
+        engine.look(now)
+    q = session.q
+    opened.close()
+    return q, list(dict.fromkeys(modes))
+
+
+def color_logic(count: int) -> tuple[int, dict[str, int]]:
+    """Every lamp of random object poses against all branches of the closed form: wrong ones, and how many of each."""
+    rng, wrong, colors = np.random.default_rng(0), 0, {GREEN: 0, AMBER: 0, RED: 0}
+    surroundings = Surroundings(WORLD)
+    for _ in range(count):
+        turn = pin.exp3(rng.normal(0.0, 0.5, 3))
+        T = pin.SE3(turn @ PLACE.rotation, rng.uniform([0.9, -0.6, -0.2], [1.6, 0.8, 0.8]))
+        surroundings.see([seen_at(T)])
+        world, holding = surroundings.world, surroundings.holding("valve")
+        for lamp in lamps(world, VALVE, T, PROBLEM.start, holding=holding):
+            stages = stage_poses(T, VALVE.grasp(lamp.type), lamp.level)
+            wrong += lamp.color != _exhaustive(stages, (world, holding, holding))
+            colors[lamp.color] += 1
+    return wrong, colors
+
+
+def _exhaustive(stages: Any, worlds: Any) -> str:
+    color = GREEN
+    for stage, world in zip(stages, worlds, strict=True):
+        found = solutions(ROBOT, stage.homogeneous[None])
+        rows = [row for row in found.branches[0][found.valid[0]] if ROBOT.within_limits(row[None]).all()]
+        if not rows:
+            return RED
+        if not any(world.valid(row) for row in rows):
+            color = AMBER
+    return color
+
+
+class Preventive(NamedTuple):
+    """Random commands, and what a second look says of those that were accepted."""
+
+    commands: int
+    accepted: int
+    judged: int
+    agree: bool
+    looks: int
+    bad: int
+
+
+def preventive_checks(count: int) -> Preventive:
+    """Random commands of one joint from random free postures; what is accepted is looked at a second time."""
+    rng = np.random.default_rng(2)
+    starts, ends, joints = _random_commands(count, rng)
+    accepted = ROBOT.within_limits(ends)
+    accepted[accepted] = WORLD.motion_valid_batch(starts[accepted], ends[accepted])
+    some = rng.choice(len(starts), size=min(JUDGED, len(starts)), replace=False)
+    verdicts = [judge_move(WORLD, starts[k], int(joints[k]), float(ends[k, joints[k]])).allowed for k in some]
+    agree = bool((np.array(verdicts) == accepted[some]).all())
+    beyond = int((~ROBOT.within_limits(ends[accepted])).sum())
+    fine = WORLD.refined(4.0).motion_valid_batch(starts[accepted], ends[accepted])
+    chosen = rng.choice(np.flatnonzero(accepted), size=min(LOOKED_AT, int(accepted.sum())), replace=False)
+    share = np.linspace(0.0, 1.0, LOOKS)[:, None, None]
+    looks = (starts[chosen] + share * (ends[chosen] - starts[chosen])).reshape(-1, ROBOT.dof)
+    bad = beyond + int((~fine).sum()) + int((~WORLD.certify(looks)).sum())
+    return Preventive(len(starts), int(accepted.sum()), len(some), agree, len(looks), bad)
+
+
+def _random_commands(count: int, rng: np.random.Generator) -> tuple[Any, Any, Any]:
+    """Free postures, the same with one joint elsewhere, also beyond its limits, and the numbers of these joints."""
+    starts = rng.uniform(ROBOT.lower, ROBOT.upper, (4 * count, ROBOT.dof))
+    starts = starts[WORLD.valid_batch(starts)][:count]
+    ends, joints = starts.copy(), rng.integers(ROBOT.dof, size=len(starts))
+    width, middle = 1.2 * (ROBOT.upper - ROBOT.lower), 0.5 * (ROBOT.upper + ROBOT.lower)
+    rows = np.arange(len(ends))
+    ends[rows, joints] = (middle + rng.uniform(-0.5, 0.5, ends.shape) * width)[rows, joints]
+    return starts, ends, joints

@@ -1,0 +1,1 @@
+"""DRRT-Con among moving obstacles."""

@@ -1,0 +1,202 @@
+"""Runs of replanning for the DRRT-Con report, and repairs by several ways side by side at the same moments."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.planning import plan
+from rrtik_ompl.replanning import Run, replan
+from rrtik_ompl.replanning.connecting import Motions, PlainConnect
+from rrtik_ompl.replanning.contact_check import Verdict, judge
+from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
+from rrtik_ompl.replanning.generate import moving_problem
+from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
+from rrtik_ompl.replanning.loop import Loop
+from rrtik_ompl.replanning.settings import settings
+from rrtik_ompl.scene import Scene
+
+ARMS = {
+    "ur5": {"count": 20, "speed": 0.2, "step": 0.05},
+    "titan4": {"count": 20, "speed": 0.1, "step": 0.02},
+}
+RATE, MARGIN, LONGEST = 50.0, 0.02, 20.0
+OURS, SCRATCH = "DRRT-Con", "from scratch, same kernels"
+PLANS = (("fastrrtconnect", "fastrrtconnect"), ("RRTConnect", "OMPL's RRT-Connect"))
+
+
+def arm_problem(name: str, seed: int) -> rrtik.Problem:
+    arm = ARMS[name]
+    return moving_problem(rrtik.load_robot(name), int(arm["count"]), arm["speed"], seed, seconds=LONGEST)
+
+
+def arm_options(name: str) -> dict[str, Any]:
+    """A repair may take half a second, so that figures do not depend on how busy the machine is."""
+    arm = ARMS[name]
+    bound = {"margin": MARGIN, "speed_bound": arm["speed"], "seconds": LONGEST}
+    return {"step": arm["step"], "rate": RATE, "slot": 0.5, **bound}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the tables need of a run; times [s] are of the processor.
+
+    Attributes:
+        counts: Ticks of each kind.
+        repairs, ticks: Seconds of each repair that found a path, and of each tick.
+        contacts: Kind of each tick with contact, by the judge; empty without one.
+        nearest: Smallest distance between arm and obstacles [m], 0 for a contact.
+    """
+
+    arrived: bool
+    length: float
+    counts: dict[str, int]
+    repairs: list[float]
+    ticks: list[float]
+    contacts: tuple[str, ...] = ()
+    nearest: float = np.inf
+
+
+def outcome(run: Run, verdict: Verdict | None = None) -> Outcome:
+    """A run in short, and what a judge says of it."""
+    seen: dict[str, Any] = (
+        {} if verdict is None else {"contacts": tuple(c[1] for c in verdict.contacts), "nearest": verdict.nearest}
+    )
+    counts = {event: run.count(event) for event in ("repair", "wait", "evade")}
+    times = run.seconds("repair", "repair").tolist(), run.seconds("all").tolist()
+    return Outcome(run.arrived, run.length, counts, *times, **seen)
+
+
+def arm_outcome(name: str, seed: int, planner: str, slot: float, seconds: float) -> Outcome:
+    """A run of an arm among obstacles, judged."""
+    problem = arm_problem(name, seed)
+    changes = {"planner": planner, "slot": slot, "seconds": seconds, "clock": time.process_time}
+    run = replan(problem, seed=seed, **{**arm_options(name), **changes})
+    return outcome(run, judge(problem.robot, run, problem.world.scene, fine=5))
+
+
+def executed_valid(problem: rrtik.Problem, run: Run) -> bool:
+    """Whether every step along a path was free, by the exact world of its moment."""
+    scene = problem.world.scene
+    for tick, after in zip(run.ticks[:-1], run.ticks[1:], strict=True):
+        if tick.event in ("plan", "walk", "repair") and (tick.q != after.q).any():
+            now = rrtik.World(
+                problem.robot, still(scene.at(tick.time)), motion_resolution=problem.world.motion_resolution
+            )
+            if not now.certify(np.linspace(tick.q, after.q, 11)).all():
+                return False
+    return True
+
+
+def still(scene: Scene) -> Scene:
+    """The scene without its motions."""
+    frozen = tuple(rrtik.Obstacle(o.name, o.shape, o.pose) for o in scene.obstacles)
+    return Scene(frozen, scene.attached, scene.allowed_collisions)
+
+
+@dataclass
+class Moments:
+    """What each way to a new path took at the same moments [s], and the new path's length over the blocked one's."""
+
+    ours: list[tuple[float, float]] = field(default_factory=list)
+    others: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
+
+    def add(self, found: dict[str, tuple[float, float]]) -> None:
+        """Note a moment at which all ways found a path."""
+        self.ours.append(found[OURS])
+        for name, measured in found.items():
+            if name != OURS:
+                self.others.setdefault(name, []).append(measured)
+
+    def ratio(self, name: str) -> float:
+        """Median of a way's seconds over ours, pair by pair."""
+        way = self.ours if name == OURS else self.others[name]
+        return float(np.median([theirs[0] / mine[0] for theirs, mine in zip(way, self.ours, strict=True)]))
+
+
+def paired(name: str, seeds: range, slow_every: int = 8) -> tuple[Moments, Moments]:
+    """Runs of DRRT-Con in which at each repair the same is planned from scratch too, by the same kernels.
+
+    The second result: at every ``slow_every``-th repair also by `plan()` in a new `World`, RRT-Connect of OMPL, and
+    with the published search in Python.
+    """
+    quick, slow = Moments(), Moments()
+    for seed in seeds:
+        loop = _loop(name, seed)
+        with_pairs(loop, quick, slow, slow_every)
+        for number in range(int(LONGEST * RATE)):
+            if not loop.tick(number):
+                break
+    return quick, slow
+
+
+def _loop(name: str, seed: int) -> Loop:
+    problem = arm_problem(name, seed)
+    usual: dict[str, Any] = {"planner": "drrt-con", "eps": None, "limits": None, "predict": 0, "seed": seed}
+    return Loop(problem, problem.world.scene.at, settings(problem.robot, **usual, **arm_options(name)), None)
+
+
+def with_pairs(loop: Loop, quick: Moments, slow: Moments, slow_every: int) -> None:
+    """Make a loop's planner time the others before each of its repairs."""
+    planner, repair, world = loop._planner, loop._planner.repair, loop._world
+    lower, upper = loop._problem.robot.finite_range()
+    eps, count = planner.eps, 0
+    scratch = {SCRATCH: KernelDrrtCon(world, lower, upper, eps, 1, forgetting=True)}
+    plain = {
+        "DRRT-Con as published, in Python": DrrtCon(PlainConnect(lower, upper, eps, 1), eps),
+        "from scratch as published, in Python": FromScratch(PlainConnect(lower, upper, eps, 1), eps),
+    }
+
+    def timed(motions: Motions, stop: Callable[[], Any]) -> bool:
+        nonlocal count
+        count += 1
+        assert planner.path is not None
+        path, often = planner.path.copy(), count % slow_every != 0
+        found = {what: _repaired(other, path, motions) for what, other in (scratch if often else plain).items()}
+        if not often:
+            found |= {f"from scratch: new World, {title}, shortcut": _by_plan(loop, kind) for kind, title in PLANS}
+        planner.look(motions)  # once more: what a repair reads is as fresh in memory as for the others
+        begin = time.process_time()
+        ours = repair(motions, stop)
+        found[OURS] = (time.process_time() - begin, _length(planner.path) / _length(path)) if ours else None
+        if None not in found.values():
+            (quick if often else slow).add({what: each for what, each in found.items() if each is not None})
+        return ours
+
+    planner.repair = timed  # type: ignore[method-assign, assignment]
+
+
+def _repaired(other: DrrtCon, path: np.ndarray, motions: Motions) -> tuple[float, float] | None:
+    """Seconds of another's repair and the share of the path's length that the new one has."""
+    other.path = path
+    other.look(motions)
+    begin = time.process_time()
+    found = other.repair(motions, _after(begin + 2.0))
+    return (time.process_time() - begin, _length(other.path) / _length(path)) if found else None
+
+
+def _length(path: np.ndarray | None) -> float:
+    assert path is not None
+    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+
+
+def _after(deadline: float) -> Callable[[], bool]:
+    return lambda: time.process_time() > deadline
+
+
+def _by_plan(loop: Loop, planner: str) -> tuple[float, float] | None:
+    """A new world and `plan()` from where the robot is, and as much shortening as a repair has."""
+    begin = time.process_time()
+    world = rrtik.World(loop._problem.robot, still(loop._world.scene), accuracy="conservative")
+    problem = rrtik.Problem(world, loop.q, loop._goals[0])
+    found = plan(problem, planner, seconds=2.0, seed=1)
+    if found.path is None:
+        return None
+    several = len(found.path.waypoints) > 2
+    path = rrtik.shorten(found.path, problem, method="sequential", seed=1) if several else found.path
+    return time.process_time() - begin, path.length / _length(loop._planner.path)

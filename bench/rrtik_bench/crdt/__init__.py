@@ -1,0 +1,1 @@
+"""C-RDT: what was published, and the runs that are compared with it."""

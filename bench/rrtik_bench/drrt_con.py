@@ -1,0 +1,137 @@
+"""The test scenes of the DRRT-Con paper: figures without numbers, so that what is compared is what its text says."""
+
+from __future__ import annotations
+
+from itertools import groupby
+
+import numpy as np
+
+from rrtik_bench.report.rows import Row, verdict
+from rrtik_bench.tables import Table
+from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.replanning import Run
+from rrtik_ompl.replanning.connecting import PlainConnect
+from rrtik_ompl.replanning.contact_check import judge
+from rrtik_ompl.replanning.drrt_con import DrrtCon
+from rrtik_ompl.replanning.scenario import Scenario, load_scenario
+from rrtik_ompl.transitions import route_length
+from rrtik_ompl.world.moving_world import MovingWorld
+
+SOURCE = "DRRT-Con paper"
+SCENE = "coordinates, speeds and steps chosen here: none is printed"
+FREE_SLOT = 2.0  # [s] for a repair, so that a run does not depend on how busy the machine is
+FASTEST = 2.5  # [m/s]: no triangle is faster
+STOP, GO = "wait", "go"
+
+
+def _runs(scenario: Scenario, count: int, **changes: float) -> list[Run]:
+    return [scenario.run(seed=seed, slot=FREE_SLOT, **changes) for seed in range(count)]
+
+
+def static(quick: bool) -> list[Row]:
+    """Two walls that stand: what was walked, beside RRT-Connect with one pass of post-processing."""
+    scenario, count = load_scenario("replan_walls"), 3 if quick else 30
+    problem, eps = scenario.problem, float(scenario.options["eps"])
+    assert isinstance(problem.goal, JointGoal)
+    walked = [run.length for run in _runs(scenario, count)]
+    once = []
+    for seed in range(count):
+        planner = DrrtCon(PlainConnect(problem.robot.lower, problem.robot.upper, eps, seed), eps)
+        planner.begin(problem.start, problem.goal.q[None], MovingWorld(problem.world))
+        assert planner.path is not None
+        once.append(route_length(planner.path))
+    shorter = float(np.mean(np.array(walked) <= np.array(once)))
+    measured = f"{np.mean(walked):.2f} beside {np.mean(once):.2f}; shorter in {shorter:.0%} of {count}"
+    return [Row("length walked, beside RRT-Connect and one pass of post-processing", "shorter", measured,
+                verdict(shorter >= 0.9), SCENE)]  # fmt: skip
+
+
+def triangles(quick: bool) -> list[Row]:
+    """Six triangles that wander: new routes, arrival, no contact; and what the printed loop would do."""
+    scenario, count = load_scenario("replan_triangles"), 3 if quick else 30
+    runs = _runs(scenario, count)
+    arrived, repairs = sum(run.arrived for run in runs), [run.count("repair") for run in runs]
+    clean = sum(_kept_free(scenario, run) for run in runs)
+    untouched, bounded = _untouched(scenario, runs), _untouched(scenario, _runs(scenario, count, speed_bound=FASTEST))
+    lengths = [len(run.ticks) for run in runs]
+    ticks = [tick for run in runs for tick in run.ticks]
+    idle = np.mean([tick.event == "walk" and "look" in tick.seconds for tick in ticks])
+    return [
+        Row("arrival", "by the eighth frame", f"{arrived} of {count}, after {np.mean(lengths):.0f} ticks",
+            verdict(arrived == count), f"the time between frames is not printed; {SCENE}"),
+        Row("new routes where triangles close the first one", "one is shown", f"{np.mean(repairs):.1f} a run",
+            verdict(min(repairs) > 0), f"repairs, small ones included; {SCENE}"),
+        Row("runs in which every step along the path is free when it is made", "implied", f"{clean} of {count}",
+            verdict(clean == count), "evasive steps left out"),
+        Row("runs without contact, in continuous time", "implied", f"{untouched} of {count}",
+            verdict(untouched == count, True), "no margin, as printed: what stands free when a tick begins can be run "
+            "over before it ends"),
+        Row("the same, told how fast triangles are", "not in the print", f"{bounded} of {count}",
+            verdict(bounded == count), f"speed_bound {FASTEST:g}: the robot keeps as far as they come in a tick"),
+        Row("ticks in which things move and the path is free: the robot", "has no branch in the print",
+            f"goes on, in {idle:.0%} of the ticks", verdict(False, bool(idle > 0.0)),
+            "to the letter it would stand still in all of them and not arrive; treated as if nothing had moved"),
+    ]  # fmt: skip
+
+
+def _kept_free(scenario: Scenario, run: Run) -> bool:
+    """Whether every step along the path was free of the obstacles where they were when it was made."""
+    world, scene = MovingWorld(scenario.problem.world), scenario.problem.world.scene
+    for tick, after in zip(run.ticks[:-1], run.ticks[1:], strict=True):
+        world.move(scene.at(tick.time))
+        if tick.event in ("plan", "walk", "repair") and not world.motion_valid(tick.q, after.q):
+            return False
+    return True
+
+
+def _untouched(scenario: Scenario, runs: list[Run]) -> int:
+    """How many runs had no contact at any time, by an independent judge."""
+    problem = scenario.problem
+    return sum(not judge(problem.robot, run, problem.world.scene).contacts for run in runs)
+
+
+def pockets(quick: bool) -> list[Row]:
+    """Two pockets, one of them sliding: the path ahead becomes shorter as the robot goes."""
+    count = 3 if quick else 30
+    runs = _runs(load_scenario("replan_pockets"), count)
+    shrinking = [
+        route_length(b.path) < route_length(a.path)
+        for run in runs
+        for a, b in zip(run.ticks[:-1], run.ticks[1:], strict=True)
+        if a.path is not None and b.path is not None and b.event == "walk"
+    ]
+    arrived, share = sum(run.arrived for run in runs), float(np.mean(shrinking))
+    return [
+        Row("arrival", "in the sixth frame", f"{arrived} of {count}", verdict(arrived == count), SCENE),
+        Row("the path ahead becomes shorter", "at every step shown", f"in {share:.0%} of the steps",
+            verdict(share == 1.0, share > 0.9), "of ticks without a repair"),
+    ]  # fmt: skip
+
+
+def planar_arm(quick: bool) -> list[Row]:
+    """A planar arm whose goal posture is covered for a while: the order of events."""
+    count = 3 if quick else 30
+    runs = _runs(load_scenario("replan_planar_arm"), count)
+    orders = [_order(run) for run in runs]
+    kept = sum([event for event, _ in order] == [GO, STOP, GO, "arrive"] for order in orders)
+    steps = [step for _, step in orders[0][1:]]
+    first = f"stops at step {steps[0]}, goes on at {steps[min(1, len(steps) - 1)]}, arrives at {steps[-1]}"
+    return [
+        Row("follows, stops, holds, goes on, arrives", "steps 6, 14, 39, 68, 86",
+            f"in this order in {kept} of {count}; the first: {first}", verdict(kept == count),
+            f"the order, not the numbers; {SCENE}"),
+    ]  # fmt: skip
+
+
+def _order(run: Run) -> list[tuple[str, int]]:
+    """Kinds of events in the order in which they came, each with the number of its first tick."""
+    kinds = [GO if tick.event in ("plan", "walk", "repair") else tick.event for tick in run.ticks]
+    return [(event, next(group)[0]) for event, group in groupby(enumerate(kinds), key=lambda pair: pair[1])]
+
+
+TABLES = (
+    Table("drrt-con-static", "Static scene: what is walked", f"{SOURCE}, figure of scene 2", static, 2, 1),
+    Table("drrt-con-pockets", "Two obstacles, one sliding", f"{SOURCE}, figure of scene 1", pockets, 2, 1),
+    Table("drrt-con-triangles", "Six triangles", f"{SOURCE}, figure of scene 3", triangles, 5, 1),
+    Table("drrt-con-arm", "Planar arm, goal covered for a while", f"{SOURCE}, figure of scene 4", planar_arm, 3, 1),
+)

@@ -1,0 +1,1 @@
+"""MB-RRT: what was published, and the runs that are compared with it."""

@@ -1,0 +1,1 @@
+"""Marker sensing: what was published, and the runs that are compared with it."""

@@ -1,0 +1,1 @@
+"""Markers photographed by a synthetic camera, and the drawing over camera pictures."""

@@ -1,0 +1,100 @@
+"""The arm drawn over a picture: its silhouette pixel for pixel, and what a whole frame costs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import cv2
+import numpy as np
+
+from bench.shared.problems import goal_joints
+from rrtik_bench.report.page import Report
+from rrtik_ompl import load_problem, load_robot
+from rrtik_ompl.overlay.augment import Augmenter, Ghost
+from rrtik_ompl.overlay.canvas import FAR, Canvas
+from rrtik_ompl.overlay.figure import figure_of, placed
+from rrtik_ompl.overlay.reference_z_buffer import ROUNDING, reference_z_buffer
+from rrtik_ompl.overlay.surfaces import robot_surfaces
+from rrtik_ompl.overlay.virtual_camera import eye_at
+from rrtik_ompl.pilot.devices.simulated_vehicle import find_scenario, load_scenario
+from rrtik_ompl.sensing.cameras.pictures import Picture
+from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph, published_camera
+from rrtik_ompl.sensing.markers.detection import marker_cells
+from rrtik_ompl.sensing.sensor import Sensor
+
+BUDGET = 20.0  # [ms] of processor time
+
+
+def silhouettes(report: Report, count: int) -> None:
+    """TITAN-4 and UR5 at random configurations from random places, against a second rasteriser in double precision."""
+    camera, rng, rows, different = published_camera(), np.random.default_rng(0), [], 0
+    for name in ("titan4", "ur5"):
+        robot = load_robot(name)
+        arm, drawn, differ, doubtful, deep = figure_of(robot_surfaces(robot, 3000)), 0, 0, 0, 0.0
+        for _ in range(count):
+            q = rng.uniform(np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi))
+            eye = eye_at([0.6, 0.0, 0.2], *rng.uniform([1.8, -np.pi, -0.3], [3.0, np.pi, 1.2]))
+            shown = placed(arm, eye.inverse().homogeneous @ robot.joint_frames(q[None])[0])
+            canvas = Canvas(camera)
+            canvas.draw(shown)
+            truth, doubt = reference_z_buffer(camera, shown)
+            both = canvas.drawn & (truth < FAR)
+            drawn += int(both.sum())
+            differ += int((canvas.drawn != (truth < FAR)).sum())
+            doubtful += int((both & doubt).sum())
+            deep = max(deep, float(np.abs(canvas.depths - truth)[both].max()))
+        different += differ
+        rows.append(
+            [name, str(count), str(len(arm.faces)), str(drawn), str(differ), str(doubtful), f"{1e3 * deep:.3f}"]
+        )
+    report.table("Silhouettes against a z-buffer in double precision",
+                 ["robot", "pictures", "triangles", "pixels drawn", "that differ",
+                  f"centres within {ROUNDING:g} of an edge", "largest difference of depth [mm]"], rows)  # fmt: skip
+    report.bar("silhouette against an independent z-buffer", "equal pixel for pixel",
+               f"{different} pixels differ", different == 0)  # fmt: skip
+
+
+def frame_times(report: Report, count: int) -> None:
+    """One 640 x 480 picture with two markers: detect, refine, pose, draw TITAN-4, encode."""
+    problem, scenario = load_problem("titan4_sdu"), load_scenario(find_scenario("titan4_sdu"))
+    sensor, augmenter = Sensor(scenario.camera, scenario.marker_map), Augmenter(problem.robot, scenario.camera)
+    seen_from = scenario.T_base_camera.inverse()
+    prints = [(seen_from * scenario.places[thing.name] * marker.T_object_marker,
+               marker_print(marker_cells(scenario.marker_map.dictionary, marker.number), marker.side))
+              for thing in scenario.marker_map.objects for marker in thing.markers]  # fmt: skip
+    gray = photograph(clean_picture(scenario.camera, prints, rays=6), np.random.default_rng(0))
+    taken = np.repeat(gray[..., None], 3, axis=2)
+    q, goal = np.array(problem.start), np.array(goal_joints(problem))
+    tips = problem.robot.fk_batch(q + np.linspace(0.0, 1.0, 40)[:, None] * (goal - q))[:, :3, 3]
+    arm = partial(augmenter.draw, taken, scenario.T_base_camera)
+    more: dict[str, Any] = {"trail": tips, "frames": [problem.robot.fk(goal)]}
+    drawn = arm(q)
+    stages: dict[str, Callable[[int], Any]] = {  # arms that move: what stands still is not drawn anew
+        "detect, refine, pose": lambda k: sensor.view(Picture(taken, "picture", k / 30.0)),
+        "draw the arm, which moves": lambda k: arm(q + 1e-3 * k * (goal - q)),
+        "encode (JPEG, quality 80)": lambda _: cv2.imencode(".jpg", drawn, [cv2.IMWRITE_JPEG_QUALITY, 80]),
+        "draw the moving arm, a ghost that stands still, a trail and a frame": lambda k: arm(
+            q + 1e-3 * (k + 0.5) * (goal - q), ghosts=[Ghost(goal)], **more
+        ),
+        "the same, the ghost moves, too": lambda k: arm(
+            q + 1e-3 * (k + 0.7) * (goal - q), ghosts=[Ghost(goal + 1e-3 * k * (q - goal))], **more
+        ),
+    }
+    spent = {name: [] for name in stages}  # type: dict[str, list[float]]
+    for k in range(count):
+        for name, run in stages.items():
+            begin = time.process_time()
+            run(k)
+            spent[name].append(1e3 * (time.process_time() - begin))
+    median = {name: float(np.median(values)) for name, values in spent.items()}
+    faces = len(figure_of(robot_surfaces(problem.robot)).faces)
+    report.table(f"Processor time of a frame, TITAN-4 with {faces} triangles, two markers, median of {count} [ms]",
+                 ["stage", "ms"], [[name, f"{value:.1f}"] for name, value in median.items()])  # fmt: skip
+    whole = sum(list(median.values())[:3])
+    report.bar("whole 640 x 480 frame: detect, refine, pose, draw, encode", f"<= {BUDGET:g} ms of processor time",
+               f"{whole:.1f} ms", whole <= BUDGET)  # fmt: skip
+    report.bar("draw the moving arm, a moving ghost, a trail and a frame", f"<= {BUDGET:g} ms of processor time",
+               f"{list(median.values())[-1]:.1f} ms", list(median.values())[-1] <= BUDGET)  # fmt: skip

@@ -1,0 +1,13 @@
+"""What scripts read from problems."""
+
+from __future__ import annotations
+
+from rrtik_ompl.arrays import Vector
+from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.problem import Problem
+
+
+def goal_joints(problem: Problem) -> Vector:
+    """The goal of a problem whose goal is one configuration."""
+    assert isinstance(problem.goal, JointGoal)
+    return problem.goal.q

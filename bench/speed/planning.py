@@ -1,0 +1,286 @@
+"""Speed rows about whole plans: the Panda set against the peers, the way through OMPL, TITAN-4."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from importlib.util import find_spec
+from itertools import pairwise
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bench.peers.description import task_of
+from bench.peers.libraries import ompl_callback, roboplan, vamp
+from bench.peers.task import PER_RADIAN, Search, Task
+from bench.speed.cases import Options, exact_problem, family, panda_files, shipped_problems, sphere_problem
+from bench.speed.ours import PLANNER, ompl_overhead, our_search, timed, warm_up
+from rrtik_bench.report.page import Report
+from rrtik_ompl import JointPath, plan
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.problem import Problem
+
+REPEATS = 5
+HAS_ROBOPLAN, HAS_VAMP = (find_spec(name) is not None for name in ("roboplan", "vamp"))
+NO_FOLDER = "Not run: give the folder of the MotionBenchMaker set."
+NO_ROBOPLAN = "roboplan is not installed (`pip install rrtik-ompl[peers]`): its figures are missing."
+STORED = "VAMP 0.6.4, stored, inner time, indicative"
+VAMP_STORED = (43.5, 108.9, 519.0)  # [us], on the Xeon of the project's first measurements
+CALLBACK_LIMIT = 10.0  # [s]
+SPHERE_PATHS = (
+    "{found} found; by coal, {checked} of them are free at VAMP's own 32 configurations per radian, and {certified} in "
+    "steps of 5 mm too, which are up to five times as fine: as VAMP's would, the others cut a corner in between."
+)
+TITAN_COLUMNS = ("ours", "plan()", "bicrdt")
+
+Times = dict[str, list[float]]
+
+
+def spheres(options: Options, report: Report) -> None:
+    """Row 1: 59 spheres, VAMP's obstacle shapes, checks as dense as VAMP's; the best of a few calls."""
+    title = "1. Panda of 59 spheres"
+    files = panda_files(options, options.problems)
+    if not files:
+        return report.note(title, NO_FOLDER)
+    times = _times("ours", "roboplan", "VAMP, call", "VAMP, inner")
+    count = found = as_checked = as_certified = 0
+    for number, file in enumerate(files):
+        problem = sphere_problem(options, file)
+        if problem is None:
+            continue
+        count += 1
+        ours = our_search(problem, seconds=options.limit, per_radian=PER_RADIAN)
+        if number == 0:
+            warm_up(problem)
+        runs = [timed(partial(ours, options.seed)) for _ in range(REPEATS)]
+        times["ours"].append(min(seconds for seconds, _ in runs))
+        rows = runs[0][1]
+        found += rows is not None
+        as_checked += _verified_between(problem, rows, PER_RADIAN)
+        as_certified += _verified(problem, rows)
+        if HAS_ROBOPLAN:
+            peer = _peer(problem, options.limit, roboplan.search)
+            calls = [timed(partial(peer, options.seed))[0] for _ in range(REPEATS)]
+            times["roboplan"].append(min(calls))
+        if HAS_VAMP:
+            theirs = vamp.search(problem)
+            inner_calls = [timed(theirs) for _ in range(REPEATS)]
+            times["VAMP, call"].append(min(seconds for seconds, _ in inner_calls))
+            times["VAMP, inner"].append(min(inner for _, (_, inner) in inner_calls))
+    table = _rows(times, "ours")
+    if not HAS_VAMP:
+        table.append([STORED, "", *(f"{value:.1f}" for value in VAMP_STORED), ""])
+    report.table(title, ["", "problems", "median [us]", "mean [us]", "95 % [us]", "median ratio to ours"], table)
+    report.note("Paths of the spheres", SPHERE_PATHS.format(found=found, checked=as_checked, certified=as_certified))
+    ours_us = 1e6 * np.array(times["ours"])
+    measured = _three(ours_us)
+    three = (float(np.median(ours_us)), float(ours_us.mean()), float(np.quantile(ours_us, 0.95)))
+    report.bar(
+        f"{count} Panda problems of 59 spheres, Python call, median / mean / 95 %; {as_checked} solved and verified",
+        "35 / 90 / 450 us (aim 22 / 55 / 260)",
+        measured,
+        as_checked == count and all(a <= b for a, b in zip(three, (35.0, 90.0, 450.0), strict=True)),
+    )
+
+
+def exact(options: Options, report: Report) -> None:
+    """Rows 2 and 3: exact solids, ours under both rules for steps and whole `plan` calls, roboplan in turn with it."""
+    title = "2, 3. Panda with exact solids"
+    files = panda_files(options, options.problems)
+    if not files:
+        return report.note(title, NO_FOLDER)
+    names = ("ours, 32 checks per radian", "ours, own rule", "plan()", "roboplan")
+    times, verified, wall = _times(*names), dict.fromkeys(names, 0), []
+    by_family: dict[str, Times] = {}
+    for number, file in enumerate(files):
+        problem = exact_problem(options, file)
+        if number == 0:
+            warm_up(problem)
+        for name, search in _exact_searches(problem, options).items():
+            begin = time.perf_counter()
+            seconds, rows = timed(partial(search, options.seed))
+            wall += [time.perf_counter() - begin] if name == "plan()" else []
+            times[name].append(seconds)
+            by_family.setdefault(family(file), _times(*names))[name].append(seconds)
+            verified[name] += _verified(problem, rows)
+    head = ["", "problems", "median [us]", "mean [us]", "95 % [us]", "median ratio to the first", "solved and verified"]
+    rows = [[*row, str(verified[row[0]])] for row in _rows(times, names[0])]
+    report.table(title, head, rows)
+    cells = [[key, *(_ms(np.median(v[n])) if v[n] else "" for n in names)] for key, v in by_family.items()]
+    report.table("Medians by family [ms]", ["", *names], cells)
+    own, same = 1e3 * np.array(times["ours, own rule"]), np.array(times[names[0]])
+    within, count = sum(w <= 1.0 for w in wall), len(files)
+    report.bar(
+        f"{count} exact Panda problems: plan() finds a verified path within 1 s; median of the search",
+        f"{count}, 2 ms (aim 0.5 ms)",
+        f"{verified['plan()']}, {within} of them within 1 s; {np.median(own):.3g} ms",
+        verified["plan()"] == within == count and bool(np.median(own) <= 2.0),
+    )
+    if HAS_ROBOPLAN:
+        ratios = [float(f(times["roboplan"]) / f(same)) for f in (np.median, lambda v: np.quantile(v, 0.95))]
+        wanted, text = "10 x (aim 30 x)", f"{ratios[0]:.3g} x, {ratios[1]:.3g} x"
+        report.bar(
+            "the same against roboplan, the same density of checks, median and 95 %", wanted, text, min(ratios) >= 10
+        )
+    else:
+        report.note("roboplan", NO_ROBOPLAN)
+
+
+def _exact_searches(problem: Problem, options: Options) -> dict[str, Callable[[int], Matrix | None]]:
+    searches = {
+        "ours, 32 checks per radian": our_search(problem, seconds=options.limit, per_radian=PER_RADIAN),
+        "ours, own rule": our_search(problem, seconds=options.limit),
+        "plan()": _whole_plan(problem, options),
+    }
+    if HAS_ROBOPLAN:
+        searches["roboplan"] = _peer(problem, options.limit, roboplan.search)
+    return searches
+
+
+def _peer(problem: Problem, seconds: float, search: Callable[[Task], Search]) -> Search:
+    """A peer's search, its files read."""
+    with TemporaryDirectory() as folder:
+        return search(task_of(problem, Path(folder), seconds))
+
+
+def _whole_plan(problem: Problem, options: Options) -> Callable[[int], Matrix | None]:
+    """The call that a person makes: search, restarts and second check; from a seed to a path."""
+
+    def whole(seed: int) -> Matrix | None:
+        found = plan(problem, PLANNER, seconds=options.limit, seed=seed)
+        return None if found.path is None else found.path.waypoints
+
+    return whole
+
+
+def callbacks(options: Options, report: Report) -> None:
+    """Row 4: OMPL with a Python validity callback on the meshes; medians over one subset."""
+    title = "4. OMPL's RRT-Connect with a validity callback in Python"
+    files = panda_files(options, options.peer_problems)
+    if not files:
+        return report.note(title, NO_FOLDER)
+    names = ("ours", "with broadphase", "plain")
+    times, solved = _times(*names), dict.fromkeys(names, 0)
+    for number, file in enumerate(files):
+        problem = exact_problem(options, file)
+        if number == 0:
+            warm_up(problem)
+        searches = {
+            "ours": our_search(problem, seconds=CALLBACK_LIMIT, per_radian=PER_RADIAN),
+            "with broadphase": _peer(problem, CALLBACK_LIMIT, partial(ompl_callback.search, broadphase=True)),
+            "plain": _peer(problem, CALLBACK_LIMIT, ompl_callback.search),
+        }
+        for name, search in searches.items():
+            seconds, rows = timed(partial(search, options.seed))
+            times[name].append(seconds)
+            solved[name] += rows is not None
+    rows = [[*row, str(solved[row[0]])] for row in _rows(times, "ours")]
+    head = ["", "problems", "median [us]", "mean [us]", "95 % [us]", "median ratio to ours", "solved"]
+    report.table(f"{title}, at most {CALLBACK_LIMIT:g} s each", head, rows)
+    for name, bar, aim in (("plain", 500, 1500), ("with broadphase", 100, 250)):
+        ratio = float(np.median(times[name]) / np.median(times["ours"]))
+        what = f"{len(files)} exact problems, OMPL's RRT-Connect with a Python callback, {name}, median"
+        report.bar(what, f"{bar} x (aim {aim} x)", f"{ratio:.3g} x", ratio >= bar)
+
+
+def ompl_layer(options: Options, report: Report) -> None:
+    """Row 8: what OMPL around the kernel planner costs, call by call."""
+    title = "8. SimpleSetup.solve() against the bare search"
+    files = panda_files(options, options.peer_problems)
+    problems = [exact_problem(options, file) for file in files] or shipped_problems()
+    bare, whole = [], []
+    for problem in problems:
+        solve = ompl_overhead(problem, seconds=1.0, seed=options.seed)
+        if solve is None:
+            return report.note(title, "Not run: the kernel planner is not there.")
+        warm_up(problem)
+        runs = [solve() for _ in range(4 * REPEATS)]
+        bare += [inner for _, inner in runs]
+        whole += [outer for outer, _ in runs]
+    more = 1e6 * float(np.median(np.array(whole) - np.array(bare)))
+    report.table(
+        title,
+        ["problems", "search inside [us]", "solve() [us]", "difference [us]"],
+        [[str(len(problems)), *(f"{1e6 * np.median(t):.1f}" for t in (bare, whole)), f"{more:.1f}"]],
+    )
+    report.bar(
+        "SimpleSetup.solve() against the bare search, medians", "+ 30 us (aim + 20)", f"+ {more:.1f} us", more <= 30
+    )
+
+
+def titan(options: Options, report: Report) -> None:
+    """Row 9: TITAN-4, all shipped problems, exact."""
+    rows, medians = [], []
+    seeds = range(options.seed, options.seed + (3 if options.quick else 20))
+    for problem in shipped_problems():
+        warm_up(problem)
+        cells = [problem.name]
+        searches = {
+            "ours": our_search(problem, seconds=options.limit),
+            "plan()": _whole_plan(problem, options),
+            "bicrdt": our_search(problem, seconds=options.limit, planner="bicrdt"),
+        }
+        for name, search in searches.items():
+            runs = [timed(partial(search, seed)) for seed in seeds]
+            verified = sum(_verified(problem, rows) for _, rows in runs)
+            times = [seconds for seconds, _ in runs]
+            medians += [float(np.median(times))] if name == "ours" else []
+            cells += [_ms(np.median(times)), _ms(np.quantile(times, 0.95)), f"{verified} of {len(runs)}"]
+        rows.append(cells)
+    columns = ("median [ms]", "95 % [ms]", "verified")
+    head = ["", *(f"{name}, {column}" for name in TITAN_COLUMNS for column in columns)]
+    report.table("9. TITAN-4, shipped problems", head, rows)
+    worst, bar = 1e3 * max(medians), "2 ms (aim 0.5 ms)"
+    report.bar(
+        "TITAN-4, all shipped problems, exact: largest median of the search", bar, f"{worst:.3g} ms", worst <= 2.0
+    )
+
+
+def _verified(problem: Problem, rows: Matrix | None) -> bool:
+    """Whether there is a path from the start to the goal that the second check accepts."""
+    if rows is None:
+        return False
+    path = JointPath.of(problem.world.robot, rows)
+    ends = np.allclose(path.start, problem.start, atol=1e-6) and problem.reached(path.end)
+    return bool(ends) and not path.violations(problem.world)
+
+
+def _verified_between(problem: Problem, rows: Matrix | None, per_radian: float) -> bool:
+    """Whether the second check accepts a path at the configurations at which a search so dense looks."""
+    if rows is None:
+        return False
+    shares = [np.linspace(0.0, 1.0, 1 + _steps(a, b, per_radian))[:, None] for a, b in pairwise(rows)]
+    dense = [(1.0 - s) * a + s * b for s, (a, b) in zip(shares, pairwise(rows), strict=True)]
+    return bool(problem.reached(rows[-1]) and problem.world.certify(np.vstack(dense)).all())
+
+
+def _steps(start: Vector, end: Vector, per_radian: float) -> int:
+    return max(1, int(np.ceil(per_radian * float(np.linalg.norm(end - start)) - 1e-9)))
+
+
+def _times(*names: str) -> Times:
+    return {name: [] for name in names}
+
+
+def _rows(times: Times, first: str) -> list[list[str]]:
+    """A table row of each candidate that was measured."""
+    base = float(np.median(times[first]))
+    found = []
+    for name, values in times.items():
+        if values:
+            cells = [f"{1e6 * v:.1f}" for v in (np.median(values), np.mean(values), np.quantile(values, 0.95))]
+            found.append([name, str(len(values)), *cells, f"{np.median(values) / base:.3g}"])
+    return found
+
+
+def _three(values: ArrayLike) -> str:
+    numbers = np.asarray(values, dtype=float)
+    found = (np.median(numbers), np.mean(numbers), np.quantile(numbers, 0.95))
+    return " / ".join(f"{v:.1f}" for v in found) + " us"
+
+
+def _ms(seconds: float) -> str:
+    return f"{1e3 * seconds:.3g}"

@@ -1,1 +1,0 @@
-"""Published tables measured again: what was printed, what comes out here, and how the text was read."""
