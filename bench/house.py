@@ -1,8 +1,9 @@
 """Figures of the house: rooms and their modules, imports between rooms, circles, complexity, lengths, untyped values.
 
-    python bench/house.py [--json] [--arrows]
+    python bench/house.py [--json] [--arrows] [--tables]
 
 Prints what is measured beside its bound; exit code 1 if a bound is broken. ``tests/house`` holds the same bounds.
+``--tables`` prints an order of the modules of each package that holds, as ``tests/house/package_tables.yaml`` has it.
 """
 
 from __future__ import annotations
@@ -12,15 +13,32 @@ import ast
 import json
 import re
 import sys
+import textwrap
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from house_imports import LIBRARY, REPOSITORY, knots, module_graph, place, room_arrows, sources, tree_of
+import yaml
+
+from house_imports import (
+    LIBRARY,
+    REPOSITORY,
+    inner_arrows,
+    knots,
+    levels,
+    module_graph,
+    packages,
+    place,
+    room_arrows,
+    sources,
+    tree_of,
+)
 
 KERNEL_DECORATORS = {"kernel", "entry", "inlined", "intrinsic", "overload", "type_callable", "lower_builtin"}
-COMMANDS = REPOSITORY / LIBRARY / "cli"  # every option of a command is a parameter
+COMMANDS = REPOSITORY / LIBRARY / "cli"  # each option of a command is a parameter, and the caller is typer
+PACKAGE_TABLES = REPOSITORY / "tests" / "house" / "package_tables.yaml"
+MODULES_WITHOUT_TABLE = 6
 BOUNDS = {
     "modules in the root": 17,
     "modules in a folder": 18,
@@ -200,11 +218,30 @@ def report(found: list[Finding]) -> str:
     return "\n".join(lines)
 
 
+def package_tables() -> str:
+    """An order of each package's modules by what they import, in the form of ``tests/house/package_tables.yaml``."""
+    lines = []
+    for package, rows in listed_tables().items():
+        apart = [name for row in rows for name in row.split() if "." in name]
+        lines.append(f"{package}:")
+        for level in levels(inner_arrows(package, apart)):
+            lines += [f"  - {line}" for line in textwrap.wrap(" ".join(level), 112)]
+    return "\n".join(lines)
+
+
+def listed_tables() -> dict[str, list[str]]:
+    """The tables of ``tests/house/package_tables.yaml``; packages that have none and should are there without rows."""
+    listed: dict[str, list[str]] = yaml.safe_load(PACKAGE_TABLES.read_text(encoding="utf-8"))
+    unlisted = {package: [] for package in packages(MODULES_WITHOUT_TABLE) if package != LIBRARY}
+    return dict(sorted({**unlisted, **listed}.items()))
+
+
 def main() -> int:
     """Print the figures; 1 if a bound is broken."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="all findings, for machines")
     parser.add_argument("--arrows", action="store_true", help="imports between rooms as well")
+    parser.add_argument("--tables", action="store_true", help="an order of the modules of each package")
     options = parser.parse_args()
     found = findings()
     if options.json:
@@ -214,6 +251,8 @@ def main() -> int:
     if options.arrows:
         for room, targets in sorted(room_arrows().items()):
             print(f"{room:28} -> " + ", ".join(f"{target} {count}" for target, count in sorted(targets.items())))
+    if options.tables:
+        print(package_tables())
     return int(any(item.broken for item in found))
 
 
