@@ -28,9 +28,11 @@ from house_imports import (
     knots,
     levels,
     module_graph,
+    module_name,
     packages,
     place,
     room_arrows,
+    room_of,
     sources,
     tree_of,
 )
@@ -51,21 +53,17 @@ BOUNDS = {
     "files with private sources": 0,
     "signatures with bare Any": 116,  # a third of those of version 0.1
 }
-REPEATED_STATEMENTS = 6  # in a row, of the same shape and names
+REPEATED_LINES = 6  # of statements in a row, the same but for layout and comments
 BRANCHES = (ast.If, ast.For, ast.While, ast.ExceptHandler, ast.IfExp, ast.Assert, ast.match_case, ast.comprehension)
 WORDS = (  # names of sources that no reader can look up; REFERENCES.md has them by number
-    "C-RDT paper",
-    "GA-REB paper",
-    "IKURT paper",
-    "shared-control tool",
-    "the specification",
-    "Post-processing page",
+    *("C-RDT paper", "GA-REB paper", "IKURT paper", "DRRT-Con paper", "MB-RRT paper", "post-processing paper"),
+    *("shared-control tool", "the specification", "kinematics specification", "Post-processing page", "test plan"),
 )
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One measured value: what, where, how much."""
+    """One measured value: which of ``BOUNDS``, where, how much."""
 
     what: str
     where: str
@@ -129,7 +127,7 @@ def complexities() -> Iterator[Finding]:
 
 
 def parameters() -> Iterator[Finding]:
-    """Parameters that are not keyword-only, outside kernels and commands."""
+    """Parameters that are not keyword-only, ``self`` not counted, outside kernels and commands."""
     for file in sources():
         for where, node in functions(file):
             if not decorators(node) & KERNEL_DECORATORS and file.parent != COMMANDS:
@@ -139,19 +137,21 @@ def parameters() -> Iterator[Finding]:
 
 def bare_any() -> Finding:
     """Signatures outside kernels in which a parameter or the result is ``Any`` itself."""
-    count = 0
+    rooms: Counter[str] = Counter()
     for file in sources():
         for _, node in functions(file):
             own = node.args.posonlyargs + node.args.args + node.args.kwonlyargs
             annotations = [item.annotation for item in own] + [node.returns]
-            if not decorators(node) & KERNEL_DECORATORS and any(_is_any(item) for item in annotations):
-                count += 1
-    return Finding("signatures with bare Any", "library, planners, robots, tables", count)
+            if not decorators(node) & KERNEL_DECORATORS and any(is_any(item) for item in annotations):
+                rooms[room_of(module_name(file)).removeprefix(f"{LIBRARY}.")] += 1
+    where = ", ".join(f"{room} {count}" for room, count in rooms.most_common())
+    return Finding("signatures with bare Any", where, rooms.total())
 
 
-def _is_any(annotation: ast.expr | None) -> bool:
+def is_any(annotation: ast.expr | None) -> bool:
+    """Whether an annotation is ``Any`` itself, or ``Any`` or something else."""
     if isinstance(annotation, ast.BinOp):
-        return _is_any(annotation.left) or _is_any(annotation.right)
+        return is_any(annotation.left) or is_any(annotation.right)
     return isinstance(annotation, ast.Name) and annotation.id == "Any"
 
 
@@ -162,7 +162,7 @@ def circles() -> Finding:
 
 
 def repeated_runs() -> Finding:
-    """Runs of statements that stand in two places, the same to the letter but for layout and comments."""
+    """Runs of statements that stand in two places, the same but for layout and comments."""
     places: dict[str, list[tuple[str, int]]] = defaultdict(list)
     for file in sources():
         for node in ast.walk(tree_of(file)):
@@ -177,9 +177,14 @@ def repeated_runs() -> Finding:
 
 def _add_runs(places: dict[str, list[tuple[str, int]]], file: str, body: list[ast.stmt]) -> None:
     plain = [item for item in body if not _is_text(item) and not isinstance(item, ast.Import | ast.ImportFrom)]
-    for first in range(len(plain) - REPEATED_STATEMENTS + 1):
-        run = plain[first : first + REPEATED_STATEMENTS]
-        places["\n".join(ast.unparse(item) for item in run)].append((file, run[0].lineno))
+    texts = [ast.unparse(item).splitlines() for item in plain]
+    for first, item in enumerate(plain):
+        lines: list[str] = []
+        for text in texts[first:]:
+            lines += text
+            if len(lines) >= REPEATED_LINES:
+                places["\n".join(lines)].append((file, item.lineno))
+                break
 
 
 def _is_text(item: ast.stmt) -> bool:
@@ -189,7 +194,9 @@ def _is_text(item: ast.stmt) -> bool:
 def words() -> Finding:
     """Words that name a source which no reader can look up."""
     files = [*sources(), *REPOSITORY.glob("*.md"), *(REPOSITORY / "docs").rglob("*.md")]
-    found = [place(file) for file in files if re.search("|".join(WORDS), " ".join(file.read_text().split()))]
+    found = [
+        place(file) for file in files if re.search("|".join(WORDS), " ".join(file.read_text().split()), re.IGNORECASE)
+    ]
     return Finding("files with private sources", " ".join(found), len(found))
 
 
@@ -232,7 +239,7 @@ def package_tables() -> str:
 def listed_tables() -> dict[str, list[str]]:
     """The tables of ``tests/house/package_tables.yaml``; packages that have none and should are there without rows."""
     listed: dict[str, list[str]] = yaml.safe_load(PACKAGE_TABLES.read_text(encoding="utf-8"))
-    unlisted = {package: [] for package in packages(MODULES_WITHOUT_TABLE) if package != LIBRARY}
+    unlisted: dict[str, list[str]] = {package: [] for package in packages(MODULES_WITHOUT_TABLE) if package != LIBRARY}
     return dict(sorted({**unlisted, **listed}.items()))
 
 
