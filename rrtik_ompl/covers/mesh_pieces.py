@@ -97,7 +97,7 @@ class _Part:
 def convex_pieces(mesh: Any) -> tuple[list[Matrix], list[Matrix], list[Matrix]]:
     """Convex pieces whose union contains a coal mesh and what it encloses, convex pieces inside it, and points of it.
 
-    The cell whose pieces come out smallest is cut first (compare Lien and Amato 2007), until cuts gain little. A
+    The cell whose pieces come out smallest is cut first (compare [44]), until cuts gain little. A
     sketch of the mesh is enough to choose the cuts. Nothing is known to be inside a mesh that is not closed, and
     there are no pieces of a mesh that is a point or has more than ``MOST_TRIANGLES``.
 

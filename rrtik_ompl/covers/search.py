@@ -1,10 +1,10 @@
 """Few balls that hold all elements of a solid and reach little beyond it.
 
-A ball sticks out by at most its radius minus the depth of its centre. Greedy set cover (Chvatal 1979) with a bisection
+A ball sticks out by at most its radius minus the depth of its centre. Greedy set cover [41] with a bisection
 of the protrusion finds a first set of balls; then elements and balls are matched and every ball is moved to where it
 sticks out least, in turns, and balls that others can stand in for are moved to where the protrusion is largest (after
-Wang et al. 2006, variational sphere set approximation). All this only looks for good places: whatever they are, each
-ball is made large enough for its elements, so the cover holds the solid.
+[42]). All this only searches for good places: whatever they are, each ball is made large enough for its elements, so the
+cover holds the solid.
 """
 
 from __future__ import annotations
@@ -201,7 +201,7 @@ def _settled(parts: Elements, surface: cKDTree, places: Places, owner: NDArray[n
     """Each ball moved to where it sticks out least while it holds its points.
 
     It goes away from the surface that is nearest and towards the point that is farthest, in ever shorter steps (after
-    Badoiu and Clarkson 2003). A step is shorter than the depth, so a centre stays inside.
+    [43]). A step is shorter than the depth, so a centre stays inside.
     """
     order = np.argsort(owner, kind="stable")
     points, radii, owner = parts.points[order], parts.radii[order], owner[order]

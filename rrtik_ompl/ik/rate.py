@@ -1,9 +1,6 @@
 """Joint rates for a wanted motion of the tip, also near and in singular postures, where the exact answer has no bound.
 
-Sources: Y. Nakamura and H. Hanafusa, "Inverse kinematic solutions with singularity robustness for robot manipulator
-control", Journal of Dynamic Systems, Measurement and Control 108 (1986), 163-171; the damping of the smallest singular
-value alone, A. Maciejewski and C. Klein, "Numerical filtering for the operation of robotic manipulators through
-kinematically singular configurations", Journal of Robotic Systems 5 (1988), 527-552.
+Sources: Nakamura and Hanafusa [25]; the damping of the smallest singular value alone, Maciejewski and Klein [26].
 """
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ def reach_map(
         robot: The arm.
         measure: ``orientations``: share of 64 evenly spread directions (planar arms: of the plane) in which the tip's
             axis was seen to point; ``manipulability``: the largest product of the Jacobian's singular values
-            seen, sqrt(det(J J^T)) from six joints on (Yoshikawa 1985), metres and radians as they are;
+            seen, sqrt(det(J J^T)) from six joints on [31], metres and radians as they are;
             ``samples``: how many came.
         cell: Side of a cell [m]; about an 18th of the reach if None.
         samples: Postures to draw; where nothing but the arm is looked at, each in 16 turns of the first joint.

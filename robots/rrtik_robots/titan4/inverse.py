@@ -1,6 +1,6 @@
 """Inverse kinematics of the TITAN 4 in closed form: eight branches, and a representative of every singular family.
 
-Source: section 7 of the kinematics specification. Axes 2, 3, 4 are parallel, axes 5 and 6 meet in the wrist point
+Source: [1, ch. 3, app. A to C]. Axes 2, 3, 4 are parallel, axes 5 and 6 meet in the wrist point
 P = E - d6 w. The azimuth follows from P (front or back), the wrist yaw and the sum psi of the three pitch angles from
 w (two ways), and what is left is a triangle (elbow up or down). Arrays are kept as (shoulder, wrist, elbow, m).
 """

@@ -1,7 +1,7 @@
 """Where the TITAN 4 can be used on its vehicle: in reach with a margin, seen by a camera, clear of the vehicle.
 
-Source: section 11 of the kinematics specification. The published figures with numbers are lost: the poses of cameras
-and vehicle are **chosen** here, their sizes are the specification's defaults; everything can be set.
+Source: [1, ch. 3]. The published figures with numbers are lost: poses and sizes of cameras and vehicle are **chosen**
+here; everything can be set.
 """
 
 from __future__ import annotations

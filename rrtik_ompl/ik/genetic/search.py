@@ -1,6 +1,6 @@
 """The genetic algorithm along a trajectory: one population follows a target that moves on whenever it is reached.
 
-Source: GA-REB. The bit strings are kept when the window moves, so that a constant chromosome is a constant velocity
+Source: [2]. The bit strings are kept when the window moves, so that a constant chromosome is a constant velocity
 (gain 0) or acceleration (gain 1), and the population predicts the next point.
 """
 

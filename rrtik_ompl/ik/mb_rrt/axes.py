@@ -1,7 +1,7 @@
-"""A real arm as the tree sees it: joints that each turn about one axis, and the lengths that are left after each.
+"""A real arm as the tree models it: joints that each turn about one axis, and the lengths that are left after each.
 
-A node carries the frame of a joint, an edge is a turn about its axis, and the joint angles come for free
-(specification of MB-RRT, section 12.4).
+A node carries the frame of a joint, an edge is a turn about its axis, and the joint angles come for
+free.
 """
 
 from __future__ import annotations

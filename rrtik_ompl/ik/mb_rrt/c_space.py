@@ -1,4 +1,4 @@
-"""The baseline of the MB-RRT paper: an RRT in the space of joint angles whose every vertex is tried at the goal."""
+"""The baseline of MB-RRT [3]: an RRT in the space of joint angles whose every vertex is tried at the goal."""
 
 from __future__ import annotations
 

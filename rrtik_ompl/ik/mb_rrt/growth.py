@@ -1,9 +1,9 @@
-"""The tree in the workspace as published, grown index by index for many passes at a time.
+"""The tree in the workspace as published [3], grown index by index for many passes at a time.
 
 A pass adds one node of each index, joined to a node of the index before. What is sampled does not depend on the tree,
 and a level depends on the level before it alone. So a whole block of passes can be added to one level before the next
-one is looked at, as long as a node chooses among those that its pass could know: the same tree, without a loop over
-passes. Source: the MB-RRT paper.
+one is begun, as long as a node chooses among those that its pass could know: the same tree, without a loop over
+passes.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 An arm whose axes are all parallel ends exactly on the goal. Elsewhere a sphere about the goal is not all that a joint
 with one axis can keep to; the newest branches, which are near the goal and free as far as the links know, are then
-polished by Levenberg-Marquardt (specification of MB-RRT, section 12.4).
+polished by Levenberg-Marquardt.
 """
 
 from __future__ import annotations

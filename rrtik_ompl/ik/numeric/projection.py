@@ -1,9 +1,8 @@
 """Inverse kinematics of regions: configurations walk to the nearest pose of a region, which is found anew each step.
 
-What the region leaves free asks nothing of the joints, so that arms of fewer joints than a pose needs fit as well.
+What the region leaves free does not constrain the joints, so that arms of fewer joints than a pose needs fit as well.
 
-Sources: M. Stilman, "Global manipulation planning in robot joint space with task constraints", IEEE Transactions on
-Robotics 26 (2010), 576-584, for steps that leave free directions out; damping after Sugihara, as in
+Sources: [23] for steps that leave free directions out; damping after [22], as in
 `rrtik_ompl.ik.numeric.reference_descent`.
 """
 
