@@ -30,12 +30,12 @@ from typing import Any
 
 import llvmlite.binding as llvm
 import numpy as np
-from behaviour_calls import inverse_kinematics, others, replans
-from behaviour_paths import plain, plans, shortenings, trajectories
-from behaviour_problems import Result
 from ompl import util as ou
 
 import rrtik_ompl
+from behaviour_calls import inverse_kinematics, others, replans
+from behaviour_paths import plain, plans, shortenings, trajectories
+from behaviour_problems import Result
 
 LIBRARIES = ("ompl", "pin", "coal", "numpy", "scipy", "numba", "llvmlite", "ruckig", "toppra")
 GROUPS = (plans, plain, shortenings, trajectories, inverse_kinematics, replans, others)

@@ -9,6 +9,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+
+import rrtik_ompl as rrtik
 from behaviour_paths import plan_of
 from behaviour_problems import (
     AHEAD,
@@ -25,8 +27,6 @@ from behaviour_problems import (
     robot_of,
     surroundings,
 )  # fmt: skip
-
-import rrtik_ompl as rrtik
 
 SLOW_ALL = ("ccd", "pso", "pso-resampled", "pinocchio", "projection")  # seconds for all solutions of one goal
 

@@ -11,12 +11,12 @@ from functools import cache, partial
 from typing import Any
 
 import numpy as np
-from behaviour_problems import LONG, MADE, TIMED, Cases, Result, problem_of
 from ompl import base as ob
 from ompl import geometric as og
 
 import rrtik_ompl as rrtik
 import rrtik_planners
+from behaviour_problems import LONG, MADE, TIMED, Cases, Result, problem_of
 
 OWN = ("bicrdt", "crdt", "fastrrtconnect", "mbrrt", "drrt-con", "ikurt")
 WHEEL = ("RRTConnect", "RRT", "KPIECE1", "BKPIECE1", "LBKPIECE1", "FMT", "BFMT")

@@ -8,7 +8,9 @@ from hypothesis import settings
 from ompl import util as ou
 
 from rrtik_bench.crdt import published as crdt_published
+from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.shapes import Mesh
+from rrtik_tests.bent_meshes import bent_meshes_of
 
 # Machines differ and are shared: no example may fail for being slow, and an unattended run repeats the same examples.
 settings.register_profile("rrtik", deadline=None, derandomize=bool(os.environ.get("CI")))
@@ -19,6 +21,12 @@ BOTTOM_AND_SIDES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5
 BOTTOM_AND_SIDES += [(0, 2, 6), (0, 6, 4)]
 TOP = [(1, 5, 7), (1, 7, 3)]
 PUSHED_IN_TOP = [(1, 5, 8), (5, 7, 8), (7, 3, 8), (3, 1, 8)]
+
+
+@pytest.fixture(scope="session")
+def titan():
+    """TITAN 4."""
+    return load_robot("titan4")
 
 
 @pytest.fixture(scope="session")
@@ -53,6 +61,12 @@ def dented_cube():
         return Mesh(np.vstack([half * CORNERS, [[0.0, 0.0, height]]]), BOTTOM_AND_SIDES + PUSHED_IN_TOP)
 
     return make
+
+
+@pytest.fixture(scope="session")
+def bent_meshes(dented_cube):
+    """Meshes of coal that are not convex, by kind."""
+    return bent_meshes_of(dented_cube)
 
 
 @pytest.fixture

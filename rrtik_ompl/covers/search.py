@@ -3,8 +3,8 @@
 A ball sticks out by at most its radius minus the depth of its centre. Greedy set cover [41] with a bisection
 of the protrusion finds a first set of balls; then elements and balls are matched and every ball is moved to where it
 sticks out least, in turns, and balls that others can stand in for are moved to where the protrusion is largest (after
-[42]). All this only searches for good places: whatever they are, each ball is made large enough for its elements, so the
-cover holds the solid.
+[42]). All this only searches for good places: whatever they are, each ball is made large enough for its elements, so
+the cover holds the solid.
 """
 
 from __future__ import annotations

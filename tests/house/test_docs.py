@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 import yaml
-from rrtik_tests.places import ROOT
 
 import rrtik_ompl
 from rrtik_ompl.benchmark import load_suite
@@ -18,6 +17,7 @@ from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.path import load_path
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.problem_files.run import RunSection
+from rrtik_tests.places import ROOT
 
 LIBRARY = ROOT / "rrtik_ompl"
 PAGES = {file.stem: file.read_text() for file in (*ROOT.glob("*.md"), *sorted((ROOT / "docs").glob("[a-z]*.md")))}

@@ -1,15 +1,10 @@
 """The bounds of the house: sizes of folders and files, complexity, parameters, repeated logic, citations, types."""
 
 import ast
-import sys
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "bench"))
-
-import house  # noqa: E402
+import house
 
 
 @pytest.fixture(scope="module")

@@ -1,16 +1,11 @@
 """Who may import whom: rooms by the floors of ARCHITECTURE.md, modules of a package by the table of the package."""
 
 import re
-import sys
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "bench"))
-
-import house  # noqa: E402
-import house_imports  # noqa: E402
+import house
+import house_imports
 
 LIBRARY = house_imports.LIBRARY
 TABLES = house.listed_tables()

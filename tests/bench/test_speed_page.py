@@ -1,0 +1,58 @@
+"""The speed page comes out whole where neither the peers nor the Panda set are there."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from rrtik_tests.places import ROOT
+
+SCRIPT = ROOT / "bench" / "speed" / "report.py"
+PACKAGES = os.pathsep.join(str(ROOT / folder) for folder in (".", "planners", "robots", "bench"))
+
+
+def run(folder, *arguments):
+    page = folder / "speed.md"
+    command = [sys.executable, str(SCRIPT), "--quick", "--out", str(page), *arguments]
+    environment = {**os.environ, "PYTHONPATH": PACKAGES}
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode in (0, 1), done.stderr  # 1: a bar was missed, which is no matter of this test
+    return page.read_text()
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    names = ("exact", "spheres", "free-motions", "near-obstacles", "titan4", "memory")
+    return run(tmp_path_factory.mktemp("speed"), *(word for name in names for word in ("--only", name)))
+
+
+def test_the_page_names_the_processor_and_the_versions(page):
+    assert all(f"{name} " in page for name in ("numpy", "ompl", "pin", "coal", "roboplan"))
+    assert "cores; Python" in page
+
+
+def test_rows_without_their_data_say_so(page):
+    assert page.count("Not run: give the folder of the MotionBenchMaker set.") == 2
+
+
+def test_rows_that_need_no_data_are_measured(page):
+    for title in ("5. Panda along free motions", "6, 7. Exact", "9. TITAN-4", "11. Memory over 50 plans"):
+        assert f"## {title}" in page
+
+
+def test_our_checks_are_never_wrong_near_obstacles(page):
+    table = page.partition("## 6, 7.")[2].partition("##")[0].strip().splitlines()
+    heads = [cell.strip() for cell in table[2].split("|")]
+    wrong = [line.split("|")[heads.index("ours wrong")].strip() for line in table[4:] if line.startswith("|")]
+    assert wrong
+    assert set(wrong) == {"0"}
+
+
+def test_a_process_of_another_copy_of_the_package_is_refused(tmp_path):
+    from bench.speed.process import same_source
+
+    (tmp_path / "rrtik_ompl").mkdir()
+    (tmp_path / "rrtik_ompl" / "__init__.py").touch()
+    with pytest.raises(RuntimeError, match="a new process imports"):
+        same_source({"PYTHONPATH": str(tmp_path)})

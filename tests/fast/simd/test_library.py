@@ -1,0 +1,412 @@
+"""Kernels are made once for a processor, load without numba, and a bad cache costs time, never a wrong answer."""
+
+import os
+import runpy
+import shutil
+import subprocess
+import sys
+import types
+import warnings
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rrtik_ompl.cli import terminal
+from rrtik_ompl.cli.app import run
+from rrtik_ompl.fast import warm_up
+from rrtik_ompl.fast.simd import announce, bitcode, code_files, compiled, library
+
+pytestmark = pytest.mark.kernels
+
+KERNELS = "checks.check_kernels"
+PROGRAM = """
+import sys, warnings; warnings.simplefilter("error")
+import coal, numpy as np, pinocchio as pin
+from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.fast import FastWorld
+from rrtik_ompl.fast.simd import announce
+announce.on_compile = lambda message: print("compiling", file=sys.stderr)
+chain = load_robot("titan4").chain
+at = [pin.SE3(np.eye(3), np.array(p)) for p in ([0.0, 0, 0], [0.1, 0, 0], [1.0, 0.5, 0.5], [-0.8, 0.3, 0.2])]
+bodies = [Body("b", j, at[k], coal.Sphere(0.25), "link") for k, j in enumerate((2, 6, 0, 0))]
+spheres = [np.array([[0.0, 0.0, 0.0, r]]) for r in (0.25, 0.2)]
+pairs = [(0, 1), (0, 2), (1, 2), (0, 3), (1, 3)]
+world = FastWorld(chain, bodies, pairs, outer=[spheres[0]] * 4, inner=[spheres[1]] * 4)
+rng = np.random.default_rng(1)
+V, ends = rng.uniform(-3, 3, (2, 400, 6))
+print("".join(map(str, [*world.classify(V), *world.classify_edges(V, ends, np.full(400, 9))])))
+print("marks", world.undecided_pairs(V[:50]))
+print("numba" if "numba" in sys.modules else "llvmlite" if world.address else "numpy")
+"""
+
+
+def start(code=PROGRAM, **environment):
+    environment = {"NUMBA_CACHE_DIR": os.environ.get("NUMBA_CACHE_DIR", ""), **environment}
+    return subprocess.Popen(
+        [sys.executable, "-c", code],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, **{k: v for k, v in environment.items() if v}, "RRTIK_CACHE": environment["RRTIK_CACHE"]},
+    )
+
+
+def finished(process):
+    out, err = process.communicate(timeout=200)
+    assert process.returncode == 0, err
+    answers, marks, backend = out.splitlines()
+    return answers + marks, backend, err
+
+
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory):
+    """A cache folder that a process has filled, and what it answered."""
+    folder = tmp_path_factory.mktemp("cache")
+    answers, backend, said = finished(start(RRTIK_CACHE=str(folder)))
+    assert (backend, said) == ("numba", "compiling\n")
+    assert set(answers[:800]) == set("012")
+    return folder, answers
+
+
+@pytest.fixture
+def cached(filled, tmp_path, monkeypatch):
+    """A copy of that folder as this process's cache: the file of the kernels."""
+    shutil.copytree(filled[0], tmp_path, dirs_exist_ok=True)
+    monkeypatch.setenv("RRTIK_CACHE", str(tmp_path))
+    monkeypatch.setattr(library, "_libraries", {})
+    (file,) = (tmp_path / "kernels").iterdir()
+    return file
+
+
+def test_what_one_process_compiled_the_next_loads_without_numba(filled):
+    assert finished(start(RRTIK_CACHE=str(filled[0]))) == (filled[1], "llvmlite", "")
+
+
+def test_kernels_that_are_there_need_no_numba_at_all(filled):
+    process = start("import sys; sys.modules['numba'] = None\n" + PROGRAM, RRTIK_CACHE=str(filled[0]))
+    answers, _, said = finished(process)
+    assert (answers, said) == (filled[1], "")
+
+
+def test_plain_numpy_answers_the_same(filled):
+    plain = PROGRAM.replace("* 4)", "* 4, compiled=False)")
+    assert finished(start(plain, RRTIK_CACHE=str(filled[0]))) == (filled[1], "numpy", "")
+
+
+def test_both_widths_answer_the_same(filled, tmp_path):
+    for width in ("8", "16"):
+        answers, _, said = finished(start(RRTIK_CACHE=str(tmp_path), RRTIK_LANES=width))
+        assert (answers, said) == (filled[1], "compiling\n")
+
+
+def test_processes_that_start_at_once_do_not_disturb_each_other(filled, tmp_path):
+    for process in [start(RRTIK_CACHE=str(tmp_path)) for _ in range(2)]:
+        assert finished(process)[0] == filled[1]
+    (file,) = (tmp_path / "kernels").iterdir()
+    assert file.read_bytes() == next((filled[0] / "kernels").iterdir()).read_bytes()
+
+
+@pytest.mark.parametrize("folder", ["", "file/below"])
+def test_without_a_folder_kernels_live_in_memory(filled, tmp_path, folder):
+    (tmp_path / "file").write_text("not a folder")
+    answers, backend, _ = finished(start(RRTIK_CACHE=folder and str(tmp_path / folder)))
+    assert (answers, backend) == (filled[1], "numba")
+
+
+def checked(body):
+    return sha256(body).digest() + body
+
+
+def described(data):
+    """What a file says of itself: its key, its functions."""
+    return data[32:].partition(b"\n")[0]
+
+
+def swapped(data, place):
+    return data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :]
+
+
+DAMAGES = {
+    "empty": lambda data: b"",
+    "short": lambda data: data[:-100],
+    "nonsense": lambda data: b"nonsense" * 100,
+    "one bit of the checksum": lambda data: swapped(data, 3),
+    "one bit of the description": lambda data: swapped(data, 40),
+    "one bit of the code": lambda data: swapped(data, len(data) // 2),
+    "another's": lambda data: checked(data[32:].replace(b"lanes", b"lines", 1)),
+    "no machine code": lambda data: checked(data[32:].partition(b"\n")[0] + b"\n" + b"nonsense" * 100),
+    "other functions": lambda data: checked(data[32:].replace(b'"classify"', b'"classifx"', 1)),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
+def test_a_damaged_file_is_made_anew(cached, damage, capfd, monkeypatch):
+    monkeypatch.setattr(announce, "on_compile", lambda message: None)  # a command line may have set its own
+    whole = cached.read_bytes()
+    cached.write_bytes(damage(whole))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert library.library(KERNELS) is not None
+    assert described(cached.read_bytes()) == described(whole)  # the code may differ by what else is in the process
+    assert library._kept(KERNELS) is not None
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_folder_in_the_files_place_is_no_trouble(cached):
+    cached.unlink()
+    cached.mkdir()
+    assert library.library(KERNELS) is not None
+    assert [*cached.parent.iterdir()] == [cached]
+
+
+def test_a_library_is_loaded_once(cached):
+    assert library.library(KERNELS) is library.library(KERNELS)
+
+
+def test_functions_take_whole_numbers_only(cached):
+    kernels = library.library(KERNELS)
+    assert kernels.classify(0, 0, 0, 0, True) == 0
+    with pytest.raises(Exception, match="argument 3"):
+        kernels.classify(0, 0, 0.5, 0, 0)
+    with pytest.raises(TypeError):
+        kernels.classify(0, 0)
+
+
+def test_every_entry_of_every_module_is_in_its_library():
+    for name in code_files.kernel_modules():
+        entries = compiled.entries(bitcode.import_module(f"rrtik_ompl.fast.{name}").__name__)
+        assert set(entries) == set(vars(library.library(name)))
+        assert entries
+
+
+@pytest.fixture
+def edited(monkeypatch):
+    """Reads a module of the package as if somebody had edited it."""
+
+    def edit(name):
+        text = code_files._text
+        monkeypatch.setattr(code_files, "_text", lambda module: text(module) + "# changed\n" * (module == name))
+        monkeypatch.setattr(code_files, "sources_digest", code_files.sources_digest.__wrapped__)
+
+    return edit
+
+
+def test_another_source_or_processor_has_another_file(edited, monkeypatch):
+    before = code_files.machine_key(KERNELS)
+    monkeypatch.setattr(code_files, "processor_identity", lambda: "another")
+    other = code_files.machine_key(KERNELS)
+    edited("simd.lanes")
+    assert len({code_files.file_name(KERNELS, key) for key in (before, other, code_files.machine_key(KERNELS))}) == 3
+
+
+def test_an_edit_of_a_kernel_or_a_layout_makes_anew_what_depends_on_it_and_nothing_else(edited):
+    before = {name: code_files.machine_key(name) for name in code_files.kernel_modules()}
+    edited("search.connect_layout")
+    assert {name for name, key in before.items() if code_files.machine_key(name) != key} == {
+        "search.connect_kernels",
+        "search.repair_kernels",
+    }
+
+
+@pytest.mark.parametrize("module", ["tables.robot_tables", "tables.packing", "simd.library", "checks.fast_world"])
+def test_an_edit_of_what_holds_no_kernel_makes_nothing_anew(edited, module):
+    before = {name: code_files.machine_key(name) for name in code_files.kernel_modules()}
+    assert all(module not in code_files.kernel_sources(name) for name in before)
+    edited(module)
+    assert {name: code_files.machine_key(name) for name in before} == before
+
+
+def test_the_sources_of_a_kernel_are_all_that_it_imports():
+    for name in code_files.kernel_modules():
+        code = f"import sys, rrtik_ompl.fast.{name}; print(*sys.modules)"
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        loaded = {m.removeprefix("rrtik_ompl.fast.") for m in done.stdout.split() if m.startswith("rrtik_ompl.fast.")}
+        assert loaded - set(code_files.kernel_sources(name)) <= {
+            "simd",
+            "checks",
+            "search",
+            "ik",
+            "tables",
+            "search.crdt",
+            "simd.code_files",
+        }
+
+
+def test_bitcode_of_another_kind_of_processor_is_not_taken():
+    foreign = b'target triple = "riscv64-unknown-elf"\n'
+    module = bitcode.llvm.parse_assembly(foreign.decode())
+    assert library.machine_code(code_files.Code({}, module.as_bitcode())) is None
+    assert library.machine_code(code_files.Code({}, b"nonsense")) is None
+
+
+def test_a_kernel_that_needs_python_is_refused(monkeypatch):
+    def allocating(count):
+        return np.zeros(count).size
+
+    name = "rrtik_ompl.fast.allocating"
+    monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
+    monkeypatch.setattr(compiled, "_entries", {})
+    allocating.__module__ = name
+    compiled.entry(allocating)
+    with pytest.raises(RuntimeError, match="allocating: kernels may not allocate, raise or use objects, but need NRT"):
+        bitcode.compiled_module("allocating")
+
+
+def test_a_compiler_that_fails_is_told_once_and_replaced_by_numpy(cached, monkeypatch):
+    def fail(name):
+        raise ValueError(f"no {name}")
+
+    cached.unlink()
+    monkeypatch.setattr(bitcode, "compiled_module", fail)
+    monkeypatch.setattr(library, "_warned", False)
+    with pytest.warns(RuntimeWarning, match="plain numpy, many times slower: ValueError: no \\w*kernels"):
+        assert not warm_up(print)
+    assert library.library(KERNELS) is None
+
+
+def test_warming_up_makes_all_kernels(cached, capsys):
+    before = cached.read_bytes()
+    cached.unlink()
+    assert run(["warmup"]) == 0
+    assert capsys.readouterr().out.splitlines() == [f"{name}: ready" for name in code_files.kernel_modules()]
+    assert described(cached.read_bytes()) == described(before)
+    assert library._kept(KERNELS) is not None
+
+
+def test_compiling_is_told_in_one_line(monkeypatch, capsys):
+    monkeypatch.setattr(announce, "on_compile", terminal.note)
+    monkeypatch.setattr(announce, "_told", False)
+    announce.announce_compiling()
+    announce.announce_compiling()
+    assert capsys.readouterr().err == "rrtik: compiling kernels for this processor, once per machine: 10 to 80 s\n"
+
+
+def test_the_sources_of_kernels_need_no_collision_library():
+    code = "import sys; sys.modules.update(dict.fromkeys(('coal', 'pinocchio', 'ompl', 'scipy')))\n"
+    code += f"import rrtik_ompl.fast.simd.bitcode; names = {code_files.kernel_modules()}\n"
+    code += "for name in names:\n    __import__('rrtik_ompl.fast.' + name)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.fixture
+def packaged(cached, tmp_path, monkeypatch):
+    """The file of bitcode that the package brings, an empty cache and no compiler."""
+
+    def fail(name):
+        raise ValueError(f"{name} is compiled")
+
+    folder = tmp_path / "package"
+    folder.mkdir()
+    bitcode.write_bitcode(folder)
+    cached.unlink()
+    monkeypatch.setattr(library, "FOLDER", folder)
+    monkeypatch.setattr(bitcode, "compiled_module", fail)
+    monkeypatch.setattr(library, "_warned", False)
+    return folder / code_files.bitcode_name(KERNELS)
+
+
+def test_bitcode_of_the_package_saves_compiling(packaged, cached):
+    assert library.library(KERNELS).classify(0, 0, 0, 0, 0) == 0
+    assert cached.is_file()
+
+
+@pytest.mark.parametrize("damage", ["short", "one bit of the code", "another's", "no machine code"])
+def test_damaged_bitcode_of_the_package_is_passed_over(packaged, damage):
+    packaged.write_bytes(DAMAGES[damage](packaged.read_bytes()))
+    with pytest.warns(RuntimeWarning, match="kernels is compiled"):
+        assert library.library(KERNELS) is None
+
+
+@pytest.fixture
+def hook(monkeypatch):
+    """The build hook's module, without hatch, and a hook whose messages are kept."""
+    name = "hatchling.builders.hooks.plugin.interface"
+    interface = types.ModuleType(name)
+    interface.BuildHookInterface = object
+    monkeypatch.setitem(sys.modules, name, interface)
+    module = types.SimpleNamespace(**runpy.run_path(str(code_files.FOLDER / "simd" / "hatch_build.py")))
+    made, said = module.KernelBitcode(), []
+    made.root = str(code_files.FOLDER.parent.parent)
+    made.app = types.SimpleNamespace(display_info=said.append, display_warning=said.append)
+    return made, module.KernelBitcode.initialize.__globals__, said
+
+
+def test_a_wheel_takes_along_what_could_be_compiled(hook, monkeypatch):
+    made, names, said = hook
+    order = [sys.executable, "-c", "import sys, pathlib; pathlib.Path(sys.argv[1], 'k-8.bitcode').touch()"]
+    monkeypatch.setitem(names, "_compiler", lambda width, root, folder: subprocess.Popen([*order, str(folder)]))
+    build = {"force_include": {}}
+    made.initialize("standard", build)
+    assert [*build["force_include"].values()] == ["rrtik_ompl/fast/k-8.bitcode"]
+    assert all(Path(file).is_file() for file in build["force_include"])
+    assert said == ["kernels as bitcode: k-8.bitcode"]
+
+
+def test_a_wheel_is_built_without_a_compiler(hook, monkeypatch):
+    made, names, said = hook
+    build = {"force_include": {}}
+    made.initialize("editable", build)
+    monkeypatch.setitem(names, "_compiler", lambda *_: subprocess.Popen([sys.executable, "-c", "raise SystemExit(1)"]))
+    made.initialize("standard", build)
+    monkeypatch.setitem(names, "_compiler", lambda *_: subprocess.Popen(["no such program"]))
+    made.initialize("standard", build)
+    assert build == {"force_include": {}}
+    assert [message.partition(":")[0] for message in said] == ["kernels as bitcode"] * 2
+
+
+def test_a_damaged_cache_of_numba_is_not_trusted(tmp_path):
+    source, folder = tmp_path / "twice.py", tmp_path / "numba"
+    source.write_text(
+        "from rrtik_ompl.fast.simd.compiled import kernel\n@kernel\ndef twice(x):\n    return 2 * x\nprint(twice(21))"
+    )
+    for _ in range(2):
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
+        done = subprocess.run([sys.executable, source], capture_output=True, text=True, env=environment, check=False)
+        assert (done.stdout, done.stderr) == ("42\n", "")
+        files = [file for file in folder.rglob("*") if file.is_file()]
+        assert files
+        for file in files:
+            file.write_bytes(b"nonsense")
+
+
+KINDS = """
+import sys
+import numba
+from rrtik_ompl.fast.simd.compiled import kernel
+@kernel
+def marked(x, mark):
+    return x + 1 if mark == 0 else x * mark
+@numba.njit
+def without(x):
+    return marked(x, 0)
+@numba.njit
+def within(x, mark):
+    return marked(x, mark)
+calls = {"without": lambda: without(5), "with": lambda: within(5, 7)}
+print(*[calls[name]() for name in sys.argv[1:]])
+"""
+
+
+def test_code_for_other_kinds_of_arguments_is_not_taken_from_numbas_cache(tmp_path):
+    """Two processes that fill it at once can leave each other's code under a name."""
+    source, folder = tmp_path / "kinds.py", tmp_path / "numba"
+    source.write_text(KINDS)
+
+    def answers(*names):
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
+        command = [sys.executable, source, *names]
+        done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+        assert done.stderr == ""
+        return done.stdout.split()
+
+    assert answers("without", "with") == ["6", "35"]
+    first, second = sorted(folder.rglob("*marked*.nbc"))
+    first_code, second_code = first.read_bytes(), second.read_bytes()
+    for order in (["without", "with"], ["with", "without"], ["with"]):
+        first.write_bytes(second_code)
+        second.write_bytes(first_code)
+        assert answers(*order) == [{"without": "6", "with": "35"}[name] for name in order]

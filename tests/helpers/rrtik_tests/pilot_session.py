@@ -1,0 +1,38 @@
+"""TITAN-4 before the subsea distribution unit with a valve in view: what the tests of the pilot's tool share."""
+
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl import load_problem
+from rrtik_ompl.pilot.devices.arm import SimulatedArm
+from rrtik_ompl.pilot.session import Session
+from rrtik_ompl.poses import pose_from_rpy
+from rrtik_ompl.scene import Obstacle
+from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject, MountedMarker
+from rrtik_ompl.sensing.scene_from_view import SeenObject
+from rrtik_ompl.shapes import Box
+
+PROBLEM = load_problem("titan4_sdu")
+ROBOT, WORLD = PROBLEM.robot, PROBLEM.world
+VALVE = MarkedObject(
+    "valve",
+    "target",
+    (MountedMarker(7, 0.08),),
+    (Obstacle("body", Box([0.02, 0.02, 0.02])),),
+    tuple(
+        GraspType(name, [pose_from_rpy([0, 0, 0.03 * k], [roll, 0, 0]) for k in range(3)], approach=0.08, lift=0.05)
+        for name, roll in (("front", 0.0), ("rolled", np.pi / 2))
+    ),
+)
+PLACE = pin.SE3(ROBOT.fk(PROBLEM.goal.q).rotation, np.array([1.30, 0.17, 0.09]))
+
+
+def seen_at(T):
+    return SeenObject(VALVE, T, 1e-8 * np.eye(6), None)
+
+
+def session(record=None):
+    arm = SimulatedArm(ROBOT, PROBLEM.start)
+    made = Session(PROBLEM, arm, record=record, seed=1)
+    made.see([seen_at(PLACE)], 0.0)
+    return made, arm

@@ -1,0 +1,53 @@
+"""What imports cost, and that what is imported is there; test_ladder holds who may import whom."""
+
+import ast
+import inspect
+import subprocess
+import sys
+from importlib.util import find_spec
+
+import pytest
+
+import rrtik_ompl
+from rrtik_tests.places import ROOT
+
+PEERS = {
+    "vamp",
+    "roboplan",
+    "pytracik",
+    "trac_ik",
+    "ikpy",
+    "eaik",
+    "mplib",
+    "pyroboplan",
+    "roboticstoolbox",
+}  # measured where they are installed
+
+
+@pytest.mark.parametrize(
+    "script", sorted((ROOT / "bench").rglob("*.py")), ids=lambda file: f"{file.parent.name}/{file.stem}"
+)
+def test_a_script_of_bench_imports_what_there_is(script):
+    nodes = list(ast.walk(ast.parse(script.read_text())))
+    modules = {node.module for node in nodes if isinstance(node, ast.ImportFrom)}
+    modules |= {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    assert not {name for name in modules if name.split(".")[0] not in PEERS and find_spec(name) is None}
+
+
+def test_importing_the_package_imports_nothing_heavy():
+    heavy = ["cv2", "meshcat", "numba", "matplotlib", "scipy"]
+    code = f"import sys, rrtik_ompl; print([m for m in {heavy} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_a_world_is_loaded_without_a_compiler_and_without_what_covers_are_made_with():
+    code = "import sys, rrtik_ompl.world, rrtik_ompl.covers.cache, rrtik_ompl.fast.checks.fast_world"
+    code += "; print([m for m in ('numba', 'scipy') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_every_public_name_is_there_and_says_what_it_is():
+    assert set(rrtik_ompl.__all__) < set(dir(rrtik_ompl))
+    assert [name for name in rrtik_ompl.__all__ if not inspect.getdoc(getattr(rrtik_ompl, name))] == []

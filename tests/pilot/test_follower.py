@@ -1,0 +1,55 @@
+"""Routes that are followed, lost and found again."""
+
+import numpy as np
+import pytest
+
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.pilot.devices.arm import joint_rates
+from rrtik_ompl.pilot.routes.follower import REACTION, Follower
+from rrtik_tests.pilot_session import ROBOT
+
+CORNERS = np.zeros((4, 6))
+CORNERS[1:, 0], CORNERS[2:, 1], CORNERS[3:, 0] = 0.5, -0.4, 0.2
+
+
+def follower():
+    return Follower(JointPath.of(ROBOT, CORNERS), joint_rates(ROBOT))
+
+
+def test_moves_are_followed_in_their_order_with_advice_in_time():
+    following, rate = follower(), float(joint_rates(ROBOT)[0])
+    assert following.update(CORNERS[0]).advice == "move"
+    half = following.update([0.25, 0, 0, 0, 0, 0] * np.ones(6))
+    assert half.share == pytest.approx(0.5)
+    near = following.update(np.array([0.5 - 0.9 * rate * REACTION, 0, 0, 0, 0, 0]))
+    assert (near.advice, near.move) == ("stop", 0)
+    assert following.update(CORNERS[1]).move == 1
+    assert following.update(CORNERS[2]).move == 2
+    assert following.update(CORNERS[3]).advice == "done"
+    assert following.done
+
+
+def test_a_move_shorter_than_the_tolerance_has_to_be_made_all_the_same():
+    rows = np.zeros((3, 6))
+    rows[1:, 0], rows[2:, 1] = np.radians(0.8), 0.5
+    following = Follower(JointPath.of(ROBOT, rows), joint_rates(ROBOT))
+    assert following.update(rows[0]).move == 0
+    assert following.update(rows[1]).move == 1
+
+
+def test_the_wrong_joint_or_the_wrong_way_is_lost_and_named():
+    wrong = follower().update(np.array([0.0, 0.1, 0, 0, 0, 0]))
+    assert wrong.advice == "lost"
+    assert ROBOT.joint_names[1] in wrong.fault
+    assert follower().update(np.array([-0.1, 0, 0, 0, 0, 0])).advice == "lost"
+    assert follower().update(np.array([0.6, 0, 0, 0, 0, 0])).advice == "lost"
+
+
+def test_the_way_back_is_the_way_reversed():
+    following = follower()
+    following.update(CORNERS[1])
+    here = CORNERS[1].copy()
+    here[1] = -0.2
+    following.update(here)
+    assert following.back(here).waypoints == pytest.approx(np.vstack([here, CORNERS[1], CORNERS[0]]))
+    assert following.rest(here).waypoints == pytest.approx(np.vstack([here, CORNERS[2:]]))

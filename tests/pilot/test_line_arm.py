@@ -1,0 +1,81 @@
+"""An arm on the other side of a TCP connection: what it is told, and what happens when the line is cut."""
+
+import json
+import socket
+
+import numpy as np
+import pytest
+
+from rrtik_ompl import load_problem
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.pilot.devices.arm import SimulatedArm
+from rrtik_ompl.pilot.devices.line_arm import LineArm, LineServer
+from rrtik_ompl.pilot.session import Session
+from rrtik_tests.waiting import until
+
+PROBLEM = load_problem("titan4_sdu")
+ROBOT, START = PROBLEM.robot, PROBLEM.start
+FAST = np.full(6, 3.0)
+
+
+def test_a_move_is_made_over_the_line_and_stops_when_told():
+    with LineServer(SimulatedArm(ROBOT, START, FAST)) as server:
+        arm = LineArm(ROBOT, "127.0.0.1", server.port)
+        assert arm.read() == pytest.approx(START)
+        arm.move(0, float(START[0]) - 0.5)
+        until(lambda: abs(arm.read()[0] - START[0] + 0.5) < 1e-9)
+        assert arm.read()[1:] == pytest.approx(START[1:])
+        arm.move(0, float(ROBOT.lower[0]))
+        until(lambda: arm.read()[0] < START[0] - 0.6)
+        arm.stop()
+        until(lambda: server.arm.moving is None)
+        arm.close()
+        assert arm.read()[0] > ROBOT.lower[0]
+
+
+def test_a_lost_line_is_said_keeps_the_joints_stops_the_arm_and_comes_back():
+    server = LineServer(SimulatedArm(ROBOT, START))
+    with server:
+        arm = LineArm(ROBOT, "127.0.0.1", server.port)
+        session = Session(PROBLEM, arm)
+        session.command("move", 0.0, target=float(START[0]) + 0.3)
+        until(lambda: server.arm.moving == 0)
+    assert server.arm.moving is None
+    until(lambda: arm.lost)
+    session.tick(1.0)
+    kept = session.q.copy()
+    assert "connection to the arm is lost" in session.message
+    assert "lost" in session.command("move", 1.1, target=float(START[0]))
+    session.tick(1.2)
+    assert session.q == pytest.approx(kept)
+    with LineServer(SimulatedArm(ROBOT, START), server.port):
+        until(lambda: not arm.lost)
+        until(lambda: np.allclose(arm.read(), START))
+        arm.close()
+
+
+def test_who_is_not_such_an_arm_is_named():
+    other = SimulatedArm(load_problem("puma_pose").robot, np.zeros(6))
+    with LineServer(other) as server, pytest.raises(InputError, match="not those of 'titan4'"):
+        LineArm(ROBOT, "127.0.0.1", server.port)
+    with pytest.raises(InputError, match="is its server running"):
+        LineArm(ROBOT, "127.0.0.1", server.port)
+
+
+def test_the_server_answers_nonsense_with_one_line():
+    with (
+        LineServer(SimulatedArm(ROBOT, START)) as server,
+        socket.create_connection(("127.0.0.1", server.port), timeout=5) as connection,
+    ):
+        lines = connection.makefile("rw")
+        assert json.loads(lines.readline())["joints"] == list(ROBOT.joint_names)
+        for asked, word in [
+            ({"do": "fly"}, "read, move or stop"),
+            ({"do": "move", "joint": 9, "target": 0}, "from 0 to 5"),
+            ({"do": "move", "joint": 0, "target": float("nan")}, "finite"),
+            ({"do": "move", "joint": [0], "target": 0}, "from 0 to 5"),
+        ]:
+            lines.write(json.dumps(asked) + "\n")
+            lines.flush()
+            assert word in json.loads(lines.readline())["error"], asked
+        assert server.arm.read() == pytest.approx(START)

@@ -1,0 +1,104 @@
+"""Commands by hand: what is refused and why, how much room is left, the way out of a contact."""
+
+import numpy as np
+import pytest
+
+from rrtik_ompl import load_robot
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.pilot.devices.arm import SimulatedArm
+from rrtik_ompl.pilot.routes.manoeuvre import free_until, judge_move, room_of, way_out
+from rrtik_ompl.pilot.session import Session
+from rrtik_ompl.scene import Scene
+from rrtik_ompl.world import World
+from rrtik_tests.pilot_session import PROBLEM, ROBOT, WORLD
+
+
+def test_no_command_of_many_leads_beyond_limits_or_into_anything():
+    rng = np.random.default_rng(0)
+    q, accepted = np.array(PROBLEM.start), []
+    for _ in range(400):
+        joint = int(rng.integers(6))
+        target = float(q[joint] + rng.normal(0.0, 0.6))
+        if judge_move(WORLD, q, joint, target).allowed:
+            end = q.copy()
+            end[joint] = target
+            accepted.append((q, end))
+            q = end
+    starts, ends = (np.array(rows) for rows in zip(*accepted, strict=True))
+    share = np.linspace(0.0, 1.0, 40)[:, None]
+    rows = np.concatenate([a + share * (b - a) for a, b in zip(starts, ends, strict=True)])
+    assert len(accepted) > 60
+    assert ROBOT.within_limits(rows).all()
+    assert WORLD.certify(rows).all()
+
+
+def test_a_refusal_names_the_pair_and_how_far_it_is_free():
+    down = judge_move(WORLD, PROBLEM.goal.q, 2, float(ROBOT.lower[2]))
+    assert not down.allowed
+    assert "overlap" in down.reason
+    assert "elbow_pitch at" in down.reason
+    until = free_until(WORLD, PROBLEM.goal.q, 2, float(ROBOT.lower[2]))
+    assert judge_move(WORLD, PROBLEM.goal.q, 2, until).allowed
+    assert not judge_move(WORLD, PROBLEM.goal.q, 2, until - 0.02).allowed
+
+
+def test_a_move_beyond_a_limit_names_it():
+    verdict = judge_move(WORLD, PROBLEM.start, 0, 9.0)
+    assert not verdict.allowed
+    assert "azimuth" in verdict.reason
+    with pytest.raises(InputError, match="0 to 5"):
+        judge_move(WORLD, PROBLEM.start, 6, 0.0)
+    with pytest.raises(InputError, match="finite"):
+        judge_move(WORLD, PROBLEM.start, 0, np.nan)
+
+
+def test_little_room_is_warned_of():
+    until = free_until(WORLD, PROBLEM.goal.q, 2, float(ROBOT.lower[2]))
+    verdict = judge_move(WORLD, PROBLEM.goal.q, 2, until)
+    assert any("mm between" in warning for warning in verdict.warnings)
+    assert 0.0 <= verdict.clearance < 0.02
+
+
+def test_the_room_of_a_joint_names_what_ends_it_and_where_the_arm_is_singular():
+    q = np.array(PROBLEM.start)
+    room = room_of(WORLD, q, 0)
+    assert (room.above, room.high) == ("limit", pytest.approx(ROBOT.upper[0]))
+    assert "meets bay_wall" in room.below
+    assert judge_move(WORLD, q, 0, room.low + 1e-3).allowed
+    assert "bay_wall" in judge_move(WORLD, q, 0, room.low - 0.01).reason
+    yaw = room_of(WORLD, q, 4)
+    low, high, case = yaw.singular[0]
+    assert yaw.low < low < high <= yaw.high
+    assert any(case in warning for warning in judge_move(WORLD, q, 4, 0.5 * (low + high)).warnings)
+    assert not judge_move(WORLD, q, 4, low - 0.1).warnings
+
+
+def test_an_arm_without_named_singular_postures_is_warned_by_its_jacobian():
+    robot = load_robot("ur5")
+    world = World(robot, Scene())
+    q = np.array([0.0, -1.2, 1.0, -1.4, 1.0, 0.0])
+    stretches = room_of(world, q, 2).singular
+    assert any(low <= 0.0 <= high for low, high, _ in stretches)  # the elbow straight
+    assert "near a singular posture" in judge_move(world, q, 2, 0.0).warnings
+    assert not judge_move(world, q, 2, 1.2).warnings
+
+
+def test_an_arm_that_touches_something_may_go_out_of_it_and_no_deeper():
+    q = np.array(PROBLEM.goal.q)
+    q[2] = free_until(WORLD, q, 2, float(ROBOT.lower[2])) - np.radians(0.5)
+    assert not WORLD.valid(q)
+    joint, target = way_out(WORLD, q)
+    end = q.copy()
+    end[joint] = target
+    assert WORLD.valid(end)
+    assert judge_move(WORLD, q, joint, target).warnings == ("out of contact",)
+    deeper = judge_move(WORLD, q, 2, q[2] - np.radians(1.0))
+    assert not deeper.allowed
+    assert "does not get it free" in deeper.reason
+    made = Session(PROBLEM, SimulatedArm(ROBOT, q), seed=1)
+    assert f"{ROBOT.joint_names[joint]} to" in made.command("plan", 0.0)
+    made.command("select", 0.1, joint=joint)
+    assert "out of contact" in made.command("move", 0.2, target=target)
+    made.arm.advance(10.0)
+    made.tick(1.0)
+    assert "moves" in made.command("plan", 1.1)

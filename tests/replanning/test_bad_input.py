@@ -1,0 +1,130 @@
+"""What makes no sense to replanning is refused in one line that names it."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.replanning import SpeedWarning, load_run, replan
+from rrtik_ompl.scene import Obstacle, Scene, Waypoints
+from rrtik_ompl.shapes import Box, HalfSpace
+from rrtik_ompl.trajectory.limits import RateLimits
+from rrtik_tests.moving_plane import OPTIONS, box, crossing, plane
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"rate": 0.0}, "rate must be greater than 0, got 0; give ticks a second"),
+        ({"step": -1.0}, "step must be greater than 0"),
+        ({"margin": -0.1}, "margin must not be negative"),
+        ({"predict": 1.5}, "predict must be a whole number"),
+        ({"speed_bound": 0.0}, "speed_bound must be greater than 0"),
+        ({"seconds": float("nan")}, "seconds"),
+        ({"eps": 1e-6}, "eps must be at least .* suits this robot"),
+        ({"limits": RateLimits([1.0] * 3, [1.0] * 3)}, "limits: there are 2 joints, but limits for 3"),
+        ({"clock": None}, "clock: expected a function"),
+        ({"record": "run.txt"}, "unknown ending '.txt'; use .json"),
+        ({"record": "no/such/folder/run.json"}, "does not exist; create it"),
+    ],
+)
+def test_a_number_that_makes_no_sense_is_named(changes, words):
+    with pytest.raises(InputError, match=words) as caught:
+        replan(crossing(), **{**OPTIONS, **changes})
+    assert "\n" not in str(caught.value)
+
+
+def test_an_unknown_planner_is_answered_with_those_there_are():
+    with pytest.raises(UnknownNameError, match="drrt-con"):
+        replan(crossing(), planner="drrtcon", **OPTIONS)
+
+
+def test_times_that_go_backwards_are_refused():
+    scene = crossing().world.scene
+    with pytest.raises(InputError, match=r"times go backwards: 0.3 s comes after 0.5 s"):
+        replan(crossing(), [(0.0, scene), (0.5, scene), (0.3, scene)], **OPTIONS)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ([5, 6], "expected pairs of a time"),
+        ([(0.0, None)], "expected pairs of a time"),
+        ([(float("nan"), Scene(()))], "expected pairs of a time"),
+        (lambda time: None, "what it returns at 0 s must be of type Scene, got NoneType"),
+    ],
+)
+def test_what_is_no_feed_is_refused(given, words):
+    with pytest.raises(InputError, match=words):
+        replan(crossing(), given, **OPTIONS)
+
+
+@pytest.mark.parametrize(
+    "later",
+    [
+        lambda lift: [],
+        lambda lift: [lift, box("new", 5.0, 5.0)],
+        lambda lift: [Obstacle("lift", Box([4.0, 9.0, 1.0]), lift.pose)],
+    ],
+)
+def test_obstacles_that_come_go_or_grow_are_refused_and_the_record_is_kept(later, tmp_path):
+    lift = box("lift", 10.0, 4.0)
+    with pytest.raises(InputError, match=r"expected the obstacles lift|another shape than before"):
+        replan(
+            plane(lift), lambda t: Scene([lift] if t < 0.5 else later(lift)), record=tmp_path / "run.json", **OPTIONS
+        )
+    assert len(load_run(tmp_path / "run.json").ticks) == 5
+
+
+@pytest.mark.parametrize(
+    ("goal", "words"),
+    [
+        ([1.0, 2.0], "goal_feed: expected a function of time"),
+        (lambda time: [1.0, 2.0, 3.0], "goal at 0 s: robot 'point2d' has 2 joints"),
+        (lambda time: [16.0, 10.0 + 50.0 * time], r"goal at 0\.\d s: joint 'y' is at \d+ m, outside its limits"),
+    ],
+)
+def test_a_moving_goal_that_is_none_is_refused(goal, words):
+    with pytest.raises(InputError, match=words):
+        replan(crossing(), goal_feed=goal, **OPTIONS)
+
+
+def test_snapshots_are_a_feed_too():
+    scene = crossing().world.scene
+    run = replan(crossing(), ((0.1 * k, scene.at(0.1 * k)) for k in range(200)), **OPTIONS)
+    assert run.arrived
+
+
+def test_an_obstacle_that_begins_inside_the_robot_is_refused_with_its_name():
+    hit = Scene([box("lift", 1.0, 10.0)])
+    with pytest.raises(InputError, match=r"in collision: .*'lift'"):
+        replan(crossing(), lambda _: hit, **OPTIONS)
+
+
+def test_a_start_within_the_margin_says_what_to_lower():
+    with pytest.raises(InputError, match="nearer to contact than the margin"):
+        replan(plane(box("near", 1.0, 12.2)), margin=0.5, **OPTIONS)
+
+
+def test_an_obstacle_faster_than_the_bound_is_warned_about_once():
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        replan(crossing(2.0), speed_bound=1.0, **OPTIONS)
+    said = [str(w.message) for w in caught if w.category is SpeedWarning]
+    assert len(said) == 1
+    assert "'lift' moves at 2 m/s" in said[0]
+    assert "speed_bound of 1 m/s" in said[0]
+
+
+def test_a_floor_that_slides_has_a_speed_like_any_obstacle():
+    tilted, slid = (pin.SE3(pin.exp3(np.array([0.0, 0.0, 0.3])), np.array([x, 0.0, 0.0])) for x in (0.0, 4.0))
+    floor = Obstacle("floor", HalfSpace([0.0, 1.0, 0.0], -5.0), tilted, Waypoints([0.0, 8.0], [tilted, slid]))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert replan(plane(floor), speed_bound=0.6, **OPTIONS).arrived
+    with pytest.warns(SpeedWarning, match="'floor' moves at 0.5 m/s"):
+        assert replan(plane(floor), speed_bound=0.4, **OPTIONS).arrived

@@ -1,0 +1,186 @@
+"""Whole runs: the robot arrives, waits, evades, catches what moves, and touches nothing."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from itertools import groupby
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.goal import PositionGoal
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.replanning import PLANNERS, SpeedWarning, replan
+from rrtik_ompl.replanning.contact_check import judge
+from rrtik_ompl.replanning.evading import evasion
+from rrtik_ompl.replanning.generate import moving_problem
+from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene, Waypoints
+from rrtik_ompl.shapes import Box, Prism, Sphere
+from rrtik_ompl.world import World
+from rrtik_ompl.world.moving_world import MovingWorld
+from rrtik_tests.moving_plane import FAST, OPTIONS, box, crossing, place, plane
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+def test_every_planner_arrives_without_contact(planner):
+    problem = crossing()
+    run = replan(problem, planner=planner, seed=1, speed_bound=3.0, **OPTIONS)
+    assert run.arrived
+    assert run.count("repair") > 0
+    assert run.configurations[-1] == pytest.approx(problem.goal.q, abs=1e-6)
+    assert judge(problem.robot, run, problem.world.scene).contacts == ()
+    assert np.linalg.norm(np.diff(run.configurations, axis=0), axis=1).max() <= 0.5 + 1e-9
+
+
+def test_the_same_seed_gives_the_same_run():
+    runs = [replan(crossing(), seed=5, **OPTIONS) for _ in range(2)]
+    assert (runs[0].configurations == runs[1].configurations).all()
+    assert [t.event for t in runs[0].ticks] == [t.event for t in runs[1].ticks]
+
+
+def test_a_robot_walks_while_things_move_elsewhere():
+    run = replan(plane(box("far", 10.0, 18.0, 1.0, 1.0, ConstantVelocity([0.05, 0.0, 0.0]))), **OPTIONS)
+    assert run.arrived
+    assert run.count("wait") == run.count("repair") == 0
+    assert run.length == pytest.approx(18.0)
+
+
+def test_a_covered_goal_is_waited_for():
+    over, away = place(19.0, 10.0), place(10.0, 3.0)
+    motion = Waypoints([0.0, 0.5, 0.8, 4.0, 4.3], [away, away, over, over, away])
+    problem = plane(Obstacle("lid", Box([2.0, 2.0, 1.0]), away, motion))
+    run = replan(problem, **OPTIONS)
+    events = [
+        event for event, _ in groupby("go" if t.event in ("plan", "walk", "repair") else t.event for t in run.ticks)
+    ]
+    assert events == ["go", "wait", "go", "arrive"]
+    assert next(t.reason for t in run.ticks if t.event == "wait") == "the goal is not free"
+    assert 4.0 < run.ticks[-1].time < 8.0
+
+
+def test_an_obstacle_that_comes_too_near_is_evaded():
+    lid = Obstacle(
+        "lid", Box([2.0, 2.0, 1.0]), place(19.0, 3.0), Waypoints([0.0, 0.1], [place(19.0, 3.0), place(19.0, 10.0)])
+    )
+    chaser = box("chaser", 8.0, 3.0, 2.0, 2.0, Waypoints([0.0, 6.0], [place(8.0, 3.0), place(17.0, 10.0)]))
+    with pytest.warns(SpeedWarning, match="'lid'"):
+        run = replan(plane(lid, chaser, start=(14.0, 10.0)), speed_bound=3.0, margin=0.1, seconds=7.0, **OPTIONS)
+    assert run.outcome == "out of time"
+    assert run.count("evade") > 0
+
+
+def test_a_robot_between_two_obstacles_that_close_in_leaves_sideways():
+    inwards = {side: ConstantVelocity([-0.5 * side, 0, 0]) for side in (-1, 1)}
+    walls = [box(f"wall{side}", 10.0 + 1.2 * side, 10.0, 2.0, 8.0, motion) for side, motion in inwards.items()]
+    problem = plane(*walls, start=(10.0, 13.0))
+    scene, ticks = problem.world.scene, 4
+    near, q = MovingWorld(problem.world, self_collision=False), problem.start
+    later, rng = (lambda ticks: scene.at(0.1 * ticks)), np.random.default_rng(0)
+    way = evasion(q, 0.5, np.full(2, 0.5), 0.5, near, later, World(problem.robot, Scene()), rng, None) - q
+    assert abs(way[1]) > 2.0 * abs(way[0])
+    assert World(problem.robot, scene.at(0.1 * ticks)).valid(q + ticks * way)
+
+
+def test_an_arm_that_waits_for_its_goal_is_not_caught_between_obstacles():
+    before = moving_problem(load_robot("ur5"), 20, 0.2, 922, seconds=20.0)
+    scene, q = before.world.scene.at(1.78), [-0.756, -0.719, -0.34, 0.668, -1.135, -0.415]
+    problem, keep = Problem(World(before.robot, scene), q, q), {"margin": 0.02, "speed_bound": 0.2, "slot": 30.0}
+    run = replan(problem, step=0.05, rate=50.0, seconds=1.2, goal_feed=lambda time: before.goal.q, seed=1, **keep)
+    assert run.count("evade") > 0
+    assert not judge(problem.robot, run, scene, fine=5).contacts
+
+
+def test_a_moving_goal_is_caught():
+    run = replan(
+        plane(box("block", 10.0, 10.0)), goal_feed=lambda t: np.array([16.0, 8.0 + 2.0 * min(t, 3.0)]), **OPTIONS
+    )
+    assert run.arrived
+    assert run.configurations[-1] == pytest.approx([16.0, 8.0 + 2.0 * min(run.ticks[-2].time, 3.0)])
+
+
+def test_another_branch_is_taken_where_the_goal_configuration_is_blocked():
+    robot = load_robot("planar", lengths=[1.0, 1.0], radius=0.01)
+    pole = [(-0.08, -0.08), (0.08, -0.08), (0.08, 0.08), (-0.08, 0.08)]
+    poles = [
+        Obstacle(name, Prism(pole), place(*p), Waypoints([0.0, 0.3], [place(*p), place(*q)]))
+        for name, p, q in (("first", (2.5, 2.0), (0.99, 0.7)), ("far", (3.0, -2.5), (3.0, -2.0)))
+    ]
+    problem = Problem(World(robot, Scene(poles)), [0.0, 0.4], PositionGoal([1.0, 1.2, 0.0], 1e-3))
+    run = replan(problem, step=0.05, rate=20.0, eps=0.3, seconds=20.0, slot=30.0, limits=FAST)
+    assert run.arrived
+    assert problem.goal.satisfied(robot, run.configurations[-1:])[0]
+
+
+def test_predicted_places_are_heeded():
+    problem = crossing(3.0)
+    plain, ahead = (replan(problem, predict=k, seed=2, **OPTIONS) for k in (0, 20))
+    assert plain.arrived
+    assert ahead.arrived
+    assert (plain.configurations[:5] != ahead.configurations[:5]).any()
+
+
+def test_a_six_joint_arm_arrives_among_wandering_obstacles_without_contact():
+    problem = moving_problem(load_robot("titan4"), 8, 0.1, 2, seconds=12.0)
+    run = replan(problem, step=0.04, rate=25.0, margin=0.02, speed_bound=0.1, seconds=20.0, slot=30.0)
+    assert run.arrived
+    assert judge(problem.robot, run, problem.world.scene, fine=3).contacts == ()
+
+
+def test_replanning_needs_no_ompl():
+    code = "import sys, rrtik_ompl.replanning; print('ompl' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+
+
+def base_and_ball(*, moves=False):
+    """UR5 and a ball that stands in its base, or gets there after half a second."""
+    robot = load_robot("ur5")
+    far, near = (pin.SE3(np.eye(3), np.array([x, 0.0, 0.03])) for x in (-1.2, -0.08))
+    motion = Waypoints([0.4, 0.5, 0.9, 1.0], [far, near, near, far]) if moves else None
+    return robot, Scene([Obstacle("ball", Sphere(0.06), far if moves else near, motion)])
+
+
+def test_nothing_is_free_while_an_obstacle_stands_in_the_base():
+    robot, scene = base_and_ball(moves=True)
+    world = World(robot, scene)
+    moving = MovingWorld(world, copies=2)
+    rows = np.random.default_rng(0).uniform(-1.5, 1.5, (50, robot.dof))
+    before = moving.valid_batch(rows)
+    assert before.any()
+    assert moving.blocked == ""
+    moving.move(scene.at(0.6), scene.at(0.6))
+    assert "'ball'" in moving.blocked
+    assert "base" in moving.blocked
+    assert not moving.valid_batch(rows).any()
+    assert not moving.motion_valid_batch(rows, rows).any()
+    assert moving.fast is None
+    assert not World(robot, scene.at(0.6)).valid_batch(rows).any()
+    moving.move(scene.at(0.0), scene.at(0.6))
+    assert moving.blocked == ""  # that place is only foreseen
+    moving.move(scene.at(0.0))
+    assert (moving.valid_batch(rows) == before).all()
+
+
+@pytest.mark.parametrize("predict", [0, 10])
+def test_a_run_waits_while_an_obstacle_stands_in_the_base_and_says_so(predict):
+    robot, scene = base_and_ball(moves=True)
+    q = robot.clamp([0.0, -1.2, 0.9, -1.2, -1.5, 0.0])
+    problem = Problem(World(robot, scene), q, q + np.array([1.5, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    run = replan(problem, step=0.01, rate=50, predict=predict, seconds=10.0)
+    waits = [t for t in run.ticks if t.event == "wait"]
+    assert run.arrived
+    assert waits
+    assert all("'ball'" in t.reason and "base" in t.reason and 0.4 < t.time < 1.0 for t in waits)
+
+
+def test_a_run_that_begins_with_an_obstacle_in_the_base_is_refused_in_one_line():
+    robot, scene = base_and_ball()
+    q = robot.clamp([0.0, -1.2, 0.9, -1.2, -1.5, 0.0])
+    problem = Problem(World(robot), q, q + 0.3)
+    with pytest.raises(InputError, match=r"in collision: .*'ball'") as error:
+        replan(problem, scene, step=0.01, rate=50)
+    assert "\n" not in str(error.value)

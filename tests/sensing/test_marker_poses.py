@@ -1,0 +1,95 @@
+"""Poses of single markers seen by a synthetic camera whose truth is known, and how far they can be trusted."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph, published_camera
+from rrtik_ompl.sensing.markers.corner_pose import pose_of_square, square_corners
+from rrtik_ompl.sensing.markers.detection import DICTIONARIES, dictionaries_seen, find_markers, marker_cells
+from rrtik_tests.marker_views import CAMERA, SIDE, facing, picture_of
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.floats(0.2, 2.5), st.floats(0.0, np.radians(70.0)), st.floats(0.0, 2 * np.pi), st.floats(-0.2, 0.2))
+def test_without_noise_a_pose_is_exact(distance, tilt, direction, aside):
+    T = facing([tilt * np.cos(direction), tilt * np.sin(direction), 0.0], [aside * distance, 0.0, distance])
+    pixels = published_camera().project(square_corners(SIDE) @ T.rotation.T + T.translation)
+    found = pose_of_square(published_camera(), pixels, SIDE)
+    assert np.linalg.norm(found.T_camera_object.translation - T.translation) < 1e-9  # 1e-6 mm
+    assert np.linalg.norm(pin.log3(found.T_camera_object.rotation.T @ T.rotation)) < 1e-8
+
+
+def test_alignment_removes_the_inward_pull_of_blur():
+    T = facing([0.4, 0.2, 0.1], [0.1, -0.05, 1.2])
+    errors = {align: [] for align in (True, False)}
+    for seed in range(8):
+        gray = picture_of([(7, T)], seed)
+        for align, list_of_errors in errors.items():
+            (marker,) = find_markers(gray, "4x4_50", align=align)
+            found = pose_of_square(CAMERA, marker.corners, SIDE)
+            list_of_errors.append(found.T_camera_object.translation[2] - T.translation[2])
+    assert abs(np.mean(errors[True])) < 0.6e-3
+    assert abs(np.mean(errors[False])) > 3e-3
+    assert np.std(errors[True]) < 0.4 * np.std(errors[False])
+
+
+@pytest.mark.parametrize("blur", [0.4, 1.1])
+def test_alignment_finds_out_how_blurred_a_picture_is(blur):
+    T = facing([0.5, 0.4, 0.2], [0.1, -0.05, 1.7])
+    away = []
+    for seed in range(10):
+        (marker,) = find_markers(picture_of([(7, T)], seed, blur=blur), "4x4_50")
+        away.append(pose_of_square(CAMERA, marker.corners, SIDE).T_camera_object.translation[2] - T.translation[2])
+    assert abs(np.mean(away)) < 0.6e-3
+
+
+def test_the_stated_uncertainty_is_neither_boast_nor_panic():
+    T = facing([0.5, 0.2, 0.1], [0.05, -0.05, 1.0])
+    truth, away, sigma = T.translation, [], []
+    for seed in range(12):
+        (marker,) = find_markers(picture_of([(7, T)], seed), "4x4_50")
+        found = pose_of_square(CAMERA, marker.corners, SIDE)
+        away.append(np.linalg.norm(found.T_camera_object.translation - truth))
+        sigma.append(found.position_sigma)
+    assert 0.3 < np.sqrt(np.mean(np.square(away))) / np.mean(sigma) < 3.0
+
+
+def test_a_marker_seen_from_the_front_is_ambiguous_and_a_tilted_one_is_not():
+    for tilt, doubt in ((0.03, True), (0.6, False)):
+        T = facing([tilt, 0.0, 0.0], [0.0, 0.0, 1.8])
+        (marker,) = find_markers(picture_of([(3, T)]), "4x4_50")
+        assert pose_of_square(CAMERA, marker.corners, SIDE).ambiguous is doubt
+
+
+def test_a_covered_corner_shows_in_the_likeness():
+    T = facing([0.3, 0.2, 0.0], [0.0, 0.0, 0.7])
+    gray = picture_of([(3, T)])
+    (whole,) = find_markers(gray, "4x4_50")
+    x, y = np.rint(whole.corners[0]).astype(int)
+    gray[y - 6 : y + 14, x - 6 : x + 14] = 128
+    covered = find_markers(gray, "4x4_50")
+    assert whole.likeness > 0.99
+    assert all(each.likeness < whole.likeness - 0.005 for each in covered)
+
+
+def test_a_marker_of_another_dictionary_is_named():
+    prints = [(facing([0.3, 0, 0], [0, 0, 0.6]), marker_print(marker_cells("6x6_50", 5), SIDE))]
+    gray = photograph(clean_picture(CAMERA, prints, rays=4), np.random.default_rng(0))
+    assert find_markers(gray, "apriltag_36h11") == ()
+    assert "6x6_50" in dictionaries_seen(gray)
+
+
+def test_unknown_dictionaries_and_numbers_are_refused():
+    with pytest.raises(UnknownNameError, match="4x4_50"):
+        marker_cells("4x4_5", 0)
+    with pytest.raises(InputError, match="0 to 49"):
+        marker_cells("4x4_50", 50)
+
+
+@pytest.mark.parametrize("dictionary", sorted(DICTIONARIES))
+def test_every_dictionary_can_be_drawn(dictionary):
+    assert set(np.unique(marker_cells(dictionary, 3))) == {0, 255}

@@ -1,0 +1,82 @@
+"""In a browser the page shows what it should."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.viewer.drawing import palette
+from rrtik_tests.crane import WAYPOINTS
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+PANE = np.s_[50:700, 0:860]  # of a window of 1280 x 800: where the 3-D picture is
+
+
+def chromium(url: str, *options: str) -> str:
+    if CHROMIUM is None:
+        pytest.skip("no chromium on PATH: pages cannot be looked at")
+    common = (
+        "--headless=new",
+        "--no-sandbox",
+        "--hide-scrollbars",
+        "--window-size=1280,800",
+        "--virtual-time-budget=8000",
+    )
+    graphics = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+    ended = subprocess.run(
+        [CHROMIUM, *common, *graphics, *options, url], capture_output=True, text=True, timeout=120, check=True
+    )
+    return ended.stdout
+
+
+def screenshot(target: Path, fragment: str) -> np.ndarray:
+    import cv2
+
+    picture = target.with_suffix(".png")
+    chromium(f"{target.as_uri()}{fragment}", f"--screenshot={picture}")
+    return cv2.imread(str(picture))[PANE][..., ::-1].astype(float)
+
+
+def share_of(color: str, picture: np.ndarray, likeness: float) -> float:
+    """Share of pixels of a hue, whatever their lightness."""
+    wanted = np.array(palette.fractions(color))
+    wanted = (wanted - wanted.mean()) / np.linalg.norm(wanted - wanted.mean())
+    tint = picture - picture.mean(axis=2, keepdims=True)
+    strength = np.linalg.norm(tint, axis=2)
+    alike = (tint @ wanted) > likeness * strength
+    return float((alike & (strength > 25.0)).mean())
+
+
+@pytest.fixture
+def file(text: str, tmp_path: Path) -> Path:
+    target = tmp_path / "view.html"
+    target.write_text(text, encoding="utf-8")
+    return target
+
+
+def test_a_browser_shows_obstacles_trail_ghosts_and_a_robot_that_moves(file: Path) -> None:
+    at_start, later = screenshot(file, ""), screenshot(file, "#waypoint=2")
+    for picture in (at_start, later):
+        assert share_of(palette.OBSTACLE, picture, 0.985) > 0.005
+        assert share_of(palette.TRAIL, picture, 0.99) > 0.0005
+        assert share_of(palette.GOAL, picture, 0.9) > 0.001
+        assert (picture.max(axis=2) < 170).mean() > 0.005
+    assert share_of(palette.START, later, 0.9) > 0.001
+    assert (np.abs(at_start - later).max(axis=2) > 30).mean() > 0.005
+
+
+def test_the_page_reads_degrees_metres_and_the_tip_where_the_robot_has_it(file: Path, crane: Robot) -> None:
+    shown = chromium(f"{file.as_uri()}#waypoint=3", "--dump-dom").replace("\u2212", "-")
+    assert 'data-ready="yes"' in shown
+    assert re.search(r">slew</td><td[^>]*>68\.8 deg</td><td[^>]*>\u2192 -57\.3<", shown)
+    assert re.search(r">hoist</td><td[^>]*>0\.700 m</td>", shown)
+    assert re.search(r">spin</td><td[^>]*>229\.2 deg</td>", shown)
+    assert "Move 4 of 4: slew 68.8 \u2192 -57.3 deg" in shown
+    x, y, z = crane.fk(WAYPOINTS[3]).translation
+    assert f"tip (hand): x {x:.3f}, y {y:.3f}, z {z:.3f} m" in shown

@@ -1,0 +1,92 @@
+"""The page that shows a problem: self-contained, complete, the same every time; what cannot be shown is refused."""
+
+from __future__ import annotations
+
+import html
+import re
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import Scene
+from rrtik_ompl.viewer import view
+from rrtik_ompl.viewer.page import page
+from rrtik_tests.crane import WAYPOINTS, problem, story
+
+
+def test_the_page_loads_nothing_from_anywhere(text: str) -> None:
+    assert not re.findall(r"""(?:src|href)\s*=\s*["']?(?!data:)[a-z]*:?//""", text)
+    assert not re.findall(r"@import|url\(\s*['\"]?https?:", text)
+    policy = html.unescape(re.findall(r'http-equiv="Content-Security-Policy" content="([^"]*)"', text)[0])
+    assert "default-src 'none'" in policy
+    assert "http" not in policy
+
+
+def test_the_page_names_every_obstacle_and_joint(text: str, crane: Robot, scene: Scene) -> None:
+    told = story(text)
+    assert [o["name"] for o in told["obstacles"]] == [o.name for o in scene.obstacles]
+    assert [(j["name"], j["unit"]) for j in told["robot"]["joints"]] == [
+        ("slew", "deg"),
+        ("hoist", "m"),
+        ("spin", "deg"),
+    ]
+    assert told["attached"] == ["hook"]
+    assert told["title"] == "lift: path of 4 moves"
+
+
+def test_a_name_cannot_break_out_of_the_page(text: str) -> None:
+    assert "</script><b>" not in text
+    assert "</title><b>" not in page(Scene(), title="</title><b>")
+
+
+def test_the_same_input_gives_the_same_page(text: str, crane: Robot, scene: Scene) -> None:
+    assert page(problem(crane, scene), SimpleNamespace(waypoints=WAYPOINTS)) == text
+
+
+def test_the_page_is_written_whole_and_returned(crane: Robot, tmp_path: Path) -> None:
+    target = tmp_path / "view.html"
+    assert view(crane, html=target) == target
+    assert target.read_text(encoding="utf-8") == page(crane)
+    assert [p.name for p in tmp_path.iterdir()] == ["view.html"]
+
+
+def test_a_failed_picture_leaves_the_old_file_alone(crane: Robot, tmp_path: Path) -> None:
+    target = tmp_path / "view.html"
+    target.write_text("old")
+    with pytest.raises(InputError, match="3 joints"):
+        view(crane, np.zeros((2, 5)), html=target)
+    assert target.read_text() == "old"
+
+
+def test_a_folder_that_does_not_exist_is_named(crane: Robot, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="nowhere"):
+        view(crane, html=tmp_path / "nowhere" / "view.html")
+
+
+def test_importing_the_library_does_not_import_meshcat() -> None:
+    command = "import sys, rrtik_ompl; sys.exit('meshcat' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", command], check=False).returncode == 0
+
+
+@pytest.mark.parametrize("shown", [None, 3, "titan4", SimpleNamespace(world=None)])
+def test_what_cannot_be_shown_is_refused(shown: Any) -> None:
+    with pytest.raises(InputError, match="give a problem, world, robot or scene"):
+        page(shown)
+
+
+def test_a_path_without_a_robot_is_refused(scene: Scene) -> None:
+    with pytest.raises(InputError, match="needs a robot"):
+        page(scene, WAYPOINTS)
+
+
+@pytest.mark.parametrize("path", [np.zeros((0, 3)), np.zeros((2, 2)), [[0.0, np.nan, 0.0]], "path.json"])
+def test_a_path_that_does_not_fit_is_refused(crane: Robot, path: Any) -> None:
+    with pytest.raises(InputError, match="path"):
+        page(crane, path)

@@ -1,0 +1,83 @@
+"""A world whose obstacles move answers as a new one at their new places."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.collision.contacts import measured
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.shapes import Box, HalfSpace, Prism, Sphere
+from rrtik_ompl.world import World
+from rrtik_ompl.world.moving_world import MovingWorld
+from rrtik_tests.moving_plane import box, plane
+
+
+def arm_scenes():
+    robot = load_robot("titan4")
+    shapes = [Sphere(0.1), Box([0.2, 0.1, 0.3]), Prism([(0, 0), (0.3, 0), (0, 0.3)], 0.2), HalfSpace([0, 0, 1], -1.2)]
+    rng = np.random.default_rng(4)
+    scenes = []
+    for _ in range(3):
+        places = [pin.SE3(pin.exp3(rng.normal(size=3)), rng.uniform(-1.5, 1.5, 3)) for _ in shapes[:3]]
+        poses = [*places, pin.SE3(np.eye(3), np.array([0.0, 0.0, rng.uniform(-0.2, 0.2)]))]
+        scenes.append(Scene([Obstacle(f"o{k}", s, p) for k, (s, p) in enumerate(zip(shapes, poses, strict=True))]))
+    return robot, scenes
+
+
+def test_a_moved_world_answers_as_a_new_one():
+    robot, scenes = arm_scenes()
+    moving = MovingWorld(World(robot, scenes[0]))
+    rng = np.random.default_rng(1)
+    rows = rng.uniform(*robot.finite_range(), (1500, robot.dof))
+    ends = np.clip(rows + 0.2 * rng.normal(size=rows.shape), robot.lower, robot.upper)
+    for scene in scenes[1:]:
+        moving.move(scene)
+        fresh = World(robot, scene, accuracy="conservative")
+        assert (moving.valid_batch(rows) == fresh.valid_batch(rows)).all()
+        assert (moving.motion_valid_batch(rows, ends) == fresh.motion_valid_batch(rows, ends)).all()
+        assert 0.0 < moving.valid_batch(rows).mean() < 1.0
+
+
+def test_free_with_room_means_that_far_away():
+    robot, scenes = arm_scenes()
+    exact, moving = World(robot, scenes[1]), MovingWorld(World(robot, scenes[0]))
+    rows = np.random.default_rng(2).uniform(*robot.finite_range(), (150, robot.dof))
+    moving.move(scenes[1], rooms={o.name: 0.15 for o in scenes[1].obstacles})
+    near = MovingWorld(exact, self_collision=False)
+    names = set(moving.names)
+    for row in rows[moving.valid_batch(rows)][:40]:
+        frames = exact.robot.joint_frames(row[None])[0]
+        found = measured(exact.bodies, exact.pairs, frames, near_only=False)
+        gaps = [c.distance for c in found if {c.first, c.second} & names]
+        assert min(gaps) >= 0.15
+    near.move(scenes[1])
+    assert (near.clearance(rows[moving.valid_batch(rows)]) >= 0.15 - 1e-4).all()
+
+
+def test_a_moved_scene_must_have_the_same_obstacles():
+    moving = MovingWorld(plane(box("a", 5.0, 10.0)).world)
+    moving.move(Scene([box("a", 6.0, 10.0)]), rooms={"a": 0.0})  # made anew, but alike
+    with pytest.raises(InputError, match="expected the obstacles a"):
+        moving.move(Scene([box("b", 5.0, 10.0)]))
+    with pytest.raises(InputError, match="'a' has another shape"):
+        moving.move(Scene([Obstacle("a", Sphere(3.0))]))
+    with pytest.raises(InputError, match="no obstacle 'c'"):
+        moving.move(moving.scene, rooms={"c": 0.1})
+    for room in (-0.1, float("nan")):
+        with pytest.raises(InputError, match="'a' must be 0 metres or more"):
+            moving.move(moving.scene, rooms={"a": room})
+
+
+def test_copies_of_an_obstacle_count_as_well():
+    problem = plane(box("a", 5.0, 10.0))
+    moving = MovingWorld(problem.world, copies=2)
+    ahead = Scene([box("a", 12.0, 10.0)])
+    moving.move(problem.world.scene, ahead)
+    assert not moving.valid([5.0, 10.0])
+    assert not moving.valid([12.0, 10.0])
+    moving.move(problem.world.scene)
+    assert moving.valid([12.0, 10.0])
