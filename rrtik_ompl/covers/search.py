@@ -23,7 +23,7 @@ from rrtik_ompl.covers.solids import Triangles
 CANDIDATES = 400
 LEAST_ON_SURFACE = 80  # candidates for what is thin or open
 BISECTIONS = 7
-ROUNDS = 7  # of matching elements with balls
+MATCHINGS = 7  # of matching elements with balls
 STEPS = 10  # of every ball in a round
 MOVES = 4  # balls moved elsewhere in a round, at most
 WORTH = 0.95  # a ball is moved elsewhere if the protrusion it leaves behind is below this share of the worst
@@ -153,14 +153,14 @@ def _refined(
     """Better places for the balls of a cover: the best set of all rounds."""
     element = np.repeat(np.arange(len(parts.start)), np.diff(np.r_[parts.start, len(parts.points)]))
     best, least = places, np.inf
-    for turn in range(ROUNDS + 1):
+    for turn in range(MATCHINGS + 1):
         needs = reaches(parts, places.centres) - places.depth[:, None].astype(np.float32) - spared
         worst = float(needs.min(axis=0).max())
         if worst < least:
             best, least = places, worst
-        if turn == ROUNDS or (wanted is not None and least <= wanted):
+        if turn == MATCHINGS or (wanted is not None and least <= wanted):
             break
-        if turn < ROUNDS - 2:
+        if turn < MATCHINGS - 2:
             places, needs = _moved_elsewhere(places, needs, spare, spare_needs, limit)
         owner = needs.argmin(axis=0)
         kept, owner = np.unique(owner, return_inverse=True)

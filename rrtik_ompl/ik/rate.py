@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
 from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
 
-NEAR = 0.05  # singular values below this are damped; metres count in units of the arm's reach
+DAMPED_BELOW = 0.05  # singular values below this are damped; metres count in units of the arm's reach
 LOST = 1e-12  # singular values below this are 0
 DAMPING = 0.05  # at a singular value of 0
 
@@ -44,7 +44,7 @@ def rate(
     *,
     bias: ArrayLike | None = None,
     damping: float = DAMPING,
-    near: float = NEAR,
+    near: float = DAMPED_BELOW,
 ) -> Rate:
     """Joint rates that move the tip with a twist as well as the posture allows.
 

@@ -33,7 +33,7 @@ def score(
     options: GeneticOptions,
     accept: Callable[[Matrix], Mask],
 ) -> Score:
-    """Judge configurations, shape (m, dof).
+    """Score configurations, shape (m, dof).
 
     The fitness in [2] is 100 inches less the distance; as a tournament asks only who is better, the distance does.
 

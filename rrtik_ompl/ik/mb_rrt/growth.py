@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array
 from rrtik_ompl.ik.mb_rrt.links import Links, directions
-from rrtik_ompl.ik.mb_rrt.run import Run, first_hit
+from rrtik_ompl.ik.mb_rrt.run import TreeSearch, first_hit
 from rrtik_ompl.ik.mb_rrt.variants import Rule, Variant, variant
 
 PASSES = 10_000
@@ -30,7 +30,7 @@ def grow(
     rng: np.random.Generator,
     passes: int = PASSES,
     stop: bool = True,
-) -> Run:
+) -> TreeSearch:
     """Grow a tree until a pass ends within the tolerance of the goal, or to the limit.
 
     Args:
@@ -56,7 +56,7 @@ def grow(
         _add_passes(links, target, chosen, nodes, parents, count, rng)
         misses = np.append(misses, np.linalg.norm(nodes[-1][done:] - target, axis=1))
         solved, done = first_hit(misses, limit), done + count
-    run = Run(links, target, tuple(nodes), tuple(parents), misses, solved)
+    run = TreeSearch(links, target, tuple(nodes), tuple(parents), misses, solved)
     return run.until(solved) if stop and solved else run
 
 
