@@ -17,7 +17,7 @@ from rrtik_bench.ikurt import as_published, metric_of
 from rrtik_ompl.goal import PoseGoal
 from rrtik_ompl.ik.ikurt.metric import TipMetric
 from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
-from rrtik_ompl.ik.ikurt.search import BatchedSearch, Judge, Options
+from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
 from rrtik_planners import IKURT, FastRRTConnect, IKURTPublished
 
 POSE_SECONDS, PANDA_SECONDS, BLOCKED_SECONDS = 2.0, 1.0, 1.0
@@ -95,9 +95,11 @@ def improved_falls() -> tuple[bool, int]:
     assert isinstance(problem.goal, PoseGoal)
     metric, until = TipMetric(problem.robot, [problem.goal]), time.monotonic() + 2.0
     (lower, upper), rng = problem.robot.finite_range(), np.random.default_rng(0)
-    judge = Judge(problem.world.valid_batch, problem.world.motion_valid_batch, lambda: time.monotonic() > until)
+    validity = IkurtValidity(
+        problem.world.valid_batch, problem.world.motion_valid_batch, lambda: time.monotonic() > until
+    )
     options = Options(0.15, 0.6, jacobian=False, most_vertices=10_000)
-    return falls(BatchedSearch(metric, options, lower, upper, judge, rng, problem.start[None]))
+    return falls(BatchedSearch(metric, options, lower, upper, validity, rng, problem.start[None]))
 
 
 def falls(search: Any) -> tuple[bool, int]:

@@ -8,8 +8,7 @@ Writes ``ladder.svg`` beside this file.
 
 from __future__ import annotations
 
-import ast
-import re
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,17 +16,12 @@ from pathlib import Path
 FOLDER = Path(__file__).resolve().parent
 ROOT = FOLDER.parents[1]
 LIBRARY = ROOT / "rrtik_ompl"
-BEGIN, END = "<!-- ladder", "<!-- end of ladder -->"
+sys.path.insert(0, str(ROOT / "bench"))
+
+from house_imports import floors, imports  # noqa: E402
+
 ROOM_COLOUR, MODULE_COLOUR, ARC_COLOUR = "#dceaf5", "#f4f4f0", "#0072b2"
 ROUNDED = "round,pad=0,rounding_size=0.08"
-ROW = re.compile(r"^\| *\d+ *\| *([^|]+?) *\|", re.MULTILINE)
-
-
-def floors() -> list[list[str]]:
-    """Names of modules and rooms, floor by floor from below, as ARCHITECTURE.md lists them."""
-    text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
-    table = text.partition(BEGIN)[2].partition(END)[0]
-    return [[name.strip() for name in names.split(",")] for names in ROW.findall(table)]
 
 
 def room_of(module: str) -> str:
@@ -43,21 +37,6 @@ def modules() -> Iterator[tuple[str, Path]]:
             yield parts[0], file
 
 
-def imports(file: Path) -> set[str]:
-    """Names below rrtik_ompl that a file imports, in functions too; those of type checking alone as well."""
-    found: set[str] = set()
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-        names: list[str] = []
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module == "rrtik_ompl":
-            names = [f"rrtik_ompl.{alias.name}" for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names = [node.module]
-        found |= {name.removeprefix("rrtik_ompl.") for name in names if name.startswith("rrtik_ompl.")}
-    return found
-
-
 def arrows(ladder: list[list[str]]) -> Counter[tuple[str, str]]:
     """How many files of a room import each other room."""
     known = {name for floor in ladder for name in floor}
@@ -65,7 +44,8 @@ def arrows(ladder: list[list[str]]) -> Counter[tuple[str, str]]:
     for room, file in modules():
         if room not in known:
             continue
-        counted.update((room, other) for other in {room_of(name) for name in imports(file)} & known - {room})
+        inside = {name.removeprefix("rrtik_ompl.") for name in imports(file) if name.startswith("rrtik_ompl.")}
+        counted.update((room, other) for other in {room_of(name) for name in inside} & known - {room})
     return counted
 
 

@@ -22,7 +22,7 @@ WAY = np.array([[2.1, 0.0]])  # [m] where the disc stands that keeps the straigh
 DISC, SMALL_DISC = 0.35, 0.12  # [m] radii
 SHELL = (0.25, 1.1)  # where the obstacles about an arm are, in reaches
 GATE, LARGEST = 0.1, 0.12  # radii in reaches: of the ball on the straight way, of a crowd of one
-ROOM = 1.4  # times their size obstacles leave to the known way
+CLEAR_SIZE_RATIO = 1.4  # times their size obstacles leave to the known way
 POSTURES, DRAWS, STOPS = 512, 200, 40
 APART = 0.6  # of the tip between start and goal, in reaches
 
@@ -98,7 +98,7 @@ def _beside(robot: Robot, stops: Matrix, count: int, reach: float, rng: np.rando
     size = LARGEST * reach / (count + 1) ** (1.0 / 3.0)
     while len(kept) < count:
         places = _places(count, reach, rng)
-        wide = World(robot, Scene(tuple(_solid(k, place, ROOM * size) for k, place in enumerate(places))))
+        wide = World(robot, Scene(tuple(_solid(k, place, CLEAR_SIZE_RATIO * size) for k, place in enumerate(places))))
         touched = {name for q in stops for contact in wide.contacts(q) for name in (contact.first, contact.second)}
         free = [place for k, place in enumerate(places) if _solid(k, place, size).name not in touched]
         kept += [_solid(len(kept) + k, place, size) for k, place in enumerate(free)]

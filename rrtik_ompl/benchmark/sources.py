@@ -17,7 +17,7 @@ from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.world import World
 
-KEPT = 4  # problems that a process remembers; runs of one problem follow each other
+CACHED_PROBLEMS = 4  # problems that a process remembers; runs of one problem follow each other
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ def from_plain(data: Mapping[str, Any]) -> Source:
     return Source(**{**data, "arguments": tuple(data["arguments"])})
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHED_PROBLEMS)
 def build(source: Source) -> Problem:
     """The problem of a source.
 

@@ -14,7 +14,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import check_target, comma_numbers
 
 FOUND, NOT_FOUND = 0, 1
-MOST_ROWS = 40  # of a table; CSV and JSON have them all
+MAX_ROWS = 40  # of a table; CSV and JSON have them all
 
 Triple = tuple[float, float, float]
 
@@ -180,7 +180,7 @@ def _one(asked: Asked, goal: Any, everything: bool, common: dict[str, Any], outp
         clearances = [world.clearance(q) for q in result.solutions] if obstacles else []
         more = f" and {sum(turns)} more by full turns of joints" if any(turns) else ""
         say(f"{robot.name}, {result.method}: {_count(len(result.solutions), 'solution')}{more}, {_time(result)}")
-        say(ik_report.solutions_table(robot, result, names, turns, clearances, MOST_ROWS))
+        say(ik_report.solutions_table(robot, result, names, turns, clearances, MAX_ROWS))
         say(*_more(len(result.solutions)))
     if not result.found and not output.as_json:
         tell = note if output.as_csv else say
@@ -220,7 +220,7 @@ def _many(
     elif output.as_csv:
         print(ik_report.rows_csv(robot, q, residuals, reasons, notes), end="")
     else:
-        shown = slice(MOST_ROWS)
+        shown = slice(MAX_ROWS)
         say(f"{robot.name}: {found} of {_count(len(rows), 'pose')} solved{line}")
         say(ik_report.rows_table(robot, q[shown], residuals[shown], reasons[shown], notes[shown]))
         say(*_more(len(rows)))
@@ -287,7 +287,7 @@ def _draw(asked: Asked, goal: Any, q: Any, output: Output, *, moving: bool = Fal
 
 
 def _more(rows: int) -> list[str]:
-    return [] if rows <= MOST_ROWS else [f"... {rows - MOST_ROWS} more: see --csv or --json"]
+    return [] if rows <= MAX_ROWS else [f"... {rows - MAX_ROWS} more: see --csv or --json"]
 
 
 def _count(number: int, noun: str) -> str:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
 
-ENDLESS = 1e9  # [m] half extent of a half-space's box
+UNBOUNDED_METRES = 1e9  # [m] half extent of a half-space's box
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,7 +78,7 @@ class Boxes:
 
 def _local_boxes(bodies: Sequence[Body]) -> tuple[Matrix, Matrix]:
     """Centres and half extents of the bodies' own bounding boxes, shapes (g, 3); a half-space has an endless one."""
-    centres, halves = np.zeros((len(bodies), 3)), np.full((len(bodies), 3), ENDLESS)
+    centres, halves = np.zeros((len(bodies), 3)), np.full((len(bodies), 3), UNBOUNDED_METRES)
     for k, body in enumerate(bodies):
         if not isinstance(body.geometry, coal.Halfspace):
             centres[k], halves[k] = body.geometry.aabb_local.center(), half_extents(body.geometry)

@@ -21,9 +21,9 @@ from rrtik_ompl.collision.margins import kept_apart, request
 from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.robot import Robot
 
-MOST = 1 << 16  # runs of rows times pairs that are looked at together, to bound memory
+MAX_PAIR_CHECKS = 1 << 16  # runs of rows times pairs that are looked at together, to bound memory
 RUNS = (64, 16, 4, 1)  # rows that are looked at together
-ROOM = 1e-5  # [m] for rounding, in our arithmetic and in coal's distances
+DISTANCE_TOLERANCE = 1e-5  # [m] for rounding, in our arithmetic and in coal's distances
 
 Numbers: TypeAlias = NDArray[np.int64]
 
@@ -61,7 +61,7 @@ class Certificate:
         come nearer within the run of rows, they are apart in all of it. What is left open is looked at in shorter runs.
         """
         found: list[tuple[int, ...]] = [()] * len(Q)
-        together = RUNS[0] * max(1, MOST // max(1, len(self._pairs)))
+        together = RUNS[0] * max(1, MAX_PAIR_CHECKS // max(1, len(self._pairs)))
         for start in range(0, len(Q), together):
             begins = np.arange(start, min(start + together, len(Q)), RUNS[0])
             run, pair = (k.ravel() for k in np.indices((len(begins), len(self._pairs))))
@@ -84,7 +84,7 @@ class Certificate:
         near = np.array([np.abs(Q[a:b] - Q[m]).max(axis=0) for a, b, m in zip(begins, ends, middles, strict=True)])
         frames = self._robot.joint_frames(Q[middles])
         placed = self._boxes.placed(frames)
-        approach = ROOM + self._approached(near, run, pair)
+        approach = DISTANCE_TOLERANCE + self._approached(near, run, pair)
         open_: Mask = self._gaps(placed, run, pair) <= approach
         kept = np.flatnonzero(open_)
         columns = (kept, run[kept], pair[kept], approach[kept], self._reached(frames, run[kept], pair[kept]))
@@ -128,9 +128,7 @@ class Certificate:
         return gaps
 
 
-def standing_contact(
-    robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]
-) -> tuple[str, str] | None:
+def fixed_contact(robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> tuple[str, str] | None:
     """Names of two bodies that touch and never move (the base and the obstacles), None if all are clear of each other.
 
     Args:

@@ -1,4 +1,4 @@
-"""How far any point of the arm can move when joints move: the rule that turns a resolution in metres into steps."""
+"""How far any point of the arm can move when joints move [16]: the rule that makes steps of a resolution in metres."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from rrtik_ompl.collision.margins import kept_apart, request
 from rrtik_ompl.collision.solids import is_mesh
 from rrtik_ompl.robot import Robot
 
-ROOM = 1e-5  # [m] taken off coal's depths
+DISTANCE_TOLERANCE = 1e-5  # [m] taken off coal's depths
 
 
 class OverlapDepth:
@@ -49,7 +49,7 @@ class OverlapDepth:
         margin = kept_apart(first, second)
         if not coal.collide(*ends, request(margin), coal.CollisionResult()):
             return 0.0
-        depth = margin - float(coal.distance(*ends, coal.DistanceRequest(), coal.DistanceResult())) - ROOM
+        depth = margin - float(coal.distance(*ends, coal.DistanceRequest(), coal.DistanceResult())) - DISTANCE_TOLERANCE
         both_move = first.joint > 0 and second.joint > 0
         return max(0.5 * depth if both_move else depth, 0.0)
 

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.covers.solids import CORNERS, Solid, Triangles
-from rrtik_ompl.covers.winding import NEAR, Flags, Shape, all_corners, winding
+from rrtik_ompl.covers.winding import EDGE_TOLERANCE, Flags, Shape, all_corners, winding
 
-MOST_CELLS = 120_000
-MOST_ALONG = 160.0  # cells along an axis: a long triangle is cut into many more pieces than cells
+MAX_CELLS = 120_000
+MAX_CELLS_ALONG_AXIS = 160.0  # cells along an axis: a long triangle is cut into many more pieces than cells
 LATTICE_CROSSED, MOST_LATTICE_CROSSED = 1500, 25_000
 LATTICE_LEAST = 4  # cells along every axis of a lattice, so that even a thin solid has points inside
 MARGINS = (0.0171, 0.0233, 0.0197)  # of a cell: keeps the faces of axis-aligned solids off the planes between cells
@@ -111,10 +111,10 @@ def _grid(triangles: Triangles, crossed: int, least: int = 1) -> Grid:
     a, b, c = (triangles[:, k] for k in range(3))
     area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
     box = 2.0 * float(extent[0] * extent[1] + extent[1] * extent[2] + extent[2] * extent[0])
-    step = max(np.sqrt(1.5 * min(0.5 * area, 2.0 * box) / crossed), float(np.prod(extent) / MOST_CELLS) ** (1.0 / 3.0))
+    step = max(np.sqrt(1.5 * min(0.5 * area, 2.0 * box) / crossed), float(np.prod(extent) / MAX_CELLS) ** (1.0 / 3.0))
     number = np.maximum(np.ceil(extent / step), float(least))
-    number = np.minimum(number, MOST_ALONG)
-    while np.prod(number) > 4 * MOST_CELLS:
+    number = np.minimum(number, MAX_CELLS_ALONG_AXIS)
+    while np.prod(number) > 4 * MAX_CELLS:
         number = np.maximum(np.ceil(number / 2.0), float(least))
     size = extent / (number - 2.0 * np.array(MARGINS) * 0.999)
     origin = low - size * MARGINS
@@ -127,10 +127,10 @@ def _pieces(triangles: Triangles, shape: Shape) -> tuple[Triangles, NDArray[np.i
         done, rest = [], triangles
         while len(rest):
             low, high = rest[:, :, axis].min(axis=1), rest[:, :, axis].max(axis=1)
-            first = np.floor(low + NEAR) + 1.0
-            spans = high > first + NEAR
+            first = np.floor(low + EDGE_TOLERANCE) + 1.0
+            spans = high > first + EDGE_TOLERANCE
             done.append(rest[~spans])
-            last = np.ceil(high[spans] - NEAR) - 1.0
+            last = np.ceil(high[spans] - EDGE_TOLERANCE) - 1.0
             rest = _cut(rest[spans], axis, np.floor(0.5 * (first[spans] + last)))
         triangles = np.concatenate(done)
     return _placed(triangles, shape)
@@ -160,7 +160,7 @@ def _placed(pieces: Triangles, shape: Shape) -> tuple[Triangles, NDArray[np.int6
     index = np.floor(pieces.mean(axis=1))
     for axis in range(3):
         level = np.round(pieces[:, 0, axis])
-        flat = np.abs(pieces[:, :, axis] - level[:, None]).max(axis=1) <= 2.0 * NEAR
+        flat = np.abs(pieces[:, :, axis] - level[:, None]).max(axis=1) <= 2.0 * EDGE_TOLERANCE
         for side in (-1.0, 0.0):
             twin = index[: len(flat)][flat]
             twin[:, axis] = level[flat] + side
@@ -220,8 +220,8 @@ def _assembled(
     boxes: NDArray[np.float64],
     sure: NDArray[np.int64],
 ) -> Elements:
-    """Elements in the solid's frame; the radii make up for surface that pokes into a cell by less than ``NEAR``."""
-    poke = 4.0 * NEAR * float(np.linalg.norm(grid.size))
+    """Elements in the solid's frame; radii make up for surface that pokes into a cell by under ``EDGE_TOLERANCE``."""
+    poke = 4.0 * EDGE_TOLERANCE * float(np.linalg.norm(grid.size))
     start = np.flatnonzero(np.r_[True, np.diff(owner) > 0])
     middle = np.add.reduceat(points, start) / np.diff(np.r_[start, len(points)])[:, None]
     return Elements(

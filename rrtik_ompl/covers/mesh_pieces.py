@@ -23,12 +23,12 @@ from rrtik_ompl.collision.enclosure import enclosure
 from rrtik_ompl.collision.solids import inside_mesh, is_closed, mesh_arrays
 from rrtik_ompl.covers.planes import most_different
 
-MOST_PIECES = 12
-MOST_TRIANGLES = 300_000
+MAX_PIECES = 12
+MAX_TRIANGLES = 300_000
 SMALLEST_GAIN = 0.01  # of the whole hull's volume: what a cut takes away at least
 SHARES = (0.25, 0.5, 0.75)  # of a cell, where it may be cut
 GRID = 24  # steps along the longest side, to which corners are moved for a sketch of a mesh
-MOST_PLANES = 90  # of a piece inside
+MAX_PLANES = 90  # of a piece inside
 SHRINKAGE = 1e-6  # of a cell's size, by which a piece inside keeps away from the surface
 THINNEST = 1e-3  # [m] radius of the largest ball in a piece inside that is worth the while
 FREELY = [(None, None)] * 4
@@ -97,16 +97,16 @@ class _Part:
 def convex_pieces(mesh: Any) -> tuple[list[Matrix], list[Matrix], list[Matrix]]:
     """Convex pieces whose union contains a coal mesh and what it encloses, convex pieces inside it, and points of it.
 
-    The cell whose pieces come out smallest is cut first (compare Lien and Amato 2007), until cuts gain little. A
+    The cell whose pieces come out smallest is cut first (compare [44]), until cuts gain little. A
     sketch of the mesh is enough to choose the cuts. Nothing is known to be inside a mesh that is not closed, and
-    there are no pieces of a mesh that is a point or has more than ``MOST_TRIANGLES``.
+    there are no pieces of a mesh that is a point or has more than ``MAX_TRIANGLES``.
 
     Returns:
         Corners of the pieces around and of those inside, and points of the solid by cells, shape (n, 3) each.
     """
     vertices, triangles = mesh_arrays(mesh)
     surface = vertices[triangles]
-    if not 0 < len(surface) <= MOST_TRIANGLES or not np.isfinite(surface).all():
+    if not 0 < len(surface) <= MAX_TRIANGLES or not np.isfinite(surface).all():
         return [], [], []
     if not np.ptp(surface, axis=(0, 1)).max() > 0.0:
         return [], [], []
@@ -152,7 +152,7 @@ def _shells(vertices: Matrix, triangles: NDArray[np.int64]) -> list[Triangles]:
     size = int(corners.max()) + 1
     _, label = connected_components(coo_matrix((np.ones(corners.size), ends), shape=(size, size)), directed=False)
     numbers = np.unique(label[corners[:, 0]])
-    if len(numbers) > MOST_PIECES:
+    if len(numbers) > MAX_PIECES:
         return [vertices[triangles]]
     return [vertices[triangles[label[corners[:, 0]] == number]] for number in numbers]
 
@@ -178,7 +178,7 @@ def _whole(part: _Part, surface: Triangles) -> _Part:
 
 def _parts(parts: list[_Part]) -> list[_Part]:
     least = SMALLEST_GAIN * sum(part.volume for part in parts)
-    while len(parts) < MOST_PIECES:
+    while len(parts) < MAX_PIECES:
         best = max(parts, key=lambda part: part.gain)
         if best.gain <= least:
             break
@@ -252,7 +252,7 @@ def _kernel(planes: Matrix, part: _Part) -> Matrix | None:
     Each triangle is kept out by the plane that has to move inwards least for it.
     """
     sides = np.concatenate([np.column_stack([np.eye(3), part.high]), np.column_stack([-np.eye(3), -part.low])])
-    kept = np.concatenate([sides, most_different(planes, MOST_PLANES)])
+    kept = np.concatenate([sides, most_different(planes, MAX_PLANES)])
     lowest = np.min(
         [part.surface[:, k] @ kept[:, :3].T for k in range(3)], axis=0
     )  # of each triangle along each normal

@@ -1,10 +1,10 @@
 """Few balls that hold all elements of a solid and reach little beyond it.
 
-A ball sticks out by at most its radius minus the depth of its centre. Greedy set cover (Chvatal 1979) with a bisection
+A ball sticks out by at most its radius minus the depth of its centre. Greedy set cover [41] with a bisection
 of the protrusion finds a first set of balls; then elements and balls are matched and every ball is moved to where it
 sticks out least, in turns, and balls that others can stand in for are moved to where the protrusion is largest (after
-Wang et al. 2006, variational sphere set approximation). All this only looks for good places: whatever they are, each
-ball is made large enough for its elements, so the cover holds the solid.
+[42]). All this only searches for good places: whatever they are, each ball is made large enough for its elements, so
+the cover holds the solid.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from rrtik_ompl.covers.solids import Triangles
 CANDIDATES = 400
 LEAST_ON_SURFACE = 80  # candidates for what is thin or open
 BISECTIONS = 7
-ROUNDS = 7  # of matching elements with balls
+MATCHINGS = 7  # of matching elements with balls
 STEPS = 10  # of every ball in a round
 MOVES = 4  # balls moved elsewhere in a round, at most
 WORTH = 0.95  # a ball is moved elsewhere if the protrusion it leaves behind is below this share of the worst
@@ -153,14 +153,14 @@ def _refined(
     """Better places for the balls of a cover: the best set of all rounds."""
     element = np.repeat(np.arange(len(parts.start)), np.diff(np.r_[parts.start, len(parts.points)]))
     best, least = places, np.inf
-    for turn in range(ROUNDS + 1):
+    for turn in range(MATCHINGS + 1):
         needs = reaches(parts, places.centres) - places.depth[:, None].astype(np.float32) - spared
         worst = float(needs.min(axis=0).max())
         if worst < least:
             best, least = places, worst
-        if turn == ROUNDS or (wanted is not None and least <= wanted):
+        if turn == MATCHINGS or (wanted is not None and least <= wanted):
             break
-        if turn < ROUNDS - 2:
+        if turn < MATCHINGS - 2:
             places, needs = _moved_elsewhere(places, needs, spare, spare_needs, limit)
         owner = needs.argmin(axis=0)
         kept, owner = np.unique(owner, return_inverse=True)
@@ -201,7 +201,7 @@ def _settled(parts: Elements, surface: cKDTree, places: Places, owner: NDArray[n
     """Each ball moved to where it sticks out least while it holds its points.
 
     It goes away from the surface that is nearest and towards the point that is farthest, in ever shorter steps (after
-    Badoiu and Clarkson 2003). A step is shorter than the depth, so a centre stays inside.
+    [43]). A step is shorter than the depth, so a centre stays inside.
     """
     order = np.argsort(owner, kind="stable")
     points, radii, owner = parts.points[order], parts.radii[order], owner[order]

@@ -40,12 +40,12 @@ from rrtik_ompl.covers.solids import (
     mesh_solid,
 )
 
-BALLS_PER_METRE, FEWEST, MOST = 70.0, 2, 32  # 32: four full clusters of the kernels; 36 make eight
+BALLS_PER_METRE, MIN_BALLS, MAX_BALLS = 70.0, 2, 32  # 32: four full clusters of the kernels; 36 make eight
 BALLS_OF_OPEN = 3  # times as many for a mere surface: nothing of a ball on it is inside
 INNER_SHARE = 1.5  # inner balls for each outer one
-MOST_ON_REQUEST = 512  # balls, where a protrusion is asked for
+MAX_BALLS_ON_REQUEST = 512  # balls, where a protrusion is asked for
 # A mesh of more triangles or open edges is taken as its bounding box, and nothing is proven to collide with it.
-MOST_TRIANGLES, MOST_OPEN_EDGES = 300_000, 4000
+MAX_TRIANGLES, MAX_OPEN_EDGES = 300_000, 4000
 CROSSED_CELLS = 1500  # at most
 CELLS_PER_BALL = 80
 SURFACE_POINTS = 6000
@@ -76,7 +76,7 @@ def outer_cover(geometry: Any, *, protrusion: float | None = None) -> Matrix:
     solid, frame = made
     wanted = None if protrusion is None else max(protrusion, 0.0) / frame.scale
     usual = balls_for(frame.scale) * (BALLS_OF_OPEN if len(solid.rim) else 1)
-    limit = usual if protrusion is None else MOST_ON_REQUEST
+    limit = usual if protrusion is None else MAX_BALLS_ON_REQUEST
     found = _searched_cover(solid, limit, wanted)
     regular = regular_cover(geometry, limit, protrusion)
     cover = frame.spheres_out(found, solid.slack + ROUNDING)
@@ -129,7 +129,7 @@ def protrusion_bound(geometry: Any, spheres: Matrix) -> float:
 
 def balls_for(extent: float) -> int:
     """Number of balls that suits a body of this extent (diagonal of its box) [m]."""
-    return int(np.clip(round(BALLS_PER_METRE * extent), FEWEST, MOST))
+    return int(np.clip(round(BALLS_PER_METRE * extent), MIN_BALLS, MAX_BALLS))
 
 
 def _swept_radius(geometry: Any) -> float:
@@ -166,10 +166,10 @@ def _mesh(geometry: Any) -> tuple[Solid, Frame] | None:
     used = vertices[np.unique(triangles)]
     if not len(used) or not np.isfinite(used).all() or not np.ptp(used, axis=0).max() > SMALLEST:
         return None
-    if len(triangles) <= MOST_TRIANGLES:
+    if len(triangles) <= MAX_TRIANGLES:
         nothing = (np.empty((0, 3)), np.empty((0, 3)))
         made = mesh_solid(vertices, triangles, nothing if is_closed(geometry) else enclosure(geometry).boxes())
-        if len(made[0].rim) <= MOST_OPEN_EDGES:
+        if len(made[0].rim) <= MAX_OPEN_EDGES:
             return made
     low, high = used.min(axis=0), used.max(axis=0)
     thick = np.maximum(0.5 * (high - low), 1e-6 * float((high - low).max()))  # a box may be larger, never flat
@@ -189,7 +189,7 @@ def _closed(geometry: Any, solid: Solid) -> bool:
 
 def _capsule_balls(capsule: Any, protrusion: float | None) -> Matrix:
     radius, half = float(capsule.radius), float(capsule.halfLength)
-    limit = balls_for(2.0 * (half + radius)) if protrusion is None else MOST_ON_REQUEST
+    limit = balls_for(2.0 * (half + radius)) if protrusion is None else MAX_BALLS_ON_REQUEST
     return capsule_cover(radius, half, limit, protrusion)
 
 

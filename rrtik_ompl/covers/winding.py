@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.covers.solids import CORNERS, Triangles
 
-NEAR = 1e-9  # in cells: closer than this to an edge or a plane counts as doubtful, and doubt counts as inside
+EDGE_TOLERANCE = 1e-9  # [cells] closer than this to an edge or a plane is doubtful, and doubtful counts as inside
 
 Flags = NDArray[np.bool_]
 Shape = tuple[int, int, int]
@@ -30,8 +30,8 @@ def winding(triangles: Triangles, shape: Shape) -> tuple[NDArray[np.int64], Flag
     line = np.column_stack([y, z]).astype(np.float64)
     offs = [_off_edge(p, q, line) for p, q in ((a, b), (b, c), (c, a))]
     off = np.stack(offs)
-    hit = (off > NEAR).all(axis=0) | (off < -NEAR).all(axis=0)
-    near = ~hit & ((off >= -NEAR).all(axis=0) | (off <= NEAR).all(axis=0))
+    hit = (off > EDGE_TOLERANCE).all(axis=0) | (off < -EDGE_TOLERANCE).all(axis=0)
+    near = ~hit & ((off >= -EDGE_TOLERANCE).all(axis=0) | (off <= EDGE_TOLERANCE).all(axis=0))
     doubtful[:, y[near], z[near]] = True
     a, b, c, y, z, line = a[hit], b[hit], c[hit], y[hit], z[hit], line[hit]
     if len(a):
@@ -49,8 +49,8 @@ def winding(triangles: Triangles, shape: Shape) -> tuple[NDArray[np.int64], Flag
 
 def _lines_near(triangles: Triangles, corners: Shape) -> tuple[NDArray[np.int64], ...]:
     """Pairs of a triangle and a line of corners that passes through the box around it, seen along x."""
-    low = np.ceil(triangles[:, :, 1:].min(axis=1) - NEAR).astype(np.int64)
-    high = np.floor(triangles[:, :, 1:].max(axis=1) + NEAR).astype(np.int64)
+    low = np.ceil(triangles[:, :, 1:].min(axis=1) - EDGE_TOLERANCE).astype(np.int64)
+    high = np.floor(triangles[:, :, 1:].max(axis=1) + EDGE_TOLERANCE).astype(np.int64)
     low, high = np.maximum(low, 0), np.minimum(high, np.array(corners[1:]) - 1)
     count = np.maximum(high - low + 1, 0)
     total = count.prod(axis=1)
@@ -64,7 +64,7 @@ def _off_edge(p: Matrix, q: Matrix, line: Matrix) -> Vector:
     side, away = q[:, 1:] - p[:, 1:], line - p[:, 1:]
     length = np.linalg.norm(side, axis=1)
     cross = side[:, 0] * away[:, 1] - side[:, 1] * away[:, 0]
-    return np.asarray(np.where(length > NEAR, cross / np.maximum(length, NEAR), 0.0))
+    return np.asarray(np.where(length > EDGE_TOLERANCE, cross / np.maximum(length, EDGE_TOLERANCE), 0.0))
 
 
 def _crossing(a: Matrix, b: Matrix, c: Matrix, line: Matrix) -> tuple[Vector, Vector]:
@@ -72,7 +72,7 @@ def _crossing(a: Matrix, b: Matrix, c: Matrix, line: Matrix) -> tuple[Vector, Ve
     normal = np.cross(b - a, c - a)
     x = a[:, 0] - ((line - a[:, 1:]) * normal[:, 1:]).sum(axis=1) / normal[:, 0]
     steep = np.abs(normal[:, 0]) / np.linalg.norm(normal, axis=1)
-    return x, NEAR / np.maximum(steep, 1e-12)
+    return x, EDGE_TOLERANCE / np.maximum(steep, 1e-12)
 
 
 def all_corners(flag: Flags) -> Flags:

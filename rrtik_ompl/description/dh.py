@@ -1,4 +1,4 @@
-"""Robots from Denavit-Hartenberg tables, standard (Paul 1981) or modified (Craig 1986): the caller says which."""
+"""Robots from Denavit-Hartenberg tables, standard [32] or modified [33]: the caller says which."""
 
 from __future__ import annotations
 

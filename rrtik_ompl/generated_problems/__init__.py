@@ -27,9 +27,13 @@ __all__ = ["FAMILIES", "generated_problem"]
 
 POSTURES = 512  # drawn at a time
 DRAWS = 300  # of scenes, before a seed is given up
-WIDER = 0.01  # more room with every draw
+SPACE_PER_DRAW = 0.01  # more room with every draw
 STARTS = 2  # tried in a scene
-NEAR, FAR, LOW = 0.4, 0.85, -0.25  # where a goal's tip lies: distance from the base and height, in reaches
+MIN_DISTANCE, MAX_DISTANCE, MIN_HEIGHT = (
+    0.4,
+    0.85,
+    -0.25,
+)  # where a goal's tip lies: distance from the base and height, in reaches
 AWAY = 0.3  # the tip's least distance between start and goal, in reaches
 OUTWARD = 0.3  # cosine of the forearm's angle to the way out, at least
 PROOFS = {"fastrrtconnect": 20_000, "bicrdt": 200}  # planners and their iterations
@@ -59,7 +63,7 @@ def generated_problem(robot: Robot, family: str, seed: int, *, motion_resolution
     goals = _goals(alone, reach, rng)
     for number in range(DRAWS):
         goal, place = next(goals)
-        scene = Scene(obstacles(family, rng, place, reach, 1.0 + WIDER * number))
+        scene = Scene(obstacles(family, rng, place, reach, 1.0 + SPACE_PER_DRAW * number))
         world = World(robot, scene, motion_resolution=motion_resolution)
         for start in _starts(world, goal, reach, rng):
             problem = Problem(world, start, goal, name=f"{robot.name}/{family}/{seed}")
@@ -103,8 +107,14 @@ def _goals(alone: World, reach: float, rng: np.random.Generator) -> Iterator[tup
         away = tips - base
         for row, tip, joint, way, axis in zip(rows, tips, elbow, away, frames[:, 1, :3, 2], strict=True):
             forearm, distance = tip - joint, float(np.linalg.norm(way))
-            long_enough = np.linalg.norm(forearm) > 1e-3 * reach and NEAR * reach < distance < FAR * reach
-            if long_enough and way[2] > LOW * reach and forearm @ way > OUTWARD * distance * np.linalg.norm(forearm):
+            long_enough = (
+                np.linalg.norm(forearm) > 1e-3 * reach and MIN_DISTANCE * reach < distance < MAX_DISTANCE * reach
+            )
+            if (
+                long_enough
+                and way[2] > MIN_HEIGHT * reach
+                and forearm @ way > OUTWARD * distance * np.linalg.norm(forearm)
+            ):
                 yield row, pin.SE3(_axes(forearm, axis), tip)
 
 

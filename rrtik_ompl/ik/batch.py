@@ -16,7 +16,7 @@ from rrtik_ompl.ik.goal_rows import POSE, pose_rows
 from rrtik_ompl.ik.method_interface import tolerances
 from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ik.numeric.descent import Search
-from rrtik_ompl.ik.solve import SECONDS, chosen_method, free_of_collision, solve_ik, usual_posture
+from rrtik_ompl.ik.solve import SECONDS, chosen_method, free_of_collision, mid_range_configuration, solve_ik
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World, check_world
 
@@ -70,7 +70,7 @@ def solve_ik_batch(
     load_kernels(robot)
     begin = time.monotonic()
     targets = finite_array(poses, (None, 4, 4), "poses")
-    posture = usual_posture(robot) if near is None else robot.configuration(near, "near")
+    posture = mid_range_configuration(robot) if near is None else robot.configuration(near, "near")
     limit, first_seed = not_negative(seconds, "seconds"), whole_number(seed, "seed")
     q, residuals = np.full((len(targets), robot.dof), np.nan), np.full((len(targets), 2), np.nan)
     reasons, details = [""] * len(targets), [""] * len(targets)

@@ -30,10 +30,10 @@ from rrtik_ompl.task_region import TaskRegion
 STARTS = 48  # of inverse kinematics in one round
 FEWEST = 4  # for each part, to tell how near the arm came
 PARTS = 6  # of a grasp set, among which the starts of a round are shared out
-ROUNDS = 4  # at most, until one free configuration is found
+MAX_ROUNDS = 4  # at most, until one free configuration is found
 LAST_ROUND = 64
 TREE_SECONDS = 0.3  # that MB-RRT may take
-MOST = 16  # configurations that one round adds
+MAX_CONFIGURATIONS = 16  # configurations that one round adds
 LARGEST = 96  # configurations altogether
 SAME_POSTURE = 1e-3  # [rad] or [m]
 
@@ -81,7 +81,7 @@ class GoalSearch:
 
     def first(self) -> Matrix:
         """Search until there is a free configuration, for a few rounds; all rows."""
-        for _ in range(ROUNDS):
+        for _ in range(MAX_ROUNDS):
             if len(self.rows) == 0:
                 self.more()
         return self.rows
@@ -180,7 +180,7 @@ def _turns(problem: Problem, q: Vector) -> Matrix:
 
 
 def _chosen(problem: Problem, rows: Matrix, known: Matrix) -> Matrix:
-    """At most ``MOST`` rows unlike each other and the known ones, turned to lie near the start, nearest first.
+    """At most `MAX_CONFIGURATIONS` rows unlike each other and the known, turned near the start, nearest first.
 
     Half of them are the nearest to the start; the others lie farthest from all that were chosen before, for what is
     near to the start and to each other may all be blocked by the same thing.
@@ -193,8 +193,8 @@ def _chosen(problem: Problem, rows: Matrix, known: Matrix) -> Matrix:
     for row in known:
         apart = np.minimum(apart, np.abs(joint_difference(robot, turned, row)).max(axis=1))
     kept: list[int] = []
-    while len(kept) < MOST and (apart > SAME_POSTURE).any():
-        value = -distance if len(kept) < MOST // 2 else apart
+    while len(kept) < MAX_CONFIGURATIONS and (apart > SAME_POSTURE).any():
+        value = -distance if len(kept) < MAX_CONFIGURATIONS // 2 else apart
         kept.append(int(np.argmax(np.where(apart > SAME_POSTURE, value, -np.inf))))
         apart = np.minimum(apart, np.abs(joint_difference(robot, turned, turned[kept[-1]])).max(axis=1))
     return turned[sorted(kept, key=lambda k: (distance[k], k))]

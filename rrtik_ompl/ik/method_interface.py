@@ -18,7 +18,7 @@ Target: TypeAlias = PoseGoal | PositionGoal
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Question:
+class IkRequest:
     """What a method is asked.
 
     Attributes:
@@ -50,7 +50,7 @@ class Question:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Answer:
+class IkResponse:
     """What a method found.
 
     Attributes:
@@ -71,7 +71,7 @@ class Method:
     """A method: ``misfit`` says why it does not fit a robot and a target ("" if it does); ``run`` answers."""
 
     misfit: Callable[[Robot, Target], str]
-    run: Callable[[Question], Answer]
+    run: Callable[[IkRequest], IkResponse]
 
 
 def tolerances(target: Target) -> tuple[float, float]:

@@ -21,13 +21,13 @@ from rrtik_ompl.ik.baselines.joint_axes import coupled_fault
 from rrtik_ompl.ik.baselines.pso import PARTICLES, pso, resampled_pso
 from rrtik_ompl.ik.genetic.method import genetic
 from rrtik_ompl.ik.mb_rrt.method import mb_rrt, mb_rrt_misfit
-from rrtik_ompl.ik.method_interface import Answer, Method, Question, Target, tolerances
+from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Method, Target, tolerances
 from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric
 from rrtik_ompl.ik.numeric.projection import projection
-from rrtik_ompl.ik.numeric.restarts import ROUNDS, STARTS, Walk, restarted
+from rrtik_ompl.ik.numeric.restarts import MAX_ROUNDS, STARTS, Walk, restarted
 from rrtik_ompl.robot import Robot
 
-ENOUGH = 4  # starts that arrive before the others of a round are given up
+SUFFICIENT_STARTS = 4  # starts that arrive before the others of a round are given up
 
 
 def load_kernels(robot: Robot) -> None:
@@ -45,26 +45,26 @@ def _closed_form_misfit(robot: Robot, target: Target) -> str:
     return tip_fault(robot, form_of(robot))
 
 
-def _closed_form(question: Question) -> Answer:
+def _closed_form(request: IkRequest) -> IkResponse:
     """All branches of all targets; if none will do, the curves of those that are singular within their tolerances."""
-    robot, targets = question.robot, question.targets
+    robot, targets = request.robot, request.targets
     poses = np.array([_matrix(target) for target in targets])
-    hints = np.array([question.near] * len(targets))
+    hints = np.array([request.near] * len(targets))
     found = branches_of(robot, poses, hints, check=False)
     q = found.branches[found.valid]
-    if len(q) and question.accept(q).any():  # the usual case; forward kinematics judges what is returned
-        return Answer(q, question.near)
+    if len(q) and request.accept(q).any():  # the usual case; forward kinematics judges what is returned
+        return IkResponse(q, request.near)
     found = branches_of(robot, poses, hints)
     rows, owner = found.branches.reshape(-1, robot.dof), np.repeat(np.arange(len(targets)), found.real.shape[1])
     residuals = np.asarray(found.residuals).reshape(-1, 2)
     near_enough = residuals <= np.array([tolerances(target) for target in targets])[owner]
     reaching = near_enough.all(axis=1)
     q = rows[robot.within_limits(rows) & reaching]
-    if not question.accept(q).any():
+    if not request.accept(q).any():
         q = np.vstack([q, *(family(robot, _matrix(target), slack=_slack(target)) for target in targets)])
     outside = np.maximum(robot.lower - rows, rows - robot.upper).max(axis=1)
     best = np.argmin(np.where(reaching, outside, np.inf) if reaching.any() else residuals.sum(axis=1))
-    return Answer(q, rows[int(best)])
+    return IkResponse(q, rows[int(best)])
 
 
 def _slack(target: Target) -> float:
@@ -82,7 +82,7 @@ def _matrix(target: Target) -> Matrix:
     return np.asarray(target.T_world_tip.homogeneous, dtype=np.float64)
 
 
-def _walks(walk: Walk, starts: int = STARTS, rounds: int = ROUNDS) -> Callable[[Question], Answer]:
+def _walks(walk: Walk, starts: int = STARTS, rounds: int = MAX_ROUNDS) -> Callable[[IkRequest], IkResponse]:
     return partial(restarted, walk, starts=starts, rounds=rounds)
 
 
@@ -103,10 +103,10 @@ METHODS: Mapping[str, Method] = MappingProxyType(
         "genetic": Method(_fits_all, genetic),
         "mb-rrt": Method(mb_rrt_misfit, mb_rrt),
         "projection": Method(_fits_all, projection),
-        "damped": Method(_fits_all, _walks(partial(damped_least_squares, enough=ENOUGH))),
+        "damped": Method(_fits_all, _walks(partial(damped_least_squares, enough=SUFFICIENT_STARTS))),
         "pinocchio": Method(_fits_all, _walks(pinocchio_iteration, starts=1, rounds=64)),
-        "ccd": Method(_stands_alone, _walks(partial(ccd, enough=ENOUGH))),
-        "fabrik": Method(fabrik_misfit, _walks(partial(fabrik, enough=ENOUGH))),
+        "ccd": Method(_stands_alone, _walks(partial(ccd, enough=SUFFICIENT_STARTS))),
+        "fabrik": Method(fabrik_misfit, _walks(partial(fabrik, enough=SUFFICIENT_STARTS))),
         "pso": Method(_fits_all, _walks(pso, starts=4 * PARTICLES)),
         "pso-resampled": Method(_fits_all, _walks(resampled_pso, starts=4 * PARTICLES)),
     }

@@ -1,9 +1,6 @@
 """Joint rates for a wanted motion of the tip, also near and in singular postures, where the exact answer has no bound.
 
-Sources: Y. Nakamura and H. Hanafusa, "Inverse kinematic solutions with singularity robustness for robot manipulator
-control", Journal of Dynamic Systems, Measurement and Control 108 (1986), 163-171; the damping of the smallest singular
-value alone, A. Maciejewski and C. Klein, "Numerical filtering for the operation of robotic manipulators through
-kinematically singular configurations", Journal of Robotic Systems 5 (1988), 527-552.
+Sources: Nakamura and Hanafusa [25]; the damping of the smallest singular value alone, Maciejewski and Klein [26].
 """
 
 from __future__ import annotations
@@ -16,7 +13,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
 from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
 
-NEAR = 0.05  # singular values below this are damped; metres count in units of the arm's reach
+DAMPED_BELOW = 0.05  # singular values below this are damped; metres count in units of the arm's reach
 LOST = 1e-12  # singular values below this are 0
 DAMPING = 0.05  # at a singular value of 0
 
@@ -47,7 +44,7 @@ def rate(
     *,
     bias: ArrayLike | None = None,
     damping: float = DAMPING,
-    near: float = NEAR,
+    near: float = DAMPED_BELOW,
 ) -> Rate:
     """Joint rates that move the tip with a twist as well as the posture allows.
 

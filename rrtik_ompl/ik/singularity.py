@@ -23,7 +23,7 @@ class SingularityReport:
     Attributes:
         singular_values: Of the Jacobian at the tip, largest first, shape (min(6, dof),); metres and radians mixed.
         rank: How many of them are not 0: never the count of vanishing factors, which overstates the loss.
-        manipulability: Their product, sqrt(det(J J^T)) (Yoshikawa 1985).
+        manipulability: Their product, sqrt(det(J J^T)) [31].
         nearness: The singular cases that the robot names, 0 at the singularity: sines, or metres.
         active: The cases at which it is.
         at_limits: Joints that stand at a limit.

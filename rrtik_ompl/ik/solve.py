@@ -13,7 +13,7 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen, not_negative
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.goal import PositionGoal, TipGoal, has_task_regions, joint_difference, parts_of, tip_errors
 from rrtik_ompl.ik.mb_rrt.search import out_of_reach
-from rrtik_ompl.ik.method_interface import Answer, Question, Target, tolerances
+from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target, tolerances
 from rrtik_ompl.ik.methods import METHODS, load_kernels
 from rrtik_ompl.ik.random_stream import RandomStream
 from rrtik_ompl.ik.targets import leaves_freedom, targets
@@ -97,7 +97,7 @@ def solve_ik(
     begin = time.monotonic()
     require(goal, TipGoal, "goal", "inverse kinematics needs a goal of the tip, such as PoseGoal(T_world_tip)")
     limit, random = not_negative(seconds, "seconds"), RandomStream(seed)
-    posture = usual_posture(robot) if near is None else robot.configuration(near, "near")
+    posture = mid_range_configuration(robot) if near is None else robot.configuration(near, "near")
     drawn = (goal,) if isinstance(goal, Target) else tuple(targets(goal, max(DRAWS, len(parts_of(goal))), random.rng))
     name = chosen_method(robot, drawn, method)
     if method == "auto" and name == "numeric":
@@ -106,16 +106,16 @@ def solve_ik(
     def accept(Q: Matrix) -> Mask:
         return free_of_collision(world, Q)
 
-    question = Question(robot, goal, drawn, posture, accept, all, begin + limit, random, world)
-    answer, q, residuals, free = _tried(question, name)
+    request = IkRequest(robot, goal, drawn, posture, accept, all, begin + limit, random, world)
+    answer, q, residuals, free = _tried(request, name)
     if method == "auto" and not free.any() and _draws(name, goal):
         name = _walker(goal)
-        answer, q, residuals, free = _tried(question, name)
+        answer, q, residuals, free = _tried(request, name)
     turned = joint_difference(robot, q, posture)
     (rows,) = free.nonzero()
     order = rows[np.vecdot(turned, turned)[rows].argsort(kind="stable")]
     kept = different_rows(turned, order) if all else order[:1]
-    reason, detail = ("", "") if len(kept) else _why(question, answer, name, q)
+    reason, detail = ("", "") if len(kept) else _why(request, answer, name, q)
     return IkResult(
         solutions=frozen(np.where(robot.continuous, posture + turned[kept], q[kept])),
         residuals=frozen(residuals[kept]),
@@ -128,7 +128,7 @@ def solve_ik(
 
 
 @lru_cache(maxsize=64)
-def usual_posture(robot: Robot) -> Vector:
+def mid_range_configuration(robot: Robot) -> Vector:
     """Where a search begins if nobody says: the middle of the limits, shape (dof,)."""
     return frozen(0.5 * np.sum(robot.finite_range(), axis=0))
 
@@ -169,21 +169,21 @@ def free_of_collision(world: World | None, Q: Matrix) -> Mask:
     return free
 
 
-def _tried(question: Question, name: str) -> tuple[Answer, Matrix, Matrix, Mask]:
+def _tried(request: IkRequest, name: str) -> tuple[IkResponse, Matrix, Matrix, Mask]:
     """What a method answers: of that the rows at the goal, shape (k, dof), their residuals, and which are accepted.
 
     If one is enough, the nearest is looked at first and alone: mostly it will do.
     """
-    robot, answer = question.robot, METHODS[name].run(question)
+    robot, answer = request.robot, METHODS[name].run(request)
     inside = robot.clamp(answer.q[robot.within_limits(answer.q)])
-    if not question.all and len(inside) > 1:
-        away = joint_difference(robot, inside, question.near)
+    if not request.all and len(inside) > 1:
+        away = joint_difference(robot, inside, request.near)
         nearest = int(np.vecdot(away, away).argmin())
-        q, residuals = _at_goal(robot, question.goal, inside[nearest : nearest + 1])
-        if len(q) and question.accept(q)[0]:
+        q, residuals = _at_goal(robot, request.goal, inside[nearest : nearest + 1])
+        if len(q) and request.accept(q)[0]:
             return answer, q, residuals, np.ones(1, dtype=bool)
-    q, residuals = _at_goal(robot, question.goal, inside)
-    return answer, q, residuals, question.accept(q)
+    q, residuals = _at_goal(robot, request.goal, inside)
+    return answer, q, residuals, request.accept(q)
 
 
 def different_rows(rows: Matrix, order: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -204,21 +204,21 @@ def _at_goal(robot: Robot, goal: TipGoal, q: Matrix) -> tuple[Matrix, Matrix]:
     return q[at], residuals[at]
 
 
-def _why(question: Question, answer: Answer, name: str, q: Matrix) -> tuple[str, str]:
+def _why(request: IkRequest, answer: IkResponse, name: str, q: Matrix) -> tuple[str, str]:
     """Reason and detail of a failure of a method that found q, shape (k, dof), all in collision."""
-    robot, goal = question.robot, question.goal
-    if len(q) and question.world is not None:
-        return "collision", f"{len(q)} configurations reach the goal, all in collision: {question.world.explain(q[0])}"
+    robot, goal = request.robot, request.goal
+    if len(q) and request.world is not None:
+        return "collision", f"{len(q)} configurations reach the goal, all in collision: {request.world.explain(q[0])}"
     fault = robot.limit_fault(answer.nearest)
     reached = bool(goal.satisfied(robot, answer.nearest[None])[0])
     if reached and not fault:
         return "time", f"the goal is in reach, but the method gave up after {answer.iterations} steps"
     if _draws(name, goal):
-        return "time", f"none of {len(question.targets)} targets drawn from the goal is reached inside the limits"
+        return "time", f"none of {len(request.targets)} targets drawn from the goal is reached inside the limits"
     if reached:
         return "limits", f"the arm could reach the goal, but {fault}"
     away = f"the nearest posture is {_away(robot, goal, answer.nearest)}"
-    if answer.timed_out and not all(out_of_reach(robot, target) for target in question.targets):
+    if answer.timed_out and not all(out_of_reach(robot, target) for target in request.targets):
         return "time", f"no solution in time; {away}"
     return "unreachable", f"{away} from the goal"
 

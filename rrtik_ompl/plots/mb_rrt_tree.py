@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.ik.mb_rrt.run import Run
+from rrtik_ompl.ik.mb_rrt.run import TreeSearch
 from rrtik_ompl.plots.joints import COLORS, plot_format, save_figure, tidy
 
-MOST_COLORS = 6  # one an index; then they repeat
+MAX_COLORS = 6  # one an index; then they repeat
 INK, GREY = COLORS[6], COLORS[7]
 
 
-def plot_tree(run: Run, file: str | os.PathLike[str]) -> None:
+def plot_tree(run: TreeSearch, file: str | os.PathLike[str]) -> None:
     """Draw a planar tree: links by index, the solution region of each index in the same colour, the chain found.
 
     The same input gives the same file.
@@ -28,7 +28,7 @@ def plot_tree(run: Run, file: str | os.PathLike[str]) -> None:
         InputError: If the run is not planar, the ending is another one, or the file cannot be written.
     """
     plot_format(file)
-    require(run, Run, "tree to plot")
+    require(run, TreeSearch, "tree to plot")
     if run.links.dimension != 2:
         raise InputError(
             "tree to plot: it grows in space, and only planar ones are drawn; see rrtik_ompl.viewer.drawing.tree_marks"
@@ -46,10 +46,10 @@ def plot_tree(run: Run, file: str | os.PathLike[str]) -> None:
 
 
 def _color(index: int) -> str:
-    return COLORS[(index - 1) % MOST_COLORS]
+    return COLORS[(index - 1) % MAX_COLORS]
 
 
-def _region(panel: Any, run: Run, index: int) -> None:
+def _region(panel: Any, run: TreeSearch, index: int) -> None:
     """The ring about the goal in which the joint of an index can be part of a solution."""
     from matplotlib.patches import Annulus, Circle
 
@@ -61,7 +61,7 @@ def _region(panel: Any, run: Run, index: int) -> None:
     panel.add_patch(Circle((x, y), far, fill=False, edgecolor=_color(index), linewidth=1.0, alpha=0.8, zorder=1))
 
 
-def _links(panel: Any, run: Run) -> None:
+def _links(panel: Any, run: TreeSearch) -> None:
     """Every edge of the tree, and nodes outside their region as crosses."""
     from matplotlib.collections import LineCollection
 
@@ -80,14 +80,14 @@ def _links(panel: Any, run: Run) -> None:
             panel.plot(*level[far].T, linestyle="none", marker="x", markersize=4.5, color=_color(index), zorder=3)
 
 
-def _chain(panel: Any, run: Run) -> None:
+def _chain(panel: Any, run: TreeSearch) -> None:
     chain = run.chain
     panel.plot(*chain.T, color=INK, linewidth=2.6, marker="o", markersize=5, zorder=5, label="solution")
     panel.plot(*run.goal, marker="*", markersize=15, color=COLORS[1], markeredgecolor="white", zorder=6)
     panel.plot(0.0, 0.0, marker="s", markersize=8, color=INK, zorder=6)
 
 
-def _frame(panel: Any, run: Run) -> None:
+def _frame(panel: Any, run: TreeSearch) -> None:
     reach = 1.06 * run.links.reach
     low = np.minimum(-0.35 * reach, run.goal - run.links.remaining[1] * 1.04)
     high = np.maximum(0.35 * reach, run.goal + run.links.remaining[1] * 1.04)

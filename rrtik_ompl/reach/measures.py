@@ -67,7 +67,7 @@ class Manipulability(Counter):
     """The largest seen."""
 
     def quality(self, robot: Robot, Q: Matrix) -> Vector:
-        """Product of the singular values of the Jacobian (Yoshikawa 1985), as many as there are joints, at most six."""
+        """Product of the singular values of the Jacobian [31], as many as there are joints, at most six."""
         jacobian = robot.jacobian_batch(Q)
         flipped = jacobian.transpose(0, 2, 1)
         gram = flipped @ jacobian if robot.dof < 6 else jacobian @ flipped  # the smaller of the two

@@ -20,10 +20,10 @@ SAMPLES = 200_000
 BLOCK = 20_000  # postures at a time
 TURNS = 16  # of the first joint for each of them: the whole arm turns as one body, which needs no kinematics
 CELLS = 18  # of the grid across the farthest reach, if no size is given
-MOST_CELLS = 4_000_000
+MAX_CELLS = 4_000_000
 PROBE = 4096  # postures that tell how large the grid must be
 BELOW = 1e-3  # of a cell: the layer of a planar arm ends so far above the arm, which is seen from above
-ROOM = 1.1  # how much larger than what the probe reached
+PROBE_MARGIN = 1.1  # how much larger than what the probe reached
 
 
 def reach_map(
@@ -42,7 +42,7 @@ def reach_map(
         robot: The arm.
         measure: ``orientations``: share of 64 evenly spread directions (planar arms: of the plane) in which the tip's
             axis was seen to point; ``manipulability``: the largest product of the Jacobian's singular values
-            seen, sqrt(det(J J^T)) from six joints on (Yoshikawa 1985), metres and radians as they are;
+            seen, sqrt(det(J J^T)) from six joints on [31], metres and radians as they are;
             ``samples``: how many came.
         cell: Side of a cell [m]; about an 18th of the reach if None.
         samples: Postures to draw; where nothing but the arm is looked at, each in 16 turns of the first joint.
@@ -115,14 +115,14 @@ def _grid(robot: Robot, base: Vector, cell: float | None) -> tuple[Vector, float
     """Corner, cell size and numbers of cells of a grid that holds all tips; the base is on a cell's corner."""
     rng = np.random.default_rng(0)
     tips = robot.fk_batch(rng.uniform(*robot.finite_range(), (PROBE, robot.dof)))[:, :3, 3] - base
-    reach = ROOM * float(np.linalg.norm(tips, axis=1).max())
+    reach = PROBE_MARGIN * float(np.linalg.norm(tips, axis=1).max())
     size = reach / CELLS if cell is None else positive(cell, "cell")
-    margin = 0.5 * (ROOM - 1.0) * reach
+    margin = 0.5 * (PROBE_MARGIN - 1.0) * reach
     low, high = (np.floor if k == 0 else np.ceil for k in (0, 1))
     first, last = low((tips.min(axis=0) - margin) / size), high((tips.max(axis=0) + margin) / size)
     if robot.planar:
         first[2], last[2] = BELOW - 1.0, BELOW
     shape = tuple(int(n) for n in np.maximum(last - first, 1.0))
-    if np.prod(shape, dtype=float) > MOST_CELLS:
-        raise InputError(f"cell of {size:g} m makes {np.prod(shape, dtype=float):.3g} cells; at most {MOST_CELLS}")
+    if np.prod(shape, dtype=float) > MAX_CELLS:
+        raise InputError(f"cell of {size:g} m makes {np.prod(shape, dtype=float):.3g} cells; at most {MAX_CELLS}")
     return base + size * first, size, (shape[0], shape[1], shape[2])

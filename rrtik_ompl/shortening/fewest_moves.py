@@ -21,7 +21,7 @@ from rrtik_ompl.world import World
 from rrtik_ompl.world.motion_queries import Stop, never
 
 ROUNDS = 10
-MOST_CELLS = 2_000_000  # of a grid
+MAX_CELLS = 2_000_000  # of a grid
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,8 +131,8 @@ def grid_route(problem: Problem, step: float) -> Matrix | None:
         raise InputError(f"grid_route: step must be greater than 0, got {step:g}")
     lower, upper = turning_limits(world.robot, ends)
     size = float(np.prod((upper - lower) / step + 2.0))
-    if size > MOST_CELLS:
-        raise InputError(f"grid_route: {size:.1e} cells are too many (at most {MOST_CELLS:.0e}); use a larger step")
+    if size > MAX_CELLS:
+        raise InputError(f"grid_route: {size:.1e} cells are too many (at most {MAX_CELLS:.0e}); use a larger step")
     limits = zip(lower, upper, ends.T, strict=True)
     values = [np.union1d(np.linspace(low, high, int((high - low) / step) + 1), both) for low, high, both in limits]
     lattice = MoveLattice(values, world.motion_valid_batch, np.ones(world.robot.dof))

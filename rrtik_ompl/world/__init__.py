@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Matrix, finite_array
 from rrtik_ompl.collision.bodies import colliding_pairs, link_bodies, scene_bodies
-from rrtik_ompl.collision.certificate import Certificate, standing_contact
+from rrtik_ompl.collision.certificate import Certificate, fixed_contact
 from rrtik_ompl.collision.contacts import Contact as Contact
 from rrtik_ompl.collision.contacts import inside, measured
 from rrtik_ompl.collision.motion_bound import displacement_weights, step_counts
@@ -101,7 +101,7 @@ class World:
         self._certificate = Certificate(robot, self.bodies, pairs)
         self._checks = CollisionChecks(robot, self.bodies, moving, conservative=accuracy == "conservative")
         standing = tuple(p for p in pairs if all(self.bodies[i].joint == 0 for i in p))
-        self._always_colliding = standing_contact(robot, self.bodies, standing) is not None
+        self._always_colliding = fixed_contact(robot, self.bodies, standing) is not None
 
     def __repr__(self) -> str:
         return f"World({self.robot.name}, {self.scene}, motion_resolution={self.motion_resolution:g} m)"

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Vector, finite_array
 from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.collision.certificate import standing_contact
+from rrtik_ompl.collision.certificate import fixed_contact
 from rrtik_ompl.collision.motion_bound import step_counts
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast import FREE, FastWorld
@@ -140,7 +140,7 @@ class MovingWorld:
 
     def _contact_of_base(self) -> str:
         """See ``blocked``; predicted places do not count, for nothing can be done about them."""
-        found = standing_contact(self.robot, tuple(self._bodies), self._fixed)
+        found = fixed_contact(self.robot, tuple(self._bodies), self._fixed)
         return "" if found is None else f"'{found[0]}' and '{found[1]}' overlap, and the base cannot give way"
 
 

@@ -62,7 +62,7 @@ def check_covers(geometry, count=6000):
     assert cover.dtype == np.float64
     assert cover.shape == (len(cover), 4)
     few = not is_mesh(geometry) or is_closed(geometry)
-    assert 1 <= len(cover) <= covers.MOST * (1 if few else covers.BALLS_OF_OPEN)
+    assert 1 <= len(cover) <= covers.MAX_BALLS * (1 if few else covers.BALLS_OF_OPEN)
     assert gap_outside(points_of(geometry, np.random.default_rng(1), count), cover) <= TOLERANCE
     assert_inside(inner_spheres(geometry), geometry)
 

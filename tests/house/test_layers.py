@@ -1,4 +1,4 @@
-"""The house is a ladder: a module imports only from those that stand before it."""
+"""What imports cost, and that what is imported is there; test_ladder holds who may import whom."""
 
 import ast
 import inspect
@@ -11,14 +11,6 @@ import pytest
 import rrtik_ompl
 from rrtik_tests.places import ROOT
 
-RUNGS = (
-    "errors arrays shapes files poses transitions robot",
-    "tip_distance task_region scene goal collision covers fast description catalog",
-    "world path problem ik problem_files moves reach",
-    "ompl_bridge planning shortening generated_problems",
-    "trajectory replanning plots",
-    "viewer sensing overlay benchmark pilot cli __main__",
-)
 PEERS = {
     "vamp",
     "roboplan",
@@ -30,51 +22,6 @@ PEERS = {
     "pyroboplan",
     "roboticstoolbox",
 }  # measured where they are installed
-LADDER = [name for rung in RUNGS for name in rung.split()]
-
-
-def _modules():
-    for file in sorted((ROOT / "rrtik_ompl").rglob("*.py")):
-        parts = file.relative_to(ROOT / "rrtik_ompl").with_suffix("").parts
-        if parts != ("__init__",):
-            yield parts[0], file
-
-
-def _imports(file):
-    for node in ast.walk(ast.parse(file.read_text())):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            yield node.module
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
-
-
-def test_every_module_has_its_place_on_the_ladder():
-    assert {room for room, _ in _modules()} == set(LADDER)
-
-
-@pytest.mark.parametrize(("room", "file"), list(_modules()), ids=lambda value: getattr(value, "stem", value))
-def test_a_module_imports_only_from_the_rungs_below(room, file):
-    allowed = set(LADDER[: LADDER.index(room)]) | {room}
-    inside = {name.split(".")[1] for name in _imports(file) if name.startswith("rrtik_ompl.")}
-    assert inside <= allowed | {n for n in inside if n not in LADDER}, f"{file.name} reaches up: {inside - allowed}"
-
-
-def test_the_core_knows_no_robot_and_no_planner():
-    reached = {name.split(".")[0] for _, file in _modules() for name in _imports(file)}
-    assert not reached & {"rrtik_planners", "rrtik_robots", "rrtik_bench"}
-
-
-def test_the_published_tables_know_no_planner_no_robot_and_no_script():
-    files = (ROOT / "bench" / "rrtik_bench").rglob("*.py")
-    reached = {name.split(".")[0] for file in files for name in _imports(file)}
-    assert not reached & {"rrtik_planners", "rrtik_robots", "bench"}
-
-
-def test_robots_and_planners_do_not_know_each_other():
-    for folder, other in (("planners", "rrtik_robots"), ("robots", "rrtik_planners")):
-        for file in (ROOT / folder).rglob("*.py"):
-            assert other not in {name.split(".")[0] for name in _imports(file)}, file
 
 
 @pytest.mark.parametrize(

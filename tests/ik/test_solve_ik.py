@@ -6,8 +6,8 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.ik.method_interface import Question
-from rrtik_ompl.ik.numeric.restarts import ROUNDS, restarted
+from rrtik_ompl.ik.method_interface import IkRequest
+from rrtik_ompl.ik.numeric.restarts import MAX_ROUNDS, restarted
 from rrtik_ompl.ik.random_stream import RandomStream
 from rrtik_ompl.ik.solve import list_ik_methods, solve_ik
 from rrtik_ompl.poses import pose_from_rpy
@@ -212,7 +212,7 @@ def test_a_closed_form_looks_at_every_grasp_of_a_large_set():
 
 def test_methods_that_walk_from_random_starts_give_every_target_a_round():
     robot = rrtik.load_robot("ur5")
-    goals = tuple(rrtik.PositionGoal([5.0 + k, 0.0, 0.0]) for k in range(2 * ROUNDS))
+    goals = tuple(rrtik.PositionGoal([5.0 + k, 0.0, 0.0]) for k in range(2 * MAX_ROUNDS))
     asked = []
 
     def stay(robot, target, Q):
@@ -220,7 +220,7 @@ def test_methods_that_walk_from_random_starts_give_every_target_a_round():
         return Q, 1
 
     rest = {"near": np.zeros(6), "accept": lambda Q: np.ones(len(Q), dtype=bool), "all": False, "deadline": np.inf}
-    restarted(stay, Question(robot, rrtik.GoalSet(goals), goals, random=RandomStream(0), **rest))
+    restarted(stay, IkRequest(robot, rrtik.GoalSet(goals), goals, random=RandomStream(0), **rest))
     assert asked == list(goals)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.ik.mb_rrt.c_space import grow_in_joint_space
 from rrtik_ompl.ik.mb_rrt.growth import grow, one_link
 from rrtik_ompl.ik.mb_rrt.links import Links, sunflower
-from rrtik_ompl.ik.mb_rrt.run import Run, first_hit
+from rrtik_ompl.ik.mb_rrt.run import TreeSearch, first_hit
 from rrtik_ompl.ik.mb_rrt.variants import surface
 
 C_SPACE = "c-space"
@@ -74,7 +74,9 @@ def arm(count: int) -> Links:
     return Links([10.0] * count)
 
 
-def one_run(links: Links, name: str, goal: np.ndarray, tolerance: float, rng: np.random.Generator, stop: bool) -> Run:
+def one_run(
+    links: Links, name: str, goal: np.ndarray, tolerance: float, rng: np.random.Generator, stop: bool
+) -> TreeSearch:
     """One search of a variant, ended at its first success if ``stop``."""
     if name == C_SPACE:
         return grow_in_joint_space(links, goal, tolerance=tolerance, rng=rng, stop=stop)
@@ -99,13 +101,13 @@ def measure(count: int, name: str, seed: int, thinned: int = 1) -> dict[float, M
     return {tol: _row([*whole, *short], tol, rho_all) for tol in tolerances}
 
 
-def aimed_at(tree: Run, goal: np.ndarray, tolerance: float) -> Run:
+def aimed_at(tree: TreeSearch, goal: np.ndarray, tolerance: float) -> TreeSearch:
     """A tree that knows no goal, judged by another one."""
     misses = np.linalg.norm(tree.nodes[-1] - goal, axis=1)
-    return Run(tree.links, goal, tree.nodes, tree.parents, misses, first_hit(misses, tolerance))
+    return TreeSearch(tree.links, goal, tree.nodes, tree.parents, misses, first_hit(misses, tolerance))
 
 
-def _row(runs: list[Run], tolerance: float, rho_all: tuple[float, float]) -> Measured:
+def _row(runs: list[TreeSearch], tolerance: float, rho_all: tuple[float, float]) -> Measured:
     hits = [first_hit(run.misses, tolerance) for run in runs]
     solved = [hit for hit in hits if hit]
     stopped = [run.until(hit) if hit else run for run, hit in zip(runs, hits, strict=True)]
@@ -113,7 +115,7 @@ def _row(runs: list[Run], tolerance: float, rho_all: tuple[float, float]) -> Mea
     return Measured(100.0 * len(solved) / len(runs), mean, _rho(stopped), rho_all)
 
 
-def _rho(runs: list[Run]) -> tuple[float, float]:
+def _rho(runs: list[TreeSearch]) -> tuple[float, float]:
     """Mean share of nodes outside their region, at a margin of 1 % of the reach and strictly."""
     loose, strict = (float(np.mean([run.rho(margin) for run in runs])) for margin in (0.01, 0.0))
     return loose, strict

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.fast.ik.branch_layout import REACH_TOLERANCE, SHOULDER_ROOT, SINGULAR
-from rrtik_ompl.ik.analytic.analytic_solver import Branches, ClosedFormSolver, two_links, wrapped
+from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver, Branches, two_links, wrapped
 
 Numbers = NDArray[np.float64]
 MISFIT = 1e-9  # sine of the angle between axis 5 and where a pose wants it; more is out of reach for five joints
@@ -47,23 +47,23 @@ class PumaGeometry:
         return float(np.hypot(self.a3, self.d4))
 
 
-def pose_form(geometry: PumaGeometry) -> ClosedFormSolver:
+def pose_form(geometry: PumaGeometry) -> AnalyticSolver:
     """The six-joint arm. With the wrist straight (family ``wrist``) theta4 is free, and theta6 follows it."""
     solve, near = partial(puma_branches, geometry), partial(nearness, geometry)
     numbers = (geometry.base, geometry.a2, geometry.d3, geometry.forearm, float(np.arctan2(geometry.d4, geometry.a3)))
-    return ClosedFormSolver("tip", "pose", BRANCHES, ("wrist",), (3,), solve, near, kernel="ball_arm", numbers=numbers)
+    return AnalyticSolver("tip", "pose", BRANCHES, ("wrist",), (3,), solve, near, kernel="ball_arm", numbers=numbers)
 
 
-def position_form(geometry: PumaGeometry) -> ClosedFormSolver:
+def position_form(geometry: PumaGeometry) -> AnalyticSolver:
     """The first three joints in the modified Denavit-Hartenberg sense (theta2, theta3 turn downwards)."""
     solve = partial(arm_branches, geometry)
-    return ClosedFormSolver("tip", "position", ARM_BRANCHES, (), (), solve, partial(nearness, geometry))
+    return AnalyticSolver("tip", "position", ARM_BRANCHES, (), (), solve, partial(nearness, geometry))
 
 
-def five_joint_form(geometry: PumaGeometry, tool: float) -> ClosedFormSolver:
+def five_joint_form(geometry: PumaGeometry, tool: float) -> AnalyticSolver:
     """Five joints and a segment of length ``tool`` [m] along the last axis, for poses; points leave two joints free."""
     solve = partial(five_joint_branches, geometry, tool)
-    return ClosedFormSolver("tip", "pose", ARM_BRANCHES, (), (), solve, partial(nearness, geometry))
+    return AnalyticSolver("tip", "pose", ARM_BRANCHES, (), (), solve, partial(nearness, geometry))
 
 
 def puma_branches(g: PumaGeometry, poses: Numbers, near: Matrix | None = None, slack: float = 0.0) -> Branches:

@@ -1,6 +1,6 @@
 """The curves of solutions that singular poses of the TITAN 4 have: which values of the free angle the arm can reach.
 
-Sections 8.1 to 8.3 of the kinematics specification ask for a scan; the intervals have a closed form. With K the wrist
+The intervals have a closed form, so that no scan is needed (poses: [1, ch. 3, app. A to C]). With K the wrist
 point seen from the shoulder axis, the elbow triangle closes where |a2 - a3| <= |K - a4 (cos psi, sin psi)| <= a2 + a3,
 which bounds cos(psi - angle of K) from both sides.
 """

@@ -1,6 +1,6 @@
 """Inverse kinematics of the TITAN 4 in closed form: eight branches, and a representative of every singular family.
 
-Source: section 7 of the kinematics specification. Axes 2, 3, 4 are parallel, axes 5 and 6 meet in the wrist point
+Source: [1, ch. 3, app. A to C]. Axes 2, 3, 4 are parallel, axes 5 and 6 meet in the wrist point
 P = E - d6 w. The azimuth follows from P (front or back), the wrist yaw and the sum psi of the three pitch angles from
 w (two ways), and what is left is a triangle (elbow up or down). Arrays are kept as (shoulder, wrist, elbow, m).
 """
@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.fast.ik.branch_layout import NORMAL, ROUNDING, SINGULAR, UNSURE
-from rrtik_ompl.ik.analytic.analytic_solver import Branches, ClosedFormSolver, two_links, wrapped
+from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver, Branches, two_links, wrapped
 from rrtik_robots.titan4.families import nearest_azimuth, nearest_psi, psi_within_rounding
 from rrtik_robots.titan4.geometry import TitanGeometry
 from rrtik_robots.titan4.singularities import nearness
 
 FAMILIES = ("wrist", "shoulder")
 BRANCHES = tuple(" ".join(tag) for tag in product(("front", "back"), ("near", "far"), ("up", "down")))
-MOST_ROOM = 0.5  # of the part of the gripper axis in the arm plane: how far rounding may move it at most
+MAX_SHIFT = 0.5  # of the part of the gripper axis in the arm plane: how far rounding may move it at most
 SIGMA = np.array([1.0, -1.0])[:, None]  # the two ways of the wrist: theta5 and pi - theta5
 
 
@@ -40,7 +40,7 @@ class Target:
         return Target(self.u[:, which], self.w[:, which], self.p[:, which])
 
 
-def closed_form(geometry: TitanGeometry) -> ClosedFormSolver:
+def closed_form(geometry: TitanGeometry) -> AnalyticSolver:
     """The arm's own inverse kinematics for frame ``grip_point``.
 
     Where the gripper axis is normal to the arm plane (family ``wrist``) psi is free, and where P lies on the azimuth
@@ -48,7 +48,7 @@ def closed_form(geometry: TitanGeometry) -> ClosedFormSolver:
     """
     solve, near = partial(titan_branches, geometry), partial(nearness, geometry)
     numbers = (geometry.a1, geometry.a2, geometry.a3, geometry.a4, geometry.d6)
-    return ClosedFormSolver(
+    return AnalyticSolver(
         "grip_point", "pose", BRANCHES, FAMILIES, (0, 1), solve, near, kernel="parallel_axes", numbers=numbers
     )
 
@@ -150,7 +150,7 @@ def _representatives(
     radius = target.p[0] * turn[0] + target.p[1] * turn[1]
     free, _ = nearest_psi(g, radius, target.p[2], wanted)
     close = any_psi | (np.abs(wrapped(free - psi)) * h < SINGULAR)
-    room = np.clip(SINGULAR / np.maximum(np.hypot(*target.p[:2]), SINGULAR), SINGULAR, MOST_ROOM)
+    room = np.clip(SINGULAR / np.maximum(np.hypot(*target.p[:2]), SINGULAR), SINGULAR, MAX_SHIFT)
     height = np.broadcast_to(target.p[2], x.shape)
     other, moved, fits = psi_within_rounding(g, radius, height, SIGMA * x, SIGMA * target.w[2], room)
     fits &= ~close & (h < UNSURE)

@@ -1,6 +1,6 @@
 """How near the TITAN 4 is to its singularities: three families and the three published cases of self-motion.
 
-Source: sections 9 and 10 of the kinematics specification. The determinant of the Jacobian is
+Source: [1, ch. 3, app. A to C]. The determinant of the Jacobian is
 -a2 a3 r sin(theta3) cos(theta5) with r the signed distance of the wrist point from the azimuth axis.
 """
 

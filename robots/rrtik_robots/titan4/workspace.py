@@ -1,7 +1,7 @@
 """Where the TITAN 4 can be used on its vehicle: in reach with a margin, seen by a camera, clear of the vehicle.
 
-Source: section 11 of the kinematics specification. The published figures with numbers are lost: the poses of cameras
-and vehicle are **chosen** here, their sizes are the specification's defaults; everything can be set.
+Source: [1, ch. 3]. The published figures with numbers are lost: poses and sizes of cameras and vehicle are **chosen**
+here; everything can be set.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from rrtik_ompl.robot import Robot
 PITCHES_DEG = tuple(range(-90, 91, 15))  # of the gripper in the arm plane, with a straight wrist
 CELL = 0.025  # [m]
 GRID = ((-1.4, 2.2), (-2.1, 2.2), (-1.7, 2.0))  # x, y, z in the base frame [m]
-FAR_AWAY = frozen([[98.0, 98.0, 98.0], [99.0, 99.0, 99.0]])  # a vehicle that is in nobody's way
+FAR_VEHICLE = frozen([[98.0, 98.0, 98.0], [99.0, 99.0, 99.0]])  # a vehicle that is in nobody's way
 JOINTS_OF_POINTS = ("forearm", "wrist", "yaw_housing")  # links whose origins are elbow, wrist pitch and wrist yaw axis
 
 
@@ -157,7 +157,7 @@ def effective_slices(space: EffectiveWorkspace | None = None, *, cell: float = C
         cell: Of the grid [m].
     """
     used = EffectiveWorkspace(load_robot("titan4", limits="envelope")) if space is None else space
-    reach = replace(used, cameras=[ALL_SEEING], vehicle=FAR_AWAY, margin=0.0)
+    reach = replace(used, cameras=[ALL_SEEING], vehicle=FAR_VEHICLE, margin=0.0)
     x, y, z = (np.arange(low, high, cell) for low, high in GRID)
     views = (
         ("side, straight ahead", "z [m]", z, 2, reach.side_view(x, z), used.side_view(x, z)),

@@ -11,7 +11,7 @@ BRANCHES, DOF = 8, 6
 FROM_WORLD, TO_FRAME, NUMBERS, LOWEST, HIGHEST, TURNING, LIMB = range(7)
 
 # Call. ROWS: targets; BLOCKS: of WIDTH of them, the last one filled up · POSES: T_world_tip, 16 numbers each · NEAR:
-# configurations, 6 numbers each, 0: none · SLACK: one number, see `ClosedFormSolver` · the answers, targets last,
+# configurations, 6 numbers each, 0: none · SLACK: one number, see `AnalyticSolver` · the answers, targets last,
 # WIDTH times BLOCKS of them: Q: joint values, joint by joint of each branch; REAL, FITS: of each branch, whether it
 # reaches the target and whether it is inside the limits; ODD: whether the answer is not to be used; RESIDUALS: of each
 # branch its distance, then of each its angle (0: not wanted) · SCRATCH: see below

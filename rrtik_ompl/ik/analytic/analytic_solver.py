@@ -1,6 +1,6 @@
 """What a robot brings that knows its own inverse kinematics: a function from poses to branches, and what to call them.
 
-A robot's folder makes one `ClosedFormSolver` and hands it to `Robot` as ``closed_form``;
+A robot's folder makes one `AnalyticSolver` and hands it to `Robot` as ``closed_form``;
 `rrtik_ompl.ik.analytic.closed_form` places it in the world, applies the joint limits and checks the answers.
 """
 
@@ -24,7 +24,7 @@ class Branches:
         q: Joint values, angles in (-pi, pi], shape (m, b, dof). A branch that is not real holds the posture that
             comes nearest on that branch, so that its residual says how far the pose is out of reach.
         real: Which branches reach the pose, joint limits aside, shape (m, b).
-        singular: Bit k is set if the pose belongs to family k of `ClosedFormSolver.families`: it has a whole curve of
+        singular: Bit k is set if the pose belongs to family k of `AnalyticSolver.families`: it has a whole curve of
             solutions, of which ``q`` holds representatives. Shape (m,).
     """
 
@@ -34,7 +34,7 @@ class Branches:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ClosedFormSolver:
+class AnalyticSolver:
     """The inverse kinematics of one arm in formulas.
 
     Attributes:

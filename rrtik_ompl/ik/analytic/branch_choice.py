@@ -17,7 +17,7 @@ from rrtik_ompl.robot import Robot
 JUMP = 0.2  # [rad] or [m] of any joint between two points of a trajectory: more is another branch, not motion
 JUMP_COST = 1e3  # more than any motion can cost
 TIE = 1e-9  # distances this near count as equal
-MOST = 32  # candidates kept of a singular point
+MAX_CANDIDATES = 32  # candidates kept of a singular point
 REFINEMENTS = 6  # sweeps along the curve of a singular pose, each 18 times finer than the one before
 
 
@@ -170,7 +170,7 @@ def _candidates(
     close = solutions(robot, np.broadcast_to(goal, (len(before), *goal.shape)), near=before, check=False)
     hints, tags = np.nonzero(close.valid)
     q = close.branches[hints, tags]
-    nearest_first = np.argsort(np.linalg.norm(q - before[hints], axis=1), kind="stable")[:MOST]
+    nearest_first = np.argsort(np.linalg.norm(q - before[hints], axis=1), kind="stable")[:MAX_CANDIDATES]
     return q[nearest_first], tags[nearest_first]
 
 

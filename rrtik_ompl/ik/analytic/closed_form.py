@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix, finite_array
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.ik.analytic.analytic_solver import ClosedFormSolver
+from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver
 from rrtik_ompl.ik.analytic.kernel_branches import kernel_branches
 from rrtik_ompl.ik.analytic.planar import planar_form
 from rrtik_ompl.ik.analytic.reference_branches import reference_branches, tip_fault
@@ -42,13 +42,13 @@ class ClosedForm:
     residuals: NDArray[np.float64] | None
 
 
-def form_of(robot: Robot) -> ClosedFormSolver:
+def form_of(robot: Robot) -> AnalyticSolver:
     """What the robot brings, or the form of planar arms if it is one.
 
     Raises:
         InputError: If there is none; it names the methods that fit.
     """
-    if isinstance(robot.closed_form, ClosedFormSolver):
+    if isinstance(robot.closed_form, AnalyticSolver):
         return robot.closed_form
     form = planar_form(robot)
     if form is None:
@@ -61,7 +61,7 @@ def form_of(robot: Robot) -> ClosedFormSolver:
 
 def has_closed_form(robot: Robot) -> bool:
     """Whether `form_of` finds a closed form."""
-    return isinstance(robot.closed_form, ClosedFormSolver) or planar_form(robot) is not None
+    return isinstance(robot.closed_form, AnalyticSolver) or planar_form(robot) is not None
 
 
 def solutions(
@@ -128,7 +128,7 @@ def family(robot: Robot, target: ArrayLike, *, samples: int = SWEEP, slack: floa
     return different
 
 
-def _poses(robot: Robot, form: ClosedFormSolver, targets: ArrayLike) -> NDArray[np.float64]:
+def _poses(robot: Robot, form: AnalyticSolver, targets: ArrayLike) -> NDArray[np.float64]:
     if form.kind == "position" and np.ndim(targets) == 2:
         points = finite_array(targets, (None, 3), "targets")
         poses = np.tile(np.eye(4), (len(points), 1, 1))

@@ -16,7 +16,7 @@ from rrtik_ompl.fast.ik.branch_layout import BRANCHES, DOF
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.fast.tables.robot_tables import Table, table
-from rrtik_ompl.ik.analytic.analytic_solver import ClosedFormSolver
+from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver
 from rrtik_ompl.ik.analytic.reference_branches import mountings, reference_branches
 from rrtik_ompl.ik.call_memory import WORD, CallLayout, CallMemory
 from rrtik_ompl.ik.serial_chain import limb_of, pose_numbers
@@ -26,7 +26,7 @@ UNBOUNDED_ANGLE = 1e300  # limits of continuous joints: kernels know no infinity
 
 
 def kernel_branches(
-    robot: Robot, form: ClosedFormSolver, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool
+    robot: Robot, form: AnalyticSolver, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool
 ) -> list[NDArray[Any]] | None:
     """As `reference_branches`, which answers the poses that are singular; None if there is no kernel for the arm."""
     kernels = library(layout.KERNELS) if form.kernel else None
@@ -53,7 +53,7 @@ class _Arm:
 
 
 @lru_cache(maxsize=64)
-def _arm_of(robot: Robot, form: ClosedFormSolver) -> _Arm | None:
+def _arm_of(robot: Robot, form: AnalyticSolver) -> _Arm | None:
     """None if forward kinematics in kernels does not know such a limb."""
     limb = limb_of(robot)
     if limb is None or limb.header[ik_layout.JOINTS] != DOF or limb[ik_layout.SLIDING].any():

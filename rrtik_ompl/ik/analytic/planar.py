@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.ik.analytic.analytic_solver import Branches, ClosedFormSolver, two_links, wrapped
+from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver, Branches, two_links, wrapped
 from rrtik_ompl.robot import Robot
 
 BRANCHES = ("left", "right")
@@ -56,7 +56,7 @@ class PlanarArm:
 
 
 @lru_cache(maxsize=64)
-def planar_form(robot: Robot) -> ClosedFormSolver | None:
+def planar_form(robot: Robot) -> AnalyticSolver | None:
     """The closed form of a robot whose two or three joints turn about parallel axes, one after another; else None."""
     chain = robot.chain
     plain = np.array_equal(chain.gain, np.eye(robot.dof)) and not chain.offset.any() and not robot.prismatic.any()
@@ -75,7 +75,7 @@ def planar_form(robot: Robot) -> ClosedFormSolver | None:
         return None
     arm = PlanarArm(to_plane, links, places[-1])
     kind = "position" if robot.dof == 2 else "pose"
-    return ClosedFormSolver(robot.tip, kind, BRANCHES, (), (), arm.solve, arm.nearness)
+    return AnalyticSolver(robot.tip, kind, BRANCHES, (), (), arm.solve, arm.nearness)
 
 
 def _plane(origin: Vector, axis: Vector) -> NDArray[np.float64]:

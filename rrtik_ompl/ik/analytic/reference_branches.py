@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import TAU, Matrix
-from rrtik_ompl.ik.analytic.analytic_solver import ClosedFormSolver, wrapped
+from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver, wrapped
 from rrtik_ompl.ik.tip_columns import tip_columns
 from rrtik_ompl.robot import FEW, LIMIT_TOLERANCE, Robot
 
@@ -17,7 +17,7 @@ BLOCK = 2048  # targets at a time: their arrays stay in the cache
 
 
 @lru_cache(maxsize=64)
-def tip_fault(robot: Robot, form: ClosedFormSolver) -> str:
+def tip_fault(robot: Robot, form: AnalyticSolver) -> str:
     """A line if the robot's tip is carried by another joint than the frame that the form places; else ""."""
     tip, own = (robot.model.frames[robot.model.getFrameId(name)] for name in (robot.tip, form.frame))
     if tip.parentJoint == own.parentJoint:
@@ -26,7 +26,7 @@ def tip_fault(robot: Robot, form: ClosedFormSolver) -> str:
 
 
 def reference_branches(
-    robot: Robot, form: ClosedFormSolver, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool
+    robot: Robot, form: AnalyticSolver, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool
 ) -> list[NDArray[Any]]:
     """What `rrtik_ompl.ik.analytic.closed_form.ClosedForm` holds, in its order, the targets in the last axis of each.
 
@@ -35,7 +35,7 @@ def reference_branches(
         form: Its closed form.
         poses: T_world_tip, shape (m, 4, 4).
         hints: Configurations that solutions are wanted near to, shape (m, dof), or None.
-        slack: See `ClosedFormSolver`.
+        slack: See `AnalyticSolver`.
         check: Whether residuals are wanted; their array is empty if not.
     """
     parts = []
@@ -46,7 +46,7 @@ def reference_branches(
 
 
 def _block(
-    robot: Robot, form: ClosedFormSolver, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool
+    robot: Robot, form: AnalyticSolver, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool
 ) -> list[NDArray[Any]]:
     """The same for as many targets as the cache has room for."""
     found = form(_placed(robot, form, poses), hints, slack)
@@ -56,7 +56,7 @@ def _block(
     return [q, real, valid, np.array(found.singular), residuals]
 
 
-def _placed(robot: Robot, form: ClosedFormSolver, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+def _placed(robot: Robot, form: AnalyticSolver, poses: NDArray[np.float64]) -> NDArray[np.float64]:
     """T_base_frame for T_world_tip: the base may stand anywhere, and the tip may be another frame of the last link."""
     T_base_world, T_tip_frame = mountings(robot, form)
     if T_base_world is not None:
@@ -65,7 +65,7 @@ def _placed(robot: Robot, form: ClosedFormSolver, poses: NDArray[np.float64]) ->
 
 
 @lru_cache(maxsize=64)
-def mountings(robot: Robot, form: ClosedFormSolver) -> tuple[Matrix | None, Matrix | None]:
+def mountings(robot: Robot, form: AnalyticSolver) -> tuple[Matrix | None, Matrix | None]:
     """T_base_world and T_tip_frame, None where they are the identity."""
     frames = robot.model.frames
     base, tip, own = (frames[robot.model.getFrameId(name)] for name in (robot.link_names[0], robot.tip, form.frame))

@@ -1,8 +1,7 @@
 """Cyclic coordinate descent: one joint at a time, from the last to the first, each at its own optimum.
 
-Source: L.-C. T. Wang and C. C. Chen, "A combined optimization method for solving the inverse kinematics problem of
-mechanical manipulators", IEEE Transactions on Robotics and Automation 7 (1991), 489-499. The cost of a pose is the
-squared distance of the tip and of the ends of its three axes, drawn as long as a part of the reach.
+Source: [27]. The cost of a pose is the squared distance of the tip and of the ends of its three axes, drawn as long as
+a part of the reach.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Steps by the Jacobian: damped least squares for many starts at once, and Pinocchio's iteration for one.
 
-Sources: C. W. Wampler, "Manipulator inverse kinematic solutions based on vector formulations and damped least-squares
-methods", IEEE Transactions on Systems, Man and Cybernetics 16 (1986), 93-101; the inverse kinematics example in
-Pinocchio's documentation (step 0.1, damping 1e-12, at most 1000 steps), in which joints know no limits.
+Sources: [24]; the inverse kinematics example in Pinocchio's documentation (step 0.1, damping 1e-12, at most 1000
+steps), which does not regard joint limits.
 """
 
 from __future__ import annotations

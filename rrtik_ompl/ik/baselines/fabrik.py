@@ -1,9 +1,8 @@
 """FABRIK: the joints as points at fixed distances, pulled to the goal from the tip, then back to the base.
 
-Source: A. Aristidou and J. Lasenby, "FABRIK: a fast, iterative solver for the inverse kinematics problem", Graphical
-Models 73 (2011), 243-260. On the way back each joint turns about its own axis, inside its limits, to where it
-brings the points after it nearest to where they were pulled: so the arm, in the plane or in space, stays what it is.
-With that the method converges no longer for certain, and other starts are tried.
+Source: [28]. On the way back each joint turns about its own axis, inside its limits, to where it brings the points
+after it nearest to where they were pulled, so that the arm keeps its joints in the plane and in space. With that
+convergence is no longer certain, and other starts are tried.
 """
 
 from __future__ import annotations

@@ -1,9 +1,7 @@
 """Particle swarms: several at once, with velocities, or fully resampled: every particle drawn anew each time.
 
-Sources: M. Clerc and J. Kennedy, "The particle swarm - explosion, stability, and convergence in a multidimensional
-complex space", IEEE Transactions on Evolutionary Computation 6 (2002), 58-73 (constriction); J. Kennedy, "Bare bones
-particle swarms", IEEE Swarm Intelligence Symposium 2003, 80-87 (no velocity: a particle is drawn from the normal
-distribution between its own best place and the swarm's).
+Sources: [29] (constriction); [30] (no velocity: a particle is drawn from the normal distribution between its own best
+place and the swarm's).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Chromosomes: 16 bits of Gray code a joint, and the window of joint values that they stand for.
 
-Source: GA-REB, equation 1. Every chromosome is a configuration inside its window, so that limits need no penalty.
+Source: [2], equation 1. Every chromosome is a configuration inside its window, so that limits need no penalty.
 """
 
 from __future__ import annotations

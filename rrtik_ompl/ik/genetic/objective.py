@@ -33,9 +33,9 @@ def score(
     options: GeneticOptions,
     accept: Callable[[Matrix], Mask],
 ) -> Score:
-    """Judge configurations, shape (m, dof).
+    """Score configurations, shape (m, dof).
 
-    The paper's fitness is 100 inches less the distance; as a tournament asks only who is better, the distance does.
+    The fitness in [2] is 100 inches less the distance; as a tournament asks only who is better, the distance does.
 
     Args:
         robot: The arm.
@@ -65,7 +65,7 @@ def score(
 
 
 def manipulability(robot: Robot, Q: Matrix, position_only: bool) -> Vector:
-    """Product of the singular values of the Jacobian, sqrt(det(J J^T)) (Yoshikawa 1985), lengths in units of the reach.
+    """Product of the singular values of the Jacobian, sqrt(det(J J^T)) [31], lengths in units of the reach.
 
     Args:
         robot: The arm.

@@ -16,7 +16,7 @@ DEGREE = float(np.pi / 180.0)
 
 @dataclass(frozen=True, slots=True)
 class GeneticOptions:
-    """Settings, those of the GA-REB paper unless said otherwise.
+    """Settings, those of [2] unless said otherwise.
 
     Attributes:
         population: Individuals, an even number.
@@ -30,7 +30,7 @@ class GeneticOptions:
         generations: Limit for the whole trajectory.
         stall: Generations without an improvement by 1 % after which the population is drawn anew; None: never.
         start_over: Generations without a point gained after which the trajectory begins anew; None: never.
-        refined: How many of the best individuals take a damped Newton step each generation (not in the paper).
+        refined: How many of the best individuals take a damped Newton step each generation (not in [2]).
         orientation_weight: What an angle counts [m/rad] beside the distance.
         motion_weight: What the joints' motion from the last point counts [m/rad].
         largest_step: Of any joint between two points [rad or m]; individuals farther away are not taken. None: any.

@@ -1,6 +1,6 @@
 """The genetic algorithm along a trajectory: one population follows a target that moves on whenever it is reached.
 
-Source: GA-REB. The bit strings are kept when the window moves, so that a constant chromosome is a constant velocity
+Source: [2]. The bit strings are kept when the window moves, so that a constant chromosome is a constant velocity
 (gain 0) or acceleration (gain 1), and the population predicts the next point.
 """
 
@@ -71,7 +71,7 @@ def follow_targets(
         near: Posture before the first point, shape (dof,): one individual begins there.
         deadline: Time of ``time.monotonic`` at which to stop.
     """
-    run = _Run(robot, targets, options, rng, accept, near)
+    run = GaRun(robot, targets, options, rng, accept, near)
     while len(run.points) < len(targets) and run.generation < options.generations:
         if time.monotonic() > deadline:
             return run.result(timed_out=True)
@@ -79,7 +79,7 @@ def follow_targets(
     return run.result(timed_out=False)
 
 
-class _Run:
+class GaRun:
     """The state of a run: a population, its window, the points gained so far, and what the restarts watch."""
 
     def __init__(
@@ -125,22 +125,22 @@ class _Run:
         return self.points[-1] if self.points else self.near
 
     def step(self) -> None:
-        """One generation: judge the population, then move on to the next point or breed."""
+        """One generation: score the population, then move on to the next point or breed."""
         Q = self.window.decode(self.genes)
         Q[: len(self.exact)] = self.exact
-        judged = score(self.robot, self.targets[len(self.points)], Q, self.last, self.options, self.will_do)
+        scored = score(self.robot, self.targets[len(self.points)], Q, self.last, self.options, self.will_do)
         self.generation += 1
         self.since_point += 1
-        self.remember(Q, judged)
-        if judged.reached.any():
-            self.advance(Q[int(np.argmin(np.where(judged.reached, judged.cost, np.inf)))])
+        self.remember(Q, scored)
+        if scored.reached.any():
+            self.advance(Q[int(np.argmin(np.where(scored.reached, scored.cost, np.inf)))])
         elif self.options.start_over is not None and self.since_point >= self.options.start_over:
             self.begin()
-        elif self.stands_still(float(judged.cost.min())):
+        elif self.has_stalled(float(scored.cost.min())):
             self.fresh += 1
             self.draw()
         else:
-            self.breed(Q, judged)
+            self.breed(Q, scored)
 
     def will_do(self, Q: Matrix) -> Mask:
         """Which configurations may be taken: near enough to the last point, and accepted."""
@@ -151,12 +151,12 @@ class _Run:
             good[good] = self.accept(Q[good])
         return good
 
-    def remember(self, Q: Matrix, judged: Score) -> None:
+    def remember(self, Q: Matrix, scored: Score) -> None:
         """Keep the best distance for the record, and the posture that came nearest to the farthest point so far."""
-        best = int(np.argmin(judged.cost))
-        self.distances.append(float(judged.distance[best]))
-        if len(self.points) >= len(self.farthest) and judged.cost[best] < self.least:
-            self.nearest, self.least = Q[best].copy(), float(judged.cost[best])
+        best = int(np.argmin(scored.cost))
+        self.distances.append(float(scored.distance[best]))
+        if len(self.points) >= len(self.farthest) and scored.cost[best] < self.least:
+            self.nearest, self.least = Q[best].copy(), float(scored.cost[best])
 
     def advance(self, q: Vector) -> None:
         """A point is gained: place the window for the next one; the bit strings stay as they are."""
@@ -171,7 +171,7 @@ class _Run:
             most = np.inf if self.options.largest_step is None else self.options.largest_step
             self.window = around(self.robot, q + np.clip(self.gain * step, -most, most), self.options.window)
 
-    def stands_still(self, cost: float) -> bool:
+    def has_stalled(self, cost: float) -> bool:
         """Whether the best cost has not improved for as long as the options allow."""
         if cost < self.best - (1.0 - IMPROVEMENT) * abs(self.best) or not np.isfinite(self.best):
             self.best, self.standing = cost, 0
@@ -179,11 +179,11 @@ class _Run:
             self.standing += 1
         return self.options.stall is not None and self.standing >= self.options.stall
 
-    def breed(self, Q: Matrix, judged: Score) -> None:
+    def breed(self, Q: Matrix, scored: Score) -> None:
         """The next generation; the best individuals, if some are to be refined, take a damped Newton step into it."""
-        self.genes = children(self.rng, self.genes, judged.cost, self.options)
+        self.genes = children(self.rng, self.genes, scored.cost, self.options)
         if self.options.refined:
-            best = np.argsort(judged.cost, kind="stable")[: self.options.refined]
+            best = np.argsort(scored.cost, kind="stable")[: self.options.refined]
             self.exact, _ = descend(self.robot, self.targets[len(self.points)], Q[best], iterations=1)
             self.genes[: len(best)] = self.window.encode(self.exact)
 

@@ -1,6 +1,6 @@
 """Steps by the Jacobian down the metric of IKURT: Levenberg-Marquardt for many configurations at once, inside bounds.
 
-Source: T. Sugihara, as in :mod:`rrtik_ompl.ik.numeric.reference_descent`: the damping is half the squared residual
+Source: [22], as in :mod:`rrtik_ompl.ik.numeric.reference_descent`: the damping is half the squared residual
 plus a small constant. Joints that a step would push through a bound are held and the step is solved for again, so that
 goals on a limit are reached.
 """

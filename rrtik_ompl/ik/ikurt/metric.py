@@ -1,6 +1,6 @@
 """How far configurations are from the goal: of the tip in the workspace, or in joint space where the goal is there.
 
-Source: the IKURT paper, whose metric of a pose is the root of (mu times the distance)^2 plus the square of the angle
+Source: [1, ch. 5.1], whose metric of a pose is the root of (mu times the distance)^2 plus the square of the angle
 between the unit quaternions, which is half the rotation angle. Its absolute value is missing in print.
 """
 

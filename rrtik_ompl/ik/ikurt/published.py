@@ -1,4 +1,4 @@
-"""IKURT to the letter: the published algorithms 4 and 5, one sample at a time. Source: the IKURT paper."""
+"""IKURT as published, one sample at a time [1, ch. 5.1, algorithms 4 and 5]."""
 
 from __future__ import annotations
 

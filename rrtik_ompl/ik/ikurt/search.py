@@ -27,15 +27,15 @@ SLOW_FALL = 0.97  # or to this one where there is no other way to the goal
 GROWN, SHRUNK, SHORTEST = 1.5, 0.7, 1e-4  # of CONNECT's step after a success and a miss, and its smallest [rad]
 CHECKED = 4  # of the better directions, nearest to the goal first, whose motions are checked together
 NEARER = 0.5  # a new descent from the way of CONNECT when the distance has fallen to this share
-MOST_EXPLORED = 256  # batches of exploration between two CONNECTs; one before the first, then always twice as many,
-FEW_EXPLORED = 4  # but no more than these as long as CONNECT alone can reach the goal
+MAX_EXPLORATIONS = 256  # batches of exploration between two CONNECTs; one before the first, then always twice as many,
+MAX_EXPLORATIONS_WITH_CONNECT = 4  # but no more than these as long as CONNECT alone can reach the goal
 SAMPLES = 24  # of one batch of exploration
 PIECES = (0.2, 0.5, 1.0)  # shares of the exploration's step, asked about one after the other as long as they are free
 TOWARDS_OTHER = 0.5  # share of the samples that are the newest vertices of the other tree
 DESCENTS = 2  # from vertices of a batch of exploration,
 SCOUTS = 22  # and from samples anywhere, for other goal configurations
 RARE = 32  # once a goal configuration is known, descents follow one batch in so many
-MOST_GOALS = 64
+MAX_GOALS = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class Options:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Judge:
+class IkurtValidity:
     """What the search asks: which configurations are free; which straight motions are; whether to stop."""
 
     free: Callable[[Matrix], Mask]
@@ -71,7 +71,7 @@ class BatchedSearch:
         metric: Distance from the goal.
         options: How to work.
         lower, upper: Bounds, shape (n,).
-        judge: What is free.
+        validity: What is free.
         rng: Random numbers.
         starts: Roots, shape (k, n).
 
@@ -89,12 +89,12 @@ class BatchedSearch:
         options: Options,
         lower: Vector,
         upper: Vector,
-        judge: Judge,
+        validity: IkurtValidity,
         rng: np.random.Generator,
         starts: Matrix,
     ) -> None:
         self._metric, self._options, self._lower, self._upper = metric, options, lower, upper
-        self._judge, self._rng, self._starts = judge, rng, starts
+        self._validity, self._rng, self._starts = validity, rng, starts
         self._distances = metric.distance(starts)
         self.goals = metric.goals if isinstance(metric, ConfigurationMetric) else starts[:0]
         self.tree = Tree(starts, self._distances)
@@ -122,13 +122,13 @@ class BatchedSearch:
             return self.tree.branch(int(self._distances.argmin()))
         explored = 1
         path = self._finish(np.arange(self.tree.size))
-        while path is None and not self._judge.stop():
+        while path is None and not self._validity.stop():
             for _ in range(explored):
                 path = self._explore()
-                if path is not None or self._judge.stop():
+                if path is not None or self._validity.stop():
                     return path
             path = self._connect(self.tree.best())
-            explored = min(2 * explored, MOST_EXPLORED if self.back.size else FEW_EXPLORED)
+            explored = min(2 * explored, MAX_EXPLORATIONS if self.back.size else MAX_EXPLORATIONS_WITH_CONNECT)
             if self.tree.size > self._options.most_vertices:
                 self._restart()
                 explored = 1
@@ -141,7 +141,7 @@ class BatchedSearch:
         path = self._finish(np.array([vertex]))
         tried_at = before = self.tree.distance[vertex]
         for number in count(1):
-            if path is not None or self._judge.stop():
+            if path is not None or self._validity.stop():
                 return path
             lower = self._downhill(vertex, step)
             step = max(step * (SHRUNK if lower is None else GROWN), SHORTEST)
@@ -168,7 +168,7 @@ class BatchedSearch:
         distances = self._metric.distance(candidates)
         order = np.argsort(distances)[:CHECKED]
         order = order[distances[order] < self.tree.distance[vertex]]
-        free = self._judge.motions_free(np.broadcast_to(q, (len(order), len(q))), candidates[order])
+        free = self._validity.motions_free(np.broadcast_to(q, (len(order), len(q))), candidates[order])
         if not free.any():
             return None
         k = order[free.argmax()]
@@ -202,7 +202,7 @@ class BatchedSearch:
         going, moved = np.flatnonzero(length > 0.0), np.zeros(SAMPLES, dtype=bool)
         for piece in PIECES:
             further = tree.q[near[going]] + piece * step[going]
-            free = self._judge.motions_free(ends[going], further)
+            free = self._validity.motions_free(ends[going], further)
             going = going[free]
             ends[going], moved[going] = further[free], True
         return tree.add(ends[moved], near[moved], self._metric.distance(ends[moved]))
@@ -231,7 +231,7 @@ class BatchedSearch:
     def _join(self, tree: Tree, vertices: NDArray[np.int64], other: Tree) -> Matrix | None:
         """The path from the root of one tree to that of the other over the first free motion between two vertices."""
         near = other.nearest(tree.q[vertices])
-        free = self._judge.motions_free(tree.q[vertices], other.q[near])
+        free = self._validity.motions_free(tree.q[vertices], other.q[near])
         if not free.any():
             return None
         k = int(free.argmax())
@@ -239,7 +239,7 @@ class BatchedSearch:
 
     def _straight(self, vertices: NDArray[np.int64], goals: Matrix) -> Matrix | None:
         """The path over the first free motion from vertices to goal configurations."""
-        free = self._judge.motions_free(self.tree.q[vertices], goals)
+        free = self._validity.motions_free(self.tree.q[vertices], goals)
         if not free.any():
             return None
         k = int(free.argmax())
@@ -247,9 +247,9 @@ class BatchedSearch:
 
     def _remember(self, q: Matrix) -> Matrix | None:
         """Free goal configurations become roots of the tree at the goal; the path if one of them is seen at once."""
-        free = self._judge.free(q)
+        free = self._validity.free(q)
         self.blocked = np.vstack([self.blocked, q[~free]])[:1]
-        if len(self.goals) >= MOST_GOALS or not free.any():
+        if len(self.goals) >= MAX_GOALS or not free.any():
             return None
         self.goals = np.vstack([self.goals, q[free]])
         roots = self.back.add(q[free], np.full(int(free.sum()), -1), np.zeros(int(free.sum())))

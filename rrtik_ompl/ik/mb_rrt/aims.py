@@ -13,7 +13,7 @@ from rrtik_ompl.ik.targets import targets
 from rrtik_ompl.world import World
 
 DRAWS = 16  # targets of a goal that leaves freedom
-MOST = 16  # configurations
+MAX_CONFIGURATIONS = 16  # configurations
 
 
 def tree_aims(
@@ -23,7 +23,7 @@ def tree_aims(
     rng: np.random.Generator,
     *,
     seconds: float = 1.0,
-    most: int = MOST,
+    most: int = MAX_CONFIGURATIONS,
 ) -> Matrix:
     """Free configurations at a goal, nearest to a posture first.
 

@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.ik.mb_rrt.links import Links, directions
-from rrtik_ompl.ik.mb_rrt.run import Run
+from rrtik_ompl.ik.mb_rrt.run import TreeSearch
 
 NOWHERE = 1e-300  # a distance that may be divided by
 
 
-def grow_on_arcs(links: Links, goal: ArrayLike, *, rng: np.random.Generator, passes: int = 1) -> Run:
+def grow_on_arcs(links: Links, goal: ArrayLike, *, rng: np.random.Generator, passes: int = 1) -> TreeSearch:
     """Passes that each start at the base and end at the goal.
 
     Args:
@@ -34,7 +34,7 @@ def grow_on_arcs(links: Links, goal: ArrayLike, *, rng: np.random.Generator, pas
     own = (np.zeros(passes, dtype=np.int64), *(np.arange(passes),) * (links.count - 1))
     misses = np.linalg.norm(chains[:, -1] - target, axis=1)
     levels = (chains[:1, 0], *chains[:, 1:].transpose(1, 0, 2))
-    return Run(links, target, levels, own, misses, min(passes, 1))
+    return TreeSearch(links, target, levels, own, misses, min(passes, 1))
 
 
 def arc_chains(links: Links, goals: Matrix, rng: np.random.Generator) -> NDArray[np.float64]:

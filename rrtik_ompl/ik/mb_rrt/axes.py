@@ -1,7 +1,7 @@
-"""A real arm as the tree sees it: joints that each turn about one axis, and the lengths that are left after each.
+"""A real arm as the tree models it: joints that each turn about one axis, and the lengths that are left after each.
 
-A node carries the frame of a joint, an edge is a turn about its axis, and the joint angles come for free
-(specification of MB-RRT, section 12.4).
+A node carries the frame of a joint, an edge is a turn about its axis, and the joint angles come for
+free.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rrtik_ompl.ik.mb_rrt.links import ROUNDING, smallest_spans
 from rrtik_ompl.ik.tip_columns import tip_columns
 from rrtik_ompl.robot import Robot
 
-ROUNDS = 60  # of reweighting, to find the shortest polygon through the axes
+REWEIGHTINGS = 60  # of reweighting, to find the shortest polygon through the axes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,7 +142,7 @@ def _heights(fixed: NDArray[np.float64], oriented: bool) -> Vector:
             matrix[side, :, side + 1] = fixed[side + 1, :3, 2]
     heights: Vector = np.zeros(count)
     weight: Vector = np.ones(sides)
-    for _ in range(ROUNDS):
+    for _ in range(REWEIGHTINGS):
         scaled = np.sqrt(weight)[:, None]
         rows = (scaled[:, :, None] * matrix).reshape(-1, count)
         heights = np.asarray(np.linalg.lstsq(rows, -(scaled * shift).ravel(), rcond=1e-10)[0], dtype=np.float64)

@@ -1,7 +1,7 @@
-"""Surface sampling and rule B for joints with one axis, without any look ahead: the plain carry-over to real arms.
+"""Surface sampling and rule B for joints with one axis, without looking ahead: the direct transfer to real arms.
 
-A node carries a frame, and the parent is the one whose circle of next points passes closest to the sample
-(specification of MB-RRT, section 12.4). It shows what the arcs and the polish add; joint limits are not regarded.
+A node carries a frame, and the parent is the one whose circle of next points passes closest to the sample.
+It shows what the arcs and the polish add; joint limits are not regarded.
 """
 
 from __future__ import annotations

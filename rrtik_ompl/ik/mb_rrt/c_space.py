@@ -1,4 +1,4 @@
-"""The baseline of the MB-RRT paper: an RRT in the space of joint angles whose every vertex is tried at the goal."""
+"""The baseline of MB-RRT [3]: an RRT in the space of joint angles whose every vertex is tried at the goal."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rrtik_ompl.arrays import Matrix, finite_array
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.ik.mb_rrt.growth import PASSES
 from rrtik_ompl.ik.mb_rrt.links import Links, joints_to_chain
-from rrtik_ompl.ik.mb_rrt.run import Run, first_hit
+from rrtik_ompl.ik.mb_rrt.run import TreeSearch, first_hit
 
 STEP = np.radians(3.0)  # "3 units" of the published demonstration
 BLOCK = 500  # vertices between two looks at the goal
@@ -24,7 +24,7 @@ def grow_in_joint_space(
     passes: int = PASSES,
     stop: bool = True,
     step: float = STEP,
-) -> Run:
+) -> TreeSearch:
     """Grow a classical RRT in [-pi, pi]^n from the stretched arm; uniform samples, no bias, no wrapping round.
 
     Args:
@@ -54,7 +54,7 @@ def grow_in_joint_space(
         solved = first_hit(misses[:done], limit)
     levels = (np.zeros((1, 2)), *(chains[:done, i] for i in range(1, links.count + 1)))
     own = (np.zeros(done, dtype=np.int64), *(np.arange(done),) * (links.count - 1))
-    run = Run(links, target, levels, own, misses[:done], solved)
+    run = TreeSearch(links, target, levels, own, misses[:done], solved)
     return run.until(solved) if stop and solved else run
 
 

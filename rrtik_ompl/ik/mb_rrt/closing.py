@@ -1,6 +1,6 @@
 """MB-RRT whose last two links are closed exactly: the elbow stands where the two circles about node and goal meet.
 
-Surface sampling and rule B up to index n - 2 (specification of MB-RRT, section 12.5). Planar.
+Surface sampling and rule B up to index n - 2. Planar.
 """
 
 from __future__ import annotations

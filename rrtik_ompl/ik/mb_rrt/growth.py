@@ -1,9 +1,9 @@
-"""The tree in the workspace as published, grown index by index for many passes at a time.
+"""The tree in the workspace as published [3], grown index by index for many passes at a time.
 
 A pass adds one node of each index, joined to a node of the index before. What is sampled does not depend on the tree,
 and a level depends on the level before it alone. So a whole block of passes can be added to one level before the next
-one is looked at, as long as a node chooses among those that its pass could know: the same tree, without a loop over
-passes. Source: the MB-RRT paper.
+one is begun, as long as a node chooses among those that its pass could know: the same tree, without a loop over
+passes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array
 from rrtik_ompl.ik.mb_rrt.links import Links, directions
-from rrtik_ompl.ik.mb_rrt.run import Run, first_hit
+from rrtik_ompl.ik.mb_rrt.run import TreeSearch, first_hit
 from rrtik_ompl.ik.mb_rrt.variants import Rule, Variant, variant
 
 PASSES = 10_000
@@ -30,7 +30,7 @@ def grow(
     rng: np.random.Generator,
     passes: int = PASSES,
     stop: bool = True,
-) -> Run:
+) -> TreeSearch:
     """Grow a tree until a pass ends within the tolerance of the goal, or to the limit.
 
     Args:
@@ -56,7 +56,7 @@ def grow(
         _add_passes(links, target, chosen, nodes, parents, count, rng)
         misses = np.append(misses, np.linalg.norm(nodes[-1][done:] - target, axis=1))
         solved, done = first_hit(misses, limit), done + count
-    run = Run(links, target, tuple(nodes), tuple(parents), misses, solved)
+    run = TreeSearch(links, target, tuple(nodes), tuple(parents), misses, solved)
     return run.until(solved) if stop and solved else run
 
 

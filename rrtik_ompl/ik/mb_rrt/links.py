@@ -1,4 +1,4 @@
-"""A chain of links with free joints, as the published method sees an arm, and where its joints can usefully be."""
+"""A chain of links with free joints, as MB-RRT [3] models an arm, and where its joints can usefully be."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class Links:
     """Links from the origin on, joined so that each may point anywhere in the plane or in space.
 
     After the joint of index i, i = 0..n, the rest of the chain spans every distance from ``folded[i]`` to
-    ``remaining[i]`` and no other, in the plane and in space (MB-RRT paper, sections 4.2 and 12.1 of its
-    specification): joint i of any solution lies in that ring or shell about the goal.
+    ``remaining[i]`` and no other, in the plane and in space: joint i of any solution lies in that ring or
+    shell about the goal [3].
 
     Attributes:
         lengths: Base first, shape (n,); one unit of length for all numbers.
@@ -100,8 +100,8 @@ def directions(count: int, dimension: int, rng: np.random.Generator) -> Matrix:
 def sunflower(links: Links, count: int) -> Matrix:
     """Goals spread evenly over the disc or the ball that the chain reaches, the same at every call.
 
-    Radii L ((k + 1/2) / N)^(1/dimension) at golden angles (specification of MB-RRT, section 11, row 6), in space
-    around heights that are spread evenly too. Shape (count, dimension).
+    Radii L ((k + 1/2) / N)^(1/dimension) at golden angles, in space around heights that are spread
+    evenly too. Shape (count, dimension).
     """
     k = np.arange(count)
     radius = links.reach * ((k + 0.5) / count) ** (1.0 / links.dimension)

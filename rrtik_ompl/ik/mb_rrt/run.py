@@ -14,7 +14,7 @@ MARGIN = 0.01  # of the reach: how far outside its region a node must lie to be 
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Run:
+class TreeSearch:
     """A grown tree. Level i holds the nodes of index i, one for each pass; level 0 is the base alone.
 
     Attributes:
@@ -69,12 +69,12 @@ class Run:
         counted = self.passes * (self.links.count - 1)
         return self.outside(margin) / counted if counted else 0.0
 
-    def until(self, passes: int) -> Run:
+    def until(self, passes: int) -> TreeSearch:
         """The tree as it was after some of its passes."""
         kept = tuple(rows[:passes] for rows in self.parents)
         solved = self.solved_in if self.solved_in <= passes else 0
         nodes = (self.nodes[0], *(level[:passes] for level in self.nodes[1:]))
-        return Run(self.links, self.goal, nodes, kept, self.misses[:passes], solved)
+        return TreeSearch(self.links, self.goal, nodes, kept, self.misses[:passes], solved)
 
     def edge_error(self) -> float:
         """The largest difference between an edge and its link."""

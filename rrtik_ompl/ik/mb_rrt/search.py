@@ -2,7 +2,7 @@
 
 An arm whose axes are all parallel ends exactly on the goal. Elsewhere a sphere about the goal is not all that a joint
 with one axis can keep to; the newest branches, which are near the goal and free as far as the links know, are then
-polished by Levenberg-Marquardt (specification of MB-RRT, section 12.4).
+polished by Levenberg-Marquardt.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.goal import PoseGoal, PositionGoal
 from rrtik_ompl.ik.mb_rrt.axes import Axes, axes_of, misfit
 from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
-from rrtik_ompl.ik.mb_rrt.workspace_tree import AxisTree
+from rrtik_ompl.ik.mb_rrt.workspace_tree import WorkspaceTree
 from rrtik_ompl.ik.numeric.descent import descend
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 
 WIDTH = 16  # passes at a time
-ROUNDS = 64  # after which it gives up
+MAX_ROUNDS = 64  # after which it gives up
 FIRST_STEPS = 12  # of the polish, after which most branches that get to the goal at all are there
-BLIND_ROUNDS = 2  # that look at whole postures alone; where free ones are common, that is faster
+POSTURE_ONLY_ROUNDS = 2  # that look at whole postures alone; where free ones are common, that is faster
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +48,7 @@ def search(
     world: World | None = None,
     all: bool = False,
     width: int = WIDTH,
-    rounds: int = ROUNDS,
+    rounds: int = MAX_ROUNDS,
 ) -> Found:
     """Grow the tree until a configuration at the goal will do.
 
@@ -69,9 +69,9 @@ def search(
     if out_of_reach(robot, target):
         return Found(found, 0)
     axes = axes_of(robot, isinstance(target, PoseGoal))
-    tree = AxisTree(axes, axes.nearest_in_reach(aimed_point(axes, target)), near, rng)
+    tree = WorkspaceTree(axes, axes.nearest_in_reach(aimed_point(axes, target)), near, rng)
     for number in range(rounds):
-        if number == BLIND_ROUNDS and world is not None and world.pairs:
+        if number == POSTURE_ONLY_ROUNDS and world is not None and world.pairs:
             tree.check_links(LinkWorlds(world, axes).free)
         ends = polished(robot, axes, target, tree.grow(width), all=all)
         found = np.vstack([found, ends])

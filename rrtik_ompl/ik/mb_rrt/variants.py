@@ -1,4 +1,4 @@
-"""The published variants: how a sample is drawn and which node it is joined to. Source: the MB-RRT paper."""
+"""The published variants of MB-RRT [3]: how a sample is drawn and which node it is joined to."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class Variant:
     """One configuration of the method.
 
     Attributes:
-        name: By which it is asked for.
-        title: As the paper calls it.
+        name: By which it is chosen.
+        title: As [3] calls it.
         draw: Samples for the joint of an index, from (links, goal, index, count, rng), shape (count, dimension).
         rule: What the parent must have least of, from squared distances to the sample and the link's length.
     """
@@ -34,19 +34,19 @@ class Variant:
 
 
 def square(links: Links, goal: Vector, index: int, count: int, rng: np.random.Generator) -> Matrix:
-    """Uniform in the square, or cube, around the base that holds the whole reach (section 4.1)."""
+    """Uniform in the square, or cube, around the base that holds the whole reach."""
     return rng.uniform(-links.reach, links.reach, (count, links.dimension))
 
 
 def square_then_goal(links: Links, goal: Vector, index: int, count: int, rng: np.random.Generator) -> Matrix:
-    """As `square`, and the goal itself for the last index: the "*" option (section 4.5)."""
+    """As `square`, and the goal itself for the last index: the "*" option."""
     if index < links.count:
         return square(links, goal, index, count, rng)
     return np.broadcast_to(goal, (count, links.dimension))
 
 
 def surface(links: Links, goal: Vector, index: int, count: int, rng: np.random.Generator) -> Matrix:
-    """On the circle, or sphere, around the goal whose radius is the length still to come (equation 4.1)."""
+    """On the circle, or sphere, around the goal whose radius is the length still to come."""
     circle: Matrix = goal + links.remaining[index] * directions(count, links.dimension, rng)
     return circle
 
@@ -57,7 +57,7 @@ def nearest(squared: Matrix, length: float) -> Matrix:
 
 
 def one_link_away(squared: Matrix, length: float) -> Matrix:
-    """Rule B: the node whose distance from the sample is closest to the link's length (equation 4.2)."""
+    """Rule B: the node whose distance from the sample is closest to the link's length."""
     off = np.sqrt(squared, out=squared)
     off -= length
     return np.abs(off, out=off)

@@ -9,9 +9,9 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.goal import TipGoal
 from rrtik_ompl.ik.goal_rows import goal_rows
-from rrtik_ompl.ik.method_interface import Answer, Question
+from rrtik_ompl.ik.method_interface import IkRequest, IkResponse
 from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS, Search, walk
-from rrtik_ompl.ik.numeric.restarts import ROUNDS, STARTS, aims_of, nearest_posture
+from rrtik_ompl.ik.numeric.restarts import MAX_ROUNDS, STARTS, aims_of, nearest_posture
 from rrtik_ompl.robot import Robot
 
 AT_ONCE = 32  # members of a goal, before the clock is looked at and others have their turn
@@ -39,42 +39,42 @@ def numeric_ik(robot: Robot, goal: TipGoal, starts: Matrix, *, iterations: int =
     return Q[goal.satisfied(robot, Q)]
 
 
-def numeric(question: Question) -> Answer:
+def numeric(request: IkRequest) -> IkResponse:
     """The method of `solve_ik`: solutions of many members of the goal side by side until one will do."""
-    if question.all:
-        return _many(question)
-    aims, timed_out = aims_of(question), False
-    search, waiting = Search(question.robot, aims, question.near), np.arange(len(aims))
+    if request.all:
+        return _many(request)
+    aims, timed_out = aims_of(request), False
+    search, waiting = Search(request.robot, aims, request.near), np.arange(len(aims))
     found = []
     while len(waiting):
         going, waiting = waiting[:AT_ONCE], waiting[AT_ONCE:]
         going = going[search.advance(going)]
         found.append(search.q[going])
-        timed_out = time.monotonic() > question.deadline
-        if timed_out or question.accept(found[-1]).any():
+        timed_out = time.monotonic() > request.deadline
+        if timed_out or request.accept(found[-1]).any():
             break
         waiting = np.concatenate([waiting, going])
-    return _answered(question, np.concatenate(found), search.steps, timed_out)
+    return _answered(request, np.concatenate(found), search.steps, timed_out)
 
 
-def _many(question: Question) -> Answer:
+def _many(request: IkRequest) -> IkResponse:
     """Solutions from many random starts, as different as they come."""
-    robot, steps, timed_out = question.robot, 0, False
+    robot, steps, timed_out = request.robot, 0, False
     found = [np.zeros((0, robot.dof))]
-    aims = aims_of(question)
-    for number in range(ROUNDS):
-        Q = question.rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
+    aims = aims_of(request)
+    for number in range(MAX_ROUNDS):
+        Q = request.rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
         if number == 0:
-            Q[0] = question.near
+            Q[0] = request.near
         Q, reached, taken = walk(robot, aims[(number * STARTS + np.arange(STARTS)) % len(aims)], Q, patience=PATIENCE)
         found.append(Q[reached])
-        steps, timed_out = steps + taken, time.monotonic() > question.deadline
+        steps, timed_out = steps + taken, time.monotonic() > request.deadline
         if timed_out:
             break
-    return _answered(question, np.vstack(found), steps, timed_out)
+    return _answered(request, np.vstack(found), steps, timed_out)
 
 
-def _answered(question: Question, found: Matrix, steps: int, timed_out: bool) -> Answer:
+def _answered(request: IkRequest, found: Matrix, steps: int, timed_out: bool) -> IkResponse:
     if len(found):
-        return Answer(found, question.near, steps, timed_out)
-    return Answer(found, nearest_posture(question, searched=not question.all and not timed_out), steps, timed_out)
+        return IkResponse(found, request.near, steps, timed_out)
+    return IkResponse(found, nearest_posture(request, searched=not request.all and not timed_out), steps, timed_out)

@@ -1,9 +1,8 @@
 """Inverse kinematics of regions: configurations walk to the nearest pose of a region, which is found anew each step.
 
-What the region leaves free asks nothing of the joints, so that arms of fewer joints than a pose needs fit as well.
+What the region leaves free does not constrain the joints, so that arms of fewer joints than a pose needs fit as well.
 
-Sources: M. Stilman, "Global manipulation planning in robot joint space with task constraints", IEEE Transactions on
-Robotics 26 (2010), 576-584, for steps that leave free directions out; damping after Sugihara, as in
+Sources: [23] for steps that leave free directions out; damping after [22], as in
 `rrtik_ompl.ik.numeric.reference_descent`.
 """
 
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector
 from rrtik_ompl.goal import as_task_region, parts_of
-from rrtik_ompl.ik.method_interface import Answer, Question
+from rrtik_ompl.ik.method_interface import IkRequest, IkResponse
 from rrtik_ompl.ik.residual import SHARE, shortened, twist_between
 from rrtik_ompl.poses import rpy_matrices
 from rrtik_ompl.robot import Robot
@@ -27,7 +26,7 @@ ITERATIONS = 60
 PATIENCE, STALLED = 10, 0.5  # a walk is given up whose squared residual is not down to this share in so many steps
 DAMPING = 1e-6  # the constant part, in units of the squared residual (1 is the reach)
 LARGEST_STEP = 0.5  # [rad] or [m] of any joint in one iteration
-STARTS, ROUNDS = 32, 16
+STARTS, MAX_ROUNDS = 32, 16
 
 
 def project(robot: Robot, region: TaskRegion, starts: Matrix, *, places: Matrix | None = None) -> Matrix:
@@ -79,27 +78,27 @@ def projected(robot: Robot, region: TaskRegion, starts: Matrix, rng: np.random.G
     return project(robot, region, starts, places=places)
 
 
-def projection(question: Question) -> Answer:
+def projection(request: IkRequest) -> IkResponse:
     """The method of `solve_ik`: from random postures onto one part of the goal after the other."""
-    robot, rng = question.robot, question.rng
-    regions = [as_task_region(part) for part in parts_of(question.goal)]
-    found, nearest, least = np.zeros((0, robot.dof)), question.near, np.inf
+    robot, rng = request.robot, request.rng
+    regions = [as_task_region(part) for part in parts_of(request.goal)]
+    found, nearest, least = np.zeros((0, robot.dof)), request.near, np.inf
     timed_out = False
-    for number in range(max(ROUNDS, len(regions))):
+    for number in range(max(MAX_ROUNDS, len(regions))):
         region = regions[number % len(regions)]
         starts = rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
-        starts[0] = question.near
+        starts[0] = request.near
         rows = projected(robot, region, starts, rng)
         distance = region.distance(robot, rows)
         if distance.min() < least:
             nearest, least = rows[distance.argmin()], distance.min()
         found = np.vstack([found, rows[region.satisfied(robot, rows)]])
-        if question.accept(found).any() and not question.all:
+        if request.accept(found).any() and not request.all:
             break
-        timed_out = time.monotonic() > question.deadline
+        timed_out = time.monotonic() > request.deadline
         if timed_out:
             break
-    return Answer(found, nearest, number + 1, timed_out)
+    return IkResponse(found, nearest, number + 1, timed_out)
 
 
 def _arrived(region: TaskRegion, twist: Matrix) -> Mask:

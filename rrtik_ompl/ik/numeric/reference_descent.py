@@ -1,7 +1,6 @@
-"""Levenberg-Marquardt from many starts in numpy: the slow, plain form of :mod:`rrtik_ompl.fast.ik.ik_kernels`.
+"""Levenberg-Marquardt from many starts in numpy: the reference implementation of :mod:`rrtik_ompl.fast.ik.ik_kernels`.
 
-Source: T. Sugihara, "Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method", IEEE Transactions
-on Robotics 27 (2011), 984-991: the damping is the residual itself plus a small constant, so that steps are short far
+Source: [22]: the damping is the residual itself plus a small constant, so that steps are short far
 from the target and in singular postures, and Newton's near the solution.
 """
 

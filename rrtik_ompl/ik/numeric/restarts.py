@@ -13,71 +13,71 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.goal import has_task_regions, tip_errors
 from rrtik_ompl.ik.goal_rows import goal_rows
-from rrtik_ompl.ik.method_interface import Answer, Question, Target
+from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target
 from rrtik_ompl.ik.numeric.descent import Search, walk
 from rrtik_ompl.robot import Robot
 
 STARTS = 32  # in one round
-ROUNDS = 16  # after which it gives up
+MAX_ROUNDS = 16  # after which it gives up
 MEMBERS = 4  # of a region, that are searched once more to say why there is no solution
 
 # From (robot, goal, starts of shape (m, dof)) to where each start has led to, shape (m, dof), and the steps taken.
 Walk: TypeAlias = Callable[[Robot, Target, Matrix], tuple[Matrix, int]]
 
 
-def restarted(method: Walk, question: Question, *, starts: int = STARTS, rounds: int = ROUNDS) -> Answer:
+def restarted(method: Walk, request: IkRequest, *, starts: int = STARTS, rounds: int = MAX_ROUNDS) -> IkResponse:
     """Walk from the posture and from random ones, round after round until a solution will do.
 
     Args:
         method: What walks; what it leads to outside the joint limits is left out.
-        question: What is asked.
+        request: What is asked.
         starts: In one round.
         rounds: At most, but one for each target; these take turns.
     """
-    robot = question.robot
+    robot = request.robot
     found, steps = np.zeros((0, robot.dof)), 0
-    for number in range(max(rounds, len(question.targets))):
-        target = question.targets[number % len(question.targets)]
-        Q = question.rng.uniform(*robot.finite_range(), (starts, robot.dof))
-        if number < len(question.targets):
-            Q[0] = question.near
+    for number in range(max(rounds, len(request.targets))):
+        target = request.targets[number % len(request.targets)]
+        Q = request.rng.uniform(*robot.finite_range(), (starts, robot.dof))
+        if number < len(request.targets):
+            Q[0] = request.near
         Q, taken = method(robot, target, Q)
         good = target.satisfied(robot, Q) & robot.within_limits(Q)
         found, steps = np.vstack([found, Q[good]]), steps + taken
-        if question.accept(found).any() and not question.all:
+        if request.accept(found).any() and not request.all:
             break
-        if time.monotonic() > question.deadline:
-            return Answer(found, nearest_posture(question), steps, timed_out=True)
-    return Answer(found, question.near if len(found) else nearest_posture(question), steps)
+        if time.monotonic() > request.deadline:
+            return IkResponse(found, nearest_posture(request), steps, timed_out=True)
+    return IkResponse(found, request.near if len(found) else nearest_posture(request), steps)
 
 
-def nearest_posture(question: Question, *, searched: bool = False) -> Vector:
+def nearest_posture(request: IkRequest, *, searched: bool = False) -> Vector:
     """The posture that comes nearest to the goal, for the reason of a failure, shape (dof,).
 
     It is one inside the limits if such a one reaches the goal; otherwise the joints may turn without limits.
 
     Args:
-        question: What was asked.
+        request: What was asked.
         searched: Whether `Search` is known to find nothing inside the limits.
     """
-    robot, aims = question.robot, aims_of(question)
+    robot, aims = request.robot, aims_of(request)
     if not searched:
-        search = Search(robot, aims[:MEMBERS], question.near)
+        search = Search(robot, aims[:MEMBERS], request.near)
         inside = search.q[search.advance(np.arange(len(search.q)))]
         if len(inside):
             first: Vector = inside[0]
             return first
-    starts = question.rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
+    starts = request.rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
     anywhere, _, _ = walk(_turning_freely(robot), aims[np.arange(STARTS) % len(aims)], starts)
-    nearest: Vector = anywhere[int(np.argmin(np.add(*tip_errors(question.goal, robot, anywhere))))]
+    nearest: Vector = anywhere[int(np.argmin(np.add(*tip_errors(request.goal, robot, anywhere))))]
     return nearest
 
 
-def aims_of(question: Question) -> Matrix:
+def aims_of(request: IkRequest) -> Matrix:
     """Rows of the goal, see `rrtik_ompl.ik.goal_rows`; of targets drawn from it if it has task-space regions."""
-    if has_task_regions(question.goal):
-        return np.vstack([goal_rows(target) for target in question.targets])
-    return goal_rows(question.goal)
+    if has_task_regions(request.goal):
+        return np.vstack([goal_rows(target) for target in request.targets])
+    return goal_rows(request.goal)
 
 
 @lru_cache(maxsize=64)

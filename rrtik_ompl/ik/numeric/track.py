@@ -15,7 +15,7 @@ from rrtik_ompl.ik.numeric.descent import descend
 from rrtik_ompl.ik.numeric.restarts import STARTS
 from rrtik_ompl.robot import Robot
 
-ROUNDS = 4  # of random starts at a point that no motion leads to
+ROUNDS_PER_POINT = 4  # of random starts at a point that no motion leads to
 CARRIED = 8  # solutions that are followed side by side, those nearest to the posture before
 SAME_POSTURE = 1e-3  # [rad] or [m]
 
@@ -67,7 +67,7 @@ class Tracker:
     def fresh(self, target: TipGoal, last: Vector | None) -> tuple[Matrix, int]:
         """Different solutions of one point, at most `CARRIED`, nearest to the posture before first, and the steps."""
         steps = 0
-        for number in range(ROUNDS):
+        for number in range(ROUNDS_PER_POINT):
             starts = self.rng.uniform(*self.robot.finite_range(), (STARTS, self.robot.dof))
             if number == 0 and last is not None:
                 starts[0] = last

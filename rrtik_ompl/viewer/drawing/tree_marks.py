@@ -6,7 +6,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import require
-from rrtik_ompl.ik.mb_rrt.run import Run
+from rrtik_ompl.ik.mb_rrt.run import TreeSearch
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.marks import Mark, balls, tubes
 
@@ -15,7 +15,7 @@ MOST = 600  # links drawn of each index, the first ones
 FAINT = 0.08  # opacity of a region
 
 
-def tree_marks(run: Run, *, unit: float = 1.0) -> list[Mark]:
+def tree_marks(run: TreeSearch, *, unit: float = 1.0) -> list[Mark]:
     """A tree to be shown by ``view(Scene(), marks=tree_marks(run))``, each index in a colour of its own.
 
     Args:
@@ -25,7 +25,7 @@ def tree_marks(run: Run, *, unit: float = 1.0) -> list[Mark]:
     Raises:
         InputError: If ``run`` is something else.
     """
-    require(run, Run, "tree to show")
+    require(run, TreeSearch, "tree to show")
     reach, goal = run.links.reach * unit, _in_space(run.goal[None]) * unit
     marks = []
     for index in range(1, run.links.count + 1):

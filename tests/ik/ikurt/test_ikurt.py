@@ -16,7 +16,7 @@ from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal
 from rrtik_ompl.ik.ikurt.descent import descend
 from rrtik_ompl.ik.ikurt.metric import TipMetric, reach
 from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
-from rrtik_ompl.ik.ikurt.search import BatchedSearch, Judge, Options
+from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
 from rrtik_ompl.ik.ikurt.tree import FIRST_ROOM, Tree
 from rrtik_ompl.ompl_bridge.contract import small_problem
 from rrtik_ompl.poses import pose
@@ -143,9 +143,9 @@ def improved(problem: Any, seed: int) -> Any:
     """Without descents, which would need no CONNECT."""
     metric, rng = TipMetric(problem.robot, [problem.goal]), np.random.default_rng(seed)
     options = Options(step=0.15, stride=0.6, jacobian=False, most_vertices=10_000)
-    judge = Judge(problem.world.valid_batch, problem.world.motion_valid_batch, rounds(1500))
+    validity = IkurtValidity(problem.world.valid_batch, problem.world.motion_valid_batch, rounds(1500))
     low, high = problem.robot.finite_range()
-    return BatchedSearch(metric, options, low, high, judge, rng, problem.start[None])
+    return BatchedSearch(metric, options, low, high, validity, rng, problem.start[None])
 
 
 @pytest.mark.parametrize("search_of", [published, improved])
