@@ -13,7 +13,8 @@ from scipy.spatial import ConvexHull
 
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.collision.enclosure import enclosure
-from rrtik_ompl.collision.solids import bvh, hull, inside_mesh, is_closed, is_mesh, mesh_arrays, pieces, robot_solids
+from rrtik_ompl.collision.shape_table import pieces
+from rrtik_ompl.collision.solids import bvh, hull, inside_mesh, is_closed, is_mesh, mesh_arrays, robot_solids
 from rrtik_ompl.covers import cache as cover_cache
 from rrtik_ompl.covers import spheres as covers
 from rrtik_ompl.covers.cache import cached_inner_spheres, cached_outer_cover
