@@ -17,6 +17,7 @@ from rrtik_ompl.files.tables import dumps, loads, path_format
 from rrtik_ompl.files.text import read_text, write_text
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.transitions import SAME, merge_moves, moved, route_length, single_joint, transitions
+from rrtik_ompl.units import joint_units
 from rrtik_ompl.world import World
 
 SECOND_CHECK = 2.0  # how many times finer than the motion resolution a path is checked again
@@ -176,8 +177,7 @@ class JointPath:
                 f"path: edge {edge + 1} moves several joints at once ({together}); it is no list of moves: "
                 "convert it with one_joint_moves(path, world)"
             )
-        units = ["m" if sliding else "rad" for sliding in self.prismatic]
-        joints = changes.argmax(axis=1)
+        joints, units = changes.argmax(axis=1), joint_units(self.prismatic)
         return tuple(
             Move(self.joint_names[j], float(rows[i, j]), float(rows[i + 1, j]), units[j], bool(self.continuous[j]))
             for i, j in enumerate(joints)
@@ -244,7 +244,7 @@ class JointPath:
             "kind": "joint_path",
             "robot": self.robot_name,
             "joint_names": list(self.joint_names),
-            "units": ["m" if sliding else "rad" for sliding in self.prismatic],
+            "units": joint_units(self.prismatic),
             "continuous": [name for name, endless in zip(self.joint_names, self.continuous, strict=True) if endless],
             "length": self.length,
             "transitions": self.transitions,

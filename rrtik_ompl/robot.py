@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.poses import cross_products, joint_motions
+from rrtik_ompl.units import shown_unit
 
 FEW = 16  # configurations up to which Pinocchio's calls cost less than numpy's
 LIMIT_TOLERANCE = 1e-6  # [rad] or [m]; a value this far outside counts as inside and is moved onto the limit
@@ -149,7 +150,7 @@ class Robot:
         if len(outside) == 0:
             return ""
         joint = int(outside[0])
-        factor, unit = (1.0, "m") if self.prismatic[joint] else (180.0 / np.pi, "deg")
+        factor, unit = shown_unit(self.prismatic[joint])
         value, low, high = (factor * float(x) for x in (q[joint], self.lower[joint], self.upper[joint]))
         name = self.joint_names[joint]
         return f"joint '{name}' is at {value:.6g} {unit}, outside its limits {low:.6g} .. {high:.6g} {unit}"

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError, UnknownNameError, require
-from rrtik_ompl.shapes import HalfSpace, Shape
+from rrtik_ompl.shapes import SHAPES, Shape
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +73,10 @@ Motion: TypeAlias = ConstantVelocity | Waypoints
 
 def _check_solid(name: object, shape: object, pose: object) -> None:
     require(name, str, "name of an obstacle or attached object")
-    require(shape, Shape, f"shape of '{name}'", "use rrtik_ompl.shapes")
+    if not isinstance(shape, Shape):
+        kinds = " or ".join(kind.__name__ for kind in SHAPES.values())
+        found = f"must be of type {kinds}, got {type(shape).__name__}"
+        raise InputError(f"shape of '{name}' {found}; use rrtik_ompl.shapes")
     require(pose, pin.SE3, f"pose of '{name}'", "use rrtik_ompl.poses.pose(xyz, quat_xyzw)")
 
 
@@ -116,7 +119,7 @@ class AttachedObject:
 
     def __post_init__(self) -> None:
         _check_solid(self.name, self.shape, self.pose)
-        if isinstance(self.shape, HalfSpace):
+        if not self.shape.bounded:
             raise InputError("a half-space cannot be attached to a link")
 
 

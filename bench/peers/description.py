@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from bench.peers.task import BASE, GROUP, TIP, Solid, Task
 from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.collision.shape_of import shape_of
+from rrtik_ompl.collision.shape_table import shape_of
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ik.tip_columns import TipColumns, tip_columns
 from rrtik_ompl.problem import Problem

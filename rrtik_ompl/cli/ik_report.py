@@ -19,10 +19,10 @@ from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form, solutio
 from rrtik_ompl.ik.analytic.reference_branches import tip_fault
 from rrtik_ompl.ik.solve import IkResult, different_rows, mid_range_configuration
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.units import DEGREES
 
 SAME = 1e-5  # [rad] or [m]; a double root is known to the square root of the rounding
 MILLIMETRES = 1e3
-DEGREES = 180.0 / np.pi
 
 
 def branch_names(robot: Robot, goal: Any, Q: Matrix) -> list[str]:

@@ -9,12 +9,13 @@ from rich import box
 from rich.table import Table
 
 from rrtik_ompl.goal import JointGoal, PositionGoal
-from rrtik_ompl.moves.text import COLUMNS, moves_document, reading
+from rrtik_ompl.moves.text import COLUMNS, moves_document
 from rrtik_ompl.path import SECOND_CHECK, JointPath
 from rrtik_ompl.planning import Plan
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.trajectory import RateLimits, Trajectory
 from rrtik_ompl.transitions import lower_bound
+from rrtik_ompl.units import reading, shown_unit
 
 
 def moves_table(path: JointPath) -> Table:
@@ -32,13 +33,12 @@ def moves_table(path: JointPath) -> Table:
 
 def waypoints_table(path: JointPath) -> Table:
     """One row per waypoint, one column per joint; degrees, or metres for a prismatic joint."""
-    units = ["m" if sliding else "deg" for sliding in path.prismatic]
+    factors, units = zip(*map(shown_unit, path.prismatic), strict=True)
     heads = [f"{name} [{unit}]" for name, unit in zip(path.joint_names, units, strict=True)]
     table = Table("waypoint", *heads, box=box.SIMPLE_HEAD, pad_edge=False)
     for column in table.columns:
         column.justify = "right"
-    scale = np.where(path.prismatic, 1.0, 180.0 / np.pi)
-    for number, row in enumerate(path.waypoints * scale, start=1):
+    for number, row in enumerate(path.waypoints * factors, start=1):
         table.add_row(
             str(number),
             *(f"{value:.4f}" if m else f"{value:.2f}" for value, m in zip(row, path.prismatic, strict=False)),
@@ -55,7 +55,7 @@ def peaks_table(trajectory: Trajectory, limits: RateLimits) -> Table:
     peaks, words = trajectory.peaks(), ("jumps", "none")  # said of a peak, of a limit, that is infinite
     pairs = ((peaks.velocity, limits.velocity), (peaks.acceleration, limits.acceleration), (peaks.jerk, limits.jerk))
     for k, name in enumerate(trajectory.joint_names):
-        factor, unit = (1.0, "m") if trajectory.prismatic[k] else (180.0 / np.pi, "deg")
+        factor, unit = shown_unit(trajectory.prismatic[k])
         cells = (_rate(factor * float(row[k]), word) for pair in pairs for row, word in zip(pair, words, strict=True))
         table.add_row(name, *cells, unit)
     return table

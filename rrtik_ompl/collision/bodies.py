@@ -11,7 +11,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.collision.solids import Piece, pieces, robot_solids
+from rrtik_ompl.collision.shape_table import Piece, pieces
+from rrtik_ompl.collision.solids import robot_solids
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import AttachedObject, Obstacle, Scene

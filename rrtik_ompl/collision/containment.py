@@ -13,6 +13,7 @@ from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.boxes import half_extents
 from rrtik_ompl.collision.enclosure import enclosure
+from rrtik_ompl.collision.shape_table import core_of
 from rrtik_ompl.collision.solids import inside_mesh, is_closed, is_mesh, mesh_arrays
 
 ROUNDING = 1e-9  # [m]
@@ -138,7 +139,7 @@ def _end_points(geometry: Any) -> Matrix:
         points = vertices[np.unique(triangles)]
     elif isinstance(geometry, coal.ConvexBase):
         points = np.array(geometry.points()).reshape(-1, 3)
-    elif isinstance(geometry, (coal.Box, coal.Sphere, coal.Capsule, coal.Cylinder)):
+    elif core_of(geometry) is not None:
         return np.concatenate([np.eye(3), -np.eye(3)]) * half_extents(geometry)
     else:
         return np.zeros((6, 3))

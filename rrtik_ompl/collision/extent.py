@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.collision.solids import pieces
-from rrtik_ompl.shapes import HalfSpace, Shape
+from rrtik_ompl.collision.shape_table import pieces
+from rrtik_ompl.shapes import Shape
 
 
 def farthest(shape: Shape, pose: Any) -> float:
@@ -17,7 +17,7 @@ def farthest(shape: Shape, pose: Any) -> float:
         shape: What it is.
         pose: Where it is, ``pinocchio.SE3``.
     """
-    if isinstance(shape, HalfSpace):
+    if not shape.bounded:
         return float("inf")
     solids = [(piece.geometry, pose * piece.placement) for piece in pieces(shape)]
     return max(float(np.linalg.norm(place.act(s.aabb_center)) + s.aabb_radius) for s, place in solids)

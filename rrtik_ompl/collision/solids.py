@@ -1,20 +1,17 @@
-"""Shapes as coal solids: convex pieces where a shape is convex or can be cut into convex pieces, a mesh otherwise."""
+"""Coal geometries: convex hulls and meshes, what is inside them, and those of a robot."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import coal
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector, frozen
+from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
 
 # A mesh whose volume is at least this share of its convex hull's is taken as convex: its hull stands for it. The hull
 # contains the mesh, so nothing that touches the mesh is missed.
@@ -22,41 +19,6 @@ CONVEX_VOLUME_RATIO = 0.999
 
 # Hulls outside these are refused: thickness over extent, and extent [m].
 FLATTEST, SMALLEST, LARGEST = 1e-7, 1e-6, 1e6
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Piece:
-    """One coal geometry of a shape and its placement in the shape's frame (``pinocchio.SE3``)."""
-
-    geometry: Any
-    placement: Any
-
-
-def pieces(shape: Shape) -> tuple[Piece, ...]:
-    """Coal geometries whose union is the shape."""
-    identity = pin.SE3.Identity()
-    if isinstance(shape, Prism):
-        solids = [hull(_extruded(part, shape.height)) for part in convex_parts(shape.polygon)]
-    else:
-        solids = [_single(shape)]
-    return tuple(Piece(_measured(solid), identity) for solid in solids)
-
-
-def _single(shape: Shape) -> Any:
-    if isinstance(shape, Box):
-        return coal.Box(*shape.size)
-    if isinstance(shape, Sphere):
-        return coal.Sphere(shape.radius)
-    if isinstance(shape, Cylinder):
-        return coal.Cylinder(shape.radius, shape.length)
-    if isinstance(shape, Capsule):
-        return coal.Capsule(shape.radius, shape.length)
-    if isinstance(shape, HalfSpace):
-        return coal.Halfspace(np.array(shape.normal), shape.offset)
-    if isinstance(shape, Mesh):
-        surface = bvh(shape.vertices, shape.triangles)
-        return convexified(surface) if shape.closed else surface
-    raise TypeError(f"no coal geometry for {type(shape).__name__}")
 
 
 def bvh(vertices: Matrix, triangles: NDArray[np.int64]) -> Any:
@@ -179,10 +141,10 @@ def _mesh_arrays(key: SameObject) -> tuple[Matrix, NDArray[np.int64]]:
 @lru_cache(maxsize=16)
 def robot_solids(robot: Robot) -> tuple[Any, ...]:
     """Coal geometry of every collision object of a robot, convex meshes as solids, in the order of the model."""
-    return tuple(_measured(convexified(body.geometry)) for body in robot.collision.geometryObjects)
+    return tuple(measured(convexified(body.geometry)) for body in robot.collision.geometryObjects)
 
 
-def _measured(geometry: Any) -> Any:
+def measured(geometry: Any) -> Any:
     """The geometry with its bounding box and sphere computed, which coal leaves undone for some kinds."""
     geometry.computeLocalAABB()
     return geometry
@@ -200,82 +162,3 @@ def inside_mesh(vertices: Matrix, triangles: NDArray[np.int64], point: Vector) -
     dot = np.einsum
     denominator = la * lb * lc + dot("ij,ij->i", a, b) * lc + dot("ij,ij->i", b, c) * la + dot("ij,ij->i", c, a) * lb
     return bool(abs(np.arctan2(numerator, denominator).sum()) > np.pi)  # half of 4 pi, as each angle is counted halved
-
-
-def _extruded(polygon: Matrix, height: float) -> Matrix:
-    low = np.column_stack([polygon, np.full(len(polygon), -0.5 * height)])
-    high = np.column_stack([polygon, np.full(len(polygon), 0.5 * height)])
-    return np.vstack([low, high])
-
-
-def convex_parts(polygon: Matrix) -> tuple[Matrix, ...]:
-    """Cut a simple polygon, shape (k, 2), into convex polygons: ear clipping, then greedy merging of neighbours."""
-    area = np.sum(polygon[:, 0] * np.roll(polygon[:, 1], -1) - np.roll(polygon[:, 0], -1) * polygon[:, 1])
-    ring = list(range(len(polygon))) if area > 0 else list(range(len(polygon)))[::-1]
-    parts = [ring] if _is_convex(polygon, ring) else _merged(polygon, _ears(polygon, ring))
-    return tuple(frozen(polygon[part]) for part in parts)
-
-
-def _turn(p: Vector, q: Vector, r: Vector) -> float:
-    """Twice the signed area of a triangle: positive for a left turn."""
-    return float((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))
-
-
-def _is_convex(polygon: Matrix, ring: list[int]) -> bool:
-    size = len(ring)
-    corners = ((polygon[ring[k]], polygon[ring[(k + 1) % size]], polygon[ring[(k + 2) % size]]) for k in range(size))
-    return all(_turn(*corner) >= 0.0 for corner in corners)
-
-
-def _ears(polygon: Matrix, ring: list[int]) -> list[list[int]]:
-    """Triangulate by cutting ears (Meisters 1975); ``ring`` runs counter-clockwise."""
-    rest, triangles = list(ring), []
-    while len(rest) > 3:
-        for k in range(len(rest)):
-            before, tip, after = rest[k - 1], rest[k], rest[(k + 1) % len(rest)]
-            p, q, r = polygon[before], polygon[tip], polygon[after]
-            others = (polygon[i] for i in rest if i not in (before, tip, after))
-            if _turn(p, q, r) > 0.0 and not any(_in_triangle(o, p, q, r) for o in others):
-                triangles.append([before, tip, after])
-                del rest[k]
-                break
-        else:  # only straight corners are left: drop one, it adds no area
-            flat = min(
-                range(len(rest)), key=lambda k: abs(_turn(*(polygon[rest[(k + d) % len(rest)]] for d in (-1, 0, 1))))
-            )
-            del rest[flat]
-    return [*triangles, rest]
-
-
-def _in_triangle(point: Vector, p: Vector, q: Vector, r: Vector) -> bool:
-    return _turn(p, q, point) >= 0.0 and _turn(q, r, point) >= 0.0 and _turn(r, p, point) >= 0.0
-
-
-def _merged(polygon: Matrix, parts: list[list[int]]) -> list[list[int]]:
-    """Join neighbouring parts while the union stays convex (Hertel and Mehlhorn 1983)."""
-    parts = [list(part) for part in parts]
-    joined = True
-    while joined:
-        joined = False
-        for i in range(len(parts)):
-            for j in range(i + 1, len(parts)):
-                union = _joined(parts[i], parts[j])
-                if union is not None and _is_convex(polygon, union):
-                    parts[i] = union
-                    del parts[j]
-                    joined = True
-                    break
-            if joined:
-                break
-    return parts
-
-
-def _joined(first: list[int], second: list[int]) -> list[int] | None:
-    """Union of two counter-clockwise rings that share one edge, or None."""
-    for k in range(len(first)):
-        a, b = first[k], first[(k + 1) % len(first)]
-        for m in range(len(second)):
-            if second[m] == b and second[(m + 1) % len(second)] == a:
-                around = [second[(m + 1 + s) % len(second)] for s in range(len(second))]  # from a all round to b
-                return first[: k + 1] + around[1:-1] + first[k + 1 :]
-    return None

@@ -16,6 +16,7 @@ import coal
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.collision.shape_table import sizes_of
 from rrtik_ompl.collision.solids import is_mesh, mesh_arrays
 from rrtik_ompl.files.cache import cache_folder, write_whole
 
@@ -65,12 +66,9 @@ def cached_convex_pieces(mesh: Any) -> tuple[list[Matrix], ...]:
 def geometry_bytes(geometry: Any) -> bytes | None:
     """All that a cover depends on, or None for a kind that is not cached."""
     numbers: list[Any]
-    if isinstance(geometry, coal.Box):
-        numbers = [np.array(geometry.halfSide, dtype=np.float64)]
-    elif isinstance(geometry, coal.Sphere):
-        numbers = [np.array([geometry.radius])]
-    elif isinstance(geometry, (coal.Capsule, coal.Cylinder)):
-        numbers = [np.array([geometry.radius, geometry.halfLength])]
+    sizes = sizes_of(geometry)
+    if sizes is not None:
+        numbers = [sizes]
     elif isinstance(geometry, coal.ConvexBase):
         numbers = [np.array(geometry.points(), dtype=np.float64)]
     elif is_mesh(geometry):

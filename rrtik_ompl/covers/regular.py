@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import coal
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.collision.shape_table import Core
 from rrtik_ompl.covers.solids import ROUNDING
 
 CAPSULE_PROTRUSION = 0.06  # share of the radius
@@ -42,22 +40,21 @@ def row_on_z(heights: Vector, radius: float) -> Matrix:
     return spheres
 
 
-def regular_cover(geometry: Any, limit: int, protrusion: float | None) -> Matrix | None:
+def regular_cover(core: Core, limit: int, protrusion: float | None) -> Matrix | None:
     """Boxes as grids of balls, cylinders as rows of balls: the best one of at most ``limit`` balls."""
-    if isinstance(geometry, coal.Box):
-        half = np.array(geometry.halfSide)
+    half, radius = core.half_sides, core.disc
+    if half is not None:
         pairs = ((a, b) for a in range(1, limit + 1) for b in range(1, limit // a + 1))
         grids = np.array([(a, b, c) for a, b in pairs for c in range(1, limit // (a * b) + 1)])
         cells = half / grids
         sticks = np.linalg.norm(cells, axis=1) - cells.min(axis=1)
-    elif isinstance(geometry, coal.Cylinder):
+        return _grid(half, _chosen(grids, sticks, protrusion))
+    if radius is not None:
         grids = np.array([(1, 1, k) for k in range(1, limit + 1)])
-        step = geometry.halfLength / grids[:, 2]
-        radius = np.hypot(geometry.radius, step)
-        sticks = radius - np.minimum(step, geometry.radius)
-    else:
-        return None
-    return _regular(geometry, _chosen(grids, sticks, protrusion))
+        step = core.half_length / grids[:, 2]
+        sticks = np.hypot(radius, step) - np.minimum(step, radius)
+        return _row(radius, core.half_length, int(_chosen(grids, sticks, protrusion)[2]))
+    return None
 
 
 def _chosen(grids: NDArray[np.int64], sticks: Vector, protrusion: float | None) -> NDArray[np.int64]:
@@ -67,12 +64,13 @@ def _chosen(grids: NDArray[np.int64], sticks: Vector, protrusion: float | None) 
     return np.asarray(grids[sticks.argmin()])
 
 
-def _regular(geometry: Any, grid: NDArray[np.int64]) -> Matrix:
-    if isinstance(geometry, coal.Cylinder):
-        step = geometry.halfLength / grid[2]
-        heights = spread(geometry.halfLength - step, int(grid[2]))
-        return row_on_z(heights, np.hypot(geometry.radius, step) * (1.0 + ROUNDING))
-    cell = np.array(geometry.halfSide) / grid
-    axes = [spread(float(h - c), int(n)) for h, c, n in zip(geometry.halfSide, cell, grid, strict=True)]
+def _row(radius: float, half_length: float, count: int) -> Matrix:
+    step = half_length / count
+    return row_on_z(spread(half_length - step, count), np.hypot(radius, step) * (1.0 + ROUNDING))
+
+
+def _grid(half: Vector, grid: NDArray[np.int64]) -> Matrix:
+    cell = half / grid
+    axes = [spread(float(h - c), int(n)) for h, c, n in zip(half, cell, grid, strict=True)]
     centres = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     return np.column_stack([centres, np.full(len(centres), np.linalg.norm(cell) * (1.0 + ROUNDING))])

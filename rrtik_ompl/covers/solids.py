@@ -6,7 +6,6 @@ leads back.
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -177,11 +176,6 @@ def convex_solid(points: Matrix) -> tuple[ConvexSolid, Frame]:
     beyond = float((local @ normals.T - offsets).max())
     below = float((offsets[:, None] - np.einsum("ijk,ik->ij", triangles, normals)).max())
     return ConvexSolid(triangles, normals, offsets, max(beyond, 0.0) + max(below, 0.0) + ROUNDING), frame
-
-
-def box_corners(half: Vector) -> Matrix:
-    """Corners of a box about the origin with these half sides, shape (8, 3)."""
-    return np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * half
 
 
 def cylinder_solid(radius: float, half_length: float) -> tuple[CylinderSolid, Frame]:

@@ -17,6 +17,7 @@ from scipy.spatial import QhullError, cKDTree
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.collision.enclosure import enclosure
+from rrtik_ompl.collision.shape_table import Core, box_corners, core_of
 from rrtik_ompl.collision.solids import is_closed, is_mesh, mesh_arrays
 from rrtik_ompl.covers.cells import elements
 from rrtik_ompl.covers.inner import inscribed
@@ -34,7 +35,6 @@ from rrtik_ompl.covers.solids import (
     Frame,
     MeshSolid,
     Solid,
-    box_corners,
     convex_solid,
     cylinder_solid,
     mesh_solid,
@@ -63,11 +63,9 @@ def outer_cover(geometry: Any, *, protrusion: float | None = None) -> Matrix:
             cover reaches farther (``protrusion_bound`` tells). None: what a number of balls that suits the size of
             the solid allows.
     """
-    swept = _swept_radius(geometry)
-    if isinstance(geometry, coal.Sphere):
-        return np.array([[0.0, 0.0, 0.0, geometry.radius + swept]])
-    if isinstance(geometry, coal.Capsule):
-        return _grown(_capsule_balls(geometry, protrusion), swept)
+    swept, core = _swept_radius(geometry), core_of(geometry)
+    if core is not None and core.rounded:
+        return _grown(_round_cover(core, protrusion), swept)
     if is_mesh(geometry) and geometry.num_tris == 0:
         return np.empty((0, 4))
     made = _solid(geometry)
@@ -78,7 +76,7 @@ def outer_cover(geometry: Any, *, protrusion: float | None = None) -> Matrix:
     usual = balls_for(frame.scale) * (BALLS_OF_OPEN if len(solid.rim) else 1)
     limit = usual if protrusion is None else MAX_BALLS_ON_REQUEST
     found = _searched_cover(solid, limit, wanted)
-    regular = regular_cover(geometry, limit, protrusion)
+    regular = None if core is None else regular_cover(core, limit, protrusion)
     cover = frame.spheres_out(found, solid.slack + ROUNDING)
     if regular is not None and _better(geometry, regular, cover, protrusion):
         cover = regular
@@ -92,10 +90,9 @@ def inner_spheres(geometry: Any, *, count: int | None = None) -> Matrix:
         geometry: A coal geometry.
         count: At most so many; None: a number that suits the size.
     """
-    if isinstance(geometry, coal.Sphere):
-        return np.array([[0.0, 0.0, 0.0, geometry.radius]])[:count]
-    if isinstance(geometry, coal.Capsule):
-        return _capsule_core(geometry, count)
+    core = core_of(geometry)
+    if core is not None and core.rounded:
+        return _round_inner(core, count)
     made = _solid(geometry)
     if made is None or not _closed(geometry, made[0]):
         return np.empty((0, 4))
@@ -114,11 +111,11 @@ def protrusion_bound(geometry: Any, spheres: Matrix) -> float:
     """
     if not len(spheres):
         return 0.0
-    if isinstance(geometry, (coal.Sphere, coal.Capsule)):
-        half = geometry.halfLength if isinstance(geometry, coal.Capsule) else 0.0
-        beyond = np.maximum(np.abs(spheres[:, 2]) - half, 0.0)
+    core = core_of(geometry)
+    if core is not None and core.rounded:
+        beyond = np.maximum(np.abs(spheres[:, 2]) - core.half_length, 0.0)
         from_axis = np.linalg.norm(np.column_stack([spheres[:, :2], beyond]), axis=1)
-        return max(float((spheres[:, 3] + from_axis).max()) - float(geometry.radius), 0.0)
+        return max(float((spheres[:, 3] + from_axis).max()) - core.radius, 0.0)
     made = _solid(geometry)
     if made is None:
         return np.inf
@@ -142,13 +139,14 @@ def _grown(spheres: Matrix, by: float) -> Matrix:
 
 def _solid(geometry: Any) -> tuple[Solid, Frame] | None:
     """The geometry as a solid of about unit size, or None if its kind is not known or it has no volume to speak of."""
-    if isinstance(geometry, coal.Cylinder):
-        sizes = geometry.radius, geometry.halfLength
+    core = core_of(geometry)
+    if core is not None and core.disc is not None:
+        sizes = core.disc, core.half_length
         return cylinder_solid(*sizes) if min(sizes) > 0.0 and np.isfinite(sizes).all() else None
     if is_mesh(geometry):
         return _mesh(geometry)
-    if isinstance(geometry, coal.Box):
-        points = box_corners(np.array(geometry.halfSide))
+    if core is not None:
+        points = core.corners
     elif isinstance(geometry, coal.ConvexBase):
         points = np.array(geometry.points(), dtype=np.float64).reshape(-1, 3)
     else:
@@ -187,15 +185,19 @@ def _closed(geometry: Any, solid: Solid) -> bool:
     return not len(solid.rim) and (not is_mesh(geometry) or isinstance(solid, MeshSolid))
 
 
-def _capsule_balls(capsule: Any, protrusion: float | None) -> Matrix:
-    radius, half = float(capsule.radius), float(capsule.halfLength)
+def _round_cover(core: Core, protrusion: float | None) -> Matrix:
+    radius, half = core.radius, core.half_length
+    if len(core.corners) == 1:
+        return np.array([[0.0, 0.0, 0.0, radius]])
     limit = balls_for(2.0 * (half + radius)) if protrusion is None else MAX_BALLS_ON_REQUEST
     return capsule_cover(radius, half, limit, protrusion)
 
 
-def _capsule_core(capsule: Any, count: int | None) -> Matrix:
-    """Balls inside a capsule, as many as its cover has."""
-    radius, half = float(capsule.radius), float(capsule.halfLength)
+def _round_inner(core: Core, count: int | None) -> Matrix:
+    """Balls inside a ball or a capsule, as many as its cover has."""
+    radius, half = core.radius, core.half_length
+    if len(core.corners) == 1:
+        return np.array([[0.0, 0.0, 0.0, radius]])[:count]
     number = min(balls_on_axis(radius, half, CAPSULE_PROTRUSION * radius), balls_for(2.0 * (half + radius)))
     return row_on_z(spread(half, number if count is None else min(count, number)), radius)
 

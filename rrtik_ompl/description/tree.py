@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, Sphere
+from rrtik_ompl.shapes import Shape
 
 KINDS = ("revolute", "continuous", "prismatic", "fixed")
 
@@ -33,9 +33,12 @@ class MeshFile:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solid:
-    """A shape fixed to a link: ``T_link_solid`` is a ``pinocchio.SE3``, ``colour`` is red, green, blue, opacity."""
+    """A shape fixed to a link: ``T_link_solid`` is a ``pinocchio.SE3``, ``colour`` is red, green, blue, opacity.
 
-    shape: Box | Sphere | Cylinder | Capsule | MeshFile
+    The shape is one solid for coal, as all that URDF knows are (a polygon that is not convex is several).
+    """
+
+    shape: Shape | MeshFile
     T_link_solid: Any = field(default_factory=pin.SE3.Identity)
     colour: tuple[float, float, float, float] | None = None
 

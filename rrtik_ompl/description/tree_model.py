@@ -10,7 +10,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.collision.solids import pieces
+from rrtik_ompl.collision.shape_table import pieces
 from rrtik_ompl.description.tree import Joint, Link, MeshFile, Tree
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import read_bytes

@@ -19,7 +19,7 @@ from rrtik_ompl.description.robot_build import Mimic
 from rrtik_ompl.description.tree import KINDS, Joint, Link, MeshFile, Solid, Tree
 from rrtik_ompl.errors import InputError, MeshWarning, MissingFileError, RrtikError, UnknownNameError
 from rrtik_ompl.poses import pose_from_rpy
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, Sphere
+from rrtik_ompl.shapes import SHAPES, Cylinder, Measure, Shape
 
 Colour = tuple[float, float, float, float]
 _TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -162,24 +162,21 @@ class _Reader:
             raise InputError(f"{where}: <{element.tag}> must hold one <geometry> with one shape")
         shape = self.shape(shapes[0], where)
         if isinstance(shape, Cylinder) and element.get("name", "") in capsules:
-            shape = Capsule(shape.radius, shape.length)
+            shape = shape.capped()
         return Solid(shape, _origin(element, where), self.colour(element.find("material"), where))
 
-    def shape(self, element: Element, where: str) -> Box | Sphere | Cylinder | Capsule | MeshFile:
-        if element.tag == "box":
-            return Box(numbers(element, "size", 3, None, where))
-        if element.tag == "sphere":
-            return Sphere(numbers(element, "radius", 1, None, where)[0])
-        if element.tag in ("cylinder", "capsule"):
-            kind = Cylinder if element.tag == "cylinder" else Capsule
-            return kind(numbers(element, "radius", 1, None, where)[0], numbers(element, "length", 1, None, where)[0])
+    def shape(self, element: Element, where: str) -> Shape | MeshFile:
+        kind = SHAPES.get(element.tag)
+        if kind is not None and kind.in_urdf:
+            return kind(**{measure.name: _measured(element, measure, where) for measure in kind.measures})
         if element.tag == "mesh":
             uri = attribute(element, "mesh", "filename", where)
             x, y, z = numbers(element, "scale", 3, (1.0, 1.0, 1.0), where)
             if x * y * z == 0.0:
                 raise InputError(f"{where}: mesh '{uri}' has a scale of 0; every axis needs another number")
             return MeshFile(resolve_mesh(uri, self.folder, self.packages, where), (x, y, z))
-        raise UnknownNameError("shape", element.tag, ("box", "sphere", "cylinder", "capsule", "mesh"), where=where)
+        known = (key for key, kind in SHAPES.items() if kind.in_urdf)
+        raise UnknownNameError("shape", element.tag, (*known, "mesh"), where=where)
 
     def colour(self, material: Element | None, where: str) -> Colour | None:
         if material is None:
@@ -212,6 +209,12 @@ class _Reader:
             source = attribute(tie, "mimic", "joint", where)
             multiplier = numbers(tie, "multiplier", 1, (1.0,), where)[0]
             yield Mimic(element.get("name", ""), source, multiplier, numbers(tie, "offset", 1, (0.0,), where)[0])
+
+
+def _measured(element: Element, measure: Measure, where: str) -> float | list[float]:
+    if measure.kind == "three lengths":
+        return numbers(element, measure.name, 3, None, where)
+    return numbers(element, measure.name, 1, None, where)[0]
 
 
 def _limit(limit: Element | None, kind: str, where: str) -> tuple[float, float, float]:

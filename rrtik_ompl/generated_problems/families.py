@@ -8,6 +8,7 @@ thick, or whose wrist stands off to one side, is given more room beside the way 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
@@ -150,8 +151,5 @@ def obstacles(
 
 
 def _scaled(shape: Solid, factor: float) -> Solid:
-    if isinstance(shape, Box):
-        return Box(factor * shape.size)
-    if isinstance(shape, Sphere):
-        return Sphere(factor * shape.radius)
-    return type(shape)(factor * shape.radius, factor * shape.length)
+    """The same shape in another size; all measures of these kinds are lengths."""
+    return replace(shape, **{measure.name: factor * getattr(shape, measure.name) for measure in shape.measures})

@@ -9,18 +9,9 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.path import JointPath, Move
+from rrtik_ompl.units import reading
 
 COLUMNS = ("move", "joint", "from", "to", "change", "unit")
-
-
-def joint_unit(slides: bool) -> str:
-    """Unit of the values of a joint: "m" if it slides, else "rad"."""
-    return "m" if slides else "rad"
-
-
-def reading(value: float, unit: str) -> tuple[float, str]:
-    """A joint value as a person reads it: degrees for radians, metres as they are; and the name of that unit."""
-    return (value, "m") if unit == "m" else (float(np.rad2deg(value)), "deg")
 
 
 def moves_csv(path: JointPath) -> str:

@@ -9,18 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.collision.shape_of import shape_of
+from rrtik_ompl.collision.shape_table import shape_of
 from rrtik_ompl.collision.solids import is_mesh
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
+from rrtik_ompl.shapes import Mesh, Shape
+from rrtik_ompl.shapes.surfaces import Faces
 from rrtik_ompl.viewer.drawing import palette
-from rrtik_ompl.viewer.drawing.triangles import Faces, capsule, extruded, split_creases, thin_out
+from rrtik_ompl.viewer.drawing.triangles import split_creases, thin_out
 
 ROBOT_TRIANGLES = 20_000
 OBSTACLE_TRIANGLES = 5_000
-SIDES = 32  # of a drawn cylinder
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,7 +62,7 @@ def obstacle_surfaces(obstacles: Sequence[Obstacle], color: str = palette.OBSTAC
     """Bounded obstacles in the frame of the world; half-spaces are left out."""
     found = []
     for each in obstacles:
-        if not isinstance(each.shape, HalfSpace):
+        if each.shape.bounded:
             found.append(moved(surface_of_shape(each.shape, color), each.pose.rotation, each.pose.translation))
     return tuple(found)
 
@@ -92,27 +92,16 @@ def _link_surface(body: object, limit: int) -> Surface | None:
         shape = shape_of(geometry)
     except InputError:  # a mesh without area: nothing to see
         return None
-    if shape is None or isinstance(shape, HalfSpace):
+    if shape is None or not shape.bounded:
         return None
     return moved(surface_of_shape(shape, color, joint, limit), placement.rotation, placement.translation)
 
 
 def _triangles(shape: Shape, limit: int) -> tuple[Matrix, Faces]:
+    surface = shape.surface()
     if isinstance(shape, Mesh):
-        return thin_out(shape.vertices, shape.triangles, limit)
-    if isinstance(shape, Sphere):
-        return _welded(*capsule(shape.radius, 0.0))
-    if isinstance(shape, Capsule):
-        return _welded(*capsule(shape.radius, shape.length))
-    if isinstance(shape, Prism):
-        return extruded(shape.polygon, shape.height)
-    if isinstance(shape, Cylinder):
-        turn = np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)
-        return extruded(shape.radius * np.stack([np.cos(turn), np.sin(turn)], 1), shape.length)
-    if isinstance(shape, Box):
-        x, y, z = shape.size
-        return extruded(0.5 * np.array([[-x, -y], [x, -y], [x, y], [-x, y]]), z)
-    raise InputError(f"a {type(shape).__name__} cannot be drawn as a bounded solid")
+        return thin_out(*surface, limit)
+    return _welded(*surface) if shape.smooth else surface
 
 
 def _welded(vertices: Matrix, faces: Faces) -> tuple[Matrix, Faces]:

@@ -14,7 +14,6 @@ import numpy as np
 from rrtik_ompl.arrays import Vector, frozen
 from rrtik_ompl.errors import InputError, RrtikError, UnknownNameError
 from rrtik_ompl.goal import JointGoal
-from rrtik_ompl.moves.text import joint_unit, reading
 from rrtik_ompl.pilot.arguments import LONGEST, fitting
 from rrtik_ompl.pilot.devices.arm import Arm, joint_rates
 from rrtik_ompl.pilot.feasibility import Outlook
@@ -26,6 +25,7 @@ from rrtik_ompl.pilot.routes.route import Route, route_to, route_to_grasp
 from rrtik_ompl.pilot.surroundings import Surroundings
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.sensing.scene_from_view import SeenObject
+from rrtik_ompl.units import joint_unit, reading
 
 MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING = "manoeuvre", "choosing", "proposed", "following"
 STALE = 0.5  # [s]; a picture older than that is not what is there now

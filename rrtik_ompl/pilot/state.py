@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.moves.text import joint_unit, reading, spoken_moves
+from rrtik_ompl.moves.text import spoken_moves
 from rrtik_ompl.pilot.session import STALE, Session
+from rrtik_ompl.units import joint_unit, reading
 
 
 def state_document(session: Session) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import pinocchio as pin
 from pydantic import BaseModel, Field
@@ -12,9 +12,13 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.sections import Length, Name, Number, Positive, Vector3, Vector4
 from rrtik_ompl.poses import IDENTITY_QUATERNION, pose
 from rrtik_ompl.scene import Obstacle
-from rrtik_ompl.shapes import Box, Cylinder, Shape, Sphere
+from rrtik_ompl.shapes import SHAPES, Shape
 
-SIZES = {"box": 3, "cylinder": 2, "sphere": 1}
+KNOWN = {key: kind for key, kind in sorted(SHAPES.items()) if kind.moveit}
+if TYPE_CHECKING:
+    PrimitiveName = str
+else:
+    PrimitiveName = Literal[tuple(KNOWN)]
 
 
 class PoseMessage(BaseModel):
@@ -37,19 +41,19 @@ class Header(BaseModel):
 class Primitive(BaseModel):
     """A shape: box [x, y, z], cylinder [height, radius], sphere [radius], full sizes in metres."""
 
-    type: Literal["box", "cylinder", "sphere"]
+    type: PrimitiveName
     dimensions: Annotated[list[Length], Field(min_length=1, max_length=3)]
 
     def build(self) -> Shape:
         """The shape."""
-        if len(self.dimensions) != SIZES[self.type]:
-            raise InputError(f"a {self.type} has {SIZES[self.type]} dimensions, found {len(self.dimensions)}")
-        if self.type == "box":
-            return Box(self.dimensions)
-        if self.type == "sphere":
-            return Sphere(self.dimensions[0])
-        height, radius = self.dimensions
-        return Cylinder(radius, height)
+        kind = KNOWN[self.type]
+        sizes = {m.name: 3 if m.kind == "three lengths" else 1 for m in kind.measures}
+        if len(self.dimensions) != sum(sizes.values()):
+            raise InputError(f"a {self.type} has {sum(sizes.values())} dimensions, found {len(self.dimensions)}")
+        rest, values = iter(self.dimensions), {}
+        for name in kind.moveit:
+            values[name] = next(rest) if sizes[name] == 1 else [next(rest) for _ in range(sizes[name])]
+        return kind(**values)
 
 
 class CollisionObject(BaseModel):

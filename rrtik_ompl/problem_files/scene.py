@@ -11,17 +11,12 @@ import pinocchio as pin
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.files.mesh import load_mesh
+from rrtik_ompl.errors import require
 from rrtik_ompl.files.sections import (
-    Length,
     Name,
     NotNegative,
     Number,
-    Positive,
     Section,
-    Sizes3,
-    Vector2,
     Vector3,
     Vector4,
     Version,
@@ -31,11 +26,8 @@ from rrtik_ompl.files.sections import (
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml, write_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.poses import pose, pose_from_rpy, quaternion_xyzw
+from rrtik_ompl.problem_files.shapes import ONE_SHAPE, ShapeEntry, shape_data
 from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, Waypoints
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
-
-SHAPE_KEYS = ("box", "sphere", "cylinder", "capsule", "half_space", "polygon", "mesh")
-_ONE_SHAPE = {"oneOf": [{"required": [key]} for key in SHAPE_KEYS]}
 
 
 class PoseEntry(Section):
@@ -56,20 +48,6 @@ class PoseEntry(Section):
         if self.rpy_deg is not None:
             return pose_from_rpy(self.xyz, np.radians(self.rpy_deg))
         return pose(self.xyz) if self.quat_xyzw is None else pose(self.xyz, self.quat_xyzw)
-
-
-class RoundEntry(Section):
-    """Measures of a cylinder or a capsule along z. A capsule's length is the distance between its cap centres."""
-
-    radius: Length = Field(description="[m]")
-    length: Length = Field(description="[m]")
-
-
-class HalfSpaceEntry(Section):
-    """The filled side of a plane: points with normal . x <= offset; the free side is normal . x > offset."""
-
-    normal: Vector3
-    offset: Number = Field(0.0, description="[m]")
 
 
 class WaypointEntry(Section):
@@ -98,53 +76,17 @@ class MotionEntry(Section):
         return Waypoints([w.time for w in stations], [w.pose.build() for w in stations])
 
 
-class SolidEntry(Section):
+class SolidEntry(ShapeEntry):
     """A named solid: exactly one shape and a pose."""
 
-    name: Name
-    box: Sizes3 | None = Field(None, description="full side lengths [m]")
-    sphere: Length | None = Field(None, description="radius [m]")
-    cylinder: RoundEntry | None = None
-    capsule: RoundEntry | None = None
-    half_space: HalfSpaceEntry | None = None
-    polygon: Annotated[list[Vector2], Field(min_length=3)] | None = Field(
-        None, description="vertices in the xy-plane [m], in order; extruded along z, centred about z = 0"
-    )
-    height: Length | None = Field(None, description="of a polygon, along z [m]; 1 if absent")
-    mesh: Name | None = Field(None, description="STL, OBJ or DAE file, relative to the folder of this file")
-    scale: Positive | None = Field(None, description="of a mesh: metres per unit of its file; 1 if absent")
     pose: PoseEntry | None = None
-
-    @model_validator(mode="after")
-    def _one_shape(self) -> SolidEntry:
-        kind = exactly_one(self, SHAPE_KEYS, f"'{self.name}'")
-        for key, owner in (("height", "polygon"), ("scale", "mesh")):
-            if getattr(self, key) is not None and kind != owner:
-                raise PydanticCustomError("stray_key", f"'{key}' belongs to a {owner}, but '{self.name}' is a {kind}")
-        return self
-
-    def build_shape(self, folder: Path) -> Shape:
-        """The shape; meshes are looked for relative to ``folder``."""
-        if self.box is not None:
-            return Box(self.box)
-        if self.sphere is not None:
-            return Sphere(self.sphere)
-        if self.cylinder is not None:
-            return Cylinder(self.cylinder.radius, self.cylinder.length)
-        if self.capsule is not None:
-            return Capsule(self.capsule.radius, self.capsule.length)
-        if self.half_space is not None:
-            return HalfSpace(self.half_space.normal, self.half_space.offset)
-        if self.polygon is not None:
-            return Prism(self.polygon, 1.0 if self.height is None else self.height)
-        return load_mesh(folder / str(self.mesh), 1.0 if self.scale is None else self.scale)
 
     def build_pose(self) -> Any:
         """The pose; identity if none is given."""
         return pin.SE3.Identity() if self.pose is None else self.pose.build()
 
 
-class ObstacleEntry(SolidEntry, json_schema_extra=_ONE_SHAPE):
+class ObstacleEntry(SolidEntry, json_schema_extra=ONE_SHAPE):
     """An obstacle in the world."""
 
     motion: MotionEntry | None = None
@@ -165,7 +107,7 @@ class ObstacleEntry(SolidEntry, json_schema_extra=_ONE_SHAPE):
         return Obstacle(self.name, self.build_shape(folder), place, motion, own)
 
 
-class AttachedEntry(SolidEntry, json_schema_extra=_ONE_SHAPE):
+class AttachedEntry(SolidEntry, json_schema_extra=ONE_SHAPE):
     """A solid that a link holds; ``pose`` is in the frame of the link."""
 
     link: Name
@@ -256,7 +198,7 @@ def pose_data(placement: Any) -> dict[str, Any]:
 
 
 def _obstacle_data(obstacle: Obstacle, folder: Path) -> dict[str, Any]:
-    data = {"name": obstacle.name, **_shape_data(obstacle.name, obstacle.shape, folder)}
+    data = {"name": obstacle.name, **shape_data(obstacle.name, obstacle.shape, folder)}
     data["pose"] = pose_data(obstacle.pose)
     if isinstance(obstacle.motion, ConstantVelocity):
         data["motion"] = {"velocity": obstacle.motion.velocity.tolist()}
@@ -267,29 +209,6 @@ def _obstacle_data(obstacle: Obstacle, folder: Path) -> dict[str, Any]:
 
 
 def _attached_data(held: AttachedObject, folder: Path) -> dict[str, Any]:
-    data = {"name": held.name, "link": held.link, **_shape_data(held.name, held.shape, folder)}
+    data = {"name": held.name, "link": held.link, **shape_data(held.name, held.shape, folder)}
     data["pose"] = pose_data(held.pose)
     return data | ({"allow": list(held.allow)} if held.allow else {})
-
-
-def _shape_data(name: str, shape: Shape, folder: Path) -> dict[str, Any]:
-    if isinstance(shape, Box):
-        return {"box": shape.size.tolist()}
-    if isinstance(shape, Sphere):
-        return {"sphere": float(shape.radius)}
-    if isinstance(shape, Cylinder):
-        return {"cylinder": {"radius": float(shape.radius), "length": float(shape.length)}}
-    if isinstance(shape, Capsule):
-        return {"capsule": {"radius": float(shape.radius), "length": float(shape.length)}}
-    if isinstance(shape, HalfSpace):
-        return {"half_space": {"normal": shape.normal.tolist(), "offset": float(shape.offset)}}
-    if isinstance(shape, Prism):
-        return {"polygon": shape.polygon.tolist(), "height": float(shape.height)}
-    return _mesh_data(name, shape, folder)
-
-
-def _mesh_data(name: str, mesh: Mesh, folder: Path) -> dict[str, Any]:
-    if not mesh.source:
-        raise InputError(f"'{name}': a mesh made in memory cannot be written; save it as STL and use load_mesh")
-    file = os.path.relpath(os.path.realpath(mesh.source), os.path.realpath(folder))
-    return {"mesh": Path(file).as_posix()} | ({} if mesh.scale == 1.0 else {"scale": mesh.scale})

@@ -40,8 +40,8 @@ def moving_scene(robot: Robot, count: int, speed: float, seed: int, *, seconds: 
     times = BETWEEN * np.arange(steps + 1)
     obstacles = []
     for k in range(count):
-        shape, size = _shape(rng, k, reach)
-        low, high = SHELL[0] * reach + size, SHELL[1] * reach
+        shape = _shape(rng, k, reach)
+        low, high = SHELL[0] * reach + shape.bounding_radius, SHELL[1] * reach
         places = _wander(rng, steps, speed * BETWEEN, low, high) + centre
         turned = _rotation(rng)
         turns = turning_points(places)
@@ -87,14 +87,14 @@ def _reach(robot: Robot) -> tuple[Vector, float]:
     return foot, float(np.linalg.norm(tips - foot, axis=1).max())
 
 
-def _shape(rng: np.random.Generator, number: int, reach: float) -> tuple[Shape, float]:
-    """One of three kinds in turn, and the radius of the ball around it [m]."""
+def _shape(rng: np.random.Generator, number: int, reach: float) -> Shape:
+    """One of three kinds in turn."""
     a, b, c = rng.uniform(0.03, 0.08, 3) * reach
     if number % 3 == 0:
-        return Sphere(a), a
+        return Sphere(a)
     if number % 3 == 1:
-        return Box([2 * a, 2 * b, 2 * c]), float(np.linalg.norm([a, b, c]))
-    return Capsule(0.5 * a, 2 * b), 0.5 * a + b
+        return Box([2 * a, 2 * b, 2 * c])
+    return Capsule(0.5 * a, 2 * b)
 
 
 def _wander(rng: np.random.Generator, steps: int, length: float, low: float, high: float) -> Any:

@@ -16,6 +16,7 @@ from rrtik_ompl.files.text import read_text, write_text
 from rrtik_ompl.path import SECOND_CHECK, JointPath
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.trajectory.text import decoded, encoded, trajectory_format
+from rrtik_ompl.units import joint_units
 from rrtik_ompl.world import World
 
 FIT = 1e-8  # [rad] or [m]; how well a knot and the cubic that leads to it must agree
@@ -210,7 +211,7 @@ class Trajectory:
         Raises:
             InputError: If the ending is another one or the file cannot be written.
         """
-        units = ["m" if sliding else "rad" for sliding in self.prismatic]
+        units = joint_units(self.prismatic)
         columns = (self.times, self.positions, self.velocities, self.accelerations)
         points = [column.tolist() for column in columns]
         write_text(file, encoded(self.robot_name, self.joint_names, units, points, trajectory_format(file)))

@@ -11,8 +11,8 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.goal import Goal, GoalSet, JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
-from rrtik_ompl.shapes import HalfSpace
 from rrtik_ompl.transitions import moved, route_length, transitions
+from rrtik_ompl.units import shown_unit
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.framing import Frame
 from rrtik_ompl.viewer.drawing.marks import Mark
@@ -106,7 +106,7 @@ def _robot(robot: Robot) -> dict[str, Any]:
             "placement": _numbers(tip.placement.homogeneous.ravel()),
         },
         "joints": [
-            {"name": name, "unit": "m" if slides else "deg", "lower": _limit(low), "upper": _limit(high)}
+            {"name": name, "unit": shown_unit(slides)[1], "lower": _limit(low), "upper": _limit(high)}
             for name, slides, low, high in zip(
                 robot.joint_names, robot.prismatic, robot.lower, robot.upper, strict=True
             )
@@ -161,7 +161,7 @@ def _obstacles(scene: Scene) -> list[dict[str, Any]]:
         {
             "name": o.name,
             "node": node_name(o.name),
-            "plate": isinstance(o.shape, HalfSpace),
+            "plate": not o.shape.bounded,
             "moving": o.motion is not None,
             "margin": o.margin,
             "margin_drawn": o.margin > 0.0 and look_of_margin(o.shape, o.margin) is not None,

@@ -7,9 +7,11 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rrtik_ompl.collision.certificate import distance
-from rrtik_ompl.collision.solids import convex_parts, hull, inside_mesh, pieces
+from rrtik_ompl.collision.shape_table import pieces
+from rrtik_ompl.collision.solids import hull, inside_mesh
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
+from rrtik_ompl.shapes.polygons import convex_parts
 
 LETTER_E = [(8, 4), (18, 4), (18, 7), (11, 7), (11, 11), (18, 11)]
 LETTER_E += [(18, 14), (11, 14), (11, 18), (18, 18), (18, 21), (8, 21)]

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.collision.solids import bvh, hull, inside_mesh, is_closed, is_mesh, mesh_arrays, pieces, robot_solids
+from rrtik_ompl.collision.shape_table import pieces
+from rrtik_ompl.collision.solids import bvh, hull, inside_mesh, is_closed, is_mesh, mesh_arrays, robot_solids
 from rrtik_ompl.covers import spheres as covers
 from rrtik_ompl.covers.solids import distance_to_triangles
 from rrtik_ompl.covers.spheres import inner_spheres, outer_cover, protrusion_bound

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rrtik_ompl.collision.solids import pieces
+from rrtik_ompl.collision.shape_table import pieces
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
+from rrtik_ompl.shapes.surfaces import capsule, extruded
 from rrtik_ompl.viewer.drawing.meshes import half_space_plate, look_of_coal, look_of_shape, thickened
-from rrtik_ompl.viewer.drawing.triangles import capsule, extruded, split_creases, thin_out, tube
+from rrtik_ompl.viewer.drawing.triangles import split_creases, thin_out, tube
 
 L_SHAPE = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]])
 

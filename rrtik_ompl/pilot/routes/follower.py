@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.moves.text import joint_unit, reading
 from rrtik_ompl.path import JointPath, Move
+from rrtik_ompl.units import joint_unit, reading
 from rrtik_ompl.world import World
 
 TOLERANCE = np.deg2rad(1.0)  # [rad]; a move is done this near to its end

@@ -12,11 +12,11 @@ import numpy as np
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form
-from rrtik_ompl.moves.text import joint_unit, reading
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.pilot.routes.clearance import tightest
 from rrtik_ompl.pilot.routes.follower import slack
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.units import joint_unit, reading
 from rrtik_ompl.world import World
 
 NEAR_SINGULAR = 0.05  # sines of the angles that vanish in a singular posture, metres of a lever

@@ -9,7 +9,6 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import HalfSpace
 from rrtik_ompl.viewer.drawing.meshes import look_of_shape
 
 HUGE = 3.0  # an obstacle this many times larger than the arm's box is surroundings: it may run out of the picture
@@ -53,7 +52,7 @@ def frame_around(
         extra: Further points, each array of shape (m, 3) [m].
         whole: Take in huge obstacles completely.
     """
-    boxes = [obstacle_corners(o) for o in scene.obstacles if not isinstance(o.shape, HalfSpace)]
+    boxes = [obstacle_corners(o) for o in scene.obstacles if o.shape.bounded]
     if arm_points is None or len(arm_points) == 0:
         everything = np.concatenate([*boxes, *extra, *([] if boxes or extra else [EMPTY])])
         low, high = everything.min(axis=0), everything.max(axis=0)

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix, frozen
+from rrtik_ompl.shapes.surfaces import Faces, capsule
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.meshes import look_of_triangles
-from rrtik_ompl.viewer.drawing.triangles import Faces, capsule, tube
+from rrtik_ompl.viewer.drawing.triangles import tube
 
 SIDES = 6  # of the tubes of a line: there may be thousands
 ROUND = 48  # segments of a ball

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,20 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.collision.shape_of import shape_of
+from rrtik_ompl.collision.shape_table import shape_of
 from rrtik_ompl.collision.solids import is_mesh
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
-from rrtik_ompl.viewer.drawing.triangles import (
-    Faces,
-    box_corners,
-    capsule,
-    extruded,
-    rounded,
-    split_creases,
-    thin_out,
-    tube,
-)
+from rrtik_ompl.shapes import Box, Cylinder, HalfSpace, Mesh, Shape, Sphere
+from rrtik_ompl.shapes.surfaces import Faces
+from rrtik_ompl.viewer.drawing.triangles import box_corners, split_creases, thin_out, tube
 
 MAX_OBSTACLE_TRIANGLES = 30_000  # a drawn mesh above this is thinned out; the one that is checked stays as it is
 BEAD = 0.9  # radius of the bead that stands for a robot that is a mere point, in thicknesses of a line
@@ -52,37 +45,21 @@ def look_of_shape(shape: Shape, limit: int = MAX_OBSTACLE_TRIANGLES) -> Look:
     Raises:
         InputError: For a half-space, which has no end: see :func:`half_space_plate`.
     """
-    if isinstance(shape, Sphere):
-        return _primitive(mg.Sphere(shape.radius), np.eye(4), np.full(3, shape.radius))
-    if isinstance(shape, Cylinder):
-        half = [shape.radius, shape.radius, 0.5 * shape.length]
-        return _primitive(mg.Cylinder(shape.length, shape.radius), _Y_TO_Z, half)
-    if isinstance(shape, Box):
-        return _primitive(mg.Box(shape.size.tolist()), np.eye(4), 0.5 * shape.size)
-    if isinstance(shape, Capsule):
-        return look_of_triangles(*capsule(shape.radius, shape.length))
-    if isinstance(shape, Prism):
-        return look_of_triangles(*split_creases(*extruded(shape.polygon, shape.height)))
-    if isinstance(shape, Mesh):
-        return look_of_triangles(*split_creases(*thin_out(shape.vertices, shape.triangles, limit)))
-    raise InputError(f"a {type(shape).__name__} cannot be drawn as a bounded solid")
+    own = OWN_LOOKS.get(type(shape))
+    if own is not None:
+        return own(shape)
+    surface = shape.surface()
+    if shape.smooth:
+        return look_of_triangles(*surface)
+    return look_of_triangles(*split_creases(*(thin_out(*surface, limit) if isinstance(shape, Mesh) else surface)))
 
 
 def look_of_margin(shape: Shape, margin: float) -> Look | None:
-    """How everything within a margin [m] of a shape is drawn; None for half-spaces, polygons and meshes."""
-    if isinstance(shape, Sphere):
-        return look_of_shape(Sphere(shape.radius + margin))
-    if isinstance(shape, Capsule):
-        return look_of_shape(Capsule(shape.radius + margin, shape.length))
-    if isinstance(shape, Cylinder):
-        turn = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
-        circle = shape.radius * np.stack([np.cos(turn), np.sin(turn)], 1)
-        return look_of_triangles(*rounded(circle, turn, shape.length, margin))
-    if isinstance(shape, Box):
-        turn = np.concatenate([np.linspace(0.0, 0.5 * np.pi, 7) + 0.5 * np.pi * k for k in range(4)])
-        corners = np.repeat(0.5 * shape.size[:2] * [[1, 1], [-1, 1], [-1, -1], [1, -1]], 7, axis=0)
-        return look_of_triangles(*rounded(corners, turn, float(shape.size[2]), margin))
-    return None
+    """How everything within a margin [m] of a shape is drawn; None if the shape does not know it."""
+    grown = shape.grown(margin)
+    if grown is None:
+        return None
+    return look_of_shape(grown) if isinstance(grown, Shape) else look_of_triangles(*grown)
 
 
 def look_of_triangles(vertices: Matrix, faces: Faces) -> Look:
@@ -153,3 +130,13 @@ def _frame_along(normal: NDArray[np.float64]) -> NDArray[np.float64]:
     x = np.cross(aside, normal)
     x /= np.linalg.norm(x)
     return np.stack([x, np.cross(normal, x), normal], 1)
+
+
+# What three.js draws by itself, smoother and in fewer bytes than triangles.
+OWN_LOOKS: dict[type[Shape], Callable[[Any], Look]] = {
+    Sphere: lambda ball: _primitive(mg.Sphere(ball.radius), np.eye(4), np.full(3, ball.radius)),
+    Cylinder: lambda solid: _primitive(
+        mg.Cylinder(solid.length, solid.radius), _Y_TO_Z, [solid.radius, solid.radius, 0.5 * solid.length]
+    ),
+    Box: lambda box: _primitive(mg.Box(box.size.tolist()), np.eye(4), 0.5 * box.size),
+}

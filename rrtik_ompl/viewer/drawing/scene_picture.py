@@ -30,7 +30,7 @@ def draw_scene(vis: Any, scene: Scene, frame: Frame) -> None:
     for obstacle in scene.at(0.0).obstacles:
         _draw_obstacle(vis["obstacles"][node_name(obstacle.name)], obstacle, frame)
     for obstacle in scene.obstacles:
-        if obstacle.motion is not None and not isinstance(obstacle.shape, HalfSpace):
+        if obstacle.motion is not None and obstacle.shape.bounded:
             _draw_motion(vis["later"][node_name(obstacle.name)], obstacle, obstacle.motion, frame)
 
 
@@ -45,7 +45,7 @@ def obstacle_look(obstacle: Obstacle, frame: Frame) -> tuple[Look, Matrix]:
 
 def _draw_obstacle(node: Any, obstacle: Obstacle, frame: Frame) -> None:
     look, placement = obstacle_look(obstacle, frame)
-    opacity = 0.2 if isinstance(obstacle.shape, HalfSpace) else 1.0
+    opacity = 1.0 if obstacle.shape.bounded else 0.2
     node.set_object(look.geometry, _material(palette.OBSTACLE, opacity))
     node.set_transform(obstacle.pose.homogeneous @ placement)
     _draw_margin(node["margin"], obstacle, placement)

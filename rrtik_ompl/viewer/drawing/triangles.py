@@ -1,18 +1,15 @@
-"""Triangle meshes for drawing: crisp edges on smooth surfaces, fewer triangles, polygons, capsules and tubes."""
+"""Triangle meshes for drawing: crisp edges on smooth surfaces, fewer triangles, tubes."""
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.collision.solids import convex_parts
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.shapes.surfaces import Faces, wrap
 
-Faces: TypeAlias = NDArray[np.int64]  # vertex numbers, shape (m, 3)
 CREASE = np.deg2rad(35.0)  # faces that meet at a larger angle are drawn with an edge between them
 
 
@@ -55,52 +52,6 @@ def thin_out(vertices: Matrix, faces: Faces, limit: int) -> tuple[Matrix, Faces]
     return thin_vertices, thin_faces
 
 
-def extruded(polygon: Matrix, height: float) -> tuple[Matrix, Faces]:
-    """Closed prism over a simple polygon, shape (k, 2), from z = -height/2 to +height/2."""
-    ring = polygon if _signed_area(polygon) > 0.0 else polygon[::-1]
-    walls = [_quad(a, b, height) for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True)]
-    fans = [np.stack([part[[0, k, k + 1]] for k in range(1, len(part) - 1)]) for part in convex_parts(ring)]
-    cap = np.concatenate(fans)  # triangles in the plane, shape (m, 3, 2)
-    z = np.full((*cap.shape[:2], 1), 0.5 * height)
-    top, bottom = np.concatenate([cap, z], axis=2), np.concatenate([cap, -z], axis=2)[:, ::-1]
-    corners = np.concatenate([top, bottom, *walls]).reshape(-1, 3)
-    vertices, index = np.unique(corners, axis=0, return_inverse=True)
-    return vertices, np.asarray(index, dtype=np.int64).reshape(-1, 3)
-
-
-def capsule(radius: float, length: float, segments: int = 24) -> tuple[Matrix, Faces]:
-    """Capsule along z about the origin; ``length`` is the distance between the two cap centres."""
-    rings = segments // 4
-    angles = np.linspace(0.0, 0.5 * np.pi, rings + 1)
-    lift = np.concatenate([np.full(rings + 1, -0.5 * length), np.full(rings + 1, 0.5 * length)])
-    latitude = np.concatenate([-angles[::-1], angles])
-    radii, heights = radius * np.cos(latitude), radius * np.sin(latitude) + lift
-    turn = np.linspace(0.0, 2.0 * np.pi, segments, endpoint=False)
-    x, y = np.outer(radii, np.cos(turn)), np.outer(radii, np.sin(turn))
-    circles = np.stack([x, y, np.broadcast_to(heights[:, None], x.shape)], 2)
-    return circles.reshape(-1, 3), _wrap(len(radii), segments)
-
-
-def rounded(outline: Matrix, turn: Vector, length: float, radius: float, rings: int = 6) -> tuple[Matrix, Faces]:
-    """What lies within a radius of an upright convex solid: its surface.
-
-    Args:
-        outline: Points on the solid's outline, anticlockwise, shape (k, 2).
-        turn: Angles of the outward normal at each of them, shape (k,) [rad]; a corner is repeated, once for each.
-        length: Full extent of the solid along z.
-        radius: Of the edges.
-        rings: Steps from an upright side to a face.
-    """
-    quarter = np.linspace(0.0, 0.5 * np.pi, rings + 1)
-    out = np.stack([np.cos(turn), np.sin(turn)], 1)
-    side = [outline + radius * np.cos(angle) * out for angle in quarter]
-    half = 0.5 * length + radius * np.sin(np.append(quarter, quarter[-1]))
-    middle = np.broadcast_to(outline.mean(axis=0), outline.shape)
-    upper = [np.column_stack([ring, np.full(len(ring), z)]) for ring, z in zip([*side, middle], half, strict=True)]
-    circles = [*(ring * [1.0, 1.0, -1.0] for ring in upper[::-1]), *upper]
-    return np.concatenate(circles), _wrap(len(circles), len(outline))
-
-
 def tube(points: Matrix, radius: float, sides: int = 8) -> tuple[Matrix, Faces]:
     """Tube of the given radius along a line through at least two points, shape (k, 3)."""
     along = np.gradient(points, axis=0)
@@ -114,7 +65,7 @@ def tube(points: Matrix, radius: float, sides: int = 8) -> tuple[Matrix, Faces]:
     beside = np.cross(along, across)
     turn = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)[:, None]
     circles = points[:, None] + radius * (np.cos(turn) * across[:, None] + np.sin(turn) * beside[:, None])
-    return circles.reshape(-1, 3), _wrap(len(points), sides)
+    return circles.reshape(-1, 3), wrap(len(points), sides)
 
 
 def box_corners(points: ArrayLike) -> Matrix:
@@ -124,13 +75,6 @@ def box_corners(points: ArrayLike) -> Matrix:
     pick = np.array([[k & 1, k >> 1 & 1, k >> 2 & 1] for k in range(8)], dtype=bool)
     corners: Matrix = np.where(pick, high, low)
     return corners
-
-
-def _wrap(rings: int, sides: int) -> Faces:
-    """Faces between consecutive rings of vertices, first and last ring left open."""
-    ring, side = (a.reshape(-1) for a in np.meshgrid(np.arange(rings - 1), np.arange(sides), indexing="ij"))
-    a, b = ring * sides + side, ring * sides + (side + 1) % sides
-    return np.concatenate([np.stack([a, b, b + sides], 1), np.stack([a, b + sides, a + sides], 1)])
 
 
 def _half_edge_pairs(start: Faces, end: Faces, count: int) -> tuple[Faces, Faces]:
@@ -174,15 +118,3 @@ def _cluster(vertices: Matrix, faces: Faces, cell: float) -> tuple[Matrix, Faces
     low, middle, high = np.sort(merged, axis=1).T
     _, different = np.unique((low * len(means) + middle) * len(means) + high, return_index=True)
     return means, merged[np.sort(different)].astype(np.int64)
-
-
-def _signed_area(polygon: Matrix) -> float:
-    x, y = polygon.T
-    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
-
-
-def _quad(a: Vector, b: Vector, height: float) -> NDArray[np.float64]:
-    """Upright wall over the side from a to b, seen from the right of it, as two triangles, shape (2, 3, 3)."""
-    z = 0.5 * height
-    low, high = [[*a, -z], [*b, -z]], [[*a, z], [*b, z]]
-    return np.array([[low[0], low[1], high[1]], [low[0], high[1], high[0]]])

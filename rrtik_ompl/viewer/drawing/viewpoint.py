@@ -6,7 +6,6 @@ import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import HalfSpace
 from rrtik_ompl.viewer.drawing.meshes import look_of_shape
 
 USUAL_AZIMUTH = np.deg2rad(-50.0)  # from in front of the arm (x), on its right
@@ -22,7 +21,7 @@ def overview(points: Matrix, scene: Scene) -> Vector:
         points: Places that should be seen, shape (m, 3) [m].
         scene: Its obstacles hide what lies behind the boxes around them.
     """
-    obstacles = [o for o in scene.obstacles if not isinstance(o.shape, HalfSpace)]
+    obstacles = [o for o in scene.obstacles if o.shape.bounded]
     best, least = direction(0.0, float(ELEVATIONS[0])), np.inf
     for elevation in ELEVATIONS:
         for turn in TURNS:

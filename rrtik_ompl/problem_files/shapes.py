@@ -1,0 +1,139 @@
+"""The keys that give a shape in our YAML files, made from what the registered shapes say of their measures."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from pydantic import Field, create_model, model_validator
+from pydantic_core import PydanticCustomError
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.mesh import load_mesh
+from rrtik_ompl.files.sections import (
+    Length,
+    Name,
+    Number,
+    Positive,
+    Section,
+    Sizes3,
+    Vector2,
+    Vector3,
+    exactly_one,
+)
+from rrtik_ompl.shapes import SHAPES, Measure, Mesh, Shape
+from rrtik_ompl.shapes.shape import MeasureKind
+
+ONE_SHAPE = {"oneOf": [{"required": [key]} for key in SHAPES]}
+
+_TYPES: dict[MeasureKind, Any] = {
+    "length": Length,
+    "three lengths": Sizes3,
+    "number": Number,
+    "vector": Vector3,
+    "points": Annotated[list[Vector2], Field(min_length=3)],
+}
+
+
+def _optional(kind: Any, text: str | None) -> Any:
+    return kind | None, Field(None, description=text)
+
+
+def _required(measure: Measure) -> Any:
+    default = ... if measure.default is None else measure.default
+    return _TYPES[measure.kind], Field(default, description=measure.text)
+
+
+def _keys(kind: type[Shape]) -> dict[str, Any]:
+    """The keys of one kind of shape, all of them optional, with their types and descriptions."""
+    if kind is Mesh:
+        return {
+            kind.key: _optional(Name, "STL, OBJ or DAE file, relative to the folder of this file"),
+            "scale": _optional(Positive, "of a mesh: metres per unit of its file; 1 if absent"),
+        }
+    if kind.grouped:
+        entry = create_model(
+            f"{kind.__name__}Entry",
+            __base__=Section,
+            __doc__=kind.__doc__,
+            **{m.name: _required(m) for m in kind.measures},
+        )
+        return {kind.key: _optional(entry, None)}
+    first, *others = kind.measures
+    return {
+        kind.key: _optional(_TYPES[first.kind], first.text),
+        **{m.name: _optional(_TYPES[m.kind], m.text) for m in others},
+    }
+
+
+_KEYS = {kind.key: _keys(kind) for kind in SHAPES.values()}
+_OWNERS = {key: owner for owner, keys in _KEYS.items() for key in keys if key != owner}
+
+
+class NamedEntry(Section):
+    """Anything with a name."""
+
+    name: Name
+
+
+if TYPE_CHECKING:
+
+    class _ShapeKeys(NamedEntry):
+        mesh: str | None
+        scale: float | None
+else:
+    _ShapeKeys = create_model(
+        "_ShapeKeys", __base__=NamedEntry, **{key: field for keys in _KEYS.values() for key, field in keys.items()}
+    )
+
+
+class ShapeEntry(_ShapeKeys):
+    """A name and exactly one shape."""
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> ShapeEntry:
+        given = exactly_one(self, SHAPES, f"'{self.name}'")
+        for key, owner in _OWNERS.items():
+            if getattr(self, key) is not None and given != owner:
+                raise PydanticCustomError("stray_key", f"'{key}' belongs to a {owner}, but '{self.name}' is a {given}")
+        return self
+
+    def build_shape(self, folder: Path) -> Shape:
+        """The shape; meshes are looked for relative to ``folder``."""
+        kind = next(kind for key, kind in SHAPES.items() if getattr(self, key) is not None)
+        value: Any = getattr(self, kind.key)
+        if kind is Mesh:
+            return load_mesh(folder / str(value), 1.0 if self.scale is None else self.scale)
+        return kind(**dict(self._values(kind, value)))
+
+    def _values(self, kind: type[Shape], value: Any) -> Iterator[tuple[str, Any]]:
+        for k, measure in enumerate(kind.measures):
+            if kind.grouped:
+                yield measure.name, getattr(value, measure.name)
+            else:
+                given = getattr(self, kind.key if k == 0 else measure.name)
+                yield measure.name, measure.default if given is None else given
+
+
+def shape_data(name: str, shape: Shape, folder: Path) -> dict[str, Any]:
+    """What a file in ``folder`` says about the shape of the solid of that name.
+
+    Raises:
+        InputError: If it is a mesh that does not come from a file.
+    """
+    if isinstance(shape, Mesh):
+        return _mesh_data(name, shape, folder)
+    values = {m.name: np.asarray(getattr(shape, m.name), dtype=np.float64).tolist() for m in shape.measures}
+    if shape.grouped:
+        return {shape.key: values}
+    return {shape.key: values.pop(shape.measures[0].name), **values}
+
+
+def _mesh_data(name: str, mesh: Mesh, folder: Path) -> dict[str, Any]:
+    if not mesh.source:
+        raise InputError(f"'{name}': a mesh made in memory cannot be written; save it as STL and use load_mesh")
+    file = os.path.relpath(os.path.realpath(mesh.source), os.path.realpath(folder))
+    return {"mesh": Path(file).as_posix()} | ({} if mesh.scale == 1.0 else {"scale": mesh.scale})

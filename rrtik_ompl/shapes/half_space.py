@@ -1,0 +1,49 @@
+"""Half-spaces: floors and walls without end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import Vector, finite_array, frozen
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.shapes.shape import Measure, Shape
+from rrtik_ompl.shapes.surfaces import Triangles
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HalfSpace(Shape):
+    """The filled side of a plane: points with ``normal . x <= offset``; the free side is ``normal . x > offset``.
+
+    ``normal`` is stored with unit length, and ``offset`` [m] is scaled with it.
+    """
+
+    key = "half_space"
+    measures = (Measure("normal", "vector", None), Measure("offset", "number", default=0.0))
+    bounded = False
+
+    normal: Vector
+    offset: float
+
+    def __init__(self, normal: ArrayLike, offset: float = 0.0) -> None:
+        direction = finite_array(normal, (3,), "half-space normal")
+        length = float(np.linalg.norm(direction))
+        if length < 1e-9:
+            raise InputError("half-space normal must not be the zero vector")
+        object.__setattr__(self, "normal", frozen(direction / length))
+        object.__setattr__(self, "offset", float(finite_array(offset, (), "half-space offset")) / length)
+
+    @property
+    def bounding_radius(self) -> float:
+        """Infinite."""
+        return float("inf")
+
+    def surface(self) -> Triangles:
+        """None: see :func:`rrtik_ompl.viewer.drawing.meshes.half_space_plate`.
+
+        Raises:
+            InputError: Always.
+        """
+        raise InputError("a HalfSpace cannot be drawn as a bounded solid")

@@ -1,0 +1,83 @@
+"""Triangle meshes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.arrays import Matrix, finite_array, frozen
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.shapes.shape import Shape
+from rrtik_ompl.shapes.surfaces import Triangles
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh(Shape):
+    """A triangle mesh. A closed mesh counts as a solid, an open one as a surface.
+
+    Attributes:
+        vertices: Shape (n, 3), metres.
+        triangles: Vertex numbers, shape (m, 3).
+        source: Path of the file it was read from, or "".
+        scale: The factor that was applied to the file's numbers, kept for writing the scene back.
+    """
+
+    key = "mesh"
+
+    vertices: Matrix
+    triangles: NDArray[np.int64]
+    source: str = ""
+    scale: float = 1.0
+    open_edges: int = field(default=0)
+
+    def __init__(self, vertices: ArrayLike, triangles: ArrayLike, source: str = "", scale: float = 1.0) -> None:
+        what = f"mesh {source}" if source else "mesh"
+        points = finite_array(vertices, (None, 3), f"{what}: vertices")
+        faces = np.asarray(triangles)
+        if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
+            raise InputError(f"{what}: needs at least one triangle (three vertex numbers each); export it triangulated")
+        faces = finite_array(faces, (None, 3), f"{what}: triangles").astype(np.int64)
+        if faces.min() < 0 or faces.max() >= len(points):
+            raise InputError(f"{what}: a triangle names vertex {int(faces.max())}, but there are only {len(points)}")
+        points, faces = _welded(points, faces)
+        if len(faces) == 0:
+            raise InputError(f"{what}: every triangle has zero area; check its scale and export it again")
+        object.__setattr__(self, "vertices", frozen(points))
+        object.__setattr__(self, "triangles", frozen(faces, np.int64))
+        object.__setattr__(self, "source", source)
+        object.__setattr__(self, "scale", float(scale))
+        object.__setattr__(self, "open_edges", _open_edges(faces))
+
+    @property
+    def closed(self) -> bool:
+        """Whether every edge is shared by exactly two triangles of opposite sense, so that inside and outside exist."""
+        return self.open_edges == 0
+
+    @property
+    def bounding_radius(self) -> float:
+        """Distance of its farthest vertex from its origin [m]."""
+        return float(np.linalg.norm(self.vertices[np.unique(self.triangles)], axis=1).max())
+
+    def surface(self) -> Triangles:
+        """Its triangles."""
+        return Triangles(self.vertices, self.triangles)
+
+
+def _welded(points: Matrix, faces: NDArray[np.int64]) -> tuple[Matrix, NDArray[np.int64]]:
+    """Merge equal vertices (STL repeats them per triangle) and drop triangles that collapse to a line or a point."""
+    unique, index = np.unique(points, axis=0, return_inverse=True)
+    merged = np.asarray(index).reshape(-1)[faces]
+    a, b, c = (unique[merged[:, k]] for k in range(3))
+    return unique, merged[np.linalg.norm(np.cross(b - a, c - a), axis=1) > 0.0]
+
+
+def _open_edges(faces: NDArray[np.int64]) -> int:
+    """Count directed edges without exactly one opposite partner: 0 for a closed, consistently oriented surface."""
+    edges: NDArray[Any] = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    size = int(faces.max()) + 1
+    forward, count = np.unique(edges[:, 0] * size + edges[:, 1], return_counts=True)
+    backward = np.unique(edges[:, 1] * size + edges[:, 0])
+    return int((count > 1).sum() + np.setxor1d(forward, backward).size)

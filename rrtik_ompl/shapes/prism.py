@@ -1,0 +1,52 @@
+"""Prisms: polygons extruded along z."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import Matrix, finite_array, frozen, positive
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.shapes.polygons import check_simple, without_repeats
+from rrtik_ompl.shapes.shape import Measure, Shape
+from rrtik_ompl.shapes.surfaces import Triangles, extruded
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prism(Shape):
+    """A simple polygon in the xy-plane, extruded along z and centred about z = 0.
+
+    Attributes:
+        polygon: Vertices in order (either sense), shape (k, 2), metres; convex or not, without self-crossings and
+            without places where two sides touch.
+        height: Full extent along z [m].
+    """
+
+    key = "polygon"
+    measures = (
+        Measure("polygon", "points", "vertices in the xy-plane [m], in order; extruded along z, centred about z = 0"),
+        Measure("height", "length", "of a polygon, along z [m]; 1 if absent", 1.0),
+    )
+    grouped = False
+
+    polygon: Matrix
+    height: float
+
+    def __init__(self, polygon: ArrayLike, height: float = 1.0) -> None:
+        vertices = without_repeats(finite_array(polygon, (None, 2), "polygon"))
+        if len(vertices) < 3:
+            raise InputError(f"polygon needs at least 3 different vertices, got {len(vertices)}")
+        check_simple(vertices)
+        object.__setattr__(self, "polygon", frozen(vertices))
+        object.__setattr__(self, "height", positive(height, "polygon height"))
+
+    @property
+    def bounding_radius(self) -> float:
+        """Distance of its farthest corner from its origin [m]."""
+        return float(np.hypot(np.linalg.norm(self.polygon, axis=1).max(), 0.5 * self.height))
+
+    def surface(self) -> Triangles:
+        """Its walls, floor and roof."""
+        return extruded(self.polygon, self.height)
