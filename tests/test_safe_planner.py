@@ -135,7 +135,7 @@ def test_a_lazy_goal_is_waited_for() -> None:
     assert planner.goals.tolist() == [list(GOAL)]
 
 
-class Measured(ob.GoalSet):  # type: ignore[misc]
+class Measured(ob.GoalRegion):  # type: ignore[misc]
     """A goal that can be recognised but not sampled."""
 
     def distanceGoal(self, state: Any) -> float:
