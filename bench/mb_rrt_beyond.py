@@ -20,7 +20,7 @@ from rrtik_ompl.ik.mb_rrt.growth import grow
 from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
 from rrtik_ompl.ik.mb_rrt.links import Links, directions, sunflower
 from rrtik_ompl.ik.mb_rrt.search import polished
-from rrtik_ompl.ik.mb_rrt.workspace_tree import AxisTree
+from rrtik_ompl.ik.mb_rrt.workspace_tree import WorkspaceTree
 from rrtik_ompl.ik.numeric.descent import descend
 from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.shapes import Cylinder
@@ -53,7 +53,7 @@ def arcs(rng: np.random.Generator, goals: int = 200) -> tuple[list[str], float, 
     return lines, worst, outside
 
 
-def passes_of(tree: AxisTree, done: Callable[..., bool], *more: object) -> int:
+def passes_of(tree: WorkspaceTree, done: Callable[..., bool], *more: object) -> int:
     """Passes until the tree's new branches will do, one at a time; 0 if they never do."""
     while tree.passes < MOST:
         if done(tree.grow(), *more):
@@ -69,7 +69,7 @@ def limits(rng: np.random.Generator) -> tuple[list[str], dict[int, tuple[float, 
         axes, passes, errors = axes_of(robot, False), [], [0.0]
         for q in rng.uniform(robot.lower, robot.upper, (100, 10)):
             goal = robot.fk(q).translation
-            tree = AxisTree(axes, goal, np.zeros(10), rng)
+            tree = WorkspaceTree(axes, goal, np.zeros(10), rng)
             passes.append(passes_of(tree, lambda rows: len(rows) > 0))
             if passes[-1]:
                 errors.append(100 * float(np.linalg.norm(robot.fk(tree.nodes(10)[-1]).translation - goal)))
@@ -97,7 +97,7 @@ def obstacles(rng: np.random.Generator) -> tuple[str, tuple[float, float]]:
     axes = axes_of(world.robot, False)
     check, passes, bad, begin = LinkWorlds(world, axes).free, [], 0, time.perf_counter()
     for goal in goals:
-        tree = AxisTree(axes, goal, np.zeros(10), rng, check)
+        tree = WorkspaceTree(axes, goal, np.zeros(10), rng, check)
         passes.append(passes_of(tree, lambda rows: len(rows) > 0))
         bad += int((~world.certify(tree.nodes(10)[-1:])).sum())
     took = 1e3 * (time.perf_counter() - begin) / len(goals)
@@ -128,7 +128,7 @@ def one_axis(rng: np.random.Generator) -> tuple[list[str], dict[int, tuple[float
         axes, passes, raw, plain = axes_of(robot, False), [], [], []
         for q in rng.uniform(-np.pi, np.pi, (60, count)):
             goal = rrtik.PositionGoal(robot.fk(q).translation, tolerance=1e-4)
-            tree = AxisTree(axes, goal.position, np.zeros(count), rng)
+            tree = WorkspaceTree(axes, goal.position, np.zeros(count), rng)
             passes.append(passes_of(tree, lambda rows, *a: len(polished(*a, rows)) > 0, robot, axes, goal))
             raw.append(100 * goal.distance(robot, tree.nodes(count)[:1])[0])
             if len(plain) < 30:

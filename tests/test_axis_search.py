@@ -13,7 +13,7 @@ from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.fast.search.crdt import search as axis_search
-from rrtik_ompl.fast.search.crdt.rules import AxisRules, runs_in_kernels
+from rrtik_ompl.fast.search.crdt.rules import KERNELS, AxisRules
 from rrtik_ompl.fast.search.crdt.search import AxisSearch
 from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.ompl_bridge import WorldChecker
@@ -25,6 +25,7 @@ from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box
 from rrtik_ompl.transitions import merge_moves, single_joint
 from rrtik_ompl.world import World
+from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_planners import CRDT, BiCRDT
 from rrtik_planners.bicrdt import TreePair
 from rrtik_planners.crdt import SingleTree
@@ -220,10 +221,10 @@ def test_every_edge_of_the_trees_is_free() -> None:
 
 def test_kernels_are_left_alone_where_they_are_not_certain() -> None:
     world = shipped("titan4_sdu").world
-    assert runs_in_kernels(world, np.ones((1, 6)))
-    assert not runs_in_kernels(world, np.full((1, 6), 1e9))
-    assert not runs_in_kernels(Plain(world), np.ones((1, 6)))
-    assert not runs_in_kernels(None, np.ones((1, 6)))
+    assert has_kernels(world, KERNELS, within=np.ones((1, 6)))
+    assert not has_kernels(world, KERNELS, within=np.full((1, 6), 1e9))
+    assert not has_kernels(Plain(world), KERNELS, within=np.ones((1, 6)))
+    assert not has_kernels(None, KERNELS, within=np.ones((1, 6)))
 
 
 def solved(problem: Problem, planner: Any, seed: int, world: Any = None, **options: Any) -> Any:

@@ -28,7 +28,7 @@ from rrtik_ompl.shortening import MoveRules, shorten
 from rrtik_ompl.shortening.fewest_moves import fewest_moves, grid_route, least_moves
 from rrtik_ompl.transitions import lower_bound, route_length, single_joint, transitions
 from rrtik_ompl.world import World
-from rrtik_ompl.world.motion_queries import never
+from rrtik_ompl.world.motion_queries import no_stop
 from rrtik_planners import FewestMoves
 
 GRID = 4
@@ -287,9 +287,9 @@ def pose(x: float, y: float) -> object:
 def test_a_narrow_gate_is_not_refuted_and_a_closed_one_is() -> None:
     for width, refuted in ((0.5, False), (0.02, False), (-0.05, True)):
         problem = gate(width)
-        proof = OneFreeValue(problem.world, problem.start, problem.goal.q, 1, never)
+        proof = OneFreeValue(problem.world, problem.start, problem.goal.q, 1, no_stop)
         assert proof.refuted() == refuted
-        bound = sharper_bound(problem.world, range(2), problem.start, problem.goal.q, never)
+        bound = sharper_bound(problem.world, range(2), problem.start, problem.goal.q, no_stop)
         assert bound == (4 if refuted else 3)
 
 

@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parent.parent
 RUNGS = (
     "errors arrays shapes files poses transitions robot",
     "tip_distance task_region scene goal collision covers fast description catalog",
-    "world path problem ik problem_files moves reach",
+    "world search path problem ik problem_files moves reach",
     "ompl_bridge planning shortening generated_problems",
     "trajectory replanning plots",
     "viewer sensing overlay reproduce benchmark pilot cli __main__",

@@ -13,7 +13,7 @@ from rrtik_ompl.ik.mb_rrt.axes import axes_of
 from rrtik_ompl.ik.mb_rrt.axis_rule_b import grow_by_rule_b
 from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
 from rrtik_ompl.ik.mb_rrt.search import search
-from rrtik_ompl.ik.mb_rrt.workspace_tree import AxisTree
+from rrtik_ompl.ik.mb_rrt.workspace_tree import WorkspaceTree
 from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.ompl_bridge.setup import Judge, space_information
 from rrtik_ompl.planning import plan
@@ -44,7 +44,7 @@ def test_arcs_inside_joint_limits_end_exactly_on_goals_that_are_feasible():
     rng, axes, passes = np.random.default_rng(0), axes_of(LIMITED, False), []
     for q in rng.uniform(LIMITED.lower, LIMITED.upper, (40, 10)):
         goal = LIMITED.fk(q).translation
-        done, ends = passes_to_an_end(AxisTree(axes, goal, np.zeros(10), rng))
+        done, ends = passes_to_an_end(WorkspaceTree(axes, goal, np.zeros(10), rng))
         passes.append(done)
         assert LIMITED.within_limits(ends, 1e-9).all()
         assert np.linalg.norm(LIMITED.fk_batch(ends)[:, :3, 3] - goal, axis=1).max() < 1e-12
@@ -59,7 +59,7 @@ def test_a_planar_arm_anywhere_in_space_is_solved_exactly(lengths, seed):
     base = pin.SE3(pin.exp3(rng.uniform(-2.0, 2.0, 3)), rng.uniform(-1.0, 1.0, 3))
     robot = planar(lengths=lengths, base_pose=base)
     goal = robot.fk(rng.uniform(-np.pi, np.pi, len(lengths))).translation
-    _, ends = passes_to_an_end(AxisTree(axes_of(robot, False), goal, np.zeros(len(lengths)), rng))
+    _, ends = passes_to_an_end(WorkspaceTree(axes_of(robot, False), goal, np.zeros(len(lengths)), rng))
     assert len(ends) == 1
     assert np.linalg.norm(robot.fk(ends[0]).translation - goal) < 1e-10
 
@@ -69,7 +69,7 @@ def test_edges_are_links_that_keep_clear_of_obstacles():
     axes = axes_of(world.robot, False)
     check = LinkWorlds(world, axes).free
     for goal in ([0.6, 0.1, 0.0], [0.0, 0.2, 0.0], [-0.9, 0.0, 0.0], [0.1, -0.55, 0.0]):
-        _, ends = passes_to_an_end(AxisTree(axes, np.array(goal), np.zeros(10), rng, check))
+        _, ends = passes_to_an_end(WorkspaceTree(axes, np.array(goal), np.zeros(10), rng, check))
         assert world.certify(ends).all()
         assert np.linalg.norm(world.robot.fk_batch(ends)[:, :3, 3] - goal, axis=1).max() < 1e-12
 

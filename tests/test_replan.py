@@ -18,7 +18,7 @@ from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning import PLANNERS, SpeedWarning, load_run, replan
-from rrtik_ompl.replanning.connecting import KernelConnect, PlainConnect, Tree, never
+from rrtik_ompl.replanning.connecting import KernelConnect, PlainConnect
 from rrtik_ompl.replanning.contact_check import judge
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch, points_along, sequential_cut, without_points_between
 from rrtik_ompl.replanning.evading import evasion
@@ -26,9 +26,11 @@ from rrtik_ompl.replanning.generate import moving_problem, moving_scene
 from rrtik_ompl.replanning.single_tree import trimmed
 from rrtik_ompl.replanning.walking import one_step, to_first_corner
 from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene, Waypoints
+from rrtik_ompl.search.tree import ConfigurationTree
 from rrtik_ompl.shapes import Box, HalfSpace, Prism, Sphere
 from rrtik_ompl.trajectory.limits import RateLimits
 from rrtik_ompl.world import World
+from rrtik_ompl.world.motion_queries import no_stop
 from rrtik_ompl.world.moving_world import MovingWorld
 
 FAST = RateLimits([1e3, 1e3], [1e3, 1e3])
@@ -116,7 +118,7 @@ def test_both_searches_join_two_pieces_of_a_path(kind):
     connect = PlainConnect(LOW, HIGH, 1.0, 5) if kind == "plain" else KernelConnect(world, LOW, HIGH, 1.0, 5)
     first = np.array([[1.0, 10.0], [4.0, 10.0], [8.0, 10.0]])
     second = np.array([[12.0, 10.0], [15.0, 10.0], [19.0, 10.0]])
-    found = connect(first, second, world, never)
+    found = connect(first, second, world, no_stop)
     assert (found.path[0] == first[0]).all()
     assert (found.path[-1] == second[-1]).all()
     assert world.motion_valid_batch(found.path[:-1], found.path[1:]).all()
@@ -151,7 +153,7 @@ def test_a_step_goes_round_corners_or_stops_at_them_and_keeps_the_limits():
 
 
 def test_trimming_cuts_off_what_hangs_on_a_blocked_edge():
-    tree = Tree(np.array([[0.0, 0.0]]))
+    tree = ConfigurationTree(np.array([[0.0, 0.0]]))
     a = tree.add(np.array([5.0, 0.0]), 0)
     tree.add(np.array([9.0, 0.0]), a)
     tree.add(np.array([0.0, 5.0]), 0)

@@ -9,12 +9,13 @@ import numpy as np
 from rrtik_ompl.arrays import TAU, Vector, finite_array, whole_number
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
-from rrtik_ompl.replanning.connecting import KernelCuts, PlainConnect, has_kernels
+from rrtik_ompl.replanning.connecting import KERNELS, KernelCuts, PlainConnect
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
 from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
 from rrtik_ompl.replanning.single_tree import SingleTree
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.trajectory.limits import RateLimits
+from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_ompl.world.moving_world import MovingWorld
 
 PLANNERS = ("drrt-con", "rrt-connect", "drrt")
@@ -100,13 +101,11 @@ def settings(
 
 def planner_of(chosen: Settings, world: MovingWorld, lower: Vector, upper: Vector) -> DrrtCon:
     """The replanner of the name, for a world and a box of configurations to sample in."""
-    kernels = has_kernels(world)
     if chosen.planner == SingleTree.name:
-        return SingleTree(
-            lower, upper, chosen.eps, chosen.seed, post=KernelCuts(world, chosen.seed) if kernels else None
-        )
-    forgetting = chosen.planner == FromScratch.name
-    if kernels:
+        post = KernelCuts(world, chosen.seed) if has_kernels(world, *KERNELS) else None
+        return SingleTree(lower, upper, chosen.eps, chosen.seed, post=post)
+    forgetting, in_kernels = chosen.planner == FromScratch.name, has_kernels(world, *KERNELS)
+    if in_kernels:
         return KernelDrrtCon(world, lower, upper, chosen.eps, chosen.seed, forgetting=forgetting)
     kind = FromScratch if forgetting else DrrtCon
     return kind(PlainConnect(lower, upper, chosen.eps, chosen.seed), chosen.eps)

@@ -17,7 +17,7 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.goal import PoseGoal, PositionGoal
 from rrtik_ompl.ik.mb_rrt.axes import Axes, axes_of, misfit
 from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
-from rrtik_ompl.ik.mb_rrt.workspace_tree import AxisTree
+from rrtik_ompl.ik.mb_rrt.workspace_tree import WorkspaceTree
 from rrtik_ompl.ik.numeric.descent import descend
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
@@ -69,7 +69,7 @@ def search(
     if out_of_reach(robot, target):
         return Found(found, 0)
     axes = axes_of(robot, isinstance(target, PoseGoal))
-    tree = AxisTree(axes, axes.nearest_in_reach(aimed_point(axes, target)), near, rng)
+    tree = WorkspaceTree(axes, axes.nearest_in_reach(aimed_point(axes, target)), near, rng)
     for number in range(rounds):
         if number == BLIND_ROUNDS and world is not None and world.pairs:
             tree.check_links(LinkWorlds(world, axes).free)

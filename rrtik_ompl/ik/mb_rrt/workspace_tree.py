@@ -16,7 +16,7 @@ TRIES = 24  # other nodes of the same index that are tried where an edge cannot 
 LinkFree = Callable[[int, Matrix], Mask]  # from level and rows of q, of which joints 0..level count
 
 
-class AxisTree:
+class WorkspaceTree:
     """Grows branches towards a point, several passes at a time.
 
     A pass goes on from its own node; where that has no useful angle, or the link would touch something, from other
