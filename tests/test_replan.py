@@ -20,7 +20,13 @@ from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning import PLANNERS, SpeedWarning, load_run, replan
 from rrtik_ompl.replanning.connecting import KernelConnect, PlainConnect
 from rrtik_ompl.replanning.contact_check import judge
-from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch, points_along, sequential_cut, without_points_between
+from rrtik_ompl.replanning.drrt_con import (
+    DrrtCon,
+    FromScratch,
+    dense_sequential_cut,
+    points_along,
+    without_points_between,
+)
 from rrtik_ompl.replanning.evading import evasion
 from rrtik_ompl.replanning.generate import moving_problem, moving_scene
 from rrtik_ompl.replanning.single_tree import trimmed
@@ -129,7 +135,7 @@ def test_both_searches_join_two_pieces_of_a_path(kind):
 def test_the_sequential_cut_shortens_and_keeps_both_ends():
     judge_ = Scripted((10.0, 10.0), 2.0)
     zigzag = np.array([[0.0, 10.0], [3.0, 14.0], [6.0, 12.0], [9.0, 16.0], [12.0, 13.0], [16.0, 15.0], [20.0, 10.0]])
-    cut = sequential_cut(zigzag, 0.5, judge_)
+    cut = dense_sequential_cut(zigzag, 0.5, judge_)
     assert (cut[[0, -1]] == zigzag[[0, -1]]).all()
     assert judge_.motion_valid_batch(cut[:-1], cut[1:]).all()
     assert np.linalg.norm(np.diff(cut, axis=0), axis=1).sum() < 23.0
@@ -337,11 +343,11 @@ def test_predicted_places_are_heeded():
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"rate": 0.0}, "rate must be greater than 0, got 0; give ticks a second"),
-        ({"step": -1.0}, "step must be greater than 0"),
+        ({"rate": 0.0}, "rate: must be greater than 0, got 0; give ticks a second"),
+        ({"step": -1.0}, "step: must be greater than 0"),
         ({"margin": -0.1}, "margin must not be negative"),
         ({"predict": 1.5}, "predict must be a whole number"),
-        ({"speed_bound": 0.0}, "speed_bound must be greater than 0"),
+        ({"speed_bound": 0.0}, "speed_bound: must be greater than 0"),
         ({"seconds": float("nan")}, "seconds"),
         ({"eps": 1e-6}, "eps must be at least .* suits this robot"),
         ({"limits": RateLimits([1.0] * 3, [1.0] * 3)}, "limits: there are 2 joints, but limits for 3"),
@@ -510,7 +516,7 @@ def test_a_file_that_is_no_record_is_refused(tmp_path):
         (lambda record: record["ticks"][1]["poses"].update(lift=[0.0] * 7), "'lift': quat_xyzw must have length 1"),
         (lambda record: record["ticks"][1]["seconds"].update(look="x"), "seconds of 'look': expected numbers"),
         (lambda record: record["ticks"][1].update(checked=0.5), "checked must be a whole number"),
-        (lambda record: record.update(rate=0), "rate must be greater than 0"),
+        (lambda record: record.update(rate=0), "rate: must be greater than 0"),
         (lambda record: record.update(problem=7), "problem must be of type str"),
     ],
 )

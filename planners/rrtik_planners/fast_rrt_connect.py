@@ -6,10 +6,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.arrays import Mask, Matrix, Vector, positive
 from rrtik_ompl.fast.search.connect import ConnectSearch
 from rrtik_ompl.fast.search.connect_layout import KERNELS
-from rrtik_ompl.fast.search.connect_lengths import connect_lengths, positive
+from rrtik_ompl.fast.search.connect_lengths import connect_lengths
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
 from rrtik_ompl.search.rrt_connect import ConnectRules, RrtConnect, straight_path
 from rrtik_ompl.world.motion_queries import has_kernels, is_conservative, kernel_tables

@@ -118,7 +118,7 @@ class DrrtCon:
         if found is not None:
             path, begin, end = found.path, found.begin, found.end
             new = path[begin : end + 1]
-            new = sequential_cut(new, 0.5 * self.eps, motions) if self.post is None else self.post(new)
+            new = dense_sequential_cut(new, 0.5 * self.eps, motions) if self.post is None else self.post(new)
             self.path = without_points_between(np.vstack([path[:begin], new, path[end + 1 :]]))
         return self.free
 
@@ -149,10 +149,11 @@ def without_points_between(path: Matrix) -> Matrix:
     return kept
 
 
-def sequential_cut(path: Matrix, step: float, motions: MotionQueries) -> Matrix:
+def dense_sequential_cut(path: Matrix, step: float, motions: MotionQueries) -> Matrix:
     """Shorten a free path: from each kept point straight to the last point that can be reached.
 
-    Points stand every ``step`` along the path. Post-processing paper, method 1, as DRRT-Con uses it.
+    Post-processing paper, method 1, as DRRT-Con uses it: points every ``step`` along the path are tried, ``MOST_CUTS``
+    of them in one call; :func:`rrtik_ompl.shortening.sequential.sequential_cut` tries every waypoint and no others.
     """
     done, rest = [path[:1]], path
     while len(rest) > 2:

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, positive
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast.search import connect_layout as layout
-from rrtik_ompl.fast.search.connect_lengths import connect_lengths, positive
+from rrtik_ompl.fast.search.connect_lengths import connect_lengths
 from rrtik_ompl.fast.search.tree_layout import CAPACITY, SIZE
 from rrtik_ompl.fast.search.tree_memory import grow, tree_table
 from rrtik_ompl.fast.simd.halton import inverse_bases
