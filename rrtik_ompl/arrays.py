@@ -66,15 +66,20 @@ def finite_number(value: ArrayLike, what: str) -> float:
     return float(finite_array(value, (), what))
 
 
-def positive(value: ArrayLike, what: str) -> float:
+def positive(value: ArrayLike, what: str, remedy: str = "") -> float:
     """A number greater than 0 given by a user.
+
+    Args:
+        value: What was given.
+        what: Name of the value, with which the error message begins.
+        remedy: What to give instead; the error message ends with it.
 
     Raises:
         InputError: If it is none.
     """
     number = finite_number(value, what)
     if number <= 0.0:
-        raise InputError(f"{what} must be greater than 0, got {number:g}")
+        raise InputError(f"{what}: must be greater than 0, got {number:g}" + (f"; {remedy}" if remedy else ""))
     return number
 
 

@@ -8,14 +8,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.fast.search.crdt.rules import KERNELS, CrdtRules, runs_in_kernels
+from rrtik_ompl.fast.search.crdt.rules import KERNELS, CrdtRules
 from rrtik_ompl.fast.search.crdt.search import CrdtSearch
 from rrtik_ompl.moves.rules import Joints, PerJoint, joint_numbers
-from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
+from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_planners.crdt_endings import NO_ENDING, Endings
 from rrtik_planners.crdt_options import AxisOptions, joint_names
-from rrtik_planners.crdt_stream import AxisStream
-from rrtik_planners.crdt_tree import AxisTree, Outcome
+from rrtik_planners.crdt_stream import CrdtStream
+from rrtik_planners.crdt_tree import CrdtTree, Outcome
 
 
 class BiCRDT(SafePlanner):
@@ -32,7 +33,7 @@ class BiCRDT(SafePlanner):
         self,
         si: Any,
         *,
-        world: WorldLike | None = None,
+        world: MotionQueries | None = None,
         seed: int | None = None,
         scale_by_range: bool = False,
         max_iterations: int | None = None,
@@ -88,7 +89,7 @@ class BiCRDT(SafePlanner):
         rules, seed = self.options.rules(*self.bounds(), starts[0], self.last_joints), int(self.rng.integers(2**63))
         limit, path = self.options.max_iterations, _common_row(starts, goals)
         trees: Any
-        if runs_in_kernels(self._world, starts, goals, rules.lower[None], rules.upper[None]):
+        if has_kernels(self._world, KERNELS, within=np.vstack([starts, goals, rules.lower, rules.upper])):
             trees = CrdtSearch(self._world, rules, seed, limit, starts, goals)
         else:
             trees = TreePair(rules, seed, limit, starts, goals, checker)
@@ -114,8 +115,8 @@ class TreePair:
         self, rules: CrdtRules, seed: int, limit: int | None, starts: Matrix, goals: Matrix, checker: MotionChecker
     ) -> None:
         self._rules, self._limit, self._checker = rules, limit, checker
-        self._stream = AxisStream(seed)
-        self._trees = AxisTree(starts, rules), AxisTree(goals, rules)
+        self._stream = CrdtStream(seed)
+        self._trees = CrdtTree(starts, rules), CrdtTree(goals, rules)
         self._growing = 0
         self._met = (0, 0)
         self.iterations = 0

@@ -9,13 +9,14 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.search.crdt.rules import KERNELS, CrdtRules, runs_in_kernels
+from rrtik_ompl.fast.search.crdt.rules import KERNELS, CrdtRules
 from rrtik_ompl.fast.search.crdt.search import CrdtSearch
 from rrtik_ompl.moves.rules import Joints, PerJoint
-from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
+from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_planners.crdt_options import AxisOptions, joint_names
-from rrtik_planners.crdt_stream import AxisStream
-from rrtik_planners.crdt_tree import AxisTree, Outcome
+from rrtik_planners.crdt_stream import CrdtStream
+from rrtik_planners.crdt_tree import CrdtTree, Outcome
 
 GOAL_TOLERANCE_SHARE = 0.2  # default goal tolerance as a share of the diagonal of the space
 
@@ -39,7 +40,7 @@ class CRDT(SafePlanner):
         self,
         si: Any,
         *,
-        world: WorldLike | None = None,
+        world: MotionQueries | None = None,
         seed: int | None = None,
         goal_tolerance: float | None = None,
         scale_by_range: bool = False,
@@ -87,7 +88,7 @@ class CRDT(SafePlanner):
         rules, seed = self.options.rules(lower, upper, starts[0]), int(self.rng.integers(2**63))
         limit, path = self.options.max_iterations, None
         tree: Any
-        if runs_in_kernels(self._world, starts, goals, rules.lower[None], rules.upper[None]):
+        if has_kernels(self._world, KERNELS, within=np.vstack([starts, goals, rules.lower, rules.upper])):
             tree = CrdtSearch(self._world, rules, seed, limit, starts, goals=goals, tolerance=tolerance)
         else:
             tree = SingleTree(rules, seed, limit, starts, goals, tolerance, checker)
@@ -124,7 +125,7 @@ class SingleTree:
     ) -> None:
         self._rules, self._limit, self._checker = rules, limit, checker
         self._goals, self._tolerance = goals, tolerance
-        self._stream, self._tree = AxisStream(seed), AxisTree(starts, rules)
+        self._stream, self._tree = CrdtStream(seed), CrdtTree(starts, rules)
         self._waiting = self._near_goals(0)
         self._ending = 0
         self.iterations = 0

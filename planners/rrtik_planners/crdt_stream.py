@@ -24,7 +24,7 @@ class Random(Protocol):
         """The axes in random order."""
 
 
-class AxisStream:
+class CrdtStream:
     """Random configurations and orders of axes.
 
     Args:

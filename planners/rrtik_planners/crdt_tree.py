@@ -42,7 +42,7 @@ class Extension:
     vertex: int
 
 
-class AxisTree:
+class CrdtTree:
     """A growing tree (or forest, if there are several roots) in preallocated arrays.
 
     Every edge has itself been found free, those that come from rewriting parents included.

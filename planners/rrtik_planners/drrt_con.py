@@ -6,12 +6,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import Matrix, Vector, positive
 from rrtik_ompl.fast.search.connect_layout import KERNELS
-from rrtik_ompl.fast.search.connect_lengths import connect_lengths, positive
-from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
-from rrtik_ompl.replanning.connecting import KernelConnect, PlainConnect, has_kernels
+from rrtik_ompl.fast.search.connect_lengths import connect_lengths
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
+from rrtik_ompl.replanning.connecting import KERNELS as LIBRARIES
+from rrtik_ompl.replanning.connecting import KernelConnect, PlainConnect
 from rrtik_ompl.replanning.drrt_con import DrrtCon, points_along
+from rrtik_ompl.world.motion_queries import has_kernels, is_conservative
 
 UNLIMITED = 2**62  # samples; the time is the limit
 
@@ -29,7 +31,7 @@ class DRRTCon(SafePlanner):
     kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
 
     def __init__(
-        self, si: Any, *, world: WorldLike | None = None, seed: int | None = None, range: float | None = None
+        self, si: Any, *, world: MotionQueries | None = None, seed: int | None = None, range: float | None = None
     ) -> None:
         """Make a planner.
 
@@ -76,7 +78,7 @@ class DRRTCon(SafePlanner):
         lower, upper = self.bounds()
         eps, _ = connect_lengths(lower, upper, self.range, None)
         seed, world = int(self.rng.integers(2**63)), self._world
-        if getattr(world, "accuracy", "exact") == "conservative" and has_kernels(world):
+        if is_conservative(world) and has_kernels(world, *LIBRARIES):
             return DrrtCon(KernelConnect(world, lower, upper, eps, seed, UNLIMITED), eps)
         return DrrtCon(PlainConnect(lower, upper, eps, seed, UNLIMITED), eps)
 

@@ -6,13 +6,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.arrays import Mask, Matrix, Vector, positive
 from rrtik_ompl.fast.search.connect import ConnectSearch
 from rrtik_ompl.fast.search.connect_layout import KERNELS
-from rrtik_ompl.fast.search.connect_lengths import connect_lengths, positive
-from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
-from rrtik_planners.connect_loop import ConnectRules, connect
+from rrtik_ompl.fast.search.connect_lengths import connect_lengths
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
+from rrtik_ompl.search.rrt_connect import ConnectRules, RrtConnect, straight_path
+from rrtik_ompl.world.motion_queries import has_kernels, is_conservative, kernel_tables
 from rrtik_planners.crdt_options import iteration_limit
 
 
@@ -30,7 +30,7 @@ class FastRRTConnect(SafePlanner):
         self,
         si: Any,
         *,
-        world: WorldLike | None = None,
+        world: MotionQueries | None = None,
         seed: int | None = None,
         range: float | None = None,
         domain: float | None = None,
@@ -59,15 +59,12 @@ class FastRRTConnect(SafePlanner):
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         kernels = self._kernels()
         if kernels is None:
-            lower, upper = self.bounds()
-            rules = ConnectRules(lower, upper, *connect_lengths(lower, upper, *self._lengths), self.max_iterations)
-            return SearchResult(*connect(starts, goals, rules, checker, self.rng, ptc))
-        conservative = getattr(self._world, "accuracy", "exact") == "conservative"
+            return self._in_python(starts, goals, checker, ptc)
         path = kernels.solve(
             starts,
             goals,
             self.rng.bit_generator.random_raw(),
-            ask=None if conservative else checker.motion_valid_batch,
+            ask=None if is_conservative(self._world) else checker.motion_valid_batch,
             stop=ptc,
             max_iterations=self.max_iterations,
         )
@@ -83,25 +80,36 @@ class FastRRTConnect(SafePlanner):
         checker.checked_states += len(rows)
         return np.ones(len(rows), dtype=bool)
 
+    def _in_python(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+        """The same search, where every motion is decided at once."""
+        lower, upper = self.bounds()
+        range_, domain = connect_lengths(lower, upper, *self._lengths)
+        rules = ConnectRules(lower, upper, range_, domain, balanced=True, max_iterations=self.max_iterations)
+        search = RrtConnect(starts, goals, rules, checker.motion_valid, self.rng)
+        path = straight_path(starts, goals, checker.motion_valid, ptc)
+        path = search.run(ptc) if path is None else path
+        edges = search.vertices - len(starts) - len(goals)
+        return SearchResult(path, {"iterations": search.iterations, "vertices": search.vertices, "edges": edges})
+
     @property
     def _lengths(self) -> tuple[float | None, float | None]:
         return self.range, self.domain
 
     def _kernels(self) -> ConnectSearch | None:
         """The search in kernels for the world and bounds of this solve, or None where the world has no kernels."""
-        fast, bounds = getattr(self._world, "fast", None), self.bounds()
+        fast, bounds = kernel_tables(self._world), self.bounds()
         if self._kept is None or self._kept[0] is not fast or self._kept[1] is not bounds:
-            self._kept = fast, bounds, self._made(fast, *bounds)
+            self._kept = fast, bounds, self._made(*bounds)
         return self._kept[2]
 
-    def _made(self, fast: Any, lower: Vector, upper: Vector) -> ConnectSearch | None:
-        if fast is None or library(KERNELS) is None:
+    def _made(self, lower: Vector, upper: Vector) -> ConnectSearch | None:
+        world = self._world
+        if not has_kernels(world, KERNELS):
             return None
-        world: Any = self._world
         robot = world.robot
         range_, domain = connect_lengths(lower, upper, *self._lengths)
         return ConnectSearch(
-            fast,
+            world.fast,
             np.maximum(lower, robot.lower),  # the kernels do not know the robot's limits
             np.minimum(upper, robot.upper),
             weights=world.weights,

@@ -13,7 +13,7 @@ from rrtik_ompl.moves.lower_bounds import sharper_bound
 from rrtik_ompl.moves.rules import Joints, PerJoint, joint_numbers
 from rrtik_ompl.moves.search import MOST_NODES, MoveSearch
 from rrtik_ompl.moves.staircase import one_joint_moves
-from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.shortening import Task
 from rrtik_ompl.shortening.random_cut import shortcut
@@ -42,7 +42,7 @@ class FewestMoves(SafePlanner):
         self,
         si: Any,
         *,
-        world: WorldLike | None = None,
+        world: MotionQueries | None = None,
         seed: int | None = None,
         searches: int = SEARCHES,
         rounds: int = ROUNDS,

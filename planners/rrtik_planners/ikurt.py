@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.arrays import Matrix, positive
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.search.connect_lengths import positive
 from rrtik_ompl.goal import Goal
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
-from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
-from rrtik_ompl.ompl_bridge import MotionChecker, SearchResult, WorldLike
+from rrtik_ompl.ik.ikurt.search import BatchedSearch, Options
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult
 from rrtik_ompl.world import World
 from rrtik_planners.tip_seeker import TipSeeker, misses
 
@@ -30,7 +29,7 @@ class IKURT(TipSeeker):
         self,
         si: Any,
         *,
-        world: WorldLike | None = None,
+        world: MotionQueries | None = None,
         seed: int | None = None,
         goal: Goal | None = None,
         jacobian: bool = True,

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.fast.search.connect_lengths import positive
+from rrtik_ompl.arrays import Matrix, positive
 from rrtik_ompl.goal import Goal
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric, reach
 from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
-from rrtik_ompl.ompl_bridge import MotionChecker, SearchResult, WorldLike
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult
 from rrtik_ompl.world import World
 from rrtik_planners.tip_seeker import TipSeeker, misses
 
@@ -28,7 +27,7 @@ class IKURTPublished(TipSeeker):
         self,
         si: Any,
         *,
-        world: WorldLike | None = None,
+        world: MotionQueries | None = None,
         seed: int | None = None,
         goal: Goal | None = None,
         mu: float | None = None,

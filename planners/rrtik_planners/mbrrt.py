@@ -11,7 +11,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import Goal, JointGoal
 from rrtik_ompl.ik.mb_rrt.aims import tree_aims
 from rrtik_ompl.ik.mb_rrt.axes import misfit
-from rrtik_ompl.ompl_bridge import MotionChecker, SearchResult, WorldLike, space_bounds
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, space_bounds
 from rrtik_ompl.world import World
 from rrtik_planners.bicrdt import BiCRDT
 
@@ -27,7 +27,7 @@ class MBRRT(BiCRDT):
         self,
         si: Any,
         *,
-        world: WorldLike | None = None,
+        world: MotionQueries | None = None,
         seed: int | None = None,
         goal: Goal | None = None,
         ik_seconds: float = 1.0,
@@ -74,7 +74,7 @@ class MBRRT(BiCRDT):
         return inside
 
 
-def _check_fit(world: WorldLike | None) -> None:
+def _check_fit(world: MotionQueries | None) -> None:
     if not isinstance(world, World):
         raise InputError("goal: MBRRT needs world= to know the arm whose tip it is; or give OMPL a GoalSampler")
     fault = misfit(world.robot)

@@ -13,7 +13,7 @@ from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
 from rrtik_ompl.ik.ikurt.tree import Tree
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.targets import targets
-from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
 from rrtik_ompl.world import World
 
 DRAWS = 16  # targets of a goal that leaves freedom
@@ -25,7 +25,7 @@ class TipSeeker(SafePlanner):
 
     finds_goals: ClassVar[bool] = True
 
-    def __init__(self, si: Any, name: str, *, world: WorldLike | None, seed: int | None, goal: Goal | None) -> None:
+    def __init__(self, si: Any, name: str, *, world: MotionQueries | None, seed: int | None, goal: Goal | None) -> None:
         """See :class:`rrtik_planners.ikurt.IKURT`."""
         super().__init__(si, name, world=world, seed=seed)
         self.goal = None if isinstance(goal, JointGoal) else goal

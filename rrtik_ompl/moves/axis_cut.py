@@ -14,14 +14,14 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.transitions import merge_moves
-from rrtik_ompl.world.motion_queries import MotionsFree, Stop, never
+from rrtik_ompl.world.motion_queries import MotionsFree, Stop, no_stop
 
 PART, LONGER = 16, 4  # moves of the first parts that are cut, and how many times longer they are the next time
 FIRST_TESTS, MORE_TESTS = 4, 4  # waypoints asked about together from a pivot, and how many times more the next time
 
 
 def axis_cut(
-    waypoints: ArrayLike, motions_free: MotionsFree, *, axes: Sequence[int] | None = None, stop: Stop = never
+    waypoints: ArrayLike, motions_free: MotionsFree, *, axes: Sequence[int] | None = None, stop: Stop = no_stop
 ) -> Matrix:
     """One pass of the axis post-processor.
 
@@ -45,7 +45,7 @@ def axis_cut(
 
 
 def double_axis_cut(
-    waypoints: ArrayLike, motions_free: MotionsFree, *, axes: Sequence[int] | None = None, stop: Stop = never
+    waypoints: ArrayLike, motions_free: MotionsFree, *, axes: Sequence[int] | None = None, stop: Stop = no_stop
 ) -> Matrix:
     """The published post-processing: a pass from the end of the route, then one from the start. See :func:`axis_cut`.
 
@@ -55,7 +55,7 @@ def double_axis_cut(
     return _backward_pass(_backward_pass(_route(waypoints), ask, axes, stop), ask, axes, stop)
 
 
-def cut_parts(waypoints: ArrayLike, motions_free: MotionsFree, *, stop: Stop = never) -> Matrix:
+def cut_parts(waypoints: ArrayLike, motions_free: MotionsFree, *, stop: Stop = no_stop) -> Matrix:
     """The double cut of short parts of a long route, then of longer ones of what is left, up to the whole.
 
     The cut of a whole route asks about the square of its moves, and far waypoints come first; most of what it gains is

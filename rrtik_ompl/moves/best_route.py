@@ -12,7 +12,7 @@ from rrtik_ompl.moves.lattice import MoveLattice
 from rrtik_ompl.moves.rules import long_enough
 from rrtik_ompl.moves.values import Values, lattice_size
 from rrtik_ompl.transitions import edge_keys, merge_moves, transitions
-from rrtik_ompl.world.motion_queries import Questions, never
+from rrtik_ompl.world.motion_queries import BatchedMotionQueries, no_stop
 
 DIGITS = 9  # of the travel after the point; the rest is rounding
 NONE = 2**31  # moves, if there is no route
@@ -31,7 +31,7 @@ class BestRoute:
         smallest_move: A route with a shorter move is not kept, shape (n,).
     """
 
-    def __init__(self, ask: Questions, costs: Vector, order: Sequence[int], smallest_move: Vector) -> None:
+    def __init__(self, ask: BatchedMotionQueries, costs: Vector, order: Sequence[int], smallest_move: Vector) -> None:
         self._ask, self._costs, self._order, self._smallest_move = ask, costs, order, smallest_move
         self.route: Matrix | None = None
 
@@ -91,7 +91,7 @@ class BestRoute:
 
     def _confirmed_cut(self, found: Matrix, route: Matrix) -> Matrix:
         """The cut of a route if it is free, else the route. That is found out even when it is time to stop."""
-        stop, self._ask.stop = self._ask.stop, never
+        stop, self._ask.stop = self._ask.stop, no_stop
         confirmed = self._confirmed(found, route)
         self._ask.stop = stop
         if not confirmed:

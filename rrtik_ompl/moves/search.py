@@ -18,7 +18,7 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.moves.best_route import BestRoute
 from rrtik_ompl.moves.values import Values, lattice_size, near_values, values_of, with_spread
 from rrtik_ompl.transitions import lower_bound, merge_moves, transitions
-from rrtik_ompl.world.motion_queries import MotionsFree, OutOfTime, Questions, Stop, never
+from rrtik_ompl.world.motion_queries import BatchedMotionQueries, MotionsFree, OutOfTime, Stop, no_stop
 
 MOST_NODES = 4096  # of a lattice: some milliseconds in the kernels
 MOST_FREE = 3  # joints with free values in one lattice
@@ -70,7 +70,7 @@ class MoveSearch:
         self._bounds = [lower_bound(s, g) for s, g in self.pairs]
         self._differing = min(self._bounds)
         self._lower, self._upper = lower, upper
-        self._ask = Questions(motions_free)
+        self._ask = BatchedMotionQueries(motions_free)
         self._rng = np.random.default_rng(seed)
         count = starts.shape[1]
         order = self._rng.permutation(count).tolist()
@@ -122,7 +122,7 @@ class MoveSearch:
         self._offers.append(merged)
         self._best.take(merged)
 
-    def settle_corners(self, stop: Stop = never) -> None:
+    def settle_corners(self, stop: Stop = no_stop) -> None:
         """Find out for each start and goal whether they are joined without a detour of any joint; sharpens the bound.
 
         Such routes have no free values: they pass the corners of the box between start and goal, all of which are
@@ -139,7 +139,7 @@ class MoveSearch:
                 if found is None or transitions(found) > least:
                     self.raise_bound(number, 3 if least == 1 else least + 1)
 
-    def improve(self, rounds: int, stop: Stop = never) -> None:
+    def improve(self, rounds: int, stop: Stop = no_stop) -> None:
         """Look for better routes, for at most ``rounds`` rounds or until ``stop()``.
 
         Once it is proven that no route has fewer moves, only the travel is still made less, in a few steps.

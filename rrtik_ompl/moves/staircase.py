@@ -6,7 +6,6 @@ together they pass no more than the ``2^n`` corners of the piece's box, and its 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TypeAlias
@@ -14,14 +13,14 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.path import SECOND_CHECK, JointPath
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.transitions import SAME, merge_moves
 from rrtik_ompl.world import World
+from rrtik_ompl.world.motion_queries import MotionsFree
 
-MotionsValid: TypeAlias = Callable[[Matrix, Matrix], Mask]  # as World.motion_valid_batch
 Order: TypeAlias = tuple[int, ...]  # the joints of a piece, the first to move first
 
 FINER = (1.0, SECOND_CHECK, 2.0 * SECOND_CHECK)  # judges, one after the other as long as the second check objects
@@ -67,19 +66,19 @@ def one_joint_moves(path: JointPath, problem: Problem | World, *, finest: float 
     raise InputError("path to convert: its single-joint moves do not pass the second check; lower motion_resolution")
 
 
-def staircase_orders(a: Vector, b: Vector, motions_valid: MotionsValid) -> list[Order]:
+def staircase_orders(a: Vector, b: Vector, motions_free: MotionsFree) -> list[Order]:
     """Orders in which the joints may change one after the other from a to b.
 
     Args:
         a: Beginning of a piece, shape (n,).
         b: Its end, shape (n,).
-        motions_valid: Which straight motions are free, for batches of shape (m, n).
+        motions_free: Which straight motions are free, for batches of shape (m, n).
 
     Returns:
         One free order for every joint that can move first; empty if no order is free.
     """
     joints = np.flatnonzero(a != b)
-    steps = _free_steps(a, b, joints, motions_valid)
+    steps = _free_steps(a, b, joints, motions_free)
     full = (1 << len(joints)) - 1
     orders = []
     for first in steps.get(0, []):
@@ -90,7 +89,7 @@ def staircase_orders(a: Vector, b: Vector, motions_valid: MotionsValid) -> list[
     return orders
 
 
-def _free_steps(a: Vector, b: Vector, joints: NDArray[np.int64], motions_valid: MotionsValid) -> dict[int, list[int]]:
+def _free_steps(a: Vector, b: Vector, joints: NDArray[np.int64], motions_free: MotionsFree) -> dict[int, list[int]]:
     """The free steps that lead from a to b, by the corner of the box where they begin; a corner is a set of bits."""
     places = range(len(joints))[::-1]  # the last joint first: distal joints sweep less
     frontier, layers = [0], []
@@ -98,7 +97,7 @@ def _free_steps(a: Vector, b: Vector, joints: NDArray[np.int64], motions_valid: 
         tried = [(corner, k) for corner in frontier for k in places if not corner >> k & 1]
         tails = np.array([_corner(a, b, joints, corner) for corner, _ in tried])
         heads = np.array([_corner(a, b, joints, corner | 1 << k) for corner, k in tried])
-        free = [step for step, ok in zip(tried, motions_valid(tails, heads), strict=True) if ok]
+        free = [step for step, ok in zip(tried, motions_free(tails, heads), strict=True) if ok]
         layers.append(free)
         frontier = sorted({corner | 1 << k for corner, k in free})[:WIDEST]
         if not frontier:

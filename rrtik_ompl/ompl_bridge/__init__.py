@@ -2,19 +2,20 @@
 
 from rrtik_ompl.ompl_bridge.contract import check_planner
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
-from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker, WorldLike
+from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner, SearchResult
 from rrtik_ompl.ompl_bridge.states import StateIO, space_bounds
+from rrtik_ompl.world.motion_queries import MotionQueries
 
 __all__ = [
     "GoalSampler",
     "MotionChecker",
+    "MotionQueries",
     "SafePlanner",
     "SearchResult",
     "SpaceChecker",
     "StateIO",
     "WorldChecker",
-    "WorldLike",
     "check_planner",
     "space_bounds",
 ]

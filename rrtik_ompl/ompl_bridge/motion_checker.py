@@ -1,4 +1,4 @@
-"""What a planner asks about the world: is this configuration free, is this motion free. With counters."""
+"""The motion queries of a planner, counted: of a world, or of an OMPL SpaceInformation."""
 
 from __future__ import annotations
 
@@ -9,49 +9,25 @@ import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.ompl_bridge.states import StateIO
+from rrtik_ompl.world.motion_queries import MotionQueries
 
 
-class WorldLike(Protocol):
-    """Anything that judges configurations and straight motions: ``rrtik_ompl.World`` or a stand-in."""
-
-    def valid(self, q: Vector) -> bool:
-        """Whether q, shape (n,), is free."""
-
-    def motion_valid(self, a: Vector, b: Vector) -> bool:
-        """Whether the straight motion from a to b, shapes (n,), is free."""
-
-    def motion_valid_batch(self, A: Matrix, B: Matrix) -> Mask:
-        """Which of the motions from A to B, shapes (m, n), are free, shape (m,)."""
-
-
-class MotionChecker(Protocol):
-    """The questions of a planner, counted.
+class MotionChecker(MotionQueries, Protocol):
+    """The motion queries of a planner, counted.
 
     Attributes:
-        checked_states: Configurations asked for by name.
-        checked_motions: Motions asked for (each of them many configurations inside).
+        checked_states: Configurations checked.
+        checked_motions: Motions checked (each of them many configurations inside).
     """
 
     checked_states: int
     checked_motions: int
 
-    def valid(self, q: Vector) -> bool:
-        """Whether q, shape (n,), is free."""
-
-    def valid_batch(self, Q: Matrix) -> Mask:
-        """Which of the configurations Q, shape (m, n), are free, shape (m,)."""
-
-    def motion_valid(self, a: Vector, b: Vector) -> bool:
-        """Whether the straight motion from a to b, shapes (n,), is free."""
-
-    def motion_valid_batch(self, A: Matrix, B: Matrix) -> Mask:
-        """Which of the motions from A to B, shapes (m, n), are free, shape (m,)."""
-
 
 class WorldChecker:
-    """Asks a World (see :class:`MotionChecker`)."""
+    """Of a world or a stand-in, which may leave out ``valid_batch`` (see :class:`MotionChecker`)."""
 
-    def __init__(self, world: WorldLike) -> None:
+    def __init__(self, world: MotionQueries) -> None:
         self._world = world
         self.checked_states = 0
         self.checked_motions = 0
@@ -81,7 +57,7 @@ class WorldChecker:
 
 
 class SpaceChecker:
-    """Asks a SpaceInformation, so whatever validity checker its owner has set (see :class:`MotionChecker`).
+    """Of a SpaceInformation, so by whatever validity checker its owner has set (see :class:`MotionChecker`).
 
     Holds C++ objects: for local variables only.
     """

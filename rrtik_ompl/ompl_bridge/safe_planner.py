@@ -20,8 +20,9 @@ from ompl import util as ou
 from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen, whole_number
 from rrtik_ompl.errors import PlannerError
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
-from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker, WorldLike
+from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker
 from rrtik_ompl.ompl_bridge.states import StateIO, real_vector_space, space_bounds
+from rrtik_ompl.world.motion_queries import MotionQueries
 
 GOAL_SAMPLES = 32  # how often a goal that can give any number of configurations is asked for one
 WAIT_FOR_GOAL = 0.002  # [s] between two questions to a goal that is still computing its first sample
@@ -73,7 +74,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     kernels: ClassVar[tuple[str, ...]] = ()
     finds_goals: ClassVar[bool] = False
 
-    def __init__(self, si: Any, name: str, *, world: WorldLike | None = None, seed: int | None = None) -> None:
+    def __init__(self, si: Any, name: str, *, world: MotionQueries | None = None, seed: int | None = None) -> None:
         """Make a planner.
 
         Args:

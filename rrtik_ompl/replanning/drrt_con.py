@@ -14,8 +14,9 @@ import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.path import subdivided
-from rrtik_ompl.replanning.connecting import Connect, Joined, Motions, Stop, never
+from rrtik_ompl.replanning.connecting import Connect, Joined
 from rrtik_ompl.transitions import without_repeats
+from rrtik_ompl.world.motion_queries import MotionQueries, Stop, no_stop
 
 MOST_CUTS = 24  # ends that are tried from one point of a path
 STRAIGHT = 1e-9  # change of direction
@@ -48,7 +49,7 @@ class DrrtCon:
         self._dense = np.zeros((0, 0))
         self._hits: Mask = np.zeros(0, dtype=bool)
 
-    def begin(self, start: Vector, goals: Matrix, motions: Motions, stop: Stop = never) -> bool:
+    def begin(self, start: Vector, goals: Matrix, motions: MotionQueries, stop: Stop = no_stop) -> bool:
         """Look for a first path from ``start`` to one of ``goals``, shape (g, n); whether there is one."""
         usable = motions.valid_batch(np.vstack([start, goals]))
         if not usable[0] or not usable[1:].any():
@@ -56,7 +57,7 @@ class DrrtCon:
         found = self.connect(start[None], goals[usable[1:]], motions, stop, chain=False)
         return self._take(found, motions)
 
-    def look(self, motions: Motions) -> bool:
+    def look(self, motions: MotionQueries) -> bool:
         """Check the path again, all of it in one call; whether it is free."""
         if self.path is None:
             return False
@@ -65,14 +66,14 @@ class DrrtCon:
         self.free = not self._hits.any()
         return self.free
 
-    def repair(self, motions: Motions, stop: Stop = never) -> bool:
+    def repair(self, motions: MotionQueries, stop: Stop = no_stop) -> bool:
         """After a :meth:`look` that found the path hit: find another one; whether there is one."""
         self.repairs += 1
         ends_free = self.path is not None and bool(motions.valid_batch(self.path[[0, -1]]).all())
         found = self._reconnected(motions, stop) if ends_free else None
         return self._take(found, motions)
 
-    def retarget(self, goals: Matrix, motions: Motions, stop: Stop = never) -> bool:
+    def retarget(self, goals: Matrix, motions: MotionQueries, stop: Stop = no_stop) -> bool:
         """Reconnect the free beginning of the path to the nearest of other goals, shape (g, n), without shortening.
 
         Whether it could be done; if not, the path stays as it is.
@@ -90,7 +91,7 @@ class DrrtCon:
             self.path, self.free = found.path, True
         return found is not None
 
-    def advance(self, place: Vector, passed: int, motions: Motions) -> None:
+    def advance(self, place: Vector, passed: int, motions: MotionQueries) -> None:
         """The robot has gone to ``place``, past ``passed`` waypoints: drop what lies behind it, shorten the rest."""
         free = self.free
         self.rejoin(place, passed)
@@ -105,19 +106,19 @@ class DrrtCon:
             self.path = rest if (rest[0] == place).all() else np.vstack([place, rest])
             self.free = False
 
-    def _reconnected(self, motions: Motions, stop: Stop) -> Joined | None:
+    def _reconnected(self, motions: MotionQueries, stop: Stop) -> Joined | None:
         """Cut at the first hit seen from the robot and at the first one seen from the goal; join the two pieces."""
         hits = np.flatnonzero(self._hits)
         first, last = int(hits[0]), int(hits[-1])
         return self.connect(self._dense[: first + 1], self._dense[last + 1 :], motions, stop)
 
-    def _take(self, found: Joined | None, motions: Motions) -> bool:
+    def _take(self, found: Joined | None, motions: MotionQueries) -> bool:
         """Walk on along a new path, if there is one; what is new of it is shortened."""
         self.free = found is not None
         if found is not None:
             path, begin, end = found.path, found.begin, found.end
             new = path[begin : end + 1]
-            new = sequential_cut(new, 0.5 * self.eps, motions) if self.post is None else self.post(new)
+            new = dense_sequential_cut(new, 0.5 * self.eps, motions) if self.post is None else self.post(new)
             self.path = without_points_between(np.vstack([path[:begin], new, path[end + 1 :]]))
         return self.free
 
@@ -127,7 +128,7 @@ class FromScratch(DrrtCon):
 
     name: ClassVar[str] = "rrt-connect"
 
-    def _reconnected(self, motions: Motions, stop: Stop) -> Joined | None:
+    def _reconnected(self, motions: MotionQueries, stop: Stop) -> Joined | None:
         return self.connect(self._dense[:1], self._dense[-1:], motions, stop)
 
 
@@ -148,10 +149,11 @@ def without_points_between(path: Matrix) -> Matrix:
     return kept
 
 
-def sequential_cut(path: Matrix, step: float, motions: Motions) -> Matrix:
+def dense_sequential_cut(path: Matrix, step: float, motions: MotionQueries) -> Matrix:
     """Shorten a free path: from each kept point straight to the last point that can be reached.
 
-    Points stand every ``step`` along the path. Post-processing paper, method 1, as DRRT-Con uses it.
+    Post-processing paper, method 1, as DRRT-Con uses it: points every ``step`` along the path are tried, ``MOST_CUTS``
+    of them in one call; :func:`rrtik_ompl.shortening.sequential.sequential_cut` tries every waypoint and no others.
     """
     done, rest = [path[:1]], path
     while len(rest) > 2:
@@ -161,7 +163,7 @@ def sequential_cut(path: Matrix, step: float, motions: Motions) -> Matrix:
     return np.vstack([*done, rest[1:]])
 
 
-def cut_from_start(path: Matrix, step: float, motions: Motions) -> Matrix:
+def cut_from_start(path: Matrix, step: float, motions: MotionQueries) -> Matrix:
     """A free path with its beginning straight to the last point along it that can be reached, asked in one call."""
     points, edges = _points_and_edges(path, step)
     known = int(np.searchsorted(edges, 1))  # what follows the end of the first edge, which needs no question

@@ -11,8 +11,8 @@ from collections.abc import Callable
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.replanning.connecting import Motions
 from rrtik_ompl.scene import Scene
+from rrtik_ompl.world.motion_queries import MotionQueries
 from rrtik_ompl.world.moving_world import MovingWorld
 
 TRIES = 192  # directions that are compared
@@ -29,7 +29,7 @@ def evasion(
     room: float,
     near: MovingWorld,
     later: Callable[[int], Scene],
-    alone: Motions,
+    alone: MotionQueries,
     rng: np.random.Generator,
     path: Matrix | None,
 ) -> Vector | None:

@@ -7,8 +7,9 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.search.repair import PathRepair
-from rrtik_ompl.replanning.connecting import CUTS, ITERATIONS, PATIENCE, KernelConnect, KernelCuts, Motions, Stop, never
+from rrtik_ompl.replanning.connecting import CUTS, ITERATIONS, PATIENCE, KernelConnect, KernelCuts
 from rrtik_ompl.replanning.drrt_con import DrrtCon
+from rrtik_ompl.world.motion_queries import MotionQueries, Stop, has_kernels, no_stop
 from rrtik_ompl.world.moving_world import MovingWorld
 
 REPAIR_CUTS, REPAIR_PATIENCE = 16, 6  # as CUTS and PATIENCE, where only a detour is new; walking shortens it further
@@ -33,17 +34,17 @@ class KernelDrrtCon(DrrtCon):
     def __init__(
         self, world: MovingWorld, lower: Vector, upper: Vector, eps: float, seed: int, *, forgetting: bool = False
     ) -> None:
-        if world.fast is None:
+        self._world, self._forgetting, self._rng = world, forgetting, np.random.default_rng([seed, 1])
+        if not has_kernels(world):
             raise InputError("replanning in kernels: the world has none; install numba")
         super().__init__(KernelConnect(world, lower, upper, eps, seed), eps, post=KernelCuts(world, seed))
         tries, patience = (CUTS, PATIENCE) if forgetting else (REPAIR_CUTS, REPAIR_PATIENCE)
-        self._world, self._forgetting, self._rng = world, forgetting, np.random.default_rng([seed, 1])
         self._kernels = PathRepair(
             world.fast, world.robot.chain, lower, upper, weights=world.weights, resolution=world.motion_resolution,
             eps=eps, iterations=ITERATIONS, tries=tries, patience=patience,
         )  # fmt: skip
 
-    def look(self, motions: Motions) -> bool:
+    def look(self, motions: MotionQueries) -> bool:
         """See :meth:`DrrtCon.look`."""
         if self.path is None:
             return False
@@ -51,7 +52,7 @@ class KernelDrrtCon(DrrtCon):
         self._world.checked += self._kernels.checked
         return self.free
 
-    def repair(self, motions: Motions, stop: Stop = never) -> bool:
+    def repair(self, motions: MotionQueries, stop: Stop = no_stop) -> bool:
         """See :meth:`DrrtCon.repair`."""
         self.repairs += 1
         seed = int(self._rng.integers(2**62))

@@ -14,7 +14,6 @@ from rrtik_ompl.goal import JOINT_TOLERANCE, JointGoal
 from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.poses import quaternion_xyzw
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.replanning.connecting import Stop
 from rrtik_ompl.replanning.evading import evasion
 from rrtik_ompl.replanning.feed import Feed, Watch, rooms
 from rrtik_ompl.replanning.run import Run, Tick
@@ -23,6 +22,7 @@ from rrtik_ompl.replanning.walking import one_step, to_first_corner
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.world import World
+from rrtik_ompl.world.motion_queries import Stop
 from rrtik_ompl.world.moving_world import MovingWorld
 
 GoalFeed = Callable[[float], ArrayLike]

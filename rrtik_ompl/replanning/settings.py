@@ -6,15 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.arrays import TAU, Vector, finite_array, whole_number
+from rrtik_ompl.arrays import TAU, Vector, finite_array, positive, whole_number
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
-from rrtik_ompl.replanning.connecting import KernelCuts, PlainConnect, has_kernels
+from rrtik_ompl.replanning.connecting import KERNELS, KernelCuts, PlainConnect
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
 from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
 from rrtik_ompl.replanning.single_tree import SingleTree
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.trajectory.limits import RateLimits
+from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_ompl.world.moving_world import MovingWorld
 
 PLANNERS = ("drrt-con", "rrt-connect", "drrt")
@@ -72,7 +73,7 @@ def settings(
     """
     if planner not in PLANNERS:
         raise UnknownNameError("replanner", str(planner), PLANNERS)
-    frequency = _above(rate, "rate", "ticks a second, such as 50")
+    frequency = positive(rate, "rate", "give ticks a second, such as 50")
     if frequency > FASTEST:
         raise InputError(f"rate must be {FASTEST:g} Hz or less, got {frequency:g}")
     for value, name in ((predict, "predict"), (seed, "seed")):
@@ -84,43 +85,34 @@ def settings(
     lower, upper = (np.clip(ends, -TAU, TAU) for ends in (robot.lower, robot.upper))
     usual, _ = connect_lengths(lower, upper, None, None)
     return Settings(
-        step=_above(step, "step", "how far to go in a tick [rad or m]"),
+        step=positive(step, "step", "give how far to go in a tick [rad or m]"),
         rate=frequency,
         planner=planner,
         eps=usual if eps is None else _long_enough(eps, usual),
         margin=distance,
-        speed_bound=None if speed_bound is None else _above(speed_bound, "speed_bound", "metres a second"),
+        speed_bound=None if speed_bound is None else positive(speed_bound, "speed_bound", "give metres a second"),
         most=rates.velocity / frequency,
         predict=int(predict),
-        seconds=_above(seconds, "seconds", "how long the run may last"),
-        slot=1.0 / frequency if slot is None else _above(slot, "slot", "how long a repair may take [s]"),
+        seconds=positive(seconds, "seconds", "give how long the run may last"),
+        slot=1.0 / frequency if slot is None else positive(slot, "slot", "give how long a repair may take [s]"),
         seed=int(seed),
     )
 
 
 def planner_of(chosen: Settings, world: MovingWorld, lower: Vector, upper: Vector) -> DrrtCon:
     """The replanner of the name, for a world and a box of configurations to sample in."""
-    kernels = has_kernels(world)
     if chosen.planner == SingleTree.name:
-        return SingleTree(
-            lower, upper, chosen.eps, chosen.seed, post=KernelCuts(world, chosen.seed) if kernels else None
-        )
-    forgetting = chosen.planner == FromScratch.name
-    if kernels:
+        post = KernelCuts(world, chosen.seed) if has_kernels(world, *KERNELS) else None
+        return SingleTree(lower, upper, chosen.eps, chosen.seed, post=post)
+    forgetting, in_kernels = chosen.planner == FromScratch.name, has_kernels(world, *KERNELS)
+    if in_kernels:
         return KernelDrrtCon(world, lower, upper, chosen.eps, chosen.seed, forgetting=forgetting)
     kind = FromScratch if forgetting else DrrtCon
     return kind(PlainConnect(lower, upper, chosen.eps, chosen.seed), chosen.eps)
 
 
 def _long_enough(eps: float, usual: float) -> float:
-    number = _above(eps, "eps", "the longest motion of the trees [rad or m]")
+    number = positive(eps, "eps", "give the longest motion of the trees [rad or m]")
     if number < SHORTEST * usual:
         raise InputError(f"eps must be at least {SHORTEST * usual:.3g}, got {number:g}; {usual:.3g} suits this robot")
-    return number
-
-
-def _above(value: float, name: str, what: str) -> float:
-    number = float(finite_array(value, (), name))
-    if number <= 0.0:
-        raise InputError(f"{name} must be greater than 0, got {number:g}; give {what}")
     return number

@@ -11,8 +11,11 @@ from typing import ClassVar
 import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.replanning.connecting import ITERATIONS, Joined, Motions, Stop, Tree, joined, never
+from rrtik_ompl.replanning.connecting import ITERATIONS, Joined, joined, one_by_one
 from rrtik_ompl.replanning.drrt_con import DrrtCon, Post
+from rrtik_ompl.search.rrt_connect import ConnectRules, extend
+from rrtik_ompl.search.tree import ConfigurationTree
+from rrtik_ompl.world.motion_queries import MotionQueries, Stop, no_stop
 
 TO_THE_ROBOT = 0.4  # probability
 
@@ -31,50 +34,50 @@ class SingleTree(DrrtCon):
 
     def __init__(self, lower: Vector, upper: Vector, eps: float, seed: int, *, post: Post | None = None) -> None:
         super().__init__(self, eps, post=post)
-        self._lower, self._upper = lower, upper
+        self._rules = ConnectRules(lower, upper, eps)
         self._rng = np.random.default_rng(seed)
-        self._tree: Tree | None = None
+        self._tree: ConfigurationTree | None = None
         self.samples = 0
 
-    def begin(self, start: Vector, goals: Matrix, motions: Motions, stop: Stop = never) -> bool:
+    def begin(self, start: Vector, goals: Matrix, motions: MotionQueries, stop: Stop = no_stop) -> bool:
         """See :meth:`DrrtCon.begin`; the tree's only root is the first goal that is free."""
         self._tree = None
         return super().begin(start, goals, motions, stop)
 
-    def _reconnected(self, motions: Motions, stop: Stop) -> Joined | None:
+    def _reconnected(self, motions: MotionQueries, stop: Stop) -> Joined | None:
         if self._tree is not None:
             self._tree = trimmed(self._tree, motions)
         return self(self._dense[:1], self._dense[-1:], motions, stop)
 
     def __call__(
-        self, first: Matrix, second: Matrix, motions: Motions, stop: Stop, *, chain: bool = True
+        self, first: Matrix, second: Matrix, motions: MotionQueries, stop: Stop, *, chain: bool = True
     ) -> Joined | None:
         """Grow the tree until it reaches the end of ``first``; the way back to its root, or None."""
         del chain
         aim = first[-1]
         if self._tree is None or not (self._tree.rows[0] == second[0]).all():
-            self._tree = Tree(second[:1])
+            self._tree = ConfigurationTree(second[:1])
         for _ in range(ITERATIONS):
             if stop():
                 return None
             self.samples += 1
             at_robot = self._rng.random() < TO_THE_ROBOT
-            target = aim if at_robot else self._rng.uniform(self._lower, self._upper)
-            new = self._tree.extend(target, self.eps, motions)
+            target = aim if at_robot else self._rng.uniform(self._rules.lower, self._rules.upper)
+            new = extend(self._tree, target, self._rules, one_by_one(motions))
             if new is not None and (self._tree.rows[new] == aim).all():
                 return joined(first, self._tree.branch(new)[::-1], second, chain=False)
         return None
 
 
-def trimmed(tree: Tree, motions: Motions) -> Tree:
+def trimmed(tree: ConfigurationTree, motions: MotionQueries) -> ConfigurationTree:
     """What is left of a tree when blocked edges and all that hangs on them are cut off; checked in one call."""
-    rows, parents = np.array(tree.rows), np.array(tree.parents)
+    rows, parents = tree.rows, np.array(tree.parents)
     keep: Mask = np.ones(len(rows), dtype=bool)
     keep[1:] = motions.motion_valid_batch(rows[parents[1:]], rows[1:])
     for k in range(1, len(rows)):  # parents come before their children
         keep[k] &= keep[parents[k]]
     numbers = np.cumsum(keep) - 1
-    left = Tree(rows[:1])
+    left = ConfigurationTree(rows[:1])
     for k in np.flatnonzero(keep)[1:]:
         left.add(rows[k], int(numbers[parents[k]]))
     return left

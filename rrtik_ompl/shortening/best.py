@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.moves.axis_cut_rounds import axis_cut_rounds
-from rrtik_ompl.shortening.random_cut import PULLS, WAYPOINTS, has_kernels, kernel_search, random_cut, run
+from rrtik_ompl.shortening.random_cut import PULLS, WAYPOINTS, kernel_search, random_cut, run
 from rrtik_ompl.shortening.retraction import STEPS, retract
 from rrtik_ompl.shortening.sequential import sequential_cut
 from rrtik_ompl.shortening.task import Task
@@ -23,7 +23,7 @@ def best_in_time(route: Matrix, task: Task) -> Matrix:
     """Shorten a route, shape (k, n), by whatever helps: shortcuts from several seeds, then retraction and shortcuts."""
     if task.one_joint:
         return task.better(route, axis_cut_rounds(route, task.free_batch, seed=task.seed, stop=task.expired))
-    if not has_kernels(task) or len(route) < 3:
+    if task.kernel_world is None or len(route) < 3:
         return _without_kernels(route, task)
     best = _several_starts(route, task)
     rounds = idle = 0

@@ -18,7 +18,7 @@ from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.transitions import lower_bound, single_joint
 from rrtik_ompl.world import World
-from rrtik_ompl.world.motion_queries import Stop, never
+from rrtik_ompl.world.motion_queries import Stop, no_stop
 
 ROUNDS = 10
 MAX_CELLS = 2_000_000  # of a grid
@@ -50,7 +50,7 @@ def fewest_moves(
     *,
     rounds: int = ROUNDS,
     seed: int = 0,
-    stop: Stop = never,
+    stop: Stop = no_stop,
     rules: MoveRules | None = None,
 ) -> MovesFound:
     """Look for a route with fewer moves, or with as many and less travel.
@@ -108,7 +108,7 @@ def least_moves(problem: Problem) -> int:
     search.settle_corners()
     if search.proven or search.bound == lower_bound(ends[0], ends[1]):  # met, or too many corners
         return search.bound
-    return sharper_bound(world, range(world.robot.dof), ends[0], ends[1], never)
+    return sharper_bound(world, range(world.robot.dof), ends[0], ends[1], no_stop)
 
 
 def grid_route(problem: Problem, step: float) -> Matrix | None:

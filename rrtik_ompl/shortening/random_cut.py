@@ -6,16 +6,13 @@ shortcuts that the kernels cannot decide, for those take a hundred times as long
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.fast.search.shortcut import ShortcutSearch
-from rrtik_ompl.fast.search.shortcut_layout import KERNELS
-from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.shortening.task import Task
 from rrtik_ompl.transitions import without_repeats
+from rrtik_ompl.world.motion_queries import is_conservative
 
 TRIES = 400  # where there is no end to the time
 PATIENCE = 2000  # tries without gain that end the search where there is one
@@ -34,7 +31,7 @@ def shortcut(route: Matrix, task: Task, *, tries: int = TRIES) -> Matrix:
 
 def _cut(route: Matrix, task: Task, tries: int, *, share: float, pull: float) -> Matrix:
     limit = 2**62 if task.bounded else tries
-    if not has_kernels(task) or len(route) < 3:
+    if task.kernel_world is None or len(route) < 3:
         return _plain(route, task, limit, share)
     for asking in (False, True):
         search = kernel_search(route, task, seed=2 * task.seed + asking, share=share, pull=pull, asking=asking)
@@ -43,15 +40,10 @@ def _cut(route: Matrix, task: Task, tries: int, *, share: float, pull: float) ->
     return route
 
 
-def has_kernels(task: Task) -> bool:
-    """Whether the world of a task can judge motions inside a kernel."""
-    fast = getattr(task.motions, "fast", None)
-    return fast is not None and not task.one_joint and library(KERNELS) is not None
-
-
 def kernel_search(route: Matrix, task: Task, *, seed: int, share: float, pull: float, asking: bool) -> ShortcutSearch:
-    """A search in the world of a task; a conservative world is not asked."""
-    world: Any = task.motions
+    """A search in the kernels of a task's world, which must have them; a conservative world is not asked."""
+    world = task.kernel_world
+    assert world is not None
     return ShortcutSearch(
         world.fast,
         world.robot.chain,
@@ -61,7 +53,7 @@ def kernel_search(route: Matrix, task: Task, *, seed: int, share: float, pull: f
         seed=seed,
         share=share,
         pull=pull,
-        asking=asking and world.accuracy == "exact",
+        asking=asking and not is_conservative(world),
     )
 
 

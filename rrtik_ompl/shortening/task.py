@@ -4,21 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any, Protocol
 
 import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.fast.search.shortcut_layout import KERNELS
 from rrtik_ompl.moves.axis_cut import axis_moves
 from rrtik_ompl.moves.rules import MoveRules
 from rrtik_ompl.transitions import edge_keys, route_length, transitions
-
-
-class Motions(Protocol):
-    """Anything that judges straight motions: ``rrtik_ompl.World`` or a stand-in."""
-
-    def motion_valid_batch(self, A: Matrix, B: Matrix) -> Mask:
-        """Which straight motions A[k] -> B[k], shapes (m, n), are free, shape (m,)."""
+from rrtik_ompl.world.motion_queries import KernelWorld, MotionQueries, has_kernels
 
 
 class Task:
@@ -48,7 +42,7 @@ class Task:
 
     def __init__(
         self,
-        motions: Motions,
+        motions: MotionQueries,
         *,
         seconds: float = np.inf,
         seed: int = 0,
@@ -57,7 +51,7 @@ class Task:
         on_better: Callable[[Matrix], object] | None = None,
         stop: Callable[[], bool] | None = None,
     ) -> None:
-        self.motions: Any = motions
+        self.motions = motions
         self.seed, self.one_joint, self.rules = seed, one_joint, rules
         self.asked = self.confirmed_again = 0
         self.bounded = bool(np.isfinite(seconds))
@@ -71,6 +65,12 @@ class Task:
         if self._stop is not None and self._stop():
             self._deadline = -np.inf
         return max(self._deadline - time.monotonic(), 0.0)
+
+    @property
+    def kernel_world(self) -> KernelWorld | None:
+        """The world, if random shortcuts can be searched for in its kernels, else None."""
+        world = self.motions
+        return world if not self.one_joint and has_kernels(world, KERNELS) else None
 
     def expired(self) -> bool:
         """Whether the time is up."""

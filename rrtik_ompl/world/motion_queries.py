@@ -1,34 +1,123 @@
-"""Questions about many motions at once that can be broken off."""
+"""What planners, shortening and replanning need to know of motions: the one interface, kernels, and batches.
+
+The interface is :class:`MotionQueries`. Its two optional members are read here alone, so that a stand-in for a world
+may leave them out: ``fast``, the tables for searches in kernels (:func:`has_kernels`), and ``accuracy``
+(:func:`is_conservative`).
+"""
 
 from __future__ import annotations
 
 import time
+from abc import abstractmethod
 from collections.abc import Callable
 from contextlib import suppress
-from typing import TypeAlias
+from typing import Protocol, TypeAlias, TypeGuard
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix
+from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.fast import FastWorld
+from rrtik_ompl.fast.simd.library import library
+from rrtik_ompl.robot import Chain, Robot
 
-MotionsFree: TypeAlias = Callable[[Matrix, Matrix], Mask]  # as World.motion_valid_batch
+MotionFree: TypeAlias = Callable[[Vector, Vector], bool]  # as MotionQueries.motion_valid
+MotionsFree: TypeAlias = Callable[[Matrix, Matrix], Mask]  # as MotionQueries.motion_valid_batch
 Stop: TypeAlias = Callable[[], object]  # true when it is time to stop
 
-MOST_AT_ONCE = 1024  # motions
-BLINK = 0.01  # [s] between two looks at the clock; fewer motions are asked about at once if it takes longer
+LARGEST_BATCH = 1024  # motions
+FIRST_BATCH = 64
+CALL_TARGET_SECONDS = 0.01  # [s] that a batch may take before the next one is made smaller
 
 
-def never() -> bool:
-    """It is not time to stop."""
+class MotionQueries(Protocol):
+    """Says which configurations and straight motions are free: a `World`, a stand-in, or the checker of a planner.
+
+    Optional: ``fast`` and ``accuracy``, as of `World`; see :func:`has_kernels` and :func:`is_conservative`. A stand-in
+    that derives from this class need only implement :meth:`motion_valid_batch`.
+    """
+
+    def valid(self, q: Vector) -> bool:
+        """Whether q, shape (n,), is free."""
+        return bool(self.valid_batch(q[None])[0])
+
+    def valid_batch(self, Q: Matrix) -> Mask:
+        """Which configurations Q, shape (m, n), are free, shape (m,)."""
+        return self.motion_valid_batch(Q, Q)
+
+    def motion_valid(self, a: Vector, b: Vector) -> bool:
+        """Whether the straight motion from a to b, shapes (n,), is free."""
+        return bool(self.motion_valid_batch(a[None], b[None])[0])
+
+    @abstractmethod
+    def motion_valid_batch(self, A: Matrix, B: Matrix) -> Mask:
+        """Which straight motions A[k] -> B[k], shapes (m, n), are free, shape (m,)."""
+
+
+class KernelWorld(MotionQueries, Protocol):
+    """A world whose checks also run in kernels; :func:`has_kernels` says whether a world is one."""
+
+    @property
+    def robot(self) -> Robot:
+        """The arm."""
+
+    @property
+    def fast(self) -> FastWorld:
+        """The tables that kernels read."""
+
+    @property
+    def weights(self) -> Vector:
+        """No point of the arm moves farther than ``weights @ |b - a|`` [m] from a to b, shape (dof,)."""
+
+    @property
+    def motion_resolution(self) -> float:
+        """Largest step of any point of the arm between two checked configurations [m]."""
+
+    @property
+    def accuracy(self) -> str:
+        """The name of the accuracy: "exact" or "conservative"."""
+
+
+def kernel_tables(world: object) -> FastWorld | None:
+    """The tables that kernels read of a world, or None where it has none."""
+    return getattr(world, "fast", None)
+
+
+def has_kernels(world: object, *libraries: str, within: Matrix | None = None) -> TypeGuard[KernelWorld]:
+    """Whether searches can run in kernels in a world.
+
+    Args:
+        world: A world, a stand-in, or None.
+        libraries: Names of the kernel libraries that are needed (:func:`rrtik_ompl.fast.simd.library.library`).
+        within: Corners of a box of configurations, shape (m, n), in all of which the kernels must be certain.
+    """
+    fast = kernel_tables(world)
+    if fast is None or (within is not None and not _certain(fast, world.robot.chain, within)):  # type: ignore[attr-defined]
+        return False
+    return all(library(name) is not None for name in libraries)
+
+
+def _certain(fast: FastWorld, chain: Chain, corners: Matrix) -> bool:
+    """Whether no joint value of a box of configurations, given by corners of shape (m, n), is too large for kernels."""
+    largest = np.abs(corners).max(axis=0)
+    return bool((np.abs(chain.gain) @ largest + np.abs(chain.offset) <= fast.limits).all())
+
+
+def is_conservative(world: object) -> bool:
+    """Whether a world counts as blocked what its kernels cannot decide; one that does not say is taken to be exact."""
+    return bool(getattr(world, "accuracy", "exact") == "conservative")
+
+
+def no_stop() -> bool:
+    """It is never time to stop."""
     return False
 
 
 class OutOfTime(Exception):
-    """Ends the work on a lattice."""
+    """It is time to stop, in the middle of a batch."""
 
 
-class Questions:
-    """Asks about motions in parts, so that a search ends soon after it should.
+class BatchedMotionQueries:
+    """Checks motions in batches that take about ``CALL_TARGET_SECONDS``, so that a search ends soon after it should.
 
     Attributes:
         asked: Motions so far.
@@ -37,9 +126,9 @@ class Questions:
 
     def __init__(self, motions_free: MotionsFree) -> None:
         self._motions_free = motions_free
-        self._at_once = 64
+        self._batch = FIRST_BATCH
         self.asked = 0
-        self.stop: Stop = never
+        self.stop: Stop = no_stop
 
     def __call__(self, tails: Matrix, heads: Matrix) -> Mask:
         """Which motions are free, shapes (m, n) and (m,).
@@ -51,13 +140,13 @@ class Questions:
         while first < len(tails):
             if self.stop():
                 raise OutOfTime
-            begin, last = time.perf_counter(), first + self._at_once
+            begin, last = time.perf_counter(), first + self._batch
             parts.append(self._motions_free(tails[first:last], heads[first:last]))
             first = last
-            if time.perf_counter() - begin > BLINK:
-                self._at_once = max(self._at_once // 2, 1)
+            if time.perf_counter() - begin > CALL_TARGET_SECONDS:
+                self._batch = max(self._batch // 2, 1)
             else:
-                self._at_once = min(2 * self._at_once, MOST_AT_ONCE)
+                self._batch = min(2 * self._batch, LARGEST_BATCH)
         self.asked += len(tails)
         return np.concatenate(parts)
 

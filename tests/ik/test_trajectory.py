@@ -178,7 +178,7 @@ def test_bad_input_is_refused_in_a_line():
         rrtik.solve_ik_trajectory(robot, poses[:, :3, 3], free_rotation_axis="z")
     with pytest.raises(InputError, match="must be x, y or z, got 'w'"):
         rrtik.solve_ik_trajectory(robot, poses, free_rotation_axis="w")
-    with pytest.raises(InputError, match="jump must be greater than 0"):
+    with pytest.raises(InputError, match="jump: must be greater than 0"):
         rrtik.solve_ik_trajectory(robot, poses, jump=0.0)
     with pytest.raises(InputError, match="another robot"):
         rrtik.solve_ik_trajectory(robot, poses, world=rrtik.World(rrtik.load_robot("ur5")))

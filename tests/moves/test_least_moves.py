@@ -15,7 +15,7 @@ from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box
 from rrtik_ompl.shortening.fewest_moves import grid_route, least_moves
 from rrtik_ompl.world import World
-from rrtik_ompl.world.motion_queries import never
+from rrtik_ompl.world.motion_queries import no_stop
 from rrtik_tests.mazes import OPTIMA
 
 
@@ -64,9 +64,9 @@ def pose(x: float, y: float) -> object:
 def test_a_narrow_gate_is_not_refuted_and_a_closed_one_is() -> None:
     for width, refuted in ((0.5, False), (0.02, False), (-0.05, True)):
         problem = gate(width)
-        proof = OneFreeValue(problem.world, problem.start, problem.goal.q, 1, never)
+        proof = OneFreeValue(problem.world, problem.start, problem.goal.q, 1, no_stop)
         assert proof.refuted() == refuted
-        bound = sharper_bound(problem.world, range(2), problem.start, problem.goal.q, never)
+        bound = sharper_bound(problem.world, range(2), problem.start, problem.goal.q, no_stop)
         assert bound == (4 if refuted else 3)
 
 

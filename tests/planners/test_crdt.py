@@ -13,7 +13,7 @@ from rrtik_ompl.fast.search.crdt.rules import CrdtRules
 from rrtik_ompl.ompl_bridge.contract import small_problem, solution_rows
 from rrtik_ompl.transitions import single_joint
 from rrtik_planners import CRDT, BiCRDT
-from rrtik_planners.crdt_tree import AxisTree, Outcome
+from rrtik_planners.crdt_tree import CrdtTree, Outcome
 
 
 class Interval:
@@ -41,8 +41,8 @@ def rules(dof: int, scale: Any = 1.0, smallest_move: float = 0.0) -> CrdtRules:
     return CrdtRules(-np.ones(dof), np.ones(dof), np.full(dof, scale), np.full(dof, smallest_move), np.ones(dof))
 
 
-def grown(*targets: Any, checker: Any = None, dof: int = 2, seed: int = 0) -> tuple[AxisTree, list[Any]]:
-    tree = AxisTree(np.zeros((1, dof)), rules(dof))
+def grown(*targets: Any, checker: Any = None, dof: int = 2, seed: int = 0) -> tuple[CrdtTree, list[Any]]:
+    tree = CrdtTree(np.zeros((1, dof)), rules(dof))
     rng = np.random.default_rng(seed)
     return tree, [tree.extend(np.array(t, dtype=float), checker or Interval(), rng) for t in targets]
 
@@ -98,7 +98,7 @@ def test_turning_back_beyond_the_parent_starts_from_the_parent() -> None:
 
 
 def test_turning_back_exactly_to_the_parent_adds_nothing() -> None:
-    tree = AxisTree(np.zeros((1, 2)), rules(2))
+    tree = CrdtTree(np.zeros((1, 2)), rules(2))
     rng = np.random.default_rng(0)
     tree.extend(np.array([1.0, 0.0]), Interval(), rng)
     extension = tree.extend_from(1, np.array([0.0, 0.0]), Interval(), rng)
@@ -107,8 +107,8 @@ def test_turning_back_exactly_to_the_parent_adds_nothing() -> None:
 
 def test_the_nearest_vertex_is_measured_in_the_scaled_metric() -> None:
     roots = np.array([[0.0, 0.0], [3.0, 1.0]])
-    assert AxisTree(roots, rules(2)).nearest(np.array([2.0, 0.0])) == 1
-    assert AxisTree(roots, rules(2, (0.1, 1.0))).nearest(np.array([2.0, 0.0])) == 0
+    assert CrdtTree(roots, rules(2)).nearest(np.array([2.0, 0.0])) == 1
+    assert CrdtTree(roots, rules(2, (0.1, 1.0))).nearest(np.array([2.0, 0.0])) == 0
 
 
 def test_the_arrays_grow_and_keep_what_they_hold() -> None:

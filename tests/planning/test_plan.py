@@ -178,7 +178,7 @@ def test_a_continuous_joint_goes_the_short_way_round():
     ("arguments", "message"),
     [
         ({"planner": "rrt_conect"}, "no planner 'rrt_conect'; have"),
-        ({"seconds": 0}, "seconds must be greater than 0"),
+        ({"seconds": 0}, "seconds: must be greater than 0"),
         ({"seconds": float("nan")}, "seconds"),
         ({"seconds": "long"}, "seconds"),
         ({"seed": -1}, "seed"),

@@ -19,11 +19,11 @@ from rrtik_tests.moving_plane import OPTIONS, box, crossing, plane
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"rate": 0.0}, "rate must be greater than 0, got 0; give ticks a second"),
-        ({"step": -1.0}, "step must be greater than 0"),
+        ({"rate": 0.0}, "rate: must be greater than 0, got 0; give ticks a second"),
+        ({"step": -1.0}, "step: must be greater than 0"),
         ({"margin": -0.1}, "margin must not be negative"),
         ({"predict": 1.5}, "predict must be a whole number"),
-        ({"speed_bound": 0.0}, "speed_bound must be greater than 0"),
+        ({"speed_bound": 0.0}, "speed_bound: must be greater than 0"),
         ({"seconds": float("nan")}, "seconds"),
         ({"eps": 1e-6}, "eps must be at least .* suits this robot"),
         ({"limits": RateLimits([1.0] * 3, [1.0] * 3)}, "limits: there are 2 joints, but limits for 3"),

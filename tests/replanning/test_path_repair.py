@@ -5,8 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rrtik_ompl.replanning.connecting import PlainConnect, Tree
-from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch, points_along, sequential_cut, without_points_between
+from rrtik_ompl.replanning.connecting import PlainConnect
+from rrtik_ompl.replanning.drrt_con import (
+    DrrtCon,
+    FromScratch,
+    dense_sequential_cut,
+    points_along,
+    without_points_between,
+)
 from rrtik_ompl.replanning.single_tree import trimmed
 from rrtik_ompl.replanning.walking import one_step, to_first_corner
 from rrtik_tests.moving_plane import HIGH, LOW
@@ -76,7 +82,7 @@ def test_from_scratch_forgets_the_pieces():
 def test_the_sequential_cut_shortens_and_keeps_both_ends():
     judge_ = Scripted((10.0, 10.0), 2.0)
     zigzag = np.array([[0.0, 10.0], [3.0, 14.0], [6.0, 12.0], [9.0, 16.0], [12.0, 13.0], [16.0, 15.0], [20.0, 10.0]])
-    cut = sequential_cut(zigzag, 0.5, judge_)
+    cut = dense_sequential_cut(zigzag, 0.5, judge_)
     assert (cut[[0, -1]] == zigzag[[0, -1]]).all()
     assert judge_.motion_valid_batch(cut[:-1], cut[1:]).all()
     assert np.linalg.norm(np.diff(cut, axis=0), axis=1).sum() < 23.0
@@ -100,7 +106,7 @@ def test_a_step_goes_round_corners_or_stops_at_them_and_keeps_the_limits():
 
 
 def test_trimming_cuts_off_what_hangs_on_a_blocked_edge():
-    tree = Tree(np.array([[0.0, 0.0]]))
+    tree = ConfigurationTree(np.array([[0.0, 0.0]]))
     a = tree.add(np.array([5.0, 0.0]), 0)
     tree.add(np.array([9.0, 0.0]), a)
     tree.add(np.array([0.0, 5.0]), 0)

@@ -72,7 +72,7 @@ def test_a_file_that_is_no_record_is_refused(tmp_path):
         (lambda record: record["ticks"][1]["poses"].update(lift=[0.0] * 7), "'lift': quat_xyzw must have length 1"),
         (lambda record: record["ticks"][1]["seconds"].update(look="x"), "seconds of 'look': expected numbers"),
         (lambda record: record["ticks"][1].update(checked=0.5), "checked must be a whole number"),
-        (lambda record: record.update(rate=0), "rate must be greater than 0"),
+        (lambda record: record.update(rate=0), "rate: must be greater than 0"),
         (lambda record: record.update(problem=7), "problem must be of type str"),
     ],
 )

@@ -244,7 +244,7 @@ def test_better_paths_are_told(problem, raw):
 def test_requests_that_make_no_sense_are_refused_in_one_line(problem, raw, raw_moves):
     single = raw[0].with_waypoints(raw[0].waypoints[:1])
     for request, words in (
-        (lambda: rrtik.shorten(raw[0], problem, seconds=0.0), "seconds must be greater than 0"),
+        (lambda: rrtik.shorten(raw[0], problem, seconds=0.0), "seconds: must be greater than 0"),
         (lambda: rrtik.shorten(raw[0], problem, seconds=float("nan")), "seconds"),
         (lambda: rrtik.shorten(single, problem), "one waypoint"),
         (lambda: rrtik.shorten(raw[0], problem, method="random", seed=-1), "seed must be a whole number"),

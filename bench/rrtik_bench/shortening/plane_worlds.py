@@ -16,6 +16,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from rrtik_ompl.world.motion_queries import MotionQueries
+
 Array: TypeAlias = NDArray[Any]
 Word: TypeAlias = tuple[int, ...]
 Roads: TypeAlias = list[list[tuple[int, float, Word]]]
@@ -26,7 +28,7 @@ ARC = np.deg2rad(5.0)  # steps of the arcs around corners
 
 
 @dataclass(eq=False)
-class Plane:
+class Plane(MotionQueries):
     """A disc (radius 0 for a point) in a box among polygons; straight motions are judged exactly and counted."""
 
     name: str

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, positive
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast.search import connect_layout as layout
-from rrtik_ompl.fast.search.connect_lengths import connect_lengths, positive
+from rrtik_ompl.fast.search.connect_lengths import connect_lengths
 from rrtik_ompl.fast.search.tree_layout import CAPACITY, SIZE
 from rrtik_ompl.fast.search.tree_memory import grow, tree_table
 from rrtik_ompl.fast.simd.halton import inverse_bases
@@ -108,7 +108,7 @@ class ConnectSearch:
         seed: int,
         *,
         ask: Ask | None = None,
-        stop: Callable[[], bool] | None = None,
+        stop: Callable[[], object] | None = None,
         max_iterations: int | None = None,
     ) -> Matrix | None:
         """Look for a path from any start to any goal.
@@ -149,7 +149,7 @@ class ConnectSearch:
         self._search.header[layout.RESOLVE], self._search.header[layout.LIMIT] = 0, max_iterations
         return self._search.address
 
-    def go_on(self, stop: Callable[[], Any]) -> bool:
+    def go_on(self, stop: Callable[[], object]) -> bool:
         """Search on, where another kernel has begun; whether there is a path."""
         return self._run(None, stop) == layout.SOLVED
 
@@ -173,7 +173,7 @@ class ConnectSearch:
             "rejected": rejected,
         }
 
-    def _run(self, ask: Ask | None, stop: Callable[[], bool] | None) -> int:
+    def _run(self, ask: Ask | None, stop: Callable[[], object] | None) -> int:
         """Call the kernel until it is done; its last status."""
         budget = FIRST_BUDGET
         while True:

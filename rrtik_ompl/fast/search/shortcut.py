@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,8 +14,6 @@ from rrtik_ompl.fast.search import shortcut_layout as layout
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.tables.robot_tables import table
 from rrtik_ompl.robot import Chain
-
-Ask: TypeAlias = Callable[[Matrix, Matrix], Mask]
 
 ROOM = 256  # more waypoints than at the beginning
 WHOLE = 2**62
@@ -150,7 +147,7 @@ class ShortcutSearch:
         tries: int,
         *,
         patience: int = WHOLE,
-        ask: Ask | None = None,
+        ask: Callable[[Matrix, Matrix], Mask] | None = None,
         stop: Callable[[], bool] | None = None,
         chunk: int = CHUNK,
     ) -> bool:

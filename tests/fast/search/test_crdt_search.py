@@ -11,13 +11,14 @@ import pytest
 
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.fast.search.crdt import search as axis_search
-from rrtik_ompl.fast.search.crdt.rules import CrdtRules, runs_in_kernels
+from rrtik_ompl.fast.search.crdt.rules import KERNELS, CrdtRules
 from rrtik_ompl.fast.search.crdt.search import CrdtSearch
 from rrtik_ompl.ompl_bridge import WorldChecker
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box
 from rrtik_ompl.world import World
+from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_planners.bicrdt import TreePair
 from rrtik_planners.crdt import SingleTree
 from rrtik_tests.slider_arm import NAMES, Plain, shipped
@@ -198,7 +199,7 @@ def test_every_edge_of_the_trees_is_free() -> None:
 
 def test_kernels_are_left_alone_where_they_are_not_certain() -> None:
     world = shipped("titan4_sdu").world
-    assert runs_in_kernels(world, np.ones((1, 6)))
-    assert not runs_in_kernels(world, np.full((1, 6), 1e9))
-    assert not runs_in_kernels(Plain(world), np.ones((1, 6)))
-    assert not runs_in_kernels(None, np.ones((1, 6)))
+    assert has_kernels(world, KERNELS, within=np.ones((1, 6)))
+    assert not has_kernels(world, KERNELS, within=np.full((1, 6), 1e9))
+    assert not has_kernels(Plain(world), KERNELS, within=np.ones((1, 6)))
+    assert not has_kernels(None, KERNELS, within=np.ones((1, 6)))

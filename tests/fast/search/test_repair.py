@@ -9,12 +9,13 @@ import pytest
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.search.repair import PathRepair
-from rrtik_ompl.replanning.connecting import PlainConnect, never
+from rrtik_ompl.replanning.connecting import PlainConnect
 from rrtik_ompl.replanning.drrt_con import DrrtCon
 from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box, Sphere
 from rrtik_ompl.world import World
+from rrtik_ompl.world.motion_queries import no_stop
 from rrtik_ompl.world.moving_world import MovingWorld
 
 pytestmark = pytest.mark.kernels
@@ -74,7 +75,7 @@ def test_a_repair_keeps_both_ends_and_the_free_pieces_next_to_them():
     repair = repairing(world)
     assert not repair.look(path)
     for seed in range(20):
-        found = repair.repair(seed, never)
+        found = repair.repair(seed, no_stop)
         repair.look(path)
         assert free(world, found)
         assert (found[[0, -1]] == path[[0, -1]]).all()
@@ -86,7 +87,7 @@ def test_the_same_seed_gives_the_same_repair():
     found = []
     for repair in (repairing(world), repairing(world)):
         repair.look(path)
-        found.append(repair.repair(5, never))
+        found.append(repair.repair(5, no_stop))
     assert (found[0] == found[1]).all()
 
 
@@ -95,9 +96,9 @@ def test_from_scratch_none_of_the_path_is_kept():
     bent = np.vstack([path[:1], [[4.0, 2.0]], path[1:]])
     repair = repairing(world)
     repair.look(bent)
-    assert (repair.repair(1, never) == bent[1]).all(axis=1).any()
+    assert (repair.repair(1, no_stop) == bent[1]).all(axis=1).any()
     repair.look(bent)
-    assert not (repair.repair(1, never, forgetting=True) == bent[1]).all(axis=1).any()
+    assert not (repair.repair(1, no_stop, forgetting=True) == bent[1]).all(axis=1).any()
 
 
 @pytest.mark.parametrize("end", [0, -1])
@@ -106,14 +107,14 @@ def test_a_blocked_end_has_no_repair(end):
     path[end] = [10.0, 10.0]
     repair = repairing(world)
     assert not repair.look(path)
-    assert repair.repair(0, never) is None
+    assert repair.repair(0, no_stop) is None
 
 
 def test_a_search_gives_up_when_told_to_and_when_its_samples_are_spent():
     world = plane(20.0)
     path = np.array([[1.0, 10.0], [19.0, 10.0]])
     told, spent = repairing(world, iterations=10**9), repairing(world, iterations=300)
-    for repair, stop in ((told, lambda: True), (spent, never)):
+    for repair, stop in ((told, lambda: True), (spent, no_stop)):
         assert not repair.look(path)
         assert repair.repair(0, stop) is None
 
@@ -122,7 +123,7 @@ def test_memory_grows_with_what_a_path_needs():
     world, path = walled()
     repair = repairing(world, eps=0.02, iterations=10**6, tries=0)
     assert not repair.look(path)
-    found = repair.repair(2, never)
+    found = repair.repair(2, no_stop)
     assert len(found) > 256
     assert free(world, found)
     assert repair.look(found)
@@ -139,7 +140,7 @@ def test_points_at_which_a_path_goes_straight_on_fall_away():
     world, path = walled()
     repair = repairing(world)
     repair.look(path)
-    found = repair.repair(3, never)
+    found = repair.repair(3, no_stop)
     ways = np.diff(found, axis=0)
     lengths = np.linalg.norm(ways, axis=1)
     assert lengths.min() > 0.0

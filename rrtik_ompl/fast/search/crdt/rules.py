@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.fast.simd.library import library
+from rrtik_ompl.arrays import Vector
 
 KERNELS = "search.crdt.kernels"  # the library of these searches
 
@@ -35,14 +33,3 @@ class CrdtRules:
     def axes(self) -> NDArray[np.int32]:
         """The coordinates that may move."""
         return np.flatnonzero(self.lower < self.upper).astype(np.int32)
-
-
-def runs_in_kernels(world: Any, *rows: Matrix) -> bool:
-    """Whether a world has kernels that are certain about all configurations between ``rows``, shapes (m, n)."""
-    fast = getattr(world, "fast", None)
-    if fast is None:
-        return False
-    chain = world.robot.chain
-    largest = np.abs(np.vstack(rows)).max(axis=0)
-    within = bool((np.abs(chain.gain) @ largest + np.abs(chain.offset) <= fast.limits).all())
-    return within and library(KERNELS) is not None

@@ -53,7 +53,7 @@ class CrdtSearch:
     ) -> None:
         kernels = library(KERNELS)
         if kernels is None:
-            raise PlannerError("there are no kernels for this processor; see runs_in_kernels")
+            raise PlannerError("there are no kernels for this processor; see has_kernels")
         self._world = world
         single = goals is not None
         self._resume = kernels.resume_single if single else kernels.resume_pair

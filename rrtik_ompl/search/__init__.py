@@ -1,0 +1,1 @@
+"""Search in configuration space in Python, for any motion check: RRT-Connect and the tree that it grows."""
