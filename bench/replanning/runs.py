@@ -12,7 +12,7 @@ import numpy as np
 import rrtik_ompl as rrtik
 from rrtik_ompl.planning import plan
 from rrtik_ompl.replanning import Run, replan
-from rrtik_ompl.replanning.connecting import Motions, PlainConnect
+from rrtik_ompl.replanning.connecting import PlainConnect
 from rrtik_ompl.replanning.contact_check import Verdict, judge
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
 from rrtik_ompl.replanning.generate import moving_problem
@@ -20,6 +20,7 @@ from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
 from rrtik_ompl.replanning.loop import Loop
 from rrtik_ompl.replanning.settings import settings
 from rrtik_ompl.scene import Scene
+from rrtik_ompl.world.motion_queries import MotionQueries
 
 ARMS = {
     "ur5": {"count": 20, "speed": 0.2, "step": 0.05},
@@ -152,7 +153,7 @@ def with_pairs(loop: Loop, quick: Moments, slow: Moments, slow_every: int) -> No
         "from scratch as published, in Python": FromScratch(PlainConnect(lower, upper, eps, 1), eps),
     }
 
-    def timed(motions: Motions, stop: Callable[[], Any]) -> bool:
+    def timed(motions: MotionQueries, stop: Callable[[], Any]) -> bool:
         nonlocal count
         count += 1
         assert planner.path is not None
@@ -171,7 +172,7 @@ def with_pairs(loop: Loop, quick: Moments, slow: Moments, slow_every: int) -> No
     planner.repair = timed  # type: ignore[method-assign, assignment]
 
 
-def _repaired(other: DrrtCon, path: np.ndarray, motions: Motions) -> tuple[float, float] | None:
+def _repaired(other: DrrtCon, path: np.ndarray, motions: MotionQueries) -> tuple[float, float] | None:
     """Seconds of another's repair and the share of the path's length that the new one has."""
     other.path = path
     other.look(motions)

@@ -9,7 +9,7 @@ from rrtik_ompl.arrays import Matrix, positive
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import Goal
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
-from rrtik_ompl.ik.ikurt.search import BatchedSearch, Options
+from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult
 from rrtik_ompl.world import World
 from rrtik_planners.tip_seeker import TipSeeker, misses

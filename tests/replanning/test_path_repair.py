@@ -15,6 +15,7 @@ from rrtik_ompl.replanning.drrt_con import (
 )
 from rrtik_ompl.replanning.single_tree import trimmed
 from rrtik_ompl.replanning.walking import one_step, to_first_corner
+from rrtik_ompl.search.tree import ConfigurationTree
 from rrtik_tests.moving_plane import HIGH, LOW
 
 
