@@ -25,7 +25,7 @@ Where what is, from below; each module imports only from those below it:
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 if TYPE_CHECKING:
     from rrtik_ompl.benchmark.batch import plan_batch as plan_batch
