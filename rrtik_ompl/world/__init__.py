@@ -18,7 +18,7 @@ from rrtik_ompl.errors import InputError, MeshWarning, UnknownNameError, require
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
-from rrtik_ompl.world.exact_checks import CollisionChecks
+from rrtik_ompl.world.exact_checks import ExactChecker
 
 MOTION_RESOLUTION = 0.01  # [m]
 ACCURACIES = ("exact", "conservative")
@@ -99,7 +99,7 @@ class World:
         self.pairs = pairs
         self.accuracy = _accuracy(accuracy)
         self._certificate = Certificate(robot, self.bodies, pairs)
-        self._checks = CollisionChecks(robot, self.bodies, moving, conservative=accuracy == "conservative")
+        self._checks = ExactChecker(robot, self.bodies, moving, conservative=accuracy == "conservative")
         standing = tuple(p for p in pairs if all(self.bodies[i].joint == 0 for i in p))
         self._always_colliding = standing_contact(robot, self.bodies, standing) is not None
 

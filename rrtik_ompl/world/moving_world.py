@@ -22,7 +22,7 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import same_shape
 from rrtik_ompl.world import World
-from rrtik_ompl.world.exact_checks import fast_world
+from rrtik_ompl.world.arm_cache import arm_cache
 
 
 class MovingWorld:
@@ -63,7 +63,8 @@ class MovingWorld:
         kept = tuple(p for p in pairs if any(self._bodies[i].joint > 0 for i in p))
         if not self_collision:
             kept = tuple(p for p in kept if any(self._bodies[i].kind == "obstacle" for i in p))
-        self._fast = fast_world(self.robot, self._bodies, kept, share=self_collision)
+        arm = arm_cache(self.robot)
+        self._fast = arm.pack(self._bodies, kept, arm.covers_of(self._bodies), share=self_collision)
         self._rooms = [0.0] * len(self._bodies)
         self._fixed = tuple(p for p in world.pairs if all(self._bodies[i].joint == 0 for i in p))
         self.blocked = self._contact_of_base()
