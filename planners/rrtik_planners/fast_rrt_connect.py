@@ -6,10 +6,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.arrays import Mask, Matrix, Vector, positive
 from rrtik_ompl.fast.search.connect import ConnectSearch
 from rrtik_ompl.fast.search.connect_layout import KERNELS
-from rrtik_ompl.fast.search.connect_lengths import connect_lengths, positive
+from rrtik_ompl.fast.search.connect_lengths import connect_lengths
+from rrtik_ompl.fast.search.motions.motion_table import MotionTable
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
 from rrtik_planners.connect_loop import ConnectRules, connect
@@ -19,7 +20,7 @@ from rrtik_planners.crdt_options import iteration_limit
 class FastRRTConnect(SafePlanner):
     """RRT-Connect with dynamic domain and balanced trees; the straight motion is tried first.
 
-    With a world that has kernels (``world.fast``) the search runs in them and a path comes back in microseconds.
+    With a world that has kernels (``world.motions``) the search runs in them and a path comes back in microseconds.
     Motions that they cannot decide are asked of the world once they stand on a path, and never in a conservative
     world. With any other world, or none, a plain loop does the same on one motion at a time.
     """
@@ -53,7 +54,7 @@ class FastRRTConnect(SafePlanner):
         self.range = None if range is None else positive(range, "range")
         self.domain = None if domain is None else positive(domain, "domain")
         self.max_iterations = iteration_limit(max_iterations)
-        self._kept: tuple[Any, Any, ConnectSearch | None] | None = None  # world, bounds, and the search made for them
+        self._kept: tuple[Any, Any, ConnectSearch | None] | None = None  # motions, bounds, and the search made for them
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
@@ -89,25 +90,16 @@ class FastRRTConnect(SafePlanner):
 
     def _kernels(self) -> ConnectSearch | None:
         """The search in kernels for the world and bounds of this solve, or None where the world has no kernels."""
-        fast, bounds = getattr(self._world, "fast", None), self.bounds()
-        if self._kept is None or self._kept[0] is not fast or self._kept[1] is not bounds:
-            self._kept = fast, bounds, self._made(fast, *bounds)
+        motions, bounds = getattr(self._world, "motions", None), self.bounds()
+        if self._kept is None or self._kept[0] is not motions or self._kept[1] is not bounds:
+            self._kept = motions, bounds, self._made(motions, *bounds)
         return self._kept[2]
 
-    def _made(self, fast: Any, lower: Vector, upper: Vector) -> ConnectSearch | None:
-        if fast is None or library(KERNELS) is None:
+    def _made(self, motions: MotionTable | None, lower: Vector, upper: Vector) -> ConnectSearch | None:
+        if motions is None or library(KERNELS) is None:
             return None
         world: Any = self._world
         robot = world.robot
         range_, domain = connect_lengths(lower, upper, *self._lengths)
-        return ConnectSearch(
-            fast,
-            np.maximum(lower, robot.lower),  # the kernels do not know the robot's limits
-            np.minimum(upper, robot.upper),
-            weights=world.weights,
-            resolution=world.motion_resolution,
-            gain=robot.chain.gain,
-            offset=robot.chain.offset,
-            range_=range_,
-            domain=domain,
-        )
+        lower, upper = np.maximum(lower, robot.lower), np.minimum(upper, robot.upper)  # unknown to the kernels
+        return ConnectSearch(motions, lower, upper, range_=range_, domain=domain)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.fast.search.connect_lengths import positive
+from rrtik_ompl.arrays import Matrix, positive
 from rrtik_ompl.goal import Goal
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric, reach
 from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps

@@ -1,4 +1,4 @@
-"""DRRT-Con whose look at the path and whose repair are one call of a kernel each, for worlds that have kernels."""
+"""DRRT-Con whose check of the path and whose repair are one call of a kernel each, for worlds that have kernels."""
 
 from __future__ import annotations
 
@@ -33,21 +33,21 @@ class KernelDrrtCon(DrrtCon):
     def __init__(
         self, world: MovingWorld, lower: Vector, upper: Vector, eps: float, seed: int, *, forgetting: bool = False
     ) -> None:
-        if world.fast is None:
+        motions = world.motions
+        if motions is None:
             raise InputError("replanning in kernels: the world has none; install numba")
         super().__init__(KernelConnect(world, lower, upper, eps, seed), eps, post=KernelCuts(world, seed))
         tries, patience = (CUTS, PATIENCE) if forgetting else (REPAIR_CUTS, REPAIR_PATIENCE)
         self._world, self._forgetting, self._rng = world, forgetting, np.random.default_rng([seed, 1])
         self._kernels = PathRepair(
-            world.fast, world.robot.chain, lower, upper, weights=world.weights, resolution=world.motion_resolution,
-            eps=eps, iterations=ITERATIONS, tries=tries, patience=patience,
+            motions, lower, upper, eps=eps, iterations=ITERATIONS, tries=tries, patience=patience
         )  # fmt: skip
 
     def look(self, motions: Motions) -> bool:
         """See :meth:`DrrtCon.look`."""
         if self.path is None:
             return False
-        self.free = self._kernels.look(self.path)
+        self.free = self._kernels.check(self.path)
         self._world.checked += self._kernels.checked
         return self.free
 

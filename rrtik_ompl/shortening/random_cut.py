@@ -53,11 +53,8 @@ def kernel_search(route: Matrix, task: Task, *, seed: int, share: float, pull: f
     """A search in the world of a task; a conservative world is not asked."""
     world: Any = task.motions
     return ShortcutSearch(
-        world.fast,
-        world.robot.chain,
+        world.motions,
         route,
-        weights=world.weights,
-        resolution=world.motion_resolution,
         seed=seed,
         share=share,
         pull=pull,
