@@ -14,6 +14,7 @@ from ompl import geometric as og
 from rrtik_ompl import Problem, World
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.fast.search.connect import ConnectSearch
+from rrtik_ompl.fast.search.motions.motion_table import MotionTable
 from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.ompl_bridge.attempt import attempt
 from rrtik_ompl.ompl_bridge.setup import planning_bounds, unjudged_space
@@ -97,6 +98,16 @@ def warm_up(problem: Problem) -> None:
     problem.world.valid_batch(problem.start[None])
 
 
+def _motions_by_length(world: World, per_radian: float) -> MotionTable:
+    """The rule that divides a motion by its length in configuration space alone."""
+    assert world.fast is not None
+    chain, weights = world.robot.chain, np.zeros(world.robot.dof)
+    resolution = world.motion_resolution
+    return MotionTable(
+        world.fast, chain.gain, chain.offset, weights=weights, resolution=resolution, steps_per_unit=per_radian
+    )
+
+
 def _kernel_search(problem: Problem, goals: Matrix, seconds: float, per_radian: float | None) -> Search:
     """The search object of the kernel planner without OMPL around it; undecided motions are asked as always.
 
@@ -104,19 +115,9 @@ def _kernel_search(problem: Problem, goals: Matrix, seconds: float, per_radian: 
     """
     world, starts = problem.world, problem.start[None]
     ask = None if world.accuracy == "conservative" else world.motion_valid_batch
-    chain, (lower, upper) = world.robot.chain, planning_bounds(problem, goals)
-    weights = world.weights if per_radian is None else np.zeros(world.robot.dof)
-    assert world.fast is not None
-    search = ConnectSearch(
-        world.fast,
-        lower,
-        upper,
-        weights=weights,
-        resolution=world.motion_resolution,
-        steps_per_unit=per_radian or 0.0,
-        gain=chain.gain,
-        offset=chain.offset,
-    )
+    motions = world.motions if per_radian is None else _motions_by_length(world, per_radian)
+    assert motions is not None
+    search = ConnectSearch(motions, *planning_bounds(problem, goals))
 
     def solve(seed: int) -> Matrix | None:
         end = time.perf_counter() + seconds

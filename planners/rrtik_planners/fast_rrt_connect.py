@@ -10,16 +10,18 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector, positive
 from rrtik_ompl.fast.search.connect import ConnectSearch
 from rrtik_ompl.fast.search.connect_layout import KERNELS
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
+from rrtik_ompl.fast.search.motions.motion_table import MotionTable
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
+from rrtik_ompl.robot import Robot
 from rrtik_ompl.search.rrt_connect import ConnectRules, RrtConnect, straight_path
-from rrtik_ompl.world.motion_queries import has_kernels, is_conservative, kernel_tables
+from rrtik_ompl.world.motion_queries import has_kernels, is_conservative
 from rrtik_planners.crdt_options import iteration_limit
 
 
 class FastRRTConnect(SafePlanner):
     """RRT-Connect with dynamic domain and balanced trees; the straight motion is tried first.
 
-    With a world that has kernels (``world.fast``) the search runs in them and a path comes back in microseconds.
+    With a world that has kernels (``world.motions``) the search runs in them and a path comes back in microseconds.
     Motions that they cannot decide are asked of the world once they stand on a path, and never in a conservative
     world. With any other world, or none, a plain loop does the same on one motion at a time.
     """
@@ -53,7 +55,7 @@ class FastRRTConnect(SafePlanner):
         self.range = None if range is None else positive(range, "range")
         self.domain = None if domain is None else positive(domain, "domain")
         self.max_iterations = iteration_limit(max_iterations)
-        self._kept: tuple[Any, Any, ConnectSearch | None] | None = None  # world, bounds, and the search made for them
+        self._kept: tuple[Any, Any, ConnectSearch | None] | None = None  # motions, bounds, and the search made for them
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
@@ -97,25 +99,14 @@ class FastRRTConnect(SafePlanner):
 
     def _kernels(self) -> ConnectSearch | None:
         """The search in kernels for the world and bounds of this solve, or None where the world has no kernels."""
-        fast, bounds = kernel_tables(self._world), self.bounds()
-        if self._kept is None or self._kept[0] is not fast or self._kept[1] is not bounds:
-            self._kept = fast, bounds, self._made(*bounds)
-        return self._kept[2]
-
-    def _made(self, lower: Vector, upper: Vector) -> ConnectSearch | None:
-        world = self._world
+        world, bounds = self._world, self.bounds()
         if not has_kernels(world, KERNELS):
             return None
-        robot = world.robot
+        if self._kept is None or self._kept[0] is not world.motions or self._kept[1] is not bounds:
+            self._kept = world.motions, bounds, self._made(world.motions, world.robot, *bounds)
+        return self._kept[2]
+
+    def _made(self, motions: MotionTable, robot: Robot, lower: Vector, upper: Vector) -> ConnectSearch:
         range_, domain = connect_lengths(lower, upper, *self._lengths)
-        return ConnectSearch(
-            world.fast,
-            np.maximum(lower, robot.lower),  # the kernels do not know the robot's limits
-            np.minimum(upper, robot.upper),
-            weights=world.weights,
-            resolution=world.motion_resolution,
-            gain=robot.chain.gain,
-            offset=robot.chain.offset,
-            range_=range_,
-            domain=domain,
-        )
+        lower, upper = np.maximum(lower, robot.lower), np.minimum(upper, robot.upper)  # unknown to the kernels
+        return ConnectSearch(motions, lower, upper, range_=range_, domain=domain)

@@ -1,4 +1,4 @@
-"""How far any point of the arm can move when joints move [16]: the rule that makes steps of a resolution in metres."""
+"""How far any point of the arm can move when joints move [16]: bounds by which motions are divided into steps."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.collision.bodies import Body
@@ -22,13 +21,6 @@ def displacement_weights(robot: Robot, bodies: Iterable[Body]) -> Vector:
     tip = robot.model.frames[robot.model.getFrameId(robot.tip)]
     points = [*_balls(bodies), (tip.parentJoint, tip.placement.translation, 0.0)]
     return frozen(np.abs(robot.chain.gain).T @ _joint_weights(robot, points))
-
-
-def step_counts(starts: Matrix, ends: Matrix, weights: Vector, resolution: float) -> NDArray[np.int64]:
-    """Steps in which motions, shapes (m, dof), are checked: the bound on the displacement over the resolution [m]."""
-    travel = np.abs(ends - starts) @ weights
-    counts: NDArray[np.int64] = np.maximum(1, np.ceil(travel / resolution - 1e-9)).astype(np.int64)
-    return counts
 
 
 def approach_weights(robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> Matrix:

@@ -68,17 +68,7 @@ class KernelConnect:
     def __init__(
         self, world: KernelWorld, lower: Vector, upper: Vector, eps: float, seed: int, iterations: int = ITERATIONS
     ) -> None:
-        chain = world.robot.chain
-        self._search = ConnectSearch(
-            world.fast,
-            lower,
-            upper,
-            weights=world.weights,
-            resolution=world.motion_resolution,
-            gain=chain.gain,
-            offset=chain.offset,
-            range_=eps,
-        )
+        self._search = ConnectSearch(world.motions, lower, upper, range_=eps)
         self._rng, self._iterations, self.samples = np.random.default_rng(seed), iterations, 0
 
     def __call__(
@@ -119,16 +109,7 @@ class KernelCuts:
         """The route, shape (k, n), shortened; all its edges must be free."""
         if len(route) < 3:
             return route
-        world = self._world
-        search = ShortcutSearch(
-            world.fast,
-            world.robot.chain,
-            route,
-            weights=world.weights,
-            resolution=world.motion_resolution,
-            seed=int(self._rng.integers(2**62)),
-            asking=False,
-        )
+        search = ShortcutSearch(self._world.motions, route, seed=int(self._rng.integers(2**62)), asking=False)
         search.run(CUTS, patience=PATIENCE)
         return search.waypoints
 

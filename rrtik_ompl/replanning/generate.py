@@ -61,7 +61,7 @@ def moving_problem(
     scene = moving_scene(robot, count, speed, seed, seconds=seconds)
     world = World(robot, scene)
     clear = MovingWorld(world)
-    clear.move(scene, rooms={o.name: room for o in scene.obstacles})
+    clear.move(scene, inflation={o.name: room for o in scene.obstacles})
     rng = np.random.default_rng([seed, 1])
     lower, upper = (np.clip(ends, -0.5 * np.pi, 0.5 * np.pi) for ends in robot.finite_range())
     rows = rng.uniform(lower, upper, (TRIES, robot.dof))

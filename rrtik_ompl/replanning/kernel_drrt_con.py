@@ -1,4 +1,4 @@
-"""DRRT-Con whose look at the path and whose repair are one call of a kernel each, for worlds that have kernels."""
+"""DRRT-Con whose check of the path and whose repair are one call of a kernel each, for worlds that have kernels."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.search.repair import PathRepair
 from rrtik_ompl.replanning.connecting import CUTS, ITERATIONS, PATIENCE, KernelConnect, KernelCuts
 from rrtik_ompl.replanning.drrt_con import DrrtCon
-from rrtik_ompl.world.motion_queries import MotionQueries, Stop, has_kernels, no_stop
+from rrtik_ompl.world.motion_queries import MotionQueries, Stop, no_stop
 from rrtik_ompl.world.moving_world import MovingWorld
 
 REPAIR_CUTS, REPAIR_PATIENCE = 16, 6  # as CUTS and PATIENCE, where only a detour is new; walking shortens it further
@@ -40,15 +40,14 @@ class KernelDrrtCon(DrrtCon):
         super().__init__(KernelConnect(world, lower, upper, eps, seed), eps, post=KernelCuts(world, seed))
         tries, patience = (CUTS, PATIENCE) if forgetting else (REPAIR_CUTS, REPAIR_PATIENCE)
         self._kernels = PathRepair(
-            world.fast, world.robot.chain, lower, upper, weights=world.weights, resolution=world.motion_resolution,
-            eps=eps, iterations=ITERATIONS, tries=tries, patience=patience,
+            world.motions, lower, upper, eps=eps, iterations=ITERATIONS, tries=tries, patience=patience
         )  # fmt: skip
 
     def look(self, motions: MotionQueries) -> bool:
         """See :meth:`DrrtCon.look`."""
         if self.path is None:
             return False
-        self.free = self._kernels.look(self.path)
+        self.free = self._kernels.check(self.path)
         self._world.checked += self._kernels.checked
         return self.free
 

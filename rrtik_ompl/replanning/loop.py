@@ -59,7 +59,7 @@ class Loop:
         self._goals = _goals(problem, self._alone, self._rng) if goal_feed is None else _goal(robot, goal_feed, 0.0)
         self._first = {o.name: o.pose for o in scene.obstacles}
         self._see(0.0)
-        self._world.move(scene, rooms=self._room)  # a start may stand where something is only expected
+        self._world.move(scene, inflation=self._room)  # a start may stand where something is only expected
         _check_start(self.q, scene, first, self._world)
         ends = np.vstack([self.q, self._goals])
         lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - TAU)
@@ -108,7 +108,7 @@ class Loop:
         clear = chosen.margin + 0.5 * self._world.motion_resolution  # between two looks at a motion too
         self._room = rooms(scene, clear, chosen.tick, chosen.speed_bound, self._watch.speeds)
         ahead = [chosen.predict * chosen.tick * k / (COPIES - 1) for k in range(1, COPIES)] if chosen.predict else []
-        self._world.move(scene, *(self._watch.later(scene, seconds) for seconds in ahead), rooms=self._room)
+        self._world.move(scene, *(self._watch.later(scene, seconds) for seconds in ahead), inflation=self._room)
         return True
 
     def _follow_goal(self) -> bool:
@@ -127,7 +127,7 @@ class Loop:
             return True
         if not self._chosen.predict:
             return False
-        self._world.move(self._world.scene, rooms=self._room)
+        self._world.move(self._world.scene, inflation=self._room)
         return self._planner.look(self._world) or self._new_path()
 
     def _new_path(self) -> bool:

@@ -45,11 +45,8 @@ def kernel_search(route: Matrix, task: Task, *, seed: int, share: float, pull: f
     world = task.kernel_world
     assert world is not None
     return ShortcutSearch(
-        world.fast,
-        world.robot.chain,
+        world.motions,
         route,
-        weights=world.weights,
-        resolution=world.motion_resolution,
         seed=seed,
         share=share,
         pull=pull,

@@ -13,12 +13,13 @@ from rrtik_ompl.collision.bodies import colliding_pairs, link_bodies, scene_bodi
 from rrtik_ompl.collision.certificate import Certificate, fixed_contact
 from rrtik_ompl.collision.contacts import Contact as Contact
 from rrtik_ompl.collision.contacts import inside, measured
-from rrtik_ompl.collision.motion_bound import displacement_weights, step_counts
+from rrtik_ompl.collision.motion_bound import displacement_weights
 from rrtik_ompl.errors import InputError, MeshWarning, UnknownNameError, require
 from rrtik_ompl.fast import FastWorld
+from rrtik_ompl.fast.search.motions.motion_table import MotionTable, motions_of, step_counts
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
-from rrtik_ompl.world.exact_checks import CollisionChecks
+from rrtik_ompl.world.exact_checks import ExactChecker
 
 MOTION_RESOLUTION = 0.01  # [m]
 ACCURACIES = ("exact", "conservative")
@@ -42,8 +43,8 @@ def check_world(world: World | None, robot: Robot) -> None:
 class World:
     """Exact collision checks of a robot in a scene.
 
-    Answers are coal's, on the robot's and the scene's own geometry; kernels give most of them without asking coal
-    (:mod:`rrtik_ompl.world.exact_checks`). A conservative world never asks coal: what the kernels cannot prove free is
+    Answers are coal's, on the robot's and the scene's own geometry; kernels give most of them without calling coal
+    (:mod:`rrtik_ompl.world.exact_checks`). A conservative world never calls coal: what the kernels cannot prove free is
     refused.
 
     Motions are straight lines in configuration space, checked at both ends and at equal steps in between, so many that
@@ -99,7 +100,8 @@ class World:
         self.pairs = pairs
         self.accuracy = _accuracy(accuracy)
         self._certificate = Certificate(robot, self.bodies, pairs)
-        self._checks = CollisionChecks(robot, self.bodies, moving, conservative=accuracy == "conservative")
+        self._motions: MotionTable | None = None
+        self._checks = ExactChecker(robot, self.bodies, moving, conservative=accuracy == "conservative")
         standing = tuple(p for p in pairs if all(self.bodies[i].joint == 0 for i in p))
         self._always_colliding = fixed_contact(robot, self.bodies, standing) is not None
 
@@ -111,6 +113,12 @@ class World:
         """The world's tables, for planners that run in kernels; None without kernels or where nothing is ever free."""
         tables = self._checks.fast
         return tables if tables.address and not self._always_colliding else None
+
+    @property
+    def motions(self) -> MotionTable | None:
+        """How motions are checked, for searches in kernels: one table for all of them. None where ``fast`` is."""
+        self._motions = motions_of(self, self._motions)
+        return self._motions
 
     def with_accuracy(self, accuracy: str) -> World:
         """The same world, "exact" or "conservative"; shares everything else.
@@ -158,8 +166,8 @@ class World:
 
     def steps(self, a: ArrayLike, b: ArrayLike, resolution: float | None = None) -> int:
         """Number of steps in which a motion is checked: the bound on the arm's displacement over the resolution."""
-        travel = float(self.weights @ np.abs(np.asarray(b, dtype=np.float64) - np.asarray(a, dtype=np.float64)))
-        return max(1, int(np.ceil(travel / (self.motion_resolution if resolution is None else resolution) - 1e-9)))
+        start, end = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
+        return int(step_counts(start, end, self.weights, self.motion_resolution if resolution is None else resolution))
 
     def contacts(self, q: ArrayLike) -> tuple[Contact, ...]:
         """Every pair of bodies that touches or is within its margin at q, deepest first; empty if q is free."""
@@ -172,7 +180,7 @@ class World:
     def closest(self, q: ArrayLike, *, known_free: bool = False) -> Contact | None:
         """The pair of bodies that is nearest to contact or to its margin at q, or deepest in it; None if there is none.
 
-        ``known_free`` leaves out the look for contacts, where they were ruled out before.
+        ``known_free`` leaves out the check for contacts, where they were ruled out before.
         """
         touching = () if known_free else self.contacts(q)
         if touching:

@@ -17,6 +17,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.fast import FastWorld
+from rrtik_ompl.fast.search.motions.motion_table import MotionTable
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.robot import Chain, Robot
 
@@ -63,6 +64,10 @@ class KernelWorld(MotionQueries, Protocol):
     @property
     def fast(self) -> FastWorld:
         """The tables that kernels read."""
+
+    @property
+    def motions(self) -> MotionTable:
+        """How kernels check motions: tables, joint values, step rule."""
 
     @property
     def weights(self) -> Vector:

@@ -1,4 +1,4 @@
-"""A robot among obstacles that move: checks that keep a room around each obstacle, and follow a scene within a tick.
+"""A robot among obstacles that move: checks that keep a clearance, and follow a scene within a tick.
 
 What is free is proven by the kernels alone (:mod:`rrtik_ompl.fast`); what they cannot prove is refused, so that an
 answer never waits for coal. When the scene changes, only the obstacles that moved are packed again.
@@ -15,22 +15,22 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Mask, Vector, finite_array
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.certificate import fixed_contact
-from rrtik_ompl.collision.motion_bound import step_counts
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast import FREE, FastWorld
+from rrtik_ompl.fast.search.motions.motion_table import MotionTable, motions_of, step_counts
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import same_shape
 from rrtik_ompl.world import World
-from rrtik_ompl.world.exact_checks import fast_world
+from rrtik_ompl.world.arm_cache import arm_cache
 
 
 class MovingWorld:
     """Checks of a robot among obstacles that may be moved; stands in for a conservative ``World``.
 
     A configuration is free if it is within the limits, proven free of self-collision, and proven to be farther than
-    margin and ``rooms`` from every obstacle. Motions are looked at as a ``World`` does. While an obstacle stands in the
-    arm's fixed base nothing is free.
+    margin and ``inflation`` from every obstacle. Motions are checked as a ``World`` does. While an obstacle overlaps
+    the arm's fixed base nothing is free.
 
     Attributes:
         robot, weights, motion_resolution: Those of the world.
@@ -38,8 +38,8 @@ class MovingWorld:
         scene: Where the obstacles are now.
         fast: The tables, for searches in kernels; None without kernels or while ``blocked``. Moved in place, their
             address stays.
-        blocked: Which obstacle stands in which fixed part of the arm, as a line for a person; "" if none does.
-        checked: Configurations looked at so far, counted as if no motion had been refused early.
+        blocked: Which obstacle overlaps which fixed part of the arm, as a line for a person; "" if none does.
+        checked: Configurations checked so far, counted as if no motion had been refused early.
 
     Args:
         world: The robot and the scene, obstacles at their first places.
@@ -63,8 +63,10 @@ class MovingWorld:
         kept = tuple(p for p in pairs if any(self._bodies[i].joint > 0 for i in p))
         if not self_collision:
             kept = tuple(p for p in kept if any(self._bodies[i].kind == "obstacle" for i in p))
-        self._fast = fast_world(self.robot, self._bodies, kept, share=self_collision)
-        self._rooms = [0.0] * len(self._bodies)
+        arm = arm_cache(self.robot)
+        self._fast = arm.pack(self._bodies, kept, arm.covers_of(self._bodies), share=self_collision)
+        self._motions: MotionTable | None = None
+        self._inflation = [0.0] * len(self._bodies)
         self._fixed = tuple(p for p in world.pairs if all(self._bodies[i].joint == 0 for i in p))
         self.blocked = self._contact_of_base()
 
@@ -74,43 +76,49 @@ class MovingWorld:
         return self._fast if self._fast.address and not self.blocked else None
 
     @property
+    def motions(self) -> MotionTable | None:
+        """How motions are checked, for searches in kernels, wherever obstacles are moved; None where ``fast`` is."""
+        self._motions = motions_of(self, self._motions)
+        return self._motions
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the obstacles."""
         return tuple(o.name for o in self.scene.obstacles)
 
-    def move(self, *scenes: Scene, rooms: Mapping[str, float] | None = None) -> None:
+    def move(self, *scenes: Scene, inflation: Mapping[str, float] | None = None) -> None:
         """Put the obstacles where they are now, and their copies where they will be.
 
         Args:
             *scenes: The scene now, then one for each further copy; the last one stands for those that are missing.
-            rooms: How far the arm has to stay from obstacles beyond their margins [m]; what is not named keeps its
-                room.
+            inflation: How far the arm has to stay from obstacles beyond their margins [m]; what is not named keeps
+                its own.
 
         Raises:
-            InputError: If a scene has other obstacles than the world began with, or a room is not 0 or more.
-            UnknownNameError: If a room is given for what is no obstacle.
+            InputError: If a scene has other obstacles than the world began with, or an inflation is not 0 or more.
+            UnknownNameError: If an inflation is given for what is no obstacle.
         """
         places = [{o.name: (o.pose, o.margin) for o in scene.obstacles} for scene in scenes]
         for scene in scenes:
             _check_obstacles(scene, self._known)
-        for name, room in (rooms or {}).items():
+        for name, metres in (inflation or {}).items():
             if name not in self._known:
-                raise UnknownNameError("obstacle", name, self._known, where="rooms")
-            if not room >= 0.0:
-                raise InputError(f"rooms: that of '{name}' must be 0 metres or more, got {room}")
+                raise UnknownNameError("obstacle", name, self._known, where="inflation")
+            if not metres >= 0.0:
+                raise InputError(f"inflation: that of '{name}' must be 0 metres or more, got {metres}")
         for k, body in enumerate(self._bodies):
             if body.kind == "obstacle":
                 pose, margin = places[min(self._copy[k], len(places) - 1)][body.name]
                 if margin != body.margin or not np.array_equal(pose.homogeneous, body.placement.homogeneous):
                     self._bodies[k] = replace(body, placement=pose.copy(), margin=margin)
-                if rooms is not None and body.name in rooms:
-                    self._rooms[k] = float(rooms[body.name])
+                if inflation is not None and body.name in inflation:
+                    self._inflation[k] = float(inflation[body.name])
         self.scene = scenes[0]
         self.blocked = self._contact_of_base()
-        self._fast.update_obstacles(self._bodies, self._rooms)
+        self._fast.update_obstacles(self._bodies, self._inflation)
 
     def clearance(self, Q: ArrayLike) -> Vector:
-        """Lower bounds of the distance to contact of rows of Q, less margins and rooms [m]. (m, dof) -> (m,)."""
+        """Lower bounds of the distance to contact of rows of Q, less margins and inflation [m]. (m, dof) -> (m,)."""
         return self._fast.clearance(self.robot.joint_values(Q)).lower
 
     def valid(self, q: ArrayLike) -> bool:

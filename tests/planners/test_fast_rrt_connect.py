@@ -14,6 +14,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast import FastWorld, needs_covers
 from rrtik_ompl.fast.search import connect
 from rrtik_ompl.fast.search.connect import ConnectSearch
+from rrtik_ompl.fast.search.motions.motion_table import MotionTable
 from rrtik_ompl.ompl_bridge import StateIO
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box, Sphere
@@ -73,9 +74,15 @@ class Covered(World):
 
 def search_in(world, **options):
     chain = world.robot.chain
-    rules = {"weights": world.weights, "resolution": world.motion_resolution}
-    gain = {"gain": chain.gain, "offset": chain.offset}
-    return ConnectSearch(world.fast, world.robot.lower, world.robot.upper, **{**rules, **gain, **options})
+    rules = {
+        "weights": world.weights,
+        "resolution": world.motion_resolution,
+        "gain": chain.gain,
+        "offset": chain.offset,
+    }
+    own = {name: options.pop(name) for name in ("range_", "domain", "patience") if name in options}
+    motions = MotionTable(world.fast, **{**rules, **options})
+    return ConnectSearch(motions, world.robot.lower, world.robot.upper, **own)
 
 
 def rows(*configurations):
@@ -159,8 +166,8 @@ def test_the_path_does_not_depend_on_how_the_work_is_divided(coarse, monkeypatch
     paths = []
     for first, most in ((1, 1), (7, 7), (256, 1 << 20)):
         monkeypatch.setattr(connect, "FIRST_BUDGET", first)
-        monkeypatch.setattr(connect, "LEAST_BUDGET", first)
-        monkeypatch.setattr(connect, "MOST_BUDGET", most)
+        monkeypatch.setattr(connect, "MIN_BUDGET", first)
+        monkeypatch.setattr(connect, "MAX_BUDGET", most)
         search = search_in(world)
         paths.append([search.solve(START, GOAL, s, ask=world.motion_valid_batch) for s in (4, 5, 4)])
     for one, two, again in paths:

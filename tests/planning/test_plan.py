@@ -21,7 +21,7 @@ from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box
 from rrtik_ompl.shortening import shorten
 from rrtik_ompl.world import World
-from rrtik_ompl.world.exact_checks import CollisionChecks
+from rrtik_ompl.world.exact_checks import ExactChecker
 
 
 def at(x, y):
@@ -281,7 +281,7 @@ def test_a_conservative_problem_is_planned_without_asking_coal(planner, monkeypa
     def asked(*_):
         raise AssertionError
 
-    monkeypatch.setattr(CollisionChecks, "_gaps", asked)
+    monkeypatch.setattr(ExactChecker, "_gaps", asked)
     for found in (plan(careful, planner, seed=1), plan(exact, planner, seed=1, accuracy="conservative")):
         assert found.found, found.reason
         assert not found.path.violations(exact.world)

@@ -150,7 +150,7 @@ def test_a_moving_world_keeps_the_margins_and_follows_when_they_change():
     rows = np.column_stack([np.linspace(2.0, 4.0, 41), np.full(41, 5.0)])
     assert (moving.valid_batch(rows) == world.valid_batch(rows)).all()
     for margin, room in ((0.6, 0.0), (0.0, 0.0), (0.1, 0.3)):
-        moving.move(disc_and_wall(margin).scene, rooms={"wall": room})
+        moving.move(disc_and_wall(margin).scene, inflation={"wall": room})
         assert (moving.valid_batch(rows) == (3.5 - rows[:, 0] > margin + room + 1e-3)).all()
 
 

@@ -46,7 +46,7 @@ def test_free_with_room_means_that_far_away():
     robot, scenes = arm_scenes()
     exact, moving = World(robot, scenes[1]), MovingWorld(World(robot, scenes[0]))
     rows = np.random.default_rng(2).uniform(*robot.finite_range(), (150, robot.dof))
-    moving.move(scenes[1], rooms={o.name: 0.15 for o in scenes[1].obstacles})
+    moving.move(scenes[1], inflation={o.name: 0.15 for o in scenes[1].obstacles})
     near = MovingWorld(exact, self_collision=False)
     names = set(moving.names)
     for row in rows[moving.valid_batch(rows)][:40]:
@@ -60,16 +60,16 @@ def test_free_with_room_means_that_far_away():
 
 def test_a_moved_scene_must_have_the_same_obstacles():
     moving = MovingWorld(plane(box("a", 5.0, 10.0)).world)
-    moving.move(Scene([box("a", 6.0, 10.0)]), rooms={"a": 0.0})  # made anew, but alike
+    moving.move(Scene([box("a", 6.0, 10.0)]), inflation={"a": 0.0})  # made anew, but alike
     with pytest.raises(InputError, match="expected the obstacles a"):
         moving.move(Scene([box("b", 5.0, 10.0)]))
     with pytest.raises(InputError, match="'a' has another shape"):
         moving.move(Scene([Obstacle("a", Sphere(3.0))]))
     with pytest.raises(InputError, match="no obstacle 'c'"):
-        moving.move(moving.scene, rooms={"c": 0.1})
+        moving.move(moving.scene, inflation={"c": 0.1})
     for room in (-0.1, float("nan")):
         with pytest.raises(InputError, match="'a' must be 0 metres or more"):
-            moving.move(moving.scene, rooms={"a": room})
+            moving.move(moving.scene, inflation={"a": room})
 
 
 def test_copies_of_an_obstacle_count_as_well():

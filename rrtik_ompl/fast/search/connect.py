@@ -9,23 +9,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, positive
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast import FastWorld
-from rrtik_ompl.fast.search import connect_layout as layout
+from rrtik_ompl.fast.search import connect_layout
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
+from rrtik_ompl.fast.search.motions.motion_table import MotionTable
 from rrtik_ompl.fast.search.tree_layout import CAPACITY, SIZE
 from rrtik_ompl.fast.search.tree_memory import grow, tree_table
 from rrtik_ompl.fast.simd.halton import inverse_bases
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.simd.processor import WIDTH
-from rrtik_ompl.fast.tables.robot_tables import Table, table
+from rrtik_ompl.fast.tables.robot_tables import Table, aligned, table
 
 PATIENCE = 8  # rejected paths until undecided motions are asked for at once
 FIRST_CAPACITY = 64 * WIDTH  # vertices
 FIRST_ROOTS = 16
 FIRST_PATH = 64  # rows
-FIRST_BUDGET, LEAST_BUDGET, MOST_BUDGET = 256, 16, 1 << 20  # motions in one call of the kernel
+FIRST_BUDGET, MIN_BUDGET, MAX_BUDGET = 256, 16, 1 << 20  # motions in one call of the kernel
 CALL_SECONDS = 1e-3  # what a call should take
 NO_LIMIT = 2**62
 
@@ -42,12 +42,8 @@ class ConnectSearch:
         domain: Radius in which a vertex is extended once it was blocked [unit of the box].
 
     Args:
-        fast: The checks; must have kernels (an ``address`` other than 0).
+        motions: How motions are checked in a world.
         lower, upper: The box, shape (n,), finite.
-        weights: A motion takes ``weights @ |b - a| / resolution`` steps, rounded up, shape (n,).
-        resolution: See ``weights``, above 0.
-        steps_per_unit: At least this many steps for each unit of Euclidean length; with zero weights the only rule.
-        gain, offset: Joint values are ``gain @ q + offset``, shapes (joints, n) and (joints,); q itself if None.
         range_: See ``range``; what suits the box if None.
         domain: See ``domain``; what suits the box if None.
         patience: Paths that may be rejected until undecided motions are asked for before they are used.
@@ -58,47 +54,35 @@ class ConnectSearch:
 
     def __init__(
         self,
-        fast: FastWorld,
+        motions: MotionTable,
         lower: ArrayLike,
         upper: ArrayLike,
         *,
-        weights: ArrayLike,
-        resolution: float,
-        steps_per_unit: float = 0.0,
-        gain: ArrayLike | None = None,
-        offset: ArrayLike | None = None,
         range_: float | None = None,
         domain: float | None = None,
         patience: int = PATIENCE,
     ) -> None:
-        kernels = library(layout.KERNELS)
-        if fast.address == 0 or kernels is None:
+        kernels = library(connect_layout.KERNELS)
+        if kernels is None:
             raise InputError("search in kernels: there are none; install numba")
         self._kernels = kernels
-        self._fast = fast  # owns the tables
-        box = finite_array(lower, (None,), "lower bounds"), finite_array(upper, (None,), "upper bounds")
-        self._dof = dof = len(box[0])
-        if dof == 0 or len(box[1]) != dof or (box[0] > box[1]).any():
+        self._motions = motions  # owns the tables
+        self._dof = dof = motions.dof
+        box = finite_array(lower, (dof,), "lower bounds"), finite_array(upper, (dof,), "upper bounds")
+        if dof == 0 or (box[0] > box[1]).any():
             raise InputError(f"bounds: expected {dof} upper ones, none below its lower one, and at least one")
-        matrix, shift = _joint_map(gain, offset, dof)
-        _require_certain(fast, matrix, shift, np.maximum(np.abs(box[0]), np.abs(box[1])))
+        motions.require_covered(*box)
         self.range, self.domain = connect_lengths(*box, range_, domain)
-        span = positive(resolution, "resolution")
-        self._numbers = np.array([self.range, self.domain, span, steps_per_unit, layout.EVERYWHERE])
-        joints = 0 if _is_identity(matrix, shift) else len(shift)
+        joints = 0 if motions.identity else motions.joints
         self._trees = [tree_table(dof, joints, FIRST_CAPACITY) for _ in range(2)]
-        self._search = _search_table(
-            fast.address, self._trees, box, finite_array(weights, (dof,), "weights"), self._numbers, matrix, shift
-        )
-        if joints == 0:
-            self._search.header[layout.ROW_VALUES] = self._search.header[layout.ROW]
-        self._search.header[layout.PATIENCE] = patience
+        numbers = np.array([self.range, self.domain, connect_layout.UNBOUNDED_SPREAD])
+        self._search = _search_table(motions, self._trees, box, numbers)
+        self._search.header[connect_layout.PATIENCE] = patience
         self._roots = [np.empty((0, dof)), np.empty((0, dof))]
         self._places = [0, 0]  # addresses of the roots in memory, which numpy takes a microsecond to tell
         for side in range(2):
             self._make_room(side, FIRST_ROOTS)
-        self._path_rows = np.empty((FIRST_PATH, dof))
-        self._path_place = self._path_rows.ctypes.data
+        self._make_path_room(FIRST_PATH)
         self._questions = 0
 
     def solve(
@@ -117,7 +101,7 @@ class ConnectSearch:
             starts: Free configurations, shape (s, n), s at least 1.
             goals: Free configurations, shape (g, n), g at least 1.
             seed: Any whole number.
-            ask: Decides motions (A, B), shapes (m, n), that the covers leave undecided, shape (m,); if None, they
+            ask: Decides motions (A, B), shapes (m, n), that the kernels leave undecided, shape (m,); if None, they
                 count as colliding.
             stop: Called about every millisecond and after each question; true to give up.
             max_iterations: Samples at most.
@@ -131,14 +115,14 @@ class ConnectSearch:
         header = self._search.header
         self._set_roots(0, starts)
         self._set_roots(1, goals)
-        header[layout.RESOLVE] = ask is not None
-        header[layout.LIMIT] = NO_LIMIT if max_iterations is None else max_iterations
+        header[connect_layout.RESOLVE] = ask is not None
+        header[connect_layout.LIMIT] = NO_LIMIT if max_iterations is None else max_iterations
         self._questions = 0
         outside = self._kernels.begin(self._search.address, len(starts), len(goals), int(seed) & (2**63 - 1))
         if outside >= 0:
             what = f"start {outside}" if outside < len(starts) else f"goal {outside - len(starts)}"
             raise InputError(f"search: {what} is not in the box of configurations")
-        return self._path() if self._run(ask, stop) == layout.SOLVED else None
+        return self._path() if self._run(ask, stop) == connect_layout.SOLVED else None
 
     def serve(self, roots: int, max_iterations: int) -> int:
         """Let other kernels begin searches, with as many roots on a side; the address of the table.
@@ -146,12 +130,12 @@ class ConnectSearch:
         Such a search asks nothing and draws ``max_iterations`` samples at most; :meth:`go_on` continues it.
         """
         self._fit_trees(roots)
-        self._search.header[layout.RESOLVE], self._search.header[layout.LIMIT] = 0, max_iterations
+        self._search.header[connect_layout.RESOLVE], self._search.header[connect_layout.LIMIT] = 0, max_iterations
         return self._search.address
 
     def go_on(self, stop: Callable[[], object]) -> bool:
         """Search on, where another kernel has begun; whether there is a path."""
-        return self._run(None, stop) == layout.SOLVED
+        return self._run(None, stop) == connect_layout.SOLVED
 
     def proven_free(self, rows: Matrix) -> bool:
         """Whether all configurations, shape (k, n), lie in the box and the covers prove them free."""
@@ -179,23 +163,23 @@ class ConnectSearch:
         while True:
             begin = time.perf_counter()
             status = self._kernels.resume(self._search.address, budget)
-            if status == layout.ASKING and ask is not None:
+            if status == connect_layout.ASKING and ask is not None:
                 self._answer(ask)
-            elif status == layout.FULL:
+            elif status == connect_layout.FULL:
                 self._grow()
-            elif status == layout.RUNNING:
+            elif status == connect_layout.RUNNING:
                 elapsed = time.perf_counter() - begin
-                budget = min(2 * budget, MOST_BUDGET) if elapsed < 0.5 * CALL_SECONDS else budget
-                budget = max(budget // 2, LEAST_BUDGET) if elapsed > 2.0 * CALL_SECONDS else budget
+                budget = min(2 * budget, MAX_BUDGET) if elapsed < 0.5 * CALL_SECONDS else budget
+                budget = max(budget // 2, MIN_BUDGET) if elapsed > 2.0 * CALL_SECONDS else budget
             else:
                 return status
             if stop is not None and stop():
-                return layout.RUNNING
+                return connect_layout.RUNNING
 
     def _answer(self, ask: Ask) -> None:
-        count, shape = int(self._search.header[layout.QUESTIONS]), (-1, self._dof)
+        count, shape = int(self._search.header[connect_layout.QUESTIONS]), (-1, self._dof)
         ends = (self._search[place].reshape(shape)[:count].copy() for place in _QUESTIONS)
-        self._search[layout.ANSWERS][:count] = ask(*ends)
+        self._search[connect_layout.ANSWERS][:count] = ask(*ends)
         self._questions += count
 
     def _grow(self) -> None:
@@ -205,8 +189,7 @@ class ConnectSearch:
     def _path(self) -> Matrix:
         count = self._kernels.write_path(self._search.address, self._path_place, len(self._path_rows))
         if count > len(self._path_rows):
-            self._path_rows = np.empty((2 * count, self._dof))
-            self._path_place = self._path_rows.ctypes.data
+            self._make_path_room(2 * count)
             self._kernels.write_path(self._search.address, self._path_place, count)
         return self._path_rows[:count].copy()
 
@@ -223,54 +206,34 @@ class ConnectSearch:
             self._grow()  # both are as large
 
     def _make_room(self, side: int, count: int) -> None:
-        self._roots[side] = np.zeros((count, self._dof))
+        self._roots[side] = aligned(np.zeros(count * self._dof)).reshape(count, self._dof)
         self._places[side] = self._roots[side].ctypes.data
-        self._search.header[layout.START_ROWS + side] = self._places[side]
+        self._search.header[connect_layout.START_ROWS + side] = self._places[side]
+
+    def _make_path_room(self, count: int) -> None:
+        self._path_rows = aligned(np.zeros(count * self._dof)).reshape(count, self._dof)
+        self._path_place = self._path_rows.ctypes.data
 
 
-_QUESTIONS = (layout.QUESTION_STARTS, layout.QUESTION_ENDS)
-_COUNTS = slice(layout.ITERATIONS, layout.CHECKED + 1)
+_QUESTIONS = (connect_layout.QUESTION_STARTS, connect_layout.QUESTION_ENDS)
+_COUNTS = slice(connect_layout.ITERATIONS, connect_layout.CHECKED + 1)
 
 
-def _search_table(
-    world: int,
-    trees: list[Table],
-    box: tuple[Vector, Vector],
-    weights: Vector,
-    numbers: Vector,
-    gain: Matrix,
-    offset: Vector,
-) -> Table:
+def _search_table(motions: MotionTable, trees: list[Table], box: tuple[Vector, Vector], numbers: Vector) -> Table:
     """The table of a search; fields that are not named here are numbers that the kernels set."""
-    dof, joints = len(weights), len(offset)
-    asked = layout.MOST_QUESTIONS
-    fields: dict[int, int | NDArray[Any]] = dict.fromkeys(range(layout.FIELD_COUNT), 0)
-    fields |= {layout.WORLD: world, layout.DOF: dof, layout.JOINTS: joints}
-    fields |= {layout.TREES + side: tree.address for side, tree in enumerate(trees)}
-    fields |= {layout.GAIN: gain, layout.OFFSET: offset, layout.LOWER: box[0], layout.UPPER: box[1]}
-    fields |= {layout.WEIGHTS: weights, layout.NUMBERS: numbers, layout.INVERSES: np.array(inverse_bases(dof))}
-    fields |= {place: np.zeros(dof) for place in (layout.ROW, layout.POINT, layout.CENTRE)}
-    fields |= {layout.ROW_VALUES: np.zeros(joints), layout.QUERY: np.zeros(dof, dtype=np.float32)}
+    dof, asked = motions.dof, connect_layout.MAX_QUESTIONS
+    fields: dict[int, int | NDArray[Any]] = dict.fromkeys(range(connect_layout.FIELD_COUNT), 0)
+    fields |= {connect_layout.MOTIONS: motions.address}
+    fields |= {connect_layout.START_TREE + side: tree.address for side, tree in enumerate(trees)}
+    fields |= {connect_layout.LOWER: box[0], connect_layout.UPPER: box[1], connect_layout.NUMBERS: numbers}
+    fields |= {connect_layout.INVERSE_BASES: np.array(inverse_bases(dof))}
+    fields |= {place: np.zeros(dof) for place in (connect_layout.ROW, connect_layout.POINT, connect_layout.CENTRE)}
+    fields |= {connect_layout.ROW_VALUES: np.zeros(motions.joints)}
+    fields |= {connect_layout.QUERY: np.zeros(dof, dtype=np.float32)}
     fields |= {place: np.zeros(asked * dof) for place in _QUESTIONS}
-    whole = (layout.QUESTION_TREES, layout.QUESTION_VERTICES, layout.ANSWERS)
+    whole = (connect_layout.QUESTION_SIDES, connect_layout.QUESTION_VERTICES, connect_layout.ANSWERS)
     fields |= {place: np.zeros(asked, dtype=np.int32) for place in whole}
-    return table(fields)
-
-
-def _joint_map(gain: ArrayLike | None, offset: ArrayLike | None, dof: int) -> tuple[Matrix, Vector]:
-    matrix = np.eye(dof) if gain is None else finite_array(gain, (None, dof), "gain")
-    joints = len(matrix)
-    return matrix, np.zeros(joints) if offset is None else finite_array(offset, (joints,), "offset")
-
-
-def _require_certain(fast: FastWorld, gain: Matrix, offset: Vector, farthest: Vector) -> None:
-    """The kernels do not look whether joint values are among those that their margin covers."""
-    if len(offset) != len(fast.limits):
-        raise InputError(f"gain and offset: expected {len(fast.limits)} rows, one for each joint, got {len(offset)}")
-    beyond = np.flatnonzero(np.abs(gain) @ farthest + np.abs(offset) > fast.limits)
-    if len(beyond):
-        raise InputError(f"bounds: joint {beyond[0]} can go farther than the checks cover ({fast.limits[beyond[0]]:g})")
-
-
-def _is_identity(gain: Matrix, offset: Vector) -> bool:
-    return gain.shape[0] == gain.shape[1] and bool((gain == np.eye(len(gain))).all() and (offset == 0.0).all())
+    made = table(fields)
+    if motions.identity:
+        made.header[connect_layout.ROW_VALUES] = made.header[connect_layout.ROW]
+    return made

@@ -8,7 +8,7 @@ from rrtik_ompl.arrays import Vector, positive
 
 RANGE_SHARE = 0.08  # of the diagonal of the box, no joint counted for more than a turn
 DOMAIN_SHARE = 6.0**-0.5  # of the diagonal of the box: the root mean square distance of two random configurations
-SMALLEST_RANGE = 1e-9  # where lower and upper bounds coincide
+MIN_RANGE = 1e-9  # [unit of the box] where lower and upper bounds coincide
 
 
 def connect_lengths(lower: Vector, upper: Vector, range_: float | None, domain: float | None) -> tuple[float, float]:
@@ -24,7 +24,7 @@ def connect_lengths(lower: Vector, upper: Vector, range_: float | None, domain: 
         InputError: If one of them is not a number above 0.
     """
     if range_ is None:
-        range_ = max(RANGE_SHARE * float(np.linalg.norm(np.minimum(upper - lower, 2.0 * np.pi))), SMALLEST_RANGE)
+        range_ = max(RANGE_SHARE * float(np.linalg.norm(np.minimum(upper - lower, 2.0 * np.pi))), MIN_RANGE)
     used = positive(range_, "range")
     if domain is None:
         domain = max(DOMAIN_SHARE * float(np.linalg.norm(upper - lower)), used)

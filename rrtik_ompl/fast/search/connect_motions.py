@@ -1,4 +1,4 @@
-"""The motions that RRT-Connect looks at: which one is next, and whether it is free."""
+"""The motions that RRT-Connect checks: which one is next, and whether it is free."""
 
 from __future__ import annotations
 
@@ -7,70 +7,95 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.fast.checks.check_kernels import check_part
-from rrtik_ompl.fast.checks.motion_kernels import SLACK, copy_row, descends, joint_values, travel, whole_steps
-from rrtik_ompl.fast.search import connect_layout as table
-from rrtik_ompl.fast.search.tree_kernels import nearest_vertex, row_of, values_of
-from rrtik_ompl.fast.search.tree_layout import LIVE, RADII
+from rrtik_ompl.fast.search import connect_layout
+from rrtik_ompl.fast.search.connect_layout import ConnectAddress
+from rrtik_ompl.fast.search.motions.motion_kernels import (
+    descends,
+    dof_of,
+    set_joint_values,
+    step_count,
+    world_of,
+)
+from rrtik_ompl.fast.search.motions.motion_layout import MotionAddress
+from rrtik_ompl.fast.search.motions.row_kernels import Row, copy_row, distance
+from rrtik_ompl.fast.search.tree_kernels import live_of, nearest_vertex, radius_of, row_of, values_of
+from rrtik_ompl.fast.search.tree_layout import TreeAddress
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
-from rrtik_ompl.fast.simd.lanes import double_at, field, float_at, set_double, set_field, set_float
+from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field, set_float
 from rrtik_ompl.fast.simd.random_kernels import next_point
 
-MOST_STRAIGHT = 16
-WIDER = 1.1  # a sample's box than the one before, where samples begin near a place
+MAX_STRAIGHT_MOTIONS = 16  # whole motions to goals that are tried first
+SAMPLE_BOX_GROWTH = 1.1  # from one sample to the next, where samples begin near a place
+RANGE_TOLERANCE = 1e-9  # of the range, by which a motion of the trees may be longer
 
 
 @inlined
-def number(search: int, place: int) -> Any:
-    """One of the numbers."""
-    return double_at(field(search, table.NUMBERS), place)
+def motions_of(search: ConnectAddress) -> MotionAddress:
+    """The motion table of the world."""
+    motions: MotionAddress = field(search, connect_layout.MOTIONS)
+    return motions
 
 
 @inlined
-def tree_of(search: int, side: int) -> Any:
+def dof_in(search: ConnectAddress) -> Any:
+    """How many numbers a configuration has."""
+    return dof_of(motions_of(search))
+
+
+@inlined
+def tree_of(search: ConnectAddress, side: int) -> TreeAddress:
     """The tree from the starts (0) or from the goals (1)."""
-    return field(search, table.TREES + side)
+    tree: TreeAddress = field(search, connect_layout.START_TREE + side)
+    return tree
 
 
 @inlined
-def count_up(search: int, place: int) -> None:
+def meeting_of(search: ConnectAddress, side: int) -> Any:
+    """The vertex of a tree at which it meets the other one."""
+    return field(search, connect_layout.START_MEETING + side)
+
+
+@inlined
+def set_meeting(search: ConnectAddress, side: int, vertex: int) -> None:
+    """Set the vertex of a tree at which it meets the other one."""
+    set_field(search, connect_layout.START_MEETING + side, vertex)
+
+
+@inlined
+def number_of(search: ConnectAddress, place: int) -> Any:
+    """RANGE, DOMAIN or SPREAD."""
+    return double_at(field(search, connect_layout.NUMBERS), place)
+
+
+@inlined
+def count_up(search: ConnectAddress, place: int) -> None:
     """Add 1 to a field."""
     set_field(search, place, field(search, place) + 1)
 
 
 @kernel
-def set_row_values(search: int) -> None:
+def set_row_values(search: ConnectAddress) -> None:
     """Joint values of ROW, unless they are the configuration itself."""
-    row, values = field(search, table.ROW), field(search, table.ROW_VALUES)
+    row, values = field(search, connect_layout.ROW), field(search, connect_layout.ROW_VALUES)
     if row != values:
-        gain, offset = field(search, table.GAIN), field(search, table.OFFSET)
-        joint_values(field(search, table.DOF), field(search, table.JOINTS), gain, offset, row, values)
+        set_joint_values(motions_of(search), row, values)
 
 
 @kernel
-def distance(dof: int, one: int, two: int) -> float:
-    """Euclidean distance of two configurations."""
-    total = 0.0
-    for k in range(dof):
-        gap = double_at(two, k) - double_at(one, k)
-        total += gap * gap
-    return np.sqrt(total)  # type: ignore[no-any-return]
-
-
-@kernel
-def nearest_to(search: int, side: int, row: int) -> Any:
+def nearest_to(search: ConnectAddress, side: int, row: Row) -> Any:
     """The vertex of a tree that is nearest to a configuration."""
-    query = field(search, table.QUERY)
-    for k in range(field(search, table.DOF)):
+    query = field(search, connect_layout.QUERY)
+    for k in range(dof_in(search)):
         set_float(query, k, np.float32(double_at(row, k)))
     return nearest_vertex(tree_of(search, side), query)
 
 
 @kernel
-def steer(search: int, start: int, aim: int, length: float) -> Any:
-    """Set ROW to ``aim``, or to the point at the range on the way there; tells whether it is ``aim``."""
-    row, span = field(search, table.ROW), number(search, table.RANGE)
-    reached = length <= span * (1.0 + SLACK)
-    for k in range(field(search, table.DOF)):
+def steer(search: ConnectAddress, start: Row, aim: Row, length: float) -> Any:
+    """Set ROW to ``aim``, or to the point at the range on the motion to it; tells whether it is ``aim``."""
+    row, span = field(search, connect_layout.ROW), number_of(search, connect_layout.RANGE)
+    reached = length <= span * (1.0 + RANGE_TOLERANCE)
+    for k in range(dof_in(search)):
         there = double_at(aim, k)
         if not reached:
             here = double_at(start, k)
@@ -81,93 +106,88 @@ def steer(search: int, start: int, aim: int, length: float) -> Any:
 
 
 @kernel
-def steps_of(search: int, start: int, end: int) -> Any:
-    """Number of steps in which a motion is checked."""
-    dof, per_unit = field(search, table.DOF), number(search, table.STEPS_PER_UNIT)
-    steps = travel(dof, field(search, table.WEIGHTS), start, end) / number(search, table.RESOLUTION)
-    if per_unit > 0.0:
-        steps = max(steps, per_unit * distance(dof, start, end))
-    return whole_steps(steps)
-
-
-@kernel
-def check_candidate(search: int) -> int:
+def check_candidate(search: ConnectAddress) -> int:
     """Check the motion from FROM to ROW at the configurations that are checked in either direction.
 
     The ends that are vertices are left out: they were checked with the motion that led to them, or as roots.
     """
-    tree, row = tree_of(search, field(search, table.GROWING)), field(search, table.ROW)
-    start, values = row_of(tree, field(search, table.FROM)), values_of(tree, field(search, table.FROM))
-    last = steps_of(search, start, row)
-    count = last - field(search, table.BRIDGE)
-    resolve = field(search, table.RESOLVE) != 0
-    count_up(search, table.CHECKED)
-    there, first = field(search, table.ROW_VALUES), 1
-    if descends(field(search, table.DOF), start, row):
+    motions, tree = motions_of(search), tree_of(search, field(search, connect_layout.GROWING))
+    vertex, row = field(search, connect_layout.FROM), field(search, connect_layout.ROW)
+    start, values = row_of(tree, vertex), values_of(tree, vertex)
+    last = step_count(motions, start, row)
+    count = last - field(search, connect_layout.BRIDGE)
+    resolve = field(search, connect_layout.RESOLVE) != 0
+    count_up(search, connect_layout.CHECKED)
+    there, first = field(search, connect_layout.ROW_VALUES), 1
+    if descends(dof_of(motions), start, row):
         values, there, first = there, values, last - count
-    return check_part(field(search, table.WORLD), values, there, last, first, count, resolve)
+    return check_part(world_of(motions), values, there, last, first, count, resolve)
+
+
+@inlined
+def set_candidate(search: ConnectAddress, side: int, start: int, bridge: int) -> None:
+    """The motion to ROW starts at a vertex of tree ``side``; ``bridge`` is 1 if it ends at a vertex of the other."""
+    set_field(search, connect_layout.GROWING, side)
+    set_field(search, connect_layout.FROM, start)
+    set_field(search, connect_layout.BRIDGE, bridge)
 
 
 @kernel
-def aim_at_vertex(search: int, side: int, start: int, target: int) -> None:
+def aim_at_vertex(search: ConnectAddress, side: int, start: int, target: int) -> None:
     """The next motion: from a vertex of tree ``side`` towards a vertex of the other tree."""
     goal = row_of(tree_of(search, 1 - side), target)
     begin = row_of(tree_of(search, side), start)
-    reached = steer(search, begin, goal, distance(field(search, table.DOF), begin, goal))
-    set_field(search, table.GROWING, side)
-    set_field(search, table.FROM, start)
-    set_field(search, table.TARGET, target)
-    set_field(search, table.BRIDGE, 1 if reached else 0)
+    reached = steer(search, begin, goal, distance(dof_in(search), begin, goal))
+    set_field(search, connect_layout.TARGET, target)
+    set_candidate(search, side, start, 1 if reached else 0)
 
 
 @kernel
-def aim_straight(search: int) -> bool:
+def aim_straight(search: ConnectAddress) -> bool:
     """The next motion: a whole one from the nearest start to the next goal. False when no goal is left."""
-    goal = field(search, table.STRAIGHT_TRIED)
-    if goal >= min(field(search, table.ROOTS), MOST_STRAIGHT):
+    goal = field(search, connect_layout.STRAIGHT_TRIED)
+    if goal >= min(field(search, connect_layout.GOAL_COUNT), MAX_STRAIGHT_MOTIONS):
         return False
-    set_field(search, table.STRAIGHT_TRIED, goal + 1)
-    target, row = row_of(tree_of(search, 1), goal), field(search, table.ROW)
-    copy_row(field(search, table.DOF), target, row)
+    count_up(search, connect_layout.STRAIGHT_TRIED)
+    target = row_of(tree_of(search, 1), goal)
+    copy_row(dof_in(search), target, field(search, connect_layout.ROW))
     set_row_values(search)
-    set_field(search, table.GROWING, 0)
-    set_field(search, table.FROM, nearest_to(search, 0, target))
-    set_field(search, table.TARGET, goal)
-    set_field(search, table.BRIDGE, 1)
+    set_field(search, connect_layout.TARGET, goal)
+    set_candidate(search, 0, nearest_to(search, 0, target), 1)
     return True
 
 
 @kernel
-def place_sample(search: int) -> None:
-    """Set ROW to where POINT, a point of the unit box, lies in the box of samples; the next one is wider."""
-    spread = number(search, table.SPREAD)
-    for k in range(field(search, table.DOF)):
-        middle = double_at(field(search, table.CENTRE), k)
-        low = max(double_at(field(search, table.LOWER), k), middle - spread)
-        high = min(double_at(field(search, table.UPPER), k), middle + spread)
-        set_double(field(search, table.ROW), k, low + (high - low) * double_at(field(search, table.POINT), k))
-    set_double(field(search, table.NUMBERS), table.SPREAD, min(WIDER * spread, table.EVERYWHERE))
+def place_sample(search: ConnectAddress) -> None:
+    """Set ROW to where POINT, a point of the unit box, lies in the box of samples; the next box is larger."""
+    spread = number_of(search, connect_layout.SPREAD)
+    for k in range(dof_in(search)):
+        middle = double_at(field(search, connect_layout.CENTRE), k)
+        low = max(double_at(field(search, connect_layout.LOWER), k), middle - spread)
+        high = min(double_at(field(search, connect_layout.UPPER), k), middle + spread)
+        share = double_at(field(search, connect_layout.POINT), k)
+        set_double(field(search, connect_layout.ROW), k, low + (high - low) * share)
+    larger = min(SAMPLE_BOX_GROWTH * spread, connect_layout.UNBOUNDED_SPREAD)
+    set_double(field(search, connect_layout.NUMBERS), connect_layout.SPREAD, larger)
 
 
 @kernel
-def aim_at_sample(search: int) -> bool:
+def aim_at_sample(search: ConnectAddress) -> bool:
     """The next motion: from the nearest vertex of a tree towards a sample. False if that is outside its domain."""
-    count_up(search, table.ITERATIONS)
-    side = 1 - field(search, table.GROWER)
-    if field(tree_of(search, side), LIVE) > field(tree_of(search, 1 - side), LIVE):
+    count_up(search, connect_layout.ITERATIONS)
+    side = 1 - field(search, connect_layout.GROWER)
+    if live_of(tree_of(search, side)) > live_of(tree_of(search, 1 - side)):
         side = 1 - side
-    set_field(search, table.GROWER, side)
-    dof, point, row = field(search, table.DOF), field(search, table.POINT), field(search, table.ROW)
-    next_point(search, table.RANDOM, point, field(search, table.INVERSES), dof)
+    set_field(search, connect_layout.GROWER, side)
+    dof, row = dof_in(search), field(search, connect_layout.ROW)
+    point, bases = field(search, connect_layout.POINT), field(search, connect_layout.INVERSE_BASES)
+    next_point(search, connect_layout.RANDOM, point, bases, dof)
     place_sample(search)
-    tree = tree_of(search, side)
-    near = nearest_to(search, side, row)
+    tree, near = tree_of(search, side), nearest_to(search, side, row)
     begin = row_of(tree, near)
     length = distance(dof, begin, row)
-    if length > float_at(field(tree, RADII), near) or length == 0.0:
+    if length > radius_of(tree, near) or length == 0.0:
         return False
     steer(search, begin, row, length)
-    set_field(search, table.GROWING, side)
-    set_field(search, table.FROM, near)
-    set_field(search, table.BRIDGE, 0)
+    set_candidate(search, side, near, 0)
     return True

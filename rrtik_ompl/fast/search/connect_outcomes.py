@@ -2,116 +2,144 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from rrtik_ompl.fast.checks.motion_kernels import copy_row
-from rrtik_ompl.fast.search import connect_layout as table
-from rrtik_ompl.fast.search.connect_motions import count_up, nearest_to, number, tree_of
-from rrtik_ompl.fast.search.tree_kernels import add_vertex, cut_branch, parent_of, row_of, state_of
-from rrtik_ompl.fast.search.tree_layout import CERTAIN, CUT, OPEN, RADII, STATES
+from rrtik_ompl.fast.search import connect_layout
+from rrtik_ompl.fast.search.connect_layout import ConnectAddress
+from rrtik_ompl.fast.search.connect_motions import (
+    count_up,
+    dof_in,
+    meeting_of,
+    nearest_to,
+    number_of,
+    set_meeting,
+    tree_of,
+)
+from rrtik_ompl.fast.search.motions.row_kernels import Row, copy_row, row_at
+from rrtik_ompl.fast.search.tree_kernels import (
+    add_vertex,
+    cut_branch,
+    parent_of,
+    row_of,
+    set_radius,
+    set_state,
+    state_of,
+)
+from rrtik_ompl.fast.search.tree_layout import CERTAIN, CUT, OPEN
 from rrtik_ompl.fast.simd.compiled import kernel
-from rrtik_ompl.fast.simd.lanes import field, int_at, set_field, set_float, set_int
-
-NO_DOMAIN = 1e30
+from rrtik_ompl.fast.simd.lanes import field, int_at, set_field, set_int
 
 
 @kernel
-def shrink_domain(search: int, side: int, vertex: int) -> None:
+def shrink_domain(search: ConnectAddress, side: int, vertex: int) -> None:
     """A vertex that was blocked is given a domain."""
-    set_float(field(tree_of(search, side), RADII), vertex, np.float32(number(search, table.DOMAIN)))
+    set_radius(tree_of(search, side), vertex, number_of(search, connect_layout.DOMAIN))
 
 
 @kernel
-def on_blocked(search: int) -> None:
+def on_blocked(search: ConnectAddress) -> None:
     """The motion is not free."""
-    if field(search, table.PHASE) == table.SAMPLE:
-        shrink_domain(search, field(search, table.GROWING), field(search, table.FROM))
-    elif field(search, table.PHASE) == table.CONNECT:
-        set_field(search, table.PHASE, table.SAMPLE)
+    if field(search, connect_layout.PHASE) == connect_layout.EXTEND:
+        shrink_domain(search, field(search, connect_layout.GROWING), field(search, connect_layout.FROM))
+    elif field(search, connect_layout.PHASE) == connect_layout.CONNECT:
+        set_field(search, connect_layout.PHASE, connect_layout.EXTEND)
 
 
 @kernel
-def on_free(search: int, state: int) -> int:
+def on_free(search: ConnectAddress, state: int) -> int:
     """The motion is free, or taken to be for now; returns the status."""
-    side = field(search, table.GROWING)
-    if field(search, table.BRIDGE) != 0:
-        set_field(search, table.MEETINGS + side, field(search, table.FROM))
-        set_field(search, table.MEETINGS + 1 - side, field(search, table.TARGET))
-        set_field(search, table.MEETING_OPEN, state)
+    side, start = field(search, connect_layout.GROWING), field(search, connect_layout.FROM)
+    if field(search, connect_layout.BRIDGE) != 0:
+        set_meeting(search, side, start)
+        set_meeting(search, 1 - side, field(search, connect_layout.TARGET))
+        set_field(search, connect_layout.MEETING_STATE, state)
         return finish_or_ask(search)
-    row, values = field(search, table.ROW), field(search, table.ROW_VALUES)
-    vertex = add_vertex(tree_of(search, side), row, values, field(search, table.FROM), state, NO_DOMAIN)
-    if field(search, table.PHASE) == table.SAMPLE:
-        set_field(search, table.PHASE, table.CONNECT)
-        set_field(search, table.GROWING, 1 - side)
-        set_field(search, table.FROM, nearest_to(search, 1 - side, row))
-        set_field(search, table.TARGET, vertex)
+    row, values = field(search, connect_layout.ROW), field(search, connect_layout.ROW_VALUES)
+    vertex = add_vertex(tree_of(search, side), row, values, start, state, connect_layout.UNBOUNDED_DOMAIN)
+    if field(search, connect_layout.PHASE) == connect_layout.EXTEND:
+        set_field(search, connect_layout.PHASE, connect_layout.CONNECT)
+        set_field(search, connect_layout.GROWING, 1 - side)
+        set_field(search, connect_layout.FROM, nearest_to(search, 1 - side, row))
+        set_field(search, connect_layout.TARGET, vertex)
     else:
-        set_field(search, table.FROM, vertex)
-    return table.RUNNING
+        set_field(search, connect_layout.FROM, vertex)
+    return connect_layout.RUNNING
 
 
 @kernel
-def ask(search: int, kind: int, start: int, end: int, side: int, vertex: int) -> None:
-    """Put a question: is the motion from ``start`` to ``end``, which leads to a vertex (or to none: -1), free?"""
-    place, dof = field(search, table.QUESTIONS), field(search, table.DOF)
-    copy_row(dof, start, field(search, table.QUESTION_STARTS) + 8 * dof * place)
-    copy_row(dof, end, field(search, table.QUESTION_ENDS) + 8 * dof * place)
-    set_int(field(search, table.QUESTION_TREES), place, side)
-    set_int(field(search, table.QUESTION_VERTICES), place, vertex)
-    set_field(search, table.QUESTIONS, place + 1)
-    set_field(search, table.ASKED, kind)
+def ask(search: ConnectAddress, kind: int, start: Row, end: Row, side: int, vertex: int) -> None:
+    """Ask whether the motion from ``start`` to ``end`` is free, which leads to a vertex of a tree or to NO_VERTEX."""
+    place, dof = field(search, connect_layout.QUESTIONS), dof_in(search)
+    copy_row(dof, start, row_at(field(search, connect_layout.QUESTION_STARTS), dof, place))
+    copy_row(dof, end, row_at(field(search, connect_layout.QUESTION_ENDS), dof, place))
+    set_int(field(search, connect_layout.QUESTION_SIDES), place, side)
+    set_int(field(search, connect_layout.QUESTION_VERTICES), place, vertex)
+    set_field(search, connect_layout.QUESTIONS, place + 1)
+    set_field(search, connect_layout.ASKED, kind)
 
 
 @kernel
-def finish_or_ask(search: int) -> int:
+def ask_for_candidate(search: ConnectAddress) -> None:
+    """Ask whether the motion to ROW is free, before it is inserted."""
+    tree = tree_of(search, field(search, connect_layout.GROWING))
+    start, end = row_of(tree, field(search, connect_layout.FROM)), field(search, connect_layout.ROW)
+    set_field(search, connect_layout.QUESTIONS, 0)
+    ask(search, connect_layout.MOTION_QUESTION, start, end, 0, connect_layout.NO_VERTEX)
+
+
+@kernel
+def finish_or_ask(search: ConnectAddress) -> int:
     """The trees have met: SOLVED if all motions of the path are certain, else the open ones are asked for."""
-    set_field(search, table.QUESTIONS, 0)
+    kind, most = connect_layout.PATH_QUESTION, connect_layout.MAX_QUESTIONS
+    set_field(search, connect_layout.QUESTIONS, 0)
     for side in range(2):
-        tree, vertex = tree_of(search, side), field(search, table.MEETINGS + side)
+        tree, vertex = tree_of(search, side), meeting_of(search, side)
         while vertex >= 0:
-            if state_of(tree, vertex) == OPEN and field(search, table.QUESTIONS) < table.MOST_QUESTIONS:
-                ask(search, table.PATH, row_of(tree, parent_of(tree, vertex)), row_of(tree, vertex), side, vertex)
-            vertex = parent_of(tree, vertex)
-    if field(search, table.MEETING_OPEN) != CERTAIN and field(search, table.QUESTIONS) < table.MOST_QUESTIONS:
-        start = row_of(tree_of(search, 0), field(search, table.MEETINGS))
-        ask(search, table.PATH, start, row_of(tree_of(search, 1), field(search, table.MEETINGS + 1)), 0, -1)
-    return table.SOLVED if field(search, table.QUESTIONS) == 0 else table.ASKING
+            parent = parent_of(tree, vertex)
+            if state_of(tree, vertex) == OPEN and field(search, connect_layout.QUESTIONS) < most:
+                ask(search, kind, row_of(tree, parent), row_of(tree, vertex), side, vertex)
+            vertex = parent
+    if field(search, connect_layout.MEETING_STATE) != CERTAIN and field(search, connect_layout.QUESTIONS) < most:
+        start, end = (
+            row_of(tree_of(search, 0), meeting_of(search, 0)),
+            row_of(tree_of(search, 1), meeting_of(search, 1)),
+        )
+        ask(search, kind, start, end, 0, connect_layout.NO_VERTEX)
+    return connect_layout.SOLVED if field(search, connect_layout.QUESTIONS) == 0 else connect_layout.ASKING
 
 
 @kernel
-def apply_path_answers(search: int) -> int:
+def apply_path_answers(search: ConnectAddress) -> int:
     """Use the answers for the motions of a path; returns the status."""
     rejected = 0
-    for k in range(field(search, table.QUESTIONS)):
-        side, vertex = int_at(field(search, table.QUESTION_TREES), k), int_at(field(search, table.QUESTION_VERTICES), k)
-        free, tree = int_at(field(search, table.ANSWERS), k) != 0, tree_of(search, side)
+    for k in range(field(search, connect_layout.QUESTIONS)):
+        side = int_at(field(search, connect_layout.QUESTION_SIDES), k)
+        vertex = int_at(field(search, connect_layout.QUESTION_VERTICES), k)
+        free, tree = int_at(field(search, connect_layout.ANSWERS), k) != 0, tree_of(search, side)
         if not free:
             rejected += 1
-        if vertex < 0:
-            set_field(search, table.MEETING_OPEN, CERTAIN if free else OPEN)
+        if vertex == connect_layout.NO_VERTEX:
+            set_field(search, connect_layout.MEETING_STATE, CERTAIN if free else OPEN)
         elif free and state_of(tree, vertex) != CUT:
-            set_int(field(tree, STATES), vertex, CERTAIN)
+            set_state(tree, vertex, CERTAIN)
         elif not free:
             shrink_domain(search, side, parent_of(tree, vertex))
             cut_branch(tree, vertex)
     if rejected == 0:
         return finish_or_ask(search)
-    count_up(search, table.REJECTED)
-    if field(search, table.PHASE) == table.CONNECT:
-        set_field(search, table.PHASE, table.SAMPLE)
-    return table.RUNNING
+    count_up(search, connect_layout.REJECTED)
+    if field(search, connect_layout.PHASE) == connect_layout.CONNECT:
+        set_field(search, connect_layout.PHASE, connect_layout.EXTEND)
+    return connect_layout.RUNNING
 
 
 @kernel
-def resume_after_answers(search: int) -> int:
+def resume_after_answers(search: ConnectAddress) -> int:
     """Go on from the answers to what was asked; returns the status."""
-    kind = field(search, table.ASKED)
-    set_field(search, table.ASKED, table.NOTHING)
-    if kind == table.PATH:
+    kind = field(search, connect_layout.ASKED)
+    set_field(search, connect_layout.ASKED, connect_layout.NO_QUESTION)
+    if kind == connect_layout.PATH_QUESTION:
         return apply_path_answers(search)
-    if kind == table.MOTION:
-        if int_at(field(search, table.ANSWERS), 0) != 0:
+    if kind == connect_layout.MOTION_QUESTION:
+        if int_at(field(search, connect_layout.ANSWERS), 0) != 0:
             return on_free(search, CERTAIN)
         on_blocked(search)
-    return table.RUNNING
+    return connect_layout.RUNNING

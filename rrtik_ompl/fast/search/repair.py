@@ -1,4 +1,4 @@
-"""A path's look and repair in kernels: the object that keeps their memory."""
+"""A path's check and repair in kernels: the object that keeps their memory."""
 
 from __future__ import annotations
 
@@ -9,32 +9,30 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast import FastWorld
-from rrtik_ompl.fast.search import repair_layout as layout
+from rrtik_ompl.fast.search import repair_layout
 from rrtik_ompl.fast.search.connect import FIRST_BUDGET, ConnectSearch
+from rrtik_ompl.fast.search.motions.motion_table import MotionTable
 from rrtik_ompl.fast.search.shortcut import ShortcutSearch
 from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.fast.tables.robot_tables import table
-from rrtik_ompl.robot import Chain
+from rrtik_ompl.fast.tables.robot_tables import aligned, table
 
-FIRST_ROOM = 256  # rows
-NEAR = 4.0  # gaps; narrower, new paths pass closer to what moves and are hit more often
+FIRST_CAPACITY = 256  # rows
+# Half the side of the first sample's box over the gap; narrower, new paths pass closer to what moves and are hit more.
+GAP_BOX_RATIO = 4.0
 
 
 class PathRepair:
-    """Looks at paths, and repairs the one that it has looked at last: one call of a kernel each.
+    """Checks paths, and repairs the one that it has checked last: one call of a kernel each.
 
     A repair cuts the path at the first blocked edge seen from either end, joins the two pieces by RRT-Connect that
     uses them as trees, and shortens what is new by random shortcuts. The same seed gives the same path.
 
     Attributes:
-        checked: Configurations that the last look asked for.
+        checked: Configurations that the last check counts.
 
     Args:
-        fast: The checks; must have kernels. It may be moved between two calls.
-        chain: The robot's, which turns configurations into joint values.
+        motions: How motions are checked in a world, whose obstacles may be moved between two calls.
         lower, upper: The box to sample in, shape (n,), finite.
-        weights, resolution: See :class:`ConnectSearch`.
         eps: Longest motion of the trees [unit of the box]; a path is cut at points half as far apart.
         iterations: Samples of a repair at most.
         tries, patience: Random shortcuts of a repair at most, and how many without gain end them.
@@ -45,47 +43,46 @@ class PathRepair:
 
     def __init__(
         self,
-        fast: FastWorld,
-        chain: Chain,
+        motions: MotionTable,
         lower: Vector,
         upper: Vector,
         *,
-        weights: Vector,
-        resolution: float,
         eps: float,
         iterations: int,
         tries: int,
         patience: int,
     ) -> None:
-        kernels = library(layout.KERNELS)
+        kernels = library(repair_layout.KERNELS)
         if kernels is None:
             raise InputError("repair in kernels: there are none; install numba")
-        self._kernels, self._fast, self._chain = kernels, fast, chain
-        self._reach: dict[str, Any] = {"weights": weights, "resolution": resolution}
-        self._search = ConnectSearch(
-            fast, lower, upper, **self._reach, gain=chain.gain, offset=chain.offset, range_=eps
-        )
-        self._iterations, self._dof = iterations, len(weights)
-        fields: dict[int, Any] = dict.fromkeys(range(layout.FIELD_COUNT), 0)
-        fields |= {layout.TRIES: tries, layout.PATIENCE: patience, layout.NUMBERS: np.array([0.5 * eps, NEAR])}
+        self._kernels, self._motions, self._dof = kernels, motions, motions.dof
+        self._search = ConnectSearch(motions, lower, upper, range_=eps)
+        self._iterations = iterations
+        fields: dict[int, Any] = dict.fromkeys(range(repair_layout.FIELD_COUNT), 0)
+        fields |= {
+            repair_layout.TRIES: tries,
+            repair_layout.PATIENCE: patience,
+            repair_layout.NUMBERS: np.array([0.5 * eps, GAP_BOX_RATIO]),
+        }
+        fields[repair_layout.MOTIONS] = motions.address
         self._table = table(fields)
         self._points = np.zeros((0, self._dof))
-        self._make_room(FIRST_ROOM)
+        self._make_room(FIRST_CAPACITY)
         self.checked = 0
 
-    def look(self, path: Matrix) -> bool:
+    def check(self, path: Matrix) -> bool:
         """Whether all of a path, shape (k, n), is proven free."""
         rows = np.vstack([path, path]) if len(path) == 1 else path
         if len(rows) > len(self._given):
             self._make_room(2 * len(rows))
         while True:
             self._given[: len(rows)] = rows
-            found = self._kernels.look(self._table.address, len(rows))
-            if found != layout.NO_ROOM:
+            found = self._kernels.check_path(self._table.address, len(rows))
+            if found != repair_layout.NO_ROOM:
                 break
-            self._make_room(2 * int(self._table.header[layout.COUNT]))
-        self.checked = int(self._table.header[layout.CHECKED])
-        return found == layout.FREE_PATH
+            self._make_room(2 * int(self._table.header[repair_layout.COUNT]))
+        self.checked = int(self._table.header[repair_layout.CHECKED])
+        return found == repair_layout.FREE_PATH
 
     def repair(self, seed: int, stop: Callable[[], Any], *, forgetting: bool = False) -> Matrix | None:
         """Another path between the same ends, free all along, or None.
@@ -95,10 +92,12 @@ class PathRepair:
             stop: Asked about every millisecond; True gives up.
             forgetting: Whether to plan from scratch, as to compare with: the pieces of the path are not used.
         """
-        rows = self._kernels.repair(self._table.address, seed, forgetting, FIRST_BUDGET)
-        if rows == layout.NOT_YET:
-            rows = self._kernels.finish(self._table.address, seed) if self._search.go_on(stop) else layout.NO_WAY
-        while rows == layout.LONG:
+        rows = self._kernels.repair_path(self._table.address, seed, forgetting, FIRST_BUDGET)
+        if rows == repair_layout.UNFINISHED:
+            rows = (
+                self._kernels.finish(self._table.address, seed) if self._search.go_on(stop) else repair_layout.NO_PATH
+            )
+        while rows == repair_layout.TOO_LONG:
             self._make_room(2 * len(self._given))
             rows = self._kernels.finish(self._table.address, seed)
         return self._path[:rows].copy() if rows > 0 else None
@@ -106,11 +105,18 @@ class PathRepair:
     def _make_room(self, rows: int) -> None:
         """Memory for paths of so many rows; the points stay."""
         header, old = self._table.header, self._points
-        self._given, self._points = np.zeros((rows, self._dof)), np.zeros((rows, self._dof))
+        self._given, self._points = self._zeros(rows), self._zeros(rows)
         self._points[: len(old)] = old
-        self._cuts = ShortcutSearch(self._fast, self._chain, self._given, **self._reach, asking=False)
-        self._path = np.zeros((2 * rows + self._cuts.capacity, self._dof))
-        header[layout.SEARCH] = self._search.serve(rows, self._iterations)
-        header[layout.CUTS], header[layout.ROOM] = self._cuts.address, rows
-        for place, memory in ((layout.GIVEN, self._given), (layout.POINTS, self._points), (layout.PATH, self._path)):
+        self._cuts = ShortcutSearch(self._motions, self._given, asking=False)
+        self._path = self._zeros(2 * rows + self._cuts.capacity)
+        header[repair_layout.SEARCH] = self._search.serve(rows, self._iterations)
+        header[repair_layout.CUTS], header[repair_layout.ROOM] = self._cuts.address, rows
+        for place, memory in (
+            (repair_layout.GIVEN, self._given),
+            (repair_layout.POINTS, self._points),
+            (repair_layout.PATH, self._path),
+        ):
             header[place] = memory.ctypes.data
+
+    def _zeros(self, rows: int) -> Matrix:
+        return aligned(np.zeros(rows * self._dof)).reshape(rows, self._dof)

@@ -9,15 +9,14 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast import FastWorld
-from rrtik_ompl.fast.search import shortcut_layout as layout
+from rrtik_ompl.fast.search import shortcut_layout
+from rrtik_ompl.fast.search.motions.motion_table import MotionTable
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.tables.robot_tables import table
-from rrtik_ompl.robot import Chain
 
-ROOM = 256  # more waypoints than at the beginning
-WHOLE = 2**62
-CHUNK = 256  # tries between two looks at the clock
+SPARE_WAYPOINTS = 256  # room for more than at the beginning
+NO_LIMIT = 2**62
+TRIES_PER_CALL = 256  # of the kernel, until the caller may stop it
 
 
 class ShortcutSearch:
@@ -27,11 +26,8 @@ class ShortcutSearch:
     ends stay as they are to the bit, and no try makes the route longer.
 
     Args:
-        world: Packed for the kernels.
-        chain: The robot's, which turns configurations into joint values.
+        motions: How motions are checked in a world.
         waypoints: A route whose edges are free, shape (k, dof), k at least 2.
-        weights: No point of the arm moves farther than ``weights @ |b - a|`` [m] from a to b, shape (dof,).
-        resolution: Largest step of any point of the arm between two checked configurations [m].
         seed: Of the random places.
         share: Probability that an end of a shortcut is a waypoint; 0 for the published random cut.
         pull: Probability that a try pulls a waypoint; 0 for the published random cut.
@@ -44,66 +40,52 @@ class ShortcutSearch:
 
     def __init__(
         self,
-        world: FastWorld,
-        chain: Chain,
+        motions: MotionTable,
         waypoints: ArrayLike,
         *,
-        weights: ArrayLike,
-        resolution: float,
         seed: int = 0,
         share: float = 0.5,
         pull: float = 0.3,
         metric: ArrayLike | None = None,
         asking: bool = True,
     ) -> None:
-        rows = finite_array(waypoints, (None, chain.gain.shape[1]), "waypoints to shorten")
-        dof = rows.shape[1]
+        dof = motions.dof
+        rows = finite_array(waypoints, (None, dof), "waypoints to shorten")
         lengths = finite_array(np.ones(dof) if metric is None else metric, (dof,), "metric of a shortcut search")
-        kernels = library(layout.KERNELS)
-        if (
-            kernels is None
-            or len(rows) < 2
-            or not world.address
-            or not world.covered(rows @ chain.gain.T + chain.offset)
-        ):
+        kernels = library(shortcut_layout.KERNELS)
+        if kernels is None or len(rows) < 2 or not motions.fast.covered(motions.joint_values(rows)):
             raise InputError("waypoints to shorten: expected a route of two or more that kernels can check")
-        if lengths.min(initial=0.0) < 0.0 or resolution <= 0.0:
-            raise InputError("shortcut search: weights of the length and the resolution must not be negative")
-        capacity = len(rows) + ROOM
+        if lengths.min(initial=0.0) < 0.0:
+            raise InputError("shortcut search: weights of the length must not be negative")
+        capacity = len(rows) + SPARE_WAYPOINTS
         route = np.zeros((capacity, dof))
         route[: len(rows)] = rows
-        joints = len(chain.parent)
         self._kernels = kernels
-        self._world, self._dof = world, dof  # its tables live as long as this search
+        self._motions, self._dof = motions, dof  # its tables live as long as this search
         self._table = table(
             {
-                layout.WORLD: world.address,
-                layout.DOF: dof,
-                layout.GAIN: np.ascontiguousarray(chain.gain, dtype=np.float64),
-                layout.OFFSET: np.ascontiguousarray(chain.offset, dtype=np.float64),
-                layout.REACH: np.append(finite_array(weights, (dof,), "weights"), resolution),
-                layout.METRIC: lengths * lengths,
-                layout.SHARE: np.array([share, pull]),
-                layout.ROUTE: route,
-                layout.PLACES: np.zeros(capacity),
-                layout.ENDS: np.zeros((2, dof)),
-                layout.VALUES: np.zeros((2, joints)),
-                layout.STARTS: np.zeros((3, dof)),
-                layout.GOALS: np.zeros((3, dof)),
-                layout.COUNT: len(rows),
-                layout.CAPACITY: capacity,
-                layout.RANDOM: seed % 2**62,
-                layout.TRIES: 0,
-                layout.MOST_TRIES: WHOLE,
-                layout.FAILURES: 0,
-                layout.PATIENCE: WHOLE,
-                layout.GAINS: 0,
-                layout.ASKS: int(asking),
-                layout.QUESTIONS: 0,
-                layout.ANSWERED: layout.NO_ANSWER,
-                layout.FIRST: 0,
-                layout.SECOND: 0,
-                layout.CUTS: 0,
+                shortcut_layout.MOTIONS: motions.address,
+                shortcut_layout.METRIC: lengths * lengths,
+                shortcut_layout.PROBABILITIES: np.array([share, pull]),
+                shortcut_layout.ROUTE: route,
+                shortcut_layout.ARC_LENGTHS: np.zeros(capacity),
+                shortcut_layout.ENDS: np.zeros((2, dof)),
+                shortcut_layout.QUESTION_STARTS: np.zeros((shortcut_layout.MAX_QUESTIONS, dof)),
+                shortcut_layout.QUESTION_ENDS: np.zeros((shortcut_layout.MAX_QUESTIONS, dof)),
+                shortcut_layout.COUNT: len(rows),
+                shortcut_layout.CAPACITY: capacity,
+                shortcut_layout.RANDOM: seed % 2**62,
+                shortcut_layout.TRIES: 0,
+                shortcut_layout.MAX_TRIES: NO_LIMIT,
+                shortcut_layout.FAILURES: 0,
+                shortcut_layout.PATIENCE: NO_LIMIT,
+                shortcut_layout.GAINS: 0,
+                shortcut_layout.RESOLVE: int(asking),
+                shortcut_layout.QUESTIONS: 0,
+                shortcut_layout.ANSWERED: shortcut_layout.NO_ANSWER,
+                shortcut_layout.FIRST: 0,
+                shortcut_layout.SECOND: 0,
+                shortcut_layout.CUTS: 0,
             }
         )
 
@@ -115,41 +97,41 @@ class ShortcutSearch:
     @property
     def capacity(self) -> int:
         """Waypoints that there is room for."""
-        return self._number(layout.CAPACITY)
+        return self._number(shortcut_layout.CAPACITY)
 
     @property
     def waypoints(self) -> Matrix:
         """The route as it is now, shape (k, dof); a copy."""
-        return self._rows(layout.ROUTE, self._number(layout.COUNT))
+        return self._rows(shortcut_layout.ROUTE, self._number(shortcut_layout.COUNT))
 
     @property
     def tries(self) -> int:
         """How many shortcuts have been tried."""
-        return self._number(layout.TRIES)
+        return self._number(shortcut_layout.TRIES)
 
     @property
     def gains(self) -> int:
         """How many of them have been taken."""
-        return self._number(layout.GAINS)
+        return self._number(shortcut_layout.GAINS)
 
     @property
     def questions(self) -> tuple[Matrix, Matrix]:
         """Starts and ends of the motions that must be answered before the search can go on, shape (k, dof) each."""
-        count = self._number(layout.QUESTIONS)
-        return self._rows(layout.STARTS, count), self._rows(layout.GOALS, count)
+        count = self._number(shortcut_layout.QUESTIONS)
+        return self._rows(shortcut_layout.QUESTION_STARTS, count), self._rows(shortcut_layout.QUESTION_ENDS, count)
 
     def answer(self, free: bool) -> None:
         """Answer whether all of the questions are free."""
-        self._table.header[layout.ANSWERED] = layout.ANSWER_YES if free else layout.ANSWER_NO
+        self._table.header[shortcut_layout.ANSWERED] = shortcut_layout.ANSWER_YES if free else shortcut_layout.ANSWER_NO
 
     def run(
         self,
         tries: int,
         *,
-        patience: int = WHOLE,
+        patience: int = NO_LIMIT,
         ask: Callable[[Matrix, Matrix], Mask] | None = None,
         stop: Callable[[], bool] | None = None,
-        chunk: int = CHUNK,
+        chunk: int = TRIES_PER_CALL,
     ) -> bool:
         """Go on until all tries are made, ``patience`` of them in a row gained nothing, or ``stop`` says so.
 
@@ -163,13 +145,13 @@ class ShortcutSearch:
         Returns:
             Whether the search came to its end.
         """
-        self._table.header[layout.MOST_TRIES] = min(tries, WHOLE)
-        self._table.header[layout.PATIENCE] = min(patience, WHOLE)
+        self._table.header[shortcut_layout.MAX_TRIES] = min(tries, NO_LIMIT)
+        self._table.header[shortcut_layout.PATIENCE] = min(patience, NO_LIMIT)
         while True:
             status = self._kernels.resume(self._table.address, chunk)
-            if status == layout.DONE:
+            if status == shortcut_layout.DONE:
                 return True
-            if status == layout.ASKING:
+            if status == shortcut_layout.ASKING:
                 self.answer(ask is not None and bool(np.all(ask(*self.questions))))
             if stop is not None and stop():
                 return False

@@ -1,4 +1,4 @@
-"""The kernel that shortens a route by random shortcuts: the whole loop, left only to ask or to let others look on.
+"""The kernel that shortens a route by random shortcuts: the whole loop, left only to ask or to report.
 
 A try is one of two. A shortcut takes two random places on the route, on its edges or at its waypoints, and goes
 straight from one to the other. A pull moves some joints of one waypoint towards the straight line between its
@@ -13,56 +13,76 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.fast.checks.motion_kernels import check_motion, copy_row, travel, whole_steps
-from rrtik_ompl.fast.search import shortcut_layout as table
+from rrtik_ompl.fast.search import shortcut_layout
+from rrtik_ompl.fast.search.motions.motion_kernels import check_motion, dof_of
+from rrtik_ompl.fast.search.motions.motion_layout import MotionAddress
+from rrtik_ompl.fast.search.motions.row_kernels import Row, copy_row, row_at
+from rrtik_ompl.fast.search.shortcut_layout import FIRST_INSIDE, SECOND_INSIDE, ShortcutAddress
 from rrtik_ompl.fast.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field
 from rrtik_ompl.fast.simd.random_kernels import next_share
 from rrtik_ompl.fast.tables.layout import COLLIDING, FREE, UNDECIDED
 
-PULLED_JOINTS = 0.5  # probability that a pull moves a joint
-LEAST_GAIN = 1e-6  # of the length, or a shortcut is not worth its checks
-TINY = 1e-9  # of an edge: nearer to a waypoint is at the waypoint
+PULL_PROBABILITY = 0.5  # of each joint in a pull
+MIN_GAIN = 1e-6  # of the length of the route, or a shortcut is not worth its checks
+WAYPOINT_TOLERANCE = 1e-9  # of the length of an edge: nearer to a waypoint is at the waypoint
 
 
 @inlined
-def waypoint(search: int, number: int) -> int:
+def motions_of(search: ShortcutAddress) -> MotionAddress:
+    """The motion table of the world."""
+    motions: MotionAddress = field(search, shortcut_layout.MOTIONS)
+    return motions
+
+
+@inlined
+def dof_in(search: ShortcutAddress) -> Any:
+    """How many numbers a configuration has."""
+    return dof_of(motions_of(search))
+
+
+@inlined
+def waypoint(search: ShortcutAddress, number: int) -> Any:
     """Address of a waypoint."""
-    address: int = field(search, table.ROUTE) + 8 * field(search, table.DOF) * number
-    return address
+    return row_at(field(search, shortcut_layout.ROUTE), dof_in(search), number)
 
 
 @inlined
-def end(search: int, number: int) -> int:
+def end(search: ShortcutAddress, number: int) -> Any:
     """Address of an end of the shortcut, 0 or 1."""
-    address: int = field(search, table.ENDS) + 8 * field(search, table.DOF) * number
-    return address
+    return row_at(field(search, shortcut_layout.ENDS), dof_in(search), number)
+
+
+@inlined
+def probability(search: ShortcutAddress, place: int) -> Any:
+    """WAYPOINT_END or PULL_TRY."""
+    return double_at(field(search, shortcut_layout.PROBABILITIES), place)
 
 
 @kernel
-def distance(search: int, a: int, b: int) -> float:
+def metric_distance(search: ShortcutAddress, a: Row, b: Row) -> float:
     """Length of the straight motion between two configurations."""
     total = 0.0
-    for k in range(field(search, table.DOF)):
+    for k in range(dof_in(search)):
         way = double_at(b, k) - double_at(a, k)
-        total += double_at(field(search, table.METRIC), k) * way * way
+        total += double_at(field(search, shortcut_layout.METRIC), k) * way * way
     length: float = np.sqrt(total)
     return length
 
 
 @kernel
-def measure_route(search: int, start: int) -> None:
+def measure_route(search: ShortcutAddress, start: int) -> None:
     """Length of the route up to each waypoint after ``start``."""
-    places = field(search, table.PLACES)
-    for k in range(start + 1, field(search, table.COUNT)):
-        way = distance(search, waypoint(search, k - 1), waypoint(search, k))
+    places = field(search, shortcut_layout.ARC_LENGTHS)
+    for k in range(start + 1, field(search, shortcut_layout.COUNT)):
+        way = metric_distance(search, waypoint(search, k - 1), waypoint(search, k))
         set_double(places, k, double_at(places, k - 1) + way)
 
 
 @kernel
-def edge_of(search: int, place: float) -> int:
+def edge_of(search: ShortcutAddress, place: float) -> int:
     """Number of the edge on which a place of the route lies, by bisection."""
-    places, low, high = field(search, table.PLACES), 0, field(search, table.COUNT) - 1
+    places, low, high = field(search, shortcut_layout.ARC_LENGTHS), 0, field(search, shortcut_layout.COUNT) - 1
     while high - low > 1:
         middle = (low + high) // 2
         if double_at(places, middle) <= place:
@@ -73,62 +93,62 @@ def edge_of(search: int, place: float) -> int:
 
 
 @kernel
-def random_place(search: int) -> Any:
+def random_place(search: ShortcutAddress) -> Any:
     """A random place on the route: its waypoint or edge, how much of the edge lies before it, and where that is."""
-    places, count = field(search, table.PLACES), field(search, table.COUNT)
-    if next_share(search, table.RANDOM) < double_at(field(search, table.SHARE), 0):
-        chosen = int(next_share(search, table.RANDOM) * count)
+    places, count = field(search, shortcut_layout.ARC_LENGTHS), field(search, shortcut_layout.COUNT)
+    if next_share(search, shortcut_layout.RANDOM) < probability(search, shortcut_layout.WAYPOINT_END):
+        chosen = int(next_share(search, shortcut_layout.RANDOM) * count)
         return chosen, 0.0, double_at(places, chosen)
-    place = next_share(search, table.RANDOM) * double_at(places, count - 1)
+    place = next_share(search, shortcut_layout.RANDOM) * double_at(places, count - 1)
     edge = edge_of(search, place)
     length = double_at(places, edge + 1) - double_at(places, edge)
     share = (place - double_at(places, edge)) / length if length > 0.0 else 0.0
-    if share < TINY:
+    if share < WAYPOINT_TOLERANCE:
         return edge, 0.0, double_at(places, edge)
-    if share > 1.0 - TINY:
+    if share > 1.0 - WAYPOINT_TOLERANCE:
         return edge + 1, 0.0, double_at(places, edge + 1)
     return edge, share, place
 
 
 @kernel
-def set_end(search: int, number: int, edge: int, share: float) -> None:
+def set_end(search: ShortcutAddress, number: int, edge: int, share: float) -> None:
     """Place an end of the shortcut, never outside the box between the waypoints around it."""
     a, target = waypoint(search, edge), end(search, number)
     if share == 0.0:
-        copy_row(field(search, table.DOF), a, target)
+        copy_row(dof_in(search), a, target)
         return
     b = waypoint(search, edge + 1)
-    for k in range(field(search, table.DOF)):
+    for k in range(dof_in(search)):
         low, high = min(double_at(a, k), double_at(b, k)), max(double_at(a, k), double_at(b, k))
         value = (1.0 - share) * double_at(a, k) + share * double_at(b, k)
         set_double(target, k, min(max(value, low), high))
 
 
 @kernel
-def propose_pull(search: int) -> bool:
+def propose_pull(search: ShortcutAddress) -> bool:
     """Draw a pull; whether it would gain something."""
-    chosen = 1 + int(next_share(search, table.RANDOM) * (field(search, table.COUNT) - 2))
+    chosen = 1 + int(next_share(search, shortcut_layout.RANDOM) * (field(search, shortcut_layout.COUNT) - 2))
     before, here, after = (waypoint(search, chosen - 1), waypoint(search, chosen), waypoint(search, chosen + 1))
-    first, second = distance(search, before, here), distance(search, here, after)
+    first, second = metric_distance(search, before, here), metric_distance(search, here, after)
     if first + second <= 0.0:
         return False
-    share, strength, target = first / (first + second), next_share(search, table.RANDOM), end(search, 0)
-    for k in range(field(search, table.DOF)):
+    share, strength, target = first / (first + second), next_share(search, shortcut_layout.RANDOM), end(search, 0)
+    for k in range(dof_in(search)):
         low, high = min(double_at(before, k), double_at(after, k)), max(double_at(before, k), double_at(after, k))
         straight = min(max((1.0 - share) * double_at(before, k) + share * double_at(after, k), low), high)
-        pulled = strength if next_share(search, table.RANDOM) < PULLED_JOINTS else 0.0
+        pulled = strength if next_share(search, shortcut_layout.RANDOM) < PULL_PROBABILITY else 0.0
         low, high = min(double_at(here, k), straight), max(double_at(here, k), straight)
         set_double(target, k, min(max((1.0 - pulled) * double_at(here, k) + pulled * straight, low), high))
-    set_field(search, table.FIRST, chosen)
-    set_field(search, table.CUTS, table.PULL)
-    total = double_at(field(search, table.PLACES), field(search, table.COUNT) - 1)
-    new_length = distance(search, before, target) + distance(search, target, after)
-    gain: bool = first + second - new_length > LEAST_GAIN * total
+    set_field(search, shortcut_layout.FIRST, chosen)
+    set_field(search, shortcut_layout.CUTS, shortcut_layout.PULL)
+    total = double_at(field(search, shortcut_layout.ARC_LENGTHS), field(search, shortcut_layout.COUNT) - 1)
+    new_length = metric_distance(search, before, target) + metric_distance(search, target, after)
+    gain: bool = first + second - new_length > MIN_GAIN * total
     return gain
 
 
 @kernel
-def propose_shortcut(search: int) -> bool:
+def propose_shortcut(search: ShortcutAddress) -> bool:
     """Draw a shortcut; whether it would gain something."""
     first, share, place = random_place(search)
     second, other_share, other_place = random_place(search)
@@ -136,130 +156,144 @@ def propose_shortcut(search: int) -> bool:
         first, share, place, second, other_share, other_place = second, other_share, other_place, first, share, place
     if first == second or (second == first + 1 and other_share == 0.0):  # both on one edge
         return False
-    cuts = (1 if share > 0.0 else 0) + (2 if other_share > 0.0 else 0)
-    if second == first + 1 and cuts == 3 and field(search, table.COUNT) == field(search, table.CAPACITY):
+    cuts = (FIRST_INSIDE if share > 0.0 else 0) + (SECOND_INSIDE if other_share > 0.0 else 0)
+    if (
+        second == first + 1
+        and cuts == FIRST_INSIDE + SECOND_INSIDE
+        and field(search, shortcut_layout.COUNT) == field(search, shortcut_layout.CAPACITY)
+    ):
         return False
-    set_field(search, table.FIRST, first)
-    set_field(search, table.SECOND, second)
-    set_field(search, table.CUTS, cuts)
+    set_field(search, shortcut_layout.FIRST, first)
+    set_field(search, shortcut_layout.SECOND, second)
+    set_field(search, shortcut_layout.CUTS, cuts)
     set_end(search, 0, first, share)
     set_end(search, 1, second, other_share)
-    total = double_at(field(search, table.PLACES), field(search, table.COUNT) - 1)
-    gain: bool = other_place - place - distance(search, end(search, 0), end(search, 1)) > LEAST_GAIN * total
+    total = double_at(field(search, shortcut_layout.ARC_LENGTHS), field(search, shortcut_layout.COUNT) - 1)
+    gain: bool = other_place - place - metric_distance(search, end(search, 0), end(search, 1)) > MIN_GAIN * total
     return gain
 
 
 @kernel
-def check_edge(search: int, a: int, b: int) -> int:
+def check_edge(search: ShortcutAddress, a: Row, b: Row) -> int:
     """Check a straight motion; one that is left undecided becomes a question. The same from both sides."""
-    world, dof, reach = field(search, table.WORLD), field(search, table.DOF), field(search, table.REACH)
-    gain, offset = field(search, table.GAIN), field(search, table.OFFSET)
-    steps = whole_steps(travel(dof, reach, a, b) / double_at(reach, dof))
-    resolve = field(search, table.ASKS) != 0
-    answer: int = check_motion(world, dof, gain, offset, a, b, steps, field(search, table.VALUES), resolve)
+    resolve = field(search, shortcut_layout.RESOLVE) != 0
+    answer: int = check_motion(motions_of(search), a, b, resolve)
     if answer == UNDECIDED:
-        number = field(search, table.QUESTIONS)
-        copy_row(dof, a, field(search, table.STARTS) + 8 * dof * number)
-        copy_row(dof, b, field(search, table.GOALS) + 8 * dof * number)
-        set_field(search, table.QUESTIONS, number + 1)
+        number, dof = field(search, shortcut_layout.QUESTIONS), dof_in(search)
+        copy_row(dof, a, row_at(field(search, shortcut_layout.QUESTION_STARTS), dof, number))
+        copy_row(dof, b, row_at(field(search, shortcut_layout.QUESTION_ENDS), dof, number))
+        set_field(search, shortcut_layout.QUESTIONS, number + 1)
     return answer
 
 
 @inlined
-def ends_of_part(search: int, part: int) -> Any:
+def ends_of_part(search: ShortcutAddress, part: int) -> Any:
     """Both ends of a motion to be checked: of a pull 0 and 1, else 0 for the shortcut, 1 and 2 for what is beside it.
 
     A part that does not exist has two ends that are the same.
     """
-    first, cuts = field(search, table.FIRST), field(search, table.CUTS)
+    first, cuts = field(search, shortcut_layout.FIRST), field(search, shortcut_layout.CUTS)
     near, far = end(search, 0), end(search, 1)
-    if cuts == table.PULL:
+    if cuts == shortcut_layout.PULL:
         return near, (waypoint(search, first + 2 * part - 1) if part < 2 else near)
     if part == 0:
         return near, far
     if part == 1:
-        return near, (waypoint(search, first) if cuts & 1 else near)
-    return far, (waypoint(search, field(search, table.SECOND) + 1) if cuts & 2 else far)
+        return near, (waypoint(search, first) if cuts & FIRST_INSIDE else near)
+    return far, (waypoint(search, field(search, shortcut_layout.SECOND) + 1) if cuts & SECOND_INSIDE else far)
 
 
 @kernel
-def check_parts(search: int) -> int:
+def check_parts(search: ShortcutAddress) -> int:
     """Check all motions that a shortcut or a pull would bring."""
-    set_field(search, table.QUESTIONS, 0)
+    set_field(search, shortcut_layout.QUESTIONS, 0)
     worst = FREE
-    for part in range(3):
+    for part in range(shortcut_layout.MAX_QUESTIONS):
         a, b = ends_of_part(search, part)
         if a != b:
             worst = max(worst, check_edge(search, a, b))
-        if worst == COLLIDING or (worst == UNDECIDED and field(search, table.ASKS) == 0):
+        if worst == COLLIDING or (worst == UNDECIDED and field(search, shortcut_layout.RESOLVE) == 0):
             break
     return worst
 
 
 @kernel
-def take_shortcut(search: int) -> None:
+def take_shortcut(search: ShortcutAddress) -> None:
     """Put the shortcut in place of what it cuts off."""
-    dof, count = field(search, table.DOF), field(search, table.COUNT)
-    first, second, cuts = field(search, table.FIRST), field(search, table.SECOND), field(search, table.CUTS)
-    kept_from = second + 1 if cuts & 2 else second  # the second end is that waypoint itself or lies before it
+    dof, count = dof_in(search), field(search, shortcut_layout.COUNT)
+    first, second = field(search, shortcut_layout.FIRST), field(search, shortcut_layout.SECOND)
+    cuts = field(search, shortcut_layout.CUTS)
+    kept_from = second + 1 if cuts & SECOND_INSIDE else second  # the second end is that waypoint or lies before it
     put = first + 1
-    tail = put + (cuts & 1) + (cuts >> 1)
+    tail = put + (1 if cuts & FIRST_INSIDE else 0) + (1 if cuts & SECOND_INSIDE else 0)
     moved = count - kept_from
-    size = 8 * dof
-    route = field(search, table.ROUTE)
+    source, sink = waypoint(search, kept_from), waypoint(search, tail)
     if tail <= kept_from:
-        copy_row(moved * dof, route + size * kept_from, route + size * tail)
+        copy_row(moved * dof, source, sink)
     else:  # it grows: from behind, so that nothing is overwritten before it is moved
         for k in range(moved * dof - 1, -1, -1):
-            set_double(route + size * tail, k, double_at(route + size * kept_from, k))
-    if cuts & 1:
+            set_double(sink, k, double_at(source, k))
+    if cuts & FIRST_INSIDE:
         copy_row(dof, end(search, 0), waypoint(search, put))
         put += 1
-    if cuts & 2:
+    if cuts & SECOND_INSIDE:
         copy_row(dof, end(search, 1), waypoint(search, put))
-    set_field(search, table.COUNT, tail + moved)
+    set_field(search, shortcut_layout.COUNT, tail + moved)
     measure_route(search, first)
 
 
+@inlined
+def count_up(search: ShortcutAddress, place: int) -> None:
+    """Add 1 to a field."""
+    set_field(search, place, field(search, place) + 1)
+
+
 @kernel
-def accept_or_reject(search: int, free: bool) -> None:
+def accept_or_reject(search: ShortcutAddress, free: bool) -> None:
     """Take the shortcut or the pull, or count a failure."""
     if not free:
-        set_field(search, table.FAILURES, field(search, table.FAILURES) + 1)
+        count_up(search, shortcut_layout.FAILURES)
         return
-    if field(search, table.CUTS) == table.PULL:
-        chosen = field(search, table.FIRST)
-        copy_row(field(search, table.DOF), end(search, 0), waypoint(search, chosen))
+    if field(search, shortcut_layout.CUTS) == shortcut_layout.PULL:
+        chosen = field(search, shortcut_layout.FIRST)
+        copy_row(dof_in(search), end(search, 0), waypoint(search, chosen))
         measure_route(search, chosen - 1)
     else:
         take_shortcut(search)
-    set_field(search, table.GAINS, field(search, table.GAINS) + 1)
-    set_field(search, table.FAILURES, 0)
+    count_up(search, shortcut_layout.GAINS)
+    set_field(search, shortcut_layout.FAILURES, 0)
+
+
+@inlined
+def is_done(search: ShortcutAddress) -> Any:
+    """Whether no further try is to be made."""
+    spent = field(search, shortcut_layout.TRIES) >= field(search, shortcut_layout.MAX_TRIES)
+    stuck = field(search, shortcut_layout.FAILURES) >= field(search, shortcut_layout.PATIENCE)
+    return spent or stuck or field(search, shortcut_layout.COUNT) < 3
 
 
 @entry
-def resume(search: int, budget: int) -> int:
+def resume(search: ShortcutAddress, budget: int) -> int:
     """Go on for at most ``budget`` tries. Returns DONE, RUNNING or ASKING."""
-    if field(search, table.TRIES) == 0:
+    if field(search, shortcut_layout.TRIES) == 0:
         measure_route(search, 0)
-    if field(search, table.QUESTIONS) > 0 and field(search, table.ANSWERED) == table.NO_ANSWER:
-        return table.ASKING
-    if field(search, table.QUESTIONS) > 0:
-        set_field(search, table.QUESTIONS, 0)
-        accept_or_reject(search, field(search, table.ANSWERED) == table.ANSWER_YES)
+    if field(search, shortcut_layout.QUESTIONS) > 0:
+        if field(search, shortcut_layout.ANSWERED) == shortcut_layout.NO_ANSWER:
+            return shortcut_layout.ASKING
+        set_field(search, shortcut_layout.QUESTIONS, 0)
+        accept_or_reject(search, field(search, shortcut_layout.ANSWERED) == shortcut_layout.ANSWER_YES)
     for _ in range(budget):
-        spent = field(search, table.TRIES) >= field(search, table.MOST_TRIES)
-        if spent or field(search, table.FAILURES) >= field(search, table.PATIENCE) or field(search, table.COUNT) < 3:
-            return table.DONE
-        set_field(search, table.TRIES, field(search, table.TRIES) + 1)
-        pulling = next_share(search, table.RANDOM) < double_at(field(search, table.SHARE), 1)
+        if is_done(search):
+            return shortcut_layout.DONE
+        count_up(search, shortcut_layout.TRIES)
+        pulling = next_share(search, shortcut_layout.RANDOM) < probability(search, shortcut_layout.PULL_TRY)
         if not (propose_pull(search) if pulling else propose_shortcut(search)):
             accept_or_reject(search, False)
             continue
         answer = check_parts(search)
-        if answer == UNDECIDED and field(search, table.ASKS) != 0:
-            set_field(search, table.ANSWERED, table.NO_ANSWER)
-            return table.ASKING
-        set_field(search, table.QUESTIONS, 0)
+        if answer == UNDECIDED and field(search, shortcut_layout.RESOLVE) != 0:
+            set_field(search, shortcut_layout.ANSWERED, shortcut_layout.NO_ANSWER)
+            return shortcut_layout.ASKING
+        set_field(search, shortcut_layout.QUESTIONS, 0)
         accept_or_reject(search, answer == FREE)
-    return table.RUNNING
+    return shortcut_layout.RUNNING

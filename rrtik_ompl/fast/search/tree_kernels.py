@@ -1,4 +1,4 @@
-"""Search trees for kernels: vertices in lanes for the nearest neighbour, and in float64 for the motions between them.
+"""Trees of RRT-Connect in kernels: vertices in lanes for the nearest neighbour, in float64 for motions.
 
 Vertices are counted from 0 in the order in which they came, so a parent comes before its children. A vertex that was
 cut off stays in place and is never the nearest again.
@@ -10,7 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from rrtik_ompl.fast.search.motions.row_kernels import Row, Values, copy_row, row_at
 from rrtik_ompl.fast.search.tree_layout import (
+    CAPACITY,
     CUT,
     DOF,
     JOINTS,
@@ -22,6 +24,7 @@ from rrtik_ompl.fast.search.tree_layout import (
     SIZE,
     STATES,
     VALUES,
+    TreeAddress,
 )
 from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import (
@@ -34,7 +37,6 @@ from rrtik_ompl.fast.simd.lanes import (
     int_at,
     lanes_at,
     lowest,
-    set_double,
     set_field,
     set_float,
     set_int,
@@ -42,39 +44,77 @@ from rrtik_ompl.fast.simd.lanes import (
     spread,
 )
 
-FAR = np.float32(1e15)  # a coordinate of what is no vertex
-ZERO, FARTHEST, LAST_BLOCK = np.float32(0.0), np.float32(3e38), np.float32(3e38)
+ABSENT_COORDINATE = np.float32(1e15)  # [rad or m] of what is no vertex: farther than any that is one
+UNBOUNDED_SQUARE = np.float32(3e38)  # [unit of the configurations, squared] more than any squared distance
+UNBOUNDED_BLOCK = np.float32(3e38)  # more than the number of any block
+ZERO = np.float32(0.0)
 
 
 @inlined
-def row_of(tree: int, vertex: int) -> Any:
+def row_of(tree: TreeAddress, vertex: int) -> Any:
     """Address of a vertex's configuration."""
-    return field(tree, ROWS) + 8 * field(tree, DOF) * vertex
+    return row_at(field(tree, ROWS), field(tree, DOF), vertex)
 
 
 @inlined
-def values_of(tree: int, vertex: int) -> Any:
+def values_of(tree: TreeAddress, vertex: int) -> Any:
     """Address of a vertex's joint values."""
-    return field(tree, VALUES) + 8 * field(tree, JOINTS) * vertex
+    return row_at(field(tree, VALUES), field(tree, JOINTS), vertex)
 
 
 @inlined
-def parent_of(tree: int, vertex: int) -> Any:
+def parent_of(tree: TreeAddress, vertex: int) -> Any:
     """The parent of a vertex, -1 for a root."""
     return int_at(field(tree, PARENTS), vertex)
 
 
 @inlined
-def state_of(tree: int, vertex: int) -> Any:
+def state_of(tree: TreeAddress, vertex: int) -> Any:
     """CERTAIN, OPEN or CUT."""
     return int_at(field(tree, STATES), vertex)
 
 
+@inlined
+def set_state(tree: TreeAddress, vertex: int, state: int) -> None:
+    """Set whether a vertex is CERTAIN, OPEN or CUT."""
+    set_int(field(tree, STATES), vertex, state)
+
+
+@inlined
+def radius_of(tree: TreeAddress, vertex: int) -> Any:
+    """Radius of a vertex's domain [unit of the configurations]."""
+    return float_at(field(tree, RADII), vertex)
+
+
+@inlined
+def set_radius(tree: TreeAddress, vertex: int, radius: float) -> None:
+    """Set the radius of a vertex's domain."""
+    set_float(field(tree, RADII), vertex, np.float32(radius))
+
+
+@inlined
+def live_of(tree: TreeAddress) -> Any:
+    """How many vertices are not cut off."""
+    return field(tree, LIVE)
+
+
+@inlined
+def is_full(tree: TreeAddress) -> Any:
+    """Whether a tree has no room for one more vertex."""
+    return field(tree, SIZE) >= field(tree, CAPACITY)
+
+
+@inlined
+def lane_place(dof: int, vertex: int, coordinate: int) -> Any:
+    """Which of the floats in lanes is a coordinate of a vertex."""
+    return (vertex // WIDTH * dof + coordinate) * WIDTH + vertex % WIDTH
+
+
 @kernel
-def nearest_vertex(tree: int, query: int) -> Any:
+def nearest_vertex(tree: TreeAddress, query: int) -> Any:
     """The vertex nearest to ``DOF`` floats; of several the first one."""
     dof, points = field(tree, DOF), field(tree, POINTS)
-    least, place = spread(FARTHEST), spread(ZERO)
+    least, place = spread(UNBOUNDED_SQUARE), spread(ZERO)
     for block in range((field(tree, SIZE) + WIDTH - 1) // WIDTH):
         total = spread(ZERO)
         for k in range(dof):
@@ -84,44 +124,41 @@ def nearest_vertex(tree: int, query: int) -> Any:
         least = choose(closer, total, least)
         place = choose(closer, spread(np.float32(block)), place)
     winners = least <= lowest(least)
-    block = lowest(choose(winners, place, spread(LAST_BLOCK)))
+    block = lowest(choose(winners, place, spread(UNBOUNDED_BLOCK)))
     return int(block) * WIDTH + first_bit(bits(winners & (place <= block)))
 
 
 @kernel
-def add_vertex(tree: int, row: int, values: int, parent: int, state: int, radius: float) -> Any:
+def add_vertex(tree: TreeAddress, row: Row, values: Values, parent: int, state: int, radius: float) -> Any:
     """Append a vertex; there must be room. Returns its number."""
     dof, vertex = field(tree, DOF), field(tree, SIZE)
-    block, lane = vertex // WIDTH, vertex % WIDTH
     points = field(tree, POINTS)
-    if lane == 0:
-        set_lanes(points, block * dof, spread(FAR))
+    if vertex % WIDTH == 0:
+        set_lanes(points, vertex // WIDTH * dof, spread(ABSENT_COORDINATE))
+    copy_row(dof, row, row_of(tree, vertex))
     for k in range(dof):
-        set_double(row_of(tree, vertex), k, double_at(row, k))
-        set_float(points, (block * dof + k) * WIDTH + lane, np.float32(double_at(row, k)))
+        set_float(points, lane_place(dof, vertex, k), np.float32(double_at(row, k)))
     if field(tree, VALUES) != field(tree, ROWS):
-        for k in range(field(tree, JOINTS)):
-            set_double(values_of(tree, vertex), k, double_at(values, k))
+        copy_row(field(tree, JOINTS), values, values_of(tree, vertex))
     set_int(field(tree, PARENTS), vertex, parent)
-    set_int(field(tree, STATES), vertex, state)
-    set_float(field(tree, RADII), vertex, np.float32(radius))
+    set_state(tree, vertex, state)
+    set_radius(tree, vertex, radius)
     set_field(tree, SIZE, vertex + 1)
     set_field(tree, LIVE, field(tree, LIVE) + 1)
     return vertex
 
 
 @kernel
-def cut_vertex(tree: int, vertex: int) -> int:
+def cut_vertex(tree: TreeAddress, vertex: int) -> int:
     """Cut one vertex off, not its descendants."""
-    set_int(field(tree, STATES), vertex, CUT)
+    set_state(tree, vertex, CUT)
     set_field(tree, LIVE, field(tree, LIVE) - 1)
-    place = vertex // WIDTH * field(tree, DOF) * WIDTH + vertex % WIDTH
-    set_float(field(tree, POINTS), place, FAR)
+    set_float(field(tree, POINTS), lane_place(field(tree, DOF), vertex, 0), ABSENT_COORDINATE)
     return vertex
 
 
 @kernel
-def cut_branch(tree: int, vertex: int) -> Any:
+def cut_branch(tree: TreeAddress, vertex: int) -> Any:
     """Cut a vertex and all its descendants off; returns how many vertices are left."""
     if state_of(tree, vertex) != CUT:
         cut_vertex(tree, vertex)
@@ -133,7 +170,7 @@ def cut_branch(tree: int, vertex: int) -> Any:
 
 
 @kernel
-def clear_tree(tree: int) -> int:
+def clear_tree(tree: TreeAddress) -> int:
     """Forget all vertices."""
     set_field(tree, SIZE, 0)
     set_field(tree, LIVE, 0)

@@ -158,7 +158,7 @@ def test_neither_the_budget_nor_the_room_changes_a_search(monkeypatch: Any) -> N
     usual = [grown(problem, seed) for seed in range(3)]
     assert max(len(tree) for trees in usual for tree in trees) > axis_search.FIRST_CAPACITY
     monkeypatch.setattr(axis_search, "FIRST_BUDGET", 1)
-    monkeypatch.setattr(axis_search, "LEAST_PAUSE", 0.0)
+    monkeypatch.setattr(axis_search, "MIN_PAUSE", 0.0)
     monkeypatch.setattr(axis_search, "FIRST_CAPACITY", 16)
     for seed, trees in enumerate(usual):
         for mine, theirs in zip(grown(problem, seed), trees, strict=True):

@@ -26,8 +26,7 @@ LOW, HIGH = np.zeros(2), np.full(2, 20.0)
 def repairing(world, eps=1.0, iterations=4000, tries=24):
     low, high = world.robot.finite_range()
     return PathRepair(
-        world.fast, world.robot.chain, low, high, weights=world.weights, resolution=world.motion_resolution, eps=eps,
-        iterations=iterations, tries=tries, patience=tries,
+        world.motions, low, high, eps=eps, iterations=iterations, tries=tries, patience=tries
     )  # fmt: skip
 
 
@@ -73,10 +72,10 @@ def test_a_look_finds_what_python_finds_and_asks_for_as_many_configurations(name
 def test_a_repair_keeps_both_ends_and_the_free_pieces_next_to_them():
     world, path = walled()
     repair = repairing(world)
-    assert not repair.look(path)
+    assert not repair.check(path)
     for seed in range(20):
         found = repair.repair(seed, no_stop)
-        repair.look(path)
+        repair.check(path)
         assert free(world, found)
         assert (found[[0, -1]] == path[[0, -1]]).all()
         assert np.linalg.norm(np.diff(found, axis=0), axis=1).sum() < 40.0
@@ -86,7 +85,7 @@ def test_the_same_seed_gives_the_same_repair():
     world, path = walled()
     found = []
     for repair in (repairing(world), repairing(world)):
-        repair.look(path)
+        repair.check(path)
         found.append(repair.repair(5, no_stop))
     assert (found[0] == found[1]).all()
 
@@ -95,9 +94,9 @@ def test_from_scratch_none_of_the_path_is_kept():
     world, path = walled()
     bent = np.vstack([path[:1], [[4.0, 2.0]], path[1:]])
     repair = repairing(world)
-    repair.look(bent)
+    repair.check(bent)
     assert (repair.repair(1, no_stop) == bent[1]).all(axis=1).any()
-    repair.look(bent)
+    repair.check(bent)
     assert not (repair.repair(1, no_stop, forgetting=True) == bent[1]).all(axis=1).any()
 
 
@@ -106,7 +105,7 @@ def test_a_blocked_end_has_no_repair(end):
     world, path = walled()
     path[end] = [10.0, 10.0]
     repair = repairing(world)
-    assert not repair.look(path)
+    assert not repair.check(path)
     assert repair.repair(0, no_stop) is None
 
 
@@ -115,31 +114,31 @@ def test_a_search_gives_up_when_told_to_and_when_its_samples_are_spent():
     path = np.array([[1.0, 10.0], [19.0, 10.0]])
     told, spent = repairing(world, iterations=10**9), repairing(world, iterations=300)
     for repair, stop in ((told, lambda: True), (spent, no_stop)):
-        assert not repair.look(path)
+        assert not repair.check(path)
         assert repair.repair(0, stop) is None
 
 
 def test_memory_grows_with_what_a_path_needs():
     world, path = walled()
     repair = repairing(world, eps=0.02, iterations=10**6, tries=0)
-    assert not repair.look(path)
+    assert not repair.check(path)
     found = repair.repair(2, no_stop)
     assert len(found) > 256
     assert free(world, found)
-    assert repair.look(found)
+    assert repair.check(found)
 
 
 def test_a_path_of_one_configuration_can_be_looked_at():
     world, path = walled()
     repair = repairing(world)
-    assert repair.look(path[:1])
-    assert not repair.look(np.array([[10.0, 10.0]]))
+    assert repair.check(path[:1])
+    assert not repair.check(np.array([[10.0, 10.0]]))
 
 
 def test_points_at_which_a_path_goes_straight_on_fall_away():
     world, path = walled()
     repair = repairing(world)
-    repair.look(path)
+    repair.check(path)
     found = repair.repair(3, no_stop)
     ways = np.diff(found, axis=0)
     lengths = np.linalg.norm(ways, axis=1)
@@ -150,9 +149,9 @@ def test_points_at_which_a_path_goes_straight_on_fall_away():
 def test_what_has_moved_is_seen_by_the_next_look():
     world, path = walled()
     repair = repairing(world)
-    assert not repair.look(path)
+    assert not repair.check(path)
     world.move(Scene((wall(40.0, 12.0),)))
-    assert repair.look(path)
+    assert repair.check(path)
 
 
 def test_a_world_without_kernels_is_refused(monkeypatch):

@@ -10,6 +10,7 @@ import pytest
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast import FREE, UNDECIDED, FastWorld
+from rrtik_ompl.fast.search.motions.motion_table import MotionTable
 from rrtik_ompl.fast.search.shortcut import ShortcutSearch
 from rrtik_ompl.transitions import route_length
 from rrtik_tests.random_cases import KINDS, Case, arm, joint_values
@@ -26,6 +27,12 @@ def judge(world, chain, a, b, weights):
     steps = max(1, int(np.ceil(weights @ np.abs(b - a) / RESOLUTION - 1e-9)))
     ends = (row[None] @ chain.gain.T + chain.offset for row in (a, b))
     return world.classify_edges(*ends, [steps])[0]
+
+
+def shortcuts(world, chain, route, *, weights, resolution, **options):
+    """The search in a world whose motions are checked by this rule."""
+    motions = MotionTable(world, chain.gain, chain.offset, weights=weights, resolution=resolution)
+    return ShortcutSearch(motions, route, **options)
 
 
 class Wandering:
@@ -50,7 +57,7 @@ class Wandering:
 
     def search(self, seed=0, **options):
         given = {"weights": self.weights, "resolution": RESOLUTION, "seed": seed, **options}
-        return ShortcutSearch(self.world, self.chain, self.route, **given)
+        return shortcuts(self.world, self.chain, self.route, **given)
 
 
 WANDERINGS = [("titan4", 1), ("slider", 3), ("panda", 17), ("titan4", 4)]
@@ -137,7 +144,7 @@ def test_the_search_waits_for_its_answer():
     route = np.array([[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
     solids[1].geometry.computeLocalAABB()
     for free, count in ((True, 2), (False, 3)):
-        search = ShortcutSearch(world, robot.chain, route, weights=np.ones(3), resolution=0.05, share=1.0, pull=0.0)
+        search = shortcuts(world, robot.chain, route, weights=np.ones(3), resolution=0.05, share=1.0, pull=0.0)
         looks = []
         search.run(100, ask=lambda A, B, free=free, looks=looks: looks.append((A, B)) or np.full(len(A), free))
         np.testing.assert_array_equal(np.stack(looks[0]), [[[-1.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]]])
@@ -164,7 +171,7 @@ def test_shortcuts_come_near_the_shortest_route(kind, worst):
     shortest = 2.0 * np.hypot(1.0, 0.5)
     for seed in range(5):
         options = {"weights": np.ones(3), "resolution": 0.01, "seed": seed, **kind}
-        search = ShortcutSearch(world, robot.chain, ROUTE_OVER, **options)
+        search = shortcuts(world, robot.chain, ROUTE_OVER, **options)
         assert search.run(3000, patience=1500)
         assert shortest - 0.02 < route_length(search.waypoints) < worst * shortest
 
@@ -172,7 +179,7 @@ def test_shortcuts_come_near_the_shortest_route(kind, worst):
 def test_patience_ends_a_search_that_gains_nothing():
     robot, world = wall_world()
     tent = np.array([[-1, 0, 0], [0, 0, 0.52], [1, 0, 0]])
-    search = ShortcutSearch(world, robot.chain, tent, weights=np.ones(3), resolution=0.01, share=1.0)
+    search = shortcuts(world, robot.chain, tent, weights=np.ones(3), resolution=0.01, share=1.0)
     assert search.run(10**9, patience=50)
     assert search.tries == 50
     np.testing.assert_array_equal(search.waypoints, tent)
@@ -182,7 +189,7 @@ def test_the_metric_says_what_is_short():
     robot, world = wall_world()
     metric = np.array([1.0, 1.0, 0.0])  # to climb costs nothing
     options = {"weights": np.ones(3), "resolution": 0.01, "metric": metric}
-    search = ShortcutSearch(world, robot.chain, ROUTE_OVER, **options)
+    search = shortcuts(world, robot.chain, ROUTE_OVER, **options)
     search.run(3000)
     assert route_length(ROUTE_OVER * metric) > 3.0
     assert route_length(search.waypoints * metric) < 1.01 * 2.0
@@ -192,18 +199,18 @@ def test_the_metric_says_what_is_short():
 def test_repeated_waypoints_and_a_route_of_two_are_taken():
     robot, world = wall_world()
     options = {"weights": np.ones(3), "resolution": 0.01}
-    search = ShortcutSearch(world, robot.chain, np.repeat(ROUTE_OVER, 3, axis=0), **options)
+    search = shortcuts(world, robot.chain, np.repeat(ROUTE_OVER, 3, axis=0), **options)
     search.run(1000)
     assert np.isfinite(search.waypoints).all()
     assert route_length(search.waypoints) < route_length(ROUTE_OVER)
-    pair = ShortcutSearch(world, robot.chain, ROUTE_OVER[:2], **options)
+    pair = shortcuts(world, robot.chain, ROUTE_OVER[:2], **options)
     assert pair.run(1000)
     np.testing.assert_array_equal(pair.waypoints, ROUTE_OVER[:2])
 
 
 def test_a_route_may_grow_by_many_waypoints():
     robot, world = wall_world()
-    search = ShortcutSearch(world, robot.chain, ROUTE_OVER, weights=np.ones(3), resolution=0.01, share=0.0)
+    search = shortcuts(world, robot.chain, ROUTE_OVER, weights=np.ones(3), resolution=0.01, share=0.0)
     search.run(200_000)
     assert len(search.waypoints) <= len(ROUTE_OVER) + 256
     assert route_length(search.waypoints) < route_length(ROUTE_OVER)
@@ -213,11 +220,11 @@ def test_a_route_may_grow_by_many_waypoints():
 def test_routes_that_are_none_are_refused(route):
     robot, world = wall_world()
     with pytest.raises(InputError, match="waypoints to shorten"):
-        ShortcutSearch(world, robot.chain, route, weights=np.ones(3), resolution=0.01)
+        shortcuts(world, robot.chain, route, weights=np.ones(3), resolution=0.01)
 
 
 @pytest.mark.parametrize("wrong", [{"metric": [1, -1, 1]}, {"metric": [1, 1]}, {"resolution": 0.0}, {"weights": [1]}])
 def test_options_that_make_no_sense_are_refused(wrong):
     robot, world = wall_world()
     with pytest.raises(InputError):
-        ShortcutSearch(world, robot.chain, ROUTE_OVER, **{"weights": np.ones(3), "resolution": 0.01, **wrong})
+        shortcuts(world, robot.chain, ROUTE_OVER, **{"weights": np.ones(3), "resolution": 0.01, **wrong})

@@ -4,33 +4,36 @@ from __future__ import annotations
 
 from typing import Any
 
-from rrtik_ompl.fast.search.crdt import layout as table
+from rrtik_ompl.fast.search.crdt import layout as crdt_layout
+from rrtik_ompl.fast.search.crdt.fields import dof_in, extension_row, rule_of
+from rrtik_ompl.fast.search.crdt.layout import CrdtAddress
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
-from rrtik_ompl.fast.simd.lanes import double_at, field, int_at, set_double, set_int
+from rrtik_ompl.fast.simd.lanes import field, int_at, set_double, set_int
 from rrtik_ompl.fast.simd.random_kernels import next_share
 
 
 @inlined
-def draw(search: int) -> Any:
+def draw(search: CrdtAddress) -> Any:
     """The next number of the stream, from 0 to 1, less than 1."""
-    return next_share(search, table.RANDOM)
+    return next_share(search, crdt_layout.RANDOM)
 
 
 @inlined
-def sample(search: int) -> None:
+def sample(search: CrdtAddress) -> None:
     """Draw a target within the bounds."""
-    for axis in range(field(search, table.DOF)):
-        low, high = double_at(field(search, table.LOWER), axis), double_at(field(search, table.UPPER), axis)
+    for axis in range(dof_in(search)):
+        low = rule_of(search, crdt_layout.SAMPLE_LOWER, axis)
+        high = rule_of(search, crdt_layout.SAMPLE_UPPER, axis)
         share = draw(search)
-        set_double(field(search, table.TARGET), axis, min(low + share * (high - low), high))
+        set_double(extension_row(search, crdt_layout.TARGET), axis, min(low + share * (high - low), high))
 
 
 @kernel
-def shuffle(search: int) -> None:
+def shuffle(search: CrdtAddress) -> None:
     """The axes that may move, in random order."""
-    order, count = field(search, table.ORDER), field(search, table.AXIS_COUNT)
+    order, count = field(search, crdt_layout.ORDER), field(search, crdt_layout.AXIS_COUNT)
     for k in range(count):
-        set_int(order, k, int_at(field(search, table.AXES), k))
+        set_int(order, k, int_at(field(search, crdt_layout.AXES), k))
     for k in range(count - 1, 0, -1):
         other = int(draw(search) * (k + 1))
         axis = int_at(order, k)
@@ -39,9 +42,9 @@ def shuffle(search: int) -> None:
 
 
 @inlined
-def to_front(search: int, axis: int) -> None:
+def to_front(search: CrdtAddress, axis: int) -> None:
     """Let an axis go first and the others keep their order."""
-    order, k = field(search, table.ORDER), 0
+    order, k = field(search, crdt_layout.ORDER), 0
     while int_at(order, k) != axis:
         k += 1
     for place in range(k, 0, -1):

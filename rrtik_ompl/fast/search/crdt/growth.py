@@ -7,226 +7,173 @@ from __future__ import annotations
 
 from typing import Any
 
-from rrtik_ompl.fast.checks.motion_kernels import check_motion, copy_row, travel, whole_steps
-from rrtik_ompl.fast.search.crdt import layout as table
+from rrtik_ompl.fast.search.crdt import layout as crdt_layout
 from rrtik_ompl.fast.search.crdt.draws import draw, shuffle, to_front
-from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
-from rrtik_ompl.fast.simd.lanes import (
-    choose,
-    double_at,
-    field,
-    int_at,
-    lane_numbers,
-    rounded_sum,
-    set_double,
-    set_field,
-    set_int,
-    set_wide_lanes,
-    spread_wide,
-    wide_lanes_at,
+from rrtik_ompl.fast.search.crdt.fields import dof_in, edge_end, edge_start, extension_row, motions_of, rule_of
+from rrtik_ompl.fast.search.crdt.layout import BACK, BETWEEN, BEYOND, ONWARD, CrdtAddress, CrdtTreeAddress
+from rrtik_ompl.fast.search.crdt.tree_kernels import (
+    add_crdt_vertex,
+    coordinate,
+    crdt_parent_of,
+    read_vertex,
+    set_crdt_parent,
+    size_of,
 )
+from rrtik_ompl.fast.search.motions.motion_kernels import check_motion, resolves
+from rrtik_ompl.fast.search.motions.row_kernels import Row, copy_row
+from rrtik_ompl.fast.simd.compiled import inlined, kernel
+from rrtik_ompl.fast.simd.lanes import double_at, field, int_at, set_double, set_field, set_int
 from rrtik_ompl.fast.tables.layout import COLLIDING, FREE, UNDECIDED
 
-FARTHEST = 1e300
-
 
 @inlined
-def coordinate(tree: int, vertex: int, axis: int) -> Any:
-    """A coordinate of a vertex."""
-    return double_at(field(tree, table.COORDINATES), axis * field(tree, table.CAPACITY) + vertex)
-
-
-@inlined
-def read_vertex(search: int, tree: int, vertex: int, sink: int) -> None:
-    """Copy the coordinates of a vertex to an address."""
-    for axis in range(field(search, table.DOF)):
-        set_double(sink, axis, coordinate(tree, vertex, axis))
-
-
-@inlined
-def add_vertex(search: int, tree: int, row: int, parent: int) -> Any:
-    """Add the coordinates at an address to a tree that has room; returns the number of the vertex."""
-    vertex = field(tree, table.SIZE)
-    for axis in range(field(search, table.DOF)):
-        set_double(field(tree, table.COORDINATES), axis * field(tree, table.CAPACITY) + vertex, double_at(row, axis))
-    set_int(field(tree, table.PARENTS), vertex, parent)
-    set_field(tree, table.SIZE, vertex + 1)
-    return vertex
-
-
-@kernel
-def nearest_vertex(search: int, tree: int) -> int:
-    """The vertex nearest to the target in the scaled metric; among equals the oldest."""
-    target, scale, coordinates = field(search, table.TARGET), field(search, table.SCALE), field(tree, table.COORDINATES)
-    count, run = field(tree, table.SIZE), field(tree, table.CAPACITY) // WIDTH
-    lowest, holder = spread_wide(FARTHEST), spread_wide(0.0)
-    for block in range((count + WIDTH - 1) // WIDTH):
-        total = spread_wide(0.0)
-        for axis in range(field(search, table.DOF)):
-            way = (wide_lanes_at(coordinates, axis * run + block) - double_at(target, axis)) * double_at(scale, axis)
-            total = rounded_sum(total, way * way)
-        numbers = lane_numbers() + float(block * WIDTH)
-        total = choose(numbers < float(count), total, spread_wide(FARTHEST))
-        nearer = total < lowest
-        lowest, holder = choose(nearer, total, lowest), choose(nearer, numbers, holder)
-    distances = field(search, table.DISTANCES)
-    set_wide_lanes(distances, 0, lowest)
-    set_wide_lanes(distances, 1, holder)
-    best = 0
-    for lane in range(1, WIDTH):
-        a, b = double_at(distances, lane), double_at(distances, best)
-        if a < b or (a == b and double_at(distances, WIDTH + lane) < double_at(distances, WIDTH + best)):
-            best = lane
-    return int(double_at(distances, WIDTH + best))
-
-
-@inlined
-def hold(search: int, tree: int, near: int) -> None:
+def hold_idle_axes(search: CrdtAddress, tree: CrdtTreeAddress, near: int) -> None:
     """Let each coordinate of the target stay as it is at a vertex if it does not take part this time."""
-    for axis in range(field(search, table.DOF)):
-        chance = double_at(field(search, table.CHANCE), axis)
+    for axis in range(dof_in(search)):
+        chance = rule_of(search, crdt_layout.CHANCE, axis)
         if chance < 1.0 and draw(search) >= chance:
-            set_double(field(search, table.TARGET), axis, coordinate(tree, near, axis))
+            set_double(extension_row(search, crdt_layout.TARGET), axis, coordinate(tree, near, axis))
 
 
 @inlined
-def remembered_axis(search: int, tree: int, vertex: int, parent: int) -> int:
+def remembered_axis(search: CrdtAddress, tree: CrdtTreeAddress, vertex: int, parent: int) -> int:
     """The axis of the edge that leads to a vertex."""
     axis = 0
-    while axis < field(search, table.DOF) - 1 and coordinate(tree, vertex, axis) == coordinate(tree, parent, axis):
+    while axis < dof_in(search) - 1 and coordinate(tree, vertex, axis) == coordinate(tree, parent, axis):
         axis += 1
     return axis
 
 
 @kernel
-def add_edge(search: int, axis: int, start: Any, end: Any) -> None:
+def add_edge(search: CrdtAddress, axis: int, start: Any, end: Any) -> None:
     """Put an edge along an axis through the current row on the list."""
-    count, dof, current = field(search, table.EDGE_COUNT), field(search, table.DOF), field(search, table.CURRENT)
-    first, second = field(search, table.STARTS) + 8 * dof * count, field(search, table.ENDS) + 8 * dof * count
+    count, dof = field(search, crdt_layout.EDGE_COUNT), dof_in(search)
+    current = extension_row(search, crdt_layout.CURRENT)
+    first, second = edge_start(search, count), edge_end(search, count)
     copy_row(dof, current, first)
     copy_row(dof, current, second)
     set_double(first, axis, start)
     set_double(second, axis, end)
-    set_field(search, table.EDGE_COUNT, count + 1)
+    set_field(search, crdt_layout.EDGE_COUNT, count + 1)
 
 
 @inlined
 def turning(came_from: Any, here: Any, there: Any) -> int:
     """How a leg from ``here`` to ``there`` goes on after a move that came from ``came_from``."""
     if here == came_from or (here - came_from) * (there - here) > 0.0:
-        return table.ONWARD
+        return ONWARD
     beyond = there - came_from
     if beyond == 0.0:
-        return table.BACK
-    return table.BETWEEN if (here - came_from) * beyond > 0.0 else table.BEYOND
+        return BACK
+    return BETWEEN if (here - came_from) * beyond > 0.0 else BEYOND
 
 
 @inlined
 def shortest_piece(turn: int, came_from: Any, here: Any, there: Any) -> Any:
     """Length of the shortest edge that a leg would leave in the tree."""
     length = abs(there - here)
-    return min(length, abs(there - came_from)) if turn in (table.BETWEEN, table.BEYOND) else length
+    return min(length, abs(there - came_from)) if turn in (BETWEEN, BEYOND) else length
 
 
 @kernel
-def aim(search: int, tree: int, near: int, exactly: bool) -> None:
+def lay_out(search: CrdtAddress, tree: CrdtTreeAddress, near: int, exactly: bool) -> None:
     """Lay out the way from a vertex to the target, one axis after the other: the axis that led to the vertex first.
 
     A leg shorter than the smallest move ends the way; towards a target that need not be met exactly it is left out.
     """
-    parent, current = int_at(field(tree, table.PARENTS), near), field(search, table.CURRENT)
+    parent, current = crdt_parent_of(tree, near), extension_row(search, crdt_layout.CURRENT)
     if not exactly:
-        hold(search, tree, near)
+        hold_idle_axes(search, tree, near)
     shuffle(search)
-    if parent != table.ROOT:  # a root has no direction to remember
+    if parent != crdt_layout.ROOT:  # a root has no direction to remember
         to_front(search, remembered_axis(search, tree, near, parent))
-    read_vertex(search, tree, near, current)
-    set_field(search, table.NEAR, near)
-    set_field(search, table.TURN, table.ONWARD)
-    set_field(search, table.FIRST_EDGES, 0)
-    set_field(search, table.EDGE_COUNT, 0)
-    set_field(search, table.COMPLETE, 1)
+    read_vertex(tree, dof_in(search), near, current)
+    set_field(search, crdt_layout.NEAR, near)
+    set_field(search, crdt_layout.TURN, ONWARD)
+    set_field(search, crdt_layout.FIRST_EDGES, 0)
+    set_field(search, crdt_layout.EDGE_COUNT, 0)
+    set_field(search, crdt_layout.COMPLETE, 1)
     legs = 0
-    for k in range(field(search, table.AXIS_COUNT)):
-        axis = int_at(field(search, table.ORDER), k)
-        here, there = double_at(current, axis), double_at(field(search, table.TARGET), axis)
-        came_from = here if legs > 0 or parent == table.ROOT else coordinate(tree, parent, axis)
+    for k in range(field(search, crdt_layout.AXIS_COUNT)):
+        axis = int_at(field(search, crdt_layout.ORDER), k)
+        here, there = double_at(current, axis), double_at(extension_row(search, crdt_layout.TARGET), axis)
+        came_from = here if legs > 0 or parent == crdt_layout.ROOT else coordinate(tree, parent, axis)
         turn = turning(came_from, here, there)
         if here == there:
             continue
-        if shortest_piece(turn, came_from, here, there) < double_at(field(search, table.SMALLEST_MOVE), axis):
+        if shortest_piece(turn, came_from, here, there) < rule_of(search, crdt_layout.SMALLEST_MOVE, axis):
             if exactly:
-                set_field(search, table.COMPLETE, 0)
+                set_field(search, crdt_layout.COMPLETE, 0)
                 break
             continue
-        if turn in (table.ONWARD, table.BETWEEN):
+        if turn in (ONWARD, BETWEEN):
             add_edge(search, axis, here, there)
-        if turn in (table.BETWEEN, table.BEYOND):  # the edge to the vertex is split, or left out: the way has no turn
+        if turn in (BETWEEN, BEYOND):  # the edge to the vertex is split, or left out: the way has no turn
             add_edge(search, axis, came_from, there)
         if legs == 0:
-            set_field(search, table.TURN, turn)
-            set_field(search, table.FIRST_EDGES, field(search, table.EDGE_COUNT))
+            set_field(search, crdt_layout.TURN, turn)
+            set_field(search, crdt_layout.FIRST_EDGES, field(search, crdt_layout.EDGE_COUNT))
         set_double(current, axis, there)
         legs += 1
 
 
 @kernel
-def check_edge(search: int, start: int, end: int) -> int:
-    """Check the motion between two configurations by the same configurations as the world, whatever its direction."""
-    dof = field(search, table.DOF)
-    for axis in range(dof):
+def check_edge(search: CrdtAddress, start: Row, end: Row) -> int:
+    """Check the motion between two configurations as the world does, whatever its direction."""
+    for axis in range(dof_in(search)):
         a, b = double_at(start, axis), double_at(end, axis)
-        least, most = double_at(field(search, table.LEAST), axis), double_at(field(search, table.MOST), axis)
-        if min(a, b) < least or max(a, b) > most:
+        lower, upper = rule_of(search, crdt_layout.LIMIT_LOWER, axis), rule_of(search, crdt_layout.LIMIT_UPPER, axis)
+        if min(a, b) < lower or max(a, b) > upper:
             return COLLIDING
-    way = travel(dof, field(search, table.WEIGHTS), start, end)
-    steps = whole_steps(way / double_at(field(search, table.NUMBERS), table.RESOLUTION))
-    world, gain, offset = field(search, table.WORLD), field(search, table.GAIN), field(search, table.OFFSET)
-    resolve = field(search, table.ASKS) != 0
-    answer: int = check_motion(world, dof, gain, offset, start, end, steps, field(search, table.VALUES), resolve)
+    motions = motions_of(search)
+    answer: int = check_motion(motions, start, end, resolves(motions))
     return answer
 
 
 @kernel
-def open_edges(search: int) -> int:
+def check_extension(search: CrdtAddress) -> int:
     """Check the edges of the extension up to the first that is not free; returns how many want an answer."""
-    stride, count, open_ = 8 * field(search, table.DOF), field(search, table.EDGE_COUNT), 0
+    count, open_, resolve = field(search, crdt_layout.EDGE_COUNT), 0, resolves(motions_of(search))
     for edge in range(count):
-        verdict = check_edge(
-            search, field(search, table.STARTS) + edge * stride, field(search, table.ENDS) + edge * stride
-        )
+        verdict = check_edge(search, edge_start(search, edge), edge_end(search, edge))
         if verdict == UNDECIDED:
-            verdict = UNDECIDED if field(search, table.ASKS) != 0 else COLLIDING
-            open_ += 1 if field(search, table.ASKS) != 0 else 0
-        set_int(field(search, table.VERDICTS), edge, verdict)
+            verdict = UNDECIDED if resolve else COLLIDING
+            open_ += 1 if resolve else 0
+        set_int(field(search, crdt_layout.VERDICTS), edge, verdict)
         if verdict == COLLIDING:
-            set_field(search, table.EDGE_COUNT, edge + 1)
+            set_field(search, crdt_layout.EDGE_COUNT, edge + 1)
             break
     return open_
 
 
-@kernel
-def keep(search: int, tree: int) -> int:
-    """Add the free leading part of the extension to the tree; returns what was achieved."""
-    count, first, near = field(search, table.EDGE_COUNT), field(search, table.FIRST_EDGES), field(search, table.NEAR)
-    stride, turn, known = 8 * field(search, table.DOF), field(search, table.TURN), field(tree, table.SIZE)
+@inlined
+def count_free(search: CrdtAddress) -> int:
+    """How many edges at the beginning of the extension are free."""
     free = 0
-    while free < count and int_at(field(search, table.VERDICTS), free) == FREE:
+    while free < field(search, crdt_layout.EDGE_COUNT) and int_at(field(search, crdt_layout.VERDICTS), free) == FREE:
         free += 1
-    set_field(search, table.MOTIONS, field(search, table.MOTIONS) + min(free + 1, count))
+    return free
+
+
+@kernel
+def add_free_edges(search: CrdtAddress, tree: CrdtTreeAddress) -> int:
+    """Add the free leading part of the extension to the tree; returns what was achieved."""
+    count, first = field(search, crdt_layout.EDGE_COUNT), field(search, crdt_layout.FIRST_EDGES)
+    near, turn = field(search, crdt_layout.NEAR), field(search, crdt_layout.TURN)
+    dof, known, free = dof_in(search), size_of(tree), count_free(search)
+    set_field(search, crdt_layout.CHECKED, field(search, crdt_layout.CHECKED) + min(free + 1, count))
     vertex = near
     if free >= first:
-        parent = int_at(field(tree, table.PARENTS), near)
-        if turn == table.BACK:
+        parent = crdt_parent_of(tree, near)
+        if turn == BACK:
             vertex = parent
         elif first > 0:
-            row = field(search, table.ENDS)
-            vertex = add_vertex(search, tree, row, near if turn == table.ONWARD else parent)
-            if turn == table.BETWEEN:
-                set_int(field(tree, table.PARENTS), near, vertex)
+            vertex = add_crdt_vertex(tree, dof, edge_end(search, 0), near if turn == ONWARD else parent)
+            if turn == BETWEEN:
+                set_crdt_parent(tree, near, vertex)
         for edge in range(first, free):
-            vertex = add_vertex(search, tree, field(search, table.ENDS) + edge * stride, vertex)
-    set_field(search, table.LAST, vertex)
-    if free == count and field(search, table.COMPLETE) != 0:
-        return table.REACHED
-    return table.TRAPPED if field(tree, table.SIZE) == known else table.ADVANCED
+            vertex = add_crdt_vertex(tree, dof, edge_end(search, edge), vertex)
+    set_field(search, crdt_layout.LAST, vertex)
+    if free == count and field(search, crdt_layout.COMPLETE) != 0:
+        return crdt_layout.REACHED
+    return crdt_layout.TRAPPED if size_of(tree) == known else crdt_layout.ADVANCED

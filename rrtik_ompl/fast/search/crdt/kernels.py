@@ -8,131 +8,143 @@ from __future__ import annotations
 
 from typing import Any
 
-from rrtik_ompl.fast.checks.motion_kernels import copy_row
-from rrtik_ompl.fast.search.crdt import layout as table
+from rrtik_ompl.fast.search.crdt import layout as crdt_layout
 from rrtik_ompl.fast.search.crdt.draws import sample
-from rrtik_ompl.fast.search.crdt.growth import aim, coordinate, keep, nearest_vertex, open_edges, read_vertex
+from rrtik_ompl.fast.search.crdt.fields import count_up, dof_in, extension_row, goal_row, rule_row, tree_of
+from rrtik_ompl.fast.search.crdt.growth import add_free_edges, check_extension, lay_out
+from rrtik_ompl.fast.search.crdt.layout import CrdtAddress, CrdtTreeAddress
+from rrtik_ompl.fast.search.crdt.tree_kernels import coordinate, nearest_crdt_vertex, read_vertex, size_of
+from rrtik_ompl.fast.search.motions.row_kernels import copy_row
 from rrtik_ompl.fast.simd.compiled import entry, inlined
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_field
 
 
 @inlined
-def has_room(search: int, tree: int) -> Any:
-    """Whether a tree can take a whole extension."""
-    return field(tree, table.SIZE) + field(search, table.DOF) <= field(tree, table.CAPACITY)
+def nearest_to_target(search: CrdtAddress, tree: CrdtTreeAddress) -> Any:
+    """The vertex of a tree that is nearest to TARGET."""
+    target, scale = extension_row(search, crdt_layout.TARGET), rule_row(search, crdt_layout.SCALE)
+    return nearest_crdt_vertex(tree, dof_in(search), target, scale, field(search, crdt_layout.NEAREST))
 
 
 @inlined
-def swap(search: int) -> None:
+def has_room(search: CrdtAddress, tree: CrdtTreeAddress) -> Any:
+    """Whether a tree can take a whole extension."""
+    return size_of(tree) + dof_in(search) <= field(tree, crdt_layout.CAPACITY)
+
+
+@inlined
+def swap(search: CrdtAddress) -> None:
     """Let the other tree grow."""
-    set_field(search, table.GROWING, 1 - field(search, table.GROWING))
-    set_field(search, table.NEXT, table.BEGIN)
+    set_field(search, crdt_layout.GROWING, 1 - field(search, crdt_layout.GROWING))
+    set_field(search, crdt_layout.NEXT, crdt_layout.BEGIN)
 
 
 @entry
-def resume_pair(search: int, budget: int) -> int:
+def resume_pair(search: CrdtAddress, budget: int) -> int:
     """Go on with two trees that grow in turn, for at most ``budget`` iterations. Returns a status.
 
     ASKING: the edges whose verdict is UNDECIDED want an answer. FULL: both trees want more room.
     """
     done = 0
     while True:
-        growing = field(field(search, table.TREES), field(search, table.GROWING))
-        other = field(field(search, table.TREES), 1 - field(search, table.GROWING))
-        step = field(search, table.NEXT)
-        if step == table.BEGIN:
-            if field(search, table.ITERATIONS) >= field(search, table.ITERATION_LIMIT):
-                return table.EXHAUSTED
+        growing = tree_of(search, field(search, crdt_layout.GROWING))
+        other = tree_of(search, 1 - field(search, crdt_layout.GROWING))
+        step = field(search, crdt_layout.NEXT)
+        if step == crdt_layout.BEGIN:
+            if field(search, crdt_layout.ITERATIONS) >= field(search, crdt_layout.ITERATION_LIMIT):
+                return crdt_layout.EXHAUSTED
             if done >= budget:
-                return table.RUNNING
+                return crdt_layout.RUNNING
             if not (has_room(search, growing) and has_room(search, other)):
-                return table.FULL
+                return crdt_layout.FULL
             done += 1
-            set_field(search, table.ITERATIONS, field(search, table.ITERATIONS) + 1)
+            count_up(search, crdt_layout.ITERATIONS)
             sample(search)
-            tree, exactly, step = growing, False, table.GROW
-        elif step == table.GROW:
-            if keep(search, growing) == table.TRAPPED:
+            tree, exactly, step = growing, False, crdt_layout.GROW
+        elif step == crdt_layout.GROW:
+            if add_free_edges(search, growing) == crdt_layout.TRAPPED:
                 swap(search)
                 continue
-            set_field(search, table.MET, field(search, table.LAST))
-            read_vertex(search, growing, field(search, table.LAST), field(search, table.TARGET))
-            tree, exactly, step = other, True, table.MEET
+            set_field(search, crdt_layout.MET, field(search, crdt_layout.LAST))
+            read_vertex(
+                growing, dof_in(search), field(search, crdt_layout.LAST), extension_row(search, crdt_layout.TARGET)
+            )
+            tree, exactly, step = other, True, crdt_layout.MEET
         else:
-            outcome = keep(search, other)
+            outcome = add_free_edges(search, other)
             swap(search)
-            if outcome == table.REACHED:
-                return table.SOLVED
+            if outcome == crdt_layout.REACHED:
+                return crdt_layout.SOLVED
             continue
-        aim(search, tree, nearest_vertex(search, tree), exactly)
-        set_field(search, table.NEXT, step)
-        if open_edges(search) > 0:
-            return table.ASKING
+        lay_out(search, tree, nearest_to_target(search, tree), exactly)
+        set_field(search, crdt_layout.NEXT, step)
+        if check_extension(search) > 0:
+            return crdt_layout.ASKING
 
 
 @inlined
-def goal_in_reach(search: int, tree: int, vertex: int, goal: int) -> Any:
+def goal_in_reach(search: CrdtAddress, tree: CrdtTreeAddress, vertex: int, goal: int) -> Any:
     """Whether a goal lies within the tolerance around a vertex."""
     total = 0.0
-    for axis in range(field(search, table.DOF)):
-        way = double_at(field(search, table.GOALS), goal * field(search, table.DOF) + axis) - coordinate(
-            tree, vertex, axis
-        )
+    for axis in range(dof_in(search)):
+        way = double_at(goal_row(search, goal), axis) - coordinate(tree, vertex, axis)
         total += way * way
-    return total <= double_at(field(search, table.NUMBERS), table.TOLERANCE_SQUARED)
+    return total <= double_at(field(search, crdt_layout.GOAL_TOLERANCE), 0)
 
 
 @inlined
-def choose_goal(search: int, tree: int) -> bool:
+def choose_goal(search: CrdtAddress, tree: CrdtTreeAddress) -> bool:
     """Go on to the next vertex and goal that are near each other; False if there are none."""
-    while field(search, table.VERTEX) < field(search, table.VERTEX_END):
-        while field(search, table.GOAL) < field(search, table.GOAL_COUNT):
-            if goal_in_reach(search, tree, field(search, table.VERTEX), field(search, table.GOAL)):
+    while field(search, crdt_layout.VERTEX) < field(search, crdt_layout.VERTEX_END):
+        while field(search, crdt_layout.GOAL) < field(search, crdt_layout.GOAL_COUNT):
+            if goal_in_reach(search, tree, field(search, crdt_layout.VERTEX), field(search, crdt_layout.GOAL)):
                 return True
-            set_field(search, table.GOAL, field(search, table.GOAL) + 1)
-        set_field(search, table.VERTEX, field(search, table.VERTEX) + 1)
-        set_field(search, table.GOAL, 0)
+            count_up(search, crdt_layout.GOAL)
+        count_up(search, crdt_layout.VERTEX)
+        set_field(search, crdt_layout.GOAL, 0)
     return False
 
 
 @entry
-def resume_single(search: int, budget: int) -> int:
+def resume_single(search: CrdtAddress, budget: int) -> int:
     """Go on with one tree whose vertices near a goal try to reach it; else as :func:`resume_pair`."""
-    tree, done = field(field(search, table.TREES), 0), 0
+    tree, done = tree_of(search, 0), 0
     while True:
-        step = field(search, table.NEXT)
-        if step == table.GROW:
-            keep(search, tree)
-            set_field(search, table.VERTEX_END, field(tree, table.SIZE))
-            set_field(search, table.NEXT, table.CHOOSE_GOAL)
+        step = field(search, crdt_layout.NEXT)
+        if step == crdt_layout.GROW:
+            add_free_edges(search, tree)
+            set_field(search, crdt_layout.VERTEX_END, size_of(tree))
+            set_field(search, crdt_layout.NEXT, crdt_layout.CHOOSE_GOAL)
             continue
-        if step == table.REACH_GOAL:
-            set_field(search, table.NEXT, table.CHOOSE_GOAL)
-            set_field(search, table.GOAL, field(search, table.GOAL) + 1)
-            if keep(search, tree) == table.REACHED:
-                return table.SOLVED
+        if step == crdt_layout.REACH_GOAL:
+            set_field(search, crdt_layout.NEXT, crdt_layout.CHOOSE_GOAL)
+            count_up(search, crdt_layout.GOAL)
+            if add_free_edges(search, tree) == crdt_layout.REACHED:
+                return crdt_layout.SOLVED
             continue
-        if step == table.CHOOSE_GOAL and not choose_goal(search, tree):
-            set_field(search, table.NEXT, table.BEGIN)
+        if step == crdt_layout.CHOOSE_GOAL and not choose_goal(search, tree):
+            set_field(search, crdt_layout.NEXT, crdt_layout.BEGIN)
             continue
-        if step == table.BEGIN and field(search, table.ITERATIONS) >= field(search, table.ITERATION_LIMIT):
-            return table.EXHAUSTED
-        if step == table.BEGIN and done >= budget:
-            return table.RUNNING
+        if step == crdt_layout.BEGIN and field(search, crdt_layout.ITERATIONS) >= field(
+            search, crdt_layout.ITERATION_LIMIT
+        ):
+            return crdt_layout.EXHAUSTED
+        if step == crdt_layout.BEGIN and done >= budget:
+            return crdt_layout.RUNNING
         if not has_room(search, tree):
-            return table.FULL
-        if step == table.BEGIN:
+            return crdt_layout.FULL
+        if step == crdt_layout.BEGIN:
             done += 1
-            set_field(search, table.ITERATIONS, field(search, table.ITERATIONS) + 1)
-            set_field(search, table.VERTEX, field(tree, table.SIZE))
-            set_field(search, table.GOAL, 0)
+            count_up(search, crdt_layout.ITERATIONS)
+            set_field(search, crdt_layout.VERTEX, size_of(tree))
+            set_field(search, crdt_layout.GOAL, 0)
             sample(search)
-            near, next_step = nearest_vertex(search, tree), table.GROW
+            near, next_step = nearest_to_target(search, tree), crdt_layout.GROW
         else:
-            dof = field(search, table.DOF)
-            copy_row(dof, field(search, table.GOALS) + 8 * dof * field(search, table.GOAL), field(search, table.TARGET))
-            near, next_step = field(search, table.VERTEX), table.REACH_GOAL
-        aim(search, tree, near, next_step == table.REACH_GOAL)
-        set_field(search, table.NEXT, next_step)
-        if open_edges(search) > 0:
-            return table.ASKING
+            goal = goal_row(search, field(search, crdt_layout.GOAL))
+            copy_row(dof_in(search), goal, extension_row(search, crdt_layout.TARGET))
+            near, next_step = field(search, crdt_layout.VERTEX), crdt_layout.REACH_GOAL
+        lay_out(search, tree, near, next_step == crdt_layout.REACH_GOAL)
+        set_field(search, crdt_layout.NEXT, next_step)
+        if check_extension(search) > 0:
+            return crdt_layout.ASKING

@@ -1,6 +1,11 @@
-"""The tables of searches whose trees move one coordinate an edge: what each field is, and the words for its states."""
+"""The tables of C-RDT searches, whose trees move one coordinate an edge: what each field is, and the states' words."""
 
 from __future__ import annotations
+
+from typing import NewType
+
+CrdtAddress = NewType("CrdtAddress", int)  # of the table of a search
+CrdtTreeAddress = NewType("CrdtTreeAddress", int)  # of the table of a tree
 
 ROOT = -1
 
@@ -14,22 +19,26 @@ BEGIN, GROW, MEET, CHOOSE_GOAL, REACH_GOAL = range(5)
 # Tree: coordinates are runs of CAPACITY float64, one run for each coordinate; parents int32.
 SIZE, CAPACITY, COORDINATES, PARENTS = range(4)
 
-# Search, the motions: joint values = GAIN q + OFFSET, limits of a valid configuration, WEIGHTS of its travel. NUMBERS:
-# see below. ASKS: whether the world is asked about what is undecided; otherwise it counts as colliding.
-WORLD, DOF, GAIN, OFFSET, WEIGHTS, LEAST, MOST, NUMBERS, VALUES, ASKS = range(10)
-# Its rules, see CrdtRules, and its progress.
-LOWER, UPPER, SCALE, SMALLEST_MOVE, CHANCE, AXES, AXIS_COUNT = range(10, 17)
-RANDOM, ITERATIONS, ITERATION_LIMIT, NEXT, MOTIONS = range(17, 22)
-# Its trees: the addresses of two, which of them grows; where they met.
-TREES, GROWING, MET = range(22, 25)
-# Its extension: the edges are rows of STARTS and ENDS; the first FIRST_EDGES of them belong to the first leg.
-TARGET, NEAR, ORDER, CURRENT, TURN, FIRST_EDGES, EDGE_COUNT, COMPLETE, STARTS, ENDS, VERDICTS, LAST = range(25, 37)
-# Work of the search for the nearest vertex. Goals of a single tree; which vertex tries which of them next.
-DISTANCES, GOALS, GOAL_COUNT, VERTEX, VERTEX_END, GOAL = range(37, 43)
-FIELDS = 43
+# Search: the motion table of the world; RULES: rows of float64, see below; the axes that may move.
+MOTIONS, RULES, AXES, AXIS_COUNT = range(4)
+# Its progress. CHECKED: edges.
+RANDOM, ITERATIONS, ITERATION_LIMIT, NEXT, CHECKED = range(4, 9)
+# Its trees, which of them grows, and the vertex of that one which the other is to meet.
+TREE, OTHER_TREE, GROWING, MET = range(9, 13)
+# Its extension from vertex NEAR: rows of float64, see below; the axes in their ORDER; how the first leg turns; the
+# number of edges, and of those that belong to the first leg; whether it is COMPLETE; what was found of each edge; the
+# LAST vertex.
+EXTENSION, NEAR, ORDER, TURN, FIRST_EDGES, EDGE_COUNT, COMPLETE, VERDICTS, LAST = range(13, 22)
+# Memory of the search for the nearest vertex. Goals of a single tree, and GOAL_TOLERANCE, one float64: the square of
+# how near to a goal a vertex tries to reach it; which vertex tries which of them next.
+NEAREST, GOALS, GOAL_TOLERANCE, GOAL_COUNT, VERTEX, VERTEX_END, GOAL, FIELD_COUNT = range(22, 30)
 
-# Places in NUMBERS.
-RESOLUTION, TOLERANCE_SQUARED = range(2)
+# Rows of RULES: limits of a valid configuration, then what CrdtRules says.
+LIMIT_LOWER, LIMIT_UPPER, SAMPLE_LOWER, SAMPLE_UPPER, SCALE, SMALLEST_MOVE, CHANCE = range(7)
+
+# Rows of EXTENSION: the target, the configuration that the extension has reached, the starts of as many edges as there
+# are coordinates and one more, then their ends.
+TARGET, CURRENT, EDGES = range(3)
 
 # The first leg: a new direction; back into the last edge, beyond its beginning, exactly to its beginning.
 ONWARD, BETWEEN, BEYOND, BACK = range(4)

@@ -1,0 +1,96 @@
+"""C-RDT trees in kernels: float64 coordinates in runs, for the nearest vertex in a scaled metric to the bit.
+
+A tree of RRT-Connect is another one: it is searched in float32, and keeps joint values and states of its vertices.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rrtik_ompl.fast.search.crdt import layout as crdt_layout
+from rrtik_ompl.fast.search.crdt.layout import CrdtTreeAddress
+from rrtik_ompl.fast.search.motions.row_kernels import Row
+from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
+from rrtik_ompl.fast.simd.lanes import (
+    choose,
+    double_at,
+    field,
+    int_at,
+    lane_numbers,
+    rounded_sum,
+    set_double,
+    set_field,
+    set_int,
+    set_wide_lanes,
+    spread_wide,
+    wide_lanes_at,
+)
+
+UNBOUNDED_SQUARE = 1e300  # [squared unit of the scaled metric] more than any squared distance
+
+
+@inlined
+def size_of(tree: CrdtTreeAddress) -> Any:
+    """Number of vertices."""
+    return field(tree, crdt_layout.SIZE)
+
+
+@inlined
+def coordinate(tree: CrdtTreeAddress, vertex: int, axis: int) -> Any:
+    """A coordinate of a vertex."""
+    return double_at(field(tree, crdt_layout.COORDINATES), axis * field(tree, crdt_layout.CAPACITY) + vertex)
+
+
+@inlined
+def crdt_parent_of(tree: CrdtTreeAddress, vertex: int) -> Any:
+    """The parent of a vertex, ROOT for a root."""
+    return int_at(field(tree, crdt_layout.PARENTS), vertex)
+
+
+@inlined
+def set_crdt_parent(tree: CrdtTreeAddress, vertex: int, parent: int) -> None:
+    """Hang a vertex on another one."""
+    set_int(field(tree, crdt_layout.PARENTS), vertex, parent)
+
+
+@inlined
+def read_vertex(tree: CrdtTreeAddress, dof: int, vertex: int, sink: Row) -> None:
+    """Copy the coordinates of a vertex to an address."""
+    for axis in range(dof):
+        set_double(sink, axis, coordinate(tree, vertex, axis))
+
+
+@inlined
+def add_crdt_vertex(tree: CrdtTreeAddress, dof: int, row: Row, parent: int) -> Any:
+    """Add the coordinates at an address to a tree that has room; returns the number of the vertex."""
+    vertex, coordinates = size_of(tree), field(tree, crdt_layout.COORDINATES)
+    for axis in range(dof):
+        set_double(coordinates, axis * field(tree, crdt_layout.CAPACITY) + vertex, double_at(row, axis))
+    set_crdt_parent(tree, vertex, parent)
+    set_field(tree, crdt_layout.SIZE, vertex + 1)
+    return vertex
+
+
+@kernel
+def nearest_crdt_vertex(tree: CrdtTreeAddress, dof: int, target: Row, scale: Row, nearest: int) -> int:
+    """The vertex nearest to a target in the scaled metric; among equals the oldest. ``nearest``: two wide lanes."""
+    coordinates = field(tree, crdt_layout.COORDINATES)
+    count, run = size_of(tree), field(tree, crdt_layout.CAPACITY) // WIDTH
+    lowest, holder = spread_wide(UNBOUNDED_SQUARE), spread_wide(0.0)
+    for block in range((count + WIDTH - 1) // WIDTH):
+        total = spread_wide(0.0)
+        for axis in range(dof):
+            way = (wide_lanes_at(coordinates, axis * run + block) - double_at(target, axis)) * double_at(scale, axis)
+            total = rounded_sum(total, way * way)
+        numbers = lane_numbers() + float(block * WIDTH)
+        total = choose(numbers < float(count), total, spread_wide(UNBOUNDED_SQUARE))
+        nearer = total < lowest
+        lowest, holder = choose(nearer, total, lowest), choose(nearer, numbers, holder)
+    set_wide_lanes(nearest, 0, lowest)
+    set_wide_lanes(nearest, 1, holder)
+    best = 0
+    for lane in range(1, WIDTH):
+        a, b = double_at(nearest, lane), double_at(nearest, best)
+        if a < b or (a == b and double_at(nearest, WIDTH + lane) < double_at(nearest, WIDTH + best)):
+            best = lane
+    return int(double_at(nearest, WIDTH + best))

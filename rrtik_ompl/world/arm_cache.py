@@ -1,0 +1,93 @@
+"""What all worlds of a robot share, so that a new scene does not cost the arm's part again.
+
+Two things are kept for each robot: the sphere covers of its links, which depend on nothing else, and the tables that
+were packed last. A new world takes over from those what its scene leaves as it is: the arm's joints, balls and solids,
+if the same pairs of the arm are checked. Tables are never changed through this cache; a moving world, whose obstacles
+are moved in place, shares the arm's part alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.collision.bodies import Body, link_bodies
+from rrtik_ompl.covers.cache import cached_inner_spheres, cached_outer_cover
+from rrtik_ompl.fast import FastWorld, needs_covers
+from rrtik_ompl.fast.tables.solid_tables import convex_solids
+from rrtik_ompl.robot import Robot
+
+SLIDING_MARGIN = 1e-3  # [m] beyond the limits of sliding joints that the tables cover
+MAX_ROBOTS = 16  # whose covers and tables are kept
+NO_SPHERES = np.empty((0, 4))
+
+Pairs = tuple[tuple[int, int], ...]
+Spheres = tuple[Matrix, Matrix]  # around and inside a body
+
+
+class ArmCache:
+    """The covers of a robot's links and the tables that were packed last for one of its worlds.
+
+    Made by :func:`arm_cache`, one for each robot.
+
+    Attributes:
+        covers: Spheres around and inside each link, in the order of :func:`link_bodies`.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self.covers: tuple[Spheres, ...] = tuple(_spheres(body) for body in link_bodies(robot))
+        self._latest: FastWorld | None = None
+
+    def covers_of(self, bodies: Sequence[Body]) -> tuple[Spheres, ...]:
+        """Spheres around and inside all bodies of a world, those of the robot's links first."""
+        return (*self.covers, *(_spheres(body) for body in bodies[len(self.covers) :]))
+
+    def pack(self, bodies: Sequence[Body], pairs: Pairs, covers: Sequence[Spheres], *, share: bool = True) -> FastWorld:
+        """The tables of a world.
+
+        Args:
+            bodies: Those of the robot's links first.
+            pairs: Numbers of the bodies that must not touch.
+            covers: See :meth:`covers_of`.
+            share: Whether the arm's part may be that of the tables packed last, and these are kept for the next world.
+        """
+        outer, inner = ([both[k] for both in covers] for k in (0, 1))
+        tables = FastWorld(
+            self._robot.chain,
+            bodies,
+            pairs,
+            outer=outer,
+            inner=inner,
+            solids=[convex_solids(body.geometry) for body in bodies],
+            strokes=_strokes(self._robot),
+            like=self._latest if share else None,
+        )
+        if share:
+            self._latest = tables
+        return tables
+
+
+@lru_cache(maxsize=MAX_ROBOTS)
+def arm_cache(robot: Robot) -> ArmCache:
+    """The cache of a robot; ``arm_cache.cache_clear()`` forgets all of them."""
+    return ArmCache(robot)
+
+
+def _spheres(body: Body) -> Spheres:
+    outer, inner = needs_covers(body)
+    return (
+        cached_outer_cover(body.geometry) if outer else NO_SPHERES,
+        cached_inner_spheres(body.geometry) if inner else NO_SPHERES,
+    )
+
+
+def _strokes(robot: Robot) -> Vector:
+    """How far the limits let each joint of the chain go from its zero, shape (joints,); 0 for continuous joints."""
+    ends = np.maximum(np.abs(robot.lower), np.abs(robot.upper))
+    ends = np.where(np.isfinite(ends), ends, 0.0)
+    reached: Vector = np.abs(robot.chain.gain) @ ends + np.abs(robot.chain.offset) + SLIDING_MARGIN
+    return reached
