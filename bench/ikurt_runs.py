@@ -15,7 +15,7 @@ from ompl import geometric as og
 import rrtik_ompl as rrtik
 from rrtik_ompl.ik.ikurt.metric import TipMetric
 from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
-from rrtik_ompl.ik.ikurt.search import BatchedSearch, Judge, Options
+from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
 from rrtik_ompl.reproduce.ikurt import as_published, metric_of
 from rrtik_planners import IKURT, FastRRTConnect, IKURTPublished
 
@@ -93,9 +93,11 @@ def improved_falls() -> tuple[bool, int]:
     problem = rrtik.load_problem("planar6_c_pose")
     metric, until = TipMetric(problem.robot, [problem.goal]), time.monotonic() + 2.0
     bounds, rng = problem.robot.finite_range(), np.random.default_rng(0)
-    judge = Judge(problem.world.valid_batch, problem.world.motion_valid_batch, lambda: time.monotonic() > until)
+    validity = IkurtValidity(
+        problem.world.valid_batch, problem.world.motion_valid_batch, lambda: time.monotonic() > until
+    )
     options = Options(0.15, 0.6, jacobian=False, most_vertices=10_000)
-    return falls(BatchedSearch(metric, options, *bounds, judge, rng, problem.start[None]))
+    return falls(BatchedSearch(metric, options, *bounds, validity, rng, problem.start[None]))
 
 
 def falls(search: Any) -> tuple[bool, int]:

@@ -13,7 +13,7 @@ from rrtik_ompl.fast.search.connect_lengths import connect_lengths
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
 from rrtik_ompl.search.rrt_connect import ConnectRules, RrtConnect, straight_path
 from rrtik_ompl.world.motion_queries import has_kernels, is_conservative, kernel_tables
-from rrtik_planners.crdt_options import iteration_limit
+from rrtik_planners.one_joint_options import iteration_limit
 
 
 class FastRRTConnect(SafePlanner):
@@ -25,6 +25,7 @@ class FastRRTConnect(SafePlanner):
     """
 
     kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
+    supports_iteration_limit: ClassVar[bool] = True
 
     def __init__(
         self,

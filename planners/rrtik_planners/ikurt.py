@@ -9,7 +9,7 @@ from rrtik_ompl.arrays import Matrix, positive
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import Goal
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
-from rrtik_ompl.ik.ikurt.search import BatchedSearch, Judge, Options
+from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult
 from rrtik_ompl.world import World
 from rrtik_planners.tip_seeker import TipSeeker, misses
@@ -67,8 +67,8 @@ class IKURT(TipSeeker):
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         metric = self._metric(goals)
-        judge = Judge(checker.valid_batch, checker.motion_valid_batch, ptc)
-        search = BatchedSearch(metric, self.options, *self.bounds(), judge, self.rng, starts)
+        validity = IkurtValidity(checker.valid_batch, checker.motion_valid_batch, ptc)
+        search = BatchedSearch(metric, self.options, *self.bounds(), validity, self.rng, starts)
         path = search.run()
         counts = {"connects": search.connects, "restarts": search.restarts, "vertices": search.vertices}
         result = self.result(metric, search.tree, path, counts, checker)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.ik.ikurt.descent import descend
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
-from rrtik_ompl.ik.ikurt.tree import Tree
+from rrtik_ompl.ik.ikurt.tree import IkurtTree
 
 DIRECTIONS = 16  # that CONNECT tries at once
 PATIENCE, FALL = 8, 0.8  # CONNECT goes on as long as so many rounds bring the distance down to this share,
@@ -56,7 +56,7 @@ class Options:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Judge:
+class IkurtValidity:
     """What the search asks: which configurations are free; which straight motions are; whether to stop."""
 
     free: Callable[[Matrix], Mask]
@@ -71,7 +71,7 @@ class BatchedSearch:
         metric: Distance from the goal.
         options: How to work.
         lower, upper: Bounds, shape (n,).
-        judge: What is free.
+        validity: What is free.
         rng: Random numbers.
         starts: Roots, shape (k, n).
 
@@ -89,16 +89,16 @@ class BatchedSearch:
         options: Options,
         lower: Vector,
         upper: Vector,
-        judge: Judge,
+        validity: IkurtValidity,
         rng: np.random.Generator,
         starts: Matrix,
     ) -> None:
         self._metric, self._options, self._lower, self._upper = metric, options, lower, upper
-        self._judge, self._rng, self._starts = judge, rng, starts
+        self._validity, self._rng, self._starts = validity, rng, starts
         self._distances = metric.distance(starts)
         self.goals = metric.goals if isinstance(metric, ConfigurationMetric) else starts[:0]
-        self.tree = Tree(starts, self._distances)
-        self.back = Tree(self.goals, np.zeros(len(self.goals)))
+        self.tree = IkurtTree(starts, self._distances)
+        self.back = IkurtTree(self.goals, np.zeros(len(self.goals)))
         self._newest, self._batches = starts[:0], 0
         self.connects = self.restarts = self._dropped = 0
         self.blocked = starts[:0]
@@ -122,10 +122,10 @@ class BatchedSearch:
             return self.tree.branch(int(self._distances.argmin()))
         explored = 1
         path = self._finish(np.arange(self.tree.size))
-        while path is None and not self._judge.stop():
+        while path is None and not self._validity.stop():
             for _ in range(explored):
                 path = self._explore()
-                if path is not None or self._judge.stop():
+                if path is not None or self._validity.stop():
                     return path
             path = self._connect(self.tree.best())
             explored = min(2 * explored, MOST_EXPLORED if self.back.size else FEW_EXPLORED)
@@ -141,7 +141,7 @@ class BatchedSearch:
         path = self._finish(np.array([vertex]))
         tried_at = before = self.tree.distance[vertex]
         for number in count(1):
-            if path is not None or self._judge.stop():
+            if path is not None or self._validity.stop():
                 return path
             lower = self._downhill(vertex, step)
             step = max(step * (SHRUNK if lower is None else GROWN), SHORTEST)
@@ -168,7 +168,7 @@ class BatchedSearch:
         distances = self._metric.distance(candidates)
         order = np.argsort(distances)[:CHECKED]
         order = order[distances[order] < self.tree.distance[vertex]]
-        free = self._judge.motions_free(np.broadcast_to(q, (len(order), len(q))), candidates[order])
+        free = self._validity.motions_free(np.broadcast_to(q, (len(order), len(q))), candidates[order])
         if not free.any():
             return None
         k = order[free.argmax()]
@@ -190,7 +190,7 @@ class BatchedSearch:
             return self._finish(self._worth_it(new), scouts=SCOUTS)
         return None
 
-    def _grow(self, tree: Tree) -> NDArray[np.int64]:
+    def _grow(self, tree: IkurtTree) -> NDArray[np.int64]:
         """Steps of a plain RRT, many at once; the new vertices."""
         samples = self._rng.uniform(self._lower, self._upper, (SAMPLES, len(self._lower)))
         drawn = min(int(TOWARDS_OTHER * SAMPLES), len(self._newest)) if self.back.size else 0
@@ -202,7 +202,7 @@ class BatchedSearch:
         going, moved = np.flatnonzero(length > 0.0), np.zeros(SAMPLES, dtype=bool)
         for piece in PIECES:
             further = tree.q[near[going]] + piece * step[going]
-            free = self._judge.motions_free(ends[going], further)
+            free = self._validity.motions_free(ends[going], further)
             going = going[free]
             ends[going], moved[going] = further[free], True
         return tree.add(ends[moved], near[moved], self._metric.distance(ends[moved]))
@@ -228,10 +228,10 @@ class BatchedSearch:
         path = self._straight(vertices[near], ends.q[: len(vertices)][near])
         return self._remember(ends.q[arrived]) if path is None and arrived.any() else path
 
-    def _join(self, tree: Tree, vertices: NDArray[np.int64], other: Tree) -> Matrix | None:
+    def _join(self, tree: IkurtTree, vertices: NDArray[np.int64], other: IkurtTree) -> Matrix | None:
         """The path from the root of one tree to that of the other over the first free motion between two vertices."""
         near = other.nearest(tree.q[vertices])
-        free = self._judge.motions_free(tree.q[vertices], other.q[near])
+        free = self._validity.motions_free(tree.q[vertices], other.q[near])
         if not free.any():
             return None
         k = int(free.argmax())
@@ -239,7 +239,7 @@ class BatchedSearch:
 
     def _straight(self, vertices: NDArray[np.int64], goals: Matrix) -> Matrix | None:
         """The path over the first free motion from vertices to goal configurations."""
-        free = self._judge.motions_free(self.tree.q[vertices], goals)
+        free = self._validity.motions_free(self.tree.q[vertices], goals)
         if not free.any():
             return None
         k = int(free.argmax())
@@ -247,7 +247,7 @@ class BatchedSearch:
 
     def _remember(self, q: Matrix) -> Matrix | None:
         """Free goal configurations become roots of the tree at the goal; the path if one of them is seen at once."""
-        free = self._judge.free(q)
+        free = self._validity.free(q)
         self.blocked = np.vstack([self.blocked, q[~free]])[:1]
         if len(self.goals) >= MOST_GOALS or not free.any():
             return None
@@ -266,5 +266,5 @@ class BatchedSearch:
         self._see(self.tree.q, self.tree.distance)
         self._dropped += self.tree.size + self.back.size
         self.restarts += 1
-        self.tree = Tree(self._starts, self._distances)
-        self.back = Tree(self.goals, np.zeros(len(self.goals)))
+        self.tree = IkurtTree(self._starts, self._distances)
+        self.back = IkurtTree(self.goals, np.zeros(len(self.goals)))
