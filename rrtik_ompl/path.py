@@ -20,7 +20,7 @@ from rrtik_ompl.transitions import SAME, merge_moves, moved, route_length, singl
 from rrtik_ompl.units import joint_units
 from rrtik_ompl.world import World
 
-SECOND_CHECK = 2.0  # how many times finer than the motion resolution a path is checked again
+VERIFICATION_DENSITY = 2.0  # how many times finer than the motion resolution a path is checked again
 MAX_VALUE = 1e6  # of a joint [rad or m], as everywhere in our files
 MAX_CHECKS = 30_000_000  # of a path; more than that take minutes
 AT_ONCE = 200_000  # of them, so that a long path needs no more memory than a short one
@@ -208,7 +208,7 @@ class JointPath:
             raise InputError(
                 f"path of {rows.shape[1]} joints: robot '{robot.name}' has {robot.dof}; it is another robot's"
             )
-        half = world.motion_resolution / SECOND_CHECK
+        half = verification_resolution(world)
         fine = half if resolution is None else float(finite_array(resolution, (), "resolution"))
         if fine <= 0.0:
             raise InputError(f"resolution must be greater than 0 metres, got {fine:g}")
@@ -256,6 +256,11 @@ def _in_parts(counts: Vector) -> list[NDArray[np.int64]]:
     """Numbers of the edges with so many checks each, shape (k,), in parts of about AT_ONCE checks."""
     edges = np.arange(len(counts), dtype=np.int64)
     return np.split(edges, np.flatnonzero(np.diff(counts.cumsum() // AT_ONCE)) + 1)
+
+
+def verification_resolution(world: World) -> float:
+    """Largest step of any point of the arm between two configurations of the second check [m]."""
+    return world.motion_resolution / VERIFICATION_DENSITY
 
 
 def subdivided(rows: Matrix, counts: Vector) -> tuple[Matrix, Vector]:

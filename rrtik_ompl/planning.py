@@ -17,26 +17,15 @@ from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.ik.methods import load_kernels
-from rrtik_ompl.ompl_bridge.attempt import (
-    ANYTIME_PLANNERS,
-    ONE_GOAL_PLANNERS,
-    Attempt,
-    PlannerFactory,
-    attempt,
-    can_be_brief,
-    finds_goals,
-    ompl_planners,
-)
-from rrtik_ompl.path import SECOND_CHECK, JointPath, Violation
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.ompl_bridge.attempt import Attempt, attempt
+from rrtik_ompl.ompl_bridge.ompl_planners import PlannerFactory, ompl_planners, traits_of
+from rrtik_ompl.path import JointPath, Violation
+from rrtik_ompl.problem import Problem, densely_checked
 
-DEFAULT_PLANNER = "bicrdt"
 RESTARTS = 20
 MAX_RESTARTS = 1_000_000
 SHORTEST = 1e-3  # [s] that an attempt gets at least
 MAX_SECONDS = 1e9  # thirty years; OMPL's clock overflows at about nine times as much
-# What planners count of a path, not of their work.
-OF_THE_PATH = ("lower_bound", "gap", "position_error", "orientation_error")
 _OMPL_PREFIX, _MOVEIT_SUFFIX = "geometric::", "kConfigDefault"  # as in ompl_planning.yaml
 
 
@@ -52,9 +41,8 @@ class Plan:
             large an OMPL planner's graph has become.
         planner: Name of the planner.
         seed: The seed that repeats this plan.
-        statistics: Plain counts, added up over all attempts: attempts, rejected paths, and the planner's own. Of
-            "fewest-moves" also the lower bound of the moves of a path and the gap between the two; of "ikurt" the
-            error of the tip at the end of the path, ``position_error`` [m] and ``orientation_error`` [rad].
+        statistics: Plain counts, added up over all attempts: attempts, rejected paths, and the planner's own. Those
+            that describe the path (``path_statistics`` of the planner's class) are the last attempt's.
     """
 
     found: bool
@@ -68,7 +56,7 @@ class Plan:
 
 def plan(
     problem: Problem,
-    planner: str | PlannerFactory = DEFAULT_PLANNER,
+    planner: str | PlannerFactory | None = None,
     *,
     seconds: float = 5.0,
     seed: int | None = None,
@@ -82,15 +70,23 @@ def plan(
     itself. If it does not get to them with some effort, more are drawn and it is started anew with twice the effort
     (see :class:`GoalSearch`).
 
-    The planner first asks what the kernels can prove without coal, for a short while; where that finds no path it asks
-    exactly. Either way a path is returned only if a second check agrees, which is twice as dense as the planner's and
-    shares nothing with it (:meth:`JointPath.violations`). If a planner gives up before its time it is started anew with
-    another random stream; if the second check rejects its path, it is started anew and checks as densely as that.
+    The planner first relies on what the kernels can prove without coal, for a short while; where that finds no path its
+    motions are checked exactly. Either way a path is returned only if a second check agrees, which is twice as dense
+    (:meth:`JointPath.violations`). The second check has forward kinematics of its own (numpy; the first one has
+    Pinocchio's and the kernels'), bounding boxes of its own and fresh collision requests. It shares with the first: the
+    bodies (``Body``), the pairs of them that must not touch, the test for one inside another (``Containment``), the
+    margins and what is requested of coal (``margins.request``), the bounds on how fast two bodies approach each other
+    (``approach_weights``), and the bound on the arm's displacement that the number of checked configurations is
+    computed from.
+
+    If a planner gives up before its time it is started anew with another random stream; if the second check rejects its
+    path, it is started anew and its motions are checked as densely as by the second check.
 
     Args:
         problem: What to solve.
         planner: Name of one of :func:`list_planners` (``geometric::`` may stand before OMPL's names), or a planner
-            class that is built from a SpaceInformation alone.
+            class that is built from a SpaceInformation alone. None: the default of the installed packages,
+            :func:`rrtik_ompl.catalog.default_planner`.
         seconds: Time limit for all attempts together [s].
         seed: The same seed gives the same path, as long as the time limit does not cut in; drawn if None. PRM and
             PRMstar work by the clock, so theirs may differ.
@@ -105,6 +101,7 @@ def plan(
         PlannerError: If the planner broke.
     """
     require(problem, Problem, "problem to plan", "use Problem(world, start, goal) or load_problem(name)")
+    planner = catalog.default_planner() if planner is None else planner
     require(planner, str | Callable, "planner", "use a name of list_planners() or a planner class")
     limit = positive(seconds, "seconds")
     if limit > MAX_SECONDS:
@@ -135,7 +132,7 @@ def _load_kernels(problem: Problem, factory: PlannerFactory) -> None:
     if not isinstance(problem.goal, JointGoal):
         load_kernels(problem.robot)
     if problem.world.fast is not None:
-        for name in getattr(factory, "kernels", ()):
+        for name in traits_of(factory).kernels:
             library(name)
 
 
@@ -162,13 +159,11 @@ class _Search:
         self._problem, self._factory, self._name, self._parameters = problem, factory, name, parameters
         self._deadline, self._seeds = deadline, seeds
         self._goals = GoalSearch(problem, np.random.default_rng(seeds[0]))
-        joints = isinstance(problem.goal, JointGoal)
-        self._aimless = finds_goals(factory) and not joints
-        self._brief = can_be_brief(factory)
+        self._traits, joints = traits_of(factory), isinstance(problem.goal, JointGoal)
+        self._aimless = self._traits.finds_goals and not joints
         self._long_ways = joints and bool(problem.robot.continuous.any()) and len(seeds) > 1
         # An optimal path touches what it goes round, and an anytime planner has no time left for a second attempt.
-        anytime = getattr(factory, "__name__", "") in ANYTIME_PLANNERS
-        self._asked = problem.refined(SECOND_CHECK) if anytime else problem
+        self._asked = densely_checked(problem) if self._traits.anytime else problem
 
     def run(self) -> JointPath | None:
         """The path, or None and a reason."""
@@ -208,7 +203,7 @@ class _Search:
 
     def _proven_path(self, aims: Matrix) -> JointPath | None:
         """Of a brief attempt on what the kernels can prove; None where it finds nothing or cannot prove an end."""
-        if not self._brief or self._problem.world.accuracy != "exact":
+        if not self._traits.supports_iteration_limit or self._problem.world.accuracy != "exact":
             return None
         proven = self._problem.with_accuracy("conservative")
         aims = aims[proven.world.valid_batch(aims)]
@@ -219,21 +214,21 @@ class _Search:
     def _path(self, number: int, aims: Matrix) -> JointPath | None:
         """Of an attempt that asks exactly; from the first path on that was rejected, as densely as the second check."""
         share = 0.5 if self._short_way(number) else 1.0  # before the long way is tried too
-        effort = 2**number if self._brief and self._others(number) else None
+        limited = self._traits.supports_iteration_limit and self._others(number)
+        effort = 2**number if limited else None
         seconds = share * max(self._left(), SHORTEST)
         outcome = self._attempt(self._asked, number, aims, seconds, effort)
         path, self.reason = _judged(self._problem, outcome, self._name)
         if path is None and outcome.rows is not None:
             self.totals["rejected"] += 1
-            self._asked = self._problem.refined(SECOND_CHECK)
+            self._asked = densely_checked(self._problem)
         return path
 
     def _others(self, number: int) -> bool:
         """Whether later attempts would aim at other configurations than this one."""
         if self._aimless or number == len(self._seeds) - 1:
             return False
-        one = getattr(self._factory, "__name__", "") in ONE_GOAL_PLANNERS
-        return not self._goals.exhausted or (one and number + 1 < len(self._goals.rows))
+        return not self._goals.exhausted or (self._traits.one_goal and number + 1 < len(self._goals.rows))
 
     def _attempt(self, problem: Problem, number: int, aims: Matrix, seconds: float, effort: int | None) -> Attempt:
         """One attempt, counted."""
@@ -249,7 +244,7 @@ class _Search:
         self.counting += outcome.counting
         self._deadline += outcome.counting
         for key, value in outcome.statistics.items():
-            self.totals[key] = value if key in OF_THE_PATH else self.totals.get(key, 0) + value
+            self.totals[key] = value if key in self._traits.path_statistics else self.totals.get(key, 0) + value
         return outcome
 
 

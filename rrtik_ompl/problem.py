@@ -1,9 +1,8 @@
-"""A well-posed question: a world, a start and a goal. That a `Problem` exists proves that its start is usable."""
+"""A well-posed problem: a world, a start and a goal. That a `Problem` exists proves that its start is usable."""
 
 from __future__ import annotations
 
 import copy
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +10,8 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import TAU, Vector, frozen
 from rrtik_ompl.errors import ProblemError, require
 from rrtik_ompl.goal import Goal, JointGoal
+from rrtik_ompl.path import verification_resolution
+from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 
 
@@ -43,9 +44,7 @@ class Problem:
         self.world = world
         self.name = name
         self.start: Vector = frozen(_usable(world, start, "start"))
-        wanted: Any = goal
-        if not isinstance(wanted, Goal):
-            wanted = JointGoal(wanted)
+        wanted = goal if isinstance(goal, Goal) else JointGoal(goal)
         if isinstance(wanted, JointGoal):
             q = _usable(world, wanted.q, "goal")
             wanted = JointGoal(_nearest_turn(world, self.start, q), wanted.tolerance)
@@ -55,15 +54,15 @@ class Problem:
         return f"Problem('{self.name}', {self.world}, to a {type(self.goal).__name__})"
 
     @property
-    def robot(self) -> Any:
+    def robot(self) -> Robot:
         """The robot of the world."""
         return self.world.robot
 
-    def refined(self, factor: float) -> Problem:
-        """The same problem, its motions checked in steps ``factor`` times as fine."""
-        finer = copy.copy(self)
-        finer.world = self.world.refined(factor)
-        return finer
+    def with_resolution(self, motion_resolution: float) -> Problem:
+        """The same problem, its motions checked in steps of another size [m] (:meth:`World.with_resolution`)."""
+        other = copy.copy(self)
+        other.world = self.world.with_resolution(motion_resolution)
+        return other
 
     def with_accuracy(self, accuracy: str) -> Problem:
         """The same problem, its world "exact" or "conservative" (see :meth:`rrtik_ompl.World.with_accuracy`)."""
@@ -74,6 +73,11 @@ class Problem:
     def reached(self, q: ArrayLike) -> bool:
         """Whether a configuration, shape (dof,), satisfies the goal."""
         return bool(self.goal.satisfied(self.world.robot, self.world.robot.configuration(q)[None])[0])
+
+
+def densely_checked(problem: Problem) -> Problem:
+    """The same problem, its motions checked as densely as by the second check of a path."""
+    return problem.with_resolution(verification_resolution(problem.world))
 
 
 def _usable(world: World, values: ArrayLike, what: str) -> Vector:

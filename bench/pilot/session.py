@@ -98,7 +98,7 @@ def preventive_checks(count: int) -> Preventive:
     verdicts = [judge_move(WORLD, starts[k], int(joints[k]), float(ends[k, joints[k]])).allowed for k in some]
     agree = bool((np.array(verdicts) == accepted[some]).all())
     beyond = int((~ROBOT.within_limits(ends[accepted])).sum())
-    fine = WORLD.refined(4.0).motion_valid_batch(starts[accepted], ends[accepted])
+    fine = WORLD.with_resolution(WORLD.motion_resolution / 4.0).motion_valid_batch(starts[accepted], ends[accepted])
     chosen = rng.choice(np.flatnonzero(accepted), size=min(LOOKED_AT, int(accepted.sum())), replace=False)
     share = np.linspace(0.0, 1.0, LOOKS)[:, None, None]
     looks = (starts[chosen] + share * (ends[chosen] - starts[chosen])).reshape(-1, ROBOT.dof)

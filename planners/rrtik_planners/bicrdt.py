@@ -10,16 +10,14 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.fast.search.crdt.rules import KERNELS, CrdtRules
 from rrtik_ompl.fast.search.crdt.search import CrdtSearch
-from rrtik_ompl.moves.rules import Joints, PerJoint, joint_numbers
-from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
+from rrtik_ompl.ompl_bridge import MotionChecker, SearchResult
 from rrtik_ompl.world.motion_queries import has_kernels
-from rrtik_planners.crdt_endings import NO_ENDING, Endings
-from rrtik_planners.crdt_options import AxisOptions, joint_names
 from rrtik_planners.crdt_stream import CrdtStream
 from rrtik_planners.crdt_tree import CrdtTree, Outcome
+from rrtik_planners.one_joint_planner import OneJointPlanner
 
 
-class BiCRDT(SafePlanner):
+class BiCRDT(OneJointPlanner):
     """One tree from the start and one from the goal, grown in turn; no step length, no bias, no goal tolerance.
 
     Axis moves end exactly on their target, so the trees meet exactly and every edge of the path moves one joint.
@@ -27,72 +25,18 @@ class BiCRDT(SafePlanner):
     In a world with kernels the whole search runs there; it finds the same path as the search in Python.
     """
 
-    kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
+    ompl_name: ClassVar[str] = "BiCRDT"
+    supports_iteration_limit: ClassVar[bool] = True
 
-    def __init__(
-        self,
-        si: Any,
-        *,
-        world: MotionQueries | None = None,
-        seed: int | None = None,
-        scale_by_range: bool = False,
-        max_iterations: int | None = None,
-        joint_costs: PerJoint | None = None,
-        frozen_joints: Joints = (),
-        smallest_move: PerJoint = 0.0,
-        last_joints: Joints = (),
-    ) -> None:
-        """Make a planner.
-
-        Args:
-            si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
-            world: Asked instead of ``si`` whether configurations and motions are free, if given.
-            seed: At least 0; drawn from OMPL's if None.
-            scale_by_range: See :class:`rrtik_planners.crdt_options.AxisOptions`.
-            max_iterations: As there.
-            joint_costs: As there.
-            frozen_joints: As there.
-            smallest_move: As there.
-            last_joints: Joints that stay until all others have arrived, by number or name, such as the gripper's
-                rotation; then they go straight to the goal, one after the other in this order. Goals to which that is
-                not free are left out.
-
-        Raises:
-            InputError: If an option is out of range or the space is of another kind.
-        """
-        super().__init__(si, "BiCRDT", world=world, seed=seed)
-        self.options = AxisOptions(
-            scale_by_range=scale_by_range,
-            joint_costs=joint_costs,
-            frozen_joints=frozen_joints,
-            smallest_move=smallest_move,
-            max_iterations=max_iterations,
-            names=joint_names(world),
-            dof=si.getStateDimension(),
-        )
-        self.last_joints = joint_numbers(last_joints, joint_names(world), si.getStateDimension(), "last_joints")
-
-    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
-        """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
-        starts, goals = self.options.agreeing(starts, goals)
-        last, smallest = self.last_joints, self.options.smallest_move
-        starts = starts[(starts[:, last] == starts[0, last]).all(axis=1)]
-        endings = Endings(starts[0], goals, last, smallest, checker)
-        if len(endings.aims) == 0:
-            return SearchResult(None, reason=NO_ENDING)
-        result = self._between(starts, endings.aims, checker, ptc)
-        path = None if result.path is None else endings.completed(result.path)
-        return SearchResult(path, result.statistics)
-
-    def _between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
-        """The search between starts and goals that agree in the joints that stay where they are."""
-        rules, seed = self.options.rules(*self.bounds(), starts[0], self.last_joints), int(self.rng.integers(2**63))
+    def between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+        """See :meth:`OneJointPlanner.between`."""
+        rules, seed = self.options.growth(*self.bounds(), starts[0]), int(self.rng.integers(2**63))
         limit, path = self.options.max_iterations, _common_row(starts, goals)
-        trees: Any
+        trees: CrdtSearch | TwoTreeSearch
         if has_kernels(self._world, KERNELS, within=np.vstack([starts, goals, rules.lower, rules.upper])):
             trees = CrdtSearch(self._world, rules, seed, limit, starts, goals)
         else:
-            trees = TreePair(rules, seed, limit, starts, goals, checker)
+            trees = TwoTreeSearch(rules, seed, limit, starts, goals, checker)
         while path is None and trees.advance(ptc):
             met = _join(*trees.meeting())
             path = met if self.options.accepts(met) else None
@@ -101,7 +45,7 @@ class BiCRDT(SafePlanner):
         return SearchResult(path, {"iterations": trees.iterations, "vertices": trees.vertices, "edges": edges})
 
 
-class TreePair:
+class TwoTreeSearch:
     """The search in Python, for any checker, step by step as `rrtik_ompl.fast.search.crdt.search.CrdtSearch`.
 
     Attributes:

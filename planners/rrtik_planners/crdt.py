@@ -12,16 +12,16 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.search.crdt.rules import KERNELS, CrdtRules
 from rrtik_ompl.fast.search.crdt.search import CrdtSearch
 from rrtik_ompl.moves.rules import Joints, PerJoint
-from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult
 from rrtik_ompl.world.motion_queries import has_kernels
-from rrtik_planners.crdt_options import AxisOptions, joint_names
 from rrtik_planners.crdt_stream import CrdtStream
 from rrtik_planners.crdt_tree import CrdtTree, Outcome
+from rrtik_planners.one_joint_planner import OneJointPlanner
 
 GOAL_TOLERANCE_SHARE = 0.2  # default goal tolerance as a share of the diagonal of the space
 
 
-class CRDT(SafePlanner):
+class CRDT(OneJointPlanner):
     """Single tree from the start; no step length, no goal bias.
 
     The basic algorithm ends when a vertex is close enough to the goal. Here every vertex that is close enough tries to
@@ -34,7 +34,8 @@ class CRDT(SafePlanner):
     In a world with kernels the whole search runs there; it finds the same path as the search in Python.
     """
 
-    kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
+    ompl_name: ClassVar[str] = "CRDT"
+    supports_iteration_limit: ClassVar[bool] = True
 
     def __init__(
         self,
@@ -52,46 +53,46 @@ class CRDT(SafePlanner):
         """Make a planner.
 
         Args:
-            si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
-            world: Asked instead of ``si`` whether configurations and motions are free, if given.
-            seed: At least 0; drawn from OMPL's if None.
+            si: This argument and those that are not listed are as of
+                :class:`~rrtik_planners.one_joint_planner.OneJointPlanner`.
+            world: As there.
+            seed: As there.
             goal_tolerance: Euclidean distance to a goal below which a vertex tries to reach it [unit of the space];
                 a fifth of the diagonal of the space if None.
-            scale_by_range: See :class:`rrtik_planners.crdt_options.AxisOptions`.
-            max_iterations: As there.
-            joint_costs: As there.
-            frozen_joints: As there.
-            smallest_move: As there.
+            scale_by_range: As there, like those that follow.
+            max_iterations: ..
+            joint_costs: ..
+            frozen_joints: ..
+            smallest_move: ..
 
         Raises:
             InputError: If an option is out of range or the space is of another kind.
         """
-        super().__init__(si, "CRDT", world=world, seed=seed)
-        if goal_tolerance is not None and not goal_tolerance > 0.0:
-            raise InputError(f"goal_tolerance: expected a number greater than 0, got {goal_tolerance!r}")
-        self.goal_tolerance = goal_tolerance
-        self.options = AxisOptions(
+        super().__init__(
+            si,
+            world=world,
+            seed=seed,
             scale_by_range=scale_by_range,
+            max_iterations=max_iterations,
             joint_costs=joint_costs,
             frozen_joints=frozen_joints,
             smallest_move=smallest_move,
-            max_iterations=max_iterations,
-            names=joint_names(world),
-            dof=si.getStateDimension(),
         )
+        if goal_tolerance is not None and not goal_tolerance > 0.0:
+            raise InputError(f"goal_tolerance: expected a number greater than 0, got {goal_tolerance!r}")
+        self.goal_tolerance = goal_tolerance
 
-    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
-        """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
-        starts, goals = self.options.agreeing(starts, goals)
+    def between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+        """See :meth:`OneJointPlanner.between`."""
         lower, upper = self.bounds()
         tolerance = self.goal_tolerance or GOAL_TOLERANCE_SHARE * float(np.linalg.norm(upper - lower))
-        rules, seed = self.options.rules(lower, upper, starts[0]), int(self.rng.integers(2**63))
+        rules, seed = self.options.growth(lower, upper, starts[0]), int(self.rng.integers(2**63))
         limit, path = self.options.max_iterations, None
-        tree: Any
+        tree: CrdtSearch | OneTreeSearch
         if has_kernels(self._world, KERNELS, within=np.vstack([starts, goals, rules.lower, rules.upper])):
             tree = CrdtSearch(self._world, rules, seed, limit, starts, goals=goals, tolerance=tolerance)
         else:
-            tree = SingleTree(rules, seed, limit, starts, goals, tolerance, checker)
+            tree = OneTreeSearch(rules, seed, limit, starts, goals, tolerance, checker)
         while path is None and tree.advance(ptc):
             found = tree.ending()
             path = found if self.options.accepts(found) else None
@@ -103,7 +104,7 @@ class CRDT(SafePlanner):
         return SearchResult(tree.branch(0, nearest), statistics, distance)
 
 
-class SingleTree:
+class OneTreeSearch:
     """The search in Python, for any checker, step by step as `rrtik_ompl.fast.search.crdt.search.CrdtSearch`.
 
     Attributes:

@@ -15,7 +15,7 @@ from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, Se
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.search.rrt_connect import ConnectRules, RrtConnect, straight_path
 from rrtik_ompl.world.motion_queries import has_kernels, is_conservative
-from rrtik_planners.crdt_options import iteration_limit
+from rrtik_planners.one_joint_options import iteration_limit
 
 
 class FastRRTConnect(SafePlanner):
@@ -27,6 +27,7 @@ class FastRRTConnect(SafePlanner):
     """
 
     kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
+    supports_iteration_limit: ClassVar[bool] = True
 
     def __init__(
         self,

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.moves.lower_bounds import sharper_bound
-from rrtik_ompl.moves.rules import Joints, PerJoint, joint_numbers
+from rrtik_ompl.moves.rules import Joints, PerJoint
 from rrtik_ompl.moves.search import MOST_NODES, MoveSearch
 from rrtik_ompl.moves.staircase import one_joint_moves
-from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.shortening import Task
 from rrtik_ompl.shortening.random_cut import shortcut
 from rrtik_ompl.transitions import transitions
 from rrtik_ompl.world import World
 from rrtik_planners.bicrdt import BiCRDT
-from rrtik_planners.crdt_endings import NO_ENDING, Endings
-from rrtik_planners.crdt_options import AxisOptions, joint_names
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
+from rrtik_planners.one_joint_planner import OneJointPlanner
 
 SEARCHES, ROUNDS = 5, 10
 BRIEF_ITERATIONS = 1000  # of BiCRDT, before it is started anew
@@ -30,13 +30,18 @@ SAMPLED_ITERATIONS = 20_000  # of RRT-Connect
 FEW_NODES = 256  # of a lattice, where each motion is asked about by itself
 
 
-class FewestMoves(SafePlanner):
+class FewestMoves(OneJointPlanner):
     """Fewest moves first, least joint travel second; goes on until the bound is met, its rounds are over or time is up.
 
     It starts from the best of several quick runs of BiCRDT and looks for better routes on lattices of joint values.
     Where BiCRDT hardly gets anywhere it starts from RRT-Connect's route, turned into single-joint moves.
     ``statistics`` has the lower bound of the moves and the gap: how many moves more than that the path has.
     """
+
+    ompl_name: ClassVar[str] = "FewestMoves"
+    kernels: ClassVar[tuple[str, ...]] = ()
+    anytime: ClassVar[bool] = True
+    path_statistics: ClassVar[tuple[str, ...]] = ("lower_bound", "gap")
 
     def __init__(
         self,
@@ -54,53 +59,41 @@ class FewestMoves(SafePlanner):
         """Make a planner.
 
         Args:
-            si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
-            world: Asked instead of ``si`` whether configurations and motions are free, if given. A
-                ``rrtik_ompl.World`` also lets the bound be sharpened by proofs.
-            seed: At least 0; drawn from OMPL's if None.
+            si: This argument and those without a text are as of
+                :class:`~rrtik_planners.one_joint_planner.OneJointPlanner`.
+            world: As there. A ``rrtik_ompl.World`` also lets the bound be sharpened by proofs.
+            seed: As there.
             searches: Runs of BiCRDT at the beginning, at least 1.
             rounds: Of improvement, at least 0, after the first. With time enough they alone decide what comes out.
-            joint_costs: Cost of a joint's travel; see :class:`rrtik_planners.crdt_options.AxisOptions`.
-            frozen_joints: See there.
-            smallest_move: See there.
-            last_joints: See :class:`rrtik_planners.bicrdt.BiCRDT`. The bound counts their moves too.
+            joint_costs: As there.
+            frozen_joints: As there.
+            smallest_move: As there.
+            last_joints: As there. The bound counts their moves too.
 
         Raises:
             InputError: If an option is out of range or the space is of another kind.
         """
-        super().__init__(si, "FewestMoves", world=world, seed=seed)
-        self.searches = _count(searches, 1, "searches")
-        self.rounds = _count(rounds, 0, "rounds")
-        self.options = AxisOptions(
-            scale_by_range=False,
+        super().__init__(
+            si,
+            world=world,
+            seed=seed,
             joint_costs=joint_costs,
             frozen_joints=frozen_joints,
             smallest_move=smallest_move,
-            max_iterations=None,
-            names=joint_names(world),
-            dof=si.getStateDimension(),
+            last_joints=last_joints,
         )
-        self.last_joints = joint_numbers(last_joints, joint_names(world), si.getStateDimension(), "last_joints")
+        self.searches = _count(searches, 1, "searches")
+        self.rounds = _count(rounds, 0, "rounds")
 
-    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
-        """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
-        starts, goals = self.options.agreeing(starts, goals)
-        last, smallest = self.last_joints, self.options.smallest_move
-        starts = starts[(starts[:, last] == starts[0, last]).all(axis=1)]
-        endings = Endings(starts[0], goals, last, smallest, checker)
-        if len(endings.aims) == 0:
-            return SearchResult(None, reason=NO_ENDING)
-        found = self._between(starts, endings.aims, checker, ptc)
-        if found.path is None:
-            return found
-        path = endings.completed(found.path)
-        ending = transitions(path) - transitions(found.path)
-        counts = {**found.statistics, "lower_bound": found.statistics["lower_bound"] + ending}
-        return SearchResult(path, counts)
+    def completed(self, found: SearchResult, path: Matrix) -> SearchResult:
+        """See :meth:`OneJointPlanner.completed`."""
+        assert found.path is not None
+        bound = found.statistics["lower_bound"] + transitions(path) - transitions(found.path)
+        return replace(found, path=path, statistics={**found.statistics, "lower_bound": bound})
 
-    def _between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
-        """The search between starts and goals that agree in the joints that stay where they are."""
-        frozen, world = self._staying, self._world
+    def between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+        """See :meth:`OneJointPlanner.between`."""
+        frozen, world = self.options.staying, self._world
         movable = [joint for joint in range(starts.shape[1]) if joint not in frozen]
         moves = MoveSearch(
             starts,
@@ -149,20 +142,15 @@ class FewestMoves(SafePlanner):
             world=self._world,
             seed=seed,
             joint_costs=self.options.joint_costs.tolist(),
-            frozen_joints=self._staying,
+            frozen_joints=self.options.staying,
             smallest_move=self.options.smallest_move.tolist(),
             max_iterations=iterations,
         )
 
-    @property
-    def _staying(self) -> list[int]:
-        """Joints that rest until the last moves."""
-        return [*self.options.frozen_joints, *self.last_joints]
-
     def _converted(self, seed: int, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> Matrix | None:
         """RRT-Connect's route, made shorter and turned into single-joint moves; None if there is none."""
         world = self._world
-        if not isinstance(world, World) or self._staying:
+        if not isinstance(world, World) or self.options.staying:
             return None
         sampled = FastRRTConnect(
             self.getSpaceInformation(), world=world, seed=seed, max_iterations=SAMPLED_ITERATIONS

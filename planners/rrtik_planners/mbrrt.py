@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -22,6 +22,8 @@ class MBRRT(BiCRDT):
     Source: the MB-RRT paper, which names this use and leaves the path to a planner. In plain OMPL give the problem
     definition a :class:`rrtik_ompl.GoalSampler`, or any goal of configurations; these are taken as they are.
     """
+
+    ompl_name: ClassVar[str] = "MBRRT"
 
     def __init__(
         self,
@@ -43,14 +45,13 @@ class MBRRT(BiCRDT):
             goal: What the tip has to reach; needs a world. If None, or where the tree finds nothing, the
                 configurations of the problem definition are the goals.
             ik_seconds: Time that the tree in the workspace may take [s].
-            scale_by_range: See :class:`rrtik_planners.crdt_options.AxisOptions`.
+            scale_by_range: See :class:`rrtik_planners.one_joint_planner.OneJointPlanner`.
             max_iterations: As there.
 
         Raises:
             InputError: If an option is out of range, the space is of another kind, or the robot does not fit.
         """
         super().__init__(si, world=world, seed=seed, scale_by_range=scale_by_range, max_iterations=max_iterations)
-        self.setName("MBRRT")
         if not ik_seconds > 0.0:
             raise InputError(f"ik_seconds: expected a number greater than 0, got {ik_seconds!r}")
         self.ik_seconds = ik_seconds

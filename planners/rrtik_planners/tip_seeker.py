@@ -10,7 +10,7 @@ from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import Goal, JointGoal, PoseGoal
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
-from rrtik_ompl.ik.ikurt.tree import Tree
+from rrtik_ompl.ik.ikurt.tree import IkurtTree
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.targets import targets
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
@@ -24,6 +24,7 @@ class TipSeeker(SafePlanner):
     """Base class: knows the goal of the tip, or takes configurations of the problem definition for goals."""
 
     finds_goals: ClassVar[bool] = True
+    path_statistics: ClassVar[tuple[str, ...]] = ("position_error", "orientation_error")
 
     def __init__(self, si: Any, name: str, *, world: MotionQueries | None, seed: int | None, goal: Goal | None) -> None:
         """See :class:`rrtik_planners.ikurt.IKURT`."""
@@ -43,7 +44,7 @@ class TipSeeker(SafePlanner):
     def result(
         self,
         metric: TipMetric | ConfigurationMetric,
-        tree: Tree,
+        tree: IkurtTree,
         found: Matrix | None,
         counts: dict[str, int],
         checker: MotionChecker,

@@ -14,15 +14,16 @@ from rrtik_ompl.benchmark.campaign import all_jobs
 from rrtik_ompl.benchmark.sources import file_source
 from rrtik_ompl.benchmark.suite import Entrant, Suite
 from rrtik_ompl.benchmark.suite_file import BY_KIND, NONE
+from rrtik_ompl.catalog import default_planner
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.ompl_bridge.attempt import planner_options
-from rrtik_ompl.planning import DEFAULT_PLANNER, find_planner
+from rrtik_ompl.ompl_bridge.planner_options import planner_options
+from rrtik_ompl.planning import find_planner
 from rrtik_ompl.shortening import METHODS
 
 
 def plan_batch(
     problems: Sequence[str | os.PathLike[str]],
-    planner: str = DEFAULT_PLANNER,
+    planner: str | None = None,
     *,
     seconds: float = 5.0,
     seed: int = 0,
@@ -38,7 +39,7 @@ def plan_batch(
 
     Args:
         problems: Names of shipped problems, or files.
-        planner: Name of one of :func:`rrtik_ompl.list_planners`.
+        planner: Name of one of :func:`rrtik_ompl.list_planners`; None: as of :func:`rrtik_ompl.plan`.
         seconds: For planning, each [s]; a query that takes 30 s more than thrice as long is killed.
         seed: Of all of them.
         parameters: Options of the planner.
@@ -63,7 +64,7 @@ def plan_batch(
         name="batch",
         title="batch",
         sources=tuple(replace(source, name=str(k)) for k, source in enumerate(named)),  # two may be of one name
-        entrants=(_entrant(planner, dict(parameters or {}), shorten),),
+        entrants=(_entrant(planner or default_planner(), dict(parameters or {}), shorten),),
         runs=1,
         seconds=limit,
         patience=3.0 * limit + 30.0,

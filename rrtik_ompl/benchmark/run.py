@@ -83,13 +83,14 @@ def _shortened(path: JointPath, problem: Problem, method: str, seed: int) -> Joi
 
 
 def _sizes(path: JointPath, world: World) -> dict[str, float | bool | None]:
+    strict = world.with_resolution(world.motion_resolution / STRICT)
     return {
         "length": path.length,
         "transitions": path.transitions,
         "segments": len(path.waypoints) - 1,
         "smoothness": smoothness(path),
         "clearance": clearance(path, world),
-        "strict": bool(world.refined(STRICT).motion_valid_batch(path.waypoints[:-1], path.waypoints[1:]).all()),
+        "strict": bool(strict.motion_valid_batch(path.waypoints[:-1], path.waypoints[1:]).all()),
     }
 
 

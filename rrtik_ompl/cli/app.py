@@ -76,7 +76,7 @@ def check(problem: ProblemName, path: PathFile = None) -> int:
     The check is denser than a planner's and independent of it. Exit code 1 if the path is not valid.
     """
     from rrtik_ompl import JointGoal, load_path, load_problem
-    from rrtik_ompl.path import SECOND_CHECK
+    from rrtik_ompl.path import verification_resolution
 
     question = load_problem(problem)
     world = question.world
@@ -96,7 +96,7 @@ def check(problem: ProblemName, path: PathFile = None) -> int:
         say(f"{path}: {fault}")
     if faults:
         return NOT_FOUND
-    step = world.motion_resolution / SECOND_CHECK
+    step = verification_resolution(world)
     size = f"{len(route.waypoints)} waypoints, {route.transitions} moves, length {route.length:.2f} {route.unit}"
     say(f"{path}: valid, checked every {step:g} m; {size}")
     return FOUND

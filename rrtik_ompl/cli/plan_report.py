@@ -10,7 +10,7 @@ from rich.table import Table
 
 from rrtik_ompl.goal import JointGoal, PositionGoal
 from rrtik_ompl.moves.text import COLUMNS, moves_document
-from rrtik_ompl.path import SECOND_CHECK, JointPath
+from rrtik_ompl.path import JointPath, verification_resolution
 from rrtik_ompl.planning import Plan
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.trajectory import RateLimits, Trajectory
@@ -94,7 +94,7 @@ def summary(problem: Problem, plan: Plan, path: JointPath | None, shorten_second
         angle = np.degrees(plan.statistics["orientation_error"])
         turned = "" if isinstance(problem.goal, PositionGoal) else f" and {angle:.2g} deg"
         lines.append(f"the tip ends {plan.statistics['position_error']:.2g} m{turned} from the goal")
-    step = problem.world.motion_resolution / SECOND_CHECK
+    step = verification_resolution(problem.world)
     lines.append(
         f"planning {plan.seconds:.3f} s, shortening {shorten_seconds:.3f} s; checked again every {step:g} m: valid"
     )

@@ -24,11 +24,12 @@ class MoveRules:
         smallest_move: No move is shorter, shape (n,) [rad or m].
 
     Args:
-        names: Of the n joints.
+        names: Of the n joints; empty if they have none, and then ``dof`` is needed.
         joint_costs: Greater than 0, one number or one for each joint; all 1 if None.
         frozen_joints: By number, from 0, or by name.
         last_joints: Likewise.
         smallest_move: One number or one for each joint, at least 0.
+        dof: Number of joints; that of their names if None.
 
     Raises:
         InputError: If a number is out of range.
@@ -43,8 +44,9 @@ class MoveRules:
         frozen_joints: Joints = (),
         last_joints: Joints = (),
         smallest_move: PerJoint = 0.0,
+        dof: int | None = None,
     ) -> None:
-        dof = len(names)
+        dof = len(names) if dof is None else dof
         self.joint_costs = costs_of_joints(joint_costs, dof)
         self.frozen_joints = joint_numbers(frozen_joints, names, dof, "frozen_joints")
         self.last_joints = joint_numbers(last_joints, names, dof, "last_joints")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.path import SECOND_CHECK, JointPath
+from rrtik_ompl.path import VERIFICATION_DENSITY, JointPath
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.transitions import SAME, merge_moves
 from rrtik_ompl.world import World
@@ -23,7 +23,8 @@ from rrtik_ompl.world.motion_queries import MotionsFree
 
 Order: TypeAlias = tuple[int, ...]  # the joints of a piece, the first to move first
 
-FINER = (1.0, SECOND_CHECK, 2.0 * SECOND_CHECK)  # judges, one after the other as long as the second check objects
+# Of the checks of single-joint moves, relative to the world's; the next one where the second check rejects the path.
+DENSITIES = (1.0, VERIFICATION_DENSITY, 2.0 * VERIFICATION_DENSITY)
 FINEST = 1.0 / 64.0  # of the world's motion resolution: no point of the arm moves less in a piece that is still cut
 WIDEST = 64  # corners followed per step; a piece of up to seven joints has no more, so its search is exact
 
@@ -58,8 +59,8 @@ def one_joint_moves(path: JointPath, problem: Problem | World, *, finest: float 
     least = FINEST * world.motion_resolution if finest is None else float(finest)
     if not least > 0.0:
         raise InputError(f"finest must be greater than 0 metres, got {least:g}")
-    for finer in FINER:
-        judge = world.refined(finer)
+    for density in DENSITIES:
+        judge = world.with_resolution(world.motion_resolution / density)
         converted = path.with_waypoints(_converted(path.waypoints, judge, least))
         if not converted.violations(world):
             return converted

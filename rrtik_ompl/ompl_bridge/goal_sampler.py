@@ -10,7 +10,7 @@ from ompl import base as ob
 from rrtik_ompl.arrays import Mask, Matrix, frozen, whole_number
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.ik.goal_configurations import LARGEST, GoalSearch
-from rrtik_ompl.ompl_bridge.setup import Judge, space_information
+from rrtik_ompl.ompl_bridge.setup import ValidityCallback, space_information
 from rrtik_ompl.ompl_bridge.states import StateIO, space_bounds
 from rrtik_ompl.problem import Problem
 
@@ -46,7 +46,7 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
         if isinstance(most, bool) or not isinstance(most, int) or not 1 <= most <= LARGEST:
             raise InputError(f"most: expected a whole number from 1 to {LARGEST}, got {most!r}")
         if si is None:
-            si = space_information(problem, problem.start[None], Judge(problem.world))
+            si = space_information(problem, problem.start[None], ValidityCallback(problem.world))
         io, robot = StateIO(si), problem.world.robot
         if io.dof != robot.dof:
             raise InputError(

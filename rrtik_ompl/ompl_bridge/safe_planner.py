@@ -7,6 +7,7 @@ arrays at once, and ``solve`` always returns a status.
 
 from __future__ import annotations
 
+import inspect
 import time
 import traceback
 from collections.abc import Mapping
@@ -18,7 +19,7 @@ from ompl import base as ob
 from ompl import util as ou
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen, whole_number
-from rrtik_ompl.errors import PlannerError
+from rrtik_ompl.errors import InputError, PlannerError
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker
 from rrtik_ompl.ompl_bridge.states import StateIO, real_vector_space, space_bounds
@@ -26,6 +27,7 @@ from rrtik_ompl.world.motion_queries import MotionQueries
 
 GOAL_SAMPLES = 32  # how often a goal that can give any number of configurations is asked for one
 WAIT_FOR_GOAL = 0.002  # [s] between two questions to a goal that is still computing its first sample
+GIVEN_OPTIONS = ("world", "seed", "goal")  # that `plan()` fills in
 NONE_USABLE = "none is given, or all are in collision or outside the bounds"
 
 
@@ -54,6 +56,19 @@ class SearchResult:
     reason: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """Why a ``solve`` broke off.
+
+    Attributes:
+        refused: Whether the planner refused its options or what they mean for the problem: an InputError.
+        summary: In one line, without the type of an InputError.
+    """
+
+    refused: bool
+    summary: str
+
+
 class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     """Base class: a subclass implements :meth:`search` on arrays and is a complete ``ompl.base.Planner``.
 
@@ -61,18 +76,30 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     earlier one except the state of the random generator. ``solve`` never raises an Exception: it returns ``CRASH`` and
     keeps the text in :attr:`error`. KeyboardInterrupt and SystemExit pass.
 
+    A planner refuses options by an InputError, from its constructor or, if it depends on starts and goals, from
+    :meth:`search`. The options are the keyword parameters of the constructor; ``world``, ``seed`` and, for planners
+    that want the goal of the tip, ``goal`` are filled in by `plan()`.
+
+    Traits of the class, for `plan()`; see :class:`~rrtik_ompl.ompl_bridge.ompl_planners.PlannerTraits`:
+    ``anytime``, ``one_goal``, ``finds_goals``, ``straight_first``, ``supports_iteration_limit`` (such a planner has the
+    option ``max_iterations``), ``path_statistics`` and ``kernels``.
+
     Attributes:
-        kernels: For the class: names of the kernel libraries that a search may use
-        (:mod:`rrtik_ompl.fast.simd.library`). finds_goals: For the class: whether a goal of the tip, given as the
-        option ``goal``, is enough for it. seed: The seed in use; given, or drawn from OMPL's, so that
-        ``ompl.util.RNG.setSeed`` fixes it too. rng: The generator for :meth:`search`.
+        seed: The seed in use; given, or drawn from OMPL's, so that ``ompl.util.RNG.setSeed`` fixes it too.
+        rng: The generator for :meth:`search`.
         statistics: Counts of the last ``solve``, plain ints and floats.
-        error: Why the last ``solve`` could not be done, or None. The last line says it in short.
+        error: Why the last ``solve`` could not be done, with the traceback if it broke off, or None.
+        failure: Why the last ``solve`` broke off, or None.
         reason: Why the last ``solve`` was done in vain, if the search could say it.
     """
 
-    kernels: ClassVar[tuple[str, ...]] = ()
+    anytime: ClassVar[bool] = False
+    one_goal: ClassVar[bool] = False
     finds_goals: ClassVar[bool] = False
+    straight_first: ClassVar[bool] = False
+    supports_iteration_limit: ClassVar[bool] = False
+    path_statistics: ClassVar[tuple[str, ...]] = ()
+    kernels: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, si: Any, name: str, *, world: MotionQueries | None = None, seed: int | None = None) -> None:
         """Make a planner.
@@ -93,10 +120,17 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self.rng = np.random.default_rng(self.seed)
         self.statistics: dict[str, int | float] = {}
         self.error: str | None = None
+        self.failure: Failure | None = None
         self.reason = ""
         self._world = world
         self._io = StateIO(si)  # holds the space, which knows nothing of planners, so both can be freed
         self._known_bounds: tuple[Any, Any] = ((), ())  # numbers of the space, and the arrays made from them
+
+    @classmethod
+    def default_options(cls) -> dict[str, Any]:
+        """The options that the planner takes, with their defaults."""
+        parameters = list(inspect.signature(cls).parameters.values())[1:]  # the first one is the space information
+        return {each.name: each.default for each in parameters if each.name not in GIVEN_OPTIONS}
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
         """Look for a path from any start to any goal until ``ptc()`` is true. For subclasses.
@@ -122,20 +156,20 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         Returns:
             ``ompl.base.PlannerStatus``.
         """
-        self.statistics, self.error, self.reason = {}, None, ""
+        self._forget()
         try:
             status = self._solve(_condition(ptc))
         except _Refused as refused:
             status, self.error = refused.status, refused.reason
         except Exception as error:
-            self.error = _explain(error)
+            self.failure, self.error = _failure(error), _explain(error)
             status = ob.PlannerStatus.CRASH
         return ob.PlannerStatus(status)
 
     def clear(self) -> None:
         """Forget the last attempt; called by OMPL."""
         super().clear()
-        self.statistics, self.error, self.reason = {}, None, ""
+        self._forget()
 
     def ends_free(self, rows: Matrix, checker: MotionChecker) -> Mask:
         """Which starts and goals, shape (m, n), are free, shape (m,). For subclasses that know a faster way to tell."""
@@ -147,6 +181,9 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         They are the same read-only arrays as long as they do not change.
         """
         return self._known_bounds[1] or self._read_bounds()
+
+    def _forget(self) -> None:
+        self.statistics, self.error, self.failure, self.reason = {}, None, None, ""
 
     def _read_bounds(self) -> tuple[Vector, Vector]:
         numbers = self._io.bounds()
@@ -258,11 +295,22 @@ def _seed(seed: int | None) -> int:
     return int(ou.RNG().uniformInt(0, 2**31 - 1)) if seed is None else whole_number(seed, "seed")
 
 
+def _failure(error: BaseException) -> Failure:
+    if isinstance(error, InputError):
+        return Failure(True, str(error))
+    return Failure(False, traceback.format_exception_only(error)[-1].strip().splitlines()[-1] + _hint(error))
+
+
+def _hint(error: BaseException) -> str:
+    """What probably caused an exception of the bindings that does not say so."""
+    if "bad_cast" not in str(error):
+        return ""
+    return "; a callback returned a value of the wrong type: a validity checker must return a Python bool"
+
+
 def _explain(error: BaseException) -> str:
     """The text of an exception. Drops the frames, which would keep borrowed states of a callback alive."""
-    text = "".join(traceback.format_exception(error)).strip()
-    if "bad_cast" in str(error):
-        text += "; a callback returned a value of the wrong type: a validity checker must return a Python bool"
+    text = "".join(traceback.format_exception(error)).strip() + _hint(error)
     link: BaseException | None = error
     while link is not None:
         link.__traceback__ = None

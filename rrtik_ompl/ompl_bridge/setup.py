@@ -1,4 +1,4 @@
-"""A problem as OMPL objects: bounded space, validity and motions judged by the world, start and goal."""
+"""A problem as OMPL objects: bounded space, validity and motions checked by the world, start and goal."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rrtik_ompl.world import World
 
 
 @dataclass(slots=True, eq=False)
-class Judge:
+class ValidityCallback:
     """Counts the questions of a C++ planner and remembers the first error, which must not be raised inside OMPL.
 
     After the ``deadline`` [s, of ``time.monotonic``] every answer is no, for some planners ask hundreds of questions
@@ -75,15 +75,15 @@ class Judge:
 
 
 class _Motions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no types
-    """Motions judged by the world. It must not hold the SpaceInformation, or neither is ever freed."""
+    """Motions checked by the world. It must not hold the SpaceInformation, or neither is ever freed."""
 
-    def __init__(self, si: Any, judge: Judge, states: StateIO) -> None:
+    def __init__(self, si: Any, validity: ValidityCallback, states: StateIO) -> None:
         super().__init__(si)
-        self._judge, self._states = judge, states
+        self._validity, self._states = validity, states
 
     def checkMotion(self, first: Any, second: Any, *_: Any) -> bool:
         """Whether the motion between two states is free."""
-        return self._judge.motion_valid(self._states.read(first), self._states.read(second))
+        return self._validity.motion_valid(self._states.read(first), self._states.read(second))
 
 
 def planning_bounds(problem: Problem, goals: Matrix) -> tuple[Vector, Vector]:
@@ -95,17 +95,17 @@ def planning_bounds(problem: Problem, goals: Matrix) -> tuple[Vector, Vector]:
     return lower, upper
 
 
-def space_information(problem: Problem, goals: Matrix, judge: Judge) -> Any:
+def space_information(problem: Problem, goals: Matrix, validity: ValidityCallback) -> Any:
     """A set-up ``ompl.base.SpaceInformation`` of a RealVectorStateSpace whose checks are the world's."""
     si = _bounded(problem, goals)
     states = StateIO(si)
-    si.setStateValidityChecker(lambda state: judge.valid(states.read(state)))
-    si.setMotionValidator(_Motions(si, judge, StateIO(si)))
+    si.setStateValidityChecker(lambda state: validity.valid(states.read(state)))
+    si.setMotionValidator(_Motions(si, validity, StateIO(si)))
     si.setup()
     return si
 
 
-def unjudged_space(problem: Problem, goals: Matrix) -> Any:
+def unchecked_space(problem: Problem, goals: Matrix) -> Any:
     """As :func:`space_information`, but nothing is checked: for planners that ask the world themselves.
 
     OMPL asks about each start and goal that it hands out, and a question to Python costs more than some searches.

@@ -10,8 +10,8 @@ from ompl import util as ou
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import PlannerError
-from rrtik_ompl.ompl_bridge.attempt import interrupt_ends, quiet
-from rrtik_ompl.ompl_bridge.setup import Judge, space_information
+from rrtik_ompl.ompl_bridge.attempt import in_short, interrupt_ends, quiet
+from rrtik_ompl.ompl_bridge.setup import ValidityCallback, space_information
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.problem import Problem
 
@@ -30,15 +30,15 @@ def simplified(problem: Problem, route: Matrix, *, seconds: float, seed: int) ->
     """
     with quiet():
         ou.RNG.setSeed(1 + seed % (2**31 - 2))  # before any object that draws from it; OMPL does not take 0
-        judge = Judge(problem.world)
-        si = space_information(problem, route, judge)
-        judge.deadline = time.monotonic() + min(seconds, ENDLESS)
+        validity = ValidityCallback(problem.world)
+        si = space_information(problem, route, validity)
+        validity.deadline = time.monotonic() + min(seconds, ENDLESS)
         condition = ob.timedPlannerTerminationCondition(min(seconds, ENDLESS))
-        judge.stop = condition.terminate
+        validity.stop = condition.terminate
         states = StateIO(si)
         path = states.path(si, route)
         with interrupt_ends(condition):
             og.PathSimplifier(si).simplify(path, condition, True)
-        if judge.error is not None:
-            raise PlannerError(f"PathSimplifier broke: {str(judge.error).splitlines()[-1]}")
-        return states.rows(path), judge.motions
+        if validity.error is not None:
+            raise PlannerError(f"PathSimplifier broke: {in_short(validity.error)}")
+        return states.rows(path), validity.motions

@@ -16,8 +16,8 @@ from rrtik_ompl.moves.axis_cut import double_axis_cut
 from rrtik_ompl.moves.axis_cut_rounds import axis_cut_rounds
 from rrtik_ompl.moves.rules import MoveRules
 from rrtik_ompl.ompl_bridge.simplify import simplified
-from rrtik_ompl.path import SECOND_CHECK, JointPath
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.problem import Problem, densely_checked
 from rrtik_ompl.shortening.best import best_in_time
 from rrtik_ompl.shortening.corners import snap_corners
 from rrtik_ompl.shortening.fewest_moves import fewest_moves
@@ -63,7 +63,7 @@ def _axis_rounds(route: Matrix, task: Task, _: Problem) -> Matrix:
 
 def _fewest_moves(route: Matrix, task: Task, problem: Problem) -> Matrix:
     """What travels little touches what it goes round, so it is judged as densely as by the second check."""
-    judge = problem.world.refined(SECOND_CHECK)
+    judge = densely_checked(problem).world
     return fewest_moves(route, judge, seed=task.seed, stop=task.expired, rules=task.rules).route
 
 
@@ -135,7 +135,7 @@ def shorten(
     end = time.monotonic() + (np.inf if seconds is None else float(seconds))
     listener = None if on_better is None else lambda rows: on_better(path.with_waypoints(np.vstack([rows, tail])))
     # What is as short as can be touches what it goes round, so most methods check as densely as the second check.
-    refined = problem.refined(SECOND_CHECK)
+    refined = densely_checked(problem)
     for asked in (problem, refined) if chosen.keeps_moves else (refined,):
         left = end - time.monotonic()
         limits: dict[str, Any] = {"seconds": left, "on_better": listener, "stop": stop}

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.files.text import read_text, write_text
-from rrtik_ompl.path import SECOND_CHECK, JointPath
+from rrtik_ompl.path import VERIFICATION_DENSITY, JointPath
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.trajectory.text import decoded, encoded, trajectory_format
 from rrtik_ompl.units import joint_units
@@ -193,7 +193,9 @@ class Trajectory:
         finite_array(self.positions, (None, world.robot.dof), f"trajectory for robot '{world.robot.name}'")
         h, peak = np.diff(self.times), np.abs(self.velocities)
         speed = np.maximum(peak[1:], peak[:-1]) + h[:, None] * np.abs(self.jerks * h[:, None]) / 8.0
-        counts = np.ceil(h * (speed @ world.weights) * SECOND_CHECK / world.motion_resolution).astype(np.int64) + 1
+        counts = (
+            np.ceil(h * (speed @ world.weights) * VERIFICATION_DENSITY / world.motion_resolution).astype(np.int64) + 1
+        )
         clock = np.concatenate([t + d * np.arange(n) / n for t, d, n in zip(self.times, h, counts, strict=False)])
         pieces = np.repeat(np.arange(len(h)), counts)
         clock, pieces = np.append(clock, self.duration), np.append(pieces, len(h) - 1)

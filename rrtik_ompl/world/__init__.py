@@ -8,7 +8,7 @@ import warnings
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Matrix, finite_array
+from rrtik_ompl.arrays import Mask, Matrix, finite_array, positive
 from rrtik_ompl.collision.bodies import colliding_pairs, link_bodies, scene_bodies
 from rrtik_ompl.collision.certificate import Certificate, fixed_contact
 from rrtik_ompl.collision.contacts import Contact as Contact
@@ -131,11 +131,15 @@ class World:
         other._checks = self._checks.as_conservative(accuracy == "conservative")
         return other
 
-    def refined(self, factor: float) -> World:
-        """The same world, its motions checked in steps ``factor`` times as fine; shares everything else."""
-        finer = copy.copy(self)
-        finer.motion_resolution = self.motion_resolution / factor
-        return finer
+    def with_resolution(self, motion_resolution: float) -> World:
+        """The same world, its motions checked in steps of another size [m]; shares everything else.
+
+        Raises:
+            InputError: If the size is no number greater than 0.
+        """
+        other = copy.copy(self)
+        other.motion_resolution = positive(motion_resolution, "motion_resolution")
+        return other
 
     def valid(self, q: ArrayLike) -> bool:
         """Whether q, shape (dof,), is inside the limits and free of collision.

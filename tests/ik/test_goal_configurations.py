@@ -15,7 +15,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal, joint_difference
 from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.ompl_bridge import GoalSampler, StateIO
-from rrtik_ompl.ompl_bridge.attempt import ANYTIME_PLANNERS, ONE_GOAL_PLANNERS, ompl_planners
+from rrtik_ompl.ompl_bridge.ompl_planners import ompl_planners, traits_of
 from rrtik_ompl.planning import list_planners, plan
 from rrtik_ompl.poses import pose
 from rrtik_ompl.problem import Problem
@@ -26,6 +26,8 @@ from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.world import World
 from rrtik_planners import MBRRT, BiCRDT
 
+ANYTIME_PLANNERS = tuple(name for name, planner in ompl_planners().items() if traits_of(planner).anytime)
+ONE_GOAL_PLANNERS = tuple(name for name, planner in ompl_planners().items() if traits_of(planner).one_goal)
 HERE, THERE = np.array([0, -1.2, 1.2, -1.5, -1.5, 0.0]), np.array([1.6, -1.2, 1.2, -1.5, -1.5, 0.0])
 
 

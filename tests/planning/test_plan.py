@@ -12,7 +12,7 @@ from ompl import base as ob
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.goal import PositionGoal
-from rrtik_ompl.ompl_bridge.setup import Judge
+from rrtik_ompl.ompl_bridge.setup import ValidityCallback
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning import find_planner, list_planners, plan
 from rrtik_ompl.problem import Problem
@@ -268,9 +268,9 @@ def test_a_road_map_comes_to_an_end_also_where_there_are_several_goals(name):
 
 
 def test_after_its_deadline_a_judge_says_no(wall):
-    assert Judge(wall.world).valid(wall.start)
-    assert not Judge(wall.world, deadline=0.0).valid(wall.start)
-    assert not Judge(wall.world, deadline=0.0).motion_valid(wall.start, wall.start)
+    assert ValidityCallback(wall.world).valid(wall.start)
+    assert not ValidityCallback(wall.world, deadline=0.0).valid(wall.start)
+    assert not ValidityCallback(wall.world, deadline=0.0).motion_valid(wall.start, wall.start)
 
 
 @pytest.mark.parametrize("planner", ["bicrdt", "fastrrtconnect", "RRTConnect"])

@@ -12,7 +12,7 @@ from rrtik_ompl.arrays import Vector
 from rrtik_ompl.catalog import find_planner
 from rrtik_ompl.errors import require
 from rrtik_ompl.goal import JointGoal
-from rrtik_ompl.ompl_bridge.setup import Judge, problem_definition, space_information
+from rrtik_ompl.ompl_bridge.setup import ValidityCallback, problem_definition, space_information
 from rrtik_ompl.problem import Problem
 
 STEP = 1.0  # of the RRT, and the tolerance at the goal for both
@@ -81,7 +81,7 @@ def crdt_run(problem: Problem, seed: int) -> TreeRun:
     """Basic C-RDT as an OMPL planner, with the same goal tolerance and the same counting."""
     tests, begin = PointTests(problem.world), perf_counter()
     goals = _goal(problem)[None]
-    si = space_information(problem, goals, Judge(problem.world))
+    si = space_information(problem, goals, ValidityCallback(problem.world))
     planner = find_planner("crdt")(si, world=tests, seed=seed, goal_tolerance=STEP, max_iterations=CAP)
     planner.setProblemDefinition(problem_definition(problem, goals, si))
     planner.setup()

@@ -9,7 +9,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.ik.ikurt.metric import Metric
-from rrtik_ompl.ik.ikurt.tree import Tree
+from rrtik_ompl.ik.ikurt.tree import IkurtTree
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class PublishedSearch:
     ) -> None:
         self._metric, self._steps, self._lower, self._upper = metric, steps, lower, upper
         self._free, self._stop, self._rng = motion_free, stop, rng
-        self.tree = Tree(start[None], metric.distance(start[None]))
+        self.tree = IkurtTree(start[None], metric.distance(start[None]))
         self.connects = 0
 
     def run(self) -> int | None:

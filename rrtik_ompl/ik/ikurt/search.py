@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.ik.ikurt.descent import descend
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
-from rrtik_ompl.ik.ikurt.tree import Tree
+from rrtik_ompl.ik.ikurt.tree import IkurtTree
 
 DIRECTIONS = 16  # that CONNECT tries at once
 PATIENCE, FALL = 8, 0.8  # CONNECT goes on as long as so many rounds bring the distance down to this share,
@@ -97,8 +97,8 @@ class BatchedSearch:
         self._validity, self._rng, self._starts = validity, rng, starts
         self._distances = metric.distance(starts)
         self.goals = metric.goals if isinstance(metric, ConfigurationMetric) else starts[:0]
-        self.tree = Tree(starts, self._distances)
-        self.back = Tree(self.goals, np.zeros(len(self.goals)))
+        self.tree = IkurtTree(starts, self._distances)
+        self.back = IkurtTree(self.goals, np.zeros(len(self.goals)))
         self._newest, self._batches = starts[:0], 0
         self.connects = self.restarts = self._dropped = 0
         self.blocked = starts[:0]
@@ -190,7 +190,7 @@ class BatchedSearch:
             return self._finish(self._worth_it(new), scouts=SCOUTS)
         return None
 
-    def _grow(self, tree: Tree) -> NDArray[np.int64]:
+    def _grow(self, tree: IkurtTree) -> NDArray[np.int64]:
         """Steps of a plain RRT, many at once; the new vertices."""
         samples = self._rng.uniform(self._lower, self._upper, (SAMPLES, len(self._lower)))
         drawn = min(int(TOWARDS_OTHER * SAMPLES), len(self._newest)) if self.back.size else 0
@@ -228,7 +228,7 @@ class BatchedSearch:
         path = self._straight(vertices[near], ends.q[: len(vertices)][near])
         return self._remember(ends.q[arrived]) if path is None and arrived.any() else path
 
-    def _join(self, tree: Tree, vertices: NDArray[np.int64], other: Tree) -> Matrix | None:
+    def _join(self, tree: IkurtTree, vertices: NDArray[np.int64], other: IkurtTree) -> Matrix | None:
         """The path from the root of one tree to that of the other over the first free motion between two vertices."""
         near = other.nearest(tree.q[vertices])
         free = self._validity.motions_free(tree.q[vertices], other.q[near])
@@ -266,5 +266,5 @@ class BatchedSearch:
         self._see(self.tree.q, self.tree.distance)
         self._dropped += self.tree.size + self.back.size
         self.restarts += 1
-        self.tree = Tree(self._starts, self._distances)
-        self.back = Tree(self.goals, np.zeros(len(self.goals)))
+        self.tree = IkurtTree(self._starts, self._distances)
+        self.back = IkurtTree(self.goals, np.zeros(len(self.goals)))

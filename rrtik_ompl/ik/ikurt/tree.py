@@ -11,7 +11,7 @@ FIRST_ROOM = 256  # vertices; doubled whenever it is full
 PENALTY = 1.3  # a vertex from which CONNECT has failed counts as so many times as far, each time
 
 
-class Tree:
+class IkurtTree:
     """Vertices in the order in which they were added, roots first.
 
     Args:

@@ -19,8 +19,8 @@ from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box
 from rrtik_ompl.world import World
 from rrtik_ompl.world.motion_queries import has_kernels
-from rrtik_planners.bicrdt import TreePair
-from rrtik_planners.crdt import SingleTree
+from rrtik_planners.bicrdt import TwoTreeSearch
+from rrtik_planners.crdt import OneTreeSearch
 from rrtik_tests.slider_arm import NAMES, Plain, shipped
 
 pytestmark = pytest.mark.kernels
@@ -78,7 +78,7 @@ def ends(problem: Problem, count: int, seed: int) -> tuple[np.ndarray, np.ndarra
 def assert_same_pair(problem: Problem, rules: CrdtRules, seed: int, starts: Any, goals: Any, limit: int = 60) -> None:
     checker = WorldChecker(problem.world)
     fast = CrdtSearch(problem.world, rules, seed, limit, starts, goals)
-    slow = TreePair(rules, seed, limit, starts, goals, checker)
+    slow = TwoTreeSearch(rules, seed, limit, starts, goals, checker)
     for _ in range(3):  # a search goes on after a solution
         found = slow.advance(lambda: False)
         assert fast.advance(lambda: False) == found
@@ -133,7 +133,7 @@ def test_a_single_tree_grows_as_in_python_to_the_bit(name: str) -> None:
         starts, goals = ends(problem, seed % 2, seed)
         checker, rules = WorldChecker(problem.world), rules_of(problem)
         fast = CrdtSearch(problem.world, rules, seed, 100, starts, goals=goals, tolerance=tolerance)
-        slow = SingleTree(rules, seed, 100, starts, goals, tolerance, checker)
+        slow = OneTreeSearch(rules, seed, 100, starts, goals, tolerance, checker)
         for _ in range(3):
             found = slow.advance(lambda: False)
             assert fast.advance(lambda: False) == found

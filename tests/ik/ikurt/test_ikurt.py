@@ -17,7 +17,7 @@ from rrtik_ompl.ik.ikurt.descent import descend
 from rrtik_ompl.ik.ikurt.metric import TipMetric, reach
 from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
 from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
-from rrtik_ompl.ik.ikurt.tree import FIRST_ROOM, Tree
+from rrtik_ompl.ik.ikurt.tree import FIRST_ROOM, IkurtTree
 from rrtik_ompl.ompl_bridge.contract import small_problem
 from rrtik_ompl.poses import pose
 from rrtik_ompl.shapes import Sphere
@@ -103,7 +103,7 @@ def test_kinematics_and_jacobian_at_once_are_those_asked_for_one_by_one(puma: An
 
 def test_tree_keeps_its_vertices_and_ways_when_it_grows() -> None:
     rng = np.random.default_rng(0)
-    tree = Tree(np.zeros((1, 3)), np.array([9.0]))
+    tree = IkurtTree(np.zeros((1, 3)), np.array([9.0]))
     for k in range(FIRST_ROOM + 50):
         tree.add(rng.normal(size=(1, 3)), np.array([k]), np.array([8.0 - k * 1e-3]))
     last = tree.size - 1
@@ -115,7 +115,7 @@ def test_tree_keeps_its_vertices_and_ways_when_it_grows() -> None:
 
 
 def test_penalty_falls_on_the_way_that_failed_alone() -> None:
-    tree = Tree(np.zeros((1, 2)), np.array([2.0]))
+    tree = IkurtTree(np.zeros((1, 2)), np.array([2.0]))
     (first,) = tree.add(np.ones((1, 2)), np.array([0]), np.array([1.0]))
     (last,) = tree.add(2 * np.ones((1, 2)), np.array([first]), np.array([0.9]))
     (other,) = tree.add(-np.ones((1, 2)), np.array([0]), np.array([1.1]))

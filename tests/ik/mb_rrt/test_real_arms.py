@@ -15,7 +15,7 @@ from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
 from rrtik_ompl.ik.mb_rrt.search import search
 from rrtik_ompl.ik.mb_rrt.workspace_tree import WorkspaceTree
 from rrtik_ompl.ik.solve import solve_ik
-from rrtik_ompl.ompl_bridge.setup import Judge, space_information
+from rrtik_ompl.ompl_bridge.setup import ValidityCallback, space_information
 from rrtik_ompl.planning import plan
 from rrtik_ompl.shapes import Cylinder
 from rrtik_planners import MBRRT
@@ -212,7 +212,7 @@ def test_the_planner_reaches_goals_of_the_tip(name):
 
 def test_the_planner_says_what_it_needs():
     problem = rrtik.load_problem("puma_pose")
-    si = space_information(problem, problem.start[None], Judge(problem.world))
+    si = space_information(problem, problem.start[None], ValidityCallback(problem.world))
     with pytest.raises(InputError, match="MBRRT needs world="):
         MBRRT(si, goal=problem.goal)
     with pytest.raises(InputError, match="ik_seconds"):

@@ -11,30 +11,19 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.search.crdt.rules import CrdtRules
-from rrtik_ompl.moves.rules import (
-    Joints,
-    PerJoint,
-    costs_of_joints,
-    joint_numbers,
-    long_enough,
-    smallest_moves,
-)
+from rrtik_ompl.moves.rules import MoveRules, long_enough
 
 
-class AxisOptions:
-    """The options, checked.
+class OneJointOptions(MoveRules):
+    """The options, checked: what moves have to keep to, and how the trees grow.
 
     Args:
-        scale_by_range: Divide each coordinate by its range in the metric of the nearest neighbour.
-        joint_costs: Cost of a joint's motion, greater than 0, shape (n,): a slow or risky joint costs more. The metric
-            multiplies its coordinate by it, and of the samples it takes part only in the share lowest cost / its cost,
-            so that it moves less often; where it has to, it still does. All equal if None.
-        frozen_joints: Joints that must not move, by number (from 0) or, with a world, by name. Starts and goals have to
-            agree in them exactly; those that do not are left out.
-        smallest_move: No move of a path is shorter [unit of the joint: rad or m], one number or one for each joint.
-        max_iterations: The K of the paper; without limit if None.
-        names: The joints' names, if known.
+        names: The joints' names, empty if they are not known.
         dof: Number of joints.
+        scale_by_range: This option and the others are those of
+            :class:`~rrtik_planners.one_joint_planner.OneJointPlanner`.
+        max_iterations: As there.
+        rules: As there, and as of MoveRules.
 
     Raises:
         InputError: If an option is out of range.
@@ -42,20 +31,10 @@ class AxisOptions:
     """
 
     def __init__(
-        self,
-        *,
-        scale_by_range: bool,
-        joint_costs: PerJoint | None,
-        frozen_joints: Joints,
-        smallest_move: PerJoint,
-        max_iterations: int | None,
-        names: Sequence[str],
-        dof: int,
+        self, names: Sequence[str], dof: int, *, scale_by_range: bool, max_iterations: int | None, **rules: Any
     ) -> None:
+        super().__init__(names, dof=dof, **rules)
         self.scale_by_range = scale_by_range
-        self.joint_costs = costs_of_joints(joint_costs, dof)
-        self.smallest_move = smallest_moves(smallest_move, dof)
-        self.frozen_joints = joint_numbers(frozen_joints, names, dof, "frozen_joints")
         self.max_iterations = iteration_limit(max_iterations)
         self._names = names or [str(k) for k in range(dof)]
 
@@ -78,12 +57,16 @@ class AxisOptions:
             f"start and at {goals[0, joint]:.9g} at the goal; let it move or change one of them"
         )
 
-    def rules(self, lower: Vector, upper: Vector, start: Vector, others: Sequence[int] = ()) -> CrdtRules:
-        """How trees grow within bounds, shapes (n,), if frozen joints and ``others`` stay where they are at a start."""
+    @property
+    def staying(self) -> list[int]:
+        """Joints that do not move before the last moves."""
+        return [*self.frozen_joints, *self.last_joints]
+
+    def growth(self, lower: Vector, upper: Vector, start: Vector) -> CrdtRules:
+        """How trees grow within bounds, shapes (n,), if the joints that stay are where they are at a start."""
         scale = self.joint_costs / (upper - lower) if self.scale_by_range else self.joint_costs
         lower, upper = lower.copy(), upper.copy()
-        staying = [*self.frozen_joints, *others]
-        lower[staying] = upper[staying] = start[staying]
+        lower[self.staying] = upper[self.staying] = start[self.staying]
         return CrdtRules(lower, upper, scale, self.smallest_move, self.joint_costs.min() / self.joint_costs)
 
     def accepts(self, path: Matrix) -> bool:

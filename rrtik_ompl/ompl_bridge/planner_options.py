@@ -1,0 +1,86 @@
+"""Options of planners: their names, and a planner made with them, one of ours or one of OMPL's."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeGuard
+
+from ompl import base as ob
+
+from rrtik_ompl.arrays import finite_array
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.ompl_bridge.ompl_planners import PlannerFactory
+from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
+from rrtik_ompl.problem import Problem
+
+
+def is_safe(factory: PlannerFactory) -> TypeGuard[type[SafePlanner]]:
+    """Whether a planner is a class derived from SafePlanner."""
+    return isinstance(factory, type) and issubclass(factory, SafePlanner)
+
+
+def planner_options(factory: PlannerFactory) -> tuple[str, ...]:
+    """Names of the options that a planner takes, sorted; those of OMPL's planners in snake case."""
+    if is_safe(factory):
+        return tuple(sorted(factory.default_options()))
+    setters = {s for s in dir(factory) if s.startswith("set") and not hasattr(ob.Planner, s)}
+    return tuple(sorted(map(_snake, setters)))
+
+
+def safe_planner(
+    factory: type[SafePlanner], name: str, si: Any, problem: Problem, seed: int, options: Mapping[str, Any]
+) -> SafePlanner:
+    """A planner derived from SafePlanner, for a problem.
+
+    Raises:
+        UnknownNameError: If it has no option of a name.
+        InputError: If it refuses an option.
+    """
+    _check_names(factory, name, options)
+    goal: dict[str, Any] = {"goal": problem.goal} if "goal" in inspect.signature(factory).parameters else {}
+    try:
+        return factory(si, world=problem.world, seed=seed, **goal, **options)
+    except TypeError as error:
+        raise InputError(f"planner {name}: {error}") from None
+
+
+def other_planner(factory: PlannerFactory, name: str, si: Any, definition: Any, options: Mapping[str, Any]) -> Any:
+    """A planner of OMPL, or any other, whose options are set through setters: ``goal_bias`` through ``setGoalBias``.
+
+    Raises:
+        UnknownNameError: If it has no option of a name.
+        InputError: If it refuses an option.
+    """
+    planner = factory(si)
+    try:
+        for key, value in options.items():
+            _check_names(type(planner), name, (key,))
+            _set(planner, name, key, value)
+    except InputError:
+        planner.setProblemDefinition(definition)  # AORRTC ends the process if it is destroyed before it was set up
+        planner.setup()
+        raise
+    return planner
+
+
+def _check_names(factory: PlannerFactory, name: str, keys: Iterable[str]) -> None:
+    options = planner_options(factory)
+    for key in keys:
+        if key not in options:
+            raise UnknownNameError(f"parameter of planner {name}", key, options)
+
+
+def _set(planner: Any, name: str, key: str, value: Any) -> None:
+    setter = next(s for s in dir(planner) if s.startswith("set") and _snake(s) == key)
+    if isinstance(value, float):
+        finite_array(value, (), f"planner {name}: parameter {key}")
+    try:
+        getattr(planner, setter)(value)
+    except TypeError:
+        raise InputError(f"planner {name}: parameter {key} cannot be {value!r}") from None
+
+
+def _snake(setter: str) -> str:
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", setter.removeprefix("set")).lower()
