@@ -35,7 +35,7 @@ class ConstantVelocity:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Waypoints:
+class TimedPoses:
     """A motion through poses at given times: straight lines, shortest rotations, at rest before and after."""
 
     times: Vector
@@ -63,12 +63,12 @@ class Waypoints:
         rotation = a.rotation @ pin.exp3(share * pin.log3(a.rotation.T @ b.rotation))
         return pin.SE3(rotation, (1.0 - share) * a.translation + share * b.translation)
 
-    def seen_from(self, time: float) -> Waypoints:
+    def seen_from(self, time: float) -> TimedPoses:
         """The same motion with ``time`` [s] as its time 0."""
-        return Waypoints(self.times - time, self.poses)
+        return TimedPoses(self.times - time, self.poses)
 
 
-Motion: TypeAlias = ConstantVelocity | Waypoints
+Motion: TypeAlias = ConstantVelocity | TimedPoses
 
 
 def _check_solid(name: object, shape: object, pose: object) -> None:

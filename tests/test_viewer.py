@@ -26,7 +26,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import GoalSet, JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.poses import pose
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, Waypoints
+from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
 from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.viewer import view
@@ -65,7 +65,7 @@ def crane() -> Robot:
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
-    drift = Waypoints([0.0, 4.0], [pose([-1, 0, 0.5]), pose([-1, 1, 0.5])])
+    drift = TimedPoses([0.0, 4.0], [pose([-1, 0, 0.5]), pose([-1, 1, 0.5])])
     return Scene(
         obstacles=(
             Obstacle("crate", Box([0.3, 0.3, 0.3]), pose([0.9, -0.9, 0.15])),

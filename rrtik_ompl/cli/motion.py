@@ -79,7 +79,7 @@ def time_path(
         raise InputError(f"--blend: expected 0 degrees or more, got {blend:g}")
     import numpy as np
 
-    from rrtik_ompl import RateLimits, load_problem, plot_joints, timed
+    from rrtik_ompl import RateLimits, load_problem, plot_joints, time_parameterize
     from rrtik_ompl.cli import plan_report as report
 
     question = load_problem(problem)
@@ -90,7 +90,7 @@ def time_path(
         robot, share=share, **{name: None if row is None else _scaled(row, factors) for name, row in given.items()}
     )
     with progress("timing"):
-        found = timed(route, limits, blend=float(np.deg2rad(blend)), world=question.world)
+        found = time_parameterize(route, limits, blend=float(np.deg2rad(blend)), world=question.world)
     if out is not None:
         found.save(out)
     if plot is not None:

@@ -31,7 +31,7 @@ from rrtik_ompl.files.sections import (
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml, write_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.poses import pose, pose_from_rpy, quaternion_xyzw
-from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, Waypoints
+from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, TimedPoses
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
 
 SHAPE_KEYS = ("box", "sphere", "cylinder", "capsule", "half_space", "polygon", "mesh")
@@ -95,7 +95,7 @@ class MotionEntry(Section):
         if self.velocity is not None:
             return ConstantVelocity(self.velocity)
         stations = self.waypoints or []
-        return Waypoints([w.time for w in stations], [w.pose.build() for w in stations])
+        return TimedPoses([w.time for w in stations], [w.pose.build() for w in stations])
 
 
 class SolidEntry(Section):

@@ -53,7 +53,7 @@ class Tick:
 
 
 @dataclass(slots=True, eq=False)
-class Run:
+class ReplanRun:
     """A robot's way to its goal through a scene that changes.
 
     Attributes:
@@ -145,8 +145,8 @@ _HEADS: tuple[str, ...] = ("problem", "robot", "joint_names", "planner", "seed",
 _HEADS += ("speed_bound", "outcome", "reason")
 
 
-def load_run(path: str | os.PathLike[str]) -> Run:
-    """Read a record written by :meth:`Run.save`.
+def load_run(path: str | os.PathLike[str]) -> ReplanRun:
+    """Read a record written by :meth:`ReplanRun.save`.
 
     Raises:
         InputError: If the file is missing or malformed; the message names it.
@@ -156,7 +156,7 @@ def load_run(path: str | os.PathLike[str]) -> Run:
         heads = _heads(document)
         ticks = [_tick(entry, len(heads["joint_names"])) for entry in document["ticks"]]
         _check_times(ticks)
-        return Run(**heads, ticks=ticks)
+        return ReplanRun(**heads, ticks=ticks)
     except (KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{path}: not a whole record: {error!r}; write it again with rrtik replan --record") from None
     except InputError as error:

@@ -1,7 +1,7 @@
 """The baseline of one tree: it grows from the goal, what has become blocked is trimmed, and it is grown again.
 
-Source: Ferguson, Kalra and Stentz 2006 (Replanning with RRTs), with the tree's root at the goal; as the DRRT-Con paper
-says of its predecessor, a sample is the robot's place with probability 0.4.
+Source: Ferguson, Kalra and Stentz, 2006 [8], with the tree's root at the goal; as [1, ch. 5.2] says of this method, a
+sample is the robot's configuration with probability 0.4.
 """
 
 from __future__ import annotations
@@ -14,23 +14,23 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.replanning.connecting import ITERATIONS, Joined, Motions, Stop, Tree, joined, never
 from rrtik_ompl.replanning.drrt_con import DrrtCon, Post
 
-TO_THE_ROBOT = 0.4  # probability
+ROBOT_PROBABILITY = 0.4  # of a sample at the robot's configuration
 
 
 class SingleTree(DrrtCon):
-    """DRRT: all edges of one tree are checked when the path is hit, branches behind blocked ones are trimmed.
+    """DRRT: when the path is blocked all edges of the tree are checked, and branches behind blocked ones are trimmed.
 
     Args:
         lower, upper: The box to sample in, shape (n,).
-        eps: See :class:`DrrtCon`.
+        max_edge: See :class:`DrrtCon`.
         seed: Of the samples.
         post: See :class:`DrrtCon`.
     """
 
     name: ClassVar[str] = "drrt"
 
-    def __init__(self, lower: Vector, upper: Vector, eps: float, seed: int, *, post: Post | None = None) -> None:
-        super().__init__(self, eps, post=post)
+    def __init__(self, lower: Vector, upper: Vector, max_edge: float, seed: int, *, post: Post | None = None) -> None:
+        super().__init__(self, max_edge, post=post)
         self._lower, self._upper = lower, upper
         self._rng = np.random.default_rng(seed)
         self._tree: Tree | None = None
@@ -58,9 +58,9 @@ class SingleTree(DrrtCon):
             if stop():
                 return None
             self.samples += 1
-            at_robot = self._rng.random() < TO_THE_ROBOT
+            at_robot = self._rng.random() < ROBOT_PROBABILITY
             target = aim if at_robot else self._rng.uniform(self._lower, self._upper)
-            new = self._tree.extend(target, self.eps, motions)
+            new = self._tree.extend(target, self.max_edge, motions)
             if new is not None and (self._tree.rows[new] == aim).all():
                 return joined(first, self._tree.branch(new)[::-1], second, chain=False)
         return None

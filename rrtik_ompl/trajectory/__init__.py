@@ -16,13 +16,15 @@ from rrtik_ompl.trajectory.motion import Peaks, State, Trajectory, load_trajecto
 from rrtik_ompl.trajectory.pieces import joined
 from rrtik_ompl.world import World
 
-__all__ = ["Peaks", "RateLimits", "State", "Trajectory", "load_trajectory", "timed"]
+__all__ = ["Peaks", "RateLimits", "State", "Trajectory", "load_trajectory", "time_parameterize"]
 
 SLOWINGS = 10  # one is enough but for rounding errors in motions of very short phases
 ROUNDS = 4  # of making rounded corners smaller all together, before none is rounded
 
 
-def timed(path: JointPath, limits: RateLimits | Robot, *, blend: float = 0.0, world: World | None = None) -> Trajectory:
+def time_parameterize(
+    path: JointPath, limits: RateLimits | Robot, *, blend: float = 0.0, world: World | None = None
+) -> Trajectory:
     """Give a path its times: as fast as the limits allow, beginning and ending at rest.
 
     Without ``blend`` the motion stays on the path to 1e-9 and stops at every corner; between two corners it has the

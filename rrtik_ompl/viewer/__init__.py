@@ -41,7 +41,7 @@ def view(
         ghosts: Configurations at which the arm is drawn like tinted glass, shape (k, dof), such as the solutions of
             inverse kinematics; they take the place of the ghosts of start and goal.
         marks: What else stands in the world: see ``rrtik_ompl.viewer.drawing.marks``.
-        run: A ``Run`` of :func:`rrtik_ompl.replanning.replan` to replay, in place of a path.
+        run: A ``ReplanRun`` of :func:`rrtik_ompl.replanning.replan` to replay, in place of a path.
         html: File to write. If None, the page is served on 127.0.0.1 until Ctrl-C is pressed.
         title: Heading of the page; made from the problem's or the robot's name if None.
         port: Port to serve on; a free one if 0.

@@ -13,7 +13,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.replanning.run import Run
+from rrtik_ompl.replanning.run import ReplanRun
 from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.story import story_of
@@ -31,7 +31,7 @@ def page(
     before: Any | None = None,
     ghosts: ArrayLike | None = None,
     marks: Sequence[Mark] = (),
-    run: Run | None = None,
+    run: ReplanRun | None = None,
     title: str | None = None,
 ) -> str:
     """The page that shows something, as the text of one HTML file that needs no other file and no network.

@@ -10,7 +10,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.poses import quaternion_xyzw
-from rrtik_ompl.replanning.run import Run, Tick
+from rrtik_ompl.replanning.run import ReplanRun, Tick
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.viewer.drawing.framing import Frame
@@ -22,7 +22,7 @@ SHOWN = 0.5  # [s] that a path is seen after it was replaced
 DIGITS = 5
 
 
-def run_story(run: Run, robot: Robot, scene: Scene, frame: Frame) -> dict[str, Any]:
+def run_story(run: ReplanRun, robot: Robot, scene: Scene, frame: Frame) -> dict[str, Any]:
     """The part of the page's story that is about a run."""
     lines, numbers = _lines(run, robot)
     moved = sorted({name for tick in run.ticks for name in tick.poses})
@@ -57,7 +57,7 @@ def _places(obstacle: Obstacle, ticks: list[Tick], frame: Frame) -> dict[str, An
     return {"placement": own.ravel().tolist(), "poses": np.round(poses, DIGITS).tolist()}
 
 
-def _lines(run: Run, robot: Robot) -> tuple[list[list[list[float]]], list[int]]:
+def _lines(run: ReplanRun, robot: Robot) -> tuple[list[list[list[float]]], list[int]]:
     """The tip's way along each path, and for each tick the number of its path; -1 for none."""
     lines: list[list[list[float]]] = []
     numbers: list[int] = []
@@ -85,7 +85,7 @@ def _tips(robot: Robot, path: Matrix) -> Matrix:
     return kept
 
 
-def _replaced(run: Run, numbers: list[int]) -> list[int]:
+def _replaced(run: ReplanRun, numbers: list[int]) -> list[int]:
     """For each tick the number of the path that a repair has replaced a moment ago, or -1."""
     found, last, until = [], -1, -1
     for k, tick in enumerate(run.ticks):

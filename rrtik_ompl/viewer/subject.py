@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import Goal, JointGoal
-from rrtik_ompl.replanning.run import Run
+from rrtik_ompl.replanning.run import ReplanRun
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.viewer.drawing.marks import Mark
@@ -43,7 +43,7 @@ class Subject:
     before: Matrix | None = None
     ghosts: Matrix | None = None
     marks: tuple[Mark, ...] = ()
-    run: Run | None = None
+    run: ReplanRun | None = None
 
     @property
     def start(self) -> Vector | None:
@@ -132,7 +132,7 @@ def subject_of_run(problem: Any, run: Any) -> Subject:
     Raises:
         InputError: If it is no run, or not one of that problem's robot.
     """
-    require(run, Run, "run to show", "use replan() or load_run(file)")
+    require(run, ReplanRun, "run to show", "use replan() or load_run(file)")
     if len(run.ticks) == 0:
         raise InputError("run to show: it has no tick")
     robot = subject_of(problem).robot
