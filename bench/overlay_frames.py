@@ -15,9 +15,9 @@ from rrtik_ompl import load_problem, load_robot
 from rrtik_ompl.overlay.augment import Augmenter, Ghost
 from rrtik_ompl.overlay.canvas import FAR, Canvas
 from rrtik_ompl.overlay.figure import figure_of, placed
-from rrtik_ompl.overlay.reference_z_buffer import ROUNDING, plain_z_buffer
+from rrtik_ompl.overlay.reference_z_buffer import ROUNDING, reference_z_buffer
 from rrtik_ompl.overlay.surfaces import robot_surfaces
-from rrtik_ompl.overlay.virtual_camera import eye_at
+from rrtik_ompl.overlay.virtual_camera import orbit_pose
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
 from rrtik_ompl.sensing.cameras.pictures import Picture
 from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph, published_camera
@@ -35,11 +35,11 @@ def silhouettes(report: Report, count: int) -> None:
         arm, drawn, differ, doubtful, deep = figure_of(robot_surfaces(robot, 3000)), 0, 0, 0, 0.0
         for _ in range(count):
             q = rng.uniform(np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi))
-            eye = eye_at([0.6, 0.0, 0.2], *rng.uniform([1.8, -np.pi, -0.3], [3.0, np.pi, 1.2]))
+            eye = orbit_pose([0.6, 0.0, 0.2], *rng.uniform([1.8, -np.pi, -0.3], [3.0, np.pi, 1.2]))
             shown = placed(arm, eye.inverse().homogeneous @ robot.joint_frames(q[None])[0])
             canvas = Canvas(camera)
             canvas.draw(shown)
-            truth, doubt = plain_z_buffer(camera, shown)
+            truth, doubt = reference_z_buffer(camera, shown)
             both = canvas.drawn & (truth < FAR)
             drawn += int(both.sum())
             differ += int((canvas.drawn != (truth < FAR)).sum())

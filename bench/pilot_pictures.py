@@ -17,7 +17,7 @@ import tornado.websocket
 from pilot_scene import NAME, PLACE, ROBOT, seen_at
 
 from rrtik_ompl.overlay.augment import Augmenter
-from rrtik_ompl.overlay.virtual_camera import eye_at
+from rrtik_ompl.overlay.virtual_camera import orbit_pose
 from rrtik_ompl.pilot.engine import Engine
 from rrtik_ompl.pilot.run import Loop
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
@@ -157,7 +157,7 @@ def registration(count: int) -> list[float]:
     """How far small boxes in the picture are from the outline of their corners, projected one by one [px]."""
     camera, rng, away = published_camera(), np.random.default_rng(5), []
     augmenter = Augmenter(ROBOT, camera)
-    T = eye_at([1.2, 0.2, 0.1], 1.3, np.deg2rad(-150), np.deg2rad(25))
+    T = orbit_pose([1.2, 0.2, 0.1], 1.3, np.deg2rad(-150), np.deg2rad(25))
     black = np.zeros((camera.height, camera.width, 3), dtype=np.uint8)
     while len(away) < count:
         place = pin.SE3(pin.exp3(rng.normal(0, 1, 3)), np.array([1.2, 0.2, 0.1]) + rng.uniform(-0.25, 0.25, 3))

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
 from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.files.tables import decoded, encoded, path_format
+from rrtik_ompl.files.tables import dumps, loads, path_format
 from rrtik_ompl.files.text import read_text, write_text
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.transitions import SAME, merge_moves, moved, route_length, single_joint, transitions
@@ -236,7 +236,7 @@ class JointPath:
         Raises:
             InputError: If the ending is another one or the file cannot be written.
         """
-        write_text(path, encoded(self._document(), path_format(path)))
+        write_text(path, dumps(self._document(), path_format(path)))
 
     def _document(self) -> dict[str, Any]:
         return {
@@ -281,7 +281,7 @@ def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> Joint
     require(robot, Robot | None, "robot of a path", "use load_robot(name)")
     ending = path_format(path)
     try:
-        document = decoded(read_text(path), ending)
+        document = loads(read_text(path), ending)
         names, name = document.get("joint_names"), str(document.get("robot", ""))
         units, endless = document.get("units"), document.get("continuous")
         sliding = None if units is None else [unit == "m" for unit in units]

@@ -9,7 +9,7 @@ import pytest
 
 import rrtik_robots
 from rrtik_ompl import load_path, load_problem, load_robot
-from rrtik_ompl.cli.app import app as cli
+from rrtik_ompl.cli import app as cli
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.overlay.film import ArmInPictures, write_film
 from rrtik_ompl.sensing.cameras.camera_file import load_camera

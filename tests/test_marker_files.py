@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.cli.app import app as cli
+from rrtik_ompl.cli import app as cli
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.problem_files.scene import load_scene
 from rrtik_ompl.sensing.cameras.calibration import calibrate

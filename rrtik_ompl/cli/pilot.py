@@ -27,7 +27,9 @@ def pilot(
         Path | None, typer.Option(help="File of the simulated vehicle; a shipped one if left out.")
     ] = None,
     camera_file: Annotated[Path | None, typer.Option(help="Camera file (see: rrtik markers calibrate).")] = None,
-    map_file: Annotated[Path | None, typer.Option("--map", help="Which marker sits on which object: .yaml.")] = None,
+    map_file: Annotated[
+        Path | None, typer.Option("--map", help="Marker map: which marker is on which object: .yaml.")
+    ] = None,
     record: Annotated[Path | None, typer.Option(help="Write the session to this file, line by line.")] = None,
     replay: Annotated[Path | None, typer.Option(help="Play a recorded session.")] = None,
     arm: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="An arm; a simulated one if left out.")] = None,

@@ -26,7 +26,7 @@ def path_format(path: str | os.PathLike[str]) -> str:
     return ending
 
 
-def encoded(document: dict[str, Any], ending: str) -> str:
+def dumps(document: dict[str, Any], ending: str) -> str:
     """Text of a path: ``document`` holds ``waypoints``, ``joint_names`` and whatever else JSON shall keep."""
     if ending == ".json":
         return json.dumps(document, indent=1) + "\n"
@@ -38,8 +38,8 @@ def encoded(document: dict[str, Any], ending: str) -> str:
     return text.getvalue()
 
 
-def decoded(text: str, ending: str) -> dict[str, Any]:
-    """What :func:`encoded` wrote: ``waypoints``, and ``joint_names``, ``units`` and so on if the text says them.
+def loads(text: str, ending: str) -> dict[str, Any]:
+    """What :func:`dumps` wrote: ``waypoints``, and ``joint_names``, ``units`` and so on if the text says them.
 
     Raises:
         InputError: If the text is malformed; the message names the line or the key.

@@ -1,4 +1,4 @@
-"""A second rasteriser in double precision, one triangle after the other: slow, and only there to check the first."""
+"""Reference rasteriser in double precision, one triangle after the other: slow, for tests of the first one."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rrtik_ompl.sensing.cameras.camera import Camera
 ROUNDING = 1e-3  # of a vertex's pixel in single precision, with what is folded into the matrix [pixels]
 
 
-def plain_z_buffer(camera: Camera, figure: Placed) -> tuple[Matrix, NDArray[np.bool_]]:
+def reference_z_buffer(camera: Camera, figure: Placed) -> tuple[Matrix, NDArray[np.bool_]]:
     """Depths of a figure that lies before a camera without distortion, and where rounding may decide.
 
     A pixel belongs to a triangle if its centre does; triangles that are seen from inside are left out.

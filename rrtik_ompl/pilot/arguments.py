@@ -19,9 +19,10 @@ def number(value: object, name: str) -> float:
     Raises:
         InputError: If it is none.
     """
-    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not abs(value) <= MAX_NUMBER:
+    plain = value.item() if isinstance(value, np.number) else value
+    if isinstance(plain, bool) or not isinstance(plain, int | float) or not -MAX_NUMBER <= plain <= MAX_NUMBER:
         raise InputError(f"{name} must be a finite number, got {str(value)[:MAX_WORD_LENGTH]!r}")
-    return float(value)
+    return float(plain)
 
 
 def fitting(command: Callable[..., str], name: str, arguments: Mapping[str, object]) -> dict[str, float | str]:

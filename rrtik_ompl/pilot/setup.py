@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.overlay.virtual_camera import eye_at
+from rrtik_ompl.overlay.virtual_camera import orbit_pose
 from rrtik_ompl.pilot.devices.arm import Arm, SimulatedArm
 from rrtik_ompl.pilot.devices.camera_feed import Feed
 from rrtik_ompl.pilot.devices.line_arm import LineArm
@@ -123,7 +123,7 @@ def _recorded(options: SessionOptions, problem: Problem) -> SimulatedVehicle:
         return _vehicle(options, problem)
     camera, marker_map = load_camera(options.camera_file), load_marker_map(options.map_file)
     return SimulatedVehicle(
-        camera, marker_map, {}, marker_map.T_base_camera or eye_at(np.zeros(3), *DEFAULT_CAMERA_POSE)
+        camera, marker_map, {}, marker_map.T_base_camera or orbit_pose(np.zeros(3), *DEFAULT_CAMERA_POSE)
     )
 
 

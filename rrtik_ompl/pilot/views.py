@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.overlay.augment import Augmenter, Ghost
-from rrtik_ompl.overlay.virtual_camera import eye_at, imagined_camera, sky
+from rrtik_ompl.overlay.virtual_camera import background, orbit_pose, pinhole_camera
 from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED
 from rrtik_ompl.pilot.session import FOLLOWING, PROPOSED, Session
 from rrtik_ompl.sensing.cameras.camera import Camera
@@ -79,9 +79,9 @@ class OutsideView:
 
     def __init__(self, session: Session, width: int = 640, height: int = 480) -> None:
         """Begin with the view from a corner."""
-        self._session, self._camera = session, imagined_camera(width, height)
+        self._session, self._camera = session, pinhole_camera(width, height)
         self._arm = Augmenter(session.robot, self._camera, OUTSIDE_TRIANGLES)
-        self._sky = sky(self._camera)
+        self._sky = background(self._camera)
         reach = float(np.linalg.norm(session.robot.fk(session.q).translation))
         self.centre: Vector = np.array([0.6 * reach, 0.0, 0.0])
         self.distance, self.azimuth, self.elevation = 1.9 * max(reach, 0.3), *np.radians(PRESETS["corner"])
@@ -112,7 +112,7 @@ class OutsideView:
     def draw(self) -> NDArray[np.uint8]:
         """The picture. Shape (height, width, 3), blue, green, red."""
         session = self._session
-        eye = eye_at(self.centre, self.distance, self.azimuth, self.elevation)
+        eye = orbit_pose(self.centre, self.distance, self.azimuth, self.elevation)
         shown = session.q if self.share is None else along(session, self.share)
         return self._arm.draw(
             self._sky, eye, shown, ghosts=ghosts(session), obstacles=session.surroundings.world.scene.obstacles,

@@ -70,7 +70,7 @@ class RunSection(Section):
         return data
 
     def goal_motion(self, robot: Robot) -> GoalMotion | None:
-        """The motion of the goal, or None if it stands still.
+        """The motion of the goal, or None if it does not move.
 
         Raises:
             InputError: If times go backwards, or a row has the wrong number of joints or is outside the limits.

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 from string import Template
-from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -17,7 +16,7 @@ from rrtik_ompl.replanning.run import ReplanRun
 from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.story import story_of
-from rrtik_ompl.viewer.subject import Subject, subject_of, subject_of_run
+from rrtik_ompl.viewer.subject import Showable, ShownPath, Subject, subject_of, subject_of_run
 
 # The page may run its own script and nothing else: no request leaves the machine that shows it.
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
@@ -25,10 +24,10 @@ SCRIPTS = ("kinematics.js", "stage.js", "panel.js", "replay.js", "player.js")
 
 
 def page(
-    shown: Any,
-    path: Any | None = None,
+    shown: Showable,
+    path: ShownPath | None = None,
     *,
-    before: Any | None = None,
+    before: ShownPath | None = None,
     ghosts: ArrayLike | None = None,
     marks: Sequence[Mark] = (),
     run: ReplanRun | None = None,
@@ -41,7 +40,7 @@ def page(
     Args:
         shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
         path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m].
-        before: Another path, to compare with; the way of its tip is drawn too.
+        before: Another path, to compare with; the trail of its tip is drawn too.
         ghosts: Configurations, shape (k, dof), drawn like tinted glass.
         marks: Further bodies.
         run: A run to replay in place of a path; obstacles are where they were.

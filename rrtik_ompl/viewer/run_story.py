@@ -1,4 +1,4 @@
-"""What the page needs to replay a run: groups of ticks, places of obstacles, and the tip's way along each path."""
+"""The data with which the page replays a run: groups of ticks, poses of obstacles, and the tip's trail on each path."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from rrtik_ompl.viewer.drawing.framing import Frame
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
 from rrtik_ompl.viewer.drawing.scene_picture import obstacle_look
 
-POINTS = 40  # of a path's line at most
-SHOWN = 0.5  # [s] that a path is seen after it was replaced
+MAX_POINTS = 40  # of a path's line
+SHOWN_SECONDS = 0.5  # of a path after it was replaced
 DIGITS = 5
 
 
@@ -58,7 +58,7 @@ def _places(obstacle: Obstacle, ticks: list[Tick], frame: Frame) -> dict[str, An
 
 
 def _lines(run: ReplanRun, robot: Robot) -> tuple[list[list[list[float]]], list[int]]:
-    """The tip's way along each path, and for each tick the number of its path; -1 for none."""
+    """The tip's trail on each path, and for each tick the number of its path; -1 for none."""
     lines: list[list[list[float]]] = []
     numbers: list[int] = []
     known: Matrix | None = None
@@ -76,9 +76,9 @@ def _lines(run: ReplanRun, robot: Robot) -> tuple[list[list[list[float]]], list[
 
 
 def _tips(robot: Robot, path: Matrix) -> Matrix:
-    """Points of the tip's way, shape (m, 3), none twice running."""
+    """Points of the tip's trail, shape (m, 3), none twice running."""
     lengths: Vector = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
-    wanted = np.union1d(np.linspace(0.0, lengths[-1], POINTS), lengths)
+    wanted = np.union1d(np.linspace(0.0, lengths[-1], MAX_POINTS), lengths)
     rows = np.stack([np.interp(wanted, lengths, column) for column in path.T], axis=1)
     tips = robot.fk_batch(rows)[:, :3, 3]
     kept: Matrix = tips[np.append(True, np.linalg.norm(np.diff(tips, axis=0), axis=1) > 1e-6)]
@@ -90,6 +90,6 @@ def _replaced(run: ReplanRun, numbers: list[int]) -> list[int]:
     found, last, until = [], -1, -1
     for k, tick in enumerate(run.ticks):
         if tick.event == "repair" and k and numbers[k - 1] != numbers[k]:
-            last, until = numbers[k - 1], k + int(SHOWN * run.rate)
+            last, until = numbers[k - 1], k + int(SHOWN_SECONDS * run.rate)
         found.append(last if k <= until else -1)
     return found
