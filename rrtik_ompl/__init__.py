@@ -66,7 +66,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.reach.grid_map import ReachMap as ReachMap
     from rrtik_ompl.reach.grid_map import load_reach_map as load_reach_map
     from rrtik_ompl.reach.sampling import reach_map as reach_map
-    from rrtik_ompl.replanning import Run as Run
+    from rrtik_ompl.replanning import ReplanRun as ReplanRun
     from rrtik_ompl.replanning import load_run as load_run
     from rrtik_ompl.replanning import replan as replan
     from rrtik_ompl.replanning.scenario import Scenario as Scenario
@@ -76,7 +76,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.scene import ConstantVelocity as ConstantVelocity
     from rrtik_ompl.scene import Obstacle as Obstacle
     from rrtik_ompl.scene import Scene as Scene
-    from rrtik_ompl.scene import Waypoints as Waypoints
+    from rrtik_ompl.scene import TimedPoses as TimedPoses
     from rrtik_ompl.shapes import Box as Box
     from rrtik_ompl.shapes import Capsule as Capsule
     from rrtik_ompl.shapes import Cylinder as Cylinder
@@ -90,7 +90,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.trajectory import RateLimits as RateLimits
     from rrtik_ompl.trajectory import Trajectory as Trajectory
     from rrtik_ompl.trajectory import load_trajectory as load_trajectory
-    from rrtik_ompl.trajectory import timed as timed
+    from rrtik_ompl.trajectory import time_parameterize as time_parameterize
     from rrtik_ompl.viewer import view as view
     from rrtik_ompl.world import World as World
 else:
@@ -113,15 +113,15 @@ else:
         "problem_files.problem": ("load_problem", "save_problem"),
         "reach.grid_map": ("ReachMap", "load_reach_map"),
         "reach.sampling": ("reach_map",),
-        "replanning": ("Run", "load_run", "replan"),
+        "replanning": ("ReplanRun", "load_run", "replan"),
         "robot": ("Robot",),
         "replanning.scenario": ("Scenario", "load_scenario"),
-        "scene": ("AttachedObject", "ConstantVelocity", "Obstacle", "Scene", "Waypoints"),
+        "scene": ("AttachedObject", "ConstantVelocity", "Obstacle", "Scene", "TimedPoses"),
         "problem_files.scene": ("load_scene", "save_scene"),
         "shapes": ("Box", "Capsule", "Cylinder", "HalfSpace", "Mesh", "Prism", "Sphere"),
         "shortening": ("MoveRules", "shorten"),
         "task_region": ("TaskRegion",),
-        "trajectory": ("RateLimits", "Trajectory", "load_trajectory", "timed"),
+        "trajectory": ("RateLimits", "Trajectory", "load_trajectory", "time_parameterize"),
         "viewer": ("view",),
         "world": ("World",),
     }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -24,7 +24,7 @@ class ConstantVelocity:
     def __init__(self, velocity: ArrayLike) -> None:
         object.__setattr__(self, "velocity", frozen(finite_array(velocity, (3,), "motion velocity")))
 
-    def pose_at(self, start: Any, time: float) -> Any:
+    def pose_at(self, start: pin.SE3, time: float) -> pin.SE3:
         """Pose at ``time`` [s] of an obstacle that is at ``start`` at time 0."""
         return pin.SE3(start.rotation, start.translation + time * self.velocity)
 
@@ -35,13 +35,13 @@ class ConstantVelocity:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Waypoints:
+class TimedPoses:
     """A motion through poses at given times: straight lines, shortest rotations, at rest before and after."""
 
     times: Vector
-    poses: tuple[Any, ...]
+    poses: tuple[pin.SE3, ...]
 
-    def __init__(self, times: ArrayLike, poses: Iterable[Any]) -> None:
+    def __init__(self, times: ArrayLike, poses: Iterable[pin.SE3]) -> None:
         stamps, stations = finite_array(times, (None,), "motion times"), tuple(poses)
         if len(stamps) == 0 or len(stamps) != len(stations):
             raise InputError(
@@ -52,7 +52,7 @@ class Waypoints:
         object.__setattr__(self, "times", frozen(stamps))
         object.__setattr__(self, "poses", stations)
 
-    def pose_at(self, start: Any, time: float) -> Any:
+    def pose_at(self, start: pin.SE3, time: float) -> pin.SE3:
         """Pose at ``time`` [s]; ``start`` does not matter, the waypoints are in the world."""
         del start
         k = int(np.searchsorted(self.times, time, side="right"))
@@ -63,12 +63,12 @@ class Waypoints:
         rotation = a.rotation @ pin.exp3(share * pin.log3(a.rotation.T @ b.rotation))
         return pin.SE3(rotation, (1.0 - share) * a.translation + share * b.translation)
 
-    def seen_from(self, time: float) -> Waypoints:
+    def seen_from(self, time: float) -> TimedPoses:
         """The same motion with ``time`` [s] as its time 0."""
-        return Waypoints(self.times - time, self.poses)
+        return TimedPoses(self.times - time, self.poses)
 
 
-Motion: TypeAlias = ConstantVelocity | Waypoints
+Motion: TypeAlias = ConstantVelocity | TimedPoses
 
 
 def _check_solid(name: object, shape: object, pose: object) -> None:
@@ -89,12 +89,12 @@ class Obstacle:
         shape: What it is.
         pose: T_world_obstacle.
         motion: Moves it over time, if given.
-        margin: How far from it the moving parts of the arm must stay [m].
+        margin: Distance that the moving parts of the arm must keep to it [m].
     """
 
     name: str
     shape: Shape
-    pose: Any = field(default_factory=pin.SE3.Identity)
+    pose: pin.SE3 = field(default_factory=pin.SE3.Identity)
     motion: Motion | None = None
     margin: float = 0.0
 
@@ -114,7 +114,7 @@ class AttachedObject:
     name: str
     link: str
     shape: Shape
-    pose: Any = field(default_factory=pin.SE3.Identity)
+    pose: pin.SE3 = field(default_factory=pin.SE3.Identity)
     allow: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:

@@ -17,10 +17,10 @@ import tornado.websocket
 
 from bench.pilot.scene import NAME, PLACE, ROBOT, seen_at
 from rrtik_ompl.overlay.augment import Augmenter
-from rrtik_ompl.overlay.virtual_camera import eye_at
+from rrtik_ompl.overlay.virtual_camera import orbit_pose
 from rrtik_ompl.pilot.engine import Engine
 from rrtik_ompl.pilot.run import Loop
-from rrtik_ompl.pilot.setup import Wanted, open_session
+from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.pilot.web.server import PilotServer
 from rrtik_ompl.poses import pose
 from rrtik_ompl.scene import Obstacle
@@ -37,7 +37,7 @@ class Moving:
 
     def __init__(self, engine: Engine) -> None:
         """Take the pictures."""
-        camera, q = engine.eyes._source._camera, engine.session.q  # type: ignore[attr-defined]
+        camera, q = engine.perception._source._camera, engine.session.q  # type: ignore[attr-defined]
         pictures = []
         for k in range(PICTURES):
             aside = SWAY * np.sin(2.0 * np.pi * k / PICTURES)
@@ -55,8 +55,8 @@ class Moving:
 
 def state_rate() -> float:
     """States a second of processor time, all lamps worked out anew, for an object that is elsewhere every time."""
-    engine = open_session(Wanted(NAME)).engine
-    engine.look(0.0)
+    engine = open_session(SessionOptions(NAME)).engine
+    engine.update(0.0)
     times = []
     for k in range(60):
         begin = time.process_time()
@@ -68,10 +68,10 @@ def state_rate() -> float:
 
 def stages(count: int = 60) -> list[tuple[str, float, float]]:
     """Stages of the loop while the object moves: name, processor time, clock time [s]."""
-    engine = open_session(Wanted(NAME)).engine
-    engine.eyes._source = Moving(engine)  # type: ignore[attr-defined]
+    engine = open_session(SessionOptions(NAME)).engine
+    engine.perception._source = Moving(engine)  # type: ignore[attr-defined]
     acts: list[tuple[str, Callable[[int], Any]]] = [
-        ("detect, pose, world", lambda k: engine.look(10.0 + k / 30.0)),
+        ("detect, pose, world", lambda k: engine.update(10.0 + k / 30.0)),
         ("state with its lamps", lambda _: engine.state()),
         ("camera picture, JPEG", lambda _: engine.camera_picture()),
         ("outside picture, JPEG", lambda _: engine.outside_picture()),
@@ -99,8 +99,8 @@ def served(clicks: int) -> Served:
     ready, ended, server = threading.Event(), threading.Event(), PilotServer()
 
     def serve() -> None:
-        opened = open_session(Wanted(NAME))
-        opened.engine.eyes._source = Moving(opened.engine)  # type: ignore[attr-defined]
+        opened = open_session(SessionOptions(NAME))
+        opened.engine.perception._source = Moving(opened.engine)  # type: ignore[attr-defined]
         with server:
             ready.set()
             Loop(opened.engine, server).run(ended.is_set)
@@ -158,7 +158,7 @@ def registration(count: int) -> list[float]:
     away: list[float] = []
     camera, rng = published_camera(), np.random.default_rng(5)
     augmenter = Augmenter(ROBOT, camera)
-    T = eye_at([1.2, 0.2, 0.1], 1.3, np.deg2rad(-150), np.deg2rad(25))
+    T = orbit_pose([1.2, 0.2, 0.1], 1.3, np.deg2rad(-150), np.deg2rad(25))
     black = np.zeros((camera.height, camera.width, 3), dtype=np.uint8)
     while len(away) < count:
         place = pin.SE3(pin.exp3(rng.normal(0, 1, 3)), np.array([1.2, 0.2, 0.1]) + rng.uniform(-0.25, 0.25, 3))

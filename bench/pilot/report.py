@@ -11,11 +11,11 @@ import numpy as np
 
 from bench.pilot.hulls import GROWTH, hulls_of_links
 from bench.pilot.pictures import registration, served, stages, state_rate
-from bench.pilot.routes import REACTION, REPLANNING, panel_routes, simulated_pilot, small_errors
+from bench.pilot.routes import REACTION_SECONDS, REPLANNING, panel_routes, simulated_pilot, small_errors
 from bench.pilot.session import color_logic, preventive_checks, scripted_scenario
 from bench.shared.pages import add_out
 from rrtik_bench.report.page import Report
-from rrtik_ompl.pilot.routes.route_search import STEADY
+from rrtik_ompl.pilot.routes.route_search import MIN_ROBUSTNESS
 
 PUBLISHED = 1.08  # [s] of one route: search and shortening
 
@@ -32,7 +32,7 @@ def write_session(report: Report, part: int) -> None:
     report.bar(f"colours of {count} random object poses against exhaustive IK", "0 wrong", text, wrong == 0)
     found = preventive_checks(100_000 // part)
     text = (
-        f"{found.bad} ({found.accepted} of {found.commands} accepted; {found.judged} through judge_move "
+        f"{found.bad} ({found.accepted} of {found.commands} accepted; {found.judged} through check_move "
         f"{'agree' if found.agree else 'DISAGREE'}; {found.looks} looks by the independent check)"
     )
     report.bar("accepted beyond limits or into collision, random commands", "0", text, found.bad == 0 and found.agree)
@@ -54,10 +54,10 @@ def write_routes(report: Report, part: int) -> None:
     free, warned = small_errors(60 // part)
     text = f"{100 * np.mean(free):.2f} % on the mean, {100 * min(free):.1f} % the worst of {len(free)} routes; "
     report.bar("executions with +-1 deg a move that stay free, 1000 of each route not warned of", ">= 99 %",
-               f"{text}{warned} warned of", float(np.mean(free)) >= STEADY)  # fmt: skip
+               f"{text}{warned} warned of", float(np.mean(free)) >= MIN_ROBUSTNESS)  # fmt: skip
     rows = [(len(route.path.moves()), np.rad2deg(route.travel), route.seconds) for route in routes]
     moves, degrees, seconds = np.mean(rows, axis=0)
-    narrow = sum(route.steady < STEADY for route in routes)
+    narrow = sum(route.robustness < MIN_ROBUSTNESS for route in routes)
     report.note(
         "Routes on the panel",
         f"On the mean {moves:.1f} moves, {degrees:.0f} deg, {seconds:.0f} s; {narrow} of {len(routes)} are warned of: "
@@ -78,7 +78,8 @@ def write_pilot(report: Report, part: int) -> None:
                found.tool.touching <= 0.1 * found.naive.touching)  # fmt: skip
     report.note(
         "Simulated pilot",
-        f"From the bay to the button. Reaction {REACTION} s a move, overshoot N(0, 1 deg) at its end, usual rates. "
+        f"From the bay to the button. Reaction {REACTION_SECONDS} s a move, overshoot N(0, 1 deg) at its end, usual "
+        "rates. "
         "With the tool the pilot makes the next move of the list, corrects it while it is short of its end, and plans "
         "anew where the tool says that the arm is off the route or the rest of it blocked: "
         f"{found.plans:.1f} times on the mean, {REPLANNING:g} s each. The bare list, never checked on the way, takes "

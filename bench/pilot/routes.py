@@ -13,12 +13,13 @@ from bench.shared.problems import goal_joints
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.pilot.devices.arm import SimulatedArm, joint_rates
 from rrtik_ompl.pilot.routes.clearance import executions, free_rows
+from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route import Route, route_to
-from rrtik_ompl.pilot.routes.route_search import STEADY
+from rrtik_ompl.pilot.routes.route_search import MIN_ROBUSTNESS
 from rrtik_ompl.pilot.session import Session
-from rrtik_ompl.pilot.setup import Wanted, open_session
+from rrtik_ompl.pilot.setup import SessionOptions, open_session
 
-REACTION, OVERSHOOT, REPLANNING = 0.3, np.deg2rad(1.0), 2.0
+REACTION_SECONDS, OVERSHOOT, REPLANNING = 0.3, np.deg2rad(1.0), 2.0
 
 
 class PanelRoutes(NamedTuple):
@@ -31,9 +32,9 @@ class PanelRoutes(NamedTuple):
 
 def panel_routes(count: int) -> PanelRoutes:
     """Plan to the green grasps in turn, from where the session starts; the first plan warms up."""
-    engine = open_session(Wanted(NAME)).engine
+    engine = open_session(SessionOptions(NAME)).engine
     for k in range(5):
-        engine.look(k / 30.0)
+        engine.update(k / 30.0)
     session, found = engine.session, PanelRoutes([], [], [])
     green = green_grasps(session)
     for number in range(count + 1):
@@ -60,9 +61,9 @@ def small_errors(count: int) -> tuple[list[float], int]:
         if not WORLD.valid_batch(ends).all():
             continue
         route = route_to(WORLD, ends[0], ends[1], joint_rates(ROBOT), seed=len(free) + warned)
-        if isinstance(route, str):
+        if isinstance(route, NoRoute):
             continue
-        if route.steady < STEADY:
+        if route.robustness < MIN_ROBUSTNESS:
             warned += 1
             continue
         made = executions(route.path, np.full(ROBOT.dof, OVERSHOOT), 1000, rng)
@@ -94,7 +95,7 @@ def simulated_pilot(count: int) -> SimulatedPilot:
     for seed in range(count):
         route = route_to(WORLD, np.array(PROBLEM.start), np.array(goal_joints(PROBLEM)), rates, seed)
         several = rrtik.plan(PROBLEM, "RRTConnect", seconds=5.0, seed=seed).path
-        if isinstance(route, str) or several is None:
+        if isinstance(route, NoRoute) or several is None:
             continue
         rows.append([*_piloted(route.path, rates, rng), *_piloted(_naive(several), rates, rng)])
     bare_time, bare_hits, naive_time, naive_hits = (float(mean) for mean in np.mean(rows, axis=0))
@@ -131,7 +132,7 @@ def _guided(seed: int, rates: Any, rng: np.random.Generator) -> tuple[float, flo
         after[joint] += rng.normal(0.0, OVERSHOOT)
         after = ROBOT.clamp(after)
         touched |= not WORLD.motion_valid(before, after)
-        seconds += REACTION + abs(after[joint] - before[joint]) / rates[joint]
+        seconds += REACTION_SECONDS + abs(after[joint] - before[joint]) / rates[joint]
         arm.move(joint, float(after[joint]))
         arm.advance(1e3)
         session.tick(seconds)
@@ -153,7 +154,7 @@ def _naive(path: JointPath) -> JointPath:
 def _piloted(path: JointPath, rates: Any, rng: np.random.Generator) -> tuple[float, float]:
     """Seconds that an execution takes, and the share of executions that touch something."""
     names, moves = list(path.joint_names), path.moves()
-    seconds = sum(REACTION + abs(move.change) / rates[names.index(move.joint)] for move in moves)
+    seconds = sum(REACTION_SECONDS + abs(move.change) / rates[names.index(move.joint)] for move in moves)
     made = np.tile(path.start, (100, len(moves) + 1, 1))
     for number, move in enumerate(moves, start=1):
         made[:, number:, names.index(move.joint)] = move.end + rng.normal(0.0, OVERSHOOT, (100, 1))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.pilot.devices.simulated_vehicle import find_scenario, load_scenario
+from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
 from rrtik_ompl.pilot.lamps import GREEN
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.sensing.scene_from_view import SeenObject
@@ -15,7 +15,7 @@ from rrtik_ompl.sensing.scene_from_view import SeenObject
 NAME = "titan4_sdu"
 PROBLEM = rrtik.load_problem(NAME)
 ROBOT, WORLD = PROBLEM.robot, PROBLEM.world
-SCENARIO = load_scenario(find_scenario(NAME))
+SCENARIO = load_vehicle(find_vehicle(NAME))
 VALVE, PLACE = SCENARIO.marker_map.named("valve"), SCENARIO.places["valve"]
 
 

@@ -12,8 +12,8 @@ import pinocchio as pin
 from bench.pilot.scene import NAME, PLACE, PROBLEM, ROBOT, VALVE, WORLD, seen_at
 from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED, lamps, stage_poses
-from rrtik_ompl.pilot.routes.manoeuvre import judge_move
-from rrtik_ompl.pilot.setup import Wanted, open_session
+from rrtik_ompl.pilot.routes.manoeuvre import check_move
+from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.pilot.surroundings import Surroundings
 
 JUDGED, LOOKED_AT, LOOKS = 1000, 500, 25
@@ -24,26 +24,26 @@ def scripted_scenario() -> tuple[list[str], bool]:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "session.jsonl"
         first, modes = _drive(file)
-        again = open_session(Wanted(NAME, replay=file)).engine
-        again.look(1e6)
+        again = open_session(SessionOptions(NAME, replay=file)).engine
+        again.update(1e6)
         return modes, np.array_equal(again.session.q, first) and again.session.mode == "manoeuvre"
 
 
 def _drive(record: Path) -> tuple[Any, list[str]]:
-    opened = open_session(Wanted(NAME, record=record))
+    opened = open_session(SessionOptions(NAME, record=record))
     engine, now, modes = opened.engine, 0.0, ["manoeuvre"]
     session = engine.session
-    engine.look(now)
+    engine.update(now)
     for command in ({"name": "grasp", "type": "aslant", "level": 1}, {"name": "plan"}, {"name": "accept"}):
         now += 0.1
-        engine.obey(command, now)
+        engine.execute(command, now)
         modes.append(session.mode)
     arm: Any = session.arm
     while session.mode == "following" and now < 600.0:
         if arm.moving is None:
-            engine.obey({"name": "next"}, now)
+            engine.execute({"name": "next"}, now)
         now += 0.5
-        engine.look(now)
+        engine.update(now)
     q = session.q
     opened.close()
     return q, list(dict.fromkeys(modes))
@@ -95,7 +95,7 @@ def preventive_checks(count: int) -> Preventive:
     accepted = ROBOT.within_limits(ends)
     accepted[accepted] = WORLD.motion_valid_batch(starts[accepted], ends[accepted])
     some = rng.choice(len(starts), size=min(JUDGED, len(starts)), replace=False)
-    verdicts = [judge_move(WORLD, starts[k], int(joints[k]), float(ends[k, joints[k]])).allowed for k in some]
+    verdicts = [check_move(WORLD, starts[k], int(joints[k]), float(ends[k, joints[k]])).allowed for k in some]
     agree = bool((np.array(verdicts) == accepted[some]).all())
     beyond = int((~ROBOT.within_limits(ends[accepted])).sum())
     fine = WORLD.with_resolution(WORLD.motion_resolution / 4.0).motion_valid_batch(starts[accepted], ends[accepted])

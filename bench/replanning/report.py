@@ -24,16 +24,16 @@ from bench.shared.problems import goal_joints
 from rrtik_bench.report.machine import processes
 from rrtik_bench.report.page import Report
 from rrtik_bench.shortening.plane_worlds import Plane
-from rrtik_ompl.replanning import Run, replan
+from rrtik_ompl.replanning import ReplanRun, replan
 from rrtik_ompl.replanning.connecting import PlainConnect
-from rrtik_ompl.replanning.contact_check import judge
+from rrtik_ompl.replanning.contact_check import check_contacts
 from rrtik_ompl.replanning.drrt_con import DrrtCon
 from rrtik_ompl.world.moving_world import MovingWorld
 
 PLANNERS = ("drrt-con", "rrt-connect", "drrt")
 
 
-def plane_run(problem: rrtik.Problem, seed: int, **changes: Any) -> Run:
+def plane_run(problem: rrtik.Problem, seed: int, **changes: Any) -> ReplanRun:
     return replan(
         problem,
         limits=scenes.limits(),
@@ -93,7 +93,7 @@ def triangle_rows(report: Report, count: int) -> None:
         keeping = [plane_run(p, seed, speed_bound=bound) for seed, p in enumerate(problems)]
         rows.append([f"{ratio:g}", "drrt-con, speed bound stated", *cells(problems, keeping)])
         if ratio == 1.0:
-            predictive = [plane_run(p, seed, predict=4) for seed, p in enumerate(problems)]
+            predictive = [plane_run(p, seed, lookahead_ticks=4) for seed, p in enumerate(problems)]
             rows.append([f"{ratio:g}", "drrt-con, 4 ticks ahead", *cells(problems, predictive)])
     head = ["speed ratio", "planner", *HEAD, "runs with contact"]
     report.table(f"Six triangles, {count} runs each, 5 of drrt", head, rows)
@@ -117,13 +117,13 @@ def triangle_rows(report: Report, count: int) -> None:
     predictive_bar(report, plain, predictive)
 
 
-def cells(problems: list[rrtik.Problem], found: list[Run]) -> list[str]:
+def cells(problems: list[rrtik.Problem], found: list[ReplanRun]) -> list[str]:
     """Runs in a table: figures, and how many had contact."""
-    judged = [outcome(r, judge(p.robot, r, p.world.scene)) for p, r in zip(problems, found, strict=True)]
+    judged = [outcome(r, check_contacts(p.robot, r, p.world.scene)) for p, r in zip(problems, found, strict=True)]
     return [*figures(judged), contacts(judged)]
 
 
-def predictive_bar(report: Report, plain: list[Run], predictive: list[Run]) -> None:
+def predictive_bar(report: Report, plain: list[ReplanRun], predictive: list[ReplanRun]) -> None:
     """The predictive variant against the plain one, ratio 1.0."""
     held = [[sum(r.count(e) for r in found) for e in ("wait", "evade", "repair")] for found in (plain, predictive)]
     stops = [waits + evasions for waits, evasions, _ in held]
@@ -132,7 +132,7 @@ def predictive_bar(report: Report, plain: list[Run], predictive: list[Run]) -> N
     report.bar("Beat: predictive: waits or replans", "at least 30 % fewer", text, fewer and stops[1] <= stops[0])
 
 
-def calls_bounded(problem: rrtik.Problem, run: Run) -> bool:
+def calls_bounded(problem: rrtik.Problem, run: ReplanRun) -> bool:
     """Whether each look at a free path asked for no more than its length over the resolution, and its points."""
     weights, resolution = problem.world.weights, problem.world.motion_resolution
     for before, tick in zip(run.ticks[:-1], run.ticks[1:], strict=True):
@@ -152,7 +152,7 @@ def goal_rows(report: Report, count: int) -> None:
         run = plane_run(problem, seed)
         waited.append(run.count("wait") > 0)
         arrived.append(run.arrived and run.ticks[-1].time * scenes.RATE <= 83 + 60)
-        verdict = judge(problem.robot, run, problem.world.scene)
+        verdict = check_contacts(problem.robot, run, problem.world.scene)
         clean.append(not verdict.contacts)
     shares = [float(np.mean(values)) for values in (waited, arrived, clean)]
     text = ", ".join(f"{share:.0%}" for share in shares)
@@ -173,7 +173,7 @@ def arm_order(report: Report, count: int) -> None:
     kept = []
     for seed in range(count):
         run = replan(
-            scenes.planar_arm(), step=0.08, rate=20, eps=0.3, margin=0.01, limits=slow(3), seconds=30, seed=seed
+            scenes.planar_arm(), step=0.08, rate=20, max_edge=0.3, margin=0.01, limits=slow(3), seconds=30, seed=seed
         )
         going = ["go" if t.event in ("plan", "walk", "repair") else t.event for t in run.ticks]
         kept.append([event for event, _ in groupby(going)] == ["go", "wait", "go", "arrive"])

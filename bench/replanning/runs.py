@@ -11,14 +11,14 @@ import numpy as np
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.planning import plan
-from rrtik_ompl.replanning import Run, replan
+from rrtik_ompl.replanning import ReplanRun, replan
 from rrtik_ompl.replanning.connecting import PlainConnect
-from rrtik_ompl.replanning.contact_check import Verdict, judge
+from rrtik_ompl.replanning.contact_check import ContactReport, check_contacts
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
 from rrtik_ompl.replanning.generate import moving_problem
 from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
 from rrtik_ompl.replanning.loop import Loop
-from rrtik_ompl.replanning.settings import settings
+from rrtik_ompl.replanning.settings import ReplanSettings
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.world.motion_queries import MotionQueries
 
@@ -40,7 +40,7 @@ def arm_options(name: str) -> dict[str, Any]:
     """A repair may take half a second, so that figures do not depend on how busy the machine is."""
     arm = ARMS[name]
     bound = {"margin": MARGIN, "speed_bound": arm["speed"], "seconds": LONGEST}
-    return {"step": arm["step"], "rate": RATE, "slot": 0.5, **bound}
+    return {"step": arm["step"], "rate": RATE, "repair_budget": 0.5, **bound}
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Outcome:
     Attributes:
         counts: Ticks of each kind.
         repairs, ticks: Seconds of each repair that found a path, and of each tick.
-        contacts: Kind of each tick with contact, by the judge; empty without one.
+        contacts: Kind of each tick with contact, by the independent check; empty without one.
         nearest: Smallest distance between arm and obstacles [m], 0 for a contact.
     """
 
@@ -63,10 +63,10 @@ class Outcome:
     nearest: float = np.inf
 
 
-def outcome(run: Run, verdict: Verdict | None = None) -> Outcome:
-    """A run in short, and what a judge says of it."""
+def outcome(run: ReplanRun, report: ContactReport | None = None) -> Outcome:
+    """A run in short, with its contacts."""
     seen: dict[str, Any] = (
-        {} if verdict is None else {"contacts": tuple(c[1] for c in verdict.contacts), "nearest": verdict.nearest}
+        {} if report is None else {"contacts": tuple(c[1] for c in report.contacts), "nearest": report.nearest}
     )
     counts = {event: run.count(event) for event in ("repair", "wait", "evade")}
     times = run.seconds("repair", "repair").tolist(), run.seconds("all").tolist()
@@ -74,14 +74,14 @@ def outcome(run: Run, verdict: Verdict | None = None) -> Outcome:
 
 
 def arm_outcome(name: str, seed: int, planner: str, slot: float, seconds: float) -> Outcome:
-    """A run of an arm among obstacles, judged."""
+    """A run of an arm among obstacles, checked for contacts."""
     problem = arm_problem(name, seed)
-    changes = {"planner": planner, "slot": slot, "seconds": seconds, "clock": time.process_time}
+    changes = {"planner": planner, "repair_budget": slot, "seconds": seconds, "clock": time.process_time}
     run = replan(problem, seed=seed, **{**arm_options(name), **changes})
-    return outcome(run, judge(problem.robot, run, problem.world.scene, fine=5))
+    return outcome(run, check_contacts(problem.robot, run, problem.world.scene, samples_per_tick=5))
 
 
-def executed_valid(problem: rrtik.Problem, run: Run) -> bool:
+def executed_valid(problem: rrtik.Problem, run: ReplanRun) -> bool:
     """Whether every step along a path was free, by the exact world of its moment."""
     scene = problem.world.scene
     for tick, after in zip(run.ticks[:-1], run.ticks[1:], strict=True):
@@ -138,15 +138,14 @@ def paired(name: str, seeds: range, slow_every: int = 8) -> tuple[Moments, Momen
 
 def _loop(name: str, seed: int) -> Loop:
     problem = arm_problem(name, seed)
-    usual: dict[str, Any] = {"planner": "drrt-con", "eps": None, "limits": None, "predict": 0, "seed": seed}
-    return Loop(problem, problem.world.scene.at, settings(problem.robot, **usual, **arm_options(name)), None)
+    return Loop(problem, problem.world.scene.at, ReplanSettings(seed=seed, **arm_options(name)), None)
 
 
 def with_pairs(loop: Loop, quick: Moments, slow: Moments, slow_every: int) -> None:
     """Make a loop's planner time the others before each of its repairs."""
     planner, repair, world = loop._planner, loop._planner.repair, loop._world
     lower, upper = loop._problem.robot.finite_range()
-    eps, count = planner.eps, 0
+    eps, count = planner.max_edge, 0
     scratch = {SCRATCH: KernelDrrtCon(world, lower, upper, eps, 1, forgetting=True)}
     plain = {
         "DRRT-Con as published, in Python": DrrtCon(PlainConnect(lower, upper, eps, 1), eps),

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.replanning.generate import turning_points
-from rrtik_ompl.scene import Obstacle, Scene, Waypoints
+from rrtik_ompl.scene import Obstacle, Scene, TimedPoses
 from rrtik_ompl.shapes import Prism
 
 SIZE, STEP, EPS, RATE = 20.0, 0.5, 1.0, 10.0
@@ -19,7 +19,7 @@ POCKET = [(4, 2), (12, 2), (12, 3), (5, 3), (5, 8), (4, 8)]
 UPPER = [(9, 10), (17, 10), (17, 17), (16, 17), (16, 11), (9, 11)]
 CENTRES = [(5, 5), (5, 14), (10, 9), (10, 16), (14, 5), (15, 12)]
 CIRCUMRADIUS, TURN = 1.8, 0.03
-OPTIONS = {"step": STEP, "rate": RATE, "eps": EPS, "slot": 0.5}
+OPTIONS = {"step": STEP, "rate": RATE, "max_edge": EPS, "repair_budget": 0.5}
 
 
 def limits() -> rrtik.RateLimits:
@@ -48,7 +48,7 @@ def walls() -> rrtik.Problem:
 
 def pockets(*, moving: bool) -> rrtik.Problem:
     """Scene 1, or frozen scene 2: the upper L slides left by 0.1 a tick until its left end is at x = 3."""
-    motion = Waypoints([0.0, 60.0 / RATE], [place(0, 0), place(-6, 0)]) if moving else None
+    motion = TimedPoses([0.0, 60.0 / RATE], [place(0, 0), place(-6, 0)]) if moving else None
     obstacles = [Obstacle("pocket", Prism(POCKET)), Obstacle("upper", Prism(UPPER), motion=motion)]
     return problem("pockets" if moving else "pockets_frozen", obstacles, (2, 2), (18, 14))
 
@@ -65,7 +65,7 @@ def triangles(ratio: float, seed: int, ticks: int = 400) -> rrtik.Problem:
         motion = None
         if ratio > 0.0:
             turns = turning_points(places)
-            motion = Waypoints(turns / RATE, [place(*p) for p in places[turns]])
+            motion = TimedPoses(turns / RATE, [place(*p) for p in places[turns]])
         obstacles.append(Obstacle(f"triangle{k + 1}", shape, place(*centre), motion))
     return problem("six_triangles", obstacles, (1, 1), (19, 19))
 
@@ -90,7 +90,7 @@ def covered(seed: int) -> rrtik.Problem:
     goal = (16.0, float(y))
     square = Prism([(-1.5, -1.5), (1.5, -1.5), (1.5, 1.5), (-1.5, 1.5)])
     away, over = place(16.0, y - 8.0), place(*goal)
-    motion = Waypoints([0.0, 0.5, 0.8, 8.0, 8.3], [away, away, over, over, away])
+    motion = TimedPoses([0.0, 0.5, 0.8, 8.0, 8.3], [away, away, over, over, away])
     return problem("covered_goal", [Obstacle("lid", square, away, motion)], (2, 2), goal)
 
 
@@ -111,8 +111,8 @@ def planar_arm() -> rrtik.Problem:
     """Scene 4: a planar arm; the second box covers the goal posture for a while, the first one leaves its place."""
     robot = rrtik.load_robot("planar", lengths=[1.0, 1.0, 1.0], radius=0.02)
     box = [(-0.25, -0.4), (0.25, -0.4), (0.25, 0.4), (-0.25, 0.4)]
-    first = Waypoints([0.0, 2.0, 5.0], [place(1.6, 1.6), place(1.6, 1.6), place(1.6, 3.4)])
-    second = Waypoints([0.0, 0.6, 4.5, 6.5], [place(-3.2, 1.9), place(-1.1, 1.9), place(-1.1, 1.9), place(-3.4, 1.9)])
+    first = TimedPoses([0.0, 2.0, 5.0], [place(1.6, 1.6), place(1.6, 1.6), place(1.6, 3.4)])
+    second = TimedPoses([0.0, 0.6, 4.5, 6.5], [place(-3.2, 1.9), place(-1.1, 1.9), place(-1.1, 1.9), place(-3.4, 1.9)])
     obstacles = [Obstacle("first", Prism(box), place(1.6, 1.6), first)]
     obstacles.append(Obstacle("second", Prism(box), place(-3.2, 1.9), second))
     world = rrtik.World(robot, Scene(tuple(obstacles)), motion_resolution=0.02)

@@ -9,9 +9,9 @@ import numpy as np
 from rrtik_bench.report.rows import Row, verdict
 from rrtik_bench.tables import Table
 from rrtik_ompl.goal import JointGoal
-from rrtik_ompl.replanning import Run
+from rrtik_ompl.replanning import ReplanRun
 from rrtik_ompl.replanning.connecting import PlainConnect
-from rrtik_ompl.replanning.contact_check import judge
+from rrtik_ompl.replanning.contact_check import check_contacts
 from rrtik_ompl.replanning.drrt_con import DrrtCon
 from rrtik_ompl.replanning.scenario import Scenario, load_scenario
 from rrtik_ompl.transitions import route_length
@@ -19,24 +19,24 @@ from rrtik_ompl.world.moving_world import MovingWorld
 
 SOURCE = "DRRT-Con paper"
 SCENE = "coordinates, speeds and steps chosen here: none is printed"
-FREE_SLOT = 2.0  # [s] for a repair, so that a run does not depend on how busy the machine is
+REPAIR_SECONDS = 2.0  # [s] for a repair, so that a run does not depend on how busy the machine is
 FASTEST = 2.5  # [m/s]: no triangle is faster
 STOP, GO = "wait", "go"
 
 
-def _runs(scenario: Scenario, count: int, **changes: float) -> list[Run]:
-    return [scenario.run(seed=seed, slot=FREE_SLOT, **changes) for seed in range(count)]
+def _runs(scenario: Scenario, count: int, speed_bound: float | None = None) -> list[ReplanRun]:
+    return [scenario.run(seed=seed, repair_budget=REPAIR_SECONDS, speed_bound=speed_bound) for seed in range(count)]
 
 
 def static(quick: bool) -> list[Row]:
     """Two walls that stand: what was walked, beside RRT-Connect with one pass of post-processing."""
     scenario, count = load_scenario("replan_walls"), 3 if quick else 30
-    problem, eps = scenario.problem, float(scenario.options["eps"])
+    problem, edge = scenario.problem, scenario.settings.edge_length(scenario.problem.robot)
     assert isinstance(problem.goal, JointGoal)
     walked = [run.length for run in _runs(scenario, count)]
     once = []
     for seed in range(count):
-        planner = DrrtCon(PlainConnect(problem.robot.lower, problem.robot.upper, eps, seed), eps)
+        planner = DrrtCon(PlainConnect(problem.robot.lower, problem.robot.upper, edge, seed), edge)
         planner.begin(problem.start, problem.goal.q[None], MovingWorld(problem.world))
         assert planner.path is not None
         once.append(route_length(planner.path))
@@ -74,7 +74,7 @@ def triangles(quick: bool) -> list[Row]:
     ]  # fmt: skip
 
 
-def _kept_free(scenario: Scenario, run: Run) -> bool:
+def _kept_free(scenario: Scenario, run: ReplanRun) -> bool:
     """Whether every step along the path was free of the obstacles where they were when it was made."""
     world, scene = MovingWorld(scenario.problem.world), scenario.problem.world.scene
     for tick, after in zip(run.ticks[:-1], run.ticks[1:], strict=True):
@@ -84,10 +84,10 @@ def _kept_free(scenario: Scenario, run: Run) -> bool:
     return True
 
 
-def _untouched(scenario: Scenario, runs: list[Run]) -> int:
+def _untouched(scenario: Scenario, runs: list[ReplanRun]) -> int:
     """How many runs had no contact at any time, by an independent judge."""
     problem = scenario.problem
-    return sum(not judge(problem.robot, run, problem.world.scene).contacts for run in runs)
+    return sum(not check_contacts(problem.robot, run, problem.world.scene).contacts for run in runs)
 
 
 def pockets(quick: bool) -> list[Row]:
@@ -123,7 +123,7 @@ def planar_arm(quick: bool) -> list[Row]:
     ]  # fmt: skip
 
 
-def _order(run: Run) -> list[tuple[str, int]]:
+def _order(run: ReplanRun) -> list[tuple[str, int]]:
     """Kinds of events in the order in which they came, each with the number of its first tick."""
     kinds = [GO if tick.event in ("plan", "walk", "repair") else tick.event for tick in run.ticks]
     return [(event, next(group)[0]) for event, group in groupby(enumerate(kinds), key=lambda pair: pair[1])]

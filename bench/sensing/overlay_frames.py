@@ -18,8 +18,8 @@ from rrtik_ompl.overlay.canvas import FAR, Canvas
 from rrtik_ompl.overlay.figure import figure_of, placed
 from rrtik_ompl.overlay.reference_z_buffer import ROUNDING, reference_z_buffer
 from rrtik_ompl.overlay.surfaces import robot_surfaces
-from rrtik_ompl.overlay.virtual_camera import eye_at
-from rrtik_ompl.pilot.devices.simulated_vehicle import find_scenario, load_scenario
+from rrtik_ompl.overlay.virtual_camera import orbit_pose
+from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
 from rrtik_ompl.sensing.cameras.pictures import Picture
 from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph, published_camera
 from rrtik_ompl.sensing.markers.detection import marker_cells
@@ -36,7 +36,7 @@ def silhouettes(report: Report, count: int) -> None:
         arm, drawn, differ, doubtful, deep = figure_of(robot_surfaces(robot, 3000)), 0, 0, 0, 0.0
         for _ in range(count):
             q = rng.uniform(np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi))
-            eye = eye_at([0.6, 0.0, 0.2], *rng.uniform([1.8, -np.pi, -0.3], [3.0, np.pi, 1.2]))
+            eye = orbit_pose([0.6, 0.0, 0.2], *rng.uniform([1.8, -np.pi, -0.3], [3.0, np.pi, 1.2]))
             shown = placed(arm, eye.inverse().homogeneous @ robot.joint_frames(q[None])[0])
             canvas = Canvas(camera)
             canvas.draw(shown)
@@ -59,7 +59,7 @@ def silhouettes(report: Report, count: int) -> None:
 
 def frame_times(report: Report, count: int) -> None:
     """One 640 x 480 picture with two markers: detect, refine, pose, draw TITAN-4, encode."""
-    problem, scenario = load_problem("titan4_sdu"), load_scenario(find_scenario("titan4_sdu"))
+    problem, scenario = load_problem("titan4_sdu"), load_vehicle(find_vehicle("titan4_sdu"))
     sensor, augmenter = Sensor(scenario.camera, scenario.marker_map), Augmenter(problem.robot, scenario.camera)
     seen_from = scenario.T_base_camera.inverse()
     prints = [(seen_from * scenario.places[thing.name] * marker.T_object_marker,

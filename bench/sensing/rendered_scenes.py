@@ -15,7 +15,7 @@ from rrtik_ompl.poses import pose
 from rrtik_ompl.sensing.cameras.synthetic_camera import Print, clean_picture, marker_print, photograph
 from rrtik_ompl.sensing.markers.detection import marker_cells
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
-from rrtik_ompl.sensing.sight import Sighting, look
+from rrtik_ompl.sensing.sight import Sighting, detect_objects
 from rrtik_ompl.sensing.tracker import PoseTracker, Tracked
 
 FRAMES = 12  # of a sequence
@@ -97,7 +97,7 @@ def _sequence(kind: Kind, marker_map: MarkerMap, rng: np.random.Generator) -> li
     for k, T in enumerate(path):
         prints = [(T * at, marker_print(marker_cells(DICTIONARY, n), SIDE)) for n, at in enumerate(kind.markers)]
         picture = photograph(clean_picture(CAMERA, [*prints, *((T * at, it) for at, it in strip)], rays=5), rng, **how)
-        seen = look(picture, CAMERA, marker_map)
+        seen = detect_objects(picture, CAMERA, marker_map)
         sight = seen[0] if seen and not seen[0].refused else None
         looks.append(Look(T, sight, None if sight is None else tracker.update(sight, k / RATE)))
     return looks

@@ -22,7 +22,7 @@ from rrtik_bench.sensing.runs import (
 from rrtik_bench.sensing.tables import ACCURACY, GRIPPER, NOISE, SERIES
 from rrtik_ompl import load_robot
 from rrtik_ompl.ik.analytic.closed_form import solutions
-from rrtik_ompl.overlay.virtual_camera import eye_at
+from rrtik_ompl.overlay.virtual_camera import orbit_pose
 from rrtik_ompl.poses import pose
 from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph, published_camera
 from rrtik_ompl.sensing.markers.corner_pose import pose_of_square, square_corners
@@ -30,7 +30,7 @@ from rrtik_ompl.sensing.markers.detection import marker_cells
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
 from rrtik_ompl.sensing.precision import Series
 from rrtik_ompl.sensing.scene_from_view import objects_in_base
-from rrtik_ompl.sensing.sight import look
+from rrtik_ompl.sensing.sight import detect_objects
 from rrtik_ompl.sensing.tracker import PoseTracker
 
 BOARD = [pose([x * 0.0535, y * 0.0535, 0.0]) for x in (-1, 1) for y in (-1, 1)]
@@ -130,7 +130,7 @@ def jitter(report: Report, count: int) -> None:
                   for m in thing.markers]  # fmt: skip
         clean = clean_picture(CAMERA, prints, rays=6)
         for k in range(count):
-            (sight,) = look(photograph(clean, rng), CAMERA, MarkerMap(DICTIONARY, (thing,)))
+            (sight,) = detect_objects(photograph(clean, rng), CAMERA, MarkerMap(DICTIONARY, (thing,)))
             tips["one marker" if thing is one else "four markers"].append(sight.pose.T_camera_object.act(reach))
             if thing is one:
                 followed = tracker.update(sight, k / 30.0).T_camera_object
@@ -151,7 +151,7 @@ def end_to_end(report: Report, count: int) -> None:
     errors: list[float] = []
     covered: list[bool] = []
     robot, rng = load_robot("titan4"), np.random.default_rng(3)
-    T_base_camera = eye_at([1.2, 0.0, 0.1], 0.8, np.deg2rad(-150.0), np.deg2rad(35.0))
+    T_base_camera = orbit_pose([1.2, 0.0, 0.1], 0.8, np.deg2rad(-150.0), np.deg2rad(35.0))
     thing = MarkedObject("valve", "target", (MountedMarker(0, SIDE),))
     marker_map = MarkerMap(DICTIONARY, (thing,), T_base_camera)
     sheet = marker_print(marker_cells(DICTIONARY, 0), SIDE)
@@ -165,7 +165,7 @@ def end_to_end(report: Report, count: int) -> None:
         if not in_view([T]) or not solutions(robot, wanted.homogeneous[None]).valid.any():
             continue
         picture = photograph(clean_picture(CAMERA, [(T, sheet)], rays=5), rng, **HARD)
-        (placed,) = objects_in_base(look(picture, CAMERA, marker_map), marker_map)
+        (placed,) = objects_in_base(detect_objects(picture, CAMERA, marker_map), marker_map)
         off = float(np.linalg.norm(placed.T_base_object.translation - (T_base_camera * T).translation))
         covered.append(off < placed.sigmas * placed.position_sigma)
         found = solutions(robot, (placed.T_base_object * grasp).homogeneous[None])

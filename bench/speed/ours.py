@@ -17,7 +17,7 @@ from rrtik_ompl.fast.search.connect import ConnectSearch
 from rrtik_ompl.fast.search.motions.motion_table import MotionTable
 from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.ompl_bridge.attempt import attempt
-from rrtik_ompl.ompl_bridge.setup import planning_bounds, unjudged_space
+from rrtik_ompl.ompl_bridge.setup import planning_bounds, unchecked_space
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.planning import find_planner, list_planners
 
@@ -52,7 +52,7 @@ def ompl_overhead(problem: Problem, *, seconds: float, seed: int) -> Callable[[]
     if PLANNER not in KERNEL_PLANNERS:
         return None
     goals = goal_configurations(problem, np.random.default_rng(0)).rows
-    setup = og.SimpleSetup(unjudged_space(problem, goals))  # as plan() does: the planner asks the world itself
+    setup = og.SimpleSetup(unchecked_space(problem, goals))  # as plan() does: the planner asks the world itself
     states, ends = StateIO(setup.getSpaceInformation()), []
     for row in (problem.start, goals[0]):
         ends.append(setup.getSpaceInformation().allocState())

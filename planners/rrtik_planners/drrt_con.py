@@ -68,7 +68,7 @@ class DRRTCon(SafePlanner):
     def _from_kept(self, core: DrrtCon, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> bool:
         """Whether the kept path could be made to lead from a start to a goal."""
         assert core.path is not None
-        start, passed = _nearest_place(core.path, starts, 0.5 * core.eps)
+        start, passed = _nearest_place(core.path, starts, 0.5 * core.max_edge)
         core.rejoin(start, passed)
         if not (goals == core.path[-1]).all(axis=1).any() and not core.retarget(goals, checker, ptc):
             return False

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rrtik_ompl.cli.terminal import progress, say
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import check_target
+
+if TYPE_CHECKING:
+    from rrtik_ompl.sensing.sensor import Sensor, View
 
 markers = typer.Typer(help="Print markers, calibrate a camera, sense what it sees.")
 
@@ -67,7 +71,7 @@ def calibrate_camera(
     marker: Annotated[float, typer.Option(help="Side of a marker as printed [mm].")] = 22.0,
     dictionary: Dictionary = "4x4_50",
 ) -> int:
-    """Find out a camera's intrinsics.
+    """Calibrate a camera.
 
     From photographs of a printed board; writes the camera file.
     """
@@ -78,7 +82,7 @@ def calibrate_camera(
     from rrtik_ompl.sensing.markers.detection import charuco_board
 
     board = charuco_board(columns, rows, 1e-3 * square, 1e-3 * marker, dictionary)
-    with progress("looking for the board"):
+    with progress("detecting the board"):
         taken = list(pictures_from(photographs))
         found = calibrate([picture.pixels for picture in taken], board)
     save_camera(found, out)
@@ -95,21 +99,23 @@ def calibrate_camera(
 def sense(
     source: Annotated[str, typer.Argument(help="An image, a folder of images, a video, or a camera's number.")],
     camera: Annotated[Path, typer.Option(help="Camera file (see: rrtik markers calibrate).")],
-    marker_map: Annotated[Path, typer.Option("--map", help="Which marker sits on which object: .yaml.")],
-    frames: Annotated[int, typer.Option(help="So many pictures at most; 0: all, of a camera device 1.", min=0)] = 0,
+    marker_map: Annotated[Path, typer.Option("--map", help="Marker map: which marker is on which object: .yaml.")],
+    frames: Annotated[int, typer.Option(help="Number of pictures at most; 0: all, of a camera device 1.", min=0)] = 0,
     scene: Annotated[Path | None, typer.Option(help="Write the scene in the frame of the base: .yaml.")] = None,
     task: Annotated[
-        Path | None, typer.Option(help="Write a problem with what was seen: .yaml. Needs --problem and --grasp.")
+        Path | None, typer.Option(help="Write a problem with the detected objects: .yaml. Needs --problem and --grasp.")
     ] = None,
     problem: Annotated[str | None, typer.Option(help="Robot, start and further obstacles of --task.")] = None,
     grasp: Annotated[
         str | None, typer.Option(metavar="OBJECT:TYPE:LEVEL", help="Goal of --task; levels from 1.")
     ] = None,
-    picture: Annotated[Path | None, typer.Option(help="Write the last picture with what was seen: .png, .jpg.")] = None,
-    sigmas: Annotated[float, typer.Option(help="Margins of the scene's obstacles: so many deviations; 0: none.")] = 3.0,
+    picture: Annotated[
+        Path | None, typer.Option(help="Write the last picture with the detected objects: .png, .jpg.")
+    ] = None,
+    sigmas: Annotated[float, typer.Option(help="Margins of obstacles, in standard deviations; 0: none.")] = 3.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object a picture.")] = False,
 ) -> int:
-    """Say where the marked objects are, from pictures."""
+    """Print the poses of marked objects, from pictures."""
     check_target(scene, SCENES)
     check_target(task, SCENES)
     check_target(picture, PICTURES)
@@ -151,7 +157,7 @@ def _task_goal(task: Path | None, problem: str | None, grasp: str | None) -> tup
     return name, kind, int(level)
 
 
-def _views(sensor: Any, source: str, frames: int) -> Any:
+def _views(sensor: Sensor, source: str, frames: int) -> Iterator[View]:
     from rrtik_ompl.sensing.cameras.pictures import pictures_from
 
     most = frames or (1 if source.isdecimal() else None)

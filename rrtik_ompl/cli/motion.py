@@ -1,10 +1,10 @@
-"""The commands of `rrtik` that follow a path: its list of single-joint moves, and its times."""
+"""The commands of `rrtik` for a path: its list of single-joint moves, and its time parameterisation."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,6 +12,13 @@ from rrtik_ompl.cli.terminal import progress, say
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target, comma_numbers
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from rrtik_ompl.arrays import Vector
+    from rrtik_ompl.path import JointPath
+    from rrtik_ompl.problem import Problem as PlanningProblem
 
 TRAJECTORY_FORMATS, PLOT_FORMATS = (".json", ".csv"), (".png", ".svg")
 
@@ -70,7 +77,10 @@ def time_path(
     plot: Annotated[Path | None, typer.Option(help="Draw the joints over time: .png or .svg.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> int:
-    """Give a path its times, under the robot's limits or those given."""
+    """Time-parameterize a path.
+
+    Under the robot's limits or those given.
+    """
     check_target(out, TRAJECTORY_FORMATS)
     check_target(plot, PLOT_FORMATS)
     texts = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
@@ -79,31 +89,31 @@ def time_path(
         raise InputError(f"--blend: expected 0 degrees or more, got {blend:g}")
     import numpy as np
 
-    from rrtik_ompl import RateLimits, load_problem, plot_joints, timed
+    from rrtik_ompl import RateLimits, load_problem, plot_joints, time_parameterize
     from rrtik_ompl.cli import plan_report as report
 
-    question = load_problem(problem)
-    robot = question.robot
-    route = _valid_path(path, question)
+    task = load_problem(problem)
+    robot = task.robot
+    route = _valid_path(path, task)
     factors = np.where(robot.prismatic, 1.0, np.pi / 180.0)
     limits = RateLimits.of(
         robot, share=share, **{name: None if row is None else _scaled(row, factors) for name, row in given.items()}
     )
     with progress("timing"):
-        found = timed(route, limits, blend=float(np.deg2rad(blend)), world=question.world)
+        found = time_parameterize(route, limits, blend=float(np.deg2rad(blend)), world=task.world)
     if out is not None:
         found.save(out)
     if plot is not None:
         plot_joints(found, plot)
     if as_json:
-        print(json.dumps(report.timing_document(question, found)))
+        print(json.dumps(report.timing_document(task, found)))
     else:
-        say(f"{question.name}: {found.duration:.3f} s", report.peaks_table(found, limits))
+        say(f"{task.name}: {found.duration:.3f} s", report.peaks_table(found, limits))
         say(*(f"wrote {file}" for file in (out, plot) if file is not None))
     return 0
 
 
-def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> Any:
+def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> JointPath:
     """The path as single-joint moves."""
     from rrtik_ompl import load_path, load_problem, one_joint_moves
     from rrtik_ompl.shortening import shorten as shortened
@@ -112,33 +122,33 @@ def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> Any:
         route = load_path(path)
         _check_waypoints(path, route)
         if shorten is not None:
-            raise InputError("--shorten needs to know what stands in the way: give --problem too")
+            raise InputError("--shorten needs the obstacles: give --problem too")
         if not route.one_joint_at_a_time:
             raise InputError(f"{path}: moves several joints at once; give --problem NAME, and it is converted")
         return route
-    question = load_problem(problem)
-    route = _valid_path(path, question)
+    task = load_problem(problem)
+    route = _valid_path(path, task)
     _check_waypoints(path, route)
     with progress("converting"):
         if not route.one_joint_at_a_time:
-            route = one_joint_moves(route, question)
+            route = one_joint_moves(route, task)
         if shorten is not None:
-            route = shortened(route, question, method=shorten)
+            route = shortened(route, task, method=shorten)
     return route
 
 
-def _valid_path(path: Path, question: Any) -> Any:
+def _valid_path(path: Path, task: PlanningProblem) -> JointPath:
     """A path of a file, checked against its problem."""
     from rrtik_ompl import load_path
 
-    route = load_path(path, question.robot)
-    faults = route.violations(question.world)
+    route = load_path(path, task.robot)
+    faults = route.violations(task.world)
     if faults:
-        raise InputError(f"{path}: not valid for {question.name}: edge {faults[0].edge + 1}: {faults[0].reason}")
+        raise InputError(f"{path}: not valid for {task.name}: edge {faults[0].edge + 1}: {faults[0].reason}")
     return route
 
 
-def _check_waypoints(path: Path, route: Any) -> None:
+def _check_waypoints(path: Path, route: JointPath) -> None:
     if len(route.waypoints) < 2:
         raise InputError(f"{path}: it has one waypoint, so there are no moves to list")
 
@@ -151,6 +161,6 @@ def _rates(text: str, option: str) -> list[float]:
     return row
 
 
-def _scaled(row: list[float], factors: Any) -> Any:
-    """Degrees as radians; a row of the wrong length is left for the limits to refuse."""
+def _scaled(row: list[float], factors: Vector) -> ArrayLike:
+    """Degrees as radians; a row of the wrong length stays as it is, and the limits refuse it."""
     return row if len(row) not in (1, len(factors)) else row * factors

@@ -6,13 +6,20 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rrtik_ompl.cli.terminal import progress, say
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import check_target
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from rrtik_ompl.overlay.film import ArmInPictures
+    from rrtik_ompl.sensing.cameras.pictures import Picture
 
 ENDINGS = (".mp4", ".avi", ".png", ".jpg")
 
@@ -23,17 +30,17 @@ def overlay(
     path: Annotated[Path | None, typer.Argument(help="A path that the arm follows: .json, .csv or .txt.")] = None,
     *,
     camera: Annotated[Path, typer.Option(help="Camera file (see: rrtik markers calibrate).")],
-    marker_map: Annotated[Path, typer.Option("--map", help="Which marker sits on which object: .yaml.")],
+    marker_map: Annotated[Path, typer.Option("--map", help="Marker map: which marker is on which object: .yaml.")],
     out: Annotated[Path, typer.Option(help="Film (.mp4, .avi), or the last picture (.png, .jpg).")],
-    seconds: Annotated[float, typer.Option(help="That the arm takes for the whole path [s].")] = 10.0,
+    seconds: Annotated[float, typer.Option(help="Duration of the whole path [s].")] = 10.0,
     ghosts: Annotated[int, typer.Option(help="Configurations ahead on the path, drawn as well, 0 to 20.")] = 1,
     frames: Annotated[
-        int, typer.Option(help="So many pictures at most; 0: all; a camera device needs a number.", min=0)
+        int, typer.Option(help="Number of pictures at most; 0: all; a camera device needs a number.", min=0)
     ] = 0,
 ) -> int:
-    """Draw the arm on its way into a video.
+    """Draw the moving arm into a video.
 
-    Where it is, ghosts of where it goes, the trail of its tip, frames of what is seen.
+    With ghosts of its next configurations, the trail of its tip, and frames of the detected objects.
     """
     check_target(out, ENDINGS)
     if source.isdecimal() and not frames:
@@ -45,10 +52,10 @@ def overlay(
     from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
     from rrtik_ompl.sensing.sensor import Sensor
 
-    question = load_problem(problem)
-    rows = [question.start] if path is None else load_path(path, question.robot).waypoints
+    task = load_problem(problem)
+    rows = [task.start] if path is None else load_path(path, task.robot).waypoints
     sensor = Sensor(load_camera(camera), load_marker_map(marker_map))
-    arm = ArmInPictures(question.robot, sensor, rows, seconds=seconds, ghosts=ghosts)
+    arm = ArmInPictures(task.robot, sensor, rows, seconds=seconds, ghosts=ghosts)
     rate, pictures = rate_of(islice(pictures_from(source), frames or None))
     with progress("drawing"):
         drawn = _drawn(arm, pictures, lambda: sensor.why_nothing(source))
@@ -57,12 +64,14 @@ def overlay(
             write_picture(last, out)
         else:
             write_film(out, drawn, rate)
-    missing = f"; the first {arm.without_base} show no base and stay as they were" if arm.without_base else ""
+    missing = f"; the first {arm.without_base} show no base and are unchanged" if arm.without_base else ""
     say(f"wrote {out}: {arm.count} pictures, {rate:g} a second{missing}")
     return 0
 
 
-def _drawn(arm: Any, pictures: Iterable[Any], why_nothing: Callable[[], str]) -> Iterator[Any]:
+def _drawn(
+    arm: ArmInPictures, pictures: Iterable[Picture], why_nothing: Callable[[], str]
+) -> Iterator[NDArray[np.uint8]]:
     """All pictures with the arm; an error after the last one if the base was in none of them."""
     for picture in pictures:
         yield arm.draw(picture)

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rrtik_ompl.cli.terminal import progress, say
 from rrtik_ompl.errors import InputError
+
+if TYPE_CHECKING:
+    from rrtik_ompl.pilot.setup import OpenSession
+    from rrtik_ompl.pilot.web.server import PilotServer
 
 SOURCES = ("--camera", "--video", "--images", "--simulated", "--replay")
 
@@ -19,22 +23,28 @@ def pilot(
     video: Annotated[Path | None, typer.Option(help="A video file in place of a camera.")] = None,
     images: Annotated[Path | None, typer.Option(help="A folder of images, one a second.")] = None,
     simulated: Annotated[bool, typer.Option("--simulated", help="A simulated vehicle and camera.")] = False,
-    scenario: Annotated[Path | None, typer.Option(help="What is simulated; a shipped one if left out.")] = None,
+    scenario: Annotated[
+        Path | None, typer.Option(help="File of the simulated vehicle; a shipped one if left out.")
+    ] = None,
     camera_file: Annotated[Path | None, typer.Option(help="Camera file (see: rrtik markers calibrate).")] = None,
-    map_file: Annotated[Path | None, typer.Option("--map", help="Which marker sits on which object: .yaml.")] = None,
+    map_file: Annotated[
+        Path | None, typer.Option("--map", help="Marker map: which marker is on which object: .yaml.")
+    ] = None,
     record: Annotated[Path | None, typer.Option(help="Write the session to this file, line by line.")] = None,
     replay: Annotated[Path | None, typer.Option(help="Play a recorded session.")] = None,
     arm: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="An arm; a simulated one if left out.")] = None,
     port: Annotated[int, typer.Option(help="Of the page; 0 takes a free one.", min=0, max=65535)] = 0,
     host: Annotated[str, typer.Option(help="Address for other machines; needs --token.")] = "127.0.0.1",
     token: Annotated[str, typer.Option(help="Secret word for --host, at least 16 letters.")] = "",
-    sigmas: Annotated[float, typer.Option(help="Margins of what is seen: so many deviations; 0: none.")] = 3.0,
+    sigmas: Annotated[
+        float, typer.Option(help="Margin of seen objects: this many standard deviations; 0: none.")
+    ] = 3.0,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open a browser.")] = False,
     seed: Annotated[int, typer.Option(help="The same commands give the same routes.", min=0)] = 0,
 ) -> int:
-    """Help a pilot drive an arm: a page in the browser.
+    """Help a pilot drive an arm, on a page in the browser.
 
-    The camera with the arm drawn in, grasps, routes and moves. Ctrl-C ends it.
+    It shows the camera with the arm drawn in, grasps, routes and moves. Ctrl-C ends it.
     """
     given = (camera is not None, video is not None, images is not None, simulated or bool(scenario), replay is not None)
     if sum(given) != 1 and not (sum(given) == 2 and given[3] and given[4]):
@@ -42,14 +52,14 @@ def pilot(
         raise InputError(f"one of {', '.join(SOURCES)} says where pictures come from; got {', '.join(named) or 'none'}")
     if replay is not None and (record is not None or arm is not None):
         raise InputError("--replay shows what has happened: leave out --record and --arm")
-    from rrtik_ompl.pilot.setup import Wanted, open_session
+    from rrtik_ompl.pilot.setup import SessionOptions, open_session
     from rrtik_ompl.pilot.web.server import PilotServer
 
     source = next((each for each in (camera, video, images) if each is not None), None)
-    wanted = Wanted(problem, source, scenario, camera_file, map_file, record, replay, arm, seed, sigmas)
+    options = SessionOptions(problem, source, scenario, camera_file, map_file, record, replay, arm, seed, sigmas)
     server = PilotServer(port, host, token, f"rrtik pilot · {problem}")
     with progress("preparing"):
-        opened = open_session(wanted)
+        opened = open_session(options)
     try:
         _serve(server, opened, watch_only=replay is not None, browser=not no_browser)
     finally:
@@ -59,7 +69,7 @@ def pilot(
     return 0
 
 
-def _serve(server: Any, opened: Any, *, watch_only: bool, browser: bool) -> None:
+def _serve(server: PilotServer, opened: OpenSession, *, watch_only: bool, browser: bool) -> None:
     from rrtik_ompl.pilot.run import Loop
 
     with server:

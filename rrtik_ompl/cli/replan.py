@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rrtik_ompl.cli.terminal import note, progress, say
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import check_target
+
+if TYPE_CHECKING:
+    from rrtik_ompl.replanning import ReplanRun
 
 Scenario = Annotated[str, typer.Argument(help="A problem with a run: section, shipped or a YAML file.")]
 
@@ -19,7 +22,8 @@ def replan_scenario(
     scenario: Scenario,
     planner: Annotated[str, typer.Option(help="drrt-con, or to compare with: rrt-connect, drrt.")] = "drrt-con",
     seed: Annotated[int, typer.Option(help="The same seed gives the same run.")] = 0,
-    predict: Annotated[int | None, typer.Option(help="Heed where obstacles will be, so many ticks ahead.")] = None,
+    lookahead_ticks: Annotated[int | None, typer.Option(help="Predict obstacle motion this many ticks ahead.")] = None,
+    predict: Annotated[int | None, typer.Option(hidden=True)] = None,
     seconds: Annotated[float | None, typer.Option(help="Simulated time at most [s].")] = None,
     record: Annotated[Path | None, typer.Option(help="Keep everything, on Ctrl-C too: .json.")] = None,
     replay: Annotated[Path | None, typer.Option(help="Show this record instead of a new run.")] = None,
@@ -28,14 +32,18 @@ def replan_scenario(
 ) -> int:
     """Move a robot to its goal while obstacles move.
 
-    Look, repair, step, again and again. Exit code 1 if it did not arrive.
+    In each tick: check the path, repair it, go a step. Exit code 1 if the goal was not reached.
     """
+    if predict is not None:
+        raise InputError("--predict is now called --lookahead-ticks; use that")
     check_target(html, (".html", ".htm"))
     check_target(record, (".json",))
-    options = {"predict": predict, "seconds": seconds, "record": record}
+    options: dict[str, Any] = {"lookahead_ticks": lookahead_ticks, "seconds": seconds, "record": record}
     given = {name: value for name, value in options.items() if value is not None}
     if replay is not None and given:
-        raise InputError(f"--replay shows a run that is over: leave out --{next(iter(given))}, or --replay")
+        raise InputError(
+            f"--replay shows a run that is over: leave out --{next(iter(given)).replace('_', '-')}, or --replay"
+        )
     from rrtik_ompl.replanning.scenario import load_scenario
 
     chosen = load_scenario(scenario)
@@ -62,7 +70,7 @@ def replan_scenario(
     return 0 if run.arrived else 1
 
 
-def _recorded(file: Path, problem: str) -> Any:
+def _recorded(file: Path, problem: str) -> ReplanRun:
     """The run of a record, which must be one of the problem.
 
     Raises:

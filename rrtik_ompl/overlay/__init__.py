@@ -1,5 +1,5 @@
-"""The arm drawn over a camera's picture, as it stands or as it will: with what hides it, by OpenCV's rasteriser.
+"""The arm drawn over a camera's picture, now or later along a path, hidden by what is in front of it.
 
-No graphics card, no window: arrays in, a picture out. The same drawing from an eye of one's own choice is the
-God's-eye view.
+No graphics card and no window are needed: arrays in, a picture out, by OpenCV's rasteriser. With a virtual camera the
+same drawing is the view from outside.
 """

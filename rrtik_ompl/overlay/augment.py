@@ -1,16 +1,17 @@
-"""Augmented pictures: arm, ghosts, obstacles, trail and frames over what a camera shows, hidden by what stands before.
+"""Augmented pictures: arm, ghosts, obstacles, trail and frames over a camera's picture, with occlusion.
 
-Source: shared-control tool, section 3 (video window); AR sensing, section 3 (virtualisation).
+Source: [1, ch. 4 and 6].
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import cv2
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array
@@ -24,7 +25,7 @@ from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.viewer.drawing import palette
 
 GHOST_TRIANGLES = 5_000
-FIGURES_KEPT, LAYERS_KEPT = 4, 6
+MAX_FIGURES, MAX_LAYERS = 4, 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,18 +36,18 @@ class Ghost:
         q: The configuration, shape (dof,); None for the gripper alone, where no configuration gets it.
         color: Its colour.
         opacity: From 0 to 1.
-        T_base_tip: Where the gripper is, without a configuration.
+        T_base_tip: Pose of the gripper without a configuration.
     """
 
     q: Vector | None
     color: str = palette.GOAL
     opacity: float = 0.35
-    T_base_tip: Any | None = None
+    T_base_tip: pin.SE3 | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layer:
-    """What was drawn on a canvas, ready to be laid over pictures.
+    """A drawing, ready to be blended into pictures.
 
     Attributes:
         depths: Along the optical axis [m], shape (height, width).
@@ -88,31 +89,31 @@ class Augmenter:
 
         Args:
             robot: The arm.
-            camera: Who takes the pictures, or from where they are imagined.
+            camera: Of the pictures, real or virtual.
             triangles: Of the whole arm, at most about.
         """
         self.robot, self.camera = robot, camera
         self._canvas = Canvas(camera)
-        self._layers: dict[tuple[Any, ...], Layer] = {}
+        self._layers: dict[Hashable, Layer] = {}
         self._arm = figure_of(robot_surfaces(robot, triangles))
         thin = robot_surfaces(robot, min(triangles, GHOST_TRIANGLES))
         self._tip = robot.model.frames[robot.model.getFrameId(robot.tip)]
         self._ghost = figure_of(thin)
         self._gripper = figure_of([each for each in thin if each.frame == self._tip.parentJoint])
-        self._figures: dict[tuple[Any, ...], tuple[tuple[Obstacle, ...], Figure]] = {}
+        self._figures: dict[Hashable, tuple[tuple[Obstacle, ...], Figure]] = {}
         self._last: Layer | None = None
 
     def draw(
         self,
         picture: NDArray[np.uint8],
-        T_base_camera: Any,
+        T_base_camera: pin.SE3,
         q: Vector | None = None,
         *,
         ghosts: Sequence[Ghost] = (),
         obstacles: Sequence[Obstacle] = (),
         real: Sequence[Obstacle] = (),
         trail: Matrix | None = None,
-        frames: Sequence[Any] = (),
+        frames: Sequence[pin.SE3] = (),
         opacity: float = 0.85,
         color: str | None = None,
     ) -> NDArray[np.uint8]:
@@ -120,11 +121,11 @@ class Augmenter:
 
         Args:
             picture: Of the camera's size; grey or blue, green, red.
-            T_base_camera: Where the camera is, in the frame of the arm's base.
+            T_base_camera: Pose of the camera in the frame of the arm's base.
             q: Configuration of the arm, shape (dof,); no arm if None.
-            ghosts: Further configurations, or places of the gripper.
+            ghosts: Further configurations, or poses of the gripper.
             obstacles: Virtual ones, drawn.
-            real: Solids that are in the picture already: they hide what is behind them.
+            real: Solids that are in the picture already: they are not drawn, but hide what is behind them.
             trail: Points that are joined by a line, shape (k, 3) in the frame of the base [m].
             frames: Poses in the frame of the base, drawn as axes.
             opacity: Of arm and obstacles.
@@ -136,7 +137,7 @@ class Augmenter:
         height, width = self.camera.height, self.camera.width
         if picture.shape[:2] != (height, width):
             raise InputError(f"picture has shape {picture.shape[:2]}, the camera's has {(height, width)}")
-        drawn: Any = np.array(picture if picture.ndim == 3 else cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR))
+        drawn: NDArray[np.uint8] = np.array(picture if picture.ndim == 3 else cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR))
         T_camera_base = T_base_camera.inverse().homogeneous
         hidden_by = self._depths(real, T_camera_base)
         for ghost in ghosts:
@@ -160,18 +161,22 @@ class Augmenter:
         return self._last.depths.copy()
 
     def _draw_ghost(
-        self, drawn: Any, ghost: Ghost, T_camera_base: NDArray[np.float64], hidden_by: NDArray[np.float32] | None
+        self,
+        drawn: NDArray[np.uint8],
+        ghost: Ghost,
+        T_camera_base: NDArray[np.float64],
+        hidden_by: NDArray[np.float32] | None,
     ) -> None:
-        look = T_camera_base, hidden_by, ghost.opacity, ghost.color
+        style = T_camera_base, hidden_by, ghost.opacity, ghost.color
         if ghost.q is not None:
-            self._draw_arm(drawn, self._ghost, ghost.q, *look)
+            self._draw_arm(drawn, self._ghost, ghost.q, *style)
         elif ghost.T_base_tip is not None:
             joint = (ghost.T_base_tip * self._tip.placement.inverse()).homogeneous
-            self._draw_arm(drawn, self._gripper, joint, *look)
+            self._draw_arm(drawn, self._gripper, joint, *style)
 
     def _draw_arm(
         self,
-        drawn: Any,
+        drawn: NDArray[np.uint8],
         arm: Figure,
         q: Vector | None,
         T_camera_base: NDArray[np.float64],
@@ -187,7 +192,7 @@ class Augmenter:
     def _layer(
         self, arm: Figure | None, q: Vector | None, solids: Figure | None, T: NDArray[np.float64], color: str | None
     ) -> Layer:
-        """An arm and solids before the camera; kept for some pictures, for most of what is drawn stands still.
+        """An arm and solids before the camera; kept for some pictures, for most of what is drawn does not move.
 
         The arm is at a configuration, or all of it where one joint is, shape (4, 4).
         """
@@ -199,7 +204,7 @@ class Augmenter:
                 self._canvas.draw(shown if color is None else tinted(shown, palette.fractions(color)))
             if solids is not None:
                 self._canvas.draw(placed(solids, T[None]))
-            if len(self._layers) >= LAYERS_KEPT:
+            if len(self._layers) >= MAX_LAYERS:
                 self._layers.pop(next(iter(self._layers)))
             self._layers[key] = Layer.of(self._canvas)
         layer = self._layers[key] = self._layers.pop(key)  # the one that was used last is the last to go
@@ -221,13 +226,15 @@ class Augmenter:
         """Triangles of obstacles, kept from picture to picture while they are where they were."""
         key = tuple((id(each.shape), each.pose.homogeneous.tobytes()) for each in obstacles)
         if key not in self._figures:
-            if len(self._figures) >= FIGURES_KEPT:
+            if len(self._figures) >= MAX_FIGURES:
                 self._figures.pop(next(iter(self._figures)))
             kept = tuple(obstacles)  # so that no other shape gets the identity of one that is gone
             self._figures[key] = (kept, figure_of(obstacle_surfaces(kept)))
         return self._figures[key][1]
 
-    def _pixels(self, points: Matrix, T_camera_base: NDArray[np.float64]) -> tuple[NDArray[np.int64], Any]:
+    def _pixels(
+        self, points: Matrix, T_camera_base: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Sixteenths of pixels of points in the base's frame, and which of them are before the camera."""
         seen = np.asarray(points, dtype=np.float64) @ T_camera_base[:3, :3].T + T_camera_base[:3, 3]
         before = seen[:, 2] > NEAR
@@ -236,7 +243,9 @@ class Augmenter:
             pixels[before] = self.camera.project(seen[before])
         return np.clip(np.rint(16.0 * pixels), -(2**20), 2**20).astype(np.int64), before
 
-    def _draw_line(self, drawn: Any, points: Matrix, T_camera_base: NDArray[np.float64], color: str) -> None:
+    def _draw_line(
+        self, drawn: NDArray[np.uint8], points: Matrix, T_camera_base: NDArray[np.float64], color: str
+    ) -> None:
         pixels, before = self._pixels(finite_array(points, (None, 3), "trail"), T_camera_base)
         runs = np.split(np.arange(len(pixels)), np.flatnonzero(np.diff(before.astype(int))) + 1)
         for run in runs:
@@ -244,7 +253,9 @@ class Augmenter:
                 line = pixels[run].astype(np.int32)[:, None]
                 cv2.polylines(drawn, [line], False, _bgr(color), 2, cv2.LINE_AA, 4)
 
-    def _draw_axes(self, drawn: Any, pose: Any, T_camera_base: NDArray[np.float64], length: float = 0.1) -> None:
+    def _draw_axes(
+        self, drawn: NDArray[np.uint8], pose: pin.SE3, T_camera_base: NDArray[np.float64], length: float = 0.1
+    ) -> None:
         for axis, color in enumerate(palette.AXES):
             tip = pose.translation + length * pose.rotation[:, axis]
             self._draw_line(drawn, np.stack([pose.translation, tip]), T_camera_base, color)

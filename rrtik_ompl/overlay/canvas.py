@@ -1,6 +1,6 @@
 """Colours and depths of a picture, into which placed figures are drawn. OpenCV's rasteriser does the work.
 
-It takes an opening angle alone; focal lengths, the picture's centre and half a pixel go into the matrix.
+The rasteriser takes an opening angle alone; focal lengths, the picture's centre and half a pixel go into the matrix.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ NEAR, FAR = 0.05, 50.0  # [m]
 
 
 class Canvas:
-    """A picture in the making, as a camera would take it.
+    """A picture that figures are drawn into, from the view of a camera.
 
     Attributes:
         colors: Red, green, blue from 0 to 1, of something else where nothing was drawn. Shape (height, width, 3).

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.overlay.surfaces import Surface
 
-AMBIENT = 0.35  # share of the light that comes from everywhere; the rest comes from the eye
+AMBIENT = 0.35  # share of ambient light; the rest comes from the camera
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,8 +67,8 @@ def figure_of(surfaces: Sequence[Surface]) -> Figure:
     )
 
 
-def placed(figure: Figure, T_camera_frames: Sequence[Any] | NDArray[np.float64]) -> Placed:
-    """A figure before a camera, lit by a lamp at the eye.
+def placed(figure: Figure, T_camera_frames: Sequence[ArrayLike] | NDArray[np.float64]) -> Placed:
+    """A figure in the frame of a camera, lit by a lamp at the camera.
 
     Args:
         figure: What is drawn.

@@ -1,4 +1,4 @@
-"""A film out of a film: in every picture what stands there is looked for, and the arm on its way is drawn in."""
+"""Augmented films: objects are detected in every picture of a film, and an arm that follows a path is drawn in."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import os
 from collections.abc import Iterable, Iterator
 from itertools import chain, islice
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array
@@ -22,7 +22,7 @@ from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.sensing.sensor import Sensor
 
 FILMS = {".mp4": "mp4v", ".avi": "MJPG"}
-USUAL_RATE, FASTEST_RATE = 30.0, 240.0  # pictures a second
+DEFAULT_RATE, MAX_RATE = 30.0, 240.0  # pictures a second
 TRAIL_POINTS = 80
 
 
@@ -31,7 +31,7 @@ class ArmInPictures:
 
     Attributes:
         count: How many pictures there were.
-        without_base: How many of them came before anything said where the arm's base is; they stay as they are.
+        without_base: How many of them came before the pose of the arm's base was known; they are left unchanged.
     """
 
     def __init__(self, robot: Robot, sensor: Sensor, waypoints: ArrayLike, *, seconds: float, ghosts: int = 1) -> None:
@@ -39,8 +39,8 @@ class ArmInPictures:
 
         Args:
             robot: The arm.
-            sensor: Looks at the pictures.
-            waypoints: Of its path, shape (k, dof), k at least 1: with one it stands still.
+            sensor: Detects objects in the pictures.
+            waypoints: Of its path, shape (k, dof), k at least 1; with one the arm does not move.
             seconds: From the first to the last of them.
             ghosts: So many configurations ahead are drawn as well, the last of them the end of the path.
 
@@ -56,7 +56,7 @@ class ArmInPictures:
         self._augmenter = Augmenter(robot, sensor.camera)
         self._ahead = np.linspace(0.0, 1.0, ghosts + 1)[1:]
         self._trail = robot.fk_batch(self._along(np.linspace(0.0, 1.0, TRAIL_POINTS)))[:, :3, 3]
-        self._T_base_camera: Any | None = None
+        self._T_base_camera: pin.SE3 | None = None
         self._known: dict[str, SeenObject] = {}
         self._begin: float | None = None
         self.count = self.without_base = 0
@@ -99,7 +99,7 @@ def rate_of(pictures: Iterator[Picture]) -> tuple[float, Iterator[Picture]]:
     """Pictures a second, by the times of the first two, and all of the pictures."""
     first = list(islice(pictures, 2))
     apart = first[1].time - first[0].time if len(first) == 2 else 0.0
-    rate = 1.0 / apart if apart > 1.0 / FASTEST_RATE else USUAL_RATE
+    rate = 1.0 / apart if apart > 1.0 / MAX_RATE else DEFAULT_RATE
     return rate, chain(first, pictures)
 
 
@@ -128,7 +128,7 @@ def write_film(path: Path, frames: Iterable[NDArray[np.uint8]], rate: float) -> 
         unfinished.unlink(missing_ok=True)
 
 
-def _writer(file: Path, path: Path, rate: float, shape: tuple[int, ...]) -> Any:
+def _writer(file: Path, path: Path, rate: float, shape: tuple[int, ...]) -> cv2.VideoWriter:
     code = cv2.VideoWriter.fourcc(*FILMS[path.suffix.lower()])
     with quiet():
         writer = cv2.VideoWriter(str(file), code, rate, (shape[1], shape[0]))

@@ -1,4 +1,4 @@
-"""A second rasteriser in double precision, one triangle after the other: slow, and only there to check the first."""
+"""Reference rasteriser in double precision, one triangle after the other: slow, for tests of the first one."""
 
 from __future__ import annotations
 

@@ -1,8 +1,6 @@
-"""A camera of one's own choice: the view from outside, turned and zoomed by the pilot."""
+"""A virtual camera: the view from outside, turned and zoomed by the pilot."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -14,20 +12,20 @@ from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.viewer.drawing import palette
 
 
-def imagined_camera(width: int = 640, height: int = 480, opening: float = np.deg2rad(45.0)) -> Camera:
+def pinhole_camera(width: int = 640, height: int = 480, opening: float = np.deg2rad(45.0)) -> Camera:
     """A camera without distortion whose picture opens by an angle from top to bottom [rad]."""
     focal = 0.5 * height / float(np.tan(0.5 * opening))
     matrix = [[focal, 0.0, 0.5 * (width - 1)], [0.0, focal, 0.5 * (height - 1)], [0.0, 0.0, 1.0]]
     return Camera(matrix, width, height)
 
 
-def eye_at(centre: ArrayLike, distance: float, azimuth: float, elevation: float) -> Any:
-    """``T_world_camera`` of an eye that looks at a point, the world's z axis upwards in the picture.
+def orbit_pose(centre: ArrayLike, distance: float, azimuth: float, elevation: float) -> pin.SE3:
+    """``T_world_camera`` of a camera directed at a point, the world's z axis upwards in the picture.
 
     Args:
-        centre: What it looks at, shape (3,) [m].
+        centre: The point, shape (3,) [m].
         distance: From there [m].
-        azimuth: Of the eye, seen from the centre, from the x axis towards y [rad].
+        azimuth: Of the camera, seen from the centre, from the x axis towards y [rad].
         elevation: Above the horizon [rad]; straight from above the x axis points to the right or as azimuth says.
 
     Raises:
@@ -44,7 +42,7 @@ def eye_at(centre: ArrayLike, distance: float, azimuth: float, elevation: float)
     return pin.SE3(np.stack([right, down, -back], 1), at + away * back)
 
 
-def sky(camera: Camera) -> NDArray[np.uint8]:
+def background(camera: Camera) -> NDArray[np.uint8]:
     """A pale background. Shape (height, width, 3), blue, green, red."""
     ends = np.array([palette.fractions(c)[::-1] for c in (palette.BACKGROUND_TOP, palette.BACKGROUND_BOTTOM)])
     share = np.linspace(0.0, 1.0, camera.height)[:, None]

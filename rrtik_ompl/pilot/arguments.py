@@ -1,32 +1,31 @@
-"""Arguments of commands as they come from outside: nothing is taken that a command does not expect."""
+"""Checks of the arguments of commands, which come from outside: only what a command expects is accepted."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from rrtik_ompl.errors import InputError
 
 NUMBERS = ("joint", "target", "change", "level")  # arguments of commands; all others are words
-LARGEST, LONGEST = 1e6, 100  # a number, and a word, that a command may hold
+MAX_NUMBER, MAX_WORD_LENGTH = 1e6, 100  # a number, and a word, that a command may hold
 
 
-def number(value: Any, name: str) -> float:
+def number(value: object, name: str) -> float:
     """A finite number of moderate size.
 
     Raises:
         InputError: If it is none.
     """
-    good = isinstance(value, int | float | np.number) and not isinstance(value, bool) and -LARGEST <= value <= LARGEST
-    if not good:
-        raise InputError(f"{name} must be a finite number, got {str(value)[:LONGEST]!r}")
-    return float(value)
+    plain = value.item() if isinstance(value, np.number) else value
+    if isinstance(plain, bool) or not isinstance(plain, int | float) or not -MAX_NUMBER <= plain <= MAX_NUMBER:
+        raise InputError(f"{name} must be a finite number, got {str(value)[:MAX_WORD_LENGTH]!r}")
+    return float(plain)
 
 
-def fitting(command: Callable[..., str], name: str, arguments: dict[str, Any]) -> dict[str, Any]:
+def fitting(command: Callable[..., str], name: str, arguments: Mapping[str, object]) -> dict[str, float | str]:
     """The arguments, if they are those that a command takes.
 
     Raises:
@@ -34,14 +33,14 @@ def fitting(command: Callable[..., str], name: str, arguments: dict[str, Any]) -
     """
     wanted = tuple(inspect.signature(command).parameters)
     if set(arguments) != set(wanted):
-        given = ", ".join(arguments)[:LONGEST] or "none"
+        given = ", ".join(arguments)[:MAX_WORD_LENGTH] or "none"
         raise InputError(f"{name} takes {', '.join(wanted) or 'no arguments'}, got {given}")
     return {word: _value(f"{name}: {word}", word, value) for word, value in arguments.items()}
 
 
-def _value(place: str, word: str, value: Any) -> Any:
+def _value(place: str, word: str, value: object) -> float | str:
     if word in NUMBERS:
         return number(value, place)
-    if not isinstance(value, str) or len(value) > LONGEST:
-        raise InputError(f"{place} must be a word, got {str(value)[:LONGEST]!r}")
+    if not isinstance(value, str) or len(value) > MAX_WORD_LENGTH:
+        raise InputError(f"{place} must be a word, got {str(value)[:MAX_WORD_LENGTH]!r}")
     return value

@@ -1,10 +1,11 @@
-"""The loop behind the page: a picture comes, the session learns from it, two pictures and a state go out.
+"""The loop behind the page: a picture updates the session; two pictures and a state are sent to the page.
 
 A step is cut in stages, so that a command never waits for more than one of them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from typing import Any
 
 import cv2
@@ -12,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.pilot.arguments import LONGEST, number
+from rrtik_ompl.pilot.arguments import MAX_WORD_LENGTH, number
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.camera_feed import ENDED
-from rrtik_ompl.pilot.devices.perception import Eyes
+from rrtik_ompl.pilot.devices.perception import Perception
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.state import state_document
 from rrtik_ompl.pilot.views import PRESETS, CameraView, OutsideView
@@ -25,24 +26,24 @@ VIEW_COMMANDS = {"turn": ("right", "up"), "zoom": ("factor",), "preset": ("view"
 
 
 class Engine:
-    """Ties session, eyes and pictures together. For one thread."""
+    """Connects session, perception and pictures. For one thread."""
 
-    def __init__(self, session: Session, eyes: Eyes, *, simulated: SimulatedArm | None = None) -> None:
+    def __init__(self, session: Session, perception: Perception, *, simulated: SimulatedArm | None = None) -> None:
         """Take the parts.
 
         Args:
-            session: Who decides.
-            eyes: Who looks.
-            simulated: An arm that has to be told that time passes.
+            session: The session.
+            perception: Camera and sensor.
+            simulated: An arm whose simulated time has to advance.
         """
-        self.session, self.eyes, self._simulated = session, eyes, simulated
-        self._camera_view = CameraView(eyes.camera, session)
+        self.session, self.perception, self._simulated = session, perception, simulated
+        self._camera_view = CameraView(perception.camera, session)
         self.outside = OutsideView(session)
         self._advanced = 0.0
-        self._drawn: tuple[Any, ...] = ()
+        self._drawn: tuple[Hashable, ...] = ()
 
-    def obey(self, command: dict[str, Any], time: float) -> None:
-        """Do what the pilot wants.
+    def execute(self, command: dict[str, Any], time: float) -> None:
+        """Execute a command of the pilot.
 
         Args:
             command: A ``name`` and its arguments; those of `VIEW_COMMANDS` concern the outside view alone.
@@ -55,30 +56,34 @@ class Engine:
             self.session.command(name, time, **arguments)
             return
         try:
-            self._look_from_elsewhere(name, arguments)
+            self._change_view(name, arguments)
         except InputError as error:
             self.session.message = str(error)
 
-    def look(self, time: float) -> None:
-        """Let time pass and look once."""
+    def update(self, time: float) -> None:
+        """Advance to a time [s] and process one picture."""
         self._advance(time)
-        self.eyes.look(self.session, time)
+        self.perception.update(self.session, time)
 
     def state(self) -> dict[str, Any]:
-        """What there is to be shown beside the pictures."""
-        lost = self.eyes.lost
-        shown = {"camera_lost": lost, "pictures_ended": lost == ENDED, "hint": self.eyes.hint}
+        """What the page shows beside the pictures."""
+        lost = self.perception.lost
+        shown = {"camera_lost": lost, "pictures_ended": lost == ENDED, "hint": self.perception.hint}
         shown["playing"] = self.outside.share
         return state_document(self.session) | shown
 
     def camera_picture(self) -> bytes:
-        """What the camera sees, with what is known drawn over it; JPEG."""
-        if self.eyes.T_base_camera is None:
-            return _jpeg(self.eyes.picture)
-        return _jpeg(self._camera_view.draw(self.eyes.picture, self.eyes.T_base_camera, self.eyes.arm_in_picture))
+        """The picture of the camera with the arm, the route and the chosen grasp drawn over it; JPEG."""
+        if self.perception.T_base_camera is None:
+            return _jpeg(self.perception.picture)
+        return _jpeg(
+            self._camera_view.draw(
+                self.perception.picture, self.perception.T_base_camera, self.perception.arm_in_picture
+            )
+        )
 
     def outside_picture(self, anew: bool = False) -> bytes | None:
-        """The view from outside, JPEG; None if it would be the same as last time, unless wanted ``anew``."""
+        """The view from outside, JPEG; None if it would be the same as last time and ``anew`` is false."""
         key = self.outside.key()
         if key == self._drawn and not anew:
             return None
@@ -91,7 +96,7 @@ class Engine:
         self._advanced = max(time, self._advanced)
         self.session.tick(time)
 
-    def _look_from_elsewhere(self, name: str, given: dict[str, Any]) -> None:
+    def _change_view(self, name: str, given: dict[str, Any]) -> None:
         wanted = VIEW_COMMANDS[name]
         if set(given) != set(wanted):
             raise InputError(f"{name} takes {', '.join(wanted)}")
@@ -100,7 +105,7 @@ class Engine:
         elif name == "zoom":
             self.outside.zoom(number(given["factor"], "factor"))
         elif name == "preset":
-            view = str(given["view"])[:LONGEST]
+            view = str(given["view"])[:MAX_WORD_LENGTH]
             if view not in PRESETS:
                 raise UnknownNameError("view", view, PRESETS)
             self.outside.preset(view)

@@ -1,29 +1,26 @@
-"""What the arm could do from where it is: lamps, what is wrong with a grasp, how far a joint can go.
-
-Each is worked out anew only when what it depends on has changed.
-"""
+"""Lamps, faults of a grasp, and ranges of joints, kept until what they depend on has changed."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Hashable
 
 import numpy as np
 
 from rrtik_ompl.arrays import Vector
-from rrtik_ompl.pilot.lamps import Lamp, fault_of, lamps
-from rrtik_ompl.pilot.routes.manoeuvre import Room, room_of
+from rrtik_ompl.pilot.lamps import Lamp, diagnose, lamps
+from rrtik_ompl.pilot.routes.manoeuvre import JointRange, joint_range
 from rrtik_ompl.pilot.surroundings import Surroundings
 
 
-class Outlook:
-    """Remembers its last answers."""
+class FeasibilityCache:
+    """What the arm can do from its configuration; the last results are kept."""
 
     def __init__(self, surroundings: Surroundings) -> None:
-        """Know nothing yet."""
+        """Begin empty."""
         self._surroundings = surroundings
-        self._lamps: tuple[tuple[Any, ...], tuple[Lamp, ...]] = ((), ())
-        self._fault: tuple[tuple[Any, ...], str] = ((), "")
-        self._room: tuple[tuple[Any, ...], Room | None] = ((), None)
+        self._lamps: tuple[Hashable, tuple[Lamp, ...]] = ((), ())
+        self._fault: tuple[Hashable, str] = ((), "")
+        self._range: tuple[Hashable, JointRange | None] = ((), None)
 
     def lamps(self, target: str | None, q: Vector) -> tuple[Lamp, ...]:
         """Lamps of an object where it is; none if it was never seen."""
@@ -41,19 +38,19 @@ class Outlook:
         """What is wrong with a grasp: how far out of reach it is, or what would touch; "" if it can be made."""
         around = self._surroundings
         seen = around.named(target)
-        if seen is None or not lamp.reason:
+        if seen is None or lamp.stage is None:
             return ""
         key = (target, around.version, lamp.type, lamp.level)
         if key != self._fault[0]:
             worlds = around.world, around.holding(target)
-            self._fault = (key, fault_of(lamp, seen.object, seen.T_base_object, q, *worlds))
+            self._fault = (key, diagnose(lamp, seen.object, seen.T_base_object, q, *worlds))
         return self._fault[1]
 
-    def room(self, q: Vector, joint: int) -> Room:
-        """How far a joint can be driven now; the same while it alone moves."""
+    def joint_range(self, q: Vector, joint: int) -> JointRange:
+        """The range of a joint now; it stays the same while that joint alone moves."""
         key = (joint, np.delete(q, joint).tobytes(), self._surroundings.version)
-        kept = self._room[1]
-        if kept is None or key != self._room[0] or not kept.low <= q[joint] <= kept.high:
-            kept = room_of(self._surroundings.world, q, joint)
-            self._room = (key, kept)
+        kept = self._range[1]
+        if kept is None or key != self._range[0] or not kept.low <= q[joint] <= kept.high:
+            kept = joint_range(self._surroundings.world, q, joint)
+            self._range = (key, kept)
         return kept

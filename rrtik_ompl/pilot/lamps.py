@@ -1,15 +1,16 @@
-"""A lamp for every grasp TYPE and LEVEL of an object: can the arm get there, hold it and lift it?
+"""A lamp for every grasp type and level of an object: can the arm get there, hold it and lift it?
 
 Green: approach, grasp and lift are in reach, inside the limits and free. Amber: in reach, but something is in the way.
-Red: out of reach. Source: shared-control tool, section 4; that the whole sequence counts is what users ask for.
+Red: out of reach. Source: [1, ch. 6]; here the whole sequence of approach, grasp and lift counts.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Final, Literal, TypeAlias
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
@@ -21,11 +22,16 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject
 from rrtik_ompl.world import World
 
-STAGES = ("approach", "grasp", "lift")
-GREEN, AMBER, RED = "green", "amber", "red"
+Stage: TypeAlias = Literal["approach", "grasp", "lift"]
+Color: TypeAlias = Literal["green", "amber", "red"]
+
+STAGES: tuple[Stage, Stage, Stage] = ("approach", "grasp", "lift")
+GREEN: Final = "green"
+AMBER: Final = "amber"
+RED: Final = "red"
 LIMITS, UNREACHABLE = "joint limits", "out of reach"
 NUMERIC_SECONDS = 0.01  # for a pose, where the arm has no closed form
-TELLING_SECONDS = 0.02  # for the reason why one grasp cannot be made
+DIAGNOSIS_SECONDS = 0.02  # for the reason why one grasp cannot be made
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,18 +42,20 @@ class Lamp:
         type: Name of the grasp type.
         level: Number of the level, from 0.
         color: "green", "amber" or "red".
+        stage: The stage that fails; None if green.
         reason: Which stage fails and why; "" if green.
         q: Configurations of approach, grasp and lift, NaN where there is none. Shape (3, dof).
     """
 
     type: str
     level: int
-    color: str
+    color: Color
+    stage: Stage | None
     reason: str
     q: Matrix
 
 
-def stage_poses(T_base_object: Any, grasp: GraspType, level: int) -> tuple[Any, Any, Any]:
+def stage_poses(T_base_object: pin.SE3, grasp: GraspType, level: int) -> tuple[pin.SE3, pin.SE3, pin.SE3]:
     """``T_base_tip`` of approach, grasp and lift."""
     at = T_base_object * grasp.levels[level]
     before, after = at.copy(), at.copy()
@@ -56,7 +64,9 @@ def stage_poses(T_base_object: Any, grasp: GraspType, level: int) -> tuple[Any, 
     return before, at, after
 
 
-def lamps(world: World, thing: MarkedObject, T_base_object: Any, near: Vector, *, holding: World) -> tuple[Lamp, ...]:
+def lamps(
+    world: World, thing: MarkedObject, T_base_object: pin.SE3, near: Vector, *, holding: World
+) -> tuple[Lamp, ...]:
     """The lamps of all types and levels of an object where it is now.
 
     Args:
@@ -77,27 +87,31 @@ def lamps(world: World, thing: MarkedObject, T_base_object: Any, near: Vector, *
     found = []
     for row, (grasp, level) in enumerate(names):
         reasons = why[row * len(STAGES) : (row + 1) * len(STAGES)]
-        color, reason = _color(reasons, free[row].any(axis=1))
-        found.append(Lamp(grasp.name, level, color, reason, nearest[row]))
+        color, stage, fault = _color(reasons, free[row].any(axis=1))
+        reason = "" if stage is None else f"{stage}: {fault}"
+        found.append(Lamp(grasp.name, level, color, stage, reason, nearest[row]))
     return tuple(found)
 
 
-def fault_of(lamp: Lamp, thing: MarkedObject, T_base_object: Any, near: Vector, world: World, holding: World) -> str:
-    """Which stage of a grasp fails, and by how much it is out of reach or what would touch.
+def diagnose(
+    lamp: Lamp, thing: MarkedObject, T_base_object: pin.SE3, near: Vector, world: World, holding: World
+) -> str:
+    """Which stage of a grasp fails, and by how much it is out of reach or what would touch; "" for a green lamp.
 
     Args:
-        lamp: Of the grasp; it has a reason.
+        lamp: Of the grasp.
         thing: What is to be grasped.
         T_base_object: Where it is.
         near: Posture near which the arm would be, shape (dof,).
         world: For the approach.
         holding: For grasp and lift.
     """
-    name = lamp.reason.partition(":")[0]
-    stage = STAGES.index(name)
+    if lamp.stage is None:
+        return ""
+    stage = STAGES.index(lamp.stage)
     goal = PoseGoal(stage_poses(T_base_object, thing.grasp(lamp.type), lamp.level)[stage])
-    asked = solve_ik(world.robot, goal, near=near, world=(world, holding, holding)[stage], seconds=TELLING_SECONDS)
-    return f"{name}: {asked.detail}" if asked.detail else lamp.reason
+    found = solve_ik(world.robot, goal, near=near, world=(world, holding, holding)[stage], seconds=DIAGNOSIS_SECONDS)
+    return f"{lamp.stage}: {found.detail}" if found.detail else lamp.reason
 
 
 def _postures(robot: Robot, poses: NDArray[np.float64], near: Vector) -> tuple[NDArray[np.float64], list[str]]:
@@ -112,13 +126,13 @@ def _postures(robot: Robot, poses: NDArray[np.float64], near: Vector) -> tuple[N
 
 
 def _free(postures: NDArray[np.float64], worlds: tuple[World, ...]) -> NDArray[np.bool_]:
-    """Which postures are there and touch nothing, stage by stage in its own world. Shape (m, stages, b)."""
+    """Which postures exist and touch nothing, each stage in its own world. Shape (m, stages, b)."""
     free = ~np.isnan(postures[..., 0])
     for world in dict.fromkeys(worlds):
         stages = [k for k, each in enumerate(worlds) if each is world]
-        asked = np.zeros_like(free)
-        asked[:, stages] = free[:, stages]
-        free[asked] = world.valid_batch(postures[asked])
+        pending = np.zeros_like(free)
+        pending[:, stages] = free[:, stages]
+        free[pending] = world.valid_batch(postures[pending])
     return free
 
 
@@ -131,10 +145,11 @@ def _nearest(robot: Robot, postures: NDArray[np.float64], free: NDArray[np.bool_
     return np.where(some[..., None], chosen, np.nan)
 
 
-def _color(reasons: list[str], clear: NDArray[np.bool_]) -> tuple[str, str]:
+def _color(reasons: list[str], clear: NDArray[np.bool_]) -> tuple[Color, Stage | None, str]:
+    """Color, the first stage that fails and why; reasons why stages are out of reach, and which stages are free."""
     failing = [k for k, reason in enumerate(reasons) if reason]
     if failing:
-        return RED, f"{STAGES[failing[0]]}: {reasons[failing[0]]}"
+        return RED, STAGES[failing[0]], reasons[failing[0]]
     if not clear.all():
-        return AMBER, f"{STAGES[int(np.argmin(clear))]}: something is in the way"
-    return GREEN, ""
+        return AMBER, STAGES[int(np.argmin(clear))], "something is in the way"
+    return GREEN, None, ""

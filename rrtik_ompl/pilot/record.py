@@ -1,4 +1,4 @@
-"""A session as lines of JSON: what the camera saw, what the pilot did, where the arm was. Written as it happens."""
+"""A session as lines of JSON: objects seen, commands, configurations of the arm; written as it happens."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Record:
             except OSError as error:
                 raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
 
-    def write(self, kind: str, time: float, **values: Any) -> None:
+    def write(self, kind: str, time: float, **values: object) -> None:
         """Add a line."""
         if self._file is not None:
             self._file.write(json.dumps({"time": round(time, 6), "kind": kind, **values}) + "\n")

@@ -1,4 +1,4 @@
-"""A record played again: the same session over again, seen with a simulated camera, for no pictures are recorded."""
+"""A recorded session played again, shown with a simulated camera, for no pictures are recorded."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ Entry = dict[str, Any]
 
 
 class RecordedArm:
-    """Stands where the record says; nothing moves it."""
+    """An arm that is where the record says; commands do not move it."""
 
     def __init__(self, robot: Robot, start: Vector) -> None:
-        """Stand at a configuration, shape (dof,)."""
+        """Begin at a configuration, shape (dof,)."""
         self.robot, self.lost = robot, ""
         self.q = robot.configuration(start, "start")
 
@@ -34,14 +34,14 @@ class RecordedArm:
         return self.q.copy()
 
     def move(self, joint: int, target: float) -> None:
-        """What became of it the record says."""
+        """Without effect: the record holds the result."""
 
     def stop(self) -> None:
-        """What became of it the record says."""
+        """Without effect: the record holds the result."""
 
 
-class RecordedEyes:
-    """Brings the entries of a record to a session when their time has come."""
+class RecordedPerception:
+    """Gives the entries of a record to a session when their time has come."""
 
     def __init__(self, entries: list[Entry], arm: RecordedArm, world: SimulatedCamera) -> None:
         """Begin at the beginning.
@@ -56,19 +56,19 @@ class RecordedEyes:
         self.picture: NDArray[np.uint8] = np.zeros((self.camera.height, self.camera.width, 3), dtype=np.uint8)
         self.lost = self.hint = ""
 
-    def look(self, session: Session, time: float) -> None:
-        """Let happen what has happened until a time of the record [s]."""
+    def update(self, session: Session, time: float) -> None:
+        """Apply the entries up to a time of the record [s]."""
         while self._next < len(self._entries) and self._entries[self._next]["time"] <= time:
-            self._happen(self._entries[self._next], session)
+            self._apply(self._entries[self._next], session)
             self._next += 1
         session.see((), time)
         self.picture = self._world.picture(self._arm.q, time).pixels
         self.lost = "the record ends here" if self._next == len(self._entries) else ""
 
     def close(self) -> None:
-        """Nothing to let go."""
+        """Nothing to release."""
 
-    def _happen(self, entry: Entry, session: Session) -> None:
+    def _apply(self, entry: Entry, session: Session) -> None:
         time = entry["time"]
         if entry["kind"] == "joints":
             self._arm.q = self._arm.robot.configuration(entry["q"], "q")
@@ -82,7 +82,7 @@ class RecordedEyes:
 
 
 def entries_for(path: str | os.PathLike[str], problem: str, robot: Robot, marker_map: MarkerMap) -> list[Entry]:
-    """The entries of a record, made sure to fit.
+    """The entries of a record, checked.
 
     Raises:
         InputError: If the file cannot be read, belongs to another problem, or an entry does not fit.

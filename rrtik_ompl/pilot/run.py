@@ -1,4 +1,4 @@
-"""A session at its server: pictures come, commands are obeyed between any two of them, and everything is shown."""
+"""The loop of a session at its server: commands are executed between any two pictures, and the result is shown."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import cv2
 from rrtik_ompl.pilot.engine import VIEW_COMMANDS, Engine
 from rrtik_ompl.pilot.web.server import PilotServer
 
-PERIOD = 1.0 / 32.0  # [s]; a little less than a camera's, so that none of its pictures is left out
+PERIOD_SECONDS = 1.0 / 32.0  # a little less than a camera's, so that none of its pictures is left out
 CAMERA, OUTSIDE = "C", "O"
 
 
@@ -23,9 +23,9 @@ class Loop:
         """Take both.
 
         Args:
-            engine: What is shown.
-            server: Where.
-            watch_only: Obey only commands that concern the view, and "pause": what is shown has happened already.
+            engine: Session and pictures.
+            server: Of the page.
+            watch_only: Execute only commands that concern the view, and "pause": for a record.
         """
         self._engine, self._server, self._watch_only = engine, server, watch_only
         self._answered: dict[int, int] = {}
@@ -39,27 +39,27 @@ class Loop:
         return clock.monotonic() - self._begin if self._paused_at is None else self._paused_at
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
-        """Go on until Ctrl-C, or until asked to end."""
+        """Go on until Ctrl-C, or until ``until`` is true."""
         cv2.setNumThreads(1)  # more of them only spin: no picture of this size is ready sooner
         while not until():
             begin = clock.monotonic()
             self._step()
-            while not until() and (left := begin + PERIOD - clock.monotonic()) > 0.0:
-                self._obey_one(left)
+            while not until() and (left := begin + PERIOD_SECONDS - clock.monotonic()) > 0.0:
+                self._execute_one(left)
 
     def _step(self) -> None:
         engine, server = self._engine, self._server
-        engine.look(self.time)
+        engine.update(self.time)
         self._show_state()
-        self._obey_all()
+        self._execute_all()
         audience, self._audience = self._audience, len(server.clients)
         if not self._audience:
             return
         server.show_frame(CAMERA, self.time, engine.camera_picture())
-        self._obey_all()
+        self._execute_all()
         self._outside_too = not self._outside_too
         if not self._outside_too and self._audience == audience:
-            return  # every second time is enough for what nobody steers by
+            return  # every second time is enough for the outside view
         outside = engine.outside_picture(anew=self._audience != audience)
         if outside is not None:
             server.show_frame(OUTSIDE, self.time, outside)
@@ -69,30 +69,30 @@ class Loop:
             state = self._engine.state() | {"paused": self._paused_at is not None, "replay": self._watch_only}
             self._server.show_state(state, self._answered)
 
-    def _obey_all(self) -> None:
+    def _execute_all(self) -> None:
         while not self._server.commands.empty():
-            self._obey_one(0.0)
+            self._execute_one(0.0)
 
-    def _obey_one(self, patience: float) -> None:
-        """Obey the next command and show at once what became of it, or wait for one so long [s]."""
+    def _execute_one(self, patience: float) -> None:
+        """Execute the next command and show its result at once; wait for one at most ``patience`` [s]."""
         try:
             client, command = self._server.commands.get(block=patience > 0.0, timeout=patience or None)
         except queue.Empty:
             return
         sequence = command.pop("seq", None)
-        self._obey(command)
+        self._execute(command)
         if isinstance(sequence, int) and not isinstance(sequence, bool):
             self._answered[client] = sequence
         self._show_state()
 
-    def _obey(self, command: dict[str, Any]) -> None:
+    def _execute(self, command: dict[str, Any]) -> None:
         name = command.get("name")
         if not self._watch_only or name in VIEW_COMMANDS:
-            self._engine.obey(command, self.time)
+            self._engine.execute(command, self.time)
         elif name == "pause":
             self._pause()
         elif name != "halt":
-            self._engine.session.message = "this is a record: it can be watched, paused and looked at from all sides"
+            self._engine.session.message = "this is a record: it can be watched, paused and viewed from all sides"
 
     def _pause(self) -> None:
         now = self.time

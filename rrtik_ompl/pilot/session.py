@@ -1,26 +1,27 @@
-"""The tool without its page: what the camera and the pilot say goes in, what is to be shown comes out.
+"""The pilot's session without its page: objects and commands go in, the state comes out.
 
-Source: shared-control tool, section 4 (flow chart). Two ways: assisted manoeuvre moves one joint at a time and refuses
-what must not be; assisted teleoperation chooses a grasp, plans a route, and leads through its moves.
+Source: [1, ch. 6] (flow chart). Two modes: assisted manoeuvre moves one joint at a time and refuses moves that are not
+free; assisted teleoperation chooses a grasp, plans a route, and guides the pilot through its moves.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Vector, frozen
 from rrtik_ompl.errors import InputError, RrtikError, UnknownNameError
 from rrtik_ompl.goal import JointGoal
-from rrtik_ompl.pilot.arguments import LONGEST, fitting
+from rrtik_ompl.pilot.arguments import MAX_WORD_LENGTH, fitting
 from rrtik_ompl.pilot.devices.arm import Arm, joint_rates
-from rrtik_ompl.pilot.feasibility import Outlook
+from rrtik_ompl.pilot.feasibility import FeasibilityCache
 from rrtik_ompl.pilot.lamps import Lamp, stage_poses
 from rrtik_ompl.pilot.record import Record
-from rrtik_ompl.pilot.routes.follower import Follower, Progress, still_free
-from rrtik_ompl.pilot.routes.manoeuvre import Room, Verdict, advice_to_get_free, free_until, judge_move
+from rrtik_ompl.pilot.routes.follower import Follower, Progress, path_fault
+from rrtik_ompl.pilot.routes.manoeuvre import JointRange, MoveCheck, check_move, escape_advice, free_until
+from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route import Route, route_to, route_to_grasp
 from rrtik_ompl.pilot.surroundings import Surroundings
 from rrtik_ompl.problem import Problem
@@ -28,22 +29,22 @@ from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.units import joint_unit, reading
 
 MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING = "manoeuvre", "choosing", "proposed", "following"
-STALE = 0.5  # [s]; a picture older than that is not what is there now
+STALE_SECONDS = 0.5  # a picture older than that does not show the present
 
 
 class Session:
     """One pilot, one arm, one scene."""
 
     def __init__(
-        self, problem: Problem, arm: Arm, *, rates: Any = None, record: Record | None = None, seed: int = 0
+        self, problem: Problem, arm: Arm, *, rates: ArrayLike | None = None, record: Record | None = None, seed: int = 0
     ) -> None:
         """Begin in manoeuvre.
 
         Args:
-            problem: Robot and what stands around it; its goal serves `plan` where no object was chosen.
-            arm: What is moved.
-            rates: Of the joints, shape (dof,) [rad/s or m/s]; usual ones if None.
-            record: Where everything is written down.
+            problem: Robot and surroundings; its goal serves `plan` where no object was chosen.
+            arm: The arm that is moved.
+            rates: Of the joints, shape (dof,) [rad/s or m/s]; default ones if None.
+            record: Where the session is recorded.
             seed: Of the random numbers: the same commands give the same routes.
         """
         self.problem, self.robot, self.arm, self.seed = problem, problem.robot, arm, seed
@@ -55,7 +56,7 @@ class Session:
         self.route: Route | None = None
         self.follower: Follower | None = None
         self.progress: Progress | None = None
-        self.verdict: Verdict | None = None
+        self.move_check: MoveCheck | None = None
         self.message = ""
         self.q: Vector = frozen(arm.read())
         self.desired: Vector = self.q
@@ -63,7 +64,7 @@ class Session:
         self.picture_time = -np.inf
         self._seen_at: dict[str, float] = {}
         self._record = record or Record(None)
-        self._outlook = Outlook(self.surroundings)
+        self._feasibility = FeasibilityCache(self.surroundings)
         self._commands: dict[str, Callable[..., str]] = {
             "select": self._select, "move": self._move, "nudge": self._nudge, "stop": self._stop,
             "object": self._object, "grasp": self._grasp, "plan": self._plan, "accept": self._accept,
@@ -71,10 +72,10 @@ class Session:
             "halt": self._halt,
         }  # fmt: skip
 
-    # --- what comes in -------------------------------------------------------------------------------------------
+    # --- input -------------------------------------------------------------------------------------------
 
     def see(self, objects: Sequence[SeenObject], time: float) -> None:
-        """Take in what a picture shows."""
+        """Update the surroundings by the objects of a picture."""
         self.time, self.picture_time = max(self.time, time), time
         self._seen_at |= {each.object.name: time for each in objects}
         if self.surroundings.see(objects):
@@ -85,7 +86,7 @@ class Session:
             self._check_route()
 
     def tick(self, time: float) -> None:
-        """Read the arm and see how far it is on its way."""
+        """Read the arm and update its progress along the route."""
         self.time = max(self.time, time)
         q = frozen(self.arm.read())
         if self.arm.lost and self.arm.lost != self.message:
@@ -105,15 +106,15 @@ class Session:
             self._show_due(self.follower)
             self.message = f"move {self.follower.current} of {len(self.follower.moves)} is done; 'next' makes the next"
 
-    def command(self, verb: str, time: float, /, **arguments: Any) -> str:
-        """Do what the pilot wants; the answer is a line for a person, and `message` from then on.
+    def command(self, verb: str, time: float, /, **arguments: object) -> str:
+        """Execute a command of the pilot; returns a line for a person, which is `message` from then on.
 
-        A command that makes no sense here says so and changes nothing.
+        A command that cannot be executed in this mode says so and changes nothing.
         """
         self.time = max(self.time, time)
         try:
             if verb not in self._commands:
-                raise UnknownNameError("command", verb[:LONGEST], self._commands)
+                raise UnknownNameError("command", verb[:MAX_WORD_LENGTH], self._commands)
             act = self._commands[verb]
             given = fitting(act, verb, arguments)
             self._record.write("command", time, name=verb, arguments=given)
@@ -123,11 +124,11 @@ class Session:
         self._record.write("answer", time, text=self.message, mode=self.mode)
         return self.message
 
-    # --- what goes out -------------------------------------------------------------------------------------------
+    # --- output -------------------------------------------------------------------------------------------
 
     def lamps(self) -> tuple[Lamp, ...]:
         """Lamps of the chosen object where it is and for where the arm is."""
-        return self._outlook.lamps(self.target, self.q)
+        return self._feasibility.lamps(self.target, self.q)
 
     def lamp(self) -> Lamp | None:
         """The lamp of the grasp that is chosen."""
@@ -136,11 +137,11 @@ class Session:
     def fault(self) -> str:
         """What is wrong with the grasp that is chosen: by how much it is out of reach, what touches; "" if nothing."""
         lamp = self.lamp()
-        return "" if lamp is None else self._outlook.fault(str(self.target), lamp, self.q)
+        return "" if lamp is None else self._feasibility.fault(str(self.target), lamp, self.q)
 
-    def room(self) -> Room:
-        """From where to where the selected joint can be driven now."""
-        return self._outlook.room(self.q, self.selected)
+    def joint_range(self) -> JointRange:
+        """The range in which the selected joint can be driven now."""
+        return self._feasibility.joint_range(self.q, self.selected)
 
     def unseen(self, name: str) -> float:
         """For how long an object has not been in view, by the pictures taken since [s]."""
@@ -163,18 +164,18 @@ class Session:
         return self._move(self.q[self.selected] + float(change))
 
     def _send(self, joint: int, target: float) -> str:
-        self.verdict = judge_move(self.surroundings.world, self.q, joint, target)
-        if not self.verdict.allowed:
+        self.move_check = check_move(self.surroundings.world, self.q, joint, target)
+        if not self.move_check.allowed:
             if not self.surroundings.world.valid(self.q):
-                return f"refused: {self.verdict.reason}"
-            room = free_until(self.surroundings.world, self.q, joint, target)
-            value, unit = reading(room, joint_unit(self.robot.prismatic[joint]))
-            return f"refused: {self.verdict.reason}; free until {value:.4g} {unit}"
+                return f"refused: {self.move_check.reason}"
+            reached = free_until(self.surroundings.world, self.q, joint, target)
+            value, unit = reading(reached, joint_unit(self.robot.prismatic[joint]))
+            return f"refused: {self.move_check.reason}; free until {value:.4g} {unit}"
         desired = self.q.copy()
         desired[joint] = target
         self.desired = frozen(desired)
         self.arm.move(joint, target)
-        return "; ".join(("moving " + self.robot.joint_names[joint], *self.verdict.warnings))
+        return "; ".join(("moving " + self.robot.joint_names[joint], *self.move_check.warnings))
 
     def _stop(self) -> str:
         self.arm.stop()
@@ -185,7 +186,7 @@ class Session:
         return "stopped"
 
     def _halt(self) -> str:
-        """Nobody is at the keys any more."""
+        """Stop the arm, for no page has the pilot any more."""
         self.arm.stop()
         return "the pilot has left; the arm stands still"
 
@@ -212,22 +213,22 @@ class Session:
         self.arm.stop()
         self.q = frozen(self.arm.read())
         found = self._route()
-        if isinstance(found, str):
+        if isinstance(found, NoRoute):
             self.route = self.follower = self.progress = None
             self.mode = CHOOSING if self.choice else MANOEUVRE
             otherwise = "choose another grasp" if self.choice else "drive the arm elsewhere, or choose an object"
-            return f"no route: {found}; {advice_to_get_free(self.surroundings.world, self.q) or otherwise}"
+            return f"no route: {found}; {escape_advice(self.surroundings.world, self.q) or otherwise}"
         self.route, self.mode = found, PROPOSED
         self.follower, self.progress = Follower(found.path, self.rates), None
         self.desired = frozen(found.path.end)
         return found.summary() + "; 'accept' or 'reject'"
 
-    def _route(self) -> Route | str:
+    def _route(self) -> Route | NoRoute:
         seen = None if self.target is None or self.choice is None else self.surroundings.named(self.target)
         if seen is None or self.choice is None:
             goal = self.problem.goal
             if not isinstance(goal, JointGoal):
-                return "choose an object and a grasp first"
+                return NoRoute("choose an object and a grasp first")
             return route_to(self.surroundings.world, self.q, np.array(goal.q), self.rates, self.seed)
         stages = stage_poses(seen.T_base_object, seen.object.grasp(self.choice[0]), self.choice[1])
         lamp = self.lamp()
@@ -246,7 +247,7 @@ class Session:
         return "accepted; 'next' makes the next move"
 
     def _show_due(self, follower: Follower) -> None:
-        """The joint of the current move is the one selected, and where it is to go is what is desired."""
+        """Select the joint of the current move; its end is the desired value."""
         joint = follower.joint()
         if joint is not None:
             self.desired, self.selected = frozen(follower.target), joint
@@ -265,7 +266,7 @@ class Session:
             raise InputError(self.progress.fault or "all moves are done")
         fault = self._fault_of_rest()
         if fault:
-            raise InputError(f"the route is blocked now: {fault}; 'replan' looks for another")
+            raise InputError(f"the route is blocked now: {fault}; 'replan' finds another")
         self._show_due(self.follower)
         self.arm.move(joint, float(self.desired[joint]))
         move = self.follower.moves[self.follower.current]
@@ -275,23 +276,23 @@ class Session:
         if self.follower is None:
             raise InputError("there is no route to go back on")
         self.arm.stop()
-        way = self.follower.back(self.q)
-        self.follower, self.mode = Follower(way, self.rates), PROPOSED
+        back = self.follower.back(self.q)
+        self.follower, self.mode = Follower(back, self.rates), PROPOSED
         self.progress = None
-        return f"the way back: {len(way.moves())} moves; 'accept' or 'reject'"
+        return f"the way back: {len(back.moves())} moves; 'accept' or 'reject'"
 
     def _check_route(self) -> None:
-        """The scene is another one: is the route that is followed, or proposed, still free?"""
+        """After a change of the scene: stop if the route that is followed or proposed is not free any more."""
         if self.follower is None or self.mode not in (FOLLOWING, PROPOSED):
             return
         fault = self._fault_of_rest()
         if fault:
             self.arm.stop()
-            self.message = f"the route is blocked now: {fault}; 'replan' looks for another"
+            self.message = f"the route is blocked now: {fault}; 'replan' finds another"
 
     def _fault_of_rest(self) -> str:
         if self.follower is None:
             return ""
         grasped = self.target is not None and self.choice is not None
         world = self.surroundings.holding(str(self.target)) if grasped else self.surroundings.world
-        return still_free(world, self.follower.rest(self.q))
+        return path_fault(world, self.follower.rest(self.q))

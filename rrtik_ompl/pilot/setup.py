@@ -1,4 +1,4 @@
-"""From what was asked for to an engine: problem, camera, marker map, arm, record."""
+"""From the options of a session to an engine: problem, camera, marker map, arm, record."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.overlay.virtual_camera import eye_at
+from rrtik_ompl.overlay.virtual_camera import orbit_pose
 from rrtik_ompl.pilot.devices.arm import Arm, SimulatedArm
 from rrtik_ompl.pilot.devices.camera_feed import Feed
 from rrtik_ompl.pilot.devices.line_arm import LineArm
-from rrtik_ompl.pilot.devices.perception import LiveEyes, SimulatedSource
-from rrtik_ompl.pilot.devices.simulated_vehicle import Scenario, find_scenario, load_scenario
+from rrtik_ompl.pilot.devices.perception import LivePerception, SimulatedSource
+from rrtik_ompl.pilot.devices.simulated_vehicle import SimulatedVehicle, find_vehicle, load_vehicle
 from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
 from rrtik_ompl.pilot.engine import Engine
 from rrtik_ompl.pilot.record import Record
-from rrtik_ompl.pilot.replay import RecordedArm, RecordedEyes, entries_for, start_of
+from rrtik_ompl.pilot.replay import RecordedArm, RecordedPerception, entries_for, start_of
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_files.problem import load_problem
@@ -31,16 +31,16 @@ from rrtik_ompl.sensing.sensor import Sensor
 from rrtik_ompl.sensing.sight import check_size
 
 LAST_PORT = 65535
-FROM_ASIDE = 2.5, np.radians(125.0), np.radians(30.0)  # [m], [rad]: where a camera is imagined that moved with its base
+DEFAULT_CAMERA_POSE = 2.5, np.radians(125.0), np.radians(30.0)  # [m], [rad]: of a camera whose pose is not known
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
-    """What a person asked for; see `rrtik pilot --help`. Without a source the camera is simulated."""
+class SessionOptions:
+    """Options of a session; see `rrtik pilot --help`. Without a source the camera is simulated."""
 
     problem: str
     source: int | Path | None = None
-    scenario: Path | None = None
+    vehicle: Path | None = None
     camera_file: Path | None = None
     map_file: Path | None = None
     record: Path | None = None
@@ -51,52 +51,54 @@ class Wanted:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Opened:
+class OpenSession:
     """A session with everything that it holds open."""
 
     engine: Engine
     closing: tuple[Callable[[], None], ...]
 
     def close(self) -> None:
-        """Let the arm stand still, and let go of arm, camera and record."""
+        """Stop the arm, and release arm, camera and record."""
         self.engine.session.arm.stop()
         for close in self.closing:
             close()
 
 
-def open_session(wanted: Wanted) -> Opened:
-    """Make what was asked for.
+def open_session(options: SessionOptions) -> OpenSession:
+    """Open the session of some options.
 
     Raises:
         InputError: If a file, the camera or the arm cannot be used.
     """
-    problem = load_problem(wanted.problem)
-    if wanted.replay is not None:
-        return _replay(wanted, problem, wanted.replay)
-    arm: Arm = SimulatedArm(problem.robot, problem.start) if wanted.arm is None else _line_arm(problem, wanted.arm)
-    eyes = _eyes(wanted, problem, arm)
-    record = Record(wanted.record)
-    record.write("begin", 0.0, problem=problem.name, seed=wanted.seed, q=arm.read().tolist())
-    session = Session(problem, arm, record=record, seed=wanted.seed)
+    problem = load_problem(options.problem)
+    if options.replay is not None:
+        return _replay(options, problem, options.replay)
+    arm: Arm = SimulatedArm(problem.robot, problem.start) if options.arm is None else _line_arm(problem, options.arm)
+    perception = _perception(options, problem, arm)
+    record = Record(options.record)
+    record.write("begin", 0.0, problem=problem.name, seed=options.seed, q=arm.read().tolist())
+    session = Session(problem, arm, record=record, seed=options.seed)
     simulated = arm if isinstance(arm, SimulatedArm) else None
-    closing = [eyes.close, record.close]
+    closing = [perception.close, record.close]
     if isinstance(arm, LineArm):
         closing.insert(0, arm.close)
-    return Opened(Engine(session, eyes, simulated=simulated), tuple(closing))
+    return OpenSession(Engine(session, perception, simulated=simulated), tuple(closing))
 
 
-def _eyes(wanted: Wanted, problem: Problem, arm: Arm) -> LiveEyes:
-    if wanted.source is None:
-        scenario = _scenario(wanted, problem)
-        sensor = Sensor(scenario.camera, scenario.marker_map, sigmas=wanted.sigmas)
-        return LiveEyes(sensor, SimulatedSource(_simulated(scenario, problem), arm), arm_in_picture=True)
-    for name, file in (("--camera-file", wanted.camera_file), ("--map", wanted.map_file)):
+def _perception(options: SessionOptions, problem: Problem, arm: Arm) -> LivePerception:
+    if options.source is None:
+        vehicle = _vehicle(options, problem)
+        sensor = Sensor(vehicle.camera, vehicle.marker_map, sigmas=options.sigmas)
+        return LivePerception(sensor, SimulatedSource(_simulated(vehicle, problem), arm), arm_in_picture=True)
+    for name, file in (("--camera-file", options.camera_file), ("--map", options.map_file)):
         if file is None:
             raise InputError(f"pictures need {name} FILE (see: rrtik markers --help)")
-    camera, marker_map = load_camera(str(wanted.camera_file)), load_marker_map(str(wanted.map_file))
-    sensor = Sensor(camera, marker_map, sigmas=wanted.sigmas)
-    source = wanted.source
-    return LiveEyes(sensor, Feed(lambda: _fitting(pictures_from(source), camera), paced=not isinstance(source, int)))
+    camera, marker_map = load_camera(str(options.camera_file)), load_marker_map(str(options.map_file))
+    sensor = Sensor(camera, marker_map, sigmas=options.sigmas)
+    source = options.source
+    return LivePerception(
+        sensor, Feed(lambda: _fitting(pictures_from(source), camera), paced=not isinstance(source, int))
+    )
 
 
 def _fitting(pictures: Iterator[Picture], camera: Camera) -> Iterator[Picture]:
@@ -106,25 +108,29 @@ def _fitting(pictures: Iterator[Picture], camera: Camera) -> Iterator[Picture]:
         yield picture
 
 
-def _scenario(wanted: Wanted, problem: Problem) -> Scenario:
-    scenario = load_scenario(wanted.scenario or find_scenario(problem.name))
-    if wanted.camera_file is None and wanted.map_file is None:
-        return scenario
-    raise InputError("--simulated takes camera and map from its scenario: leave out --camera-file and --map")
+def _vehicle(options: SessionOptions, problem: Problem) -> SimulatedVehicle:
+    vehicle = load_vehicle(options.vehicle or find_vehicle(problem.name))
+    if options.camera_file is None and options.map_file is None:
+        return vehicle
+    raise InputError(
+        "--simulated takes camera and map from its file (see --scenario): leave out --camera-file and --map"
+    )
 
 
-def _recorded(wanted: Wanted, problem: Problem) -> Scenario:
-    """What a record is shown with: a scenario, or the camera and map that it was made with."""
-    if wanted.camera_file is None or wanted.map_file is None:
-        return _scenario(wanted, problem)
-    camera, marker_map = load_camera(wanted.camera_file), load_marker_map(wanted.map_file)
-    return Scenario(camera, marker_map, {}, marker_map.T_base_camera or eye_at(np.zeros(3), *FROM_ASIDE))
+def _recorded(options: SessionOptions, problem: Problem) -> SimulatedVehicle:
+    """What a record is shown with: a simulated vehicle, or the camera and map that it was made with."""
+    if options.camera_file is None or options.map_file is None:
+        return _vehicle(options, problem)
+    camera, marker_map = load_camera(options.camera_file), load_marker_map(options.map_file)
+    return SimulatedVehicle(
+        camera, marker_map, {}, marker_map.T_base_camera or orbit_pose(np.zeros(3), *DEFAULT_CAMERA_POSE)
+    )
 
 
-def _simulated(scenario: Scenario, problem: Problem) -> SimulatedCamera:
+def _simulated(vehicle: SimulatedVehicle, problem: Problem) -> SimulatedCamera:
     return SimulatedCamera(
-        scenario.camera, scenario.marker_map, problem.robot, problem.world.scene, scenario.places,
-        scenario.T_base_camera,
+        vehicle.camera, vehicle.marker_map, problem.robot, problem.world.scene, vehicle.places,
+        vehicle.T_base_camera,
     )  # fmt: skip
 
 
@@ -135,10 +141,10 @@ def _line_arm(problem: Problem, address: str) -> LineArm:
     return LineArm(problem.robot, host.strip("[]"), int(port))
 
 
-def _replay(wanted: Wanted, problem: Problem, file: Path) -> Opened:
-    scenario = _recorded(wanted, problem)
-    entries = entries_for(file, problem.name, problem.robot, scenario.marker_map)
+def _replay(options: SessionOptions, problem: Problem, file: Path) -> OpenSession:
+    vehicle = _recorded(options, problem)
+    entries = entries_for(file, problem.name, problem.robot, vehicle.marker_map)
     start, seed = start_of(entries, problem.start)
     arm = RecordedArm(problem.robot, start)
-    eyes = RecordedEyes(entries, arm, _simulated(scenario, problem))
-    return Opened(Engine(Session(problem, arm, seed=seed), eyes), (eyes.close,))
+    perception = RecordedPerception(entries, arm, _simulated(vehicle, problem))
+    return OpenSession(Engine(Session(problem, arm, seed=seed), perception), (perception.close,))

@@ -1,4 +1,4 @@
-"""Everything that the page shows beside its pictures, as plain values; angles in degrees, for a person reads them."""
+"""The state that the page shows beside its pictures, as plain values; angles in degrees."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.moves.text import spoken_moves
-from rrtik_ompl.pilot.session import STALE, Session
+from rrtik_ompl.pilot.session import STALE_SECONDS, Session
+from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.units import joint_unit, reading
 
 
 def state_document(session: Session) -> dict[str, Any]:
-    """What there is to be shown; see `pilot/page` for who shows it."""
+    """The state of a session; the page in `pilot/web/page` shows it."""
     age = session.time - session.picture_time
     return {
         "mode": session.mode,
         "message": session.message,
         "picture_age": None if not np.isfinite(age) else round(age, 3),
-        "stale": bool(age > STALE),
+        "stale": bool(age > STALE_SECONDS),
         "selected": session.selected,
         "joints": _joints(session),
         "objects": [_object(seen, session.unseen(seen.object.name)) for seen in session.surroundings.seen],
@@ -30,7 +31,7 @@ def state_document(session: Session) -> dict[str, Any]:
         ],
         "fault": session.fault(),
         "route": _route(session),
-        "room": _room(session),
+        "range": _joint_range(session),
         "aim": _aim(session),
         "arm_lost": session.arm.lost,
     }
@@ -50,7 +51,7 @@ def _joints(session: Session) -> list[dict[str, Any]]:
     return found
 
 
-def _object(seen: Any, unseen: float) -> dict[str, Any]:
+def _object(seen: SeenObject, unseen: float) -> dict[str, Any]:
     return {
         "name": seen.object.name,
         "graspable": bool(seen.object.grasps),
@@ -59,12 +60,12 @@ def _object(seen: Any, unseen: float) -> dict[str, Any]:
     }
 
 
-def _room(session: Session) -> dict[str, Any]:
-    """From where to where the selected joint can be driven, what ends it there, and where the arm is near singular."""
-    unit, room = joint_unit(session.robot.prismatic[session.selected]), session.room()
-    low, high = (reading(end, unit)[0] for end in (room.low, room.high))
-    singular = [[reading(a, unit)[0], reading(b, unit)[0], case] for a, b, case in room.singular]
-    return {"low": low, "high": high, "below": room.below, "above": room.above, "singular": singular}
+def _joint_range(session: Session) -> dict[str, Any]:
+    """The range of the selected joint, what ends it, and where in it the arm is near a singular posture."""
+    unit, free = joint_unit(session.robot.prismatic[session.selected]), session.joint_range()
+    low, high = (reading(end, unit)[0] for end in (free.low, free.high))
+    singular = [[reading(a, unit)[0], reading(b, unit)[0], case] for a, b, case in free.singular]
+    return {"low": low, "high": high, "below": free.below, "above": free.above, "singular": singular}
 
 
 def _aim(session: Session) -> dict[str, Any]:
@@ -75,13 +76,13 @@ def _aim(session: Session) -> dict[str, Any]:
     if seen is None:
         return found
     goal = seen.T_base_object if session.choice is None else seen.grasp_pose(*session.choice)
-    way = goal.translation - tip.translation
-    ahead = float(way @ tip.rotation[:, 2])
-    aside = float(np.linalg.norm(way - ahead * tip.rotation[:, 2]))
+    offset = goal.translation - tip.translation
+    ahead = float(offset @ tip.rotation[:, 2])
+    aside = float(np.linalg.norm(offset - ahead * tip.rotation[:, 2]))
     return found | {
         "to": seen.object.name if session.choice is None else f"{session.choice[0]} {session.choice[1] + 1}",
-        "distance": round(float(np.linalg.norm(way)), 4),
-        "xyz": np.round(way, 4).tolist(),
+        "distance": round(float(np.linalg.norm(offset)), 4),
+        "xyz": np.round(offset, 4).tolist(),
         "ahead": round(ahead, 4),
         "aside": round(aside, 4),
         "turn_deg": round(float(np.rad2deg(np.linalg.norm(pin.log3(tip.rotation.T @ goal.rotation)))), 1),
@@ -108,7 +109,7 @@ def _route(session: Session) -> dict[str, Any] | None:
         "travel": round(reading(route.travel, "rad")[0], 1),
         "clearance_mm": None if not np.isfinite(route.clearance) else round(1e3 * route.clearance, 1),
         "joints": list(route.joints),
-        "steady": round(route.steady, 2),
+        "robustness": round(route.robustness, 2),
         "share": 0.0 if progress is None else progress.share,
         "advice": "" if progress is None else progress.advice,
     }

@@ -1,4 +1,4 @@
-"""The world of a session: what the problem says stands there, and what the camera sees; rebuilt only when it moved."""
+"""The world of a session: the problem's scene with the objects that the camera sees; rebuilt only when they move."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from rrtik_ompl.sensing.problem_from_view import scene_with
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world import World
 
-SAME_PLACE, SAME_TURN = 1e-3, np.deg2rad(0.2)  # [m], [rad]; less is trembling, and no reason to think anew
+MIN_SHIFT, MIN_ROTATION = 1e-3, np.deg2rad(0.2)  # [m], [rad]; smaller changes are noise
 
 
 class Surroundings:
-    """Worlds with what was seen last in them.
+    """Worlds with the objects as they were seen last.
 
     Attributes:
-        world: Nothing may be touched.
+        world: The world in which nothing may be touched.
         version: Counts how often the world became another one.
     """
 
     def __init__(self, world: World) -> None:
-        """Begin with what a world has."""
+        """Begin with a world without objects."""
         self._given = world
         self.world = world
         self.version = 0
@@ -35,22 +35,22 @@ class Surroundings:
 
     @property
     def seen(self) -> tuple[SeenObject, ...]:
-        """What is known to be there, seen now or earlier."""
+        """The objects seen now or earlier."""
         return tuple(self._seen.values())
 
     def named(self, name: str) -> SeenObject | None:
-        """What is known of an object, None if it was never seen."""
+        """An object as it was seen last, None if it was never seen."""
         return self._seen.get(name)
 
     def places(self) -> list[dict[str, Any]]:
-        """What is known to be there as plain values, for a record.
+        """The objects seen now or earlier as plain values, for a record.
 
         Matrices and not quaternions: a replay has to find the same routes, to the last bit.
         """
         return [_plain(each) for each in self.seen]
 
     def see(self, objects: Sequence[SeenObject]) -> bool:
-        """Take in what the camera sees; True if something moved or is new, so that the world is another one."""
+        """Update by the objects that the camera sees; True if one moved or is new, so that the world changed."""
         news = [each for each in objects if self._moved(each)]
         if not news:
             return False
@@ -76,7 +76,7 @@ class Surroundings:
         turned = float(np.linalg.norm(pin.log3(change.rotation)))
         shifted = float(np.linalg.norm(change.translation))
         wider = max(_margins(new), default=0.0) - max(_margins(old), default=0.0)
-        return shifted > SAME_PLACE or turned > SAME_TURN or abs(wider) > SAME_PLACE
+        return shifted > MIN_SHIFT or turned > MIN_ROTATION or abs(wider) > MIN_SHIFT
 
     def _with(self, allowed: Sequence[tuple[str, str]]) -> World:
         given = self._given.scene

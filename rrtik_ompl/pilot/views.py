@@ -1,12 +1,11 @@
-"""The two pictures of the page: what the camera sees, with the arm and what is chosen in it, and the view from outside.
+"""The two pictures of the page: the camera's, with the arm and the chosen grasp drawn in, and the view from outside.
 
-Source: shared-control tool, section 3.
+Source: [1, ch. 6].
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Hashable, Sequence
 
 import cv2
 import numpy as np
@@ -15,14 +14,14 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.overlay.augment import Augmenter, Ghost
-from rrtik_ompl.overlay.virtual_camera import eye_at, imagined_camera, sky
+from rrtik_ompl.overlay.virtual_camera import background, orbit_pose, pinhole_camera
 from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED
 from rrtik_ompl.pilot.session import FOLLOWING, PROPOSED, Session
 from rrtik_ompl.sensing.cameras.camera import Camera
 
 LAMP_COLORS = {GREEN: "#1b9e3a", AMBER: "#e6a100", RED: "#c62828"}
 NEXT_MOVE = "#56b4e9"
-LOOKS = 60  # points of a trail
+TRAIL_POINTS = 60  # points of a trail
 OUTSIDE_TRIANGLES = 8_000
 PRESETS = {"side": (90.0, 10.0), "top": (-90.0, 89.0), "behind": (180.0, 25.0), "corner": (125.0, 30.0)}  # degrees
 
@@ -35,14 +34,16 @@ class CameraView:
         self._session, self._arm = session, Augmenter(session.robot, camera)
         self._camera = camera
 
-    def draw(self, picture: NDArray[np.uint8], T_base_camera: Any, arm_in_picture: bool = False) -> NDArray[np.uint8]:
+    def draw(
+        self, picture: NDArray[np.uint8], T_base_camera: pin.SE3, arm_in_picture: bool = False
+    ) -> NDArray[np.uint8]:
         """The augmented picture.
 
         Args:
             picture: From the camera.
-            T_base_camera: Where the camera is.
+            T_base_camera: Pose of the camera.
             arm_in_picture: The real arm is in the picture (or simulated there): the virtual one is then not drawn
-                over it, only what it will do.
+                over it, only its planned motion.
         """
         session = self._session
         real = [solid for seen in session.surroundings.seen for solid in seen.solids()]
@@ -54,7 +55,7 @@ class CameraView:
         self._depth_aids(drawn, T_base_camera)
         return drawn
 
-    def _depth_aids(self, drawn: NDArray[np.uint8], T_base_camera: Any) -> None:
+    def _depth_aids(self, drawn: NDArray[np.uint8], T_base_camera: pin.SE3) -> None:
         """A line from the tool to the chosen grasp or object with its length, and one straight down from the tool."""
         session = self._session
         tip = session.robot.fk(session.q).translation
@@ -74,33 +75,33 @@ class CameraView:
 
 
 class OutsideView:
-    """The arm and its surroundings from where the pilot likes."""
+    """The arm and its surroundings from a viewpoint that the pilot chooses."""
 
     def __init__(self, session: Session, width: int = 640, height: int = 480) -> None:
-        """Look at the arm's base from a corner."""
-        self._session, self._camera = session, imagined_camera(width, height)
+        """Begin with the view from a corner."""
+        self._session, self._camera = session, pinhole_camera(width, height)
         self._arm = Augmenter(session.robot, self._camera, OUTSIDE_TRIANGLES)
-        self._sky = sky(self._camera)
+        self._sky = background(self._camera)
         reach = float(np.linalg.norm(session.robot.fk(session.q).translation))
         self.centre: Vector = np.array([0.6 * reach, 0.0, 0.0])
         self.distance, self.azimuth, self.elevation = 1.9 * max(reach, 0.3), *np.radians(PRESETS["corner"])
         self.share: float | None = None  # of the route that is played, None to show the arm as it is
 
     def turn(self, right: float, up: float) -> None:
-        """Go round by angles [rad]."""
+        """Turn the view by angles [rad]."""
         self.azimuth -= right
         self.elevation = float(np.clip(self.elevation + up, -1.5, 1.5533))
 
     def zoom(self, factor: float) -> None:
-        """Go nearer (below 1) or farther."""
+        """Change the distance by a factor, below 1 to come nearer."""
         self.distance = float(np.clip(self.distance * factor, 0.2, 50.0))
 
     def preset(self, name: str) -> None:
-        """Look from the side, from above, from behind or from a corner; other names are left alone."""
+        """View from the side, from above, from behind or from a corner; other names have no effect."""
         if name in PRESETS:
             self.azimuth, self.elevation = np.radians(PRESETS[name])
 
-    def key(self) -> tuple[Any, ...]:
+    def key(self) -> tuple[Hashable, ...]:
         """Equal if the picture would be."""
         session = self._session
         shown = session.q.tobytes() if self.share is None else along(session, self.share).tobytes()
@@ -111,7 +112,7 @@ class OutsideView:
     def draw(self) -> NDArray[np.uint8]:
         """The picture. Shape (height, width, 3), blue, green, red."""
         session = self._session
-        eye = eye_at(self.centre, self.distance, self.azimuth, self.elevation)
+        eye = orbit_pose(self.centre, self.distance, self.azimuth, self.elevation)
         shown = session.q if self.share is None else along(session, self.share)
         return self._arm.draw(
             self._sky, eye, shown, ghosts=ghosts(session), obstacles=session.surroundings.world.scene.obstacles,
@@ -120,23 +121,23 @@ class OutsideView:
 
 
 def ghosts(session: Session) -> list[Ghost]:
-    """What will be: the chosen grasp in the colour of its lamp, or the next move of a route."""
+    """The chosen grasp in the colour of its lamp, or the next move of a route."""
     if session.follower is not None and session.mode in (PROPOSED, FOLLOWING):
         return [Ghost(session.follower.target, NEXT_MOVE, 0.4)]
     lamp = session.lamp()
     if lamp is None:
         return []
-    if np.isnan(lamp.q[1]).any():  # no configuration holds the object: the gripper alone, where it would have to be
+    if np.isnan(lamp.q[1]).any():  # no configuration holds the object: the gripper alone at the grasp
         return [Ghost(None, LAMP_COLORS[lamp.color], 0.55, at) for at in _chosen(session)]
     return [Ghost(lamp.q[1], LAMP_COLORS[lamp.color], 0.45)]
 
 
 def trail(session: Session) -> Matrix | None:
-    """The way of the tip along the route, shape (k, 3), None without one."""
+    """Positions of the tip along the route, shape (k, 3), None without one."""
     if session.follower is None:
         return None
     path = session.follower.path
-    rows = path.resample(max(path.length / LOOKS, 1e-3)).waypoints
+    rows = path.resample(max(path.length / TRAIL_POINTS, 1e-3)).waypoints
     return np.asarray(session.robot.fk_batch(rows)[:, :3, 3])
 
 
@@ -151,20 +152,20 @@ def along(session: Session, share: float) -> Vector:
 
 
 def _write(drawn: NDArray[np.uint8], text: str, left_foot: tuple[int, int]) -> None:
-    """Light words on a dark plate: legible on any ground."""
+    """Light text on a dark plate: legible on any background."""
     font, (x, y) = (cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1), left_foot
     (width, height), below = cv2.getTextSize(text, *font)
     cv2.rectangle(drawn, (x - 4, y - height - 4), (x + width + 4, y + below), (28, 21, 15), cv2.FILLED)
     cv2.putText(drawn, text, left_foot, font[0], font[1], (255, 255, 255), font[2], cv2.LINE_AA)
 
 
-def _chosen(session: Session) -> list[Any]:
-    """``T_base_tip`` of the grasp that is chosen: where the tip would have to be, in reach or not."""
+def _chosen(session: Session) -> list[pin.SE3]:
+    """``T_base_tip`` of the grasp that is chosen, in reach or not."""
     seen = None if session.target is None else session.surroundings.named(session.target)
     if seen is None or session.choice is None:
         return []
     return [seen.grasp_pose(*session.choice)]
 
 
-def _objects(session: Session) -> Sequence[Any]:
+def _objects(session: Session) -> Sequence[pin.SE3]:
     return [pin.SE3(seen.T_base_object) for seen in session.surroundings.seen]

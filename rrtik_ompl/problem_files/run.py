@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -12,6 +12,8 @@ from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.sections import NotNegative, Numbers, Positive, Section
 from rrtik_ompl.robot import Robot
+
+RENAMED = {"eps": "max_edge", "slot": "repair_budget", "predict": "lookahead_ticks"}  # old names of settings
 
 
 class GoalWaypoint(Section):
@@ -50,19 +52,25 @@ class RunSection(Section):
     rate: Positive = Field(description="ticks a second [Hz]")
     margin: NotNegative = Field(0.0, description="distance to obstacles that is always kept [m]")
     speed_bound: Positive | None = Field(None, description="no point of an obstacle is faster [m/s]")
-    eps: Positive | None = Field(None, description="longest motion of the trees [rad or m]")
-    predict: Annotated[int, Field(strict=True, ge=0)] = Field(0, description="ticks ahead that motions are heeded")
+    max_edge: Positive | None = Field(None, description="longest edge of the trees [rad or m]")
+    lookahead_ticks: Annotated[int, Field(strict=True, ge=0)] = Field(
+        0, description="predict obstacle motion this many ticks ahead"
+    )
     seconds: Positive = Field(60.0, description="simulated time at most [s]")
     velocity: Numbers | None = Field(None, description="joint speeds, one or one a joint [rad/s or m/s]")
     goal: Annotated[list[GoalWaypoint], Field(min_length=1)] | None = Field(None, description="a goal that moves")
 
-    def options(self) -> dict[str, Any]:
-        """The keyword arguments of :func:`rrtik_ompl.replanning.replan` that are numbers."""
-        names = ("step", "rate", "margin", "speed_bound", "eps", "predict", "seconds")
-        return {name: getattr(self, name) for name in names}
+    @model_validator(mode="before")
+    @classmethod
+    def _no_renamed_key(cls, data: object) -> object:
+        for key in data if isinstance(data, dict) else ():
+            if key in RENAMED:
+                message = "'{key}' is now called '{name}'; rename the key"
+                raise PydanticCustomError("renamed_key", message, {"key": key, "name": RENAMED[key]})
+        return data
 
     def goal_motion(self, robot: Robot) -> GoalMotion | None:
-        """The goal's way, or None if it stands still.
+        """The motion of the goal, or None if it does not move.
 
         Raises:
             InputError: If times go backwards, or a row has the wrong number of joints or is outside the limits.

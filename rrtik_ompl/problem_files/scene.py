@@ -27,7 +27,7 @@ from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml, writ
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.poses import pose, pose_from_rpy, quaternion_xyzw
 from rrtik_ompl.problem_files.shapes import ONE_SHAPE, ShapeEntry, shape_data
-from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, Waypoints
+from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, TimedPoses
 
 
 class PoseEntry(Section):
@@ -73,7 +73,7 @@ class MotionEntry(Section):
         if self.velocity is not None:
             return ConstantVelocity(self.velocity)
         stations = self.waypoints or []
-        return Waypoints([w.time for w in stations], [w.pose.build() for w in stations])
+        return TimedPoses([w.time for w in stations], [w.pose.build() for w in stations])
 
 
 class SolidEntry(ShapeEntry):

@@ -1,99 +1,109 @@
-"""Replanning: a robot on its way to a goal while obstacles move, by DRRT-Con or, to compare with, by two others."""
+"""Replanning: a robot moves to a goal while obstacles move, by DRRT-Con or, to compare with, by two other planners."""
 
 from __future__ import annotations
 
 import os
 import time
+from typing import NoReturn
 
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.files.text import check_target, file_name
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning.feed import Source, SpeedWarning, feed_of
 from rrtik_ompl.replanning.loop import Clock, GoalFeed, Loop
-from rrtik_ompl.replanning.run import Run, Tick, load_run
-from rrtik_ompl.replanning.settings import PLANNERS, settings
+from rrtik_ompl.replanning.run import ReplanRun, Tick, load_run
+from rrtik_ompl.replanning.settings import PLANNERS, ReplanSettings, refuse_renamed
 from rrtik_ompl.trajectory.limits import RateLimits
 
-__all__ = ["PLANNERS", "Run", "SpeedWarning", "Tick", "load_run", "replan"]
+__all__ = ["PLANNERS", "ReplanRun", "ReplanSettings", "SpeedWarning", "Tick", "load_run", "replan", "replan_with"]
 
 
-def replan(
+def replan(  # noqa: D417 - the settings are described in one place
     problem: Problem,
     scene_feed: Source | None = None,
     *,
     step: float,
     rate: float,
     planner: str = "drrt-con",
-    eps: float | None = None,
+    max_edge: float | None = None,
     margin: float = 0.0,
     speed_bound: float | None = None,
     limits: RateLimits | None = None,
-    predict: int = 0,
+    lookahead_ticks: int = 0,
     seconds: float = 60.0,
-    slot: float | None = None,
+    repair_budget: float | None = None,
     seed: int = 0,
     goal_feed: GoalFeed | None = None,
     record: str | os.PathLike[str] | None = None,
     clock: Clock = time.perf_counter,
-) -> Run:
-    """Move a robot to its goal while obstacles move: source DRRT-Con paper.
+    **renamed: NoReturn,
+) -> ReplanRun:
+    """Move a robot to its goal while obstacles move: DRRT-Con [1, ch. 5.2, algorithms 6 to 8].
 
-    In each tick the scene is looked at; if anything has moved the path is checked again, in one call; if it is hit, it
+    In each tick the scene is read; if anything has moved the path is checked again, in one call; if it is blocked, it
     is repaired; then the robot goes one step, and only where that step is free now. Nothing is assumed of what
-    obstacles will do, unless ``predict`` says so. Where there is no path the robot waits; where an obstacle comes
-    nearer than allowed it goes out of its way.
+    obstacles will do, unless ``lookahead_ticks`` says so. Where there is no path the robot waits; where an obstacle
+    comes nearer than allowed the robot evades it.
 
-    No contact can happen in a step along the path if no obstacle is faster than ``speed_bound``: the robot stays
-    ``margin`` and as far as an obstacle comes in a tick away from what moves, and ``margin`` from all else. What moves
-    is what states a motion or was seen to; an obstacle of a feed that sets off beside the robot comes unannounced, and
-    a robot that is cornered can still be run over.
+    No contact can happen in a step along the path if no obstacle is faster than ``speed_bound``: the robot keeps a
+    distance of ``margin``, and to moving obstacles also the distance that they can travel in a tick. An obstacle moves
+    if it states a motion or was seen to move; an obstacle of a feed that begins to move beside the robot comes
+    unannounced. Contact cannot be avoided where every escape is blocked or an obstacle reaches the fixed base.
 
     Args:
         problem: Robot, scene at the begin, start and goal. Of a pose, position or region all configurations are goals:
             if one is blocked another one is tried.
-        scene_feed: What is seen over time: a scene whose obstacles state their motion, a function of time [s], or
+        scene_feed: The scene over time: a scene whose obstacles state their motion, a function of time [s], or
             pairs of a time and a scene; the problem's scene if None. The obstacles' names and shapes stay the same.
-            What is seen less often than once a tick moves in jumps, whose speed is that of the one tick.
-        step: How far the robot goes in a tick [rad, metres counted alike], unless its joints are too slow.
-        rate: Ticks a second [Hz].
-        planner: One of ``PLANNERS``.
-        eps: Longest motion of the trees [as step]; what suits the robot's range if None.
-        margin: Distance to obstacles that is always kept [m].
-        speed_bound: No point of an obstacle is faster [m/s]. One that is gives a :class:`SpeedWarning`.
-        limits: Of the joints' speeds; those of the robot if None. Accelerations are not looked at.
-        predict: Ticks ahead: obstacles are also where they will be then and half-way, by the motion that the scene
-            states or else by their velocity. 0: not predictive, as published.
-        seconds: Simulated time at most [s].
-        slot: Time that a repair may take [s]; one tick if None.
-        seed: The same seed gives the same run, as long as no repair is cut short by its slot.
+            A feed with fewer scenes than ticks makes obstacles jump; their speed is that of the jump in one tick.
+        step, rate, planner, max_edge, margin, speed_bound, limits, lookahead_ticks, seconds, repair_budget, seed: See
+            :class:`ReplanSettings`.
         goal_feed: A goal that moves: the configuration at a time [s], in place of the problem's goal.
             It is reached when the robot is where it was at the begin of the last tick.
         record: A ``.json`` file for the record; it is written on Ctrl-C and errors too, once there is a tick.
-        clock: What the times of the ticks and the ``slot`` are taken with [s]; ``time.process_time`` counts the
+        clock: Measures the times of the ticks and the ``repair_budget`` [s]; ``time.process_time`` counts the
             processor's, on a machine that does other things too.
+        renamed: None; an old name is answered with the new one.
 
     Raises:
         InputError: If a number is out of range, times go backwards, an obstacle begins in contact with the robot, or
             no configuration reaches the goal.
         UnknownNameError: If there is no planner of that name.
     """
+    refuse_renamed(renamed)
+    settings = ReplanSettings(
+        step=step, rate=rate, planner=planner, max_edge=max_edge, margin=margin, speed_bound=speed_bound,
+        limits=limits, lookahead_ticks=lookahead_ticks, seconds=seconds, repair_budget=repair_budget, seed=seed,
+    )  # fmt: skip
+    return replan_with(settings, problem, scene_feed, goal_feed=goal_feed, record=record, clock=clock)
+
+
+def replan_with(
+    settings: ReplanSettings,
+    problem: Problem,
+    scene_feed: Source | None = None,
+    *,
+    goal_feed: GoalFeed | None = None,
+    record: str | os.PathLike[str] | None = None,
+    clock: Clock = time.perf_counter,
+) -> ReplanRun:
+    """As :func:`replan`, with settings that were made before.
+
+    Raises:
+        InputError: See :func:`replan`.
+    """
+    require(settings, ReplanSettings, "settings", "use ReplanSettings(step=..., rate=...)")
     require(problem, Problem, "problem to replan", "use Problem(world, start, goal) or load_scenario(name)")
-    if limits is not None:
-        require(limits, RateLimits, "limits", "use RateLimits(velocity, acceleration)")
     if goal_feed is not None and not callable(goal_feed):
         raise InputError(f"goal_feed: expected a function of time [s], got {type(goal_feed).__name__}")
     if not callable(clock):
         raise InputError(f"clock: expected a function that gives a time [s], got {type(clock).__name__}")
     if record is not None:
         check_target(file_name(record), (".json",))
-    chosen = settings(
-        problem.robot, step=step, rate=rate, planner=planner, eps=eps, margin=margin, speed_bound=speed_bound,
-        limits=limits, predict=predict, seconds=seconds, slot=slot, seed=seed,
-    )  # fmt: skip
     feed = feed_of(problem.world.scene if scene_feed is None else scene_feed)
-    loop = Loop(problem, feed, chosen, goal_feed, clock)
+    loop = Loop(problem, feed, settings, goal_feed, clock)
     try:
-        for number in range(int(chosen.seconds * chosen.rate) + 1):
+        for number in range(int(settings.seconds * settings.rate) + 1):
             if not loop.tick(number):
                 loop.run.outcome = "arrived"
                 return loop.run

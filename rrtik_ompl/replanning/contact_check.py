@@ -1,65 +1,67 @@
-"""Was there contact? A run judged in continuous time, by coal alone, independent of what the run was planned with."""
+"""Contacts of a run, checked densely in time by coal alone, independent of what the run was planned with."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import coal
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.bodies import Body, link_bodies, scene_bodies
 from rrtik_ompl.replanning.feed import Feed
-from rrtik_ompl.replanning.run import Run
+from rrtik_ompl.replanning.run import ReplanRun
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle, Scene
 
-FINE = 10  # looks in a tick
-NEAR = 0.05  # [m]; distances above are not measured
+SAMPLES_PER_TICK = 10
+MAX_DISTANCE = 0.05  # [m]; larger distances are not measured
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Verdict:
-    """What a dense look at a run found.
+class ContactReport:
+    """What a dense check of a run found.
 
     Attributes:
         contacts: Time [s], event of the tick, link and obstacle of each tick with contact, the first of the tick.
-        nearest: Smallest distance between the arm and an obstacle [m], or ``NEAR`` if it is larger; 0 for a contact.
-        looks: Moments that were looked at.
+        nearest: Smallest distance between the arm and an obstacle [m], at most ``MAX_DISTANCE``; 0 for a contact.
+        samples: Number of times that were checked.
     """
 
     contacts: tuple[tuple[float, str, str, str], ...]
     nearest: float
-    looks: int
+    samples: int
 
 
-def judge(robot: Robot, run: Run, source: Scene | Feed, *, fine: int = FINE) -> Verdict:
-    """Look at a run ``fine`` times a tick: the arm on its straight way, every obstacle where it really is then.
+def check_contacts(
+    robot: Robot, run: ReplanRun, source: Scene | Feed, *, samples_per_tick: int = SAMPLES_PER_TICK
+) -> ContactReport:
+    """Check a run ``samples_per_tick`` times a tick: the arm moves straight, obstacles are where the source says.
 
-    Contact of the arm with obstacles alone: the arm with itself is no matter of time. What the arm holds counts.
+    Contacts of the arm, with what it holds, and obstacles; self-collision does not depend on time and is left out.
 
     Args:
         robot: Of the run.
-        run: What happened.
+        run: The record.
         source: The scene whose obstacles state their motion, or a function from any time [s] to a scene, between the
             ticks too.
-        fine: Looks in a tick.
+        samples_per_tick: Number of checks in a tick.
     """
     ticks, seconds = run.ticks, 1.0 / run.rate
-    shares = np.arange(fine) / fine
+    shares = np.arange(samples_per_tick) / samples_per_tick
     rows = [a.q + (b.q - a.q) * s for a, b in pairwise(ticks) for s in shares] + [ticks[-1].q]
     times = [t.time + s * seconds for t in ticks[:-1] for s in shares] + [ticks[-1].time]
     first = source if isinstance(source, Scene) else source(0.0)
     gaps, names = _gaps(robot, np.array(rows), first, _poses(source, times))
     contacts, done = [], set()
-    for look in np.flatnonzero((gaps <= 0.0).any(axis=1)):
-        if (tick := look // fine) not in done:
+    for sample in np.flatnonzero((gaps <= 0.0).any(axis=1)):
+        if (tick := sample // samples_per_tick) not in done:
             done.add(tick)
-            contacts.append((times[look], ticks[tick].event, *names[int(gaps[look].argmin())]))
-    return Verdict(tuple(contacts), max(float(gaps.min(initial=NEAR)), 0.0), len(times))
+            contacts.append((times[sample], ticks[tick].event, *names[int(gaps[sample].argmin())]))
+    return ContactReport(tuple(contacts), max(float(gaps.min(initial=MAX_DISTANCE)), 0.0), len(times))
 
 
 def _poses(source: Scene | Feed, times: list[float]) -> dict[str, NDArray[np.float64]]:
@@ -71,14 +73,14 @@ def _poses(source: Scene | Feed, times: list[float]) -> dict[str, NDArray[np.flo
     return {name: np.array([scene.obstacle(name).pose.homogeneous for scene in scenes]) for name in names}
 
 
-def _place(obstacle: Obstacle, time: float) -> Any:
+def _place(obstacle: Obstacle, time: float) -> pin.SE3:
     return obstacle.pose if obstacle.motion is None else obstacle.motion.pose_at(obstacle.pose, time)
 
 
 def _gaps(
     robot: Robot, rows: Matrix, scene: Scene, own: dict[str, NDArray[np.float64]]
 ) -> tuple[NDArray[np.float64], list[tuple[str, str]]]:
-    """Distances [m] of all pairs of an arm's body and an obstacle, shape (looks, pairs), and the names of the pairs."""
+    """Distances [m] of all pairs of an arm's body and an obstacle, shape (samples, pairs), and the pairs' names."""
     placed = scene_bodies(robot, scene)
     arm = [*link_bodies(robot), *(b for b in placed if b.kind == "attached")]
     allowed = {frozenset(pair) for pair in scene.allowed_collisions}
@@ -88,16 +90,16 @@ def _gaps(
     arm_poses = {id(a): frames[:, a.joint] @ a.placement.homogeneous for a in arm}
     gaps = np.full((len(rows), len(pairs)), np.inf)
     for k, (a, o) in enumerate(pairs):
-        near = np.flatnonzero(_between_balls(a, arm_poses[id(a)], o, own[o.name]) < NEAR)
-        for look in near:
-            gaps[look, k] = _distance(a.geometry, arm_poses[id(a)][look], o.geometry, own[o.name][look])
+        near = np.flatnonzero(_sphere_distances(a, arm_poses[id(a)], o, own[o.name]) < MAX_DISTANCE)
+        for sample in near:
+            gaps[sample, k] = _distance(a.geometry, arm_poses[id(a)][sample], o.geometry, own[o.name][sample])
     return gaps, [(a.name, o.name) for a, o in pairs]
 
 
-def _between_balls(
+def _sphere_distances(
     first: Body, first_poses: NDArray[np.float64], second: Body, second_poses: NDArray[np.float64]
 ) -> Vector:
-    """Distance [m] of the balls around two bodies at many poses, shape (m, 4, 4)."""
+    """Distance [m] of the spheres around two bodies at many poses, shape (m, 4, 4)."""
     solids = [body.geometry for body in (first, second)]
     if isinstance(solids[1], coal.Halfspace):
         return np.full(len(first_poses), -np.inf)
@@ -109,7 +111,9 @@ def _between_balls(
     return apart
 
 
-def _distance(first: Any, first_pose: Matrix, second: Any, second_pose: Matrix) -> float:
+def _distance(
+    first: coal.CollisionGeometry, first_pose: Matrix, second: coal.CollisionGeometry, second_pose: Matrix
+) -> float:
     """Coal's distance of two geometries [m], 0 if they touch."""
     ends = [coal.Transform3s(pose[:3, :3], pose[:3, 3]) for pose in (first_pose, second_pose)]
     if coal.collide(first, ends[0], second, ends[1], coal.CollisionRequest(), coal.CollisionResult()):

@@ -1,8 +1,8 @@
-"""DRRT-Con: a path whose robot end walks and whose blocked part is cut from both sides and reconnected.
+"""DRRT-Con: a path that follows the robot and whose blocked part is cut out from both sides and reconnected.
 
-Source: DRRT-Con paper, algorithms 6 to 8, with these corrections: where the scene has changed but the path is free the
-robot goes on; where no way is found the path is kept, and what is left of it is tried again at the next call, with new
-samples (a path that becomes free by itself needs none).
+Source: [1, ch. 5.2, algorithms 6 to 8], with these corrections: where the scene has changed but the path is free the
+robot goes on; where no connection is found the path is kept, and what is left of it is tried again at the next call,
+with new samples (a path that becomes free by itself needs none).
 """
 
 from __future__ import annotations
@@ -18,32 +18,32 @@ from rrtik_ompl.replanning.connecting import Connect, Joined
 from rrtik_ompl.transitions import without_repeats
 from rrtik_ompl.world.motion_queries import MotionQueries, Stop, no_stop
 
-MOST_CUTS = 24  # ends that are tried from one point of a path
-STRAIGHT = 1e-9  # change of direction
+MAX_CUTS = 24  # shortcut ends that are tried from one point of a path
+STRAIGHT_TOLERANCE = 1e-9  # change of the unit direction
 
 
 Post = Callable[[Matrix], Matrix]  # a free route, shape (k, n), made shorter
 
 
 class DrrtCon:
-    """A path from where the robot is to a goal, kept free while the scene changes.
+    """A path from the robot's configuration to a goal, kept free while the scene changes.
 
     Attributes:
-        path: Shape (k, n), the robot's place first; None before :meth:`begin` has found one. It is kept while it is
-            blocked.
-        free: Whether every motion of the path was free when last looked at.
-        repairs: Times that a new path was looked for so far.
+        path: Shape (k, n), the robot's configuration first; None before :meth:`begin` has found one. It is kept while
+            it is blocked.
+        free: Whether every motion of the path was free when it was checked last.
+        repairs: Number of searches for a new path so far.
 
     Args:
         connect: The search between pieces of a path.
-        eps: Longest step of the trees [unit of the space]; the path is cut at points half as far apart.
+        max_edge: Longest edge of the trees [unit of the space]; the path is cut at points half as far apart.
         post: Shortens what is new of a path; the sequential cut if None, as published.
     """
 
     name: ClassVar[str] = "drrt-con"
 
-    def __init__(self, connect: Connect, eps: float, *, post: Post | None = None) -> None:
-        self.connect, self.eps, self.post = connect, eps, post
+    def __init__(self, connect: Connect, max_edge: float, *, post: Post | None = None) -> None:
+        self.connect, self.max_edge, self.post = connect, max_edge, post
         self.path: Matrix | None = None
         self.free, self.repairs = False, 0
         self._dense = np.zeros((0, 0))
@@ -61,7 +61,7 @@ class DrrtCon:
         """Check the path again, all of it in one call; whether it is free."""
         if self.path is None:
             return False
-        self._dense = points_along(self.path, 0.5 * self.eps)
+        self._dense = points_along(self.path, 0.5 * self.max_edge)
         self._hits = ~motions.motion_valid_batch(self._dense[:-1], self._dense[1:])
         self.free = not self._hits.any()
         return self.free
@@ -81,7 +81,7 @@ class DrrtCon:
         goals = goals[motions.valid_batch(goals)]
         if self.path is None or len(goals) == 0:
             return False
-        piece = points_along(self.path, 0.5 * self.eps)
+        piece = points_along(self.path, 0.5 * self.max_edge)
         hit = np.flatnonzero(~motions.motion_valid_batch(piece[:-1], piece[1:]))
         piece = piece[: hit[0] + 1] if len(hit) else piece
         if not motions.valid_batch(piece[:1])[0]:
@@ -97,10 +97,10 @@ class DrrtCon:
         self.rejoin(place, passed)
         self.free = free
         if self.path is not None and free and len(self.path) > 2:
-            self.path = cut_from_start(self.path, 0.5 * self.eps, motions)
+            self.path = cut_from_start(self.path, 0.5 * self.max_edge, motions)
 
     def rejoin(self, place: Vector, passed: int = 0) -> None:
-        """The robot is at ``place``, on its path or not, past ``passed`` waypoints: the way there counts as unknown."""
+        """The robot is at ``place``, on its path or not, past ``passed`` waypoints: the edge there is unchecked."""
         if self.path is not None:
             rest = self.path[1 + passed :] if len(self.path) > 1 + passed else self.path[-1:]
             self.path = rest if (rest[0] == place).all() else np.vstack([place, rest])
@@ -118,13 +118,13 @@ class DrrtCon:
         if found is not None:
             path, begin, end = found.path, found.begin, found.end
             new = path[begin : end + 1]
-            new = dense_sequential_cut(new, 0.5 * self.eps, motions) if self.post is None else self.post(new)
+            new = dense_sequential_cut(new, 0.5 * self.max_edge, motions) if self.post is None else self.post(new)
             self.path = without_points_between(np.vstack([path[:begin], new, path[end + 1 :]]))
         return self.free
 
 
 class FromScratch(DrrtCon):
-    """The baseline that forgets: RRT-Connect from where the robot is to the goal whenever the path is hit."""
+    """The baseline without memory: RRT-Connect from the robot to the goal whenever the path is blocked."""
 
     name: ClassVar[str] = "rrt-connect"
 
@@ -138,13 +138,13 @@ def points_along(path: Matrix, step: float) -> Matrix:
 
 
 def without_points_between(path: Matrix) -> Matrix:
-    """The path without waypoints at which it goes straight on; both ends stay."""
+    """The path without waypoints at which its direction does not change; both ends stay."""
     if len(path) < 3:
         return path
-    ways = np.diff(path, axis=0)
-    lengths = np.linalg.norm(ways, axis=1)
-    units = ways / np.maximum(lengths, STRAIGHT)[:, None]
-    turns = np.linalg.norm(np.diff(units, axis=0), axis=1) > STRAIGHT
+    edges = np.diff(path, axis=0)
+    lengths = np.linalg.norm(edges, axis=1)
+    units = edges / np.maximum(lengths, STRAIGHT_TOLERANCE)[:, None]
+    turns = np.linalg.norm(np.diff(units, axis=0), axis=1) > STRAIGHT_TOLERANCE
     kept: Matrix = path[np.concatenate([[True], turns, [True]])]
     return kept
 
@@ -152,8 +152,9 @@ def without_points_between(path: Matrix) -> Matrix:
 def dense_sequential_cut(path: Matrix, step: float, motions: MotionQueries) -> Matrix:
     """Shorten a free path: from each kept point straight to the last point that can be reached.
 
-    Post-processing paper, method 1, as DRRT-Con uses it: points every ``step`` along the path are tried, ``MOST_CUTS``
-    of them in one call; :func:`rrtik_ompl.shortening.sequential.sequential_cut` tries every waypoint and no others.
+    Points lie every ``step`` along the path, and ``MAX_CUTS`` of them are tried in one call;
+    :func:`rrtik_ompl.shortening.sequential.sequential_cut` tries every waypoint and no others. Source: [1, ch. 5.3,
+    method 1], as DRRT-Con uses it.
     """
     done, rest = [path[:1]], path
     while len(rest) > 2:
@@ -166,8 +167,8 @@ def dense_sequential_cut(path: Matrix, step: float, motions: MotionQueries) -> M
 def cut_from_start(path: Matrix, step: float, motions: MotionQueries) -> Matrix:
     """A free path with its beginning straight to the last point along it that can be reached, asked in one call."""
     points, edges = _points_and_edges(path, step)
-    known = int(np.searchsorted(edges, 1))  # what follows the end of the first edge, which needs no question
-    ends = np.unique(np.linspace(known, len(points) - 1, MOST_CUTS).round().astype(int))
+    known = int(np.searchsorted(edges, 1))  # the first point behind the first edge, which is free
+    ends = np.unique(np.linspace(known, len(points) - 1, MAX_CUTS).round().astype(int))
     if known >= len(points):
         return path
     free = motions.motion_valid_batch(np.broadcast_to(path[0], (len(ends), path.shape[1])), points[ends])
@@ -178,7 +179,7 @@ def cut_from_start(path: Matrix, step: float, motions: MotionQueries) -> Matrix:
 
 
 def _points_and_edges(path: Matrix, step: float) -> tuple[Matrix, Vector]:
-    """See :func:`points_along`; also the number of the edge on which, or at whose end, each point stands."""
+    """See :func:`points_along`; also the number of the edge on which, or at whose end, each point lies."""
     path = path if len(path) > 1 else np.vstack([path, path])
     counts = np.ceil(np.linalg.norm(np.diff(path, axis=0), axis=1) / step - 1e-9)
     return subdivided(path, counts)

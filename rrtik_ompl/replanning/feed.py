@@ -1,11 +1,11 @@
-"""What the robot sees of a scene over time: from the motions that it states, a function, or a stream of snapshots."""
+"""The scene over time: from the motions that a scene states, from a function, or from a stream of snapshots."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -19,8 +19,8 @@ from rrtik_ompl.shapes import same_shape
 Feed: TypeAlias = Callable[[float], Scene]
 Source: TypeAlias = Scene | Feed | Iterable[tuple[float, Scene]]
 
-FASTER = 1.0 + 1e-6  # than the bound, to be warned about
-STILL = 1e-9  # [rad] from look to look, which is rounding and no turn
+SPEED_WARNING_RATIO = 1.0 + 1e-6  # of a speed to the bound, above which a warning is given
+ROTATION_NOISE = 1e-9  # [rad] between two snapshots; less is rounding
 
 
 class SpeedWarning(UserWarning):
@@ -40,14 +40,14 @@ def feed_of(source: Source) -> Feed:
     if isinstance(source, Scene):
         return source.at
     if callable(source):
-        return _seen(source)
+        return _checked(source)
     if isinstance(source, Iterable):
         return Stream(source)
     raise InputError(f"scene feed: expected a scene, a function of time or pairs, got {type(source).__name__}")
 
 
-def _seen(source: Feed) -> Feed:
-    """A function of time whose answers are checked."""
+def _checked(source: Feed) -> Feed:
+    """A function of time whose results are checked."""
 
     def at(time: float) -> Scene:
         scene = source(time)
@@ -68,7 +68,7 @@ class Stream:
         self._now = self._next
 
     def __call__(self, time: float) -> Scene:
-        """The scene as last seen at ``time`` [s].
+        """The last scene that is not later than ``time`` [s].
 
         Raises:
             InputError: If a snapshot is older than the one before it, or is no pair of a time and a scene.
@@ -82,7 +82,7 @@ class Stream:
         return self._now[1]
 
 
-def _snapshot(given: Any) -> tuple[float, Scene]:
+def _snapshot(given: object) -> tuple[float, Scene]:
     """A pair of a time and a scene, checked."""
     match given:
         case (float() | int() | np.number() as time, Scene() as scene) if np.isfinite(time):
@@ -90,11 +90,11 @@ def _snapshot(given: Any) -> tuple[float, Scene]:
     raise InputError(f"scene feed: expected pairs of a time [s] and a scene, got {given!r:.80}")
 
 
-class Watch:
-    """Measures how fast obstacles move from one look to the next, and says where they will be.
+class MotionTracker:
+    """Measures how fast obstacles move between two snapshots, and predicts where they will be.
 
     Attributes:
-        speeds: Largest speed seen so far of each obstacle that has moved [m/s]: no point of it was faster.
+        speeds: Largest speed measured so far of each obstacle that has moved [m/s]: no point of it was faster.
     """
 
     def __init__(self, scene: Scene, bound: float | None) -> None:
@@ -105,8 +105,8 @@ class Watch:
         self._velocities: dict[str, tuple[Vector, Vector]] = {}
         self.speeds: dict[str, float] = {}
 
-    def see(self, time: float, scene: Scene) -> bool:
-        """Take in the scene at a time [s]; whether anything about the obstacles is new (at the first look: True)."""
+    def update(self, time: float, scene: Scene) -> bool:
+        """Measure the scene at a time [s]; whether anything about the obstacles is new (at the first call: True)."""
         before, self._last = self._last, (time, scene)
         if before is None or time <= before[0]:
             return True
@@ -134,47 +134,49 @@ class Watch:
         moved = tuple(replace(o, pose=guessed.get(o.name, o.pose)) for o in ahead.obstacles)
         return replace(ahead, obstacles=moved)
 
-    def _measure(self, obstacle: Obstacle, old: Any, seconds: float, time: float) -> None:
+    def _measure(self, obstacle: Obstacle, old: pin.SE3, seconds: float, time: float) -> None:
         name = obstacle.name
-        way, turn = obstacle.pose.translation - old.translation, pin.log3(old.rotation.T @ obstacle.pose.rotation)
+        shift, turn = obstacle.pose.translation - old.translation, pin.log3(old.rotation.T @ obstacle.pose.rotation)
         angle = float(np.linalg.norm(turn))
-        farthest_way = self._radii[name] * angle if angle > STILL else 0.0  # a half-space has no farthest point
-        speed = (float(np.linalg.norm(way)) + farthest_way) / seconds
-        self._velocities[name] = (way / seconds, turn / seconds)
+        rotation_path = (
+            self._radii[name] * angle if angle > ROTATION_NOISE else 0.0
+        )  # a half-space has no farthest point
+        speed = (float(np.linalg.norm(shift)) + rotation_path) / seconds
+        self._velocities[name] = (shift / seconds, turn / seconds)
         self.speeds[name] = max(speed, self.speeds.get(name, 0.0))
-        if self._bound is not None and speed > FASTER * self._bound and name not in self._warned:
+        if self._bound is not None and speed > SPEED_WARNING_RATIO * self._bound and name not in self._warned:
             self._warned.add(name)
-            warnings.warn(SpeedWarning(too_fast(name, speed, time, self._bound)), stacklevel=4)
+            warnings.warn(SpeedWarning(speed_warning(name, speed, time, self._bound)), stacklevel=4)
 
 
-def too_fast(name: str, speed: float, time: float, bound: float) -> str:
-    """A line that says that an obstacle is faster than the bound."""
+def speed_warning(name: str, speed: float, time: float, bound: float) -> str:
+    """The warning that an obstacle is faster than the bound."""
     return (
         f"obstacle '{name}' moves at {speed:.3g} m/s at {time:.3g} s, faster than the stated speed_bound of "
         f"{bound:g} m/s: a contact cannot be ruled out; raise speed_bound"
     )
 
 
-def rooms(
-    scene: Scene, margin: float, seconds: float, bound: float | None, seen: Mapping[str, float]
+def required_distances(
+    scene: Scene, margin: float, seconds: float, bound: float | None, measured: Mapping[str, float]
 ) -> dict[str, float]:
-    """How far the arm keeps from each obstacle, beyond its own margin: what is given, and what it can come in a tick.
+    """Distance that the arm keeps to each obstacle, beyond its own margin: the given one plus its travel in a tick.
 
     Args:
         scene: The obstacles.
         margin: Distance that must be left to every obstacle [m].
         seconds: Length of a tick [s].
-        bound: Largest speed of what moves [m/s]; what was seen to be faster counts as that fast. None: no room for it.
-        seen: Speeds that were seen [m/s].
+        bound: Largest speed of what moves [m/s]; a larger measured speed counts. None: nothing is added for travel.
+        measured: Speeds that were measured [m/s].
     """
     found = {}
     for obstacle in scene.obstacles:
-        moves = bound is not None and (obstacle.motion is not None or obstacle.name in seen)
-        speed = max(bound or 0.0, seen.get(obstacle.name, 0.0)) if moves else 0.0
+        moves = bound is not None and (obstacle.motion is not None or obstacle.name in measured)
+        speed = max(bound or 0.0, measured.get(obstacle.name, 0.0)) if moves else 0.0
         found[obstacle.name] = margin + speed * seconds
     return found
 
 
-def _extrapolated(pose: Any, velocity: tuple[Vector, Vector], seconds: float) -> tuple[Matrix, Vector]:
+def _extrapolated(pose: pin.SE3, velocity: tuple[Vector, Vector], seconds: float) -> tuple[Matrix, Vector]:
     linear, turn = velocity
     return pose.rotation @ pin.exp3(seconds * turn), pose.translation + seconds * linear

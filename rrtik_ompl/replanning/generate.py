@@ -1,8 +1,6 @@
-"""Scenes that move, from a seed: obstacles that wander in the reach of an arm, none faster than a bound."""
+"""Scenes that move, from a seed: obstacles that move at random in the reach of an arm, none faster than a bound."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -12,20 +10,20 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Obstacle, Scene, Waypoints
+from rrtik_ompl.scene import Obstacle, Scene, TimedPoses
 from rrtik_ompl.shapes import Box, Capsule, Shape, Sphere
 from rrtik_ompl.world import World
 from rrtik_ompl.world.moving_world import MovingWorld
 
-SHELL = (0.5, 1.05)  # of the reach: between these distances from the first joints obstacles wander
+SHELL = (0.5, 1.05)  # of the reach: between these distances from the first joints obstacles move
 TURN_PROBABILITY = 0.08  # probability that one of them turns at a waypoint
-BETWEEN = 0.25  # [s] from waypoint to waypoint
-POSTURES = 400  # that measure the reach
-TRIES = 2000
+WAYPOINT_SECONDS = 0.25  # from waypoint to waypoint
+REACH_SAMPLES = 400  # configurations that measure the reach
+ENDPOINT_SAMPLES = 2000  # configurations from which start and goal are chosen
 
 
 def moving_scene(robot: Robot, count: int, speed: float, seed: int, *, seconds: float = 60.0) -> Scene:
-    """Balls, boxes and capsules that wander at constant speed, turn now and then, and keep clear of the arm's foot.
+    """Spheres, boxes and capsules that move at constant speed, turn now and then, and keep clear of the arm's base.
 
     Args:
         robot: The arm.
@@ -36,17 +34,17 @@ def moving_scene(robot: Robot, count: int, speed: float, seed: int, *, seconds: 
     """
     rng = np.random.default_rng(seed)
     centre, reach = _reach(robot)
-    steps = int(np.ceil(seconds / BETWEEN))
-    times = BETWEEN * np.arange(steps + 1)
+    steps = int(np.ceil(seconds / WAYPOINT_SECONDS))
+    times = WAYPOINT_SECONDS * np.arange(steps + 1)
     obstacles = []
     for k in range(count):
         shape = _shape(rng, k, reach)
         low, high = SHELL[0] * reach + shape.bounding_radius, SHELL[1] * reach
-        places = _wander(rng, steps, speed * BETWEEN, low, high) + centre
+        places = _wander(rng, steps, speed * WAYPOINT_SECONDS, low, high) + centre
         turned = _rotation(rng)
         turns = turning_points(places)
         poses = [pin.SE3(turned, place) for place in places[turns]]
-        obstacles.append(Obstacle(f"obstacle{k + 1}", shape, poses[0], Waypoints(times[turns], poses)))
+        obstacles.append(Obstacle(f"obstacle{k + 1}", shape, poses[0], TimedPoses(times[turns], poses)))
     return Scene(tuple(obstacles))
 
 
@@ -64,7 +62,7 @@ def moving_problem(
     clear.move(scene, inflation={o.name: room for o in scene.obstacles})
     rng = np.random.default_rng([seed, 1])
     lower, upper = (np.clip(ends, -0.5 * np.pi, 0.5 * np.pi) for ends in robot.finite_range())
-    rows = rng.uniform(lower, upper, (TRIES, robot.dof))
+    rows = rng.uniform(lower, upper, (ENDPOINT_SAMPLES, robot.dof))
     free = rows[clear.valid_batch(rows)]
     if len(free) < 2:
         raise InputError(f"no free start and goal among {count} obstacles; take fewer, or another seed than {seed}")
@@ -73,15 +71,15 @@ def moving_problem(
 
 
 def turning_points(places: Matrix) -> NDArray[np.int64]:
-    """Numbers of the first, the last, and those points of a way in equal steps, shape (k, d), at which it turns."""
+    """Numbers of the first, the last, and those points of equally spaced ones, shape (k, d), where they turn."""
     steps = np.diff(places, axis=0)
     turned = np.linalg.norm(np.diff(steps, axis=0), axis=1) > 1e-9 * np.linalg.norm(steps, axis=1).max(initial=0.0)
     return np.concatenate([[0], np.flatnonzero(turned) + 1, [len(places) - 1]])
 
 
 def _reach(robot: Robot) -> tuple[Vector, float]:
-    """Where the arm's foot is and how far its tip gets from there [m]."""
-    rows = np.random.default_rng(0).uniform(*robot.finite_range(), (POSTURES, robot.dof))
+    """Position of the arm's base and how far its tip gets from there [m]."""
+    rows = np.random.default_rng(0).uniform(*robot.finite_range(), (REACH_SAMPLES, robot.dof))
     frames, tips = robot.joint_frames(rows), robot.fk_batch(rows)[:, :3, 3]
     foot: Vector = frames[:, min(2, frames.shape[1] - 1), :3, 3].mean(axis=0)
     return foot, float(np.linalg.norm(tips - foot, axis=1).max())
@@ -97,7 +95,7 @@ def _shape(rng: np.random.Generator, number: int, reach: float) -> Shape:
     return Capsule(0.5 * a, 2 * b)
 
 
-def _wander(rng: np.random.Generator, steps: int, length: float, low: float, high: float) -> Any:
+def _wander(rng: np.random.Generator, steps: int, length: float, low: float, high: float) -> Matrix:
     """Points ``length`` apart between two spheres about the origin, shape (steps + 1, 3)."""
     place = _direction(rng) * rng.uniform(low, high)
     heading, places = _direction(rng), [place]
@@ -117,5 +115,6 @@ def _direction(rng: np.random.Generator) -> Vector:
     return unit
 
 
-def _rotation(rng: np.random.Generator) -> Any:
-    return pin.Quaternion(rng.normal(size=4)).normalized().matrix()
+def _rotation(rng: np.random.Generator) -> Matrix:
+    rotation: Matrix = pin.Quaternion(rng.normal(size=4)).normalized().matrix()
+    return rotation

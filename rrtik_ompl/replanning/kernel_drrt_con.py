@@ -1,4 +1,4 @@
-"""DRRT-Con whose check of the path and whose repair are one call of a kernel each, for worlds that have kernels."""
+"""DRRT-Con whose check and whose repair of the path are one call of a kernel each, for worlds that have kernels."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ REPAIR_CUTS, REPAIR_PATIENCE = 16, 6  # as CUTS and PATIENCE, where only a detou
 class KernelDrrtCon(DrrtCon):
     """As :class:`DrrtCon`, in one world: its path is kept free of what moves there.
 
-    What the kernels add to the paper stands in :mod:`rrtik_ompl.fast.search.repair_kernels`.
+    What the kernels add to the published algorithm: :mod:`rrtik_ompl.fast.search.repair_kernels`.
 
     Args:
-        world: Who judges; the ``motions`` of all methods.
+        world: Checks motions; the ``motions`` of all methods.
         lower, upper: The box to sample in, shape (n,).
-        eps: See :class:`DrrtCon`.
+        max_edge: See :class:`DrrtCon`.
         seed: Of the samples and the shortcuts.
         forgetting: Whether each repair plans from scratch, as :class:`FromScratch` does.
 
@@ -32,15 +32,15 @@ class KernelDrrtCon(DrrtCon):
     """
 
     def __init__(
-        self, world: MovingWorld, lower: Vector, upper: Vector, eps: float, seed: int, *, forgetting: bool = False
+        self, world: MovingWorld, lower: Vector, upper: Vector, max_edge: float, seed: int, *, forgetting: bool = False
     ) -> None:
         self._world, self._forgetting, self._rng = world, forgetting, np.random.default_rng([seed, 1])
         if not has_kernels(world):
             raise InputError("replanning in kernels: the world has none; install numba")
-        super().__init__(KernelConnect(world, lower, upper, eps, seed), eps, post=KernelCuts(world, seed))
+        super().__init__(KernelConnect(world, lower, upper, max_edge, seed), max_edge, post=KernelCuts(world, seed))
         tries, patience = (CUTS, PATIENCE) if forgetting else (REPAIR_CUTS, REPAIR_PATIENCE)
         self._kernels = PathRepair(
-            world.motions, lower, upper, eps=eps, iterations=ITERATIONS, tries=tries, patience=patience
+            world.motions, lower, upper, eps=max_edge, iterations=ITERATIONS, tries=tries, patience=patience
         )  # fmt: skip
 
     def look(self, motions: MotionQueries) -> bool:

@@ -1,4 +1,4 @@
-"""The loop that moves a robot along its path while obstacles move: look, repair, step; one tick after the other."""
+"""The loop that moves a robot along its path while obstacles move; a tick is: read the scene, check, repair, step."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.poses import quaternion_xyzw
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning.evading import evasion
-from rrtik_ompl.replanning.feed import Feed, Watch, rooms
-from rrtik_ompl.replanning.run import Run, Tick
-from rrtik_ompl.replanning.settings import COPIES, Settings, planner_of
+from rrtik_ompl.replanning.feed import Feed, MotionTracker, required_distances
+from rrtik_ompl.replanning.run import ReplanRun, Tick
+from rrtik_ompl.replanning.settings import PREDICTED_PLACES, ReplanSettings, make_planner
 from rrtik_ompl.replanning.walking import one_step, to_first_corner
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
@@ -33,7 +33,7 @@ class Loop:
     """One run; :meth:`tick` does one tick.
 
     Attributes:
-        q: Where the robot is, shape (n,).
+        q: The robot's configuration, shape (n,).
         run: The record so far.
     """
 
@@ -41,97 +41,104 @@ class Loop:
         self,
         problem: Problem,
         feed: Feed,
-        chosen: Settings,
+        settings: ReplanSettings,
         goal_feed: GoalFeed | None,
         clock: Clock = time.perf_counter,
     ) -> None:
         self._clock = clock
         robot, scene = problem.robot, feed(0.0)
-        self._problem, self._feed, self._chosen, self._goal_feed = problem, feed, chosen, goal_feed
+        self._problem, self._feed, self._settings, self._goal_feed = problem, feed, settings, goal_feed
         first = World(robot, scene, motion_resolution=problem.world.motion_resolution)
-        self._world = MovingWorld(first, copies=COPIES if chosen.predict else 1)
+        self._world = MovingWorld(first, copies=PREDICTED_PLACES if settings.lookahead_ticks else 1)
         self._near = MovingWorld(first, self_collision=False)
         empty = Scene((), scene.attached, _held_pairs(scene))
         self._alone = World(robot, empty, motion_resolution=first.motion_resolution, accuracy="conservative")
-        self._watch = Watch(scene, chosen.speed_bound)
-        self._rng = np.random.default_rng(chosen.seed)
+        self._tracker = MotionTracker(scene, settings.speed_bound)
+        self._max_change = settings.max_change(robot)
+        self._rng = np.random.default_rng(settings.seed)
         self.q = problem.start
         self._goals = _goals(problem, self._alone, self._rng) if goal_feed is None else _goal(robot, goal_feed, 0.0)
         self._first = {o.name: o.pose for o in scene.obstacles}
-        self._see(0.0)
-        self._world.move(scene, inflation=self._room)  # a start may stand where something is only expected
+        self._read_scene(0.0)
+        self._world.move(scene, inflation=self._distances)  # a start may be where an obstacle is only predicted
         _check_start(self.q, scene, first, self._world)
         ends = np.vstack([self.q, self._goals])
         lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - TAU)
         upper = np.where(np.isfinite(robot.upper), robot.upper, ends.max(axis=0) + TAU)
-        self._planner = planner_of(chosen, self._world, lower, upper)
-        self.run = Run(
-            problem.name, robot.name, robot.joint_names, chosen.planner, chosen.seed, chosen.step, chosen.rate,
-            chosen.margin, chosen.speed_bound,
+        self._planner = make_planner(settings, self._world, lower, upper)
+        self.run = ReplanRun(
+            problem.name, robot.name, robot.joint_names, settings.planner, settings.seed, settings.step, settings.rate,
+            settings.margin, settings.speed_bound,
         )  # fmt: skip
 
     def tick(self, number: int) -> bool:
-        """Do one tick and write it down; False when the goal is reached."""
-        now, begin = number * self._chosen.tick, self._clock()
+        """Do one tick and add it to the record; False when the goal is reached."""
+        now, begin = number * self._settings.tick, self._clock()
         if self._arrived():
-            self._note(now, self.q, "arrive", {}, 0, "")
+            self._record(now, self.q, "arrive", {}, 0, "")
             return False
         if self._goal_feed is not None:
             self._goals = _goal(self._problem.robot, self._goal_feed, now)
         spent: dict[str, float] = {}
-        changed = self._timed(spent, "sense", self._see, now)
-        self._timed(spent, "retarget", self._follow_goal)
+        changed = self._measured(spent, "sense", self._read_scene, now)
+        self._measured(spent, "retarget", self._follow_goal)
         checked = self._world.checked
-        free = self._timed(spent, "look", self._look) if changed or not self._planner.free else True
+        free = self._measured(spent, "look", self._check) if changed or not self._planner.free else True
         checked, event, reason = self._world.checked - checked, "walk", ""
         if not free and not self._world.blocked:
             event, before = "repair" if self._planner.path is not None else "plan", self._planner.path
-            free = self._timed(spent, event, self._repair)
+            free = self._measured(spent, event, self._repair)
             event = "walk" if free and self._planner.path is before else event
         here = self.q
         if free:
-            place = self._walk()
+            place = self._step()
             event, reason = (event, "") if place is not here else ("wait", "the goal is not free")
         else:
-            event, reason, place = self._stand_by()
+            event, reason, place = self._wait_or_evade()
         path = self._planner.path
-        self._note(now, here, event, {**spent, "all": self._clock() - begin}, checked, reason, path)
+        self._record(now, here, event, {**spent, "all": self._clock() - begin}, checked, reason, path)
         self.q = place
         return True
 
-    def _see(self, now: float) -> bool:
-        """Take in the scene; whether anything has moved."""
+    def _read_scene(self, now: float) -> bool:
+        """Read the scene; whether anything has moved."""
         scene = self._feed(now)
-        if not self._watch.see(now, scene):
+        if not self._tracker.update(now, scene):
             return False
-        chosen = self._chosen
-        clear = chosen.margin + 0.5 * self._world.motion_resolution  # between two looks at a motion too
-        self._room = rooms(scene, clear, chosen.tick, chosen.speed_bound, self._watch.speeds)
-        ahead = [chosen.predict * chosen.tick * k / (COPIES - 1) for k in range(1, COPIES)] if chosen.predict else []
-        self._world.move(scene, *(self._watch.later(scene, seconds) for seconds in ahead), inflation=self._room)
+        settings = self._settings
+        between = 0.5 * self._world.motion_resolution  # the margin holds between two checked configurations too
+        clear = settings.margin + between
+        self._distances = required_distances(scene, clear, settings.tick, settings.speed_bound, self._tracker.speeds)
+        predicted = (self._tracker.later(scene, seconds) for seconds in self._lookahead())
+        self._world.move(scene, *predicted, inflation=self._distances)
         return True
+
+    def _lookahead(self) -> list[float]:
+        """Times from now at which obstacles are avoided where they are predicted to be [s]."""
+        ticks, last = self._settings.lookahead_ticks, PREDICTED_PLACES - 1
+        return [ticks * self._settings.tick * k / last for k in range(1, PREDICTED_PLACES)] if ticks else []
 
     def _follow_goal(self) -> bool:
         """Where the goal has moved away from the end of the path, reconnect it, as far as that is free."""
         path = self._planner.path
         if self._goal_feed is None or path is None or self._world.blocked or (path[-1] == self._goals[0]).all():
             return False
-        return self._planner.retarget(self._goals, self._world, self._slot_ends())
+        return self._planner.retarget(self._goals, self._world, self._budget_ends())
 
-    def _look(self) -> bool:
+    def _check(self) -> bool:
         return self._planner.look(self._world)
 
     def _repair(self) -> bool:
-        """A free path, by whatever way; without the predicted places of obstacles if there is none with them."""
+        """Find a free path; without the predicted places of obstacles if there is none with them."""
         if self._new_path():
             return True
-        if not self._chosen.predict:
+        if not self._settings.lookahead_ticks:
             return False
-        self._world.move(self._world.scene, inflation=self._room)
+        self._world.move(self._world.scene, inflation=self._distances)
         return self._planner.look(self._world) or self._new_path()
 
     def _new_path(self) -> bool:
-        stop, planner = self._slot_ends(), self._planner
+        stop, planner = self._budget_ends(), self._planner
         if planner.path is None:
             return planner.begin(self.q, self._goals, self._world, stop)
         if self._world.valid(planner.path[-1]):
@@ -139,52 +146,54 @@ class Loop:
         others = self._goals[(self._goals != planner.path[-1]).any(axis=1)]
         return planner.retarget(others, self._world, stop)
 
-    def _walk(self) -> Vector:
-        """Go a step along the path, round corners if that is free; the place of the robot then."""
-        path, chosen = self._planner.path, self._chosen
+    def _step(self) -> Vector:
+        """Go a step along the path, round corners if that is free; the configuration of the robot then."""
+        path, settings = self._planner.path, self._settings
         if path is None or len(path) < 2:
             return self.q
-        place, passed = one_step(path, chosen.step, chosen.most)
+        place, passed = one_step(path, settings.step, self._max_change)
         if passed and not self._world.motion_valid(self.q, place):
-            place, passed = to_first_corner(path, chosen.step, chosen.most)
+            place, passed = to_first_corner(path, settings.step, self._max_change)
         self._planner.advance(place, passed, self._world)
         return place
 
-    def _stand_by(self) -> tuple[str, str, Vector]:
-        """No path: wait, or go out of the way of what comes too near. Event, reason, place."""
+    def _wait_or_evade(self) -> tuple[str, str, Vector]:
+        """Without a free path: wait, or evade an obstacle that is too near. Event, reason, configuration."""
         if self._world.blocked:
             return "wait", self._world.blocked, self.q
         if self._world.valid(self.q):
             path = self._planner.path
             goals = self._goals if path is None else path[-1:]
-            reason = "there is no way" if self._world.valid_batch(goals).any() else "the goal is not free"
+            reason = "there is no path" if self._world.valid_batch(goals).any() else "the goal is not free"
             return "wait", reason, self.q
-        chosen, way = self._chosen, self._planner.path
-        room = max(self._room.values())
-        place = evasion(self.q, chosen.step, chosen.most, room, self._near, self._later, self._alone, self._rng, way)
+        place = evasion(
+            self.q, self._planner.path, step=self._settings.step, max_change=self._max_change,
+            distance=max(self._distances.values()), near=self._near, later=self._later, alone=self._alone,
+            rng=self._rng,
+        )  # fmt: skip
         if place is None:
-            return "wait", "an obstacle is too near, and there is nowhere to go", self.q
+            return "wait", "an obstacle is too near, and every escape is blocked", self.q
         self._planner.rejoin(place)
         return "evade", "an obstacle is too near", place
 
     def _later(self, ticks: int) -> Scene:
-        return self._watch.later(self._world.scene, ticks * self._chosen.tick) if ticks else self._world.scene
+        return self._tracker.later(self._world.scene, ticks * self._settings.tick) if ticks else self._world.scene
 
     def _arrived(self) -> bool:
         return bool((np.abs(self._goals - self.q).max(axis=1) <= JOINT_TOLERANCE).any())
 
-    def _slot_ends(self) -> Stop:
-        """When a search that begins now has to end."""
-        clock, end = self._clock, self._clock() + self._chosen.slot
+    def _budget_ends(self) -> Stop:
+        """When a search that begins now has used up the budget of a repair."""
+        clock, end = self._clock, self._clock() + self._settings.repair_seconds
         return lambda: clock() > end
 
-    def _timed(self, spent: dict[str, float], name: str, work: Callable[..., bool], *arguments: float) -> bool:
+    def _measured(self, spent: dict[str, float], name: str, work: Callable[..., bool], *arguments: float) -> bool:
         begin = self._clock()
         result = work(*arguments)
         spent[name] = self._clock() - begin
         return result
 
-    def _note(
+    def _record(
         self, now: float, q: Vector, event: str, spent: Mapping[str, float], checked: int, reason: str,
         path: Matrix | None = None,
     ) -> None:  # fmt: skip
@@ -197,7 +206,7 @@ class Loop:
 
 
 def _check_start(q: Vector, scene: Scene, world: World, moving: MovingWorld) -> None:
-    """Refuse a run that begins in contact, or nearer to it than can be told apart from it.
+    """Refuse a run that begins in contact, or nearer to contact than the margin.
 
     Raises:
         InputError: It names the pair.
@@ -212,7 +221,7 @@ def _check_start(q: Vector, scene: Scene, world: World, moving: MovingWorld) -> 
 
 
 def _goals(problem: Problem, alone: World, rng: np.random.Generator) -> Matrix:
-    """Every configuration that may be the goal, whatever stands in its way now, shape (g, n).
+    """Every configuration that may be the goal, also those that obstacles block now, shape (g, n).
 
     Raises:
         InputError: If there is none.
@@ -226,7 +235,7 @@ def _goals(problem: Problem, alone: World, rng: np.random.Generator) -> Matrix:
 
 
 def _goal(robot: Robot, goal_feed: GoalFeed, now: float) -> Matrix:
-    """Where a moving goal is, shape (1, n).
+    """The configuration of a moving goal, shape (1, n).
 
     Raises:
         InputError: If that is no configuration of the robot, or outside the limits.

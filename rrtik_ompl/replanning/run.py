@@ -1,4 +1,4 @@
-"""The record of a run: every tick with the robot's place, its path, the obstacles and the times; JSON and back."""
+"""The record of a run: every tick with configuration, path, poses of obstacles and times; written and read as JSON."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, finite_number, not_negative, positive, whole_number
 from rrtik_ompl.errors import InputError, UnknownNameError, require
@@ -20,7 +20,7 @@ from rrtik_ompl.poses import pose
 from rrtik_ompl.transitions import route_length
 
 KIND = "replan_run"
-LARGEST = 512 * 1024 * 1024  # bytes of a record, half an hour of 20 obstacles at 50 Hz
+MAX_RECORD_BYTES = 512 * 1024 * 1024  # bytes of a record, half an hour of 20 obstacles at 50 Hz
 EVENTS = ("plan", "walk", "repair", "wait", "evade", "arrive")
 OUTCOMES = ("arrived", "out of time", "interrupted")
 
@@ -31,14 +31,14 @@ class Tick:
 
     Attributes:
         time: Of its begin [s].
-        q: Where the robot is then, shape (n,).
-        event: "plan" or "repair": walk along a path found just now, the first one or another one; "walk" along the old
-            one; "wait"; "evade"; "arrive": the last place.
+        q: The robot's configuration then, shape (n,).
+        event: "plan" or "repair": move along a path found just now, the first one or another one; "walk": along the old
+            one; "wait"; "evade"; "arrive": the last configuration.
         path: The path after the tick's work, shape (k, n), or None if there is none.
-        poses: Of the obstacles that are not where they were in the first tick: x, y, z and quaternion x, y, z, w.
-        seconds: Wall time of its parts [s]: "sense", "retarget", "look", "plan" or "repair" (search and shortening),
-            "all".
-        checked: Configurations that the look at the path asked for.
+        poses: Of the obstacles that have moved since the first tick: x, y, z and quaternion x, y, z, w.
+        seconds: Wall time of its parts [s]: "sense", "retarget", "look" (check of the path), "plan" or
+            "repair" (search and shortening), "all".
+        checked: Number of configurations that were checked along the path.
         reason: Why the robot waits or evades, or "".
     """
 
@@ -53,8 +53,8 @@ class Tick:
 
 
 @dataclass(slots=True, eq=False)
-class Run:
-    """A robot's way to its goal through a scene that changes.
+class ReplanRun:
+    """The record of a robot that moved to its goal through a scene that changes.
 
     Attributes:
         problem, robot, joint_names, planner, seed: What ran.
@@ -89,12 +89,12 @@ class Run:
 
     @property
     def configurations(self) -> Matrix:
-        """Where the robot is at the begin of each tick, shape (ticks, n)."""
+        """The robot's configuration at the begin of each tick, shape (ticks, n)."""
         return np.array([tick.q for tick in self.ticks])
 
     @property
     def length(self) -> float:
-        """Length of the way that was gone [rad, metres counted alike]."""
+        """Length of the motion [rad, metres counted alike]."""
         return route_length(self.configurations) if self.ticks else 0.0
 
     def count(self, event: str) -> int:
@@ -145,18 +145,18 @@ _HEADS: tuple[str, ...] = ("problem", "robot", "joint_names", "planner", "seed",
 _HEADS += ("speed_bound", "outcome", "reason")
 
 
-def load_run(path: str | os.PathLike[str]) -> Run:
-    """Read a record written by :meth:`Run.save`.
+def load_run(path: str | os.PathLike[str]) -> ReplanRun:
+    """Read a record written by :meth:`ReplanRun.save`.
 
     Raises:
         InputError: If the file is missing or malformed; the message names it.
     """
     try:
-        document = json_object(read_text(path, LARGEST), KIND, "ticks")
+        document = json_object(read_text(path, MAX_RECORD_BYTES), KIND, "ticks")
         heads = _heads(document)
         ticks = [_tick(entry, len(heads["joint_names"])) for entry in document["ticks"]]
         _check_times(ticks)
-        return Run(**heads, ticks=ticks)
+        return ReplanRun(**heads, ticks=ticks)
     except (KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{path}: not a whole record: {error!r}; write it again with rrtik replan --record") from None
     except InputError as error:
@@ -212,7 +212,7 @@ def _tick(entry: Mapping[str, Any], joints: int) -> Tick:
     )
 
 
-def _placed(values: Any, what: str) -> Vector:
+def _placed(values: ArrayLike, what: str) -> Vector:
     """x, y, z and a unit quaternion, as written."""
     row = finite_array(values, (7,), what)
     pose(row[:3], row[3:], what)

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+import time
+from dataclasses import dataclass, fields, replace
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.sections import parse
 from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_files.problem import ProblemFile, load_problem, problem_path
-from rrtik_ompl.replanning import Run, replan
-from rrtik_ompl.replanning.loop import GoalFeed
+from rrtik_ompl.problem_files.run import RunSection
+from rrtik_ompl.replanning import ReplanRun, ReplanSettings, replan_with
+from rrtik_ompl.replanning.feed import Source
+from rrtik_ompl.replanning.loop import Clock, GoalFeed
+from rrtik_ompl.replanning.settings import refuse_renamed
+from rrtik_ompl.robot import Robot
 from rrtik_ompl.trajectory.limits import RateLimits
+
+SETTINGS = {field.name for field in fields(ReplanSettings)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,17 +28,34 @@ class Scenario:
 
     Attributes:
         problem: Robot, scene with its motions, start and goal.
-        options: Keyword arguments of :func:`rrtik_ompl.replanning.replan`: step, rate, margin, ...
+        settings: Steps, ticks, distances and limits.
         goal_feed: A goal that moves, or None.
     """
 
     problem: Problem
-    options: Mapping[str, Any] = field(default_factory=dict)
+    settings: ReplanSettings
     goal_feed: GoalFeed | None = None
 
-    def run(self, **changes: Any) -> Run:
-        """Replan, with some options changed; see :func:`rrtik_ompl.replanning.replan`."""
-        return replan(self.problem, goal_feed=self.goal_feed, **{**self.options, **changes})
+    def run(  # noqa: D417 - three are described together
+        self,
+        scene_feed: Source | None = None,
+        *,
+        record: str | os.PathLike[str] | None = None,
+        clock: Clock = time.perf_counter,
+        **changes: object,
+    ) -> ReplanRun:
+        """Replan, with some settings changed; see :func:`rrtik_ompl.replanning.replan`.
+
+        Args:
+            scene_feed, record, clock: See :func:`rrtik_ompl.replanning.replan`.
+            changes: Attributes of :class:`rrtik_ompl.replanning.ReplanSettings` that differ from the scenario's.
+
+        Raises:
+            InputError: See :func:`rrtik_ompl.replanning.replan`.
+        """
+        refuse_renamed({name: value for name, value in changes.items() if name not in SETTINGS})
+        settings = replace(self.settings, **changes)  # type: ignore[arg-type]
+        return replan_with(settings, self.problem, scene_feed, goal_feed=self.goal_feed, record=record, clock=clock)
 
 
 def load_scenario(name_or_file: str | os.PathLike[str]) -> Scenario:
@@ -49,9 +71,23 @@ def load_scenario(name_or_file: str | os.PathLike[str]) -> Scenario:
     if entry is None:
         raise InputError(f"{path}: a scenario needs the key 'run'; add for instance  run: {{step: 0.05, rate: 50}}")
     problem = load_problem(path)
-    options = entry.options()
     with document.at(("run",)):
-        goal_feed = entry.goal_motion(problem.robot)
-        if entry.velocity is not None:
-            options["limits"] = RateLimits.of(problem.robot, velocity=entry.velocity)
-    return Scenario(problem, options, goal_feed)
+        return Scenario(problem, _settings(entry, problem.robot), entry.goal_motion(problem.robot))
+
+
+def _settings(entry: RunSection, robot: Robot) -> ReplanSettings:
+    """The settings of a file; what it leaves out is as in :class:`ReplanSettings`.
+
+    Raises:
+        InputError: If a setting does not fit the robot.
+    """
+    return ReplanSettings(
+        step=entry.step,
+        rate=entry.rate,
+        margin=entry.margin,
+        speed_bound=entry.speed_bound,
+        max_edge=entry.max_edge,
+        lookahead_ticks=entry.lookahead_ticks,
+        seconds=entry.seconds,
+        limits=None if entry.velocity is None else RateLimits.of(robot, velocity=entry.velocity),
+    )

@@ -1,14 +1,16 @@
-"""What a run keeps to, checked: steps, ticks, distances and limits."""
+"""How a robot replans: steps, ticks, distances and limits, checked once and frozen."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from rrtik_ompl.arrays import TAU, Vector, finite_array, positive, whole_number
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
+from rrtik_ompl.problem_files.run import RENAMED
 from rrtik_ompl.replanning.connecting import KERNELS, KernelCuts, PlainConnect
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
 from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
@@ -19,100 +21,134 @@ from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_ompl.world.moving_world import MovingWorld
 
 PLANNERS = ("drrt-con", "rrt-connect", "drrt")
-FASTEST = 1e5  # [Hz]
-SHORTEST = 1e-3  # of the usual eps: a path is looked at in pieces of half of it, which must fit into memory
-COPIES = 3  # places of an obstacle that are heeded at once where its motion is predicted
+MAX_RATE = 1e5  # [Hz]
+MIN_EDGE_SHARE = 1e-3  # of the usual max_edge: a path is checked in pieces of half of it, which must fit into memory
+PREDICTED_PLACES = 3  # places of an obstacle that are avoided at once where its motion is predicted
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Settings:
-    """See :func:`rrtik_ompl.replanning.replan`.
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ReplanSettings:
+    """How a robot replans.
 
     Attributes:
-        most: How far each joint can move in a tick [rad or m], shape (n,).
+        step: How far the robot goes in a tick [rad, metres counted alike], unless its joints are too slow.
+        rate: Ticks a second [Hz].
+        planner: One of ``PLANNERS``.
+        max_edge: Longest edge of the trees [as step]; what suits the robot's range if None.
+        margin: Distance to obstacles that is always kept [m].
+        speed_bound: No point of an obstacle is faster [m/s]. One that is gives a ``SpeedWarning``.
+        limits: Of the joints' speeds; those of the robot if None. Accelerations are not considered.
+        lookahead_ticks: Predict the obstacles' motion this many ticks ahead: they are avoided where they will be then
+            and half-way, by the motion that the scene states or else by their velocity. 0: no prediction, as
+            published.
+        seconds: Simulated time at most [s].
+        repair_budget: Time that a repair may take [s]; one tick if None.
+        seed: The same seed gives the same run, as long as no repair is cut short by its budget.
+
+    Raises:
+        InputError: If a number is out of range; it names the setting and the remedy.
+        UnknownNameError: If there is no planner of that name.
     """
 
     step: float
     rate: float
-    planner: str
-    eps: float
-    margin: float
-    speed_bound: float | None
-    most: Vector
-    predict: int
-    seconds: float
-    slot: float
-    seed: int
+    planner: str = "drrt-con"
+    max_edge: float | None = None
+    margin: float = 0.0
+    speed_bound: float | None = None
+    limits: RateLimits | None = None
+    lookahead_ticks: int = 0
+    seconds: float = 60.0
+    repair_budget: float | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.limits is not None:
+            require(self.limits, RateLimits, "limits", "use RateLimits(velocity, acceleration)")
+        if self.planner not in PLANNERS:
+            raise UnknownNameError("replanner", str(self.planner), PLANNERS)
+        rate = positive(self.rate, "rate", "give ticks a second, such as 50")
+        if rate > MAX_RATE:
+            raise InputError(f"rate must be {MAX_RATE:g} Hz or less, got {rate:g}")
+        checked: dict[str, float | None] = {"rate": rate}
+        checked |= {name: whole_number(getattr(self, name), name) for name in ("lookahead_ticks", "seed")}
+        margin = float(finite_array(self.margin, (), "margin"))
+        if margin < 0.0:
+            raise InputError(f"margin must not be negative, got {margin:g} m")
+        checked["margin"] = margin
+        for name, meaning in _POSITIVE.items():
+            value = getattr(self, name)
+            checked[name] = None if value is None and name in _OPTIONAL else positive(value, name, f"give {meaning}")
+        for name, number in checked.items():
+            object.__setattr__(self, name, number)
 
     @property
     def tick(self) -> float:
         """Length of a tick [s]."""
         return 1.0 / self.rate
 
+    @property
+    def repair_seconds(self) -> float:
+        """Time that a repair may take [s]."""
+        return self.tick if self.repair_budget is None else self.repair_budget
 
-def settings(
-    robot: Robot,
-    *,
-    step: float,
-    rate: float,
-    planner: str,
-    eps: float | None,
-    margin: float,
-    speed_bound: float | None,
-    limits: RateLimits | None,
-    predict: int,
-    seconds: float,
-    slot: float | None,
-    seed: int,
-) -> Settings:
-    """Check what a caller asks for.
+    def max_change(self, robot: Robot) -> Vector:
+        """How far each joint of a robot can move in a tick [rad or m], shape (n,).
+
+        Raises:
+            InputError: If the limits are for another number of joints.
+        """
+        rates = RateLimits.of(robot) if self.limits is None else self.limits.for_joints(robot.dof)
+        return rates.velocity / self.rate
+
+    def edge_length(self, robot: Robot) -> float:
+        """Longest edge of the trees for a robot [unit of the space].
+
+        Raises:
+            InputError: If ``max_edge`` is far too small for the robot's range.
+        """
+        lower, upper = (np.clip(ends, -TAU, TAU) for ends in (robot.lower, robot.upper))
+        usual, _ = connect_lengths(lower, upper, None, None)
+        if self.max_edge is None:
+            return usual
+        if self.max_edge < MIN_EDGE_SHARE * usual:
+            least = f"max_edge must be at least {MIN_EDGE_SHARE * usual:.3g}, got {self.max_edge:g}"
+            raise InputError(f"{least}; {usual:.3g} suits this robot")
+        return self.max_edge
+
+
+_POSITIVE = {
+    "step": "how far to go in a tick [rad or m]",
+    "max_edge": "the longest edge of the trees [rad or m]",
+    "speed_bound": "metres a second",
+    "seconds": "how long the run may last",
+    "repair_budget": "how long a repair may take [s]",
+}
+_OPTIONAL = ("max_edge", "speed_bound", "repair_budget")
+
+
+def refuse_renamed(options: Mapping[str, object]) -> None:
+    """Refuse settings by names that they no longer have.
 
     Raises:
-        InputError: If a number is out of range; it names the argument and the remedy.
-        UnknownNameError: If there is no planner of that name.
+        InputError: It names the old name and the new one.
+        TypeError: If a name never was one of a setting.
     """
-    if planner not in PLANNERS:
-        raise UnknownNameError("replanner", str(planner), PLANNERS)
-    frequency = positive(rate, "rate", "give ticks a second, such as 50")
-    if frequency > FASTEST:
-        raise InputError(f"rate must be {FASTEST:g} Hz or less, got {frequency:g}")
-    for value, name in ((predict, "predict"), (seed, "seed")):
-        whole_number(value, name)
-    distance = float(finite_array(margin, (), "margin"))
-    if distance < 0.0:
-        raise InputError(f"margin must not be negative, got {distance:g} m")
-    rates = RateLimits.of(robot) if limits is None else limits.for_joints(robot.dof)
-    lower, upper = (np.clip(ends, -TAU, TAU) for ends in (robot.lower, robot.upper))
-    usual, _ = connect_lengths(lower, upper, None, None)
-    return Settings(
-        step=positive(step, "step", "give how far to go in a tick [rad or m]"),
-        rate=frequency,
-        planner=planner,
-        eps=usual if eps is None else _long_enough(eps, usual),
-        margin=distance,
-        speed_bound=None if speed_bound is None else positive(speed_bound, "speed_bound", "give metres a second"),
-        most=rates.velocity / frequency,
-        predict=int(predict),
-        seconds=positive(seconds, "seconds", "give how long the run may last"),
-        slot=1.0 / frequency if slot is None else positive(slot, "slot", "give how long a repair may take [s]"),
-        seed=int(seed),
-    )
+    for name in options:
+        if name in RENAMED:
+            raise InputError(f"replan: '{name}' is now called '{RENAMED[name]}'; write {RENAMED[name]}=...")
+        raise TypeError(f"replan() got an unexpected keyword argument '{name}'")
 
 
-def planner_of(chosen: Settings, world: MovingWorld, lower: Vector, upper: Vector) -> DrrtCon:
+def make_planner(settings: ReplanSettings, world: MovingWorld, lower: Vector, upper: Vector) -> DrrtCon:
     """The replanner of the name, for a world and a box of configurations to sample in."""
-    if chosen.planner == SingleTree.name:
-        post = KernelCuts(world, chosen.seed) if has_kernels(world, *KERNELS) else None
-        return SingleTree(lower, upper, chosen.eps, chosen.seed, post=post)
-    forgetting, in_kernels = chosen.planner == FromScratch.name, has_kernels(world, *KERNELS)
-    if in_kernels:
-        return KernelDrrtCon(world, lower, upper, chosen.eps, chosen.seed, forgetting=forgetting)
+    edge, seed = settings.edge_length(world.robot), settings.seed
+    if settings.planner == SingleTree.name:
+        return SingleTree(
+            lower, upper, edge, seed, post=KernelCuts(world, seed) if has_kernels(world, *KERNELS) else None
+        )
+    forgetting = settings.planner == FromScratch.name
+    if has_kernels(world, *KERNELS):
+        return KernelDrrtCon(world, lower, upper, edge, seed, forgetting=forgetting)
     kind = FromScratch if forgetting else DrrtCon
-    return kind(PlainConnect(lower, upper, chosen.eps, chosen.seed), chosen.eps)
-
-
-def _long_enough(eps: float, usual: float) -> float:
-    number = positive(eps, "eps", "give the longest motion of the trees [rad or m]")
-    if number < SHORTEST * usual:
-        raise InputError(f"eps must be at least {SHORTEST * usual:.3g}, got {number:g}; {usual:.3g} suits this robot")
-    return number
+    return kind(PlainConnect(lower, upper, edge, seed), edge)

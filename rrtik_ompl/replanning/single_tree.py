@@ -1,7 +1,7 @@
 """The baseline of one tree: it grows from the goal, what has become blocked is trimmed, and it is grown again.
 
-Source: Ferguson, Kalra and Stentz 2006 (Replanning with RRTs), with the tree's root at the goal; as the DRRT-Con paper
-says of its predecessor, a sample is the robot's place with probability 0.4.
+Source: Ferguson, Kalra and Stentz, 2006 [8], with the tree's root at the goal; as [1, ch. 5.2] says of this method, a
+sample is the robot's configuration with probability 0.4.
 """
 
 from __future__ import annotations
@@ -17,24 +17,24 @@ from rrtik_ompl.search.rrt_connect import ConnectRules, extend
 from rrtik_ompl.search.tree import ConfigurationTree
 from rrtik_ompl.world.motion_queries import MotionQueries, Stop, no_stop
 
-TO_THE_ROBOT = 0.4  # probability
+ROBOT_PROBABILITY = 0.4  # of a sample at the robot's configuration
 
 
 class SingleTree(DrrtCon):
-    """DRRT: all edges of one tree are checked when the path is hit, branches behind blocked ones are trimmed.
+    """DRRT: when the path is blocked all edges of the tree are checked, and branches behind blocked ones are trimmed.
 
     Args:
         lower, upper: The box to sample in, shape (n,).
-        eps: See :class:`DrrtCon`.
+        max_edge: See :class:`DrrtCon`.
         seed: Of the samples.
         post: See :class:`DrrtCon`.
     """
 
     name: ClassVar[str] = "drrt"
 
-    def __init__(self, lower: Vector, upper: Vector, eps: float, seed: int, *, post: Post | None = None) -> None:
-        super().__init__(self, eps, post=post)
-        self._rules = ConnectRules(lower, upper, eps)
+    def __init__(self, lower: Vector, upper: Vector, max_edge: float, seed: int, *, post: Post | None = None) -> None:
+        super().__init__(self, max_edge, post=post)
+        self._rules = ConnectRules(lower, upper, max_edge)
         self._rng = np.random.default_rng(seed)
         self._tree: ConfigurationTree | None = None
         self.samples = 0
@@ -61,7 +61,7 @@ class SingleTree(DrrtCon):
             if stop():
                 return None
             self.samples += 1
-            at_robot = self._rng.random() < TO_THE_ROBOT
+            at_robot = self._rng.random() < ROBOT_PROBABILITY
             target = aim if at_robot else self._rng.uniform(self._rules.lower, self._rules.upper)
             new = extend(self._tree, target, self._rules, one_by_one(motions))
             if new is not None and (self._tree.rows[new] == aim).all():

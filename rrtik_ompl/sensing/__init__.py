@@ -1,9 +1,9 @@
 """What a camera sees of printed markers: detection, poses with their uncertainty, objects, scenes.
 
-OpenCV is imported in this room and in the one that draws over pictures, nowhere else. Frames are named in full:
+OpenCV is imported in this package, in ``overlay`` and in ``pilot``, nowhere else. Frames are named in full:
 ``T_camera_marker`` maps points of the marker to points of the camera (x right, y down, z away from it).
 """
 
 import os
 
-os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # read when OpenCV is imported; what matters is said by us, once
+os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # read when OpenCV is imported; our own errors say what matters

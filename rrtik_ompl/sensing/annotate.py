@@ -1,4 +1,4 @@
-"""What was seen, drawn into the picture: outlines, numbers, axes of objects and how far off they may be."""
+"""Detected objects drawn into the picture: outlines, numbers, axes and the uncertainty of their poses."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ AXES = ((0, 0, 255), (0, 200, 0), (255, 80, 0))  # x red, y green, z blue
 def annotated(
     picture: NDArray[np.uint8], camera: Camera, sightings: Sequence[Sighting], axis_length: float = 0.06
 ) -> NDArray[np.uint8]:
-    """A copy of a picture with everything that was seen in it. Shape (height, width, 3).
+    """A copy of a picture with every detected object. Shape (height, width, 3).
 
     Args:
         picture: Shape (height, width) or (height, width, 3).
-        camera: Who took it.
-        sightings: From `look`.
+        camera: Of the picture.
+        sightings: From `detect_objects`.
         axis_length: Of the drawn frames [m].
     """
     drawn: Any = np.array(picture if picture.ndim == 3 else cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR))

@@ -1,12 +1,10 @@
-"""From what the camera sees to where things are for the arm.
+"""From poses in the frame of the camera to poses in the frame of the arm's base.
 
-Source: AR sensing, section 1: ``T_camera_tip = T_camera_mount T_mount_base T_base_tip(q)``; with the base known from
-its mount (the camera rides with the arm) nothing but the target trembles, with a marker on it the arm does too.
+Source: [1, ch. 4]: ``T_camera_tip = T_camera_mount T_mount_base T_base_tip(q)``. Where the base is known from its mount
+(the camera moves with the arm), only the pose of the target is noisy; with a marker on the base, that of the arm too.
 """
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -21,11 +19,11 @@ class NoBaseError(InputError):
     """The base of the arm is not in view, so that nothing can be said in its frame."""
 
 
-def base_from_camera(marker_map: MarkerMap, sightings: tuple[Sighting, ...]) -> tuple[Any, Matrix]:
+def base_from_camera(marker_map: MarkerMap, sightings: tuple[Sighting, ...]) -> tuple[pin.SE3, Matrix]:
     """``T_base_camera`` and the covariance of the base's pose in the frame of the camera.
 
     Raises:
-        NoBaseError: If the base has markers and none of them is to be seen, or its pose is refused.
+        NoBaseError: If the base has markers and none of them is in view, or its pose is refused.
     """
     if marker_map.T_base_camera is not None:
         return marker_map.T_base_camera, np.zeros((6, 6))
@@ -38,7 +36,7 @@ def base_from_camera(marker_map: MarkerMap, sightings: tuple[Sighting, ...]) -> 
     raise NoBaseError(f"no marker of the base '{name}' is in view; turn the camera, or say camera_pose in the map")
 
 
-def place_in_base(T_base_camera: Any, base_covariance: Matrix, sight: Sighting) -> tuple[Any, Matrix]:
+def place_in_base(T_base_camera: pin.SE3, base_covariance: Matrix, sight: Sighting) -> tuple[pin.SE3, Matrix]:
     """``T_base_object`` and its covariance: position [m] and small rotation [rad] in the axes of the base, (6, 6).
 
     The error of the base's rotation counts with the distance between base and object as its lever arm.

@@ -1,4 +1,4 @@
-"""From what the camera saw to a problem that can be planned: its solids in the scene, a grasp ahead as the goal."""
+"""From detected objects to a planning problem: their solids in the scene, the approach to a grasp as the goal."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def grasp_problem(problem: Problem, seen: Iterable[SeenObject], name: str, kind:
     """From the start of a problem to where the approach to a grasp of a seen object begins.
 
     From there the tip goes straight along its own z axis, by the ``approach`` of the grasp type; that is not part of
-    the problem, so nothing may touch the object on the way. Solids that were seen have their margins.
+    the problem, so nothing may touch the object along the path. Solids of detected objects have their margins.
 
     Args:
         problem: Its robot, start and scene are kept.

@@ -1,4 +1,4 @@
-"""What a camera sees as a feed of `replan`: a scene for each picture, all with the same obstacles."""
+"""Pictures of a camera as a feed of `replan`: a scene for each picture, all with the same obstacles."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rrtik_ompl.sensing.cameras.pictures import Picture
 from rrtik_ompl.sensing.problem_from_view import scene_with
 from rrtik_ompl.sensing.sensor import Sensor
 
-REMEDY = "show every object of the marker map, or give the scene where it stands"
+REMEDY = "show every object of the marker map, or give the scene that holds it"
 
 
 def scene_feed(
@@ -23,9 +23,9 @@ def scene_feed(
 
     Args:
         pictures: In the order of time, such as ``pictures_from(source)``. The first that is used has the time 0.
-        sensor: Who looks at them. One that smooths lags behind what moves; ``Sensor(..., smooth=False)`` does not.
-        scene: What is there besides, none if None. An obstacle with the name of something in the map is where it says
-            until that is seen, and nobody waits for it.
+        sensor: Detects the objects. One that smooths lags behind motions; ``Sensor(..., smooth=False)`` does not.
+        scene: Further obstacles, none if None. An obstacle with the name of an object of the map has the pose that is
+            given here until that object is seen.
 
     Raises:
         InputError: If the pictures end before everything was seen; it names what was not. If a picture cannot be used.

@@ -1,11 +1,11 @@
-"""Objects seen become obstacles and goals: a scene in the frame of the arm's base, from one picture or several."""
+"""Detected objects become obstacles and goals: a scene in the frame of the arm's base, from one picture or several."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, finite_array
@@ -15,10 +15,10 @@ from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.frames import base_from_camera, place_in_base
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap
-from rrtik_ompl.sensing.sight import Sighting, look
+from rrtik_ompl.sensing.sight import Sighting, detect_objects
 from rrtik_ompl.shapes import HalfSpace
 
-SIGMAS = 3.0  # of an obstacle's place, that its margin covers
+SIGMAS = 3.0  # standard deviations of an obstacle's position that its margin covers
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,14 +27,14 @@ class SeenObject:
 
     Attributes:
         object: Which one.
-        T_base_object: Where it is.
+        T_base_object: Its pose.
         covariance: Of (position [m], small rotation about the axes of the base [rad]). Shape (6, 6).
-        sighting: What was seen of it; None if the pose was written down earlier.
+        sighting: Its detection; None if the pose is that of a record.
         sigmas: How many standard deviations of its place the margins of its solids cover; 0 for no margins.
     """
 
     object: MarkedObject
-    T_base_object: Any
+    T_base_object: pin.SE3
     covariance: Matrix
     sighting: Sighting | None
     sigmas: float = SIGMAS
@@ -69,7 +69,7 @@ class SeenObject:
             for name, each in zip(self.object.solid_names, self.object.solids, strict=True)
         )
 
-    def grasp_pose(self, kind: str, level: int) -> Any:
+    def grasp_pose(self, kind: str, level: int) -> pin.SE3:
         """``T_base_tip`` of a grasp.
 
         Raises:
@@ -85,12 +85,12 @@ def objects_in_base(
     """All objects with a pose that can be used, in the frame of the arm's base; the base itself is left out.
 
     Args:
-        sightings: What was seen.
-        marker_map: What it may be.
+        sightings: Detected objects.
+        marker_map: The map of all objects.
         sigmas: See :class:`SeenObject`.
 
     Raises:
-        NoBaseError: If nothing says where the base is.
+        NoBaseError: If the pose of the base is not known.
         InputError: If ``sigmas`` is not 0 or more.
     """
     T_base_camera, spread = base_from_camera(marker_map, sightings)
@@ -108,15 +108,15 @@ def scene_from_image(
 
     Args:
         picture: Shape (height, width) or (height, width, 3), 8 bits.
-        camera: Who took it.
-        marker_map: What may be there.
+        camera: Of the picture.
+        marker_map: The map of all objects.
         sigmas: How many standard deviations of where they are the margins cover.
 
     Raises:
-        NoBaseError: If nothing says where the base is.
+        NoBaseError: If the pose of the base is not known.
         InputError: If the picture cannot be used, or ``sigmas`` is not 0 or more.
     """
-    seen = objects_in_base(look(picture, camera, marker_map), marker_map, sigmas=sigmas)
+    seen = objects_in_base(detect_objects(picture, camera, marker_map), marker_map, sigmas=sigmas)
     return Scene(tuple(solid for each in seen for solid in each.solids()))
 
 

@@ -1,4 +1,4 @@
-"""A camera that is looked through over time: pictures in, tracked objects in the frame of the arm's base out."""
+"""A camera over time: pictures in, tracked objects in the frame of the arm's base out."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from rrtik_ompl.sensing.markers.corner_pose import CornerPose
 from rrtik_ompl.sensing.markers.detection import dictionaries_seen
 from rrtik_ompl.sensing.markers.marker_map import MarkerMap
 from rrtik_ompl.sensing.scene_from_view import SIGMAS, SeenObject, checked_sigmas, objects_in_base
-from rrtik_ompl.sensing.sight import Sighting, as_gray, look
+from rrtik_ompl.sensing.sight import Sighting, as_gray, detect_objects
 from rrtik_ompl.sensing.tracker import PoseTracker
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """What one picture shows.
+    """The objects in one picture.
 
     Attributes:
         picture: The picture.
-        camera: Who took it.
+        camera: Of the picture.
         seen: Every object of which a marker is in view, its pose smoothed over the pictures before.
         placed: Those with a usable pose, in the frame of the base.
         why_not_placed: Why there are none, if there is no base.
@@ -46,7 +46,7 @@ class View:
         """The solids of all placed objects.
 
         Raises:
-            NoBaseError: If nothing says where the base is.
+            NoBaseError: If the pose of the base is not known.
         """
         return Scene(tuple(solid for each in self.usable() for solid in each.solids()))
 
@@ -54,14 +54,14 @@ class View:
         """All placed objects.
 
         Raises:
-            NoBaseError: If nothing says where the base is.
+            NoBaseError: If the pose of the base is not known.
         """
         if self.why_not_placed:
             raise NoBaseError(self.why_not_placed)
         return self.placed
 
     def save_picture(self, path: Path) -> None:
-        """Write the picture with what was seen in it.
+        """Write the picture with the detected objects drawn in.
 
         Raises:
             InputError: If it cannot be written.
@@ -84,14 +84,14 @@ class View:
 
 
 class Sensor:
-    """Looks at pictures one after the other, and remembers what it saw."""
+    """Detects and tracks objects in one picture after the other."""
 
     def __init__(self, camera: Camera, marker_map: MarkerMap, *, smooth: bool = True, sigmas: float = SIGMAS) -> None:
-        """Start with nothing seen.
+        """Begin without objects.
 
         Args:
-            camera: Who takes the pictures.
-            marker_map: What may be seen.
+            camera: Of the pictures.
+            marker_map: The map of all objects.
             smooth: Smooth poses over time and leave out outliers.
             sigmas: How many standard deviations of their places the margins of obstacles cover; 0 for no margins.
 
@@ -103,12 +103,14 @@ class Sensor:
         self._blank: NDArray[np.uint8] | None = None  # the last picture in which nothing was found
 
     def view(self, picture: Picture) -> View:
-        """What a picture shows, later than the one before.
+        """The objects in a picture, which is later than the one before.
 
         Raises:
             InputError: If the picture does not have the camera's size, or times go backwards.
         """
-        seen = tuple(self._tracked(each, picture.time) for each in look(picture.pixels, self.camera, self.marker_map))
+        seen = tuple(
+            self._tracked(each, picture.time) for each in detect_objects(picture.pixels, self.camera, self.marker_map)
+        )
         if not seen:
             self._blank = picture.pixels
         try:
@@ -120,7 +122,7 @@ class Sensor:
     def why_nothing(self, source: str) -> str:
         """One line on why no object was seen in the last picture without one, with a remedy.
 
-        Looks for markers of all dictionaries, which takes as long as dozens of pictures.
+        Searches for markers of all dictionaries, which takes as long as dozens of pictures.
         """
         if self._blank is None:
             return f"{source}: markers of the map are in view, but none that says where the arm's base is"
@@ -176,5 +178,5 @@ def _data(sight: Sighting, place: SeenObject | None) -> dict[str, Any]:
     }
 
 
-def _pose_and_frame(sight: Sighting, place: SeenObject | None) -> tuple[Any, str]:
+def _pose_and_frame(sight: Sighting, place: SeenObject | None) -> tuple[pin.SE3, str]:
     return (sight.pose.T_camera_object, "camera") if place is None else (place.T_base_object, "base")

@@ -1,10 +1,9 @@
-"""From a picture to the poses of objects, each with its quality: what is not to be trusted is refused with a reason."""
+"""From a picture to the poses of objects, each with its quality; an unreliable pose is refused with a reason."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.sensing.cameras.camera import Camera
-from rrtik_ompl.sensing.markers.alignment import LEAST_LIKENESS
+from rrtik_ompl.sensing.markers.alignment import MIN_LIKENESS
 from rrtik_ompl.sensing.markers.corner_pose import (
     ALIGNED_SIGMA,
     ROUGH_SIGMA,
@@ -21,10 +20,10 @@ from rrtik_ompl.sensing.markers.corner_pose import (
     pose_of_square,
 )
 from rrtik_ompl.sensing.markers.detection import SeenMarker, find_markers
-from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap
+from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
 
-LEAST_SIDE = 12.0  # pixels: two a cell of the coarsest dictionaries
-MOST_ERROR = 2.0  # pixels between a corner and where its pose puts it; more is a wrong map or a wrong number
+MIN_SIDE_PIXELS = 12.0  # two a cell of the coarsest dictionaries
+MAX_REPROJECTION_ERROR = 2.0  # [pixels] of a corner; a larger one means a wrong map or a wrong number
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,15 +68,15 @@ def as_gray(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.asarray(cv2.cvtColor(np.ascontiguousarray(array), code), dtype=np.uint8)
 
 
-def look(
+def detect_objects(
     picture: NDArray[np.uint8], camera: Camera, marker_map: MarkerMap, *, align: bool = True
 ) -> tuple[Sighting, ...]:
     """The objects of a map that a picture shows, in the order of the map.
 
     Args:
         picture: Shape (height, width) or (height, width, 3), 8 bits.
-        camera: Who took it; its size must be the picture's.
-        marker_map: What may be there.
+        camera: Of the picture, with the same size.
+        marker_map: The map of all objects.
         align: Sharpen corners (`alignment`); costs about a millisecond a marker.
 
     Raises:
@@ -91,7 +90,7 @@ def look(
 
 
 def check_size(picture: NDArray[np.uint8], camera: Camera) -> None:
-    """Make sure that a camera may have taken a picture.
+    """Check that a picture has the size of a camera's.
 
     Raises:
         InputError: If the picture does not have the camera's size.
@@ -105,13 +104,13 @@ def check_size(picture: NDArray[np.uint8], camera: Camera) -> None:
 
 
 def sighting(camera: Camera, thing: MarkedObject, seen: Sequence[SeenMarker]) -> Sighting | None:
-    """What the markers that were seen say about one object; None if none of them is its own."""
+    """The sighting of one object by the markers in view; None if none of them is on it."""
     mounted = {marker.number: marker for marker in thing.markers}
     own = tuple(marker for marker in seen if marker.number in mounted)
-    usable = [marker for marker in own if marker.side >= LEAST_SIDE] or list(own)
+    usable = [marker for marker in own if marker.side >= MIN_SIDE_PIXELS] or list(own)
     if not own:
         return None
-    sharp = [marker for marker in usable if marker.likeness >= LEAST_LIKENESS]
+    sharp = [marker for marker in usable if marker.likeness >= MIN_LIKENESS]
     sigma = ALIGNED_SIGMA if sharp else ROUGH_SIGMA
     usable = sharp or usable
     if len(usable) == 1:
@@ -122,7 +121,7 @@ def sighting(camera: Camera, thing: MarkedObject, seen: Sequence[SeenMarker]) ->
     return Sighting(thing, pose, own, _refusal(pose, usable))
 
 
-def _of_one(camera: Camera, marker: SeenMarker, mounted: Any, sigma: float) -> CornerPose:
+def _of_one(camera: Camera, marker: SeenMarker, mounted: MountedMarker, sigma: float) -> CornerPose:
     """The pose of the object from that of its only visible marker."""
     found = pose_of_square(camera, marker.corners, mounted.side, sigma)
     T_marker_object = mounted.T_object_marker.inverse()
@@ -136,11 +135,11 @@ def _of_one(camera: Camera, marker: SeenMarker, mounted: Any, sigma: float) -> C
 
 def _refusal(pose: CornerPose, markers: Sequence[SeenMarker]) -> str:
     side = max(marker.side for marker in markers)
-    if side < LEAST_SIDE:
-        return f"too far away or too small: {side:.0f} pixels a side, {LEAST_SIDE:.0f} are needed"
+    if side < MIN_SIDE_PIXELS:
+        return f"too far away or too small: {side:.0f} pixels a side, {MIN_SIDE_PIXELS:.0f} are needed"
     likeness = max(marker.likeness for marker in markers)
-    if likeness < LEAST_LIKENESS:
-        return f"covered or blurred: {likeness:.2f} like the marker, {LEAST_LIKENESS:g} is needed; free it, hold still"
-    if pose.error > MOST_ERROR:
+    if likeness < MIN_LIKENESS:
+        return f"covered or blurred: {likeness:.2f} like the marker, {MIN_LIKENESS:g} is needed; free it, hold still"
+    if pose.error > MAX_REPROJECTION_ERROR:
         return f"corners lie {pose.error:.1f} pixels off: check the marker map, the side of the markers and the camera"
     return ""

@@ -1,13 +1,12 @@
-"""Poses over time: the right one of two is kept, outliers are left out, trembling is smoothed without lag.
+"""Poses over time: the right one of two is chosen, outliers are left out, noise is smoothed without lag.
 
-Smoothing is the one-euro filter (Casiez, Roussel and Vogel, CHI 2012): the faster something moves, the less it is
+Smoothing is the one-euro filter (Casiez, Roussel and Vogel, 2012 [53]): the faster an object moves, the less it is
 smoothed.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -18,14 +17,14 @@ from rrtik_ompl.sensing.markers.corner_pose import ALIGNED_SIGMA, CornerPose, tu
 from rrtik_ompl.sensing.sight import Sighting
 
 OUTLIER_LIMIT = 5.0  # standard deviations
-MOST_SPEED = 1.0  # [m/s]: what may have moved between two pictures is no outlier
-MOST_TURN = 2.0  # [rad/s]
-USUAL_TURN = 0.5  # [rad/s]: poses of one branch in two pictures differ by that, and by twice their uncertainty
-PATIENCE = 3  # as many outliers in a row are the new truth
-MEMORY = 0.75  # of the logarithm of what was believed, from picture to picture
-MOST_ODDS = 3.0  # that a single doubtful picture may speak for one of two poses
-TO_SWITCH = 0.8  # belief that the other pose needs; more than one picture can give it, starting from evens
-SURE = 0.99  # more than doubtful pictures can give, however many: errors of lens and blur repeat themselves
+MAX_SPEED = 1.0  # [m/s]: a motion below it between two pictures is no outlier
+MAX_TURN_RATE = 2.0  # [rad/s]
+BRANCH_TURN_RATE = 0.5  # [rad/s]: poses of one branch in two pictures differ by that, and by twice their uncertainty
+MAX_OUTLIERS = 3  # in a row; after as many the new pose is taken
+BELIEF_MEMORY = 0.75  # share of the logarithm of the belief that is kept from picture to picture
+MAX_ODDS = 3.0  # that a single doubtful picture gives to one of two poses
+SWITCH_BELIEF = 0.8  # that the other pose needs to be taken; more than one picture gives, starting from even odds
+CERTAIN_BELIEF = 0.99  # more than any number of doubtful pictures gives: errors of lens and blur repeat themselves
 
 
 @dataclass(slots=True)
@@ -69,7 +68,7 @@ class OneEuro:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tracked:
-    """What a tracker makes of a sighting.
+    """A tracked pose.
 
     Attributes:
         T_camera_object: The smoothed pose; that of before if the sighting was an outlier.
@@ -78,14 +77,14 @@ class Tracked:
         sure: This picture, or those before it, leave no doubt which of two poses is the right one.
     """
 
-    T_camera_object: Any
+    T_camera_object: pin.SE3
     outlier: bool
     other_branch: bool
     sure: bool
 
 
 class PoseTracker:
-    """Follows one object through pictures with times.
+    """Tracks one object through pictures with times.
 
     Where a picture fits two poses, both are followed. Each has a share of belief, which passes from the poses of one
     picture to the nearest ones of the next and grows for the pose that has less error, as in a hidden Markov model
@@ -94,7 +93,7 @@ class PoseTracker:
     """
 
     def __init__(self, cutoff: float = 0.5, gain: float = 5.0) -> None:
-        """Start with nothing seen.
+        """Begin without a pose.
 
         Args:
             cutoff: Of the one-euro filters at rest [Hz].
@@ -102,14 +101,14 @@ class PoseTracker:
         """
         self._place, self._turn = OneEuro(cutoff, gain), OneEuro(cutoff, gain)
         self._time = -np.inf
-        self._branches: list[Any] = []  # poses of the last sighting, not smoothed
+        self._branches: list[pin.SE3] = []  # poses of the last sighting, not smoothed
         self._belief: Vector = np.ones(0)  # in each of them
-        self._last: Any | None = None  # the one of them that is followed
-        self._origin: Any | None = None  # rotations are smoothed as vectors about this one
+        self._last: pin.SE3 | None = None  # the one of them that is followed
+        self._origin: pin.SE3 | None = None  # rotations are smoothed as vectors about this one
         self._strays = 0
 
     def update(self, sight: Sighting, time: float) -> Tracked:
-        """Take a sighting at a time [s].
+        """Update by a sighting at a time [s].
 
         Raises:
             InputError: If times do not increase.
@@ -120,10 +119,10 @@ class PoseTracker:
         branches = [pose.T_camera_object, pose.other] if pose.ambiguous else [pose.T_camera_object]
         belief = self._believed(branches, np.array([pose.error, pose.other_error])[: len(branches)], pose, seconds)
         taken, switched = self._taken(branches, belief)
-        settled = not self._sure(self._belief) and self._sure(belief)  # a wrong guess may have been followed until now
+        settled = not self._sure(self._belief) and self._sure(belief)  # a wrong pose may have been tracked until now
         outlier = not switched and self._is_outlier(branches[taken], sight, seconds)
         self._strays = self._strays + 1 if outlier else 0
-        if outlier and not settled and self._strays < PATIENCE:
+        if outlier and not settled and self._strays < MAX_OUTLIERS:
             return Tracked(self._smooth_pose(), True, taken == 1, self._sure(self._belief))
         if outlier or switched:
             self._place.restart()
@@ -131,43 +130,43 @@ class PoseTracker:
         self._time, self._branches, self._belief, self._last = time, branches, belief, branches[taken]
         return Tracked(self._smoothed(branches[taken], seconds), False, taken == 1, self._sure(belief))
 
-    def _believed(self, branches: list[Any], errors: Vector, pose: CornerPose, seconds: float) -> Vector:
-        """How far each pose of a new sighting is believed to be the true one; sums to 1."""
+    def _believed(self, branches: list[pin.SE3], errors: Vector, pose: CornerPose, seconds: float) -> Vector:
+        """Belief that each pose of a new sighting is the true one; sums to 1."""
         prior = np.ones(len(branches))
         if self._branches:
-            reach = np.hypot(2.0 * pose.rotation_sigma, USUAL_TURN * seconds)
+            reach = np.hypot(2.0 * pose.rotation_sigma, BRANCH_TURN_RATE * seconds)
             apart = np.array([[turn_between(before, now) for now in branches] for before in self._branches])
-            passed = 1.0 / (1.0 + (apart / reach) ** 2)  # much farther than usual is rare, not impossible
-            before = self._belief**MEMORY
+            passed = 1.0 / (1.0 + (apart / reach) ** 2)  # a much larger change is rare, not impossible
+            before = self._belief**BELIEF_MEMORY
             prior = before / before.sum() @ (passed / passed.sum(axis=1, keepdims=True))
         squares = errors**2 + ALIGNED_SIGMA**2
-        belief = prior / np.minimum(squares / squares.min(), MOST_ODDS)
+        belief = prior / np.minimum(squares / squares.min(), MAX_ODDS)
         return np.asarray(belief / belief.sum())
 
-    def _taken(self, branches: list[Any], belief: Vector) -> tuple[int, bool]:
+    def _taken(self, branches: list[pin.SE3], belief: Vector) -> tuple[int, bool]:
         """Which pose is followed, and whether it does not go on from the one that was followed until now."""
         best = int(belief.argmax())
         if self._last is None:
             return best, False
         next_one = int(np.argmin([turn_between(self._last, each) for each in branches]))
-        switched = best != next_one and belief[best] > TO_SWITCH
+        switched = best != next_one and belief[best] > SWITCH_BELIEF
         return (best if switched else next_one), switched
 
     @staticmethod
     def _sure(belief: Vector) -> bool:
-        return len(belief) > 0 and bool(belief.max() >= SURE)
+        return len(belief) > 0 and bool(belief.max() >= CERTAIN_BELIEF)
 
-    def _is_outlier(self, pose: Any, sight: Sighting, seconds: float) -> bool:
+    def _is_outlier(self, pose: pin.SE3, sight: Sighting, seconds: float) -> bool:
         if self._last is None:
             return False
         shift = float(np.linalg.norm(pose.translation - self._last.translation))
         turn = turn_between(self._last, pose)
         return (
-            shift > OUTLIER_LIMIT * sight.pose.position_sigma + MOST_SPEED * seconds
-            or turn > OUTLIER_LIMIT * sight.pose.rotation_sigma + MOST_TURN * seconds
+            shift > OUTLIER_LIMIT * sight.pose.position_sigma + MAX_SPEED * seconds
+            or turn > OUTLIER_LIMIT * sight.pose.rotation_sigma + MAX_TURN_RATE * seconds
         )
 
-    def _smoothed(self, pose: Any, seconds: float) -> Any:
+    def _smoothed(self, pose: pin.SE3, seconds: float) -> pin.SE3:
         if self._origin is None or np.linalg.norm(pin.log3(self._origin.T @ pose.rotation)) > 1.0:
             self._origin = pose.rotation.copy()
             self._turn.restart()
@@ -175,7 +174,7 @@ class PoseTracker:
         self._turn(pin.log3(self._origin.T @ pose.rotation), seconds)
         return self._smooth_pose()
 
-    def _smooth_pose(self) -> Any:
+    def _smooth_pose(self) -> pin.SE3:
         origin = np.eye(3) if self._origin is None else self._origin
         return pin.SE3(origin @ pin.exp3(self._turn.value), self._place.value.copy())
 

@@ -1,4 +1,4 @@
-"""From a path to a timed motion: a path and limits in, a trajectory out that keeps the limits everywhere."""
+"""Time parameterisation: a path and limits in, a trajectory out that keeps the limits everywhere."""
 
 from __future__ import annotations
 
@@ -16,13 +16,15 @@ from rrtik_ompl.trajectory.motion import Peaks, State, Trajectory, load_trajecto
 from rrtik_ompl.trajectory.pieces import joined
 from rrtik_ompl.world import World
 
-__all__ = ["Peaks", "RateLimits", "State", "Trajectory", "load_trajectory", "timed"]
+__all__ = ["Peaks", "RateLimits", "State", "Trajectory", "load_trajectory", "time_parameterize"]
 
-SLOWINGS = 10  # one is enough but for rounding errors in motions of very short phases
-ROUNDS = 4  # of making rounded corners smaller all together, before none is rounded
+MAX_SLOWINGS = 10  # one is enough except for rounding errors in motions of very short phases
+MAX_ROUNDINGS = 4  # attempts with smaller and smaller rounded corners, before none is rounded
 
 
-def timed(path: JointPath, limits: RateLimits | Robot, *, blend: float = 0.0, world: World | None = None) -> Trajectory:
+def time_parameterize(
+    path: JointPath, limits: RateLimits | Robot, *, blend: float = 0.0, world: World | None = None
+) -> Trajectory:
     """Give a path its times: as fast as the limits allow, beginning and ending at rest.
 
     Without ``blend`` the motion stays on the path to 1e-9 and stops at every corner; between two corners it has the
@@ -36,7 +38,7 @@ def timed(path: JointPath, limits: RateLimits | Robot, *, blend: float = 0.0, wo
 
     Args:
         path: A valid path. Waypoints that coincide or lie on a line are no corners.
-        limits: Or a robot, whose limits are taken (see :meth:`RateLimits.of` for those that it does not say).
+        limits: Or a robot, whose limits are taken (see :meth:`RateLimits.of` for those that it does not have).
         blend: Largest distance of a corner from the beginning of its rounding [rad or m]; 0 keeps to the path.
         world: For a blend: what the rounded corners must not touch.
 
@@ -63,7 +65,7 @@ def timed(path: JointPath, limits: RateLimits | Robot, *, blend: float = 0.0, wo
         raise InputError("a path with rounded corners leaves the checked one: pass world=problem.world, to check it")
     require(world, World, "world of a path with rounded corners")
     rounded = rounding(corners, reach, world)
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDINGS):
         found = _timed(path, corners, rounded, bounds)
         if found.duration >= stopping.duration:
             return stopping
@@ -90,7 +92,7 @@ def _timed(path: JointPath, corners: Matrix, rounded: Vector, limits: RateLimits
         for run in runs(corners, rounded)
     ]
     found = joined(parts, path)
-    for _ in range(SLOWINGS):
+    for _ in range(MAX_SLOWINGS):
         peaks = found.peaks()
         factor = limits.slowing(peaks.velocity, peaks.acceleration, None if rounded.any() else peaks.jerk)
         if factor == 1.0:

@@ -1,19 +1,20 @@
-"""What a path is to a clock: corners at which it stops, and runs between them, straight or with rounded corners."""
+"""Splits a path into stops and blended segments for time parameterisation."""
 
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.world import World
 
-NEAR = 1e-10  # [rad] or [m]; waypoints this close to the last one, or to a straight line, are left out
-ROUNDED = 2.5  # length of a rounded corner's parameter over its distance to the corner, see _corner
-SHARPEST = -0.98  # cosine between the directions before and after; nearer to a turn back, a corner is not rounded
-TRIES = 7  # halvings of a rounded corner that touches something, before it is left sharp
+COINCIDENCE = 1e-10  # [rad] or [m]; waypoints closer to the last one, or to a straight line, are left out
+CURVE_LENGTH_RATIO = 2.5  # length of a rounded corner's parameter over its distance to the corner, see _corner
+MIN_CORNER_COSINE = -0.98  # between the directions before and after; a corner with a smaller one is not rounded
+MAX_HALVINGS = 7  # of a rounded corner that touches something, before it is left sharp
 
 
 class Curve(NamedTuple):
@@ -25,14 +26,14 @@ class Curve(NamedTuple):
     """
 
     lengths: Vector
-    points: Any
+    points: NDArray[np.float64]
 
 
 def vertices(waypoints: Matrix) -> Matrix:
     """The waypoints between which a path is straight, to 1e-10: those that coincide or lie on a line are left out."""
     distinct = [0]
     for k in range(1, len(waypoints)):
-        if np.linalg.norm(waypoints[k] - waypoints[distinct[-1]]) > NEAR:
+        if np.linalg.norm(waypoints[k] - waypoints[distinct[-1]]) > COINCIDENCE:
             distinct.append(k)
     if len(distinct) > 1:
         distinct[-1] = len(waypoints) - 1
@@ -49,16 +50,16 @@ def rounding(corners: Matrix, reach: float, world: World) -> Vector:
     Args:
         corners: The vertices, shape (k, n).
         reach: Largest distance [rad or m] between a corner and the beginning of its curve.
-        world: Judges the curves, by its second check.
+        world: Checks the curves, by its second check.
     """
     edges = np.diff(corners, axis=0)
     lengths = np.linalg.norm(edges, axis=1)
     along = edges / lengths[:, None]
     cosines = (along[1:] * along[:-1]).sum(axis=1)
     found: Vector = np.minimum(reach, 0.5 * np.minimum(lengths[1:], lengths[:-1]))
-    found[cosines < SHARPEST] = 0.0
+    found[cosines < MIN_CORNER_COSINE] = 0.0
     for k in np.flatnonzero(found):
-        for _ in range(TRIES):
+        for _ in range(MAX_HALVINGS):
             if _free(_corner(corners[k : k + 3], found[k]), world):
                 break
             found[k] *= 0.5
@@ -86,10 +87,10 @@ def _curve(corners: Matrix, rounded: Vector) -> Curve:
     at = corners[0]
     for k, reach in enumerate(rounded):
         corner = _corner(corners[k : k + 3], reach)
-        if (gap := float(np.linalg.norm(corner[0] - at))) > NEAR:
+        if (gap := float(np.linalg.norm(corner[0] - at))) > COINCIDENCE:
             lengths.append(gap)
             points.append(np.linspace(at, corner[0], 6))
-        lengths.append(ROUNDED * float(reach))
+        lengths.append(CURVE_LENGTH_RATIO * float(reach))
         points.append(corner)
         at = corner[-1]
     lengths.append(float(np.linalg.norm(corners[-1] - at)))
@@ -111,8 +112,8 @@ def _corner(three: Matrix, reach: float) -> Matrix:
 
 def _free(control: Matrix, world: World) -> bool:
     """Whether the curve of these control points passes the second check."""
-    way = float(np.abs(np.diff(control, axis=0)).sum(axis=0) @ world.weights)
-    x = np.linspace(0.0, 1.0, 2 + int(np.ceil(2.0 * way / world.motion_resolution)))[:, None]
+    travel = float(np.abs(np.diff(control, axis=0)).sum(axis=0) @ world.weights)
+    x = np.linspace(0.0, 1.0, 2 + int(np.ceil(2.0 * travel / world.motion_resolution)))[:, None]
     weights = np.array([1.0, 5.0, 10.0, 10.0, 5.0, 1.0]) * x ** np.arange(6) * (1.0 - x) ** np.arange(5, -1, -1)
     return bool(world.certify(weights @ control).all())
 
@@ -121,8 +122,8 @@ def _on_line(rows: Matrix) -> bool:
     """Whether all points lie between the first and the last, on their line and in this order."""
     chord = rows[-1] - rows[0]
     length = float(np.linalg.norm(chord))
-    if length <= NEAR:
+    if length <= COINCIDENCE:
         return False
     shares = (rows - rows[0]) @ chord / length**2
     apart = np.linalg.norm(rows - rows[0] - shares[:, None] * chord, axis=1)
-    return bool(apart.max() <= NEAR and (np.diff(shares) > 0.0).all())
+    return bool(apart.max() <= COINCIDENCE and (np.diff(shares) > 0.0).all())

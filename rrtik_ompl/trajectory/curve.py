@@ -1,15 +1,16 @@
 """Along a curve from rest to rest in the shortest time under velocity and acceleration limits, by toppra.
 
-Source: H. Pham and Q.-C. Pham, A New Approach to Time-Optimal Path Parameterization Based on Reachability Analysis,
-2018.
+Source: H. Pham and Q.-C. Pham, "A new approach to time-optimal path parameterization based on reachability analysis",
+IEEE Transactions on Robotics 34(3), 2018.
 """
 
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.errors import PlannerError
@@ -17,7 +18,10 @@ from rrtik_ompl.trajectory.corners import Curve
 from rrtik_ompl.trajectory.limits import RateLimits
 from rrtik_ompl.trajectory.pieces import Pieces
 
-STEPS = 80  # grid steps of each piece of a curve
+if TYPE_CHECKING:
+    from toppra.interpolator import AbstractGeometricPath
+
+STEPS_PER_PIECE = 80  # grid steps of each piece of a curve
 
 
 def along_curve(curve: Curve, limits: RateLimits) -> Pieces:
@@ -30,7 +34,7 @@ def along_curve(curve: Curve, limits: RateLimits) -> Pieces:
     """
     path = _path(curve)
     ends = np.concatenate([np.zeros(1), np.cumsum(curve.lengths)])
-    shares = np.arange(STEPS) / STEPS
+    shares = np.arange(STEPS_PER_PIECE) / STEPS_PER_PIECE
     inside = [begin + (end - begin) * shares for begin, end in pairwise(ends)]
     grid = np.append(np.concatenate(inside), ends[-1])
     speeds = _speeds(path, grid, limits)
@@ -42,7 +46,7 @@ def along_curve(curve: Curve, limits: RateLimits) -> Pieces:
     return Pieces(durations, positions[:-1], velocities[:-1], accelerations)
 
 
-def _speeds(path: Any, grid: Vector, limits: RateLimits) -> Vector:
+def _speeds(path: AbstractGeometricPath, grid: Vector, limits: RateLimits) -> Vector:
     """Speed of the parameter at the points of the grid, 0 at both ends."""
     from toppra.algorithm import TOPPRA
     from toppra.constraint import DiscretizationType, JointAccelerationConstraint, JointVelocityConstraint
@@ -59,8 +63,8 @@ def _speeds(path: Any, grid: Vector, limits: RateLimits) -> Vector:
     return found
 
 
-def _path(curve: Curve) -> Any:
-    """The curve as toppra asks for it: values and derivatives at many places, as of scipy's Bernstein polynomials."""
+def _path(curve: Curve) -> AbstractGeometricPath:
+    """The curve in toppra's interface: values and derivatives at many places, by scipy's Bernstein polynomials."""
     from scipy.interpolate import BPoly
     from toppra.interpolator import AbstractGeometricPath
 
@@ -72,7 +76,8 @@ def _path(curve: Curve) -> Any:
         dof = curve.points.shape[2]
         path_interval = ends[[0, -1]]
 
-        def __call__(self, places: Any, order: int = 0) -> Any:
-            return orders[order](places)
+        def __call__(self, places: ArrayLike, order: int = 0) -> NDArray[np.float64]:
+            values: NDArray[np.float64] = orders[order](places)
+            return values
 
     return Path()

@@ -11,11 +11,14 @@ from rrtik_ompl.arrays import Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.robot import Robot
 
-TURNING, SLIDING = 0.5, 0.1  # [rad/s], [m/s]: velocity of a joint whose robot says none; slow enough to be watched
-RAMP = 0.5  # [s] in which a joint whose robot says no acceleration comes to its full velocity
-ONSET = 0.1  # [s] in which a joint whose robot says no jerk comes to its full acceleration
+DEFAULT_TURN_RATE, DEFAULT_SLIDE_RATE = (
+    0.5,
+    0.1,
+)  # [rad/s], [m/s]: of a joint without a velocity limit; slow enough to watch
+RAMP_SECONDS = 0.5  # in which a joint without an acceleration limit reaches its full velocity
+ONSET_SECONDS = 0.1  # in which a joint without a jerk limit reaches its full acceleration
 
-A_HAIR = 1.0 + 1e-12  # so that a motion slowed to a limit does not exceed it by rounding
+ROUNDING_MARGIN = 1.0 + 1e-12  # so that a motion slowed to a limit does not exceed it by rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,8 +62,8 @@ class RateLimits:
     ) -> RateLimits:
         """The limits of a robot, or those given instead.
 
-        What neither the robot nor the caller says is a default: 0.5 rad/s or 0.1 m/s; the acceleration that reaches
-        the velocity in 0.5 s; the jerk that reaches the acceleration in 0.1 s.
+        Limits that neither the robot nor the caller gives have defaults: 0.5 rad/s or 0.1 m/s; the acceleration that
+        reaches the velocity in 0.5 s; the jerk that reaches the acceleration in 0.1 s.
 
         Args:
             robot: Whose limits hold.
@@ -76,10 +79,10 @@ class RateLimits:
         part = float(finite_array(share, (), "share of the limits"))
         if not 0.0 < part <= 1.0:
             raise InputError(f"share of the limits must be greater than 0 and at most 1, got {part:g}")
-        plain = np.where(robot.prismatic, SLIDING, TURNING)
+        plain = np.where(robot.prismatic, DEFAULT_SLIDE_RATE, DEFAULT_TURN_RATE)
         v = _of_robot(robot, velocity, "velocity", robot.velocity, plain)
-        a = _of_robot(robot, acceleration, "acceleration", robot.acceleration, v / RAMP)
-        j = _of_robot(robot, jerk, "jerk", robot.jerk, a / ONSET)
+        a = _of_robot(robot, acceleration, "acceleration", robot.acceleration, v / RAMP_SECONDS)
+        j = _of_robot(robot, jerk, "jerk", robot.jerk, a / ONSET_SECONDS)
         return cls(part * v, part * a, part * j)
 
     def along(self, direction: Vector) -> tuple[float, float, float]:
@@ -106,7 +109,7 @@ class RateLimits:
             limited = np.isfinite(self.jerk)
             shares.append((jerk[limited] / self.jerk[limited]).max(initial=0.0))
         factors = [float(share) ** (1.0 / power) for power, share in enumerate(shares, start=1)]
-        return 1.0 if max(shares) <= 1.0 else max(factors) * A_HAIR
+        return 1.0 if max(shares) <= 1.0 else max(factors) * ROUNDING_MARGIN
 
 
 def _row(values: ArrayLike, name: str) -> Vector:

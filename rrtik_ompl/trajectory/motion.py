@@ -15,12 +15,12 @@ from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.files.text import read_text, write_text
 from rrtik_ompl.path import VERIFICATION_DENSITY, JointPath
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.trajectory.text import decoded, encoded, trajectory_format
+from rrtik_ompl.trajectory.text import dumps, loads, trajectory_format
 from rrtik_ompl.units import joint_units
 from rrtik_ompl.world import World
 
-FIT = 1e-8  # [rad] or [m]; how well a knot and the cubic that leads to it must agree
-JUMP = 1e-6  # of the largest acceleration; a larger difference between two pieces is a jump, its jerk infinite
+FIT_TOLERANCE = 1e-8  # [rad] or [m]; between a knot and the end of the cubic that leads to it
+JUMP_SHARE = 1e-6  # of the largest acceleration; a larger difference between two pieces is a jump, its jerk infinite
 
 
 class State(NamedTuple):
@@ -96,7 +96,7 @@ class Trajectory:
         else:
             bends = finite_array(accelerations, rows.shape, "trajectory accelerations")
             apart = np.abs(_ends(clock, rows, rates, bends) - rows[1:]).max(axis=1)
-            if apart.max() > FIT * max(1.0, np.abs(rates).max()):
+            if apart.max() > FIT_TOLERANCE * max(1.0, np.abs(rates).max()):
                 raise InputError(
                     f"trajectory: point {int(apart.argmax()) + 2} is {apart.max():.2g} away from where the point "
                     "before it leads; leave the accelerations out to have positions and velocities decide"
@@ -118,7 +118,7 @@ class Trajectory:
     def __call__(self, t: ArrayLike) -> State:
         """Positions, velocities and accelerations at a time [s], or at many: shape (n,), or (k, n) for t of shape (k,).
 
-        Before its beginning and after its end the arm stands still.
+        Before its beginning and after its end the arm does not move.
 
         Raises:
             InputError: If a time is not finite.
@@ -151,8 +151,8 @@ class Trajectory:
         ends = a[:-1] + h * j
         smooth = np.abs(ends - a[1:]) <= self._noise(h)
         acceleration = np.abs(np.vstack([a, np.where(smooth, 0.0, ends)])).max(axis=0)
-        jump = JUMP * acceleration.max()
-        rest = np.abs(a[[0, -1]]) <= jump  # before its beginning and after its end the arm stands still
+        jump = JUMP_SHARE * acceleration.max()
+        rest = np.abs(a[[0, -1]]) <= jump  # before its beginning and after its end the arm does not move
         smooth |= np.abs(ends - a[1:]) <= jump
         jerk = np.where(smooth.all(axis=0) & rest.all(axis=0), np.abs(np.diff(a, axis=0) / h).max(axis=0), np.inf)
         return Peaks(velocity, acceleration, jerk)
@@ -180,7 +180,7 @@ class Trajectory:
     def faults(self, world: World) -> tuple[str, ...]:
         """Check the motion itself, not the path it was made from, densely and independently of planners.
 
-        Each piece is looked at in steps in which no point of the arm moves more than half of the world's motion
+        Each piece is checked in steps in which no point of the arm moves more than half of the world's motion
         resolution, by :meth:`World.certify`.
 
         Returns:
@@ -216,7 +216,7 @@ class Trajectory:
         units = joint_units(self.prismatic)
         columns = (self.times, self.positions, self.velocities, self.accelerations)
         points = [column.tolist() for column in columns]
-        write_text(file, encoded(self.robot_name, self.joint_names, units, points, trajectory_format(file)))
+        write_text(file, dumps(self.robot_name, self.joint_names, units, points, trajectory_format(file)))
 
     def _names(self) -> dict[str, Any]:
         return {"joint_names": self.joint_names, "prismatic": self.prismatic, "robot_name": self.robot_name}
@@ -238,7 +238,7 @@ def load_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) ->
     require(robot, Robot | None, "robot of a trajectory", "use load_robot(name)")
     ending = trajectory_format(file)
     try:
-        document = decoded(read_text(file), ending)
+        document = loads(read_text(file), ending)
         found = _from_document(document, robot)
         if robot is not None and found.joint_names != robot.joint_names:
             own, wanted = ", ".join(found.joint_names), ", ".join(robot.joint_names)

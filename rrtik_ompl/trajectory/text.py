@@ -31,7 +31,7 @@ def trajectory_format(path: str | os.PathLike[str]) -> str:
     return ending
 
 
-def encoded(robot: str, names: Sequence[str], units: Sequence[str], columns: Sequence[list[Any]], ending: str) -> str:
+def dumps(robot: str, names: Sequence[str], units: Sequence[str], columns: Sequence[list[Any]], ending: str) -> str:
     """Text of a trajectory; ``columns`` are times (m) and positions, velocities and accelerations (m, n)."""
     if ending == ".json":
         points = [
@@ -48,8 +48,8 @@ def encoded(robot: str, names: Sequence[str], units: Sequence[str], columns: Seq
     return text.getvalue()
 
 
-def decoded(text: str, ending: str) -> dict[str, Any]:
-    """What :func:`encoded` wrote: ``times`` and ``FIELDS`` (accelerations may be None), ``joint_names``, ``units``.
+def loads(text: str, ending: str) -> dict[str, Any]:
+    """What :func:`dumps` wrote: ``times`` and ``FIELDS`` (accelerations may be None), ``joint_names``, ``units``.
 
     Raises:
         InputError: If the text is malformed; the message names the line, the point or the key.
@@ -83,7 +83,7 @@ def _from_json(text: str) -> dict[str, Any]:
     }
 
 
-def _seconds(time: Any) -> Any:
+def _seconds(time: object) -> object:
     """A duration as a number of seconds, or as the messages of ROS 1 and 2 write it."""
     if not isinstance(time, dict):
         return time

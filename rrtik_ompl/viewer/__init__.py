@@ -9,23 +9,28 @@ import os
 import webbrowser
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.files.text import write_text
 
+if TYPE_CHECKING:
+    from rrtik_ompl.replanning.run import ReplanRun
+    from rrtik_ompl.viewer.drawing.marks import Mark
+    from rrtik_ompl.viewer.subject import Showable, ShownPath
+
 __all__ = ["view"]
 
 
 def view(
-    shown: Any,
-    path: Any | None = None,
+    shown: Showable,
+    path: ShownPath | None = None,
     *,
-    before: Any | None = None,
+    before: ShownPath | None = None,
     ghosts: ArrayLike | None = None,
-    marks: Sequence[Any] = (),
-    run: Any | None = None,
+    marks: Sequence[Mark] = (),
+    run: ReplanRun | None = None,
     html: str | os.PathLike[str] | None = None,
     title: str | None = None,
     port: int = 0,
@@ -35,13 +40,13 @@ def view(
 
     Args:
         shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
-        path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m]; what is shown stands still if None.
-        before: Another path to compare with, such as the one that ``path`` was shortened from: the way of its tip is
-            drawn too.
+        path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m]; nothing moves if None.
+        before: Another path to compare with, such as the one that ``path`` was shortened from: the trail of its tip
+            is drawn too.
         ghosts: Configurations at which the arm is drawn like tinted glass, shape (k, dof), such as the solutions of
             inverse kinematics; they take the place of the ghosts of start and goal.
-        marks: What else stands in the world: see ``rrtik_ompl.viewer.drawing.marks``.
-        run: A ``Run`` of :func:`rrtik_ompl.replanning.replan` to replay, in place of a path.
+        marks: Further bodies: see ``rrtik_ompl.viewer.drawing.marks``.
+        run: A ``ReplanRun`` of :func:`rrtik_ompl.replanning.replan` to replay, in place of a path.
         html: File to write. If None, the page is served on 127.0.0.1 until Ctrl-C is pressed.
         title: Heading of the page; made from the problem's or the robot's name if None.
         port: Port to serve on; a free one if 0.

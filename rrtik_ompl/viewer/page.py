@@ -9,15 +9,14 @@ from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 from string import Template
-from typing import Any
 
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.replanning.run import Run
+from rrtik_ompl.replanning.run import ReplanRun
 from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.story import story_of
-from rrtik_ompl.viewer.subject import Subject, subject_of, subject_of_run
+from rrtik_ompl.viewer.subject import Showable, ShownPath, Subject, subject_of, subject_of_run
 
 # The page may run its own script and nothing else: no request leaves the machine that shows it.
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
@@ -25,13 +24,13 @@ SCRIPTS = ("kinematics.js", "stage.js", "panel.js", "replay.js", "player.js")
 
 
 def page(
-    shown: Any,
-    path: Any | None = None,
+    shown: Showable,
+    path: ShownPath | None = None,
     *,
-    before: Any | None = None,
+    before: ShownPath | None = None,
     ghosts: ArrayLike | None = None,
     marks: Sequence[Mark] = (),
-    run: Run | None = None,
+    run: ReplanRun | None = None,
     title: str | None = None,
 ) -> str:
     """The page that shows something, as the text of one HTML file that needs no other file and no network.
@@ -41,7 +40,7 @@ def page(
     Args:
         shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
         path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m].
-        before: Another path, to compare with; the way of its tip is drawn too.
+        before: Another path, to compare with; the trail of its tip is drawn too.
         ghosts: Configurations, shape (k, dof), drawn like tinted glass.
         marks: Further bodies.
         run: A run to replay in place of a path; obstacles are where they were.

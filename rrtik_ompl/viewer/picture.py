@@ -1,9 +1,9 @@
-"""The whole picture of a subject, recorded as meshcat commands, and the box that the camera has to take in."""
+"""The whole picture of a subject, recorded as meshcat commands, and the box that the camera shows."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import meshcat
 import numpy as np
@@ -30,8 +30,11 @@ from rrtik_ompl.viewer.drawing.trail import draw_before, draw_trail
 from rrtik_ompl.viewer.subject import Subject
 from rrtik_ompl.viewer.window import RecordingWindow
 
-FRAMED_POSTURES = 100
-LEAST_THICKNESS = 0.01  # of the picture: what is drawn of a link that is a mere line
+if TYPE_CHECKING:
+    from meshcat.visualizer import Visualizer
+
+FRAMING_SAMPLES = 100
+MIN_THICKNESS = 0.01  # of the picture: of a link that is a line
 
 
 def draw(subject: Subject) -> tuple[RecordingWindow, Frame]:
@@ -56,7 +59,7 @@ def draw(subject: Subject) -> tuple[RecordingWindow, Frame]:
     return window, frame
 
 
-def _draw_robot(vis: Any, robot: Robot, subject: Subject) -> Frame:
+def _draw_robot(vis: Visualizer, robot: Robot, subject: Subject) -> Frame:
     """Draw the arm in its first posture, and one for the page to copy as ghosts; return the box around everything."""
     shown = _spread(subject.waypoints)
     if subject.end is not None:
@@ -79,23 +82,23 @@ def _draw_robot(vis: Any, robot: Robot, subject: Subject) -> Frame:
     return frame
 
 
-def _draw_parts(node: Any, robot: Robot, parts: list[Part], frames: NDArray[np.float64], frame: Frame) -> None:
-    """Draw the arm; one that consists of mere lines and points everywhere is made thick enough to be seen."""
-    least = LEAST_THICKNESS * frame.size
+def _draw_parts(node: Visualizer, robot: Robot, parts: list[Part], frames: NDArray[np.float64], frame: Frame) -> None:
+    """Draw the arm; one that consists of lines and points alone is made thick enough to be visible."""
+    least = MIN_THICKNESS * frame.size
     seen = [replace(part, look=thickened(part.look, least)) for part in parts]
     too_thin = all(new.look is not old.look for new, old in zip(seen, parts, strict=True))
     draw_parts(node, robot, seen if too_thin else parts, frames)
 
 
 def _spread(waypoints: Matrix) -> Matrix:
-    """Postures spread over a path, shape (m, dof): those that the camera has to take in."""
+    """Configurations spread over a path, shape (m, dof), that the picture must show."""
     places = np.arange(len(waypoints))
-    wanted = np.linspace(0.0, places[-1], FRAMED_POSTURES if len(places) > 1 else 1)
+    wanted = np.linspace(0.0, places[-1], FRAMING_SAMPLES if len(places) > 1 else 1)
     return np.stack([np.interp(wanted, places, column) for column in waypoints.T], 1)
 
 
-def _flatten(vis: Any, frame: Frame) -> None:
-    """Make the obstacles of a plane world thin, so that seen from above they stand beside the arm, not over it."""
+def _flatten(vis: Visualizer, frame: Frame) -> None:
+    """Make the obstacles of a plane world thin, so that seen from above they are beside the arm, not over it."""
     height = max(2.0 * float(np.abs([frame.low[2], frame.high[2]]).max()), 1e-9)
     squeeze = np.diag([1.0, 1.0, min(0.01 * frame.size / height, 1.0), 1.0])
     vis["obstacles"].set_transform(squeeze)

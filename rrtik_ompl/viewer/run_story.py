@@ -1,4 +1,4 @@
-"""What the page needs to replay a run: groups of ticks, places of obstacles, and the tip's way along each path."""
+"""The data with which the page replays a run: groups of ticks, poses of obstacles, and the tip's trail on each path."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.poses import quaternion_xyzw
-from rrtik_ompl.replanning.run import Run, Tick
+from rrtik_ompl.replanning.run import ReplanRun, Tick
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.viewer.drawing.framing import Frame
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
 from rrtik_ompl.viewer.drawing.scene_picture import obstacle_look
 
-POINTS = 40  # of a path's line at most
-SHOWN = 0.5  # [s] that a path is seen after it was replaced
+MAX_POINTS = 40  # of a path's line
+SHOWN_SECONDS = 0.5  # of a path after it was replaced
 DIGITS = 5
 
 
-def run_story(run: Run, robot: Robot, scene: Scene, frame: Frame) -> dict[str, Any]:
+def run_story(run: ReplanRun, robot: Robot, scene: Scene, frame: Frame) -> dict[str, Any]:
     """The part of the page's story that is about a run."""
     lines, numbers = _lines(run, robot)
     moved = sorted({name for tick in run.ticks for name in tick.poses})
@@ -57,8 +57,8 @@ def _places(obstacle: Obstacle, ticks: list[Tick], frame: Frame) -> dict[str, An
     return {"placement": own.ravel().tolist(), "poses": np.round(poses, DIGITS).tolist()}
 
 
-def _lines(run: Run, robot: Robot) -> tuple[list[list[list[float]]], list[int]]:
-    """The tip's way along each path, and for each tick the number of its path; -1 for none."""
+def _lines(run: ReplanRun, robot: Robot) -> tuple[list[list[list[float]]], list[int]]:
+    """The tip's trail on each path, and for each tick the number of its path; -1 for none."""
     lines: list[list[list[float]]] = []
     numbers: list[int] = []
     known: Matrix | None = None
@@ -76,20 +76,20 @@ def _lines(run: Run, robot: Robot) -> tuple[list[list[list[float]]], list[int]]:
 
 
 def _tips(robot: Robot, path: Matrix) -> Matrix:
-    """Points of the tip's way, shape (m, 3), none twice running."""
+    """Points of the tip's trail, shape (m, 3), none twice running."""
     lengths: Vector = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
-    wanted = np.union1d(np.linspace(0.0, lengths[-1], POINTS), lengths)
+    wanted = np.union1d(np.linspace(0.0, lengths[-1], MAX_POINTS), lengths)
     rows = np.stack([np.interp(wanted, lengths, column) for column in path.T], axis=1)
     tips = robot.fk_batch(rows)[:, :3, 3]
     kept: Matrix = tips[np.append(True, np.linalg.norm(np.diff(tips, axis=0), axis=1) > 1e-6)]
     return kept
 
 
-def _replaced(run: Run, numbers: list[int]) -> list[int]:
+def _replaced(run: ReplanRun, numbers: list[int]) -> list[int]:
     """For each tick the number of the path that a repair has replaced a moment ago, or -1."""
     found, last, until = [], -1, -1
     for k, tick in enumerate(run.ticks):
         if tick.event == "repair" and k and numbers[k - 1] != numbers[k]:
-            last, until = numbers[k - 1], k + int(SHOWN * run.rate)
+            last, until = numbers[k - 1], k + int(SHOWN_SECONDS * run.rate)
         found.append(last if k <= until else -1)
     return found

@@ -6,7 +6,6 @@ import socketserver
 import threading
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler
-from typing import Any
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.viewer.page import POLICY
@@ -18,7 +17,7 @@ class PageServer:
     """Serves one HTML text at ``url`` until it is left; use it as a context manager.
 
     It listens on 127.0.0.1 alone and answers only requests that name this address themselves: a web site elsewhere
-    that makes its own name point here (DNS rebinding), or that asks from its own page, is refused.
+    that makes its own name point here (DNS rebinding), or that sends requests from its own page, is refused.
 
     Args:
         text: The page.
@@ -104,5 +103,5 @@ class _Handler(BaseHTTPRequestHandler):
         origin = self.headers.get("Origin")
         return self.headers.get("Host") in hosts and (origin is None or origin in {f"http://{h}" for h in hosts})
 
-    def log_message(self, *_: Any) -> None:
-        """Stay silent: the library prints nothing."""
+    def log_message(self, *_: object) -> None:
+        """Print nothing, as the whole library does."""

@@ -1,4 +1,4 @@
-"""What the page's panel tells and its player needs: joints with units, the chain, the waypoints and their times."""
+"""The data of the page's panel and player: joints with units, the chain, the waypoints and their times."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def _times(subject: Subject, robot: Robot, frame: Frame) -> Vector:
 def play_times(robot: Robot, waypoints: Matrix, arm: float) -> Vector:
     """Time [s] at which the page shows each waypoint: a move lasts as long as its farthest travelling joint needs.
 
-    Times are for looking at, not for execution: all joints turn at 30 deg/s, sliding joints run through the arm's box
+    Times are for display, not for execution: all joints turn at 30 deg/s, sliding joints run through the arm's box
     in 6 s, and a whole path that would be shorter than 3 s or longer than 60 s is slowed down or sped up.
 
     Args:
@@ -189,5 +189,8 @@ def _limit(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _numbers(values: NDArray[np.float64] | None) -> Any:
-    return None if values is None else (np.round(values, DIGITS) + 0.0).tolist()
+def _numbers(values: NDArray[np.float64] | None) -> list[object] | None:
+    if values is None:
+        return None
+    rounded: list[object] = (np.round(values, DIGITS) + 0.0).tolist()
+    return rounded

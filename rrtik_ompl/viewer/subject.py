@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,10 +11,20 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import Goal, JointGoal
-from rrtik_ompl.replanning.run import Run
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.replanning.run import ReplanRun
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.viewer.drawing.marks import Mark
+from rrtik_ompl.world import World
+
+
+class HasWorld(Protocol):
+    """A problem, or another value with a world."""
+
+    @property
+    def world(self) -> World:
+        """Robot and scene."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,7 +37,7 @@ class Subject:
         scene: What surrounds it.
         goal: The goal of the problem, or None.
         waypoints: Configurations to play, shape (k, dof); a single row if there is no path, (0, 0) without a robot.
-        is_path: Whether the waypoints are a path, as opposed to the one posture in which the arm stands.
+        is_path: Whether the waypoints are a path, as opposed to a single configuration.
         before: Waypoints of a path to compare with, shape (m, dof), or None.
         ghosts: Configurations drawn like tinted glass, shape (m, dof), or None.
         marks: Further bodies.
@@ -43,7 +53,7 @@ class Subject:
     before: Matrix | None = None
     ghosts: Matrix | None = None
     marks: tuple[Mark, ...] = ()
-    run: Run | None = None
+    run: ReplanRun | None = None
 
     @property
     def start(self) -> Vector | None:
@@ -65,7 +75,7 @@ class Subject:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shown:
-    """An arm in a posture, what surrounds it and where it should go: shown like a problem, but nothing is checked.
+    """An arm at a configuration, its surroundings and a goal: shown like a problem, but nothing is checked.
 
     Attributes:
         robot: The arm.
@@ -80,14 +90,18 @@ class Shown:
     start: Vector
 
 
+Showable: TypeAlias = HasWorld | Shown | World | Robot | Scene
+ShownPath: TypeAlias = JointPath | ArrayLike
+
+
 def subject_of(
-    shown: Any,
-    path: Any | None = None,
-    before: Any | None = None,
+    shown: Showable,
+    path: ShownPath | None = None,
+    before: ShownPath | None = None,
     ghosts: ArrayLike | None = None,
     marks: tuple[Mark, ...] = (),
 ) -> Subject:
-    """Take apart what a caller wants to see.
+    """The subject of what a caller wants to show.
 
     Args:
         shown: A ``Problem``, a ``World``, a ``Robot`` or a ``Scene``.
@@ -110,7 +124,7 @@ def subject_of(
     if isinstance(shown, Robot):
         robot, scene = shown, Scene()
     else:
-        world = getattr(shown, "world", shown)
+        world: Any = getattr(shown, "world", shown)
         if not isinstance(getattr(world, "robot", None), Robot) or not isinstance(getattr(world, "scene", None), Scene):
             raise InputError(f"view: cannot show a {type(shown).__name__}; give a problem, world, robot or scene")
         robot, scene = world.robot, world.scene
@@ -126,13 +140,13 @@ def subject_of(
     return Subject(name, robot, scene, goal, frozen(posture[None]), False, None, tinted, marks)
 
 
-def subject_of_run(problem: Any, run: Any) -> Subject:
+def subject_of_run(problem: Showable, run: ReplanRun) -> Subject:
     """What a run shows: the robot in every tick, and the obstacles where they are in the first one.
 
     Raises:
         InputError: If it is no run, or not one of that problem's robot.
     """
-    require(run, Run, "run to show", "use replan() or load_run(file)")
+    require(run, ReplanRun, "run to show", "use replan() or load_run(file)")
     if len(run.ticks) == 0:
         raise InputError("run to show: it has no tick")
     robot = subject_of(problem).robot
@@ -146,8 +160,9 @@ def subject_of_run(problem: Any, run: Any) -> Subject:
     return replace(shown, scene=replace(scene, obstacles=still), run=run)
 
 
-def _waypoints(robot: Robot, path: Any) -> Matrix:
-    rows = finite_array(getattr(path, "waypoints", path), (None, None), "path")
+def _waypoints(robot: Robot, path: ShownPath) -> Matrix:
+    given: Any = path
+    rows = finite_array(getattr(given, "waypoints", given), (None, None), "path")
     if len(rows) == 0 or rows.shape[1] != robot.dof:
         raise InputError(
             f"path: robot '{robot.name}' has {robot.dof} joints ({', '.join(robot.joint_names)}), "

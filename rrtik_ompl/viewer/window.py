@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import umsgpack
 from meshcat.commands import SetObject
+
+
+class Command(Protocol):
+    """A command of meshcat."""
+
+    def lower(self) -> dict[str, Any]:
+        """Its parts by name, as they are packed."""
 
 
 class RecordingWindow:
@@ -20,7 +27,7 @@ class RecordingWindow:
     def __init__(self) -> None:
         self._commands: dict[tuple[str, ...], bytes] = {}
 
-    def send(self, command: Any) -> None:
+    def send(self, command: Command) -> None:
         """Record one meshcat command, replacing an earlier one of the same kind for the same place."""
         if isinstance(command, SetObject):
             _name_after_path(command)
@@ -49,7 +56,7 @@ class RecordingWindow:
             del self._commands[key]
 
 
-def _name_after_path(command: Any) -> None:
+def _name_after_path(command: SetObject) -> None:
     """Replace meshcat's random identifiers, so that the same picture gives the same file."""
     path, drawn = command.path.lower(), command.object
     drawn.uuid = f"{path}/object"

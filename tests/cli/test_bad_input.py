@@ -354,7 +354,7 @@ API = {
     "obstacle of text": (lambda: rrtik.Obstacle("a", "box"), ["shape of 'a'", "Sphere or Cylinder", "str"]),
     "obstacle at a point": (lambda: rrtik.Obstacle("a", Sphere(1), [1, 2, 3]), ["pose of 'a'", "SE3", "poses.pose"]),
     "obstacle without name": (lambda: rrtik.Obstacle(None, Sphere(1)), ["name", "str", "NoneType"]),
-    "motion of numbers": (lambda: rrtik.Obstacle("a", Sphere(1), motion=[1, 0, 0]), ["motion of 'a'", "Waypoints"]),
+    "motion of numbers": (lambda: rrtik.Obstacle("a", Sphere(1), motion=[1, 0, 0]), ["motion of 'a'", "TimedPoses"]),
     "path checked in a robot": (lambda: rrtik.JointPath([[0, 0, 0]]).violations(robot()), ["world", "Robot"]),
     "path read for a name": (lambda: rrtik.load_path("a.json", "titan4"), ["robot of a path", "load_robot"]),
     "robot of no name": (lambda: rrtik.load_robot(None), ["name of a file", "None"]),

@@ -6,12 +6,12 @@ import pytest
 
 from rrtik_ompl import load_robot
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.overlay.augment import LAYERS_KEPT, Augmenter, Ghost
+from rrtik_ompl.overlay.augment import MAX_LAYERS, Augmenter, Ghost
 from rrtik_ompl.overlay.canvas import FAR, Canvas
 from rrtik_ompl.overlay.figure import figure_of, placed
 from rrtik_ompl.overlay.reference_z_buffer import reference_z_buffer
 from rrtik_ompl.overlay.surfaces import obstacle_surfaces, robot_surfaces, surface_of_shape
-from rrtik_ompl.overlay.virtual_camera import eye_at, imagined_camera, sky
+from rrtik_ompl.overlay.virtual_camera import background, orbit_pose, pinhole_camera
 from rrtik_ompl.poses import pose
 from rrtik_ompl.scene import Obstacle
 from rrtik_ompl.sensing.cameras.synthetic_camera import published_camera
@@ -19,7 +19,7 @@ from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
 
 CAMERA = published_camera()
 BENT = published_camera((0.05, -0.12, 0.0005, -0.0007, 0.03))
-EYE = eye_at([0.8, 0.0, 0.2], 2.2, np.radians(-50.0), np.radians(25.0))
+EYE = orbit_pose([0.8, 0.0, 0.2], 2.2, np.radians(-50.0), np.radians(25.0))
 
 
 @pytest.mark.parametrize("name", ["titan4", "ur5"])
@@ -124,10 +124,10 @@ def test_what_is_kept_from_picture_to_picture_is_what_would_be_drawn_anew():
     kept = Augmenter(robot, CAMERA)
     with pytest.raises(InputError, match="draw a picture first"):
         kept.depths()
-    postures = np.random.default_rng(0).uniform(-0.5, 0.5, (LAYERS_KEPT + 2, 6))
+    postures = np.random.default_rng(0).uniform(-0.5, 0.5, (MAX_LAYERS + 2, 6))
     for q in postures:
         kept.draw(grey, EYE, q)
-    aside = eye_at([0.8, 0.0, 0.2], 2.5, np.radians(-60.0), np.radians(25.0))
+    aside = orbit_pose([0.8, 0.0, 0.2], 2.5, np.radians(-60.0), np.radians(25.0))
     first, last = postures[0], postures[-1]
     for q, eye, color in [(last, EYE, None), (first, EYE, None), (last, aside, None), (last, EYE, "#00ff00")]:
         box = [Obstacle("box", Box([0.3, 0.3, 0.3]), pose([0.6, float(q[0]), 0.2]))]
@@ -138,15 +138,15 @@ def test_what_is_kept_from_picture_to_picture_is_what_would_be_drawn_anew():
 
 
 def test_the_eye_looks_at_its_centre_with_the_world_upright():
-    camera = imagined_camera(320, 240)
-    T = eye_at([1.0, 2.0, 0.5], 3.0, 0.7, 0.4)
+    camera = pinhole_camera(320, 240)
+    T = orbit_pose([1.0, 2.0, 0.5], 3.0, 0.7, 0.4)
     centre, above = (camera.project(T.actInv(np.array(p))[None])[0] for p in ([1, 2, 0.5], [1, 2, 1.0]))
     assert centre == pytest.approx([159.5, 119.5])
     assert above[1] < centre[1]
     assert above[0] == pytest.approx(centre[0])
-    assert sky(camera).shape == (240, 320, 3)
+    assert background(camera).shape == (240, 320, 3)
     with pytest.raises(InputError, match="distance"):
-        eye_at([0, 0, 0], 0.0, 0.0, 0.0)
+        orbit_pose([0, 0, 0], 0.0, 0.0, 0.0)
 
 
 def test_a_picture_of_another_size_is_refused():

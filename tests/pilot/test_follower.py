@@ -5,7 +5,7 @@ import pytest
 
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.pilot.devices.arm import joint_rates
-from rrtik_ompl.pilot.routes.follower import REACTION, Follower
+from rrtik_ompl.pilot.routes.follower import REACTION_SECONDS, Follower
 from rrtik_tests.pilot_session import ROBOT
 
 CORNERS = np.zeros((4, 6))
@@ -21,7 +21,7 @@ def test_moves_are_followed_in_their_order_with_advice_in_time():
     assert following.update(CORNERS[0]).advice == "move"
     half = following.update([0.25, 0, 0, 0, 0, 0] * np.ones(6))
     assert half.share == pytest.approx(0.5)
-    near = following.update(np.array([0.5 - 0.9 * rate * REACTION, 0, 0, 0, 0, 0]))
+    near = following.update(np.array([0.5 - 0.9 * rate * REACTION_SECONDS, 0, 0, 0, 0, 0]))
     assert (near.advice, near.move) == ("stop", 0)
     assert following.update(CORNERS[1]).move == 1
     assert following.update(CORNERS[2]).move == 2

@@ -6,7 +6,7 @@ import pytest
 from rrtik_ompl import load_robot
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
-from rrtik_ompl.pilot.routes.manoeuvre import free_until, judge_move, room_of, way_out
+from rrtik_ompl.pilot.routes.manoeuvre import check_move, escape_move, free_until, joint_range
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.world import World
@@ -19,7 +19,7 @@ def test_no_command_of_many_leads_beyond_limits_or_into_anything():
     for _ in range(400):
         joint = int(rng.integers(6))
         target = float(q[joint] + rng.normal(0.0, 0.6))
-        if judge_move(WORLD, q, joint, target).allowed:
+        if check_move(WORLD, q, joint, target).allowed:
             end = q.copy()
             end[joint] = target
             accepted.append((q, end))
@@ -33,66 +33,66 @@ def test_no_command_of_many_leads_beyond_limits_or_into_anything():
 
 
 def test_a_refusal_names_the_pair_and_how_far_it_is_free():
-    down = judge_move(WORLD, PROBLEM.goal.q, 2, float(ROBOT.lower[2]))
+    down = check_move(WORLD, PROBLEM.goal.q, 2, float(ROBOT.lower[2]))
     assert not down.allowed
     assert "overlap" in down.reason
     assert "elbow_pitch at" in down.reason
     until = free_until(WORLD, PROBLEM.goal.q, 2, float(ROBOT.lower[2]))
-    assert judge_move(WORLD, PROBLEM.goal.q, 2, until).allowed
-    assert not judge_move(WORLD, PROBLEM.goal.q, 2, until - 0.02).allowed
+    assert check_move(WORLD, PROBLEM.goal.q, 2, until).allowed
+    assert not check_move(WORLD, PROBLEM.goal.q, 2, until - 0.02).allowed
 
 
 def test_a_move_beyond_a_limit_names_it():
-    verdict = judge_move(WORLD, PROBLEM.start, 0, 9.0)
+    verdict = check_move(WORLD, PROBLEM.start, 0, 9.0)
     assert not verdict.allowed
     assert "azimuth" in verdict.reason
     with pytest.raises(InputError, match="0 to 5"):
-        judge_move(WORLD, PROBLEM.start, 6, 0.0)
+        check_move(WORLD, PROBLEM.start, 6, 0.0)
     with pytest.raises(InputError, match="finite"):
-        judge_move(WORLD, PROBLEM.start, 0, np.nan)
+        check_move(WORLD, PROBLEM.start, 0, np.nan)
 
 
 def test_little_room_is_warned_of():
     until = free_until(WORLD, PROBLEM.goal.q, 2, float(ROBOT.lower[2]))
-    verdict = judge_move(WORLD, PROBLEM.goal.q, 2, until)
+    verdict = check_move(WORLD, PROBLEM.goal.q, 2, until)
     assert any("mm between" in warning for warning in verdict.warnings)
     assert 0.0 <= verdict.clearance < 0.02
 
 
 def test_the_room_of_a_joint_names_what_ends_it_and_where_the_arm_is_singular():
     q = np.array(PROBLEM.start)
-    room = room_of(WORLD, q, 0)
+    room = joint_range(WORLD, q, 0)
     assert (room.above, room.high) == ("limit", pytest.approx(ROBOT.upper[0]))
     assert "meets bay_wall" in room.below
-    assert judge_move(WORLD, q, 0, room.low + 1e-3).allowed
-    assert "bay_wall" in judge_move(WORLD, q, 0, room.low - 0.01).reason
-    yaw = room_of(WORLD, q, 4)
+    assert check_move(WORLD, q, 0, room.low + 1e-3).allowed
+    assert "bay_wall" in check_move(WORLD, q, 0, room.low - 0.01).reason
+    yaw = joint_range(WORLD, q, 4)
     low, high, case = yaw.singular[0]
     assert yaw.low < low < high <= yaw.high
-    assert any(case in warning for warning in judge_move(WORLD, q, 4, 0.5 * (low + high)).warnings)
-    assert not judge_move(WORLD, q, 4, low - 0.1).warnings
+    assert any(case in warning for warning in check_move(WORLD, q, 4, 0.5 * (low + high)).warnings)
+    assert not check_move(WORLD, q, 4, low - 0.1).warnings
 
 
 def test_an_arm_without_named_singular_postures_is_warned_by_its_jacobian():
     robot = load_robot("ur5")
     world = World(robot, Scene())
     q = np.array([0.0, -1.2, 1.0, -1.4, 1.0, 0.0])
-    stretches = room_of(world, q, 2).singular
+    stretches = joint_range(world, q, 2).singular
     assert any(low <= 0.0 <= high for low, high, _ in stretches)  # the elbow straight
-    assert "near a singular posture" in judge_move(world, q, 2, 0.0).warnings
-    assert not judge_move(world, q, 2, 1.2).warnings
+    assert "near a singular posture" in check_move(world, q, 2, 0.0).warnings
+    assert not check_move(world, q, 2, 1.2).warnings
 
 
 def test_an_arm_that_touches_something_may_go_out_of_it_and_no_deeper():
     q = np.array(PROBLEM.goal.q)
     q[2] = free_until(WORLD, q, 2, float(ROBOT.lower[2])) - np.radians(0.5)
     assert not WORLD.valid(q)
-    joint, target = way_out(WORLD, q)
+    joint, target = escape_move(WORLD, q)
     end = q.copy()
     end[joint] = target
     assert WORLD.valid(end)
-    assert judge_move(WORLD, q, joint, target).warnings == ("out of contact",)
-    deeper = judge_move(WORLD, q, 2, q[2] - np.radians(1.0))
+    assert check_move(WORLD, q, joint, target).warnings == ("out of contact",)
+    deeper = check_move(WORLD, q, 2, q[2] - np.radians(1.0))
     assert not deeper.allowed
     assert "does not get it free" in deeper.reason
     made = Session(PROBLEM, SimulatedArm(ROBOT, q), seed=1)

@@ -15,7 +15,7 @@ import pytest
 import tornado.websocket
 
 from rrtik_ompl.pilot.run import Loop
-from rrtik_ompl.pilot.setup import Wanted, open_session
+from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.pilot.web.server import PilotServer
 from rrtik_ompl.sensing.cameras.pictures import CameraLostError
 
@@ -143,7 +143,7 @@ def choose(browser, color):
 
 def test_from_start_to_grasp_by_keys_alone(browser, tmp_path):
     record = tmp_path / "session.jsonl"
-    with Running(Wanted("titan4_sdu", record=record)) as running:
+    with Running(SessionOptions("titan4_sdu", record=record)) as running:
         browser.open(running.server.url)
         browser.wait(
             "state && state.lamps.length === 6 && window.measured.frames.C > 2 && window.measured.frames.O > 0"
@@ -186,7 +186,7 @@ def test_from_start_to_grasp_by_keys_alone(browser, tmp_path):
     kinds = [json.loads(line)["kind"] for line in record.read_text().splitlines()]
     assert kinds[0] == "begin"
     assert {"seen", "command", "answer", "joints"} <= set(kinds)
-    with Running(Wanted("titan4_sdu", replay=record)) as again:
+    with Running(SessionOptions("titan4_sdu", replay=record)) as again:
         browser.open(again.server.url)
         browser.wait("state && state.replay && state.route")
 
@@ -196,7 +196,7 @@ def type_a_value(browser, running):
     session = running.opened.engine.session
     session.arm._q[:] = session.problem.start
     browser.press("5")
-    browser.wait("state.selected === 4 && document.getElementById('room').textContent.includes('meets')")
+    browser.wait("state.selected === 4 && document.getElementById('range').textContent.includes('meets')")
     browser.press("m")
     browser.call("Input.insertText", text="-20")
     browser.press("Enter")
@@ -222,7 +222,7 @@ def follow(browser, running):
 
 
 def test_a_second_page_watches_and_a_lost_camera_and_a_lost_server_are_said(browser):
-    with Running(Wanted("titan4_sdu")) as running:
+    with Running(SessionOptions("titan4_sdu")) as running:
         browser.open(running.server.url)
         browser.wait("state && state.lamps.length === 6 && role.role === 'pilot'")
         other = "new WebSocket('ws://' + location.host + '/ws?page=other&token=')"
@@ -237,7 +237,7 @@ def test_a_second_page_watches_and_a_lost_camera_and_a_lost_server_are_said(brow
         browser.wait("document.getElementById('plan').disabled")
         browser.press("t")
         browser.wait("role.role === 'pilot'")
-        source = running.opened.engine.eyes._source
+        source = running.opened.engine.perception._source
         latest, source.latest = source.latest, gone
         browser.wait("document.getElementById('camera_banner').textContent.includes('Camera lost: unplugged')")
         browser.wait("document.getElementById('alerts').textContent.includes('Camera lost')")
@@ -265,7 +265,7 @@ NAMELESS = """
 
 
 def test_everything_has_a_name_and_the_keys_are_listed(browser):
-    with Running(Wanted("titan4_sdu")) as running:
+    with Running(SessionOptions("titan4_sdu")) as running:
         browser.open(running.server.url)
         browser.wait("state && state.lamps.length === 6")
         assert browser.ask(NAMELESS) == []

@@ -5,19 +5,20 @@ import pytest
 
 from rrtik_ompl import load_problem
 from rrtik_ompl.pilot.devices.arm import joint_rates
-from rrtik_ompl.pilot.devices.simulated_vehicle import find_scenario, load_scenario
+from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
 from rrtik_ompl.pilot.lamps import stage_poses
-from rrtik_ompl.pilot.routes.approach import ASIDE, FARTHER, MOST_JOINTS, TILT, approaches
+from rrtik_ompl.pilot.routes.approach import MAX_JOINTS, MAX_OFFSET, MAX_TILT, STANDOFF_FACTORS, approaches
 from rrtik_ompl.pilot.routes.clearance import executions, free_rows
 from rrtik_ompl.pilot.routes.follower import slack
+from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route import route_to, route_to_grasp
-from rrtik_ompl.pilot.routes.route_search import Way, WaySearch
+from rrtik_ompl.pilot.routes.route_search import GraspRoute, RouteSearch
 from rrtik_ompl.pilot.surroundings import Surroundings
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 
 PROBLEM = load_problem("titan4_sdu")
 ROBOT, RATES = PROBLEM.robot, joint_rates(PROBLEM.robot)
-SCENARIO = load_scenario(find_scenario("titan4_sdu"))
+SCENARIO = load_vehicle(find_vehicle("titan4_sdu"))
 VALVE, PLACE = SCENARIO.marker_map.named("valve"), SCENARIO.places["valve"]
 
 
@@ -37,7 +38,7 @@ def grasp(kind, level):
 @pytest.mark.parametrize(("kind", "level"), [("straight", 1), ("aslant", 2)])
 def test_a_route_to_a_grasp_is_short_and_free_and_forgives_small_errors(kind, level):
     world, holding, stages, route = grasp(kind, level)
-    assert len(route.path.moves()) <= ROBOT.dof + MOST_JOINTS
+    assert len(route.path.moves()) <= ROBOT.dof + MAX_JOINTS
     assert route.path.one_joint_at_a_time
     rows = route.path.waypoints
     assert rows[0] == pytest.approx(PROBLEM.start, abs=0.0)
@@ -60,14 +61,14 @@ def test_last_parts_begin_clear_of_the_object_and_in_front_of_it():
         begin = parts[0][0]
         assert world.valid(begin)
         tip = ROBOT.fk(begin)
-        places = [stages[1].translation + far * back for far in FARTHER]
-        assert min(np.linalg.norm(tip.translation - place) for place in places) < ASIDE
-        assert np.arccos(0.5 * (np.trace(stages[1].rotation.T @ tip.rotation) - 1.0)) < TILT
+        places = [stages[1].translation + far * back for far in STANDOFF_FACTORS]
+        assert min(np.linalg.norm(tip.translation - place) for place in places) < MAX_OFFSET
+        assert np.arccos(0.5 * (np.trace(stages[1].rotation.T @ tip.rotation) - 1.0)) < MAX_TILT
         for rows in parts:
             assert (rows[0] == begin).all()
             assert (rows[-1] == end).all()
             assert ((np.diff(rows, axis=0) != 0.0).sum(axis=1) == 1).all()
-            assert len(rows) - 1 <= MOST_JOINTS
+            assert len(rows) - 1 <= MAX_JOINTS
             assert holding.motion_valid_batch(rows[:-1], rows[1:]).all()
 
 
@@ -79,8 +80,8 @@ def test_a_joint_that_goes_on_needs_one_move_and_that_may_touch_the_object():
     end[1] += 0.1
     last = np.array([middle, [*end[:1], *middle[1:]], end])
     world = load_problem("titan4_sdu").world
-    way = WaySearch(world, world, start, 0).find([[last]])
-    assert isinstance(way, Way)
+    way = RouteSearch(world, world, start, 0).find([[last]])
+    assert isinstance(way, GraspRoute)
     assert (way.rows == [start, last[1], end]).all()
     assert way.grasp_from == 0
 
@@ -97,14 +98,16 @@ def test_where_no_joint_alone_goes_round_a_planner_finds_the_route(name):
 
 def test_an_arm_that_stands_in_something_is_told_so():
     world, _, _, route = grasp("straight", 1)  # the gripper holds the valve, which it may not touch any more
-    assert "overlap" in route_to(world, route.path.end, np.array(PROBLEM.start), RATES, 1)
+    found = route_to(world, route.path.end, np.array(PROBLEM.start), RATES, 1)
+    assert isinstance(found, NoRoute)
+    assert "overlap" in found.reason
 
 
 def test_of_several_ways_one_that_forgives_errors_is_taken():
     start, goal = np.array(PROBLEM.start), np.array(PROBLEM.goal.q)
-    search = WaySearch(PROBLEM.world, PROBLEM.world, start, 1)
+    search = RouteSearch(PROBLEM.world, PROBLEM.world, start, 1)
     ways = list(search._around([goal[None]]))
-    shares = [search.steady(way) for way in ways]
-    best = search.steady(search.find([[goal[None]]]))
+    shares = [search.robustness(way) for way in ways]
+    best = search.robustness(search.find([[goal[None]]]))
     assert min(shares) + 0.1 < best
     assert best > max(shares) - 0.06  # ways are compared in tenths: below that fewer moves count

@@ -12,9 +12,9 @@ import tornado.websocket
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.pilot.run import Loop
-from rrtik_ompl.pilot.setup import Wanted, open_session
+from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.pilot.web.clients import Client, Clients, Lane
-from rrtik_ompl.pilot.web.server import LARGEST_MESSAGE, MOST_WAITING, PilotServer
+from rrtik_ompl.pilot.web.server import MAX_MESSAGE_BYTES, MAX_QUEUED_COMMANDS, PilotServer
 
 TOKEN = "a-secret-of-many-letters"
 
@@ -198,13 +198,13 @@ def test_what_makes_no_sense_is_left_out_and_a_flood_is_cut(server):
     page = Page(server)
     for text in ("{", "[1]", '"stop"', "1e999", "\x00"):
         page.say_raw(text)
-    for _ in range(MOST_WAITING + 50):
+    for _ in range(MAX_QUEUED_COMMANDS + 50):
         page.say(name="stop")
     page.say(name="take")
     page.role()
     page.role()
-    assert server.commands.qsize() == MOST_WAITING
-    page.say_raw("x" * (LARGEST_MESSAGE + 1))
+    assert server.commands.qsize() == MAX_QUEUED_COMMANDS
+    page.say_raw("x" * (MAX_MESSAGE_BYTES + 1))
     with pytest.raises((ConnectionError, tornado.websocket.WebSocketClosedError)):
         page.hear()
 
@@ -247,7 +247,7 @@ def test_a_page_that_shows_nothing_holds_nobody_up():
 
 
 def test_a_command_makes_the_round_and_what_is_nonsense_ends_nothing():
-    opened = open_session(Wanted("titan4_sdu"))
+    opened = open_session(SessionOptions("titan4_sdu"))
     with PilotServer() as server:
         loop = Loop(opened.engine, server)
         page = Page(server)

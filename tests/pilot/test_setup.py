@@ -16,9 +16,9 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.camera_feed import Feed
 from rrtik_ompl.pilot.devices.line_arm import LineServer
-from rrtik_ompl.pilot.devices.simulated_vehicle import find_scenario, load_scenario
+from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
 from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED
-from rrtik_ompl.pilot.setup import Wanted, open_session
+from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.poses import pose
 from rrtik_ompl.sensing.cameras.pictures import CameraLostError, Picture
 from rrtik_tests.waiting import until
@@ -34,11 +34,11 @@ def grey(number=0):
 
 
 def test_the_shipped_scenario_has_every_color_of_lamp_and_places_the_object_well():
-    opened = open_session(Wanted("titan4_sdu"))
+    opened = open_session(SessionOptions("titan4_sdu"))
     engine = opened.engine
     for count in range(5):
-        engine.look(count / 30)
-    place = load_scenario(find_scenario("titan4_sdu")).places["valve"]
+        engine.update(count / 30)
+    place = load_vehicle(find_vehicle("titan4_sdu")).places["valve"]
     seen = engine.session.surroundings.named("valve")
     assert np.linalg.norm(seen.T_base_object.translation - place.translation) < 0.002
     assert {lamp.color for lamp in engine.session.lamps()} == {GREEN, AMBER, RED}
@@ -46,46 +46,46 @@ def test_the_shipped_scenario_has_every_color_of_lamp_and_places_the_object_well
 
 
 def test_the_outside_view_is_drawn_only_when_it_changed():
-    opened = open_session(Wanted("titan4_sdu"))
+    opened = open_session(SessionOptions("titan4_sdu"))
     engine = opened.engine
-    engine.look(0.0)
+    engine.update(0.0)
     first = engine.outside_picture()
     assert first is not None
     assert engine.outside_picture() is None
     assert engine.outside_picture(anew=True) == first
-    engine.obey({"name": "preset", "view": "top"}, 0.1)
+    engine.execute({"name": "preset", "view": "top"}, 0.1)
     assert engine.outside_picture() not in (None, first)
-    engine.obey({"name": "preset", "view": "nowhere"}, 0.2)
+    engine.execute({"name": "preset", "view": "nowhere"}, 0.2)
     assert "top" in engine.state()["message"]
     opened.close()
 
 
 def test_a_camera_that_is_lost_is_said_and_the_last_state_stays_until_it_is_back():
-    opened = open_session(Wanted("titan4_sdu"))
+    opened = open_session(SessionOptions("titan4_sdu"))
     engine = opened.engine
     for count in range(3):
-        engine.look(count / 30)
-    before, latest = engine.state(), engine.eyes._source.latest
+        engine.update(count / 30)
+    before, latest = engine.state(), engine.perception._source.latest
 
     def gone():
         raise CameraLostError("camera 0 gives no more pictures")
 
-    engine.eyes._source.latest = gone
-    engine.look(1.0)
+    engine.perception._source.latest = gone
+    engine.update(1.0)
     state = engine.state()
     assert "no more pictures" in state["camera_lost"]
     assert state["stale"]
     assert (state["objects"], state["lamps"]) == (before["objects"], before["lamps"])
     assert engine.camera_picture()[:2] == b"\xff\xd8"
-    engine.eyes._source.latest = latest
-    engine.look(1.1)
+    engine.perception._source.latest = latest
+    engine.update(1.1)
     assert engine.state()["camera_lost"] == ""
     assert not engine.state()["stale"]
     opened.close()
 
 
 def test_a_feed_gives_the_newest_picture_and_opens_a_lost_camera_again(monkeypatch):
-    monkeypatch.setattr("rrtik_ompl.pilot.devices.camera_feed.TRY_AGAIN", 0.05)
+    monkeypatch.setattr("rrtik_ompl.pilot.devices.camera_feed.RETRY_SECONDS", 0.05)
     attempts = itertools.count()
 
     def camera():
@@ -123,8 +123,8 @@ def test_pictures_of_the_past_come_as_far_apart_as_they_were_taken():
 
 
 def test_a_simulated_picture_follows_the_arm_and_the_objects_and_is_never_without_noise():
-    engine = open_session(Wanted("titan4_sdu")).engine
-    camera, start = engine.eyes._source._camera, np.array(load_problem("titan4_sdu").start)
+    engine = open_session(SessionOptions("titan4_sdu")).engine
+    camera, start = engine.perception._source._camera, np.array(load_problem("titan4_sdu").start)
     still = camera.picture(start, 0.0).pixels.astype(int)
     assert 1.0 < np.abs(camera.picture(start, 1.0 / 30.0).pixels - still).mean() < 3.0
     moved = start.copy()
@@ -136,61 +136,61 @@ def test_a_simulated_picture_follows_the_arm_and_the_objects_and_is_never_withou
 
 
 def test_a_folder_of_images_drives_a_session(tmp_path):
-    simulated = open_session(Wanted("titan4_sdu")).engine
-    simulated.look(0.0)
-    cv2.imwrite(str(tmp_path / "a.png"), simulated.eyes.picture)
+    simulated = open_session(SessionOptions("titan4_sdu")).engine
+    simulated.update(0.0)
+    cv2.imwrite(str(tmp_path / "a.png"), simulated.perception.picture)
     files = {"camera_file": FOLDER / "camera_640.yaml", "map_file": FOLDER / "titan4_panel_markers.yaml"}
-    opened = open_session(Wanted("titan4_sdu", source=tmp_path, **files))
-    opened.engine.look(0.0)
+    opened = open_session(SessionOptions("titan4_sdu", source=tmp_path, **files))
+    opened.engine.update(0.0)
     assert [each["name"] for each in opened.engine.state()["objects"]] == ["valve"]
-    until(lambda: opened.engine.look(1.0) or opened.engine.state()["pictures_ended"])
+    until(lambda: opened.engine.update(1.0) or opened.engine.state()["pictures_ended"])
     assert opened.engine.state()["objects"][0]["unseen"] == 0.0
     opened.close()
     with pytest.raises(InputError, match="--map"):
-        open_session(Wanted("titan4_sdu", source=tmp_path, camera_file=files["camera_file"]))
+        open_session(SessionOptions("titan4_sdu", source=tmp_path, camera_file=files["camera_file"]))
     (tmp_path / "none").mkdir()
     with pytest.raises(InputError, match="no images"):
-        open_session(Wanted("titan4_sdu", source=tmp_path / "none", **files))
+        open_session(SessionOptions("titan4_sdu", source=tmp_path / "none", **files))
 
 
 def test_pictures_that_the_camera_cannot_have_taken_are_refused_before_anything_is_shown(tmp_path):
     cv2.imwrite(str(tmp_path / "a.png"), np.zeros((240, 320, 3), dtype=np.uint8))
     with pytest.raises(InputError, match="320 x 240 pixels"):
-        open_session(Wanted("titan4_sdu", source=tmp_path, camera_file=CAMERA, map_file=MAP))
+        open_session(SessionOptions("titan4_sdu", source=tmp_path, camera_file=CAMERA, map_file=MAP))
 
 
 def test_an_object_that_is_out_of_view_is_said_and_costs_no_search_for_other_markers(monkeypatch):
     searched = []
     monkeypatch.setattr("rrtik_ompl.sensing.sensor.dictionaries_seen", lambda gray: searched.append(gray) or ())
-    engine = open_session(Wanted("titan4_sdu")).engine
-    camera = engine.eyes._source._camera
+    engine = open_session(SessionOptions("titan4_sdu")).engine
+    camera = engine.perception._source._camera
     there, camera.places = camera.places, {}
     for k in range(10):
-        engine.look(0.1 * k)
+        engine.update(0.1 * k)
     assert "no marker in view" in engine.state()["hint"]
     assert len(searched) == 1
     camera.places = there
-    engine.look(1.0)
+    engine.update(1.0)
     assert (engine.state()["hint"], engine.state()["objects"][0]["unseen"]) == ("", 0.0)
     camera.places = {}
-    engine.look(9.0)
+    engine.update(9.0)
     assert engine.state()["objects"][0]["unseen"] == 8.0
     assert len(searched) == 1
 
 
 def test_a_record_of_a_real_camera_is_shown_with_that_cameras_file_and_map(tmp_path):
-    simulated = open_session(Wanted("titan4_sdu")).engine
-    simulated.look(0.0)
-    cv2.imwrite(str(tmp_path / "a.png"), simulated.eyes.picture)
+    simulated = open_session(SessionOptions("titan4_sdu")).engine
+    simulated.update(0.0)
+    cv2.imwrite(str(tmp_path / "a.png"), simulated.perception.picture)
     record, given = tmp_path / "r.jsonl", {"camera_file": Path(CAMERA), "map_file": Path(MAP)}
-    opened = open_session(Wanted("titan4_sdu", source=tmp_path, record=record, **given))
-    opened.engine.look(0.0)
+    opened = open_session(SessionOptions("titan4_sdu", source=tmp_path, record=record, **given))
+    opened.engine.update(0.0)
     opened.close()
     for map_text in (Path(MAP).read_text(), _with_a_base_marker(Path(MAP).read_text())):
         given["map_file"] = tmp_path / "map.yaml"
         given["map_file"].write_text(map_text)
-        again = open_session(Wanted("titan4_sdu", replay=record, **given)).engine
-        again.look(1.0)
+        again = open_session(SessionOptions("titan4_sdu", replay=record, **given)).engine
+        again.update(1.0)
         assert [each["name"] for each in again.state()["objects"]] == ["valve"]
         assert again.camera_picture()
 
@@ -202,20 +202,20 @@ def _with_a_base_marker(text):
 
 def test_a_record_is_played_again_to_the_same_end(tmp_path):
     file = tmp_path / "a.jsonl"
-    opened = open_session(Wanted("titan4_sdu", record=file, seed=4))
+    opened = open_session(SessionOptions("titan4_sdu", record=file, seed=4))
     engine = opened.engine
-    engine.look(0.0)
+    engine.update(0.0)
     for number, command in enumerate(
         [{"name": "grasp", "type": "aslant", "level": 2}, {"name": "plan"}, {"name": "accept"}, {"name": "next"}]
     ):
-        engine.obey(command, 0.1 + 0.1 * number)
-    engine.look(1.5)
+        engine.execute(command, 0.1 + 0.1 * number)
+    engine.update(1.5)
     route, q = engine.session.route, engine.session.q
     opened.close()
-    again = open_session(Wanted("titan4_sdu", replay=file)).engine
-    again.look(0.15)
+    again = open_session(SessionOptions("titan4_sdu", replay=file)).engine
+    again.update(0.15)
     assert again.session.route is None
-    again.look(5.0)
+    again.update(5.0)
     assert again.session.route.path.waypoints == pytest.approx(route.path.waypoints)
     assert again.session.q == pytest.approx(q)
     assert again.session.mode == "following"
@@ -236,7 +236,7 @@ def test_a_record_that_does_not_fit_is_refused_before_anything_is_shown(tmp_path
     file = tmp_path / "bad.jsonl"
     file.write_text(json.dumps({"time": 0.0, **line}) + "\n")
     with pytest.raises(InputError, match=word) as caught:
-        open_session(Wanted("titan4_sdu", replay=file))
+        open_session(SessionOptions("titan4_sdu", replay=file))
     assert "bad.jsonl" in str(caught.value)
 
 
@@ -273,19 +273,19 @@ def test_a_problem_without_a_scenario_is_named(tmp_path, capsys):
     file = Path(tmp_path / "s.yaml")
     file.write_text(text)
     with pytest.raises(InputError, match=r"s\.yaml:\d+.*ship"):
-        load_scenario(file)
+        load_vehicle(file)
 
 
 def test_an_arm_whose_line_is_cut_is_said_on_the_page_and_its_joints_stay():
     problem = load_problem("titan4_sdu")
     with LineServer(SimulatedArm(problem.robot, problem.start)) as server:
-        opened = open_session(Wanted("titan4_sdu", arm=f"127.0.0.1:{server.port}"))
+        opened = open_session(SessionOptions("titan4_sdu", arm=f"127.0.0.1:{server.port}"))
         engine = opened.engine
-        engine.look(0.0)
+        engine.update(0.0)
         before = engine.state()
         assert before["arm_lost"] == ""
     until(lambda: engine.session.arm.lost)
-    engine.look(1.0)
+    engine.update(1.0)
     state = engine.state()
     assert "connection to the arm is lost" in state["arm_lost"]
     assert [joint["value"] for joint in state["joints"]] == [joint["value"] for joint in before["joints"]]

@@ -9,14 +9,14 @@ import pytest
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.plots.joints import plot_joints
-from rrtik_ompl.trajectory import RateLimits, timed
+from rrtik_ompl.trajectory import RateLimits, time_parameterize
 
 PATH = JointPath([[0.0, 0.0], [1.0, 0.2], [1.0, 0.0]], ["turn", "slide"], [False, True])
 
 
 @pytest.fixture
 def motion():
-    return timed(PATH, RateLimits(1.0, 2.0, 10.0))
+    return time_parameterize(PATH, RateLimits(1.0, 2.0, 10.0))
 
 
 def test_a_motion_is_drawn_with_units_and_the_names_of_its_joints(tmp_path, motion):
@@ -66,7 +66,8 @@ def test_another_ending_and_another_thing_are_refused(tmp_path, motion):
 
 def test_loading_the_library_loads_neither_matplotlib_nor_the_timing_libraries():
     heavy = "['matplotlib', 'toppra', 'ruckig']"
-    code = f"import sys, rrtik_ompl; rrtik_ompl.timed, rrtik_ompl.plot_joints; print({heavy} & sys.modules.keys())"
+    names = "rrtik_ompl.time_parameterize, rrtik_ompl.plot_joints"
+    code = f"import sys, rrtik_ompl; {names}; print({heavy} & sys.modules.keys())"
     code = code.replace(heavy, "{'matplotlib', 'toppra', 'ruckig'}")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"

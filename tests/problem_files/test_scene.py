@@ -7,7 +7,7 @@ import pytest
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.problem_files.scene import load_scene, save_scene
-from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, Waypoints
+from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Sphere
 
 EVERY_KEY = """version: 1
@@ -119,7 +119,7 @@ def test_numbers_survive_bit_for_bit(tmp_path):
     rng = np.random.default_rng(1)
     shapes = [Box(rng.uniform(1e-5, 1, 3)), Sphere(0.1 + 0.2), Cylinder(1 / 3, 1e-5), Prism(rng.normal(size=(3, 2)))]
     poses = [pin.SE3(pin.SE3.Random().rotation, rng.normal(size=3)) for _ in shapes]
-    moves = [ConstantVelocity([0.1, 1e-9, 3]), Waypoints([0.1, 0.3], poses[:2]), None, None]
+    moves = [ConstantVelocity([0.1, 1e-9, 3]), TimedPoses([0.1, 0.3], poses[:2]), None, None]
     rows = zip("abcd", shapes, poses, moves, strict=True)
     scene = Scene(tuple(Obstacle(*row) for row in rows), (AttachedObject("e", "hand", Box([1, 2, 3])),))
     save_scene(scene, tmp_path / "scene.yaml")

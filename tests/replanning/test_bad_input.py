@@ -10,7 +10,7 @@ import pytest
 
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.replanning import SpeedWarning, load_run, replan
-from rrtik_ompl.scene import Obstacle, Scene, Waypoints
+from rrtik_ompl.scene import Obstacle, Scene, TimedPoses
 from rrtik_ompl.shapes import Box, HalfSpace
 from rrtik_ompl.trajectory.limits import RateLimits
 from rrtik_tests.moving_plane import OPTIONS, box, crossing, plane
@@ -22,10 +22,10 @@ from rrtik_tests.moving_plane import OPTIONS, box, crossing, plane
         ({"rate": 0.0}, "rate: must be greater than 0, got 0; give ticks a second"),
         ({"step": -1.0}, "step: must be greater than 0"),
         ({"margin": -0.1}, "margin must not be negative"),
-        ({"predict": 1.5}, "predict must be a whole number"),
+        ({"lookahead_ticks": 1.5}, "lookahead_ticks must be a whole number"),
         ({"speed_bound": 0.0}, "speed_bound: must be greater than 0"),
         ({"seconds": float("nan")}, "seconds"),
-        ({"eps": 1e-6}, "eps must be at least .* suits this robot"),
+        ({"max_edge": 1e-6}, "max_edge must be at least .* suits this robot"),
         ({"limits": RateLimits([1.0] * 3, [1.0] * 3)}, "limits: there are 2 joints, but limits for 3"),
         ({"clock": None}, "clock: expected a function"),
         ({"record": "run.txt"}, "unknown ending '.txt'; use .json"),
@@ -122,7 +122,7 @@ def test_an_obstacle_faster_than_the_bound_is_warned_about_once():
 
 def test_a_floor_that_slides_has_a_speed_like_any_obstacle():
     tilted, slid = (pin.SE3(pin.exp3(np.array([0.0, 0.0, 0.3])), np.array([x, 0.0, 0.0])) for x in (0.0, 4.0))
-    floor = Obstacle("floor", HalfSpace([0.0, 1.0, 0.0], -5.0), tilted, Waypoints([0.0, 8.0], [tilted, slid]))
+    floor = Obstacle("floor", HalfSpace([0.0, 1.0, 0.0], -5.0), tilted, TimedPoses([0.0, 8.0], [tilted, slid]))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert replan(plane(floor), speed_bound=0.6, **OPTIONS).arrived

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rrtik_ompl.replanning import replan
-from rrtik_ompl.replanning.contact_check import judge
+from rrtik_ompl.replanning.contact_check import check_contacts
 from rrtik_ompl.scene import ConstantVelocity
 from rrtik_tests.moving_plane import OPTIONS, box, plane
 
@@ -11,7 +11,7 @@ from rrtik_tests.moving_plane import OPTIONS, box, plane
 def test_the_judge_sees_contact_between_two_ticks():
     problem = plane(box("bullet", 10.0, 16.0, 1.0, 1.0, ConstantVelocity([0.0, -60.0, 0.0])), start=(10.0, 10.0))
     run = replan(problem, **{**OPTIONS, "seconds": 0.25, "step": 1e-3})
-    found = judge(problem.robot, run, problem.world.scene)
+    found = check_contacts(problem.robot, run, problem.world.scene)
     assert found.contacts
     assert found.contacts[0][3] == "bullet"
     assert found.nearest == 0.0

@@ -15,10 +15,10 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning import PLANNERS, SpeedWarning, replan
-from rrtik_ompl.replanning.contact_check import judge
+from rrtik_ompl.replanning.contact_check import check_contacts
 from rrtik_ompl.replanning.evading import evasion
 from rrtik_ompl.replanning.generate import moving_problem
-from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene, Waypoints
+from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.shapes import Box, Prism, Sphere
 from rrtik_ompl.world import World
 from rrtik_ompl.world.moving_world import MovingWorld
@@ -32,7 +32,7 @@ def test_every_planner_arrives_without_contact(planner):
     assert run.arrived
     assert run.count("repair") > 0
     assert run.configurations[-1] == pytest.approx(problem.goal.q, abs=1e-6)
-    assert judge(problem.robot, run, problem.world.scene).contacts == ()
+    assert check_contacts(problem.robot, run, problem.world.scene).contacts == ()
     assert np.linalg.norm(np.diff(run.configurations, axis=0), axis=1).max() <= 0.5 + 1e-9
 
 
@@ -51,7 +51,7 @@ def test_a_robot_walks_while_things_move_elsewhere():
 
 def test_a_covered_goal_is_waited_for():
     over, away = place(19.0, 10.0), place(10.0, 3.0)
-    motion = Waypoints([0.0, 0.5, 0.8, 4.0, 4.3], [away, away, over, over, away])
+    motion = TimedPoses([0.0, 0.5, 0.8, 4.0, 4.3], [away, away, over, over, away])
     problem = plane(Obstacle("lid", Box([2.0, 2.0, 1.0]), away, motion))
     run = replan(problem, **OPTIONS)
     events = [
@@ -64,9 +64,9 @@ def test_a_covered_goal_is_waited_for():
 
 def test_an_obstacle_that_comes_too_near_is_evaded():
     lid = Obstacle(
-        "lid", Box([2.0, 2.0, 1.0]), place(19.0, 3.0), Waypoints([0.0, 0.1], [place(19.0, 3.0), place(19.0, 10.0)])
+        "lid", Box([2.0, 2.0, 1.0]), place(19.0, 3.0), TimedPoses([0.0, 0.1], [place(19.0, 3.0), place(19.0, 10.0)])
     )
-    chaser = box("chaser", 8.0, 3.0, 2.0, 2.0, Waypoints([0.0, 6.0], [place(8.0, 3.0), place(17.0, 10.0)]))
+    chaser = box("chaser", 8.0, 3.0, 2.0, 2.0, TimedPoses([0.0, 6.0], [place(8.0, 3.0), place(17.0, 10.0)]))
     with pytest.warns(SpeedWarning, match="'lid'"):
         run = replan(plane(lid, chaser, start=(14.0, 10.0)), speed_bound=3.0, margin=0.1, seconds=7.0, **OPTIONS)
     assert run.outcome == "out of time"
@@ -80,7 +80,10 @@ def test_a_robot_between_two_obstacles_that_close_in_leaves_sideways():
     scene, ticks = problem.world.scene, 4
     near, q = MovingWorld(problem.world, self_collision=False), problem.start
     later, rng = (lambda ticks: scene.at(0.1 * ticks)), np.random.default_rng(0)
-    way = evasion(q, 0.5, np.full(2, 0.5), 0.5, near, later, World(problem.robot, Scene()), rng, None) - q
+    way = evasion(
+        q, None, step=0.5, max_change=np.full(2, 0.5), distance=0.5, near=near, later=later,
+        alone=World(problem.robot, Scene()), rng=rng,
+    ) - q  # fmt: skip
     assert abs(way[1]) > 2.0 * abs(way[0])
     assert World(problem.robot, scene.at(0.1 * ticks)).valid(q + ticks * way)
 
@@ -88,10 +91,13 @@ def test_a_robot_between_two_obstacles_that_close_in_leaves_sideways():
 def test_an_arm_that_waits_for_its_goal_is_not_caught_between_obstacles():
     before = moving_problem(load_robot("ur5"), 20, 0.2, 922, seconds=20.0)
     scene, q = before.world.scene.at(1.78), [-0.756, -0.719, -0.34, 0.668, -1.135, -0.415]
-    problem, keep = Problem(World(before.robot, scene), q, q), {"margin": 0.02, "speed_bound": 0.2, "slot": 30.0}
+    problem, keep = (
+        Problem(World(before.robot, scene), q, q),
+        {"margin": 0.02, "speed_bound": 0.2, "repair_budget": 30.0},
+    )
     run = replan(problem, step=0.05, rate=50.0, seconds=1.2, goal_feed=lambda time: before.goal.q, seed=1, **keep)
     assert run.count("evade") > 0
-    assert not judge(problem.robot, run, scene, fine=5).contacts
+    assert not check_contacts(problem.robot, run, scene, samples_per_tick=5).contacts
 
 
 def test_a_moving_goal_is_caught():
@@ -106,18 +112,18 @@ def test_another_branch_is_taken_where_the_goal_configuration_is_blocked():
     robot = load_robot("planar", lengths=[1.0, 1.0], radius=0.01)
     pole = [(-0.08, -0.08), (0.08, -0.08), (0.08, 0.08), (-0.08, 0.08)]
     poles = [
-        Obstacle(name, Prism(pole), place(*p), Waypoints([0.0, 0.3], [place(*p), place(*q)]))
+        Obstacle(name, Prism(pole), place(*p), TimedPoses([0.0, 0.3], [place(*p), place(*q)]))
         for name, p, q in (("first", (2.5, 2.0), (0.99, 0.7)), ("far", (3.0, -2.5), (3.0, -2.0)))
     ]
     problem = Problem(World(robot, Scene(poles)), [0.0, 0.4], PositionGoal([1.0, 1.2, 0.0], 1e-3))
-    run = replan(problem, step=0.05, rate=20.0, eps=0.3, seconds=20.0, slot=30.0, limits=FAST)
+    run = replan(problem, step=0.05, rate=20.0, max_edge=0.3, seconds=20.0, repair_budget=30.0, limits=FAST)
     assert run.arrived
     assert problem.goal.satisfied(robot, run.configurations[-1:])[0]
 
 
 def test_predicted_places_are_heeded():
     problem = crossing(3.0)
-    plain, ahead = (replan(problem, predict=k, seed=2, **OPTIONS) for k in (0, 20))
+    plain, ahead = (replan(problem, lookahead_ticks=k, seed=2, **OPTIONS) for k in (0, 20))
     assert plain.arrived
     assert ahead.arrived
     assert (plain.configurations[:5] != ahead.configurations[:5]).any()
@@ -125,9 +131,9 @@ def test_predicted_places_are_heeded():
 
 def test_a_six_joint_arm_arrives_among_wandering_obstacles_without_contact():
     problem = moving_problem(load_robot("titan4"), 8, 0.1, 2, seconds=12.0)
-    run = replan(problem, step=0.04, rate=25.0, margin=0.02, speed_bound=0.1, seconds=20.0, slot=30.0)
+    run = replan(problem, step=0.04, rate=25.0, margin=0.02, speed_bound=0.1, seconds=20.0, repair_budget=30.0)
     assert run.arrived
-    assert judge(problem.robot, run, problem.world.scene, fine=3).contacts == ()
+    assert check_contacts(problem.robot, run, problem.world.scene, samples_per_tick=3).contacts == ()
 
 
 def test_replanning_needs_no_ompl():
@@ -140,7 +146,7 @@ def base_and_ball(*, moves=False):
     """UR5 and a ball that stands in its base, or gets there after half a second."""
     robot = load_robot("ur5")
     far, near = (pin.SE3(np.eye(3), np.array([x, 0.0, 0.03])) for x in (-1.2, -0.08))
-    motion = Waypoints([0.4, 0.5, 0.9, 1.0], [far, near, near, far]) if moves else None
+    motion = TimedPoses([0.4, 0.5, 0.9, 1.0], [far, near, near, far]) if moves else None
     return robot, Scene([Obstacle("ball", Sphere(0.06), far if moves else near, motion)])
 
 
@@ -165,12 +171,12 @@ def test_nothing_is_free_while_an_obstacle_stands_in_the_base():
     assert (moving.valid_batch(rows) == before).all()
 
 
-@pytest.mark.parametrize("predict", [0, 10])
-def test_a_run_waits_while_an_obstacle_stands_in_the_base_and_says_so(predict):
+@pytest.mark.parametrize("lookahead_ticks", [0, 10])
+def test_a_run_waits_while_an_obstacle_stands_in_the_base_and_says_so(lookahead_ticks):
     robot, scene = base_and_ball(moves=True)
     q = robot.clamp([0.0, -1.2, 0.9, -1.2, -1.5, 0.0])
     problem = Problem(World(robot, scene), q, q + np.array([1.5, 0.0, 0.0, 0.0, 0.0, 0.0]))
-    run = replan(problem, step=0.01, rate=50, predict=predict, seconds=10.0)
+    run = replan(problem, step=0.01, rate=50, lookahead_ticks=lookahead_ticks, seconds=10.0)
     waits = [t for t in run.ticks if t.event == "wait"]
     assert run.arrived
     assert waits

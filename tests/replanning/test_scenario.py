@@ -15,7 +15,7 @@ from rrtik_ompl.poses import pose
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.replanning import load_run, replan
-from rrtik_ompl.replanning.contact_check import judge
+from rrtik_ompl.replanning.contact_check import check_contacts
 from rrtik_ompl.replanning.scenario import load_scenario
 from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene
 from rrtik_ompl.shapes import HalfSpace
@@ -33,7 +33,7 @@ scene: {{obstacles: [{BOX}]}}
 start: {{joints: [1, 10]}}
 goal: {{joints: [19, 10]}}
 motion_resolution: 0.05
-run: {{step: 0.5, rate: 10, eps: 1.0, velocity: [1000]}}
+run: {{step: 0.5, rate: 10, max_edge: 1.0, velocity: [1000]}}
 """
 
 
@@ -48,10 +48,12 @@ def crossing(tmp_path):
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_every_shipped_scenario_is_run_to_its_goal_without_contact(name):
     scenario = load_scenario(name)
-    run = scenario.run(seed=1, slot=30.0)
+    run = scenario.run(seed=1, repair_budget=30.0)
     assert run.arrived, run.summary()
     if scenario.problem.robot.name != "point2d":  # a point has no room around it to keep
-        assert judge(scenario.problem.robot, run, scenario.problem.world.scene, fine=3).contacts == ()
+        assert (
+            check_contacts(scenario.problem.robot, run, scenario.problem.world.scene, samples_per_tick=3).contacts == ()
+        )
 
 
 def test_the_scenes_of_the_paper_are_shipped():
@@ -63,7 +65,7 @@ def test_a_goal_that_moves_is_read_from_the_file(crossing):
     crossing.write_text(TEXT.replace("velocity: [1000]", f"velocity: [1000], {moving}"))
     scenario = load_scenario(crossing)
     assert scenario.goal_feed(1.0) == pytest.approx([19.0, 12.0])
-    assert scenario.run(slot=30.0).configurations[-1] == pytest.approx([19.0, 14.0])
+    assert scenario.run(repair_budget=30.0).configurations[-1] == pytest.approx([19.0, 14.0])
 
 
 @pytest.mark.parametrize(
@@ -131,7 +133,9 @@ def test_a_floor_that_moves_is_replayed_as_it_lies():
     assert np.array(told["poses"])[:, 1] == pytest.approx([0.0, 0.01, 0.02, 0.03])
 
 
-@pytest.mark.parametrize(("option", "value"), [("--record", "other.json"), ("--seconds", "3"), ("--predict", "2")])
+@pytest.mark.parametrize(
+    ("option", "value"), [("--record", "other.json"), ("--seconds", "3"), ("--lookahead-ticks", "2")]
+)
 def test_what_only_a_new_run_can_heed_is_refused_beside_a_replay(option, value, capsys):
     assert rrtik(["replan", "replan_walls", "--replay", "run.json", option, value]) == 2
     assert f"leave out {option}" in capsys.readouterr().err
@@ -150,7 +154,7 @@ def test_a_run_is_not_shown_with_another_robot(crossing):
 
 
 def test_a_record_of_another_problem_is_refused(crossing):
-    run = load_scenario(crossing).run(slot=30.0)
+    run = load_scenario(crossing).run(repair_budget=30.0)
     with pytest.raises(InputError, match="lift"):
         page(load_problem("env_e"), run=run)
 

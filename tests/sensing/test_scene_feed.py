@@ -45,7 +45,7 @@ def test_replanning_follows_what_a_camera_sees():
     start = np.array([0.0, -1.6, 1.2, -1.2, 1.6, 0.0])
     problem = Problem(World(load_robot("ur5"), Scene(())), start, start + 0.3)
     feed = scene_feed(film(places), Sensor(CAMERA, marker_map, smooth=False))
-    run = replan(problem, feed, step=0.02, rate=30.0, seconds=0.1, slot=9.0)
+    run = replan(problem, feed, step=0.02, rate=30.0, seconds=0.1, repair_budget=9.0)
     gone = [float(tick.poses["box"][0]) for tick in run.ticks if "box" in tick.poses]
     assert len(gone) == 3
     assert np.diff(gone) == pytest.approx([0.01, 0.01], abs=4e-3)

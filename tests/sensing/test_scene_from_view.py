@@ -10,7 +10,7 @@ from rrtik_ompl.sensing.frames import NoBaseError, base_from_camera, place_in_ba
 from rrtik_ompl.sensing.markers.corner_pose import pose_of_square, square_corners
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
 from rrtik_ompl.sensing.scene_from_view import objects_in_base, scene_from_image
-from rrtik_ompl.sensing.sight import look
+from rrtik_ompl.sensing.sight import detect_objects
 from rrtik_tests.marker_views import BOX, CAMERA, SIDE, STAND, T_BOX_MARKERS, facing, picture_of
 
 
@@ -21,7 +21,7 @@ def test_two_markers_of_an_object_give_a_steadier_rotation_than_one():
         shown = [(10 + k, T * T_BOX_MARKERS[k]) for k in range(2)]
         for count in (1, 2):
             gray = picture_of(shown[:count], seed)
-            (sight,) = look(gray, CAMERA, MarkerMap("4x4_50", (BOX,), pin.SE3.Identity()))
+            (sight,) = detect_objects(gray, CAMERA, MarkerMap("4x4_50", (BOX,), pin.SE3.Identity()))
             assert len(sight.markers) == count
             spread[count].append(pin.log3(sight.pose.T_camera_object.rotation @ T.rotation.T))
     assert np.std(spread[2], axis=0)[0] < 0.5 * np.std(spread[1], axis=0)[0]
@@ -43,7 +43,7 @@ def test_an_object_is_placed_in_the_frame_of_a_base_that_is_seen():
         [(0, T_camera_base), (10, T_camera_box * T_BOX_MARKERS[0]), (11, T_camera_box * T_BOX_MARKERS[1])]
     )
     marker_map = MarkerMap("4x4_50", (STAND, BOX))
-    (placed,) = objects_in_base(look(gray, CAMERA, marker_map), marker_map)
+    (placed,) = objects_in_base(detect_objects(gray, CAMERA, marker_map), marker_map)
     truth = T_camera_base.inverse() * T_camera_box
     away = np.linalg.norm(placed.T_base_object.translation - truth.translation)
     assert away < 2.5e-3
@@ -86,7 +86,7 @@ def test_the_error_of_the_base_grows_with_its_lever_arm():
 
 def test_a_marker_that_is_too_small_is_refused_with_its_size():
     gray = picture_of([(10, facing([0.4, 0.0, 0.0], [0.0, 0.0, 6.5]))], noise=0.002, blur=0.3)
-    sightings = look(gray, CAMERA, MarkerMap("4x4_50", (BOX,), pin.SE3.Identity()))
+    sightings = detect_objects(gray, CAMERA, MarkerMap("4x4_50", (BOX,), pin.SE3.Identity()))
     assert all("pixels a side" in sight.refused and sight.quality == 0.0 for sight in sightings)
 
 
@@ -96,15 +96,15 @@ def test_a_wrong_side_in_the_map_is_noticed_where_two_markers_contradict_each_ot
     )
     T = facing([0.3, 0.2, 0.0], [-0.05, 0.0, 0.9])
     gray = picture_of([(10, T), (11, T * pose([0.15, 0.0, 0.0]))])
-    (sight,) = look(gray, CAMERA, MarkerMap("4x4_50", (wrong,), pin.SE3.Identity()))
+    (sight,) = detect_objects(gray, CAMERA, MarkerMap("4x4_50", (wrong,), pin.SE3.Identity()))
     assert "check the marker map" in sight.refused
 
 
 def test_a_picture_of_another_size_is_refused():
     with pytest.raises(InputError, match="100 x 50 pixels"):
-        look(np.zeros((50, 100), dtype=np.uint8), CAMERA, MarkerMap("4x4_50", (BOX,), pin.SE3.Identity()))
+        detect_objects(np.zeros((50, 100), dtype=np.uint8), CAMERA, MarkerMap("4x4_50", (BOX,), pin.SE3.Identity()))
     with pytest.raises(InputError, match="8 bits"):
-        look(np.zeros((480, 640)), CAMERA, MarkerMap("4x4_50", (BOX,), pin.SE3.Identity()))
+        detect_objects(np.zeros((480, 640)), CAMERA, MarkerMap("4x4_50", (BOX,), pin.SE3.Identity()))
 
 
 @pytest.mark.parametrize(

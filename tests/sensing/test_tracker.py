@@ -14,7 +14,7 @@ from rrtik_ompl.sensing.markers.corner_pose import (
     square_corners,
     turn_between,
 )
-from rrtik_ompl.sensing.tracker import PATIENCE, PoseTracker
+from rrtik_ompl.sensing.tracker import MAX_OUTLIERS, PoseTracker
 from rrtik_tests.marker_views import CAMERA, SIDE, facing
 
 
@@ -111,7 +111,7 @@ def test_one_outlier_is_left_out_and_a_new_place_is_believed_in_the_end():
     first = tracker.update(sight_at(there), 5 / 30)
     assert first.outlier
     assert first.T_camera_object.translation == pytest.approx(here.translation)
-    for k in range(1, PATIENCE):
+    for k in range(1, MAX_OUTLIERS):
         last = tracker.update(sight_at(there), (5 + k) / 30)
     assert not last.outlier
     assert last.T_camera_object.translation == pytest.approx(there.translation)

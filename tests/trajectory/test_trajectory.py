@@ -13,7 +13,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning import plan
 from rrtik_ompl.problem_files.problem import load_problem
-from rrtik_ompl.trajectory import RateLimits, Trajectory, load_trajectory, timed
+from rrtik_ompl.trajectory import RateLimits, Trajectory, load_trajectory, time_parameterize
 from rrtik_ompl.world import World
 
 ON_PATH = 1e-9  # [rad]
@@ -54,7 +54,7 @@ def distance_to_path(points, waypoints):
 @given(tasks())
 def test_a_motion_keeps_its_limits_on_a_dense_grid_and_in_its_peaks(task):
     path, limits = task
-    motion = timed(path, limits)
+    motion = time_parameterize(path, limits)
     state, peaks = motion(dense(motion)), motion.peaks()
     for sampled, peak, limit in (
         (state.velocities, peaks.velocity, limits.velocity),
@@ -70,7 +70,7 @@ def test_a_motion_keeps_its_limits_on_a_dense_grid_and_in_its_peaks(task):
 @given(tasks())
 def test_a_motion_stays_on_the_path_and_keeps_its_ends(task):
     path, limits = task
-    motion = timed(path, limits)
+    motion = time_parameterize(path, limits)
     points = motion(dense(motion)).positions
     assert distance_to_path(points, path.waypoints).max() <= ON_PATH
     assert (points[0] == path.start).all()
@@ -82,7 +82,7 @@ def test_a_motion_stays_on_the_path_and_keeps_its_ends(task):
 @given(tasks())
 def test_velocities_and_accelerations_are_the_derivatives_of_the_positions(task):
     path, limits = task
-    motion = timed(path, limits)
+    motion = time_parameterize(path, limits)
     step = 1e-6 * motion.duration
     clock = np.linspace(2 * step, motion.duration - 2 * step, 400)
     clock = clock[np.abs(clock[:, None] - motion.times).min(axis=1) > step]  # not across a knot
@@ -97,7 +97,7 @@ def test_velocities_and_accelerations_are_the_derivatives_of_the_positions(task)
 @given(tasks())
 def test_a_motion_begins_and_ends_at_rest_and_stands_still_outside_its_time(task):
     path, limits = task
-    motion = timed(path, limits)
+    motion = time_parameterize(path, limits)
     for t in (-1.0, 0.0, motion.duration, motion.duration + 1.0):
         assert np.allclose(motion(t).velocities, 0.0, atol=1e-9)
     assert (motion(-1.0).positions == path.start).all()
@@ -107,15 +107,17 @@ def test_a_motion_begins_and_ends_at_rest_and_stands_still_outside_its_time(task
 
 def test_single_joint_moves_are_made_one_after_the_other():
     path = JointPath([[0, 0], [1, 0], [1, -1], [0.5, -1]])
-    motion = timed(path, RateLimits([1, 1], [2, 2], [10, 10]))
+    motion = time_parameterize(path, RateLimits([1, 1], [2, 2], [10, 10]))
     moving = np.abs(motion(dense(motion)).velocities) > 1e-9
     assert moving.sum(axis=1).max() == 1
     # ruckig's own figure for 1 rad under 1 rad/s, 2 rad/s^2, 10 rad/s^3 is 1.7 s
-    assert motion.duration == pytest.approx(1.7 + 1.7 + timed(JointPath([[0], [0.5]]), RateLimits(1, 2, 10)).duration)
+    assert motion.duration == pytest.approx(
+        1.7 + 1.7 + time_parameterize(JointPath([[0], [0.5]]), RateLimits(1, 2, 10)).duration
+    )
 
 
 def test_without_a_jerk_limit_a_straight_motion_is_the_trapezoid():
-    motion = timed(JointPath([[0.0], [1.0]]), RateLimits(1.0, 2.0))
+    motion = time_parameterize(JointPath([[0.0], [1.0]]), RateLimits(1.0, 2.0))
     assert motion.duration == pytest.approx(1.5)
     assert motion.peaks().jerk == [np.inf]
     assert motion(0.25).velocities == pytest.approx([0.5])
@@ -129,16 +131,18 @@ def test_toppra_agrees_with_the_trapezoid_on_a_straight_line():
     a, b = np.array([0.0, 1.0]), np.array([1.0, -1.0])
     limits = RateLimits([1.0, 1.5], [2.0, 2.5])
     curve = Curve(np.array([np.linalg.norm(b - a)]), np.linspace(a, b, 6)[None])
-    best = timed(JointPath([a, b]), limits).duration
+    best = time_parameterize(JointPath([a, b]), limits).duration
     assert best <= along_curve(curve, limits).durations.sum() <= 1.01 * best
 
 
 def test_waypoints_that_coincide_or_lie_on_a_line_are_no_stops():
     limits = RateLimits([1.0, 1.0], [2.0, 2.0], [10.0, 10.0])
-    once = timed(JointPath([[0, 0], [1, 1]]), limits)
-    often = timed(JointPath([[0, 0], [0, 0], [0.3, 0.3], [0.3, 0.3 + 1e-12], [0.7, 0.7], [1, 1], [1, 1]]), limits)
+    once = time_parameterize(JointPath([[0, 0], [1, 1]]), limits)
+    often = time_parameterize(
+        JointPath([[0, 0], [0, 0], [0.3, 0.3], [0.3, 0.3 + 1e-12], [0.7, 0.7], [1, 1], [1, 1]]), limits
+    )
     assert often.duration == pytest.approx(once.duration)
-    there_and_back = timed(JointPath([[0, 0], [1, 1], [0.5, 0.5]]), limits)
+    there_and_back = time_parameterize(JointPath([[0, 0], [1, 1], [0.5, 0.5]]), limits)
     assert there_and_back.duration > once.duration
     assert (np.abs(there_and_back.positions - 1.0).max(axis=1) < ON_PATH).any()
 
@@ -156,9 +160,9 @@ def sdu():
 def test_rounded_corners_are_faster_free_and_near_the_path(sdu, blend):
     problem, path = sdu
     limits = RateLimits.of(problem.robot, jerk=np.inf)
-    motion = timed(path, limits, blend=blend, world=problem.world)
+    motion = time_parameterize(path, limits, blend=blend, world=problem.world)
     peaks = motion.peaks()
-    assert motion.duration < timed(path, limits).duration
+    assert motion.duration < time_parameterize(path, limits).duration
     assert motion.faults(problem.world) == ()
     assert (peaks.velocity <= limits.velocity).all()
     assert (peaks.acceleration <= limits.acceleration).all()
@@ -172,7 +176,7 @@ def test_rounded_corners_are_faster_free_and_near_the_path(sdu, blend):
 def test_rounded_corners_keep_velocity_and_acceleration_on_any_path(rows, blend):
     world = World(load_robot("planar3"))
     path, limits = JointPath.of(world.robot, rows), RateLimits([1.0, 0.5, 2.0], [2.0, 3.0, 0.7])
-    motion = timed(path, limits, blend=blend, world=world)
+    motion = time_parameterize(path, limits, blend=blend, world=world)
     state = motion(dense(motion))
     assert (np.abs(state.velocities).max(axis=0) <= limits.velocity * (1 + 1e-9)).all()
     assert (np.abs(state.accelerations).max(axis=0) <= limits.acceleration * (1 + 1e-9)).all()
@@ -188,7 +192,7 @@ def test_a_corner_that_cannot_be_rounded_is_a_stop():
     box = Obstacle("box", Box([2, 2, 2]), pin.SE3(np.eye(3), np.array([6.0, 4.0, 0.0])))
     world = World(load_robot("point2d", radius=0.1, bounds=[[0, 10], [0, 10]]), Scene([box]))
     path = JointPath.of(world.robot, [[4.89, 1.0], [4.89, 5.11], [9.0, 5.11]])  # close round the corner of the box
-    motion = timed(path, RateLimits(1.0, 1.0), blend=3.0, world=world)
+    motion = time_parameterize(path, RateLimits(1.0, 1.0), blend=3.0, world=world)
     assert motion.faults(world) == ()
     assert distance_to_path(motion.positions, path.waypoints).max() < 0.05
 
@@ -201,7 +205,7 @@ def test_a_corner_that_cannot_be_rounded_is_a_stop():
 @given(task=tasks())
 def test_a_file_gives_back_the_same_motion(tmp_path_factory, ending, task):
     file = tmp_path_factory.mktemp("motions") / f"motion{ending}"
-    motion = timed(*task)
+    motion = time_parameterize(*task)
     motion.save(file)
     again = load_trajectory(file)
     for name in ("times", "positions", "velocities", "accelerations"):
@@ -212,7 +216,7 @@ def test_a_file_gives_back_the_same_motion(tmp_path_factory, ending, task):
 def test_the_json_has_the_shape_of_a_joint_trajectory(tmp_path, sdu):
     problem, path = sdu
     file = tmp_path / "motion.json"
-    timed(path, problem.robot).save(file)
+    time_parameterize(path, problem.robot).save(file)
     document = json.loads(file.read_text())
     assert document["joint_names"] == list(problem.robot.joint_names)
     assert set(document["points"][0]) == {"positions", "velocities", "accelerations", "time_from_start"}
@@ -280,29 +284,29 @@ def test_infinite_velocity_is_refused_and_infinite_jerk_is_none():
 )
 def test_a_path_that_cannot_be_timed_is_refused(rows, words):
     with pytest.raises(InputError, match=words):
-        timed(JointPath(rows), RateLimits([1.0, 1.0], [1.0, 1.0]))
+        time_parameterize(JointPath(rows), RateLimits([1.0, 1.0], [1.0, 1.0]))
 
 
 def test_a_path_with_a_number_that_is_none_is_refused():
     with pytest.raises(InputError, match="finite"):
-        timed(JointPath([[0.0], [np.nan]]), RateLimits(1.0, 1.0))
+        time_parameterize(JointPath([[0.0], [np.nan]]), RateLimits(1.0, 1.0))
 
 
 @pytest.mark.parametrize("blend", [-1.0, np.nan])
 def test_a_blend_that_is_none_is_refused(blend):
     with pytest.raises(InputError, match="blend"):
-        timed(JointPath([[0.0], [1.0]]), RateLimits(1.0, 1.0), blend=blend)
+        time_parameterize(JointPath([[0.0], [1.0]]), RateLimits(1.0, 1.0), blend=blend)
 
 
 def test_a_blend_needs_a_world():
     with pytest.raises(InputError, match=r"world=problem\.world"):
-        timed(JointPath([[0, 0], [1, 0], [1, 1]]), RateLimits(1.0, 1.0), blend=0.1)
+        time_parameterize(JointPath([[0, 0], [1, 0], [1, 1]]), RateLimits(1.0, 1.0), blend=0.1)
 
 
 @pytest.mark.parametrize("t", [np.nan, [0.0, np.inf], "now"])
 def test_a_time_that_is_none_is_refused(t):
     with pytest.raises(InputError, match="time of a trajectory"):
-        timed(JointPath([[0.0], [1.0]]), RateLimits(1.0, 1.0))(t)
+        time_parameterize(JointPath([[0.0], [1.0]]), RateLimits(1.0, 1.0))(t)
 
 
 def test_knots_that_do_not_fit_together_are_refused():

@@ -13,7 +13,7 @@ from rrtik_ompl.ik.mb_rrt.growth import grow
 from rrtik_ompl.ik.mb_rrt.links import Links
 from rrtik_ompl.poses import pose
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, Waypoints
+from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
 from rrtik_ompl.viewer.page import page
 from rrtik_tests.crane import TETRAHEDRON, URDF, WAYPOINTS, problem
@@ -26,7 +26,7 @@ def crane() -> Robot:
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
-    drift = Waypoints([0.0, 4.0], [pose([-1, 0, 0.5]), pose([-1, 1, 0.5])])
+    drift = TimedPoses([0.0, 4.0], [pose([-1, 0, 0.5]), pose([-1, 1, 0.5])])
     return Scene(
         obstacles=(
             Obstacle("crate", Box([0.3, 0.3, 0.3]), pose([0.9, -0.9, 0.15])),

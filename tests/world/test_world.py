@@ -221,11 +221,11 @@ def test_batches_may_be_empty_of_any_layout_and_any_real_type():
 
 
 def test_moving_obstacles_stand_where_they_are_at_time_zero():
-    from rrtik_ompl.scene import ConstantVelocity, Waypoints
+    from rrtik_ompl.scene import ConstantVelocity, TimedPoses
 
     robot = load_robot("point2d", radius=0.1, bounds=[[0, 10], [0, 10]])
     buoy = Obstacle("buoy", Sphere(0.5), at(2, 2, 0), ConstantVelocity([1, 0, 0]))
-    door = Obstacle("door", Sphere(0.5), motion=Waypoints([0, 4], [at(8, 2, 0), at(8, 6, 0)]))
+    door = Obstacle("door", Sphere(0.5), motion=TimedPoses([0, 4], [at(8, 2, 0), at(8, 6, 0)]))
     scene = Scene([buoy, door])
     assert not World(robot, scene).valid([2.0, 2.0])
     assert not World(robot, scene).valid([8.0, 2.0])

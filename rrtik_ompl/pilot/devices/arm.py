@@ -1,4 +1,4 @@
-"""The arm behind the tool: read its joints, move one of them. A simulated one, and what others have to offer."""
+"""The interface of an arm, which reads its joints and moves one of them, and a simulated arm."""
 
 from __future__ import annotations
 
@@ -11,37 +11,37 @@ from rrtik_ompl.arrays import Vector, finite_array
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
 
-USUAL_RATE = np.deg2rad(10.0)  # [rad/s]; of an arm that does not say how fast its joints are
-SLIDING_RATE = 0.02  # [m/s]
+DEFAULT_RATE = np.deg2rad(10.0)  # [rad/s]; of a joint whose rate is not given
+DEFAULT_SLIDING_RATE = 0.02  # [m/s]
 
 
 class Arm(Protocol):
-    """What the tool needs to know of an arm.
+    """An arm that a pilot moves.
 
     Attributes:
-        lost: Why nothing is known of it any more; "" if all is well.
+        lost: Why the connection is lost; "" if it is not.
     """
 
     lost: str
 
     def read(self) -> Vector:
-        """Where the joints are. Shape (dof,), rad or m."""
+        """Joint values. Shape (dof,), rad or m."""
 
     def move(self, joint: int, target: float) -> None:
         """Send one joint to a value [rad or m]; all others stand still. A new move takes the place of the last."""
 
     def stop(self) -> None:
-        """Stand still at once."""
+        """Stop at once."""
 
 
 def joint_rates(robot: Robot, rates: ArrayLike | None = None) -> Vector:
-    """How fast each joint goes when it is driven, shape (dof,) [rad/s or m/s]: given, or usual ones below its limit.
+    """How fast each joint goes when it is driven, shape (dof,) [rad/s or m/s]: given, or default ones below its limit.
 
     Raises:
         InputError: If a rate is not positive.
     """
     if rates is None:
-        usual = np.where(robot.prismatic, SLIDING_RATE, USUAL_RATE)
+        usual = np.where(robot.prismatic, DEFAULT_SLIDING_RATE, DEFAULT_RATE)
         return np.minimum(usual, robot.velocity)
     given = finite_array(rates, (robot.dof,), "rates")
     if (given <= 0.0).any():
@@ -50,10 +50,10 @@ def joint_rates(robot: Robot, rates: ArrayLike | None = None) -> Vector:
 
 
 class SimulatedArm:
-    """An arm that does what it is told, at its rates, and is never wrong about where it is."""
+    """A simulated arm without errors of control or measurement."""
 
     def __init__(self, robot: Robot, start: ArrayLike, rates: ArrayLike | None = None) -> None:
-        """Stand at a configuration.
+        """Begin at a configuration.
 
         Raises:
             InputError: If the configuration does not fit the robot.
@@ -65,7 +65,7 @@ class SimulatedArm:
         self._goal: tuple[int, float] | None = None
 
     def read(self) -> Vector:
-        """Where the joints are. Shape (dof,), rad or m."""
+        """Joint values. Shape (dof,), rad or m."""
         return self._q.copy()
 
     @property
@@ -79,11 +79,11 @@ class SimulatedArm:
         self._goal = (joint, min(max(target, low), high))
 
     def stop(self) -> None:
-        """Stand still at once."""
+        """Stop at once."""
         self._goal = None
 
     def advance(self, seconds: float) -> None:
-        """Let time pass."""
+        """Advance the simulated time."""
         if self._goal is None:
             return
         joint, target = self._goal

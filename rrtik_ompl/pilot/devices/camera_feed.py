@@ -1,4 +1,4 @@
-"""Pictures from a camera that may be slow, stop, or come back: read aside, so that nobody waits for them."""
+"""Pictures from a camera that may be slow, stop, or come back: read in a thread, so that nothing waits for them."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import Protocol
 from rrtik_ompl.errors import RrtikError
 from rrtik_ompl.sensing.cameras.pictures import CameraLostError, Picture
 
-TRY_AGAIN = 2.0  # [s] after a camera was lost
+RETRY_SECONDS = 2.0  # [s] after a camera was lost
 ENDED = "no more pictures: the last one stays"
 
 
 class PictureSource(Protocol):
-    """Where pictures come from, one at a time."""
+    """A source of pictures, one at a time."""
 
     def latest(self) -> Picture | None:
         """The newest picture, None if there is none since the last call.
@@ -25,18 +25,18 @@ class PictureSource(Protocol):
         """
 
     def close(self) -> None:
-        """Let the camera go."""
+        """Release the camera."""
 
 
 class Feed:
-    """The newest picture of a camera, a video or a folder; older ones that nobody took are dropped."""
+    """The newest picture of a camera, a video or a folder; older ones are dropped."""
 
     def __init__(self, open_pictures: Callable[[], Iterator[Picture]], *, paced: bool = False) -> None:
         """Begin to read.
 
         Args:
             open_pictures: Opens the source; called again after a camera was lost.
-            paced: Pictures are of the past: give them out as far apart as they were taken, and end with the last.
+            paced: For recorded pictures: give them out at the times at which they were taken, and end with the last.
 
         Raises:
             InputError: If not even the first picture can be read.
@@ -62,19 +62,19 @@ class Feed:
         return picture
 
     def close(self) -> None:
-        """Let the camera go."""
+        """Release the camera."""
         self._ended.set()
         self._thread.join(timeout=5.0)
 
     def _read(self, pictures: Iterator[Picture]) -> None:
         while not self._ended.is_set():
             self._lose(self._read_until_lost(pictures))
-            if self._paced or self._ended.wait(TRY_AGAIN):
+            if self._paced or self._ended.wait(RETRY_SECONDS):
                 return
             pictures = self._open()
 
     def _read_until_lost(self, pictures: Iterator[Picture]) -> str:
-        """Hand out pictures; the answer says why there are no more."""
+        """Hand out pictures until there are no more; returns why."""
         begin = time.monotonic()
         try:
             for picture in pictures:

@@ -6,10 +6,10 @@ The protocol is one JSON object a line, UTF-8, at most 64 kB. Joints are in the 
 - ``{"do": "read"}`` is answered by ``{"q": [..]}``
 - ``{"do": "move", "joint": 2, "target": 0.5}`` sends one joint (counted from 0) on its way; a new move takes the place
   of the last; answered by ``{"q": [..]}``
-- ``{"do": "stop"}`` stands still at once; answered by ``{"q": [..]}``
-- what cannot be done is answered by ``{"error": "one line"}``
+- ``{"do": "stop"}`` stops at once; answered by ``{"q": [..]}``
+- a request that cannot be fulfilled is answered by ``{"error": "one line"}``
 
-The client asks for the joints about 30 times a second. A server stops the arm when its client has gone, or has said
+The client requests the joints about 30 times a second. A server stops the arm when its client has gone, or has sent
 nothing for half a second.
 """
 
@@ -29,10 +29,10 @@ from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.robot import Robot
 
 PROTOCOL, VERSION = "rrtik-arm", 1
-PERIOD = 1.0 / 30.0  # [s] between two questions for the joints
-PATIENCE = 0.5  # [s] for an answer
-TRY_AGAIN = 1.0  # [s]
-LONGEST_LINE = 64 * 1024
+POLL_SECONDS = 1.0 / 30.0  # between two requests for the joints
+TIMEOUT_SECONDS = 0.5  # for an answer
+RETRY_SECONDS = 1.0
+MAX_LINE_BYTES = 64 * 1024
 
 
 class Line:
@@ -40,11 +40,11 @@ class Line:
 
     def __init__(self, connection: socket.socket) -> None:
         """Take a connection."""
-        connection.settimeout(PATIENCE)
+        connection.settimeout(TIMEOUT_SECONDS)
         self._socket = connection
         self._rest = b""
 
-    def send(self, **words: Any) -> None:
+    def send(self, **words: object) -> None:
         """Send an object."""
         self._socket.sendall(json.dumps(words).encode() + b"\n")
 
@@ -57,7 +57,7 @@ class Line:
         while b"\n" not in self._rest:
             more = self._socket.recv(4096)
             self._rest += more
-            if not more or len(self._rest) > LONGEST_LINE:
+            if not more or len(self._rest) > MAX_LINE_BYTES:
                 raise ConnectionError("the other side has closed the connection" if not more else "an endless line")
         line, _, self._rest = self._rest.partition(b"\n")
         try:
@@ -65,7 +65,7 @@ class Line:
         except ValueError:
             found = None
         if not isinstance(found, dict):
-            raise ConnectionError("the other side does not speak JSON lines")
+            raise ConnectionError("the other side does not send JSON lines")
         return found
 
     def close(self) -> None:
@@ -80,7 +80,7 @@ class LineArm:
         """Connect.
 
         Args:
-            robot: What the arm should be.
+            robot: The robot that the arm must be.
             host: Of the server.
             port: Of the server.
 
@@ -88,18 +88,18 @@ class LineArm:
             InputError: If there is no server, or it offers another arm.
         """
         self.robot, self._address, self.lost = robot, (host, port), ""
-        self._wanted: dict[str, Any] | None = None
+        self._request: dict[str, Any] | None = None
         self._lock, self._ended, self._wake = threading.Lock(), threading.Event(), threading.Event()
         try:
             self._line = self._connect()
-            self._q = self._ask({"do": "read"})
+            self._q = self._exchange({"do": "read"})
         except (OSError, OverflowError) as error:
             raise InputError(f"arm at {host}:{port}: {error}; is its server running?") from None
-        self._thread = threading.Thread(target=self._talk, daemon=True)
+        self._thread = threading.Thread(target=self._communicate, daemon=True)
         self._thread.start()
 
     def read(self) -> Vector:
-        """Where the joints were when they were last heard of. Shape (dof,), rad or m."""
+        """The joint values received last. Shape (dof,), rad or m."""
         with self._lock:
             return self._q.copy()
 
@@ -111,11 +111,11 @@ class LineArm:
         """
         if self.lost:
             raise InputError(self.lost)
-        self._want({"do": "move", "joint": int(joint), "target": float(target)})
+        self._send_later({"do": "move", "joint": int(joint), "target": float(target)})
 
     def stop(self) -> None:
-        """Stand still at once; without connection the server sees to that itself."""
-        self._want({"do": "stop"})
+        """Stop at once; without connection the server does so itself."""
+        self._send_later({"do": "stop"})
 
     def close(self) -> None:
         """Stop, and end the connection."""
@@ -124,13 +124,13 @@ class LineArm:
         self._thread.join(timeout=5.0)
         self._line.close()
 
-    def _want(self, message: dict[str, Any]) -> None:
+    def _send_later(self, message: dict[str, Any]) -> None:
         with self._lock:
-            self._wanted = message
+            self._request = message
         self._wake.set()
 
     def _connect(self) -> Line:
-        line = Line(socket.create_connection(self._address, timeout=PATIENCE))
+        line = Line(socket.create_connection(self._address, timeout=TIMEOUT_SECONDS))
         greeting = line.receive()
         if greeting.get("protocol") != PROTOCOL or greeting.get("version") != VERSION:
             raise ConnectionError(f"the other side does not greet as {PROTOCOL} {VERSION}")
@@ -138,8 +138,8 @@ class LineArm:
             raise ConnectionError(f"it has the joints {greeting.get('joints')}, not those of '{self.robot.name}'")
         return line
 
-    def _ask(self, message: dict[str, Any]) -> Vector:
-        """Send a message; the answer says where the joints are."""
+    def _exchange(self, message: dict[str, Any]) -> Vector:
+        """Send a message and receive the joint values."""
         self._line.send(**message)
         answer = self._line.receive()
         if "error" in answer:
@@ -149,24 +149,24 @@ class LineArm:
         except (KeyError, TypeError, ValueError, InputError) as error:
             raise ConnectionError(f"an answer without the joints: {error}") from None
 
-    def _talk(self) -> None:
-        """Ask for the joints and pass on what is wanted, until the end; connect again when the connection is lost."""
+    def _communicate(self) -> None:
+        """Request the joints and send moves, until the end; connect again when the connection is lost."""
         while True:
-            self._wake.wait(PERIOD)
+            self._wake.wait(POLL_SECONDS)
             self._wake.clear()
             with self._lock:
-                message, self._wanted = self._wanted or {"do": "read"}, None
+                message, self._request = self._request or {"do": "read"}, None
             try:
                 if self.lost:
-                    self._line, message = self._connect(), {"do": "read"}  # what was wanted before is out of date
-                q = self._ask(message)
+                    self._line, message = self._connect(), {"do": "read"}  # a move from before is out of date
+                q = self._exchange(message)
                 with self._lock:
                     self._q, self.lost = q, ""
             except OSError as error:
                 self._line.close()
                 self.lost = f"the connection to the arm is lost: {error}; the joints are the last known ones"
-                self._ended.wait(TRY_AGAIN)
-            if self._ended.is_set() and self._wanted is None:
+                self._ended.wait(RETRY_SECONDS)
+            if self._ended.is_set() and self._request is None:
                 return
 
 
@@ -216,16 +216,16 @@ class LineServer:
     def _answer(self, line: Line) -> None:
         before = time.monotonic()
         while not self._ended.is_set():
-            asked = line.receive()
+            request = line.receive()
             now = time.monotonic()
             self.arm.advance(now - before)
             before = now
-            fault = self._obey(asked)
+            fault = self._execute(request)
             line.send(**({"error": fault} if fault else {"q": self.arm.read().tolist()}))
 
-    def _obey(self, asked: dict[str, Any]) -> str:
-        """Do what is asked; the answer says what is wrong with it, "" if nothing is."""
-        what, joint, target = asked.get("do"), asked.get("joint"), asked.get("target")
+    def _execute(self, request: dict[str, Any]) -> str:
+        """Execute a request; returns what is wrong with it, "" if nothing is."""
+        what, joint, target = request.get("do"), request.get("joint"), request.get("target")
         if what == "stop":
             self.arm.stop()
         elif what == "move":

@@ -1,10 +1,11 @@
-"""Who looks for a session: a camera and a sensor, live or simulated."""
+"""The perception of a session: a camera and a sensor, live or simulated."""
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.errors import RrtikError
@@ -17,49 +18,49 @@ from rrtik_ompl.sensing.cameras.pictures import Picture
 from rrtik_ompl.sensing.frames import base_from_camera
 from rrtik_ompl.sensing.sensor import Sensor, View
 
-EXPLAIN_EVERY = 5.0  # [s]
+EXPLANATION_SECONDS = 5.0  # between two searches for unknown markers
 
 
-class Eyes(Protocol):
-    """What the engine needs of them.
+class Perception(Protocol):
+    """Camera and sensor, as the engine uses them.
 
     Attributes:
         camera: The lens.
         picture: The last picture, shape (height, width, 3).
-        T_base_camera: Where the camera is, None if that is not known yet.
-        arm_in_picture: The arm itself is to be seen.
+        T_base_camera: Pose of the camera, None if it is not known yet.
+        arm_in_picture: Whether the arm itself is in the picture.
         lost: Why there are no pictures any more; "" if there are.
         hint: Why no object can be placed by the last picture; "" if one can.
     """
 
     camera: Camera
     picture: NDArray[np.uint8]
-    T_base_camera: Any | None
+    T_base_camera: pin.SE3 | None
     arm_in_picture: bool
     lost: str
     hint: str
 
-    def look(self, session: Session, time: float) -> None:
-        """Look once, and tell the session what there is to be seen."""
+    def update(self, session: Session, time: float) -> None:
+        """Process the newest picture, and give the objects in it to the session."""
 
     def close(self) -> None:
-        """Look no more."""
+        """Release the camera."""
 
 
-class LiveEyes:
+class LivePerception:
     """A camera and the sensor behind it."""
 
     def __init__(self, sensor: Sensor, source: PictureSource, *, arm_in_picture: bool = False) -> None:
-        """Take the parts; see `Eyes`."""
+        """Take the parts; see `Perception`."""
         self.camera, self.arm_in_picture = sensor.camera, arm_in_picture
         self.picture = np.zeros((self.camera.height, self.camera.width, 3), dtype=np.uint8)
-        self.T_base_camera: Any | None = sensor.marker_map.T_base_camera
+        self.T_base_camera: pin.SE3 | None = sensor.marker_map.T_base_camera
         self.lost = self.hint = ""
         self._explain_again = -np.inf
         self._sensor, self._source = sensor, source
 
-    def look(self, session: Session, time: float) -> None:
-        """Look once, and tell the session what there is to be seen."""
+    def update(self, session: Session, time: float) -> None:
+        """Process the newest picture, and give the objects in it to the session."""
         try:
             taken = self._source.latest()
             if taken is None:
@@ -75,11 +76,11 @@ class LiveEyes:
             self.T_base_camera, _ = base_from_camera(self._sensor.marker_map, view.seen)
 
     def close(self) -> None:
-        """Let the camera go."""
+        """Release the camera."""
         self._source.close()
 
     def _why_nothing(self, view: View, time: float, known: bool) -> str:
-        """Why an object cannot be placed. Looking for unknown markers is slow: only while none was ever seen."""
+        """Why no object has a pose. The search for unknown markers is slow: only while no object was ever seen."""
         if view.placed:
             return ""
         if view.seen:
@@ -88,22 +89,22 @@ class LiveEyes:
         if known:
             return "no marker in view"
         if time >= self._explain_again:
-            self._explain_again = time + EXPLAIN_EVERY
+            self._explain_again = time + EXPLANATION_SECONDS
             return self._sensor.why_nothing("camera")
         return self.hint
 
 
 class SimulatedSource:
-    """Pictures of a simulated camera, made when they are asked for."""
+    """Pictures of a simulated camera, made on demand."""
 
     def __init__(self, camera: SimulatedCamera, arm: Arm) -> None:
-        """Look at an arm."""
+        """Take camera and arm."""
         self._camera, self._arm, self._count = camera, arm, 0
 
     def latest(self) -> Picture:
-        """The scene with the arm as it stands."""
+        """A picture with the arm at its present configuration."""
         self._count += 1
         return self._camera.picture(self._arm.read(), float(self._count))
 
     def close(self) -> None:
-        """Nothing to let go."""
+        """Nothing to release."""

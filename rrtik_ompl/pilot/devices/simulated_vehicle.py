@@ -1,4 +1,4 @@
-"""A simulated vehicle <-> its YAML file: camera, marker map, and where everything really is."""
+"""A simulated vehicle, read from its YAML file: camera, marker map, and true poses of everything."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
+import pinocchio as pin
 from pydantic import Field
 
 from rrtik_ompl.catalog import problem_folders
@@ -24,31 +25,31 @@ FOLDER = "pilot"  # beside the shipped problems
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scenario:
-    """What a simulated camera looks at.
+class SimulatedVehicle:
+    """The camera of a simulated vehicle and what it sees.
 
     Attributes:
         camera: The lens.
         marker_map: The objects.
         places: ``T_base_object`` by name.
-        T_base_camera: From where it looks.
+        T_base_camera: Pose of the camera.
     """
 
     camera: Camera
     marker_map: MarkerMap
-    places: Mapping[str, Any]
-    T_base_camera: Any
+    places: Mapping[str, pin.SE3]
+    T_base_camera: pin.SE3
 
 
 class PlaceEntry(Section):
-    """Where an object of the map is."""
+    """Pose of an object of the map."""
 
     name: Name
     pose: PoseEntry = Field(description="in the frame of the arm's base")
 
 
-class ScenarioFile(Section):
-    """A file with one scenario; camera and map are files, relative to its folder."""
+class VehicleFile(Section):
+    """A file with one simulated vehicle; camera and map are files, relative to its folder."""
 
     version: Version
     camera: Name
@@ -57,30 +58,30 @@ class ScenarioFile(Section):
     places: Annotated[list[PlaceEntry], Field(min_length=1)]
 
 
-def load_scenario(path: str | os.PathLike[str]) -> Scenario:
-    """Read a scenario file.
+def load_vehicle(path: str | os.PathLike[str]) -> SimulatedVehicle:
+    """Read the file of a simulated vehicle.
 
     Raises:
         InputError: If the file, its camera file or its map cannot be used; one line with file, line, key and remedy.
     """
     document = read_yaml(path)
-    entry = parse(document, ScenarioFile)
+    entry = parse(document, VehicleFile)
     folder = document.path.parent
     marker_map = load_marker_map(folder / entry.map)
     places = {}
     for number, each in enumerate(entry.places):
         with document.at(("places", number, "name")):
             places[marker_map.named(each.name).name] = each.pose.build()
-    return Scenario(load_camera(folder / entry.camera), marker_map, places, entry.camera_pose.build())
+    return SimulatedVehicle(load_camera(folder / entry.camera), marker_map, places, entry.camera_pose.build())
 
 
-def find_scenario(problem: str) -> Path:
-    """The shipped scenario for a shipped problem.
+def find_vehicle(problem: str) -> Path:
+    """The file of the simulated vehicle that ships for a problem.
 
     Raises:
         InputError: If there is none.
     """
-    shipped = {file.stem: file for folder in problem_folders() for file in _scenarios(folder)}
+    shipped = {file.stem: file for folder in problem_folders() for file in _vehicle_files(folder)}
     if problem not in shipped:
         there = ", ".join(sorted(shipped)) or "no problem"
         raise InputError(
@@ -90,7 +91,7 @@ def find_scenario(problem: str) -> Path:
     return shipped[problem]
 
 
-def _scenarios(folder: Path) -> list[Path]:
-    """Files in a folder that are scenarios; camera files and maps lie beside them."""
+def _vehicle_files(folder: Path) -> list[Path]:
+    """Files of simulated vehicles in a folder; camera files and maps lie beside them."""
     problems = {file.stem for file in folder.glob("*.yaml")}
     return [file for file in sorted((folder / FOLDER).glob("*.yaml")) if file.stem in problems]

@@ -1,6 +1,6 @@
-"""A vehicle that is not there: what its camera would see of the marked objects, the surroundings and the arm.
+"""The camera of a simulated vehicle: pictures of marked objects, surroundings and the arm.
 
-Pictures are made as fast as a camera makes them: solids by the rasteriser, markers as pictures laid into their plane.
+Pictures are made at the rate of a camera: solids by the rasteriser, markers as images warped into their plane.
 For measurements of the markers themselves use `sensing.synthetic_camera`, which is exact and slow.
 """
 
@@ -11,8 +11,10 @@ from typing import Any
 
 import cv2
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
+from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.overlay.augment import Augmenter
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle, Scene
@@ -21,15 +23,15 @@ from rrtik_ompl.sensing.cameras.pictures import Picture
 from rrtik_ompl.sensing.markers.detection import marker_cells
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap
 
-FINE = 24  # pixels a cell of a marker's picture
+PIXELS_PER_CELL = 24  # of a marker's image
 WATER = ((96, 84, 60), (60, 52, 40))  # blue, green, red above and below
-NOISE, NOISES = 2.0, 4  # grey levels; pictures of noise, taken in turn
-RATE = 30.0  # pictures a second
+NOISE, NOISE_PICTURES = 2.0, 4  # grey levels; pictures of noise, taken in turn
+PICTURE_RATE = 30.0  # pictures a second
 TRIANGLES = 8_000  # of the arm
 
 
 class SimulatedCamera:
-    """Looks at a scene that is known, with an arm in it that moves."""
+    """A camera before a known scene with a moving arm."""
 
     def __init__(
         self,
@@ -37,33 +39,33 @@ class SimulatedCamera:
         marker_map: MarkerMap,
         robot: Robot,
         scene: Scene,
-        places: Mapping[str, Any],
-        T_base_camera: Any,
+        places: Mapping[str, pin.SE3],
+        T_base_camera: pin.SE3,
         seed: int = 0,
     ) -> None:
-        """Put everything in its place.
+        """Prepare the scene.
 
         Args:
             camera: The lens; without distortion the picture is exact.
             marker_map: The objects.
             robot: The arm in the picture.
-            scene: What else stands there.
-            places: ``T_base_object`` of objects, by name; those that are not named are not there.
-            T_base_camera: From where the camera looks.
+            scene: Further obstacles.
+            places: ``T_base_object`` of objects, by name; objects without one are left out.
+            T_base_camera: Pose of the camera.
             seed: Of the noise.
         """
         self.camera, self.marker_map, self.T_base_camera = camera, marker_map, T_base_camera
         self.places = dict(places)
         self._scene, self._arm = scene, Augmenter(robot, camera, TRIANGLES)
         rng, size = np.random.default_rng(seed), (camera.height, camera.width, 1)
-        grey = [np.rint(rng.normal(0.0, NOISE, size)).astype(np.int16) for _ in range(NOISES)]
+        grey = [np.rint(rng.normal(0.0, NOISE, size)).astype(np.int16) for _ in range(NOISE_PICTURES)]
         self._noise = [np.repeat(each, 3, axis=2) for each in grey]
         self._kept: Any = (None, None, None)
         self._kept_arm: Any = (None, None, None)
 
     def picture(self, q: NDArray[np.float64], time: float) -> Picture:
-        """What it sees with the arm at a configuration, shape (dof,)."""
-        noise = self._noise[int(time * RATE) % NOISES]
+        """The picture with the arm at a configuration, shape (dof,)."""
+        noise = self._noise[int(time * PICTURE_RATE) % NOISE_PICTURES]
         noisy = cv2.add(self._clean(q), noise, dtype=cv2.CV_8U)
         return Picture(np.asarray(noisy, dtype=np.uint8), "simulated camera", time)
 
@@ -97,8 +99,10 @@ class SimulatedCamera:
             for k, solid in enumerate(thing.solids)
         ]
 
-    def _lay_markers(self, drawn: Any, depths: Any, thing: MarkedObject, T_camera_object: Any) -> None:
-        """Lay the pictures of an object's markers into the picture, where nothing stands before them."""
+    def _lay_markers(
+        self, drawn: NDArray[np.uint8], depths: NDArray[np.float32], thing: MarkedObject, T_camera_object: pin.SE3
+    ) -> None:
+        """Draw the markers of an object into the picture where nothing hides them."""
         for marker in thing.markers:
             T = T_camera_object * marker.T_object_marker
             if float(T.rotation[:, 2] @ T.translation) >= 0.0:
@@ -110,8 +114,17 @@ class SimulatedCamera:
             if (around[:, 2] > 0.05).all():
                 self._lay(drawn, depths, sheet, self.camera.project(around), T)
 
-    def _lay(self, drawn: Any, depths: Any, sheet: NDArray[np.uint8], pixels: Any, T: Any) -> None:
-        fine = np.kron(30 + (sheet // 255) * 190, np.ones((FINE, FINE), dtype=np.uint8)).astype(np.uint8)
+    def _lay(
+        self,
+        drawn: NDArray[np.uint8],
+        depths: NDArray[np.float32],
+        sheet: NDArray[np.uint8],
+        pixels: Matrix,
+        T: pin.SE3,
+    ) -> None:
+        fine = np.kron(30 + (sheet // 255) * 190, np.ones((PIXELS_PER_CELL, PIXELS_PER_CELL), dtype=np.uint8)).astype(
+            np.uint8
+        )
         size = len(fine)
         square = np.array([[0, 0], [size, 0], [size, size], [0, size]], dtype=np.float32) - 0.5
         low = np.maximum(np.floor(pixels.min(axis=0)).astype(int) - 2, 0)

@@ -1,1 +1,1 @@
-"""Routes of single-joint moves to a grasp: how they are searched for, judged and followed."""
+"""Routes of single-joint moves to a grasp: how they are searched for, rated and followed."""

@@ -1,15 +1,15 @@
-"""Where to stand before an object so that few joints lead on to it.
+"""Configurations in front of an object from which few joints lead on to the grasp.
 
-The pose before a grasp is met only roughly: what counts is that the gripper is clear of the object and in front of it.
-That leaves configurations which differ from the grasp in two or three joints, where the exact pose would take all.
+The pose before a grasp is reached only roughly: what counts is that the gripper is clear of the object and in front of
+it. That leaves configurations which differ from the grasp in two or three joints, where the exact pose would take all.
 """
 
 from __future__ import annotations
 
 from itertools import combinations, permutations
-from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.path import JointPath
@@ -17,16 +17,16 @@ from rrtik_ompl.pilot.routes.follower import slack
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 
-MOST_JOINTS = 3
-ASIDE = 0.02  # [m] from the pose before the object, at most
-TILT = np.deg2rad(20.0)  # from its orientation, at most
-FARTHER = (1.0, 1.5, 2.0)  # as far from the object as the pose before it, and farther back: where is most room?
-ROUNDS, DAMPING = 8, 1e-4  # of the search for such configurations; [m^2]
-TRIALS = 40  # of small errors, for how much room there is at a beginning
+MAX_JOINTS = 3  # that move between such a configuration and the grasp
+MAX_OFFSET = 0.02  # [m] from the pose before the object
+MAX_TILT = np.deg2rad(20.0)  # from its orientation
+STANDOFF_FACTORS = (1.0, 1.5, 2.0)  # distances from the object that are tried, over that of the pose before it
+ITERATIONS, DAMPING = 8, 1e-4  # of the search for such configurations; [m^2]
+ERROR_SAMPLES = 40  # small errors that measure the clearance of a beginning
 
 
 def approaches(
-    world: World, holding: World, grasp: Vector, stages: tuple[Any, Any, Any], most: int
+    world: World, holding: World, grasp: Vector, stages: tuple[pin.SE3, pin.SE3, pin.SE3], max_count: int
 ) -> list[list[Matrix]]:
     """Last parts of routes, grouped by where they begin; first where small errors do no harm, then of few joints.
 
@@ -35,7 +35,7 @@ def approaches(
         holding: In which the gripper may touch the object: every part is free in it.
         grasp: The configuration that holds the object, shape (dof,).
         stages: ``T_base_tip`` of approach, grasp and lift.
-        most: How many beginnings at most.
+        max_count: Number of beginnings at most.
 
     Returns:
         For each beginning the orders of its joints that are free, shape (moves + 1, dof) each; the last row is the
@@ -47,7 +47,7 @@ def approaches(
         free = [rows for rows in parts if holding.motion_valid_batch(rows[:-1], rows[1:]).all()]
         if free:
             found.append(free)
-        if len(found) == most:
+        if len(found) == max_count:
             break
     return found
 
@@ -60,34 +60,34 @@ def _in_order(begin: Vector, end: Vector, order: tuple[int, ...]) -> Matrix:
     return rows
 
 
-def _beginnings(world: World, grasp: Vector, stages: tuple[Any, Any, Any]) -> Matrix:
+def _beginnings(world: World, grasp: Vector, stages: tuple[pin.SE3, pin.SE3, pin.SE3]) -> Matrix:
     """Free configurations before the object that differ from the grasp in few joints, best first. Shape (k, dof)."""
     joints = range(world.robot.dof)
-    sets = [np.isin(joints, some) for size in range(1, MOST_JOINTS + 1) for some in combinations(joints, size)]
+    sets = [np.isin(joints, some) for size in range(1, MAX_JOINTS + 1) for some in combinations(joints, size)]
     at, back = stages[1].translation, stages[0].translation - stages[1].translation
-    places = np.repeat([at + far * back for far in FARTHER], len(sets), axis=0)
+    places = np.repeat([at + far * back for far in STANDOFF_FACTORS], len(sets), axis=0)
     small = slack(JointPath.of(world.robot, grasp[None]))
-    rows = _led(world.robot, grasp, np.tile(sets, (len(FARTHER), 1)), places)
-    rows = np.where(np.abs(rows - grasp) <= small, grasp, rows)  # no move for what is not to be seen
+    rows = _moved_to_places(world.robot, grasp, np.tile(sets, (len(STANDOFF_FACTORS), 1)), places)
+    rows = np.where(np.abs(rows - grasp) <= small, grasp, rows)  # no move for a difference too small to notice
     _, first = np.unique(rows, axis=0, return_index=True)
     rows, places = rows[first], places[first]
     poses = world.robot.fk_batch(rows)
     aside = np.linalg.norm(poses[:, :3, 3] - places, axis=1)
     cosine = 0.5 * (np.einsum("ij,mij->m", stages[1].rotation, poses[:, :3, :3]) - 1.0)
-    near = (aside < ASIDE) & (cosine > np.cos(TILT))
+    near = (aside < MAX_OFFSET) & (cosine > np.cos(MAX_TILT))
     near[near] = world.valid_batch(rows[near])
     rows, moving = rows[near], (rows[near] != grasp).sum(axis=1)
     order = np.lexsort((-cosine[near], moving, _touching(world, rows, small)))
     return np.asarray(rows[order])
 
 
-def _led(robot: Robot, grasp: Vector, chosen: Mask, places: Matrix) -> Matrix:
+def _moved_to_places(robot: Robot, grasp: Vector, chosen: Mask, places: Matrix) -> Matrix:
     """For each choice of joints, shape (m, dof), the grasp with those moved until the tip is near its place, (m, 3).
 
     By damped least squares. Shape (m, dof).
     """
     rows = np.tile(grasp, (len(chosen), 1))
-    for _ in range(ROUNDS):
+    for _ in range(ITERATIONS):
         poses, jacobians = robot.fk_jacobian_batch(rows)
         turning = jacobians[:, :3] * chosen[:, None, :]
         square = turning @ turning.transpose(0, 2, 1) + DAMPING * np.eye(3)
@@ -98,7 +98,7 @@ def _led(robot: Robot, grasp: Vector, chosen: Mask, places: Matrix) -> Matrix:
 
 def _touching(world: World, rows: Matrix, small: Vector) -> Vector:
     """Tenths of small errors that make a configuration touch something. Shape (m,)."""
-    errors = np.random.default_rng(0).uniform(-small, small, (TRIALS, len(small)))
+    errors = np.random.default_rng(0).uniform(-small, small, (ERROR_SAMPLES, len(small)))
     tried = world.robot.clamp((rows[:, None] + errors).reshape(-1, len(small)))
     tenths: Vector = np.rint(10.0 * (1.0 - world.valid_batch(tried).reshape(len(rows), -1).mean(axis=1)))
     return tenths

@@ -1,4 +1,4 @@
-"""How near a free motion comes to anything, and whether it stays free if every move ends a little beside its end."""
+"""The clearance of a free motion, and whether it stays free if every move ends with a small error."""
 
 from __future__ import annotations
 
@@ -9,15 +9,14 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.world import Contact, World
 
-CLOSE_ENOUGH = 0.002  # [m]; the least distance found is at most that much too large
+CLEARANCE_ERROR = 0.002  # [m]; the least distance that is found is at most this much too large
 
 
-def tightest(world: World, rows: Matrix) -> Contact | None:
+def closest_pair(world: World, rows: Matrix) -> Contact | None:
     """The pair that is nearest to its margin or to contact at some free configuration; None if nothing can collide.
 
-    Few looks are enough, for between two of them a distance changes little.
-    Looks first where the bound from earlier looks is lowest: two bodies approach each other by no more than twice the
-    bound on the arm's displacement (world.py), so that most rows need no look.
+    Few rows have to be measured. The next one is that with the lowest bound from the rows before it: two bodies
+    approach each other by no more than twice the bound on the arm's displacement (``World.weights``).
 
     Args:
         world: Robot and surroundings.
@@ -26,7 +25,7 @@ def tightest(world: World, rows: Matrix) -> Contact | None:
     bound, best = np.full(len(rows), -np.inf), None
     while True:
         row = int(np.argmin(bound))
-        if best is not None and bound[row] >= best.clearance - CLOSE_ENOUGH:
+        if best is not None and bound[row] >= best.clearance - CLEARANCE_ERROR:
             return best
         found = world.closest(rows[row], known_free=True)
         if found is None:
@@ -38,7 +37,7 @@ def tightest(world: World, rows: Matrix) -> Contact | None:
 
 
 def executions(path: JointPath, slack: Vector, count: int, rng: np.random.Generator) -> Matrix:
-    """Corners of a path of single-joint moves as hands make them: every move ends up to ``slack`` beside its end.
+    """Corners of a path of single-joint moves as a pilot makes them: every move ends with an error up to ``slack``.
 
     Args:
         path: One joint at a time.
@@ -59,7 +58,7 @@ def executions(path: JointPath, slack: Vector, count: int, rng: np.random.Genera
 
 
 def free_rows(world: World, rows: Matrix) -> NDArray[np.bool_]:
-    """Which of some `executions` touch nothing; limits stop a joint, and are no fault. Shape (count,)."""
+    """Which of some `executions` touch nothing; a joint that stops at its limit is no fault. Shape (count,)."""
     if rows.shape[1] < 2:
         return np.ones(len(rows), dtype=bool)
     inside = world.robot.clamp(rows.reshape(-1, rows.shape[-1])).reshape(rows.shape)

@@ -1,6 +1,6 @@
-"""Following a list of single-joint moves: which move is next, how far it is, when to let go, when the way is lost.
+"""Following a list of single-joint moves: the next move, what remains of it, when to stop, when the arm is off it.
 
-Source: shared-control tool, section 6.
+Source: [1, ch. 6].
 """
 
 from __future__ import annotations
@@ -14,21 +14,21 @@ from rrtik_ompl.path import JointPath, Move
 from rrtik_ompl.units import joint_unit, reading
 from rrtik_ompl.world import World
 
-TOLERANCE = np.deg2rad(1.0)  # [rad]; a move is done this near to its end
+TOLERANCE = np.deg2rad(1.0)  # [rad]; a move is done this close to its end
 SLIDING_TOLERANCE = 0.002  # [m]
-REACTION = 0.3  # [s] from the advice to stop until the pilot's hand does
+REACTION_SECONDS = 0.3  # from the advice to stop until the pilot does
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Progress:
-    """Where the arm is on its way.
+    """Where the arm is on its route.
 
     Attributes:
         move: Number of the current move, from 0; as many as there are moves when all is done.
         share: Of the current move that is done, 0 to 1.
         remaining: To the current move's end, with its sign [rad or m].
-        advice: "move", "stop" (now, for the hand is slow), "done" or "lost".
-        fault: If lost: which joint is off and by how much.
+        advice: "move", "stop" (now, for the pilot needs time to react), "done" or "lost".
+        fault: If lost: which joint is off its value and by how much.
     """
 
     move: int
@@ -39,15 +39,15 @@ class Progress:
 
 
 class Follower:
-    """Watches an arm follow a path of single-joint moves."""
+    """Tracks an arm along a path of single-joint moves."""
 
     def __init__(self, path: JointPath, rates: Vector, tolerance: float = TOLERANCE) -> None:
-        """Stand at the first move.
+        """Begin at the first move.
 
         Args:
             path: One joint at a time.
             rates: Of the joints when they are driven, shape (dof,) [rad/s or m/s].
-            tolerance: Within which a joint is where it should be [rad].
+            tolerance: Largest error of a joint [rad].
 
         Raises:
             InputError: If the path moves several joints at once.
@@ -66,7 +66,7 @@ class Follower:
 
     @property
     def target(self) -> Vector:
-        """Where the arm is after the current move. Shape (dof,)."""
+        """Configuration after the current move. Shape (dof,)."""
         return np.array(self._corners[min(self.current + 1, len(self.moves))])
 
     def joint(self) -> int | None:
@@ -74,7 +74,7 @@ class Follower:
         return None if self.done else self._names.index(self.moves[self.current].joint)
 
     def update(self, q: Vector) -> Progress:
-        """Where an arm at q stands."""
+        """The progress of an arm at q."""
         joint = self.joint()
         if joint is None:
             return self._lost(q, self._corners[-1], None) or Progress(self.current, 1.0, 0.0, "done")
@@ -90,16 +90,16 @@ class Follower:
         if not inside:
             return self._off(joint, float(q[joint]), float(end))
         share = float(np.clip(1.0 - remaining / (end - begin), 0.0, 1.0))
-        ending = abs(remaining) <= self._rates[joint] * REACTION + self._slack[joint]
+        ending = abs(remaining) <= self._rates[joint] * REACTION_SECONDS + self._slack[joint]
         return Progress(self.current, share, remaining, "stop" if ending else "move")
 
     def rest(self, q: Vector) -> JointPath:
-        """The remaining moves from where the arm really is: straight to the end of the current one, then as planned."""
+        """The remaining moves from q: straight to the end of the current one, then as planned."""
         rows = np.vstack([q, self._corners[self.current + 1 :]]) if not self.done else np.vstack([q, q])
         return self.path.with_waypoints(rows)
 
     def back(self, q: Vector) -> JointPath:
-        """The way back to the beginning: what was done, reversed."""
+        """The path back to the beginning: the moves that were made, reversed."""
         return self.path.with_waypoints(np.vstack([q, self._corners[: self.current + 1][::-1]]))
 
     def _lost(self, q: Vector, planned: Vector, moving: int | None) -> Progress | None:
@@ -116,11 +116,11 @@ class Follower:
 
 
 def slack(path: JointPath, tolerance: float = TOLERANCE) -> Vector:
-    """How far beside its place each joint may be [rad or m]. Shape (dof,)."""
+    """Largest error of each joint [rad or m]. Shape (dof,)."""
     return np.where(path.prismatic, SLIDING_TOLERANCE, tolerance)
 
 
-def still_free(world: World, path: JointPath) -> str:
+def path_fault(world: World, path: JointPath) -> str:
     """Why a path is not free any more; "" if it is."""
     faults = path.violations(world)
     return faults[0].reason if faults else ""

@@ -1,6 +1,6 @@
-"""Assisted manoeuvre: what a move of one joint would do, before it is made. Preventive: what must not be is refused.
+"""Assisted manoeuvre: moves of one joint are checked before they are made, and refused if they are not free.
 
-Source: shared-control tool, section 2.
+Source: [1, ch. 6].
 """
 
 from __future__ import annotations
@@ -13,31 +13,31 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form
 from rrtik_ompl.path import JointPath
-from rrtik_ompl.pilot.routes.clearance import tightest
+from rrtik_ompl.pilot.routes.clearance import closest_pair
 from rrtik_ompl.pilot.routes.follower import slack
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.units import joint_unit, reading
 from rrtik_ompl.world import World
 
-NEAR_SINGULAR = 0.05  # sines of the angles that vanish in a singular posture, metres of a lever
-LITTLE_ROOM = 0.02  # [m]
-LOOKS = 20  # along the move, for the clearance
-SINGULAR_LOOKS = 60  # along the whole way of a joint
-WAYS_OUT = (1, 2, 3, 4, 6, 8)  # small errors, by which a joint is driven to get out of contact
+SINGULARITY_THRESHOLD = 0.05  # sine of an angle, or metres of a lever arm, that vanish in a singular posture
+CLEARANCE_WARNING = 0.02  # [m]; a smaller clearance is warned of
+CLEARANCE_SAMPLES = 20  # along a move
+SINGULARITY_SAMPLES = 60  # along the range of a joint
+ESCAPE_STEPS = (1, 2, 3, 4, 6, 8)  # multiples of a small error, by which a joint is driven to get out of contact
 
 
 Stretch = tuple[float, float, str]  # from, to [rad or m], name of the singular case
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Room:
+class JointRange:
     """How far one joint can be driven while the others stand still.
 
     Attributes:
         low: The least value [rad or m].
         high: The largest value.
-        below: What ends the way at ``low``: "limit", "full turn" or the pair that touches.
-        above: What ends it at ``high``.
+        below: What ends the range at ``low``: "limit", "full turn" or the pair that touches.
+        above: What ends the range at ``high``.
         singular: Stretches in between on which the arm is near a singular posture; its name is "" if it has none.
     """
 
@@ -49,14 +49,14 @@ class Room:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Verdict:
-    """What is to be said about a move.
+class MoveCheck:
+    """The check of a move.
 
     Attributes:
         allowed: Whether it may be made.
         reason: Why not: the limit, or the pair that would touch and where; "" if it may.
-        warnings: What to look out for.
-        clearance: The least distance to anything along the way, at a few looks [m]; -inf if it collides.
+        warnings: Small clearance, singular postures.
+        clearance: The least distance to anything along the move, at some samples [m]; -inf if it collides.
     """
 
     allowed: bool
@@ -65,8 +65,8 @@ class Verdict:
     clearance: float
 
 
-def judge_move(world: World, q: Vector, joint: int, target: float) -> Verdict:
-    """Judge a move of one joint.
+def check_move(world: World, q: Vector, joint: int, target: float) -> MoveCheck:
+    """Check a move of one joint.
 
     Args:
         world: Robot and surroundings.
@@ -86,26 +86,26 @@ def judge_move(world: World, q: Vector, joint: int, target: float) -> Verdict:
     end[joint] = target
     fault = robot.limit_fault(end)
     if fault:
-        return Verdict(False, fault, (), -np.inf)
+        return MoveCheck(False, fault, (), -np.inf)
     end = robot.clamp(end)
     if not world.valid(start):
         return _out_of_contact(world, start, end)
     if not world.motion_valid(start, end):
-        return Verdict(False, _obstruction(world, start, end, joint), (), -np.inf)
-    share = np.linspace(0.0, 1.0, LOOKS)[:, None]
-    looks = start + share * (end - start)
-    tight = tightest(world, looks)
-    room = np.inf if tight is None else tight.distance
+        return MoveCheck(False, _obstruction(world, start, end, joint), (), -np.inf)
+    share = np.linspace(0.0, 1.0, CLEARANCE_SAMPLES)[:, None]
+    rows = start + share * (end - start)
+    nearest = closest_pair(world, rows)
+    clearance = np.inf if nearest is None else nearest.distance
     warnings = [*_singular(world, end)]
-    if tight is not None and room < LITTLE_ROOM:
-        warnings.append(f"only {1e3 * max(room, 0.0):.0f} mm between {tight.first} and {tight.second}")
-    return Verdict(True, "", tuple(warnings), float(room))
+    if nearest is not None and clearance < CLEARANCE_WARNING:
+        warnings.append(f"only {1e3 * max(clearance, 0.0):.0f} mm between {nearest.first} and {nearest.second}")
+    return MoveCheck(True, "", tuple(warnings), float(clearance))
 
 
 def free_until(world: World, q: Vector, joint: int, target: float) -> float:
     """How far towards a target a joint can go without touching anything or leaving its limits [rad or m].
 
-    By bisection of the way; the arm must be free where it is.
+    By bisection; the arm must be free at q.
     """
     robot, start = world.robot, world.robot.configuration(q)
     end = start.copy()
@@ -122,18 +122,18 @@ def free_until(world: World, q: Vector, joint: int, target: float) -> float:
     return float(start[joint] + low * (end[joint] - start[joint]))
 
 
-def room_of(world: World, q: Vector, joint: int) -> Room:
+def joint_range(world: World, q: Vector, joint: int) -> JointRange:
     """How far a joint can be driven; nowhere if the arm touches something, a full turn if it is endless and free."""
     robot, here = world.robot, float(q[joint])
     if not world.valid(q):
         why = world.explain(q)
-        return Room(here, here, why, why, ())
-    low, below = _way(world, q, joint, float(robot.lower[joint]), here - 2.0 * np.pi)
-    high, above = _way(world, q, joint, float(robot.upper[joint]), here + 2.0 * np.pi)
-    return Room(low, high, below, above, _singular_stretches(robot, q, joint, low, high))
+        return JointRange(here, here, why, why, ())
+    low, below = _reach(world, q, joint, float(robot.lower[joint]), here - 2.0 * np.pi)
+    high, above = _reach(world, q, joint, float(robot.upper[joint]), here + 2.0 * np.pi)
+    return JointRange(low, high, below, above, _singular_stretches(robot, q, joint, low, high))
 
 
-def _way(world: World, q: Vector, joint: int, limit: float, turn: float) -> tuple[float, str]:
+def _reach(world: World, q: Vector, joint: int, limit: float, turn: float) -> tuple[float, str]:
     """How far a joint goes towards its limit, or round once, and what ends it: that, or the pair that touches."""
     end, name = (limit, "limit") if np.isfinite(limit) else (turn, "full turn")
     reached = free_until(world, q, joint, end)
@@ -141,13 +141,13 @@ def _way(world: World, q: Vector, joint: int, limit: float, turn: float) -> tupl
         return end, name
     start, last = q.copy(), q.copy()
     start[joint], last[joint] = reached, end
-    touching = world.contacts(_first_stuck(world, start, last))
+    touching = world.contacts(_first_blocked(world, start, last))
     return reached, f"{touching[0].first} meets {touching[0].second}" if touching else "too close to tell"
 
 
 def _singular_stretches(robot: Robot, q: Vector, joint: int, low: float, high: float) -> tuple[Stretch, ...]:
-    """Where along the way of a joint the arm is near a singular posture."""
-    values = np.linspace(low, high, SINGULAR_LOOKS)
+    """Where along the range of a joint the arm is near a singular posture."""
+    values = np.linspace(low, high, SINGULARITY_SAMPLES)
     rows = np.tile(q, (len(values), 1))
     rows[:, joint] = values
     found: list[Stretch] = []
@@ -157,52 +157,52 @@ def _singular_stretches(robot: Robot, q: Vector, joint: int, low: float, high: f
     return tuple(found)
 
 
-def way_out(world: World, q: Vector) -> tuple[int, float] | None:
+def escape_move(world: World, q: Vector) -> tuple[int, float] | None:
     """The joint, and where to drive it [rad or m], that gets an arm that touches something free again; None if none.
 
     Of all single joints the one that has to go least far, a few small errors' width at most.
     """
     small = slack(JointPath.of(world.robot, q[None]))
-    for far in WAYS_OUT:
+    for far in ESCAPE_STEPS:
         for joint, step in enumerate(far * small):
             for target in (q[joint] + step, q[joint] - step):
-                if judge_move(world, q, joint, float(target)).allowed:
+                if check_move(world, q, joint, float(target)).allowed:
                     return joint, float(target)
     return None
 
 
-def advice_to_get_free(world: World, q: Vector) -> str:
-    """What a pilot is told whose arm touches something; "" if it does not."""
+def escape_advice(world: World, q: Vector) -> str:
+    """How to get an arm that touches something free; "" if it touches nothing."""
     if world.valid(q):
         return ""
-    out = way_out(world, q)
+    out = escape_move(world, q)
     if out is None:
         return "drive the arm out of it first"
     value, unit = reading(out[1], joint_unit(world.robot.prismatic[out[0]]))
     return f"{world.robot.joint_names[out[0]]} to {value:.4g} {unit} gets it free"
 
 
-def _out_of_contact(world: World, start: Vector, end: Vector) -> Verdict:
-    """An arm that touches something may go where it touches ever less, and then nothing."""
-    rows = start + np.linspace(0.0, 1.0, LOOKS)[:, None] * (end - start)
-    room = np.array([world.clearance(row) for row in rows])
-    free = int(np.argmax(room > 0.0))
-    if room[-1] <= 0.0 or (np.diff(room[: free + 1]) <= 0.0).any() or not world.motion_valid(rows[free], end):
-        return Verdict(False, f"the arm touches something, and this does not get it free: {world.explain(start)}", (),
+def _out_of_contact(world: World, start: Vector, end: Vector) -> MoveCheck:
+    """An arm that touches something may move so that the overlap decreases and then ends."""
+    rows = start + np.linspace(0.0, 1.0, CLEARANCE_SAMPLES)[:, None] * (end - start)
+    gaps = np.array([world.clearance(row) for row in rows])
+    free = int(np.argmax(gaps > 0.0))
+    if gaps[-1] <= 0.0 or (np.diff(gaps[: free + 1]) <= 0.0).any() or not world.motion_valid(rows[free], end):
+        return MoveCheck(False, f"the arm touches something, and this does not get it free: {world.explain(start)}", (),
                        -np.inf)  # fmt: skip
-    return Verdict(True, "", ("out of contact",), float(room[-1]))
+    return MoveCheck(True, "", ("out of contact",), float(gaps[-1]))
 
 
-def _first_stuck(world: World, start: Vector, end: Vector) -> Vector:
-    """The first configuration along a motion that is not free; its end if none is seen. Shape (dof,)."""
+def _first_blocked(world: World, start: Vector, end: Vector) -> Vector:
+    """The first configuration along a motion that is not free; its end if none is found. Shape (dof,)."""
     rows = start + np.linspace(0.0, 1.0, world.steps(start, end) + 1)[:, None] * (end - start)
-    stuck = np.flatnonzero(~world.valid_batch(rows))
-    return np.array(rows[stuck[0]] if len(stuck) else end)
+    blocked = np.flatnonzero(~world.valid_batch(rows))
+    return np.array(rows[blocked[0]] if len(blocked) else end)
 
 
 def _obstruction(world: World, start: Vector, end: Vector, joint: int) -> str:
     """Which pair touches first along a move that is not free, and at which value of the joint."""
-    first = _first_stuck(world, start, end)
+    first = _first_blocked(world, start, end)
     value, unit = reading(float(first[joint]), joint_unit(world.robot.prismatic[joint]))
     why = world.explain(first) or "too close to tell"
     return f"{world.robot.joint_names[joint]} at {value:.3g} {unit}: {why}"
@@ -216,6 +216,6 @@ def _singular(world: World, q: Vector) -> list[str]:
 def _near_singular(robot: Robot, rows: Matrix) -> dict[str, Mask]:
     """Which configurations are near each singular case, shape (m,); by the Jacobian, "", if the robot names none."""
     if has_closed_form(robot):
-        return {case: np.asarray(size < NEAR_SINGULAR) for case, size in form_of(robot).nearness(rows).items()}
+        return {case: np.asarray(size < SINGULARITY_THRESHOLD) for case, size in form_of(robot).nearness(rows).items()}
     least = np.linalg.svd(robot.jacobian_batch(rows), compute_uv=False)[:, -1]
-    return {"": np.asarray(least < NEAR_SINGULAR)}
+    return {"": np.asarray(least < SINGULARITY_THRESHOLD)}

@@ -1,8 +1,8 @@
-"""Routes of few single-joint moves between two configurations, and how to leave room along them.
+"""Routes of few single-joint moves between two configurations, and variants of them with more clearance.
 
-They are looked for on small lattices of joint values: the corners between start and goal, then further values of one
-joint after the other. Only where those hold no route a planner is asked.
-Source: shared-control tool, section 6; C-RDT paper (lists of single-joint moves).
+They are searched for on small lattices of joint values: the corners between start and goal, then further values of one
+joint after the other. Only where those hold no route a planner is called.
+Source: [1, ch. 6 and 6.3] (lists of single-joint moves).
 """
 
 from __future__ import annotations
@@ -14,16 +14,17 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.moves.lattice import MoveLattice
 from rrtik_ompl.moves.values import Values, lattice_size, spread_values, values_of
+from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.planning import plan
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.shortening.fewest_moves import turning_limits
 from rrtik_ompl.world import World
 
-SECONDS = 5.0
-BRIEF = {"searches": 1, "rounds": 0}  # of the planner
-MOST_CORNERS = 256
+PLANNER_SECONDS = 5.0
+PLANNER_PARAMETERS = {"searches": 1, "rounds": 0}  # of the planner
+MAX_CORNERS = 256  # of a lattice of moves
 FURTHER_VALUES = 24  # of a joint
-ASIDE = (-16.0, -8.0, -4.0, 4.0, 8.0, 16.0)  # small errors, by which a detour is made larger or smaller
+DETOUR_STEPS = (-16.0, -8.0, -4.0, 4.0, 8.0, 16.0)  # small errors by which a detour is made larger or smaller
 
 
 def direct_routes(world: World, start: Vector, goal: Vector, orders: Sequence[Sequence[int]]) -> list[Matrix]:
@@ -33,16 +34,16 @@ def direct_routes(world: World, start: Vector, goal: Vector, orders: Sequence[Se
         world: In which they are to be free.
         start: Shape (dof,).
         goal: Shape (dof,).
-        orders: For each route all joints; of several as good the one whose last moves come first here.
+        orders: For each route all joints; of several equally good routes the one whose last moves come first here.
     """
     values = values_of(np.array([start, goal]))
-    return _routes(world, start, goal, values, orders) if lattice_size(values) <= MOST_CORNERS else []
+    return _routes(world, start, goal, values, orders) if lattice_size(values) <= MAX_CORNERS else []
 
 
 def detours(world: World, start: Vector, goal: Vector, order: Sequence[int], rng: np.random.Generator) -> list[Matrix]:
-    """Routes in which one joint takes further values on its way, for each joint the best; see `direct_routes`."""
+    """Routes in which one joint takes further values in between, for each joint the best; see `direct_routes`."""
     ends = np.array([start, goal])
-    if lattice_size(values_of(ends)) > MOST_CORNERS:
+    if lattice_size(values_of(ends)) > MAX_CORNERS:
         return []
     lower, upper = turning_limits(world.robot, ends)
     found: list[Matrix] = []
@@ -54,14 +55,16 @@ def detours(world: World, start: Vector, goal: Vector, order: Sequence[int], rng
     return found
 
 
-def planned(world: World, start: Vector, goal: Vector, seed: int) -> Matrix | str:
+def planned(world: World, start: Vector, goal: Vector, seed: int) -> Matrix | NoRoute:
     """A planner's route, shape (moves + 1, dof), or the reason why there is none.
 
     Raises:
         ProblemError: If the start or the goal is not free.
     """
-    found = plan(Problem(world, start, goal), "fewest-moves", seconds=SECONDS, seed=seed, parameters=BRIEF)
-    return found.reason if found.path is None else found.path.waypoints
+    found = plan(
+        Problem(world, start, goal), "fewest-moves", seconds=PLANNER_SECONDS, seed=seed, parameters=PLANNER_PARAMETERS
+    )
+    return NoRoute(found.reason) if found.path is None else found.path.waypoints
 
 
 def moved_aside(world: World, route: Matrix, slack: Vector) -> Iterator[Matrix]:
@@ -74,7 +77,7 @@ def moved_aside(world: World, route: Matrix, slack: Vector) -> Iterator[Matrix]:
     """
     for joint, column in enumerate(route.T):
         for value in np.setdiff1d(column, column[[0, -1]]):
-            for step in ASIDE:
+            for step in DETOUR_STEPS:
                 other = route.copy()
                 other[column == value, joint] = value + step * slack[joint]
                 if world.motion_valid_batch(other[:-1], other[1:]).all():

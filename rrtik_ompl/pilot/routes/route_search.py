@@ -1,4 +1,4 @@
-"""The best way to one of several last parts: it forgives small errors of the pilot's hand, then it has few moves."""
+"""The best route to one of several last parts: robust to small errors of the pilot first, then of few moves."""
 
 from __future__ import annotations
 
@@ -10,27 +10,28 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.pilot.routes.clearance import executions, free_rows
-from rrtik_ompl.pilot.routes.follower import slack, still_free
+from rrtik_ompl.pilot.routes.follower import path_fault, slack
 from rrtik_ompl.pilot.routes.moves import detours, direct_routes, moved_aside, planned
+from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.transitions import merge_moves, route_length
 from rrtik_ompl.world import World
 
-EXECUTIONS = 100  # with errors, of which the share that touches nothing is told
-STEADY = 0.99  # less is warned of
-TRIALS, FINALISTS = 40, 4  # executions with errors to compare ways by, and ways that are compared by all
+EXECUTIONS = 100  # with errors, that measure the robustness of a route
+MIN_ROBUSTNESS = 0.99  # a smaller one is warned of
+TRIALS, FINALISTS = 40, 4  # executions by which all routes are compared; routes that are compared by EXECUTIONS
 
-Last = Sequence[Matrix]  # last parts of ways that begin alike, shape (moves + 1, dof) each, at least one
+Tail = Sequence[Matrix]  # last parts of routes from one configuration, shape (moves + 1, dof) each, at least one
 
 
-class Way(NamedTuple):
+class GraspRoute(NamedTuple):
     """Single-joint moves, shape (moves + 1, dof), and the number of the first one that may touch the object."""
 
     rows: Matrix
     grasp_from: int
 
 
-class WaySearch:
-    """Looks for ways.
+class RouteSearch:
+    """A search for the best route.
 
     Args:
         world: In which nothing may be touched.
@@ -44,68 +45,69 @@ class WaySearch:
         self._path = JointPath.of(world.robot, q[None])
         self._slack = slack(self._path)
 
-    def find(self, lasts: Sequence[Last]) -> Way | str:
-        """The best way, or the reason why there is none.
+    def find(self, tails: Sequence[Tail]) -> GraspRoute | NoRoute:
+        """The best route.
 
         Args:
-            lasts: Last parts, grouped by where they begin; the best place to begin at first.
+            tails: Last parts, grouped by where they begin; the best beginning first.
 
         Raises:
-            ProblemError: If the arm stands in something, or the last parts begin in something.
+            ProblemError: If the arm is in collision, or the last parts begin in collision.
         """
-        best = self._best(way for last in lasts for way in self._direct(last)) or self._best(self._around(lasts[0]))
+        best = self._best(route for tail in tails for route in self._direct(tail))
+        best = best or self._best(self._around(tails[0]))
         if best is not None:
             return best
-        first = planned(self._world, self._q, lasts[0][0][0], self._seed)
-        if isinstance(first, str):
+        first = planned(self._world, self._q, tails[0][0][0], self._seed)
+        if isinstance(first, NoRoute):
             return first
-        best = self._best(_joined(first, part) for part in lasts[0])
-        return best or "it comes too close to something to be sure"
+        best = self._best(_joined(first, part) for part in tails[0])
+        return best or NoRoute("it comes too close to something to be sure")
 
-    def steady(self, way: Way, count: int = EXECUTIONS) -> float:
-        """Share of executions that touch nothing although every move ends a little beside its end."""
-        made = executions(self._path.with_waypoints(way.rows), self._slack, count, np.random.default_rng(self._seed))
-        before, after = made[:, : way.grasp_from + 1], made[:, way.grasp_from :]
+    def robustness(self, route: GraspRoute, count: int = EXECUTIONS) -> float:
+        """Share of executions that touch nothing although every move ends with a small error."""
+        made = executions(self._path.with_waypoints(route.rows), self._slack, count, np.random.default_rng(self._seed))
+        before, after = made[:, : route.grasp_from + 1], made[:, route.grasp_from :]
         return float((free_rows(self._world, before) & free_rows(self._holding, after)).mean())
 
-    def _direct(self, last: Last) -> Iterator[Way]:
-        """Ways on which every joint moves once before the last part."""
-        orders = [self._order(part) for part in last]
-        for first in direct_routes(self._world, self._q, last[0][0], orders):
-            yield from (_joined(first, part) for part in last)
+    def _direct(self, tail: Tail) -> Iterator[GraspRoute]:
+        """Routes in which every joint moves once before the last part."""
+        orders = [self._order(part) for part in tail]
+        for first in direct_routes(self._world, self._q, tail[0][0], orders):
+            yield from (_joined(first, part) for part in tail)
 
-    def _around(self, last: Last) -> Iterator[Way]:
-        """Ways on which one joint makes a detour, narrow or wide."""
+    def _around(self, tail: Tail) -> Iterator[GraspRoute]:
+        """Routes in which one joint makes a detour, narrow or wide."""
         rng = np.random.default_rng(self._seed)
-        for route in detours(self._world, self._q, last[0][0], self._order(last[0]), rng):
+        for route in detours(self._world, self._q, tail[0][0], self._order(tail[0]), rng):
             for first in (route, *moved_aside(self._world, route, self._slack)):
-                yield min((_joined(first, part) for part in last), key=lambda way: len(way.rows))
+                yield min((_joined(first, part) for part in tail), key=lambda joined: len(joined.rows))
 
     def _order(self, last: Matrix) -> list[int]:
         """All joints, first the one that a last part begins with: so that its move may join the one before."""
         joints = np.random.default_rng(self._seed).permutation(len(self._q)).tolist()
         return joints if len(last) < 2 else sorted(joints, key=lambda joint: last[0, joint] == last[1, joint])
 
-    def _best(self, ways: Iterable[Way]) -> Way | None:
-        finalists = sorted(ways, key=lambda way: self._rank(way, TRIALS))[:FINALISTS]
-        ranked = sorted(finalists, key=lambda way: self._rank(way, EXECUTIONS))
-        return next((way for way in ranked if not self._fault(way)), None)
+    def _best(self, routes: Iterable[GraspRoute]) -> GraspRoute | None:
+        finalists = sorted(routes, key=lambda route: self._rank(route, TRIALS))[:FINALISTS]
+        ranked = sorted(finalists, key=lambda route: self._rank(route, EXECUTIONS))
+        return next((route for route in ranked if not self._fault(route)), None)
 
-    def _rank(self, way: Way, count: int) -> tuple[float, int, float, float]:
-        """What is to be small: errors that do harm, as far as they matter; then moves, errors, travel."""
-        touching = 1.0 - self.steady(way, count)
-        tenths = max(round(10.0 * touching), int(touching > 1.0 - STEADY))
-        return tenths, len(way.rows), touching, route_length(way.rows)
+    def _rank(self, route: GraspRoute, count: int) -> tuple[float, int, float, float]:
+        """Sorting key, the best first: executions that touch something, in tenths; moves; their exact share; travel."""
+        touching = 1.0 - self.robustness(route, count)
+        tenths = max(round(10.0 * touching), int(touching > 1.0 - MIN_ROBUSTNESS))
+        return tenths, len(route.rows), touching, route_length(route.rows)
 
-    def _fault(self, way: Way) -> str:
-        """What a second, independent check has against a way; "" if nothing."""
-        before, after = way.rows[: way.grasp_from + 1], way.rows[way.grasp_from :]
+    def _fault(self, route: GraspRoute) -> str:
+        """Why a second, independent check refuses a route; "" if it does not."""
+        before, after = route.rows[: route.grasp_from + 1], route.rows[route.grasp_from :]
         parts = ((self._world, before), (self._holding, after))
-        return next(filter(None, (still_free(w, self._path.with_waypoints(rows)) for w, rows in parts)), "")
+        return next(filter(None, (path_fault(w, self._path.with_waypoints(rows)) for w, rows in parts)), "")
 
 
-def _joined(first: Matrix, last: Matrix) -> Way:
-    """A first part and a last one; where one joint goes on they share a move, which may touch the object."""
+def _joined(first: Matrix, last: Matrix) -> GraspRoute:
+    """A first and a last part; where the same joint moves on they share a move, which may touch the object."""
     rows = merge_moves(np.vstack([first, last[1:]]), tolerance=0.0)
     shared = len(rows) < len(first) + len(last) - 1
-    return Way(rows, len(first) - 1 - shared)
+    return GraspRoute(rows, len(first) - 1 - shared)

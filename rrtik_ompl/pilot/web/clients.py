@@ -1,4 +1,4 @@
-"""Browsers at a session: who of them is the pilot, and how much is on its way to each. For the server's thread alone.
+"""Browsers at a session: which of them is the pilot, and what is sent to each. For the server's thread alone.
 
 Nothing is queued: of every kind of message a client that is slow gets the newest one, when it is ready for it.
 """
@@ -7,22 +7,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from typing import Any
 
-FRAMES, STATES = 2, 2  # on their way to a client at a time, unacknowledged
+FRAMES, STATES = 2, 2  # unacknowledged messages to a client at a time
 PILOT, WATCHING = "pilot", "watching"
 Message = bytes | str
 
 
 class Lane:
-    """Messages to one client of which at most a few are under way; a newer one takes the place of one that waits."""
+    """Messages to one client, at most a few unacknowledged; a newer one takes the place of one that waits."""
 
     def __init__(self, send: Callable[[Message], None], width: int) -> None:
         """Start empty.
 
         Args:
             send: Sends a message.
-            width: How many may be under way.
+            width: Number of messages that may be unacknowledged.
         """
         self._send, self._width = send, width
         self._waiting: dict[str, Message] = {}
@@ -30,7 +29,7 @@ class Lane:
         self.dropped = 0
 
     def offer(self, kind: str, message: Message) -> None:
-        """Send a message as soon as there is room; one of its kind that still waits is dropped."""
+        """Send a message as soon as the client is ready; one of its kind that still waits is dropped."""
         self.dropped += kind in self._waiting
         self._waiting[kind] = message
         self._go()
@@ -50,17 +49,17 @@ class Client:
     """One open page."""
 
     def __init__(self, number: int, name: str, send: Callable[[Message], None]) -> None:
-        """Greet it.
+        """Register a page.
 
         Args:
             number: Of the connection.
-            name: That the page gave itself; it keeps it when it connects anew.
+            name: Chosen by the page; it keeps it when it connects again.
             send: Sends a message to it.
         """
         self.number, self.name, self.send = number, name, send
         self.frames, self.states = Lane(send, FRAMES), Lane(send, STATES)
 
-    def tell(self, **words: Any) -> None:
+    def send_json(self, **words: object) -> None:
         """Send a short message at once."""
         self.send(json.dumps(words))
 
@@ -69,7 +68,7 @@ class Clients:
     """All open pages. The first is the pilot; the others watch until the pilot has left or handed over."""
 
     def __init__(self, on_left: Callable[[], None]) -> None:
-        """Nobody is there yet.
+        """Begin without pages.
 
         Args:
             on_left: Called when the pilot's page is gone.
@@ -84,29 +83,29 @@ class Clients:
         return len(self._all)
 
     def join(self, client: Client) -> None:
-        """A page has come, for the first time or again; who was the pilot before is it again, if nobody else is."""
+        """Register a page; restore its role as pilot if it had that before and the role is free."""
         self._all.append(client)
         returns = client.name == self._last_pilot and not self._handed_over
         if self.pilot is None and (len(self._all) == 1 or returns):
             self._make_pilot(client)
-        self._tell_roles()
+        self._send_roles()
 
     def leave(self, client: Client) -> None:
-        """A page has gone."""
+        """Remove a page."""
         if client not in self._all:
             return
         self._all.remove(client)
         if client is self.pilot:
             self.pilot = None
             self._on_left()
-        self._tell_roles()
+        self._send_roles()
 
     def take_over(self, client: Client) -> str:
-        """A watcher wants to be the pilot; the answer says why not, "" if it is."""
+        """Make a watching page the pilot; returns why that is refused, "" if it is not."""
         if self.pilot is not None and self.pilot is not client:
             return "another page is the pilot; it has to hand over, or to leave"
         self._make_pilot(client)
-        self._tell_roles()
+        self._send_roles()
         return ""
 
     def hand_over(self, client: Client) -> None:
@@ -114,7 +113,7 @@ class Clients:
         if client is self.pilot:
             self.pilot, self._handed_over = None, True
             self._on_left()
-            self._tell_roles()
+            self._send_roles()
 
     def show_state(self, text: str) -> None:
         """Send a state to all."""
@@ -129,7 +128,7 @@ class Clients:
     def _make_pilot(self, client: Client) -> None:
         self.pilot, self._last_pilot, self._handed_over = client, client.name, False
 
-    def _tell_roles(self) -> None:
+    def _send_roles(self) -> None:
         for client in self._all:
             role = PILOT if client is self.pilot else WATCHING
-            client.tell(kind="role", role=role, free=self.pilot is None, pages=len(self._all), you=client.number)
+            client.send_json(kind="role", role=role, free=self.pilot is None, pages=len(self._all), you=client.number)

@@ -1,7 +1,7 @@
 """The page's web server: one process, one WebSocket a page, for this machine only unless told otherwise.
 
-It answers only requests that name its own address (a web site elsewhere that makes its name point here is refused) and
-that come from its own page (Host and Origin), and where a token is set only those that know it.
+It accepts only requests that name its own address (a web site elsewhere that makes its name point here is refused) and
+that come from its own page (Host and Origin), and where a token is set only those that give it.
 
 A WebSocket carries to the page: pictures as binary messages (a letter for the kind, the time as 8 bytes little-endian
 float [s], a JPEG) and JSON texts of the kinds "state", "role" and "refused"; from the page: JSON texts, either
@@ -27,20 +27,21 @@ import tornado.httpserver
 import tornado.netutil
 import tornado.web
 import tornado.websocket
+from tornado.httputil import HTTPServerRequest
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.pilot.web.clients import Client, Clients, Message
 
 LOOPBACK = "127.0.0.1"
 PAGE = Path(__file__).parent / "page"
-LARGEST_MESSAGE = 16 * 1024  # bytes, from a page
-MOST_WAITING = 200  # commands that were not obeyed yet
-SHORTEST_TOKEN = 16
-LONGEST_NAME = 40
+MAX_MESSAGE_BYTES = 16 * 1024  # from a page
+MAX_QUEUED_COMMANDS = 200
+MIN_TOKEN_LENGTH = 16
+MAX_NAME_LENGTH = 40
 GOING_AWAY, FAREWELL_SECONDS = 1001, 0.1  # code of a WebSocket that is closed, and time for it to arrive
 PING_SECONDS, PONG_SECONDS = 5.0, 5.0
 NO_TOKEN = "the token is missing or wrong: open the address as rrtik pilot printed it"
-NOT_FROM_HERE = "asked for under another name, or from another page: open the address as rrtik pilot printed it"
+WRONG_ORIGIN = "requested under another name, or from another page: open the address as rrtik pilot printed it"
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -54,7 +55,7 @@ class PilotServer:
     """Serves the page from a thread of its own until it is left; use it as a context manager.
 
     Attributes:
-        commands: What the pilot's page wants, as pairs of the page's number and the command.
+        commands: Of the pilot's page, as pairs of the page's number and the command.
     """
 
     def __init__(self, port: int = 0, host: str = LOOPBACK, token: str = "", title: str = "") -> None:
@@ -63,7 +64,7 @@ class PilotServer:
         Args:
             port: A free one if 0.
             host: Address of this machine under which pages may reach it.
-            token: Word that a page has to know; needed for any address but this machine's own.
+            token: Secret that a page has to give; needed for any address but this machine's own.
             title: Of the page.
 
         Raises:
@@ -80,7 +81,7 @@ class PilotServer:
         self.commands: queue.Queue[tuple[int, dict[str, Any]]] = queue.Queue()
         self.clients = Clients(self._pilot_left)
         self.numbers = itertools.count(1)
-        self.open_sockets: set[Any] = set()
+        self.open_sockets: set[tornado.websocket.WebSocketHandler] = set()
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._run, daemon=True)
 
@@ -97,9 +98,9 @@ class PilotServer:
         self._loop.call_soon_threadsafe(self._end)
         self._thread.join(timeout=10.0)
 
-    def show_state(self, state: dict[str, Any], answered: dict[int, int]) -> None:
-        """Send a state to all pages, with the number of the last command of each page that it is the answer to."""
-        text = json.dumps({"kind": "state", "answered": answered, **state}, allow_nan=False)
+    def show_state(self, state: dict[str, Any], executed: dict[int, int]) -> None:
+        """Send a state to all pages, with the number of the last command of each page that was executed before it."""
+        text = json.dumps({"kind": "state", "answered": executed, **state}, allow_nan=False)
         self._call(lambda: self.clients.show_state(text))
 
     def show_frame(self, kind: str, time: float, jpeg: bytes) -> None:
@@ -107,7 +108,7 @@ class PilotServer:
         frame = kind.encode() + struct.pack("<d", time) + jpeg
         self._call(lambda: self.clients.show_frame(kind, frame))
 
-    def may(self, request: Any) -> bool:
+    def may(self, request: HTTPServerRequest) -> bool:
         """Whether a request names this server, and comes from its own page or from none."""
         hosts = {f"{name}:{self.port}" for name in (self._name, *(("localhost",) if self.host == LOOPBACK else ()))}
         host, origin = request.headers.get("Host"), request.headers.get("Origin")
@@ -118,7 +119,7 @@ class PilotServer:
         return hmac.compare_digest(word.encode(), self.token.encode())
 
     def receive(self, client: Client, text: str) -> None:
-        """Do what a page says: it has shown something, changes its role, or commands."""
+        """Process a message of a page: an acknowledgement, a change of its role, or a command."""
         try:
             said = json.loads(text)
         except ValueError:
@@ -130,19 +131,21 @@ class PilotServer:
         elif said.get("name") == "take":
             refused = self.clients.take_over(client)
             if refused:
-                client.tell(kind="refused", text=refused)
+                client.send_json(kind="refused", text=refused)
         elif client is not self.clients.pilot:
-            client.tell(kind="refused", text="you are watching: T takes over when the pilot has left or handed over")
+            client.send_json(
+                kind="refused", text="you are watching: T takes over when the pilot has left or handed over"
+            )
         elif said.get("name") == "hand_over":
             self.clients.hand_over(client)
-        elif self.commands.qsize() < MOST_WAITING:
+        elif self.commands.qsize() < MAX_QUEUED_COMMANDS:
             self.commands.put((client.number, said))
 
     def _check_token(self) -> None:
         if self.host in ("", "0.0.0.0", "::"):
             raise InputError(f"--host '{self.host}': name the one address under which pages shall reach this machine")
-        if self.host != LOOPBACK and len(self.token) < SHORTEST_TOKEN:
-            raise InputError(f"--host {self.host} needs --token with a secret of at least {SHORTEST_TOKEN} letters")
+        if self.host != LOOPBACK and len(self.token) < MIN_TOKEN_LENGTH:
+            raise InputError(f"--host {self.host} needs --token with a secret of at least {MIN_TOKEN_LENGTH} letters")
 
     @property
     def _name(self) -> str:
@@ -162,16 +165,16 @@ class PilotServer:
 
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
-        logging.getLogger("tornado").addHandler(logging.NullHandler())  # what goes wrong is the page's to show
+        logging.getLogger("tornado").addHandler(logging.NullHandler())  # errors are shown on the page
         handlers: list[Any] = [(path, _PageHandler, {"server": self, "file": file}) for path, file in FILES.items()]
         application = tornado.web.Application(
             [*handlers, ("/ws", _SocketHandler, {"server": self})],
             log_function=lambda _: None,
-            websocket_max_message_size=LARGEST_MESSAGE,
+            websocket_max_message_size=MAX_MESSAGE_BYTES,
             websocket_ping_interval=PING_SECONDS,
             websocket_ping_timeout=PONG_SECONDS,
         )
-        http = tornado.httpserver.HTTPServer(application, max_body_size=LARGEST_MESSAGE)
+        http = tornado.httpserver.HTTPServer(application, max_body_size=MAX_MESSAGE_BYTES)
         http.add_sockets(self._sockets)
         self._loop.run_forever()
         http.stop()
@@ -180,13 +183,13 @@ class PilotServer:
 
 
 class _Guarded(tornado.web.RequestHandler):
-    """Refuses what does not come from the own page."""
+    """Refuses requests that do not come from the server's own page."""
 
     server: PilotServer
 
     def prepare(self) -> None:
         if not self.server.may(self.request):
-            raise tornado.web.HTTPError(403, reason=NOT_FROM_HERE)
+            raise tornado.web.HTTPError(403, reason=WRONG_ORIGIN)
 
     def set_default_headers(self) -> None:
         for name, value in (
@@ -230,9 +233,9 @@ class _SocketHandler(_Guarded, tornado.websocket.WebSocketHandler):
 
     def open(self, *_: str, **__: str) -> None:
         self.set_nodelay(True)
-        name = self.get_argument("page", "")[:LONGEST_NAME]
+        name = self.get_argument("page", "")[:MAX_NAME_LENGTH]
         self._client = Client(next(self.server.numbers), name, self._send)
-        self._client.tell(kind="title", title=self.server.title)
+        self._client.send_json(kind="title", title=self.server.title)
         self.server.open_sockets.add(self)
         self.server.clients.join(self._client)
 

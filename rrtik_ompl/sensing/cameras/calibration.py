@@ -16,8 +16,8 @@ from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.detection import charuco_corners
 from rrtik_ompl.sensing.sight import as_gray
 
-LEAST_CORNERS, LEAST_VIEWS = 8, 5
-MOST_ERROR = 1.0  # pixels; a view above it is blurred, bent or mismatched
+MIN_CORNERS, MIN_VIEWS = 8, 5
+MAX_VIEW_ERROR = 1.0  # [pixels]; a view with a larger error is blurred, bent or mismatched
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +39,7 @@ class Calibration:
     unused: tuple[str, ...]
 
 
-def calibrate(pictures: Sequence[NDArray[np.uint8]], board: Any) -> Calibration:
+def calibrate(pictures: Sequence[NDArray[np.uint8]], board: cv2.aruco.CharucoBoard) -> Calibration:
     """Calibrate from photographs of one board (`markers.charuco_board`) under different angles.
 
     The third radial coefficient stays 0: with it the second one is not stable.
@@ -51,21 +51,21 @@ def calibrate(pictures: Sequence[NDArray[np.uint8]], board: Any) -> Calibration:
     if len({gray.shape for gray in grays}) > 1:
         raise InputError("the photographs differ in size; take all of them with the same camera and settings")
     found = [charuco_corners(gray, board) for gray in grays]
-    unused = ["" if len(points) >= LEAST_CORNERS else _too_few(len(points)) for points, _ in found]
+    unused = ["" if len(points) >= MIN_CORNERS else _too_few(len(points)) for points, _ in found]
     used = [k for k, reason in enumerate(unused) if not reason]
     result = None
-    while len(used) >= LEAST_VIEWS:
+    while len(used) >= MIN_VIEWS:
         result = _solve([found[k] for k in used], grays[0].shape)
         errors = np.ravel(result[7])
         worst = int(errors.argmax())
-        if errors[worst] <= MOST_ERROR:
+        if errors[worst] <= MAX_VIEW_ERROR:
             break
         unused[used.pop(worst)] = f"corners lie {errors[worst]:.1f} pixels off: blurred, or the board is bent"
         result = None
     if result is None:
         reasons = "; ".join(sorted({reason for reason in unused if reason})) or "there are no more"
         raise InputError(
-            f"{len(used)} of {len(grays)} photographs show the board well, at least {LEAST_VIEWS} must ({reasons}); "
+            f"{len(used)} of {len(grays)} photographs show the board well, at least {MIN_VIEWS} must ({reasons}); "
             "take more, the board filling a third of the picture or more, sharp, under different angles"
         )
     error, matrix, distortion, _, _, sigmas, _, each = result
@@ -79,9 +79,9 @@ def calibrate(pictures: Sequence[NDArray[np.uint8]], board: Any) -> Calibration:
 def _solve(views: Sequence[tuple[Any, Any]], shape: tuple[int, ...]) -> Any:
     points = [np.ascontiguousarray(p, dtype=np.float32) for p, _ in views]
     pixels = [np.ascontiguousarray(q, dtype=np.float32) for _, q in views]
-    solve: Any = cv2.calibrateCameraExtended  # its type wants first guesses where None does
+    solve: Any = cv2.calibrateCameraExtended  # its type requires first guesses where None is allowed
     return solve(points, pixels, shape[::-1], None, None, flags=cv2.CALIB_FIX_K3)
 
 
 def _too_few(count: int) -> str:
-    return f"{count} corners of the board seen, {LEAST_CORNERS} are needed: too small, blurred, or another board"
+    return f"{count} corners of the board seen, {MIN_CORNERS} are needed: too small, blurred, or another board"

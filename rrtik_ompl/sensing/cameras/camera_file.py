@@ -55,7 +55,7 @@ def load_camera(path: str | os.PathLike[str]) -> Camera:
 
 
 def save_camera(camera: Camera | Calibration, path: str | os.PathLike[str]) -> None:
-    """Write a camera, with what its calibration found out if that is given.
+    """Write a camera, with the errors of its calibration if that is given.
 
     Raises:
         InputError: If the file cannot be written.

@@ -19,7 +19,7 @@ from rrtik_ompl.files.text import write_bytes
 
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 VIDEO_ENDINGS = (".mp4", ".avi", ".webm", ".mkv", ".mov", ".m4v")
-LARGEST_FILE = 512 * 1024 * 1024
+MAX_FILE_BYTES = 512 * 1024 * 1024
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +40,7 @@ def read_picture(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     file = Path(path)
     try:
         size = file.stat().st_size
-        if not file.is_file() or size > LARGEST_FILE:
+        if not file.is_file() or size > MAX_FILE_BYTES:
             raise InputError(f"{path}: is not an image file of at most 512 MiB")
         data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
     except OSError as error:
@@ -49,7 +49,7 @@ def read_picture(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     if size:
         try:
             picture = cv2.imdecode(data, cv2.IMREAD_COLOR)
-        except cv2.error:  # a header that promises more than memory holds
+        except cv2.error:  # a header with a size larger than memory
             picture = None
     if picture is None:
         raise InputError(f"{path}: is not an image that can be read; use {', '.join(IMAGE_ENDINGS)}")
@@ -124,7 +124,7 @@ def _device(number: int) -> Iterator[Picture]:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Let OpenCV keep its warnings: why something cannot be opened is said in one line, not in three."""
+    """Suppress OpenCV's warnings: our own error says in one line why something cannot be opened."""
     log: Any = cv2.utils.logging
     before = log.setLogLevel(log.LOG_LEVEL_ERROR)
     try:
@@ -134,7 +134,7 @@ def quiet() -> Iterator[None]:
 
 
 @contextmanager
-def _opened(source: str | int) -> Iterator[Any]:
+def _opened(source: str | int) -> Iterator[cv2.VideoCapture]:
     with quiet():
         capture = cv2.VideoCapture(source)
     try:
@@ -143,6 +143,6 @@ def _opened(source: str | int) -> Iterator[Any]:
         capture.release()
 
 
-def _next(capture: Any) -> NDArray[np.uint8] | None:
+def _next(capture: cv2.VideoCapture) -> NDArray[np.uint8] | None:
     good, frame = capture.read()
     return np.asarray(frame, dtype=np.uint8) if good else None

@@ -1,17 +1,17 @@
 """Pictures of printed squares as a camera would take them, with poses that are known exactly.
 
 Every photosite is the mean of the rays through it; then blur, light, noise and rounding to 8 bits. No real camera is
-better than that, most are worse: what fails here fails in water too.
+better than that, most are worse: what fails here fails under water too.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
@@ -52,14 +52,14 @@ def published_camera(distortion: Sequence[float] = (0.0,) * 5) -> Camera:
 
 def clean_picture(
     camera: Camera,
-    prints: Sequence[tuple[Any, Print]],
+    prints: Sequence[tuple[pin.SE3, Print]],
     rays: int = 10,
     behind: float | NDArray[np.float32] = GREY,
 ) -> NDArray[np.float32]:
-    """Prints as an ideal camera sees them. Shape (height, width), 0 to 1.
+    """Prints in the picture of an ideal camera. Shape (height, width), 0 to 1.
 
     Args:
-        camera: Who looks.
+        camera: The camera.
         prints: Pairs of ``T_camera_print`` and the print; later ones cover earlier ones.
         rays: Through each photosite, squared.
         behind: Brightness of what is behind, one number or a picture.
@@ -81,7 +81,7 @@ def photograph(
     motion: float = 0.0,
     jpeg: int | None = None,
 ) -> NDArray[np.uint8]:
-    """What a sensor makes of an ideal picture.
+    """The picture of a real sensor, made from an ideal one.
 
     Args:
         clean: From `clean_picture`.
@@ -107,7 +107,7 @@ def photograph(
     return np.asarray(cv2.imdecode(packed, cv2.IMREAD_GRAYSCALE), dtype=np.uint8)
 
 
-def _draw(picture: NDArray[np.float32], camera: Camera, pose: Any, sheet: Print, rays: int) -> None:
+def _draw(picture: NDArray[np.float32], camera: Camera, pose: pin.SE3, sheet: Print, rays: int) -> None:
     corners = np.array([[-1, 1], [1, 1], [1, -1], [-1, -1]]) * sheet.half
     around = np.c_[corners, np.zeros(4)] @ pose.rotation.T + pose.translation
     if (around[:, 2] <= 0.0).any():
@@ -125,7 +125,7 @@ def _draw(picture: NDArray[np.float32], camera: Camera, pose: Any, sheet: Print,
         picture[row, left:right] = np.nansum(seen, axis=(0, 2)) / rays**2 + (1.0 - share) * picture[row, left:right]
 
 
-def _seen(rays: Matrix, pose: Any, sheet: Print, brightness: NDArray[np.float32]) -> NDArray[np.float32]:
+def _seen(rays: Matrix, pose: pin.SE3, sheet: Print, brightness: NDArray[np.float32]) -> NDArray[np.float32]:
     """Brightness of the print where rays meet it, NaN where they miss it. Shape (m,)."""
     directions, normal = np.c_[rays, np.ones(len(rays))], pose.rotation[:, 2]
     with np.errstate(divide="ignore"):

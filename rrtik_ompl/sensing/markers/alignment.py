@@ -1,6 +1,6 @@
-"""Corners of a marker to a hundredth of a pixel: the whole ideal marker is laid over the picture until they agree.
+"""Corners of a marker to a hundredth of a pixel: the whole ideal marker is aligned with the picture.
 
-The agreement is the enhanced correlation coefficient of Evangelidis and Psarakis (PAMI 2008), which does not change
+The criterion is the enhanced correlation coefficient of Evangelidis and Psarakis, 2008 [52], which does not change
 with brightness and contrast; the motion is a homography. Four corners alone are pulled inwards by blur, by as much
 as 0.2 pixels; all edges of all cells together are not, if the ideal marker is blurred as the picture is: as much, and
 evenly in the picture, so unevenly on a marker that is tilted.
@@ -18,13 +18,13 @@ from rrtik_ompl.arrays import Matrix
 
 Pixels = NDArray[np.float32]
 
-LEAST_LIKENESS = 0.9  # below it something covers the marker or the picture is not sharp
-_FARTHEST = 0.25  # of a side, that a corner may move; inner edges are found in place of outer ones now and then
+MIN_LIKENESS = 0.9  # below it the marker is partly covered or the picture is not sharp
+_MAX_CORNER_SHIFT = 0.25  # of a side; inner edges are sometimes found in place of outer ones
 _CELL_PIXELS = (3, 16)  # of a cell in the ideal picture; near its size in the camera's
-_QUIET_CELLS = 0.5  # of the white rim that takes part; farther out blur brings in what is behind the marker
-_USUAL_SPOT = 0.8  # standard deviation of a sharp picture's blur: lens, photosite, interpolation [pixels]
-_SPOTS = _USUAL_SPOT * 1.5 ** np.arange(-2, 3)  # that are tried
-_SAME_SPOT = 0.1  # relative difference that is not worth a second alignment
+_RIM_CELLS = 0.5  # width of the white rim that is used; farther out blur mixes in the background
+_DEFAULT_SPOT = 0.8  # standard deviation of a sharp picture's blur: lens, photosite, interpolation [pixels]
+_SPOTS = _DEFAULT_SPOT * 1.5 ** np.arange(-2, 3)  # that are tried
+_SPOT_TOLERANCE = 0.1  # relative difference below which no second alignment is made
 _STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 1e-6)
 
 
@@ -37,42 +37,42 @@ def aligned_corners(gray: NDArray[np.uint8], corners: Matrix, cells: NDArray[np.
         cells: The ideal marker, its border included. Shape (n, n).
 
     Returns:
-        Corners, shape (4, 2), and likeness from 0 to 1. Below `LEAST_LIKENESS` the corners are returned unchanged.
+        Corners, shape (4, 2), and likeness from 0 to 1. Below `MIN_LIKENESS` the corners are returned unchanged.
     """
     count, side = len(cells), float(np.linalg.norm(np.roll(corners, -1, 0) - corners, axis=1).mean())
     cell = int(np.clip(round(side / count), *_CELL_PIXELS))
-    rim = round(_QUIET_CELLS * cell)
+    rim = round(_RIM_CELLS * cell)
     square = np.array([[0, 0], [count, 0], [count, count], [0, count]], dtype=np.float64) * cell + rim - 0.5
     low, piece = _neighbourhood(gray, corners, margin=int(0.35 * side) + 4)
     guess = cv2.getPerspectiveTransform(square.astype(np.float32), (corners - low).astype(np.float32))
     try:
         likeness, homography = _aligned(_ideal(cells, cell, rim), piece, guess.astype(np.float32))
-    except cv2.error:  # the two never came to agree
+    except cv2.error:  # the alignment did not converge
         return corners, 0.0
     better = cv2.perspectiveTransform(square[:, None], homography.astype(np.float64))[:, 0] + low
-    if np.abs(better - corners).max() > max(2.0, _FARTHEST * side):
+    if np.abs(better - corners).max() > max(2.0, _MAX_CORNER_SHIFT * side):
         return corners, 0.0
-    return (better if likeness >= LEAST_LIKENESS else corners), likeness
+    return (better if likeness >= MIN_LIKENESS else corners), likeness
 
 
 def _aligned(ideal: Pixels, piece: Pixels, homography: Pixels) -> tuple[float, Pixels]:
-    """Likeness and the homography from the ideal marker to a picture, the blur of the picture found out on the way."""
-    likeness, rough = _fitted(ideal, piece, homography, _USUAL_SPOT)
+    """Likeness and the homography from the ideal marker to a picture, whose blur is estimated too."""
+    likeness, rough = _fitted(ideal, piece, homography, _DEFAULT_SPOT)
     spot = _spot(ideal, piece, rough)
-    if abs(spot - _USUAL_SPOT) < _SAME_SPOT * _USUAL_SPOT:
+    if abs(spot - _DEFAULT_SPOT) < _SPOT_TOLERANCE * _DEFAULT_SPOT:
         return likeness, rough
     return _fitted(ideal, piece, rough, spot)
 
 
 def _fitted(ideal: Pixels, piece: Pixels, homography: Pixels, spot: float) -> tuple[float, Pixels]:
-    align: Any = cv2.findTransformECC  # its type wants a mask where None does
+    align: Any = cv2.findTransformECC  # its type requires a mask where None is allowed
     blurred = _blurred(ideal, spot**2 * _spread(homography, ideal.shape))
     likeness, better = align(blurred, piece, homography, cv2.MOTION_HOMOGRAPHY, _STOP, None, 1)
     return float(likeness), better
 
 
 def _spot(ideal: Pixels, piece: Pixels, homography: Pixels) -> float:
-    """Standard deviation of the blur that makes the ideal marker likest the picture [pixels]."""
+    """Standard deviation of the blur with which the ideal marker is most like the picture [pixels]."""
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     seen = cv2.warpPerspective(piece, homography, ideal.shape[::-1], flags=flags)
     spread = _spread(homography, ideal.shape)

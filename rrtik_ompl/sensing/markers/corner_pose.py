@@ -1,15 +1,14 @@
 """The pose of an object from pixels of points that are known on it, and how far it can be trusted.
 
 A single square seen almost from the front has two poses that explain its picture nearly as well (Collins and Bartoli,
-IPPE, IJCV 2014): both are kept. Where perspective is strong, or by chance, only one of the two is a minimum of the
-error: then the second one is what the closed form gives, for a long valley may lead from there to the minimum, with the
-true pose somewhere on its way. Covariance: first-order propagation of the error of a corner.
+2014 [51]): both are kept. Where perspective is strong, or by chance, only one of the two is a minimum of the
+error: then the second one is that of the closed form, for a long valley may lead from there to the minimum, with the
+true pose somewhere in it. Covariance: first-order propagation of the error of a corner.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
@@ -18,13 +17,13 @@ import pinocchio as pin
 from rrtik_ompl.arrays import Matrix, frozen
 from rrtik_ompl.sensing.cameras.camera import Camera
 
-RATIO_TO_TRUST = 6.0  # of the two errors of a square; below it 27 % of near-frontal views, and every wrong choice
-LUCKY_ERROR = 0.015  # [pixels]: four corners that agree better do so by chance, which proves nothing
+MIN_ERROR_RATIO = 6.0  # of the two errors of a square; below it are 27 % of near-frontal views and all wrong choices
+CHANCE_ERROR = 0.015  # [pixels]: four corners that agree better do so by chance
 ALIGNED_SIGMA = 0.02  # error of a corner [pixels]: a quarter is noise of 1 %, the rest lens and blur
 ROUGH_SIGMA = 0.2  # blur pulls corners that were not aligned inwards by as much
-FARTHEST = 1e4  # [m]
-SAME_TURN = 1e-3  # [rad]: minima that are nearer to each other are one; distinct ones are 0.03 apart and more
-_STEPS = 40
+MAX_DISTANCE = 1e4  # [m]
+MIN_BRANCH_ANGLE = 1e-3  # [rad]: minima that are nearer to each other are one; distinct ones are 0.03 apart and more
+_MAX_STEPS = 40
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,8 +38,8 @@ class CornerPose:
         covariance: Of (position [m], small rotation about the axes of the camera [rad]). Shape (6, 6).
     """
 
-    T_camera_object: Any
-    other: Any | None
+    T_camera_object: pin.SE3
+    other: pin.SE3 | None
     error: float
     other_error: float
     covariance: Matrix
@@ -48,7 +47,7 @@ class CornerPose:
     @property
     def ambiguous(self) -> bool:
         """The second pose explains the picture almost as well, so that the first may be the wrong one."""
-        return self.other_error < RATIO_TO_TRUST * max(self.error, LUCKY_ERROR)
+        return self.other_error < MIN_ERROR_RATIO * max(self.error, CHANCE_ERROR)
 
     @property
     def position_sigma(self) -> float:
@@ -61,7 +60,7 @@ class CornerPose:
         return float(np.sqrt(np.linalg.eigvalsh(self.covariance[3:, 3:])[-1]))
 
 
-def turn_between(first: Any, second: Any) -> float:
+def turn_between(first: pin.SE3, second: pin.SE3) -> float:
     """Angle between the rotations of two poses [rad]."""
     return float(np.linalg.norm(pin.log3(first.rotation.T @ second.rotation)))
 
@@ -82,7 +81,7 @@ def pose_of_square(camera: Camera, pixels: Matrix, side: float, sigma: float = A
     best = int(np.argmin(errors))
     first, error, other, other_error = refined[best], errors[best], None, np.inf
     if len(guesses) > 1:
-        merged = turn_between(first, refined[1 - best]) < SAME_TURN
+        merged = turn_between(first, refined[1 - best]) < MIN_BRANCH_ANGLE
         other = max(guesses, key=lambda guess: turn_between(first, guess)) if merged else refined[1 - best]
         other_error = _error(camera, points, pixels, other)
     return CornerPose(first, other, error, other_error, _covariance(camera, points, first, max(sigma, error)))
@@ -95,25 +94,25 @@ def pose_of_points(camera: Camera, pixels: Matrix, points: Matrix, sigma: float 
     return CornerPose(best, None, error, np.inf, _covariance(camera, points, best, max(sigma, error)))
 
 
-def _guesses(camera: Camera, points: Matrix, pixels: Matrix, method: int = cv2.SOLVEPNP_SQPNP) -> list[Any]:
+def _guesses(camera: Camera, points: Matrix, pixels: Matrix, method: int = cv2.SOLVEPNP_SQPNP) -> list[pin.SE3]:
     """Poses in closed form that explain the pixels, best first."""
     rows, seen = np.ascontiguousarray(points), np.ascontiguousarray(pixels)
     _, turns, shifts, _ = cv2.solvePnPGeneric(rows, seen, camera.matrix, camera.distortion, flags=method)
     found = [pin.SE3(cv2.Rodrigues(r)[0], t.ravel()) for r, t in zip(turns, shifts, strict=True)]
-    return [T for T in found if _sensible(T, method == cv2.SOLVEPNP_IPPE_SQUARE)]
+    return [T for T in found if _plausible(T, method == cv2.SOLVEPNP_IPPE_SQUARE)]
 
 
-def _sensible(pose: Any, facing: bool) -> bool:
+def _plausible(pose: pin.SE3, facing: bool) -> bool:
     """Finite, before the camera, and with its z axis towards it if it has to face it."""
-    if not (np.isfinite(pose.homogeneous).all() and 0.0 < pose.translation[2] < FARTHEST):
+    if not (np.isfinite(pose.homogeneous).all() and 0.0 < pose.translation[2] < MAX_DISTANCE):
         return False
     return not facing or float(pose.rotation[:, 2] @ pose.translation) < 0.0
 
 
-def _refined(camera: Camera, points: Matrix, pixels: Matrix, pose: Any) -> Any:
+def _refined(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3) -> pin.SE3:
     """The nearby pose of least error: Levenberg's steps about the axes of the camera, kept where they help."""
     damping, error = 1e-6, _error(camera, points, pixels, pose)
-    for _ in range(_STEPS):
+    for _ in range(_MAX_STEPS):
         turned = points @ pose.rotation.T
         slopes = camera.jacobian(turned, pose.translation)
         away = (pixels - camera.project(turned + pose.translation)).ravel()
@@ -131,11 +130,11 @@ def _refined(camera: Camera, points: Matrix, pixels: Matrix, pose: Any) -> Any:
     return pose
 
 
-def _error(camera: Camera, points: Matrix, pixels: Matrix, pose: Any) -> float:
+def _error(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3) -> float:
     away = camera.project(points @ pose.rotation.T + pose.translation) - pixels
     return float(np.sqrt((away**2).sum(axis=1).mean()))
 
 
-def _covariance(camera: Camera, points: Matrix, pose: Any, sigma: float) -> Matrix:
+def _covariance(camera: Camera, points: Matrix, pose: pin.SE3, sigma: float) -> Matrix:
     slopes = camera.jacobian(points @ pose.rotation.T, pose.translation)
     return frozen(sigma**2 * np.linalg.pinv(slopes.T @ slopes))

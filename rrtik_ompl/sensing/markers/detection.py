@@ -1,4 +1,4 @@
-"""Square markers: their dictionaries, their pictures, and finding them. All of OpenCV's ``aruco`` stands in here."""
+"""Square markers [50]: dictionaries, pictures and detection. OpenCV's ``aruco`` is used in this module only."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ DICTIONARIES = {
     "aruco_original": "DICT_ARUCO_ORIGINAL",
     "aruco_mip_36h12": "DICT_ARUCO_MIP_36h12",
 }
-SMALLEST_SHARE = 0.01  # of a marker's outline, of the picture's longer side; OpenCV's own 0.03 drops distant ones
+MIN_OUTLINE_SHARE = 0.01  # of a marker's outline, of the picture's longer side; OpenCV's own 0.03 drops distant ones
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,8 +31,8 @@ class SeenMarker:
         dictionary: Its dictionary.
         number: Its number in there.
         corners: Top left, top right, bottom right, bottom left as printed. Shape (4, 2), pixels.
-        likeness: Correlation of the ideal marker with the picture, 1 at best; below `LEAST_LIKENESS` the corners
-            are as they were found; NaN if nobody asked for better ones.
+        likeness: Correlation of the ideal marker with the picture, 1 at best; below `MIN_LIKENESS` the corners
+            are as they were detected; NaN without alignment.
     """
 
     dictionary: str
@@ -65,8 +65,7 @@ def find_markers(gray: NDArray[np.uint8], dictionary: str, *, align: bool = True
     Args:
         gray: Shape (height, width).
         dictionary: One of `DICTIONARIES`.
-        align: Bring the ideal marker to coincide with the picture (`aligned_corners`); else corners are as sharp as
-            their own neighbourhood makes them.
+        align: Align the ideal marker with the picture (`aligned_corners`); else corners are those of the detector.
     """
     corners, numbers, _ = _detector(dictionary).detectMarkers(gray)
     found: list[SeenMarker] = []
@@ -80,11 +79,11 @@ def find_markers(gray: NDArray[np.uint8], dictionary: str, *, align: bool = True
 
 
 def dictionaries_seen(gray: NDArray[np.uint8]) -> tuple[str, ...]:
-    """Which dictionaries have markers in a picture; to say what is wrong where the expected one has none."""
+    """Which dictionaries have markers in a picture; for the error where the expected one has none."""
     return tuple(name for name in DICTIONARIES if _detector(name).detectMarkers(gray)[1] is not None)
 
 
-def charuco_board(columns: int, rows: int, square: float, marker: float, dictionary: str) -> Any:
+def charuco_board(columns: int, rows: int, square: float, marker: float, dictionary: str) -> cv2.aruco.CharucoBoard:
     """A chessboard with markers in its white squares; sides of squares and markers in metres.
 
     Raises:
@@ -97,26 +96,27 @@ def charuco_board(columns: int, rows: int, square: float, marker: float, diction
     return cv2.aruco.CharucoBoard((columns, rows), square, marker, _table(dictionary))
 
 
-def charuco_corners(gray: NDArray[np.uint8], board: Any) -> tuple[Matrix, Matrix]:
+def charuco_corners(gray: NDArray[np.uint8], board: cv2.aruco.CharucoBoard) -> tuple[Matrix, Matrix]:
     """Corners of a board in a picture: points on the board [m], shape (k, 3), and their pixels, shape (k, 2)."""
     pixels, numbers, _, _ = cv2.aruco.CharucoDetector(board).detectBoard(gray)
     if numbers is None or len(numbers) == 0:
         return np.zeros((0, 3)), np.zeros((0, 2))
-    points, seen = board.matchImagePoints(np.asarray(pixels).reshape(-1, 1, 2), np.ravel(numbers))
+    match: Any = board.matchImagePoints  # its type requires a sequence where an array is allowed
+    points, seen = match(np.asarray(pixels).reshape(-1, 1, 2), np.ravel(numbers))
     return np.reshape(points, (-1, 3)).astype(np.float64), np.reshape(seen, (-1, 2)).astype(np.float64)
 
 
 @lru_cache
-def _table(dictionary: str) -> Any:
+def _table(dictionary: str) -> cv2.aruco.Dictionary:
     if dictionary not in DICTIONARIES:
         raise UnknownNameError("dictionary of markers", dictionary, DICTIONARIES)
     return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, DICTIONARIES[dictionary]))
 
 
 @lru_cache
-def _detector(dictionary: str) -> Any:
+def _detector(dictionary: str) -> cv2.aruco.ArucoDetector:
     parameters = cv2.aruco.DetectorParameters()
     parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-    parameters.minMarkerPerimeterRate = SMALLEST_SHARE
+    parameters.minMarkerPerimeterRate = MIN_OUTLINE_SHARE
     parameters.minDistanceToBorder = 0  # else markers that fill half of the picture are lost, though wholly in view
     return cv2.aruco.ArucoDetector(_table(dictionary), parameters)

@@ -1,11 +1,10 @@
-"""Which marker sits where on which object, what the object is, and how it can be grasped. Frozen."""
+"""Which marker is where on which object, what the object is, and how it can be grasped. Frozen."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any
 
 import pinocchio as pin
 
@@ -26,7 +25,7 @@ class MountedMarker:
 
     number: int
     side: float
-    T_object_marker: Any = field(default_factory=pin.SE3.Identity)
+    T_object_marker: pin.SE3 = field(default_factory=pin.SE3.Identity)
 
     def __post_init__(self) -> None:
         if not 0.0 < self.side < 100.0:
@@ -43,18 +42,18 @@ class GraspType:
     """A family of grasps: one orientation, and the places along the object (levels) where it is tried.
 
     Attributes:
-        name: How the pilot calls it.
+        name: For the pilot.
         levels: ``T_object_tip`` of each level.
         approach: How far before the grasp the tip stops first, against its own z axis [m].
         lift: How far the object is taken up after it, along the world's z axis [m].
     """
 
     name: str
-    levels: tuple[Any, ...]
+    levels: tuple[pin.SE3, ...]
     approach: float = 0.1
     lift: float = 0.1
 
-    def __init__(self, name: str, levels: Iterable[Any], approach: float = 0.1, lift: float = 0.1) -> None:
+    def __init__(self, name: str, levels: Iterable[pin.SE3], approach: float = 0.1, lift: float = 0.1) -> None:
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "levels", tuple(levels))
         for word, value in (("approach", approach), ("lift", lift)):
@@ -72,7 +71,7 @@ class MarkedObject:
         role: "base" (of the arm: its frame is the world of the scene), "target" or "obstacle".
         markers: Where they sit; several are used together.
         solids: What it is made of, with poses ``T_object_solid``.
-        grasps: The ways to take hold of it.
+        grasps: Its grasp types.
     """
 
     name: str
@@ -120,7 +119,7 @@ class MarkerMap:
 
     dictionary: str
     objects: tuple[MarkedObject, ...]
-    T_base_camera: Any | None = None
+    T_base_camera: pin.SE3 | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "objects", tuple(self.objects))
@@ -130,7 +129,7 @@ class MarkerMap:
         ):
             twice = [name for name, count in Counter(names).items() if count > 1]
             if twice:
-                raise InputError(f"{what} {twice[0]} stands twice in the marker map; every one needs its own")
+                raise InputError(f"{what} {twice[0]} is twice in the marker map; every one needs its own")
         bases = [o.name for o in self.objects if o.role == "base"]
         if len(bases) > 1:
             raise InputError(f"two objects are the base: {bases[0]} and {bases[1]}; there is one arm")

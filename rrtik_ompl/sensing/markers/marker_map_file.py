@@ -53,7 +53,7 @@ class ObjectEntry(Section):
     grasps: list[GraspEntry] = Field(default=[])
 
     def build(self, folder: Path) -> MarkedObject:
-        """The object; meshes are looked for relative to ``folder``."""
+        """The object; files of meshes are relative to ``folder``."""
         solids = [Obstacle(each.name, each.build_shape(folder), each.build_pose()) for each in self.solids]
         grasps = [each.build() for each in self.grasps]
         return MarkedObject(self.name, self.role, tuple(m.build() for m in self.markers), tuple(solids), tuple(grasps))

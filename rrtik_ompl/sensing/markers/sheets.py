@@ -52,7 +52,7 @@ def print_markers(
     width, height = _paper(paper)
     cells = [marker_cells(dictionary, number) for number in numbers]
     if not cells:
-        raise InputError("no marker was asked for; name at least one number")
+        raise InputError("no marker is named; give at least one number")
     if not 0.002 <= side <= 1.0:
         raise InputError(f"side of a marker must be between 0.002 and 1 m, got {side:g}")
     cell = side / len(cells[0])
@@ -93,7 +93,7 @@ def print_board(
     width, height = _paper(paper)
     if columns * square > width - 2 * EDGE or rows * square > height - 2 * EDGE - 2 * CAPTION:
         raise InputError(f"a board of {columns * square:.3f} x {rows * square:.3f} m does not fit on {paper}")
-    fine = 100  # cells a square: a marker's side becomes a whole number of them to 1 %
+    fine = 100  # cells a square: the side of a marker becomes a whole number of them to 1 %
     picture = np.asarray(board.generateImage((columns * fine, rows * fine), marginSize=0, borderBits=1), dtype=np.uint8)
     caption = f"ChArUco {columns} x {rows}, {dictionary}, squares {1e3 * square:g} mm, markers {1e3 * marker:g} mm"
     x, y = 0.5 * (width - columns * square), height - EDGE - rows * square
@@ -106,7 +106,9 @@ def _paper(name: str) -> tuple[float, float]:
     return PAPERS[name.lower()]
 
 
-def _write(path: Any, pages: list[list[_Tile]], size: tuple[float, float], dots_per_inch: int) -> None:
+def _write(
+    path: str | os.PathLike[str], pages: list[list[_Tile]], size: tuple[float, float], dots_per_inch: int
+) -> None:
     from pathlib import Path
 
     from matplotlib.backends.backend_pdf import PdfPages

@@ -1,4 +1,4 @@
-"""What the camera has to take in: the box around the arm's postures and its surroundings."""
+"""What the camera shows: the box around the arm's configurations and its surroundings."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.viewer.drawing.meshes import look_of_shape
 
-HUGE = 3.0  # an obstacle this many times larger than the arm's box is surroundings: it may run out of the picture
-EMPTY = np.array([[-0.5] * 3, [0.5] * 3])  # [m] what is looked at where there is nothing
-MARGIN = 0.5  # of the arm's box: how much of such an obstacle is taken in
+SURROUNDINGS_RATIO = 3.0  # of an obstacle's size to the arm's box, above which the picture shows only a part of it
+EMPTY_BOX = np.array([[-0.5] * 3, [0.5] * 3])  # [m] shown where there is nothing
+SURROUNDINGS_MARGIN = 0.5  # of the arm's box: how much of such an obstacle is shown
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,15 +54,15 @@ def frame_around(
     """
     boxes = [obstacle_corners(o) for o in scene.obstacles if o.shape.bounded]
     if arm_points is None or len(arm_points) == 0:
-        everything = np.concatenate([*boxes, *extra, *([] if boxes or extra else [EMPTY])])
+        everything = np.concatenate([*boxes, *extra, *([] if boxes or extra else [EMPTY_BOX])])
         low, high = everything.min(axis=0), everything.max(axis=0)
         return Frame(low, high, max(float(np.linalg.norm(high - low)), 1e-3))
     points = np.concatenate([arm_points, *extra])
     low, high = points.min(axis=0), points.max(axis=0)
     arm = max(float(np.linalg.norm(high - low)), 1e-3)
-    near_low, near_high = low - MARGIN * arm, high + MARGIN * arm
+    near_low, near_high = low - SURROUNDINGS_MARGIN * arm, high + SURROUNDINGS_MARGIN * arm
     for corners in boxes:
-        if not whole and float(np.ptp(corners, axis=0).max()) > HUGE * arm:
+        if not whole and float(np.ptp(corners, axis=0).max()) > SURROUNDINGS_RATIO * arm:
             corners = np.clip(corners, near_low, near_high)
         low, high = np.minimum(low, corners.min(axis=0)), np.maximum(high, corners.max(axis=0))
     return Frame(low, high, max(arm, 0.1 * float(np.linalg.norm(high - low))))

@@ -1,10 +1,10 @@
-"""What else a page can show beside arm and scene: bodies of triangles with a name, each with a switch of its own."""
+"""Marks: further bodies on a page beside arm and scene, of triangles, with a name and a switch each."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, TypedDict
 
 import meshcat.geometry as mg
 import numpy as np
@@ -16,10 +16,14 @@ from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.meshes import look_of_triangles
 from rrtik_ompl.viewer.drawing.triangles import tube
 
-SIDES = 6  # of the tubes of a line: there may be thousands
-ROUND = 48  # segments of a ball
+if TYPE_CHECKING:
+    from meshcat.visualizer import Visualizer
+    from typing_extensions import Unpack
+
+TUBE_SIDES = 6  # few, for there may be thousands of tubes
+BALL_SEGMENTS = 48
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])  # of a square face, in its plane
-HALVES = np.array([[0, 1, 2, 0, 2, 3]])  # its triangles
+SQUARE_FACES = np.array([[0, 1, 2, 0, 2, 3]])  # its triangles
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,7 +31,7 @@ class Mark:
     """Something drawn in the world.
 
     Attributes:
-        name: What the legend calls it.
+        name: In the legend.
         color: '#rrggbb'.
         vertices: Shape (k, 3) [m].
         faces: Rows of ``vertices``, shape (m, 3).
@@ -43,7 +47,14 @@ class Mark:
     shown: bool = True
 
 
-def tubes(name: str, color: str, lines: Iterable[ArrayLike], radius: float, **options: Any) -> Mark:
+class MarkOptions(TypedDict, total=False):
+    """Optional attributes of a `Mark`."""
+
+    opacity: float
+    shown: bool
+
+
+def tubes(name: str, color: str, lines: Iterable[ArrayLike], radius: float, **options: Unpack[MarkOptions]) -> Mark:
     """Lines as thin tubes, because WebGL draws lines one pixel wide.
 
     Args:
@@ -53,17 +64,21 @@ def tubes(name: str, color: str, lines: Iterable[ArrayLike], radius: float, **op
         radius: Of the tubes [m].
         **options: ``opacity`` and ``shown`` of the `Mark`.
     """
-    return _joined(name, color, (tube(np.asarray(line, dtype=np.float64), radius, SIDES) for line in lines), options)
+    return _joined(
+        name, color, (tube(np.asarray(line, dtype=np.float64), radius, TUBE_SIDES) for line in lines), options
+    )
 
 
-def balls(name: str, color: str, centres: ArrayLike, radius: float, **options: Any) -> Mark:
+def balls(name: str, color: str, centres: ArrayLike, radius: float, **options: Unpack[MarkOptions]) -> Mark:
     """Balls of one radius [m] at points, shape (k, 3)."""
-    vertices, faces = capsule(radius, 0.0, ROUND)
+    vertices, faces = capsule(radius, 0.0, BALL_SEGMENTS)
     points = np.asarray(centres, dtype=np.float64)
     return _joined(name, color, ((vertices + point, faces) for point in points), options)
 
 
-def cubes(name: str, color: str, inside: NDArray[np.bool_], corner: ArrayLike, size: float, **options: Any) -> Mark:
+def cubes(
+    name: str, color: str, inside: NDArray[np.bool_], corner: ArrayLike, size: float, **options: Unpack[MarkOptions]
+) -> Mark:
     """Cells of a grid, without the faces between two of them.
 
     Args:
@@ -86,11 +101,11 @@ def cubes(name: str, color: str, inside: NDArray[np.bool_], corner: ArrayLike, s
                 square[..., (axis + 1 + k) % 3] = CORNERS[:, k]
             pieces.append(origin + size * (places[:, None] + square))
     corners = np.concatenate(pieces)
-    faces = (4 * np.arange(len(corners))[:, None] + HALVES).reshape(-1, 3)
+    faces = (4 * np.arange(len(corners))[:, None] + SQUARE_FACES).reshape(-1, 3)
     return Mark(name, color, frozen(corners.reshape(-1, 3)), frozen(faces, np.int64), **options)
 
 
-def draw_marks(vis: Any, marks: Iterable[Mark]) -> None:
+def draw_marks(vis: Visualizer, marks: Iterable[Mark]) -> None:
     """Draw marks under ``marks/<number>``."""
     for number, mark in enumerate(marks):
         solid = mark.opacity == 1.0
@@ -100,7 +115,7 @@ def draw_marks(vis: Any, marks: Iterable[Mark]) -> None:
         vis["marks"][f"{number}"].set_object(look_of_triangles(mark.vertices, mark.faces).geometry, material)
 
 
-def _joined(name: str, color: str, bodies: Iterable[tuple[Matrix, Faces]], options: dict[str, Any]) -> Mark:
+def _joined(name: str, color: str, bodies: Iterable[tuple[Matrix, Faces]], options: MarkOptions) -> Mark:
     vertices, faces, count = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int64)], 0
     for points, triangles in bodies:
         vertices.append(points)

@@ -1,4 +1,4 @@
-"""Colours of the page: told apart by colour-blind people too (hues of Okabe and Ito, Color Universal Design, 2008)."""
+"""Colours of the page: distinguishable for colour-blind people (hues of Okabe and Ito, 2008 [55])."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ ATTACHED = "#cc79a7"
 INK = "#1d2733"
 TRAIL = "#d55e00"
 BEFORE = "#56b4e9"
-SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6bb1", "#7f7f7f")  # one after another
+SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6bb1", "#7f7f7f")  # in this order
 AXES = ("#d55e00", "#009e73", "#0072b2")  # x, y, z
 BACKGROUND_TOP = "#fbfcfd"
 BACKGROUND_BOTTOM = "#e3e9ef"

@@ -1,4 +1,4 @@
-"""A map of reach as bodies of cells, one for each class of values, so that the page's legend is its scale."""
+"""A reachability map as bodies of cells, one for each class of values, so that the page's legend is its scale."""
 
 from __future__ import annotations
 

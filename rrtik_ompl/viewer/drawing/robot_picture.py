@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import meshcat.geometry as mg
 import numpy as np
@@ -16,6 +17,9 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import AttachedObject
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.meshes import Look, look_of_coal, look_of_shape, triangle_count
+
+if TYPE_CHECKING:
+    from meshcat.visualizer import Visualizer
 
 ROBOT_TRIANGLES = 100_000  # drawn for the whole arm at most; its meshes are thinned out above that
 GHOST_TRIANGLES = 15_000  # of each ghost
@@ -56,7 +60,7 @@ def link_parts(robot: Robot, triangles: int = ROBOT_TRIANGLES) -> list[Part]:
     return drawn or _link_parts(robot.collision.geometryObjects, triangles)
 
 
-def _link_parts(bodies: Any, triangles: int) -> list[Part]:
+def _link_parts(bodies: Sequence[pin.GeometryObject], triangles: int) -> list[Part]:
     total = max(sum(triangle_count(body.geometry) for body in bodies), 1)
     parts = []
     for body in bodies:
@@ -69,8 +73,8 @@ def _link_parts(bodies: Any, triangles: int) -> list[Part]:
     return parts
 
 
-def _link_color(body: Any) -> str:
-    """The colour that the robot's description gives, or one of two greys in turn, so that the joints can be seen."""
+def _link_color(body: pin.GeometryObject) -> str:
+    """The colour of the robot's description, or one of two greys in turn, so that the joints are visible."""
     if body.overrideMaterial:
         return palette.hexadecimal(body.meshColor[:3])
     return palette.ROBOT_ALTERNATE if body.parentJoint % 2 else palette.ROBOT
@@ -95,7 +99,7 @@ def attached_parts(robot: Robot, attached: tuple[AttachedObject, ...]) -> list[P
     return parts
 
 
-def draw_parts(node: Any, robot: Robot, parts: list[Part], frames: NDArray[np.float64]) -> None:
+def draw_parts(node: Visualizer, robot: Robot, parts: list[Part], frames: NDArray[np.float64]) -> None:
     """Draw the arm below a node, at the joint frames of one configuration, shape (joints + 1, 4, 4)."""
     names = joint_nodes(robot)
     for name, placement in zip(names, frames, strict=True):

@@ -1,9 +1,9 @@
-"""The way of the tip: one tube per move, so that the page can highlight the move that is being made."""
+"""The trail of the tip: one tube per move, so that the page can highlight the present move."""
 
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING
 
 import meshcat.geometry as mg
 import numpy as np
@@ -14,7 +14,10 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.scene_picture import draw_tube
 
-STEP = np.deg2rad(3.0)  # [rad], or a share of the way for sliding joints: between two rings of the tube
+if TYPE_CHECKING:
+    from meshcat.visualizer import Visualizer
+
+RING_STEP = np.deg2rad(3.0)  # [rad] between two rings of the tube; for sliding joints a share of the move
 MAX_RINGS = 1500  # of all tubes together, about
 MAX_PIECES = 150  # a path of more moves is drawn in this many pieces of several moves each
 
@@ -25,16 +28,16 @@ def pieces(waypoints: Matrix) -> NDArray[np.int64]:
     return np.arange(moves) * min(moves, MAX_PIECES) // max(moves, 1)
 
 
-def draw_before(vis: Any, robot: Robot, waypoints: Matrix, radius: float) -> None:
-    """Draw the tip's way on another path, thinner, under ``before``; arguments as of :func:`draw_trail`."""
+def draw_before(vis: Visualizer, robot: Robot, waypoints: Matrix, radius: float) -> None:
+    """Draw the tip's trail on another path, thinner, under ``before``; arguments as of :func:`draw_trail`."""
     tips = robot.fk_batch(_dense(robot, waypoints, len(waypoints)))[:, :3, 3]
     tips = tips[np.insert(np.linalg.norm(np.diff(tips, axis=0), axis=1) > 0.05 * radius, 0, True)]
     if len(tips) > 1:
         draw_tube(vis["before"], tips, 0.6 * radius, palette.BEFORE)
 
 
-def draw_trail(vis: Any, robot: Robot, waypoints: Matrix, radius: float, *, beads: bool = True) -> None:
-    """Draw the tip's way under ``trail/piece N`` and a bead at every waypoint under ``beads``.
+def draw_trail(vis: Visualizer, robot: Robot, waypoints: Matrix, radius: float, *, beads: bool = True) -> None:
+    """Draw the tip's trail under ``trail/piece N`` and a bead at every waypoint under ``beads``.
 
     Args:
         vis: ``meshcat.Visualizer``.
@@ -58,11 +61,11 @@ def draw_trail(vis: Any, robot: Robot, waypoints: Matrix, radius: float, *, bead
 
 
 def _dense(robot: Robot, waypoints: Matrix, total: int) -> Matrix:
-    """Configurations along some moves, close enough for the tip's arcs to look round. Shape (m, dof)."""
+    """Configurations along some moves, close enough that the tip's arcs appear round. Shape (m, dof)."""
     most = max(MAX_RINGS // total, 2)
     rows = [waypoints[:1]]
     for a, b in pairwise(waypoints):
         turn = float(np.abs(b - a)[~robot.prismatic].max(initial=0.0))
-        steps = int(np.clip(np.ceil(turn / STEP), 1, most))
+        steps = int(np.clip(np.ceil(turn / RING_STEP), 1, most))
         rows.append(a + (b - a) * np.linspace(0.0, 1.0, steps + 1)[1:, None])
     return np.concatenate(rows)

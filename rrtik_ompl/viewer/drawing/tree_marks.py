@@ -1,4 +1,4 @@
-"""The tree of MB-RRT in 3-D: the balls in which each joint is useful, every link, and the answer."""
+"""The tree of MB-RRT in 3-D: the balls in which each joint is useful, every link, and the solution."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from rrtik_ompl.ik.mb_rrt.run import TreeSearch
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.marks import Mark, balls, tubes
 
-THIN, THICK = 0.0016, 0.006  # radii of links and of the answer, of the reach
-MOST = 600  # links drawn of each index, the first ones
-FAINT = 0.08  # opacity of a region
+LINK_RADIUS, SOLUTION_RADIUS = 0.0016, 0.006  # of links and of the solution, over the reach
+MAX_LINKS = 600  # drawn of each index, the first ones
+REGION_OPACITY = 0.08
 
 
 def tree_marks(run: TreeSearch, *, unit: float = 1.0) -> list[Mark]:
@@ -33,16 +33,18 @@ def tree_marks(run: TreeSearch, *, unit: float = 1.0) -> list[Mark]:
         if index < run.links.count:
             name = f"where joint {index + 1} can be"
             far = float(run.links.remaining[index]) * unit
-            marks.append(balls(name, color, goal, far, opacity=FAINT))
+            marks.append(balls(name, color, goal, far, opacity=REGION_OPACITY))
         before, level = (_in_space(run.nodes[k]) * unit for k in (index - 1, index))
-        edges = np.stack([before[run.parents[index - 1]], level], axis=1)[:MOST]
+        edges = np.stack([before[run.parents[index - 1]], level], axis=1)[:MAX_LINKS]
         rest = len(level) - len(edges)
         name = f"links of index {index}" + (f" (all but {rest})" if rest else "")
-        marks.append(tubes(name, color, edges, THIN * reach))
+        marks.append(tubes(name, color, edges, LINK_RADIUS * reach))
     chain = _in_space(run.chain) * unit
-    marks.append(tubes("answer", palette.INK, [chain[k : k + 2] for k in range(len(chain) - 1)], THICK * reach))
-    marks.append(balls("its joints", palette.INK, chain, 1.6 * THICK * reach))
-    marks.append(balls("goal", palette.TRAIL, goal, 2.4 * THICK * reach))
+    marks.append(
+        tubes("answer", palette.INK, [chain[k : k + 2] for k in range(len(chain) - 1)], SOLUTION_RADIUS * reach)
+    )
+    marks.append(balls("its joints", palette.INK, chain, 1.6 * SOLUTION_RADIUS * reach))
+    marks.append(balls("goal", palette.TRAIL, goal, 2.4 * SOLUTION_RADIUS * reach))
     return marks
 
 

@@ -1,4 +1,4 @@
-"""From where to look first: the direction from which obstacles hide the least of the arm's way."""
+"""The first viewpoint: the direction from which obstacles hide the least of the arm's motion."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.viewer.drawing.meshes import look_of_shape
 
-USUAL_AZIMUTH = np.deg2rad(-50.0)  # from in front of the arm (x), on its right
+DEFAULT_AZIMUTH = np.deg2rad(-50.0)  # from in front of the arm (x), on its right
 ELEVATIONS = np.deg2rad([27.0, 42.0])
 TURNS = np.deg2rad([0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180])  # tried in this order
-TURN_COST = 0.04  # share of hidden points that a turn by 90 degrees away from the usual azimuth must save
+TURN_COST = 0.04  # share of hidden points that a turn by 90 degrees away from the default azimuth must save
 
 
 def overview(points: Matrix, scene: Scene) -> Vector:
-    """Unit vector from the scene towards the eye, shape (3,).
+    """Unit vector from the scene towards the viewer, shape (3,).
 
     Args:
         points: Places that should be seen, shape (m, 3) [m].
@@ -37,13 +37,13 @@ def overview(points: Matrix, scene: Scene) -> Vector:
 
 
 def direction(turn: float, elevation: float) -> Vector:
-    """Unit vector at an azimuth ``turn`` [rad] from the usual one and an elevation [rad], shape (3,)."""
-    azimuth = USUAL_AZIMUTH + turn
+    """Unit vector at an azimuth ``turn`` [rad] from the default one and an elevation [rad], shape (3,)."""
+    azimuth = DEFAULT_AZIMUTH + turn
     return np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
 
 
 def behind(points: Matrix, away: Vector, obstacle: Obstacle) -> Mask:
-    """Which points, shape (m, 3), have the box around an obstacle between them and an eye far off. Shape (m,)."""
+    """Which points, shape (m, 3), have the box around an obstacle between them and a distant viewer. Shape (m,)."""
     corners = look_of_shape(obstacle.shape).corners
     rotation = obstacle.pose.rotation.T
     local = (points - obstacle.pose.translation) @ rotation.T

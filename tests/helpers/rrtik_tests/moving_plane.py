@@ -13,7 +13,7 @@ from rrtik_ompl.trajectory.limits import RateLimits
 from rrtik_ompl.world import World
 
 FAST = RateLimits([1e3, 1e3], [1e3, 1e3])
-OPTIONS = {"step": 0.5, "rate": 10.0, "eps": 1.0, "slot": 30.0, "limits": FAST}
+OPTIONS = {"step": 0.5, "rate": 10.0, "max_edge": 1.0, "repair_budget": 30.0, "limits": FAST}
 LOW, HIGH = np.zeros(2), np.full(2, 20.0)
 
 

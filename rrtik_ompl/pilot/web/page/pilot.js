@@ -148,12 +148,12 @@ function showJoints() {
 }
 
 function showRoom(unit) {
-  const room = state.room, at = (value) => fixed(value, unit === "m" ? 3 : 1) + (unit === "m" ? " m" : "°");
-  const singular = room.singular.map(([from, to, name]) => `near singular${name && " "}${name} ${at(from)} to ${at(to)}`);
-  const text = inWords(room.low === room.high ? `in contact, only out of it: ${room.below}`
-    : [`free ${at(room.low)} (${room.below}) to ${at(room.high)} (${room.above})`, ...singular].join(" · "));
-  set(byId("room"), text);
-  byId("room").title = text;
+  const range = state.range, at = (value) => fixed(value, unit === "m" ? 3 : 1) + (unit === "m" ? " m" : "°");
+  const singular = range.singular.map(([from, to, name]) => `near singular${name && " "}${name} ${at(from)} to ${at(to)}`);
+  const text = inWords(range.low === range.high ? `in contact, only out of it: ${range.below}`
+    : [`free ${at(range.low)} (${range.below}) to ${at(range.high)} (${range.above})`, ...singular].join(" · "));
+  set(byId("range"), text);
+  byId("range").title = text;
 }
 
 function jointRow(joint, k) {
@@ -189,7 +189,7 @@ function showJoint(row, joint, k) {
   way.style.width = percent(Math.abs(goal - now));
   free.hidden = singular.hidden = k !== state.selected || joint.lower === null;
   if (!free.hidden) {
-    const { low, high, singular: stretches } = state.room;
+    const { low, high, singular: stretches } = state.range;
     free.style.left = percent(share(low));
     free.style.width = percent(share(high) - share(low));
     const marks = stretches.map(([from, to]) => [percent(share(from) - MARK), percent(share(to) + MARK)]);
@@ -252,7 +252,7 @@ function showRoute() {
   byId("current").hidden = !route || state.mode !== "following";
   if (!route) { if (list.children.length) list.replaceChildren(); list.dataset.key = ""; set(byId("route_numbers"), ""); return; }
   const clear = route.clearance_mm === null ? "" : ` · ${fixed(route.clearance_mm, 0)} mm clear`;
-  set(byId("route_numbers"), `${route.moves.length} · ${fixed(route.travel, 0)}° · ${fixed(route.seconds, 0)} s${clear} · ${fixed(100 * route.steady, 0)} % safe at ±1°`);
+  set(byId("route_numbers"), `${route.moves.length} · ${fixed(route.travel, 0)}° · ${fixed(route.seconds, 0)} s${clear} · ${fixed(100 * route.robustness, 0)} % safe at ±1°`);
   byId("route_numbers").title = `joints: ${route.joints.join(", ").replaceAll("_", " ")}`;
   const key = JSON.stringify(route.moves.map((move) => move.text));
   if (list.dataset.key !== key) { list.dataset.key = key; list.replaceChildren(...route.moves.map((move) => make("li", { ariaLabel: move.text }, inShort(move)))); list.scrollTop = 0; }
