@@ -5,13 +5,25 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
 from rrtik_ompl.cli.terminal import note, progress, say
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import check_target, comma_numbers
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
+
+    from rrtik_ompl.arrays import Matrix, Vector
+    from rrtik_ompl.goal import Goal, PositionGoal, TipGoal
+    from rrtik_ompl.ik.solve import IkResult
+    from rrtik_ompl.ik.trajectory import IkTrajectory
+    from rrtik_ompl.robot import Robot
+    from rrtik_ompl.world import World
+
 
 FOUND, NOT_FOUND = 0, 1
 MAX_ROWS = 40  # of a table; CSV and JSON have them all
@@ -22,10 +34,24 @@ Triple = tuple[float, float, float]
 class Asked(NamedTuple):
     """The arm and what surrounds it: ``goal`` and ``near`` come from a problem, and are None without one."""
 
-    robot: Any
-    world: Any
-    goal: Any
-    near: Any
+    robot: Robot
+    world: World | None
+    goal: Goal | None
+    near: Vector | None
+
+
+class Solved(NamedTuple):
+    """Inverse kinematics of many poses: joint values, errors, reasons and details row by row.
+
+    Of a trajectory also a note for each row, such as a jump, and a line about the whole.
+    """
+
+    q: Matrix
+    residuals: Matrix
+    reasons: list[str]
+    details: list[str]
+    notes: list[str]
+    line: str = ""
 
 
 class Output(NamedTuple):
@@ -83,7 +109,7 @@ def inverse_kinematics(
     asked = _asked(robot, problem, scene, near, near_deg)
     output = Output(as_json, as_csv, html)
     tolerances = _tolerances(tolerance_mm, tolerance_deg)
-    common = {"method": method, "near": asked.near, "world": asked.world, "seed": seed}
+    common: dict[str, Any] = {"method": method, "near": asked.near, "world": asked.world, "seed": seed}
     common |= {} if seconds is None else {"seconds": seconds}
     if poses is not None:
         return _many(asked, poses, trajectory, tolerances, common, output)
@@ -116,7 +142,7 @@ def _tolerances(millimetres: float | None, degrees: float | None) -> dict[str, f
     return found if degrees is None else {**found, "orientation_tolerance": math.radians(degrees)}
 
 
-def _posture(asked: Asked, near: str | None, near_deg: str | None) -> Any:
+def _posture(asked: Asked, near: str | None, near_deg: str | None) -> Vector | None:
     if near is not None and near_deg is not None:
         raise InputError("give one of --near and --near-deg, not both")
     if near is not None:
@@ -126,7 +152,13 @@ def _posture(asked: Asked, near: str | None, near_deg: str | None) -> Any:
     return asked.robot.configuration_deg(comma_numbers(near_deg, "--near-deg"), "--near-deg")
 
 
-def _goal(asked: Asked, position: Any, quaternion: Any, rpy_deg: Any, tolerances: dict[str, float]) -> Any:
+def _goal(
+    asked: Asked,
+    position: Triple | None,
+    quaternion: tuple[float, float, float, float] | None,
+    rpy_deg: Triple | None,
+    tolerances: dict[str, float],
+) -> TipGoal:
     """The goal that is asked for; of a problem whose goal is joint values, the pose of the tip there."""
     import numpy as np
 
@@ -150,7 +182,7 @@ def _goal(asked: Asked, position: Any, quaternion: Any, rpy_deg: Any, tolerances
     return _point(position, tolerances)
 
 
-def _point(position: Any, tolerances: dict[str, float]) -> Any:
+def _point(position: ArrayLike, tolerances: dict[str, float]) -> PositionGoal:
     from rrtik_ompl import PositionGoal
 
     _refuse_orientation(tolerances, "give --quaternion or --rpy-deg, or leave it out")
@@ -162,7 +194,7 @@ def _refuse_orientation(tolerances: dict[str, float], remedy: str) -> None:
         raise InputError(f"--tolerance-deg is of an orientation, and a point has none: {remedy}")
 
 
-def _one(asked: Asked, goal: Any, everything: bool, common: dict[str, Any], output: Output) -> int:
+def _one(asked: Asked, goal: TipGoal, everything: bool, common: dict[str, Any], output: Output) -> int:
     from rrtik_ompl import solve_ik
     from rrtik_ompl.cli import ik_report
 
@@ -176,8 +208,8 @@ def _one(asked: Asked, goal: Any, everything: bool, common: dict[str, Any], outp
         reasons, notes = [""] * len(result.solutions), ik_report.solution_notes(names, turns)
         print(ik_report.rows_csv(robot, result.solutions, result.residuals, reasons, notes), end="")
     elif result.found:
-        obstacles = () if world is None else world.scene.obstacles
-        clearances = [world.clearance(q) for q in result.solutions] if obstacles else []
+        checked = world if world is not None and world.scene.obstacles else None
+        clearances = [] if checked is None else [checked.clearance(q) for q in result.solutions]
         more = f" and {sum(turns)} more by full turns of joints" if any(turns) else ""
         say(f"{robot.name}, {result.method}: {_count(len(result.solutions), 'solution')}{more}, {_time(result)}")
         say(ik_report.solutions_table(robot, result, names, turns, clearances, MAX_ROWS))
@@ -207,11 +239,8 @@ def _many(
     if rows.ndim == 2:
         _refuse_orientation(tolerances, "leave it out")
     with progress(f"inverse kinematics of {_count(len(rows), 'pose')}"):
-        if trajectory:
-            q, residuals, reasons, details, notes, line = _followed(robot, rows, tolerances, common)
-        else:
-            q, residuals, reasons, details = _each(robot, rows, tolerances, common)
-            notes, line = [""] * len(rows), ""
+        solve = _followed if trajectory else _each
+        q, residuals, reasons, details, notes, line = solve(robot, rows, tolerances, common)
     found = sum(not reason for reason in reasons)
     line += next((f"; no. {k + 1}: {detail}" for k, detail in enumerate(details) if detail), "")
     if output.as_json:
@@ -230,7 +259,7 @@ def _many(
     return FOUND if found == len(rows) else NOT_FOUND
 
 
-def _each(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[str, Any]) -> Any:
+def _each(robot: Robot, rows: NDArray[np.float64], tolerances: dict[str, float], common: dict[str, Any]) -> Solved:
     """Joint values, residuals, reasons and details: poses as one batch unless tolerances are given, else singly."""
     import numpy as np
 
@@ -238,7 +267,7 @@ def _each(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[str,
 
     if rows.ndim == 3 and not tolerances:
         batch = solve_ik_batch(robot, rows, **common)
-        return batch.q, batch.residuals, list(batch.reasons), list(batch.details)
+        return Solved(batch.q, batch.residuals, list(batch.reasons), list(batch.details), [""] * len(rows))
     q, residuals = np.full((len(rows), robot.dof), np.nan), np.full((len(rows), 2), np.nan)
     reasons, details = [], []
     for k, row in enumerate(rows):
@@ -248,10 +277,10 @@ def _each(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[str,
         details.append(result.detail)
         if result.found:
             q[k], residuals[k] = result.solutions[0], result.residuals[0]
-    return q, residuals, reasons, details
+    return Solved(q, residuals, reasons, details, [""] * len(rows))
 
 
-def _followed(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[str, Any]) -> Any:
+def _followed(robot: Robot, rows: NDArray[np.float64], tolerances: dict[str, float], common: dict[str, Any]) -> Solved:
     """The same, details of the first point without a solution alone, with a note for each: a jump, a collision."""
     from rrtik_ompl import solve_ik_trajectory
 
@@ -265,10 +294,10 @@ def _followed(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[
     if done.detail:  # which names its point, counted from 0
         first = next(k for k, reason in enumerate(done.reasons) if reason)
         details[first] = done.detail.partition(": ")[2]
-    return done.q, done.residuals, list(done.reasons), details, notes, line
+    return Solved(done.q, done.residuals, list(done.reasons), details, notes, line)
 
 
-def _draw(asked: Asked, goal: Any, q: Any, output: Output, *, moving: bool = False) -> None:
+def _draw(asked: Asked, goal: TipGoal | None, q: Matrix, output: Output, *, moving: bool = False) -> None:
     """The page: the first solution as the arm and the others as ghosts, or the arm moving through all of them."""
     if output.html is None:
         return
@@ -294,5 +323,5 @@ def _count(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
-def _time(result: Any) -> str:
+def _time(result: IkResult | IkTrajectory) -> str:
     return f"{1e3 * result.seconds:.3g} ms"

@@ -6,7 +6,7 @@ import csv
 import io
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +20,16 @@ from rrtik_ompl.ik.analytic.reference_branches import tip_fault
 from rrtik_ompl.ik.solve import IkResult, different_rows, mid_range_configuration
 from rrtik_ompl.robot import Robot
 
+if TYPE_CHECKING:
+    from rrtik_ompl.goal import TipGoal
+
+
 SAME = 1e-5  # [rad] or [m]; a double root is known to the square root of the rounding
 MILLIMETRES = 1e3
 DEGREES = 180.0 / np.pi
 
 
-def branch_names(robot: Robot, goal: Any, Q: Matrix) -> list[str]:
+def branch_names(robot: Robot, goal: TipGoal, Q: Matrix) -> list[str]:
     """What the arm's closed form calls each configuration, shape (k, dof); "" where it has no name for it.
 
     A branch such as ``front near up``; of a singular pose, which has a curve of solutions, its families too.
@@ -70,7 +74,7 @@ def fold_full_turns(robot: Robot, result: IkResult, near: Vector | None) -> tupl
     return folded, [int(number) - 1 for number in fitting.prod(axis=1)]
 
 
-def _targets(robot: Robot, goal: Any) -> NDArray[np.float64] | None:
+def _targets(robot: Robot, goal: TipGoal) -> NDArray[np.float64] | None:
     """The target of a goal as the robot's closed form takes it; None if there is no such form or it does not fit."""
     if not has_closed_form(robot) or tip_fault(robot, form_of(robot)):
         return None

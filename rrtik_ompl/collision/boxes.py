@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import coal
 import numpy as np
@@ -85,7 +84,7 @@ def _local_boxes(bodies: Sequence[Body]) -> tuple[Matrix, Matrix]:
     return centres, halves
 
 
-def half_extents(geometry: Any) -> Vector:
+def half_extents(geometry: coal.CollisionGeometry) -> Vector:
     """Half extents of a coal geometry's own bounding box, shape (3,)."""
     box = geometry.aabb_local
     return 0.5 * np.array([box.width(), box.height(), box.depth()])

@@ -7,7 +7,7 @@ support points as a first guess and have been seen to miss about 3 overlaps in 1
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import coal
 import numpy as np
@@ -152,7 +152,13 @@ def _shorter(
     return starts[: int((starts < end).sum())], runs[inside], pairs[inside]
 
 
-def distance(first: Any, first_pose: Matrix, second: Any, second_pose: Matrix, margin: float = 0.0) -> float | None:
+def distance(
+    first: coal.CollisionGeometry,
+    first_pose: Matrix,
+    second: coal.CollisionGeometry,
+    second_pose: Matrix,
+    margin: float = 0.0,
+) -> float | None:
     """A lower bound of the distance of two coal geometries at poses, shape (4, 4), less a margin [m].
 
     None if the margin is not kept. Asked with fresh request and result.

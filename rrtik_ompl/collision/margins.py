@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import coal
 
 from rrtik_ompl.collision.bodies import Body
@@ -18,7 +16,7 @@ def kept_apart(first: Body, second: Body) -> float:
     return 0.0 if first.joint == second.joint == 0 else first.margin + second.margin
 
 
-def request(margin: float) -> Any:
+def request(margin: float) -> coal.DistanceRequest:
     """A fresh request to coal: do two geometries touch, or stay no farther than ``margin`` [m] apart."""
     asked = coal.CollisionRequest()
     asked.security_margin = margin

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,10 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.enclosure import enclosure
 from rrtik_ompl.collision.solids import inside_mesh, is_closed, mesh_arrays
 from rrtik_ompl.covers.planes import most_different
+
+if TYPE_CHECKING:
+    import coal
+
 
 MAX_PIECES = 12
 MAX_TRIANGLES = 300_000
@@ -94,7 +98,7 @@ class _Part:
         )
 
 
-def convex_pieces(mesh: Any) -> tuple[list[Matrix], list[Matrix], list[Matrix]]:
+def convex_pieces(mesh: coal.BVHModelBase) -> tuple[list[Matrix], list[Matrix], list[Matrix]]:
     """Convex pieces whose union contains a coal mesh and what it encloses, convex pieces inside it, and points of it.
 
     The cell whose pieces come out smallest is cut first (compare [44]), until cuts gain little. A

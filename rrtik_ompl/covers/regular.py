@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import coal
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +40,7 @@ def row_on_z(heights: Vector, radius: float) -> Matrix:
     return spheres
 
 
-def regular_cover(geometry: Any, limit: int, protrusion: float | None) -> Matrix | None:
+def regular_cover(geometry: coal.CollisionGeometry, limit: int, protrusion: float | None) -> Matrix | None:
     """Boxes as grids of balls, cylinders as rows of balls: the best one of at most ``limit`` balls."""
     if isinstance(geometry, coal.Box):
         half = np.array(geometry.halfSide)
@@ -67,7 +65,7 @@ def _chosen(grids: NDArray[np.int64], sticks: Vector, protrusion: float | None) 
     return np.asarray(grids[sticks.argmin()])
 
 
-def _regular(geometry: Any, grid: NDArray[np.int64]) -> Matrix:
+def _regular(geometry: coal.CollisionGeometry, grid: NDArray[np.int64]) -> Matrix:
     if isinstance(geometry, coal.Cylinder):
         step = geometry.halfLength / grid[2]
         heights = spread(geometry.halfLength - step, int(grid[2]))

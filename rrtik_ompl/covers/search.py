@@ -10,7 +10,6 @@ the cover holds the solid.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +38,7 @@ class Places:
     centres: Matrix
     depth: Vector
 
-    def __getitem__(self, rows: Any) -> Places:
+    def __getitem__(self, rows: NDArray[np.int64] | NDArray[np.bool_] | slice) -> Places:
         return Places(self.centres[rows], self.depth[rows])
 
 

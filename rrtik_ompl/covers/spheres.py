@@ -9,8 +9,6 @@ holds within 1e-9 of the size of the solid [m per m].
 
 from __future__ import annotations
 
-from typing import Any
-
 import coal
 import numpy as np
 from scipy.spatial import QhullError, cKDTree
@@ -52,7 +50,7 @@ SURFACE_POINTS = 6000
 SMALLEST = 1e-12  # [m]; what is smaller counts as a point
 
 
-def outer_cover(geometry: Any, *, protrusion: float | None = None) -> Matrix:
+def outer_cover(geometry: coal.CollisionGeometry, *, protrusion: float | None = None) -> Matrix:
     """Balls whose union contains a solid, shape (n, 4).
 
     Args:
@@ -85,7 +83,7 @@ def outer_cover(geometry: Any, *, protrusion: float | None = None) -> Matrix:
     return _grown(cover, swept)
 
 
-def inner_spheres(geometry: Any, *, count: int | None = None) -> Matrix:
+def inner_spheres(geometry: coal.CollisionGeometry, *, count: int | None = None) -> Matrix:
     """Balls inside a solid, shape (n, 4), the most useful first; none for an open mesh or an unknown kind.
 
     Args:
@@ -107,7 +105,7 @@ def inner_spheres(geometry: Any, *, count: int | None = None) -> Matrix:
     return np.asarray(found[found[:, 3] > 0.0], dtype=np.float64)
 
 
-def protrusion_bound(geometry: Any, spheres: Matrix) -> float:
+def protrusion_bound(geometry: coal.CollisionGeometry, spheres: Matrix) -> float:
     """How far balls, shape (n, 4), reach beyond a solid at most [m]; infinite for kinds that are not known here.
 
     An open mesh counts with caps that close it.
@@ -132,7 +130,7 @@ def balls_for(extent: float) -> int:
     return int(np.clip(round(BALLS_PER_METRE * extent), MIN_BALLS, MAX_BALLS))
 
 
-def _swept_radius(geometry: Any) -> float:
+def _swept_radius(geometry: coal.CollisionGeometry) -> float:
     return float(geometry.getSweptSphereRadius()) if hasattr(geometry, "getSweptSphereRadius") else 0.0
 
 
@@ -140,7 +138,7 @@ def _grown(spheres: Matrix, by: float) -> Matrix:
     return np.asarray(spheres + np.array([0.0, 0.0, 0.0, by]))
 
 
-def _solid(geometry: Any) -> tuple[Solid, Frame] | None:
+def _solid(geometry: coal.CollisionGeometry) -> tuple[Solid, Frame] | None:
     """The geometry as a solid of about unit size, or None if its kind is not known or it has no volume to speak of."""
     if isinstance(geometry, coal.Cylinder):
         sizes = geometry.radius, geometry.halfLength
@@ -161,7 +159,7 @@ def _solid(geometry: Any) -> tuple[Solid, Frame] | None:
         return None
 
 
-def _mesh(geometry: Any) -> tuple[Solid, Frame] | None:
+def _mesh(geometry: coal.CollisionGeometry) -> tuple[Solid, Frame] | None:
     vertices, triangles = mesh_arrays(geometry)
     used = vertices[np.unique(triangles)]
     if not len(used) or not np.isfinite(used).all() or not np.ptp(used, axis=0).max() > SMALLEST:
@@ -176,7 +174,7 @@ def _mesh(geometry: Any) -> tuple[Solid, Frame] | None:
     return convex_solid(box_corners(thick) + 0.5 * (low + high))
 
 
-def _closed(geometry: Any, solid: Solid) -> bool:
+def _closed(geometry: coal.CollisionGeometry, solid: Solid) -> bool:
     """Whether a body that touches a ball inside the geometry surely collides with it.
 
     Coal's meshes are hollow: a body collides with one if it meets the surface, or if its reference point is inside. A
@@ -187,20 +185,20 @@ def _closed(geometry: Any, solid: Solid) -> bool:
     return not len(solid.rim) and (not is_mesh(geometry) or isinstance(solid, MeshSolid))
 
 
-def _capsule_balls(capsule: Any, protrusion: float | None) -> Matrix:
+def _capsule_balls(capsule: coal.Capsule, protrusion: float | None) -> Matrix:
     radius, half = float(capsule.radius), float(capsule.halfLength)
     limit = balls_for(2.0 * (half + radius)) if protrusion is None else MAX_BALLS_ON_REQUEST
     return capsule_cover(radius, half, limit, protrusion)
 
 
-def _capsule_core(capsule: Any, count: int | None) -> Matrix:
+def _capsule_core(capsule: coal.Capsule, count: int | None) -> Matrix:
     """Balls inside a capsule, as many as its cover has."""
     radius, half = float(capsule.radius), float(capsule.halfLength)
     number = min(balls_on_axis(radius, half, CAPSULE_PROTRUSION * radius), balls_for(2.0 * (half + radius)))
     return row_on_z(spread(half, number if count is None else min(count, number)), radius)
 
 
-def _bounding_ball(geometry: Any, swept: float) -> Matrix:
+def _bounding_ball(geometry: coal.CollisionGeometry, swept: float) -> Matrix:
     geometry.computeLocalAABB()
     centre, radius = np.array(geometry.aabb_center), float(geometry.aabb_radius)
     if not (_finite(geometry) and np.isfinite(centre).all() and np.isfinite(radius) and np.abs(centre).max() < 1e300):
@@ -208,14 +206,14 @@ def _bounding_ball(geometry: Any, swept: float) -> Matrix:
     return np.array([[*centre, radius * (1.0 + 1e-12) + 1e-15 * float(np.abs(centre).max()) + swept]])
 
 
-def _finite(geometry: Any) -> bool:
+def _finite(geometry: coal.CollisionGeometry) -> bool:
     """Whether all vertices are finite numbers; coal's box leaves out those that are not."""
     if is_mesh(geometry):
         return bool(np.isfinite(mesh_arrays(geometry)[0]).all())
     return not isinstance(geometry, coal.ConvexBase) or bool(np.isfinite(np.array(geometry.points())).all())
 
 
-def _better(geometry: Any, first: Matrix, second: Matrix, protrusion: float | None) -> bool:
+def _better(geometry: coal.CollisionGeometry, first: Matrix, second: Matrix, protrusion: float | None) -> bool:
     """Whether the first cover is better: it sticks out less or, if both stay within what is asked for, is smaller."""
     reach = [protrusion_bound(geometry, cover) for cover in (first, second)]
     if protrusion is not None and max(reach) <= protrusion * (1.0 + 1e-9):

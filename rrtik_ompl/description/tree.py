@@ -78,7 +78,7 @@ class Joint:
         kind: str,
         parent: str,
         child: str,
-        T_parent_joint: Any | None = None,
+        T_parent_joint: pin.SE3 | None = None,
         axis: ArrayLike = (0.0, 0.0, 1.0),
         lower: float = -np.pi,
         upper: float = np.pi,

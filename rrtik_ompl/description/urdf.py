@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rrtik_ompl.description.joint_limits import merge_limits, read_joint_limits
 from rrtik_ompl.description.robot_build import JointLimits, build_robot
@@ -15,6 +15,10 @@ from rrtik_ompl.description.urdf_read import UrdfDescription, located, read_urdf
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.text import read_text
 from rrtik_ompl.robot import Robot
+
+if TYPE_CHECKING:
+    from rrtik_ompl.description.robot_source import BasePose
+
 
 FilePath = str | os.PathLike[str]
 URDF_OPTIONS = ("base_pose", "group", "joint_limits", "joints", "locked", "packages", "srdf", "tip")
@@ -50,7 +54,7 @@ def robot_from_urdf_text(
     joint_limits: FilePath | None = None,
     packages: FilePath | Iterable[FilePath] = (),
     locked: Mapping[str, float] | None = None,
-    base_pose: Any | None = None,
+    base_pose: BasePose = None,
     limits: Mapping[str, JointLimits] | None = None,
     postures: Mapping[str, Mapping[str, float]] | None = None,
     allowed_collisions: Iterable[Iterable[str]] = (),

@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -235,7 +234,7 @@ def _limit(limit: Element | None, kind: str, where: str) -> tuple[float, float, 
     return lower, upper, velocity or np.inf
 
 
-def _origin(element: Element, where: str) -> Any:
+def _origin(element: Element, where: str) -> pin.SE3:
     origin = element.find("origin")
     if origin is None:
         return pin.SE3.Identity()
@@ -243,7 +242,7 @@ def _origin(element: Element, where: str) -> Any:
     return pose_from_rpy(numbers(origin, "xyz", 3, zero, where), numbers(origin, "rpy", 3, zero, where), where)
 
 
-def _inertia(inertial: Element | None, where: str) -> Any | None:
+def _inertia(inertial: Element | None, where: str) -> pin.Inertia | None:
     mass = None if inertial is None else inertial.find("mass")
     tensor = None if inertial is None else inertial.find("inertia")
     if inertial is None or mass is None or tensor is None:
