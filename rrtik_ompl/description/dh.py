@@ -106,7 +106,7 @@ def robot_from_dh(
     before, after = _fixed_parts(table, convention, T_last_tip)
     names = ["base", *(f"link{k}" for k in range(1, len(table) + 1))]
     joints = [
-        Joint(row.joint, row.kind, parent, child, placement, (0, 0, 1), *_bounds(row), row.velocity)
+        Joint(row.joint, row.kind, parent, child, placement, (0, 0, 1), **_bounds(row), velocity=row.velocity)
         for row, placement, (parent, child) in zip(table, before, pairwise(names), strict=True)
     ]
     joints.append(Joint("tip_joint", "fixed", names[-1], "tip", after))
@@ -153,8 +153,9 @@ def _radii(name: str, radius: float | Sequence[float], count: int) -> list[float
     return [max(float(value), SMALLEST_RADIUS) for value in values]
 
 
-def _bounds(row: DhRow) -> tuple[float, float]:
-    return (-np.inf, np.inf) if row.kind == "continuous" else row.limits
+def _bounds(row: DhRow) -> dict[str, float]:
+    lower, upper = (-np.inf, np.inf) if row.kind == "continuous" else row.limits
+    return {"lower": lower, "upper": upper}
 
 
 def _posture(name: str, key: str, values: ArrayLike, table: Sequence[DhRow]) -> dict[str, float]:

@@ -80,6 +80,7 @@ class Joint:
         child: str,
         T_parent_joint: pin.SE3 | None = None,
         axis: ArrayLike = (0.0, 0.0, 1.0),
+        *,
         lower: float = -np.pi,
         upper: float = np.pi,
         velocity: float = np.inf,

@@ -202,7 +202,8 @@ class _Reader:
         lower, upper, velocity = _limit(element.find("limit"), kind, where)
         with located(self.where):
             axis = [1.0, 0.0, 0.0] if kind == "fixed" else axis
-            return Joint(name, kind, parent, child, _origin(element, where), axis, lower, upper, velocity)
+            origin = _origin(element, where)
+            return Joint(name, kind, parent, child, origin, axis, lower=lower, upper=upper, velocity=velocity)
 
     def mimics(self, element: Element) -> Iterator[Mimic]:
         tie = element.find("mimic")
