@@ -31,7 +31,7 @@ MAX_ROWS = 40  # of a table; CSV and JSON have them all
 Triple = tuple[float, float, float]
 
 
-class Asked(NamedTuple):
+class Setting(NamedTuple):
     """The arm and what surrounds it: ``goal`` and ``near`` come from a problem, and are None without one."""
 
     robot: Robot
@@ -55,7 +55,7 @@ class Solved(NamedTuple):
 
 
 class Output(NamedTuple):
-    """In which form the answer is wanted."""
+    """In which form results are printed."""
 
     as_json: bool
     as_csv: bool
@@ -106,18 +106,20 @@ def inverse_kinematics(
     if poses is not None and (position or quaternion or rpy_deg or everything):
         raise InputError("--poses brings its own poses, one answer each: leave out --position, orientation and --all")
     check_target(html, (".html", ".htm"))
-    asked = _asked(robot, problem, scene, near, near_deg)
+    given = _setting(robot, problem, scene, near, near_deg)
     output = Output(as_json, as_csv, html)
     tolerances = _tolerances(tolerance_mm, tolerance_deg)
-    common: dict[str, Any] = {"method": method, "near": asked.near, "world": asked.world, "seed": seed}
+    common: dict[str, Any] = {"method": method, "near": given.near, "world": given.world, "seed": seed}
     common |= {} if seconds is None else {"seconds": seconds}
     if poses is not None:
-        return _many(asked, poses, trajectory, tolerances, common, output)
-    goal = _goal(asked, position, quaternion, rpy_deg, tolerances)
-    return _one(asked, goal, everything, common, output)
+        return _many(given, poses, trajectory, tolerances, common, output)
+    goal = _goal(given, position, quaternion, rpy_deg, tolerances)
+    return _one(given, goal, everything, common, output)
 
 
-def _asked(robot: str | None, problem: str | None, scene: Path | None, near: str | None, near_deg: str | None) -> Asked:
+def _setting(
+    robot: str | None, problem: str | None, scene: Path | None, near: str | None, near_deg: str | None
+) -> Setting:
     from rrtik_ompl import World, load_problem, load_robot, load_scene
 
     if (robot is None) == (problem is None):
@@ -126,11 +128,11 @@ def _asked(robot: str | None, problem: str | None, scene: Path | None, near: str
         if scene is not None:
             raise InputError("--problem brings its own scene: leave out --scene")
         question = load_problem(problem)
-        asked = Asked(question.robot, question.world, question.goal, question.start)
+        given = Setting(question.robot, question.world, question.goal, question.start)
     else:
         arm = load_robot(str(robot))
-        asked = Asked(arm, None if scene is None else World(arm, load_scene(scene)), None, None)
-    return asked._replace(near=_posture(asked, near, near_deg))
+        given = Setting(arm, None if scene is None else World(arm, load_scene(scene)), None, None)
+    return given._replace(near=_posture(given, near, near_deg))
 
 
 def _tolerances(millimetres: float | None, degrees: float | None) -> dict[str, float]:
@@ -142,24 +144,24 @@ def _tolerances(millimetres: float | None, degrees: float | None) -> dict[str, f
     return found if degrees is None else {**found, "orientation_tolerance": math.radians(degrees)}
 
 
-def _posture(asked: Asked, near: str | None, near_deg: str | None) -> Vector | None:
+def _posture(given: Setting, near: str | None, near_deg: str | None) -> Vector | None:
     if near is not None and near_deg is not None:
         raise InputError("give one of --near and --near-deg, not both")
     if near is not None:
-        return asked.robot.posture(near)
+        return given.robot.posture(near)
     if near_deg is None:
-        return asked.near
-    return asked.robot.configuration_deg(comma_numbers(near_deg, "--near-deg"), "--near-deg")
+        return given.near
+    return given.robot.configuration_deg(comma_numbers(near_deg, "--near-deg"), "--near-deg")
 
 
 def _goal(
-    asked: Asked,
+    given: Setting,
     position: Triple | None,
     quaternion: tuple[float, float, float, float] | None,
     rpy_deg: Triple | None,
     tolerances: dict[str, float],
 ) -> TipGoal:
-    """The goal that is asked for; of a problem whose goal is joint values, the pose of the tip there."""
+    """The goal that the options describe; of a problem whose goal is joint values, the pose of the tip there."""
     import numpy as np
 
     from rrtik_ompl import JointGoal, PoseGoal
@@ -168,13 +170,13 @@ def _goal(
     if quaternion and rpy_deg:
         raise InputError("give one of --quaternion and --rpy-deg, not both")
     if position is None:
-        if quaternion or rpy_deg or asked.goal is None:
+        if quaternion or rpy_deg or given.goal is None:
             raise InputError("where to? give --position X Y Z, --problem NAME with a goal, or --poses FILE")
-        if isinstance(asked.goal, JointGoal):
-            return PoseGoal(asked.robot.fk(asked.goal.q), **tolerances)
+        if isinstance(given.goal, JointGoal):
+            return PoseGoal(given.robot.fk(given.goal.q), **tolerances)
         if tolerances:
             raise InputError("the goal of --problem has tolerances of its own: leave out --tolerance-mm and -deg")
-        return asked.goal
+        return given.goal
     if quaternion:
         return PoseGoal(pose(position, quaternion, "--position, --quaternion"), **tolerances)
     if rpy_deg:
@@ -194,13 +196,13 @@ def _refuse_orientation(tolerances: dict[str, float], remedy: str) -> None:
         raise InputError(f"--tolerance-deg is of an orientation, and a point has none: {remedy}")
 
 
-def _one(asked: Asked, goal: TipGoal, everything: bool, common: dict[str, Any], output: Output) -> int:
+def _one(given: Setting, goal: TipGoal, everything: bool, common: dict[str, Any], output: Output) -> int:
     from rrtik_ompl import solve_ik
     from rrtik_ompl.cli import ik_report
 
-    robot, world = asked.robot, asked.world
+    robot, world = given.robot, given.world
     with progress(f"inverse kinematics of {robot.name}"):
-        result, turns = ik_report.fold_full_turns(robot, solve_ik(robot, goal, all=everything, **common), asked.near)
+        result, turns = ik_report.fold_full_turns(robot, solve_ik(robot, goal, all=everything, **common), given.near)
     names = ik_report.branch_names(robot, goal, result.solutions)
     if output.as_json:
         print(json.dumps(ik_report.document(robot, result, names, turns)))
@@ -218,12 +220,12 @@ def _one(asked: Asked, goal: TipGoal, everything: bool, common: dict[str, Any], 
         tell = note if output.as_csv else say
         tell(f"{robot.name}, {result.method}: no solution, {result.reason}: {result.detail}")
     if result.found:
-        _draw(asked, goal, result.solutions, output)
+        _draw(given, goal, result.solutions, output)
     return FOUND if result.found else NOT_FOUND
 
 
 def _many(
-    asked: Asked,
+    given: Setting,
     file: Path,
     trajectory: bool,
     tolerances: dict[str, float],
@@ -235,7 +237,7 @@ def _many(
     from rrtik_ompl.cli import ik_report
     from rrtik_ompl.problem_files.poses import load_poses
 
-    robot, rows = asked.robot, load_poses(file)
+    robot, rows = given.robot, load_poses(file)
     if rows.ndim == 2:
         _refuse_orientation(tolerances, "leave it out")
     with progress(f"inverse kinematics of {_count(len(rows), 'pose')}"):
@@ -255,7 +257,7 @@ def _many(
         say(*_more(len(rows)))
     good = q[~np.isnan(q[:, 0])]
     if len(good):
-        _draw(asked, None, good, output, moving=trajectory)
+        _draw(given, None, good, output, moving=trajectory)
     return FOUND if found == len(rows) else NOT_FOUND
 
 
@@ -297,7 +299,7 @@ def _followed(robot: Robot, rows: NDArray[np.float64], tolerances: dict[str, flo
     return Solved(done.q, done.residuals, list(done.reasons), details, notes, line)
 
 
-def _draw(asked: Asked, goal: TipGoal | None, q: Matrix, output: Output, *, moving: bool = False) -> None:
+def _draw(given: Setting, goal: TipGoal | None, q: Matrix, output: Output, *, moving: bool = False) -> None:
     """The page: the first solution as the arm and the others as ghosts, or the arm moving through all of them."""
     if output.html is None:
         return
@@ -305,12 +307,12 @@ def _draw(asked: Asked, goal: TipGoal | None, q: Matrix, output: Output, *, movi
     from rrtik_ompl.viewer import view
     from rrtik_ompl.viewer.subject import Shown
 
-    shown = Shown(asked.robot, Scene() if asked.world is None else asked.world.scene, goal, q[0])
+    shown = Shown(given.robot, Scene() if given.world is None else given.world.scene, goal, q[0])
     with progress("drawing"):
         if moving and len(q) > 1:
-            view(shown, q, html=output.html, title=f"{asked.robot.name}: trajectory of {_count(len(q), 'point')}")
+            view(shown, q, html=output.html, title=f"{given.robot.name}: trajectory of {_count(len(q), 'point')}")
         else:
-            view(shown, ghosts=q, html=output.html, title=f"{asked.robot.name}: {_count(len(q), 'solution')}")
+            view(shown, ghosts=q, html=output.html, title=f"{given.robot.name}: {_count(len(q), 'solution')}")
     if not output.as_json and not output.as_csv:
         say(f"wrote {output.html}")
 

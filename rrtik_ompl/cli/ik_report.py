@@ -1,4 +1,4 @@
-"""Answers of inverse kinematics in words and tables for a person (degrees, millimetres), as CSV, and for machines."""
+"""Results of inverse kinematics in words and tables for a person (degrees, millimetres), as CSV, and for machines."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def branch_names(robot: Robot, goal: TipGoal, Q: Matrix) -> list[str]:
 
 
 def fold_full_turns(robot: Robot, result: IkResult, near: Vector | None) -> tuple[IkResult, list[int]]:
-    """The result with one solution of those that differ by full turns of joints: the arm looks the same in all.
+    """The result with one solution of those that differ by full turns of joints: the arm is at the same place in all.
 
     Args:
         robot: The arm.
@@ -172,7 +172,7 @@ def document(robot: Robot, result: IkResult, names: Sequence[str], turns: Sequen
 def rows_document(
     robot: Robot, q: Matrix, residuals: Matrix, reasons: Sequence[str], details: Sequence[str]
 ) -> dict[str, Any]:
-    """Answers for many poses for machines: rad and m; null where there is none."""
+    """Results for many poses for machines: rad and m; null where there is none."""
     return {
         "robot": robot.name,
         "joint_names": list(robot.joint_names),

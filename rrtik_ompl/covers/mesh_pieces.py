@@ -192,7 +192,7 @@ def _parts(parts: list[_Part]) -> list[_Part]:
 
 
 def _sketch(surface: Triangles) -> Triangles:
-    """Fewer triangles that look about the same: corners moved to a grid, what coincides left out."""
+    """Fewer triangles of about the same shape: corners moved to a grid, what coincides left out."""
     low = surface.min(axis=(0, 1))
     size = max(float(np.ptp(surface, axis=(0, 1)).max()) / GRID, 1e-12)
     steps = np.round((surface - low) / size).astype(np.int64)
@@ -241,7 +241,7 @@ def _crossed(first: Matrix, second: Matrix, axis: int, place: float) -> Matrix:
 def _hull(points: Matrix) -> tuple[Matrix, Matrix]:
     """Planes (outward unit normal, offset) of the hull of points and the points that span it.
 
-    No planes and all of the points if they are too flat to tell.
+    No planes and all of the points if they are too flat to decide.
     """
     try:
         hull = ConvexHull(points)

@@ -41,7 +41,7 @@ from rrtik_ompl.covers.solids import (
 BALLS_PER_METRE, MIN_BALLS, MAX_BALLS = 70.0, 2, 32  # 32: four full clusters of the kernels; 36 make eight
 BALLS_OF_OPEN = 3  # times as many for a mere surface: nothing of a ball on it is inside
 INNER_SHARE = 1.5  # inner balls for each outer one
-MAX_BALLS_ON_REQUEST = 512  # balls, where a protrusion is asked for
+MAX_BALLS_ON_REQUEST = 512  # balls, where a protrusion is given
 # A mesh of more triangles or open edges is taken as its bounding box, and nothing is proven to collide with it.
 MAX_TRIANGLES, MAX_OPEN_EDGES = 300_000, 4000
 CROSSED_CELLS = 1500  # at most
@@ -58,7 +58,7 @@ def outer_cover(geometry: coal.CollisionGeometry, *, protrusion: float | None = 
             if it is open, what it encloses (:mod:`rrtik_ompl.collision.enclosure`). A kind that is not known here gets
             one ball (of infinite radius if the kind has no bounds).
         protrusion: How far a ball may reach beyond the solid [m]; if that takes too many balls or too fine a cut, the
-            cover reaches farther (``protrusion_bound`` tells). None: what a number of balls that suits the size of
+            cover reaches farther (see ``protrusion_bound``). None: what a number of balls that suits the size of
             the solid allows.
     """
     swept = _swept_radius(geometry)
@@ -214,7 +214,7 @@ def _finite(geometry: coal.CollisionGeometry) -> bool:
 
 
 def _better(geometry: coal.CollisionGeometry, first: Matrix, second: Matrix, protrusion: float | None) -> bool:
-    """Whether the first cover is better: it sticks out less or, if both stay within what is asked for, is smaller."""
+    """Whether the first cover is better: it sticks out less or, if both stay within what is required, is smaller."""
     reach = [protrusion_bound(geometry, cover) for cover in (first, second)]
     if protrusion is not None and max(reach) <= protrusion * (1.0 + 1e-9):
         return len(first) <= len(second)

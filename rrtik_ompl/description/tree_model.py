@@ -33,7 +33,7 @@ def build_models(tree: Tree, T_world_base: pin.SE3 | None = None) -> tuple[Any, 
     model = pin.Model()
     model.name = tree.where
     links = {link.name: link for link in tree.links}
-    # Pinocchio looks frames up by name alone in places, so a joint that is called like a link gets no frame.
+    # Pinocchio finds frames by name alone in places, so a joint that is called like a link gets no frame.
     framed = {joint.name for joint in tree.joints} - set(links)
     places = {tree.root.name: _Place(0, pin.SE3.Identity() if T_world_base is None else T_world_base, 0)}
     _add_link(model, tree.root, places)

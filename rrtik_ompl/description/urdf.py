@@ -78,7 +78,7 @@ def robot_from_urdf_text(
         joints: Actuated joints, in the order wanted.
         tip: Link that goals refer to.
         joint_limits: File in the format of MoveIt's ``joint_limits.yaml``.
-        packages: Folders in which ``package://`` names are looked for first.
+        packages: Folders in which ``package://`` names are sought first.
         locked: Values [rad or m] of joints that are held still; 0, moved into the limits, if absent.
         base_pose: ``pinocchio.SE3`` T_world_base.
         limits: Limits that replace those of the URDF and of ``joint_limits``, by joint name.

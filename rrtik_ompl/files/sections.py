@@ -38,7 +38,7 @@ def _one(value: object) -> Any:
 
 Version = Annotated[Literal[1], BeforeValidator(_one)]
 
-_TAG = "<"  # tags of unions begin with it, so that they can be told from the keys in an error's location
+_TAG = "<"  # tags of unions begin with it, so that they differ from the keys in an error's location
 
 
 class Section(BaseModel):
@@ -74,7 +74,7 @@ def told_apart_by(*keys: str, what: str, text: str | None = None) -> Discriminat
     """Choose the member of a union by which of ``keys`` is there; members are tagged ``tag(key)``.
 
     Args:
-        keys: The keys that tell the members apart.
+        keys: The keys that distinguish the members.
         what: Name of the union in the message if none of them is there.
         text: Tag word of the member that is plain text, if there is one.
     """

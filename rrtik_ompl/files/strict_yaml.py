@@ -35,7 +35,7 @@ _WORDS |= {sign + form: float(sign + "inf") for form in (".inf", ".Inf", ".INF")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class YamlDocument:
-    """A YAML file that was read: its values and where each of them stands.
+    """A YAML file that was read: its values and where each of them is.
 
     Attributes:
         path: The file, as it was named by the caller.
@@ -48,7 +48,7 @@ class YamlDocument:
     lines: Mapping[Location, int]
 
     def place(self, location: Location) -> str:
-        """``FILE:LINE: key.path`` of a location (of its nearest parent that stands in the file, for the line)."""
+        """``FILE:LINE: key.path`` of a location (of its nearest parent that is in the file, for the line)."""
         known = location
         while known and known not in self.lines:
             known = known[:-1]

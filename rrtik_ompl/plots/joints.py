@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 FORMATS = (".png", ".svg")
 SAMPLES = 2000  # times at which a motion is drawn, beside its knots
-# Told apart by colour-blind people too: Okabe and Ito, Color Universal Design, 2008; black and grey for the rest.
+# Colour-blind people can distinguish them too [55]; black and grey for the rest.
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#1d2733", "#8494a5")
 DASHES = ("solid", (0, (5, 2)), (0, (1, 1.5)))  # for the ninth joint and those after it
 
