@@ -9,18 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from rrtik_ompl.cli.ik_rows import count, each, followed, milliseconds, point, refuse_orientation
 from rrtik_ompl.cli.terminal import note, progress, say
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import check_target, comma_numbers
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import ArrayLike, NDArray
-
     from rrtik_ompl.arrays import Matrix, Vector
-    from rrtik_ompl.goal import Goal, PositionGoal, TipGoal
-    from rrtik_ompl.ik.solve import IkResult
-    from rrtik_ompl.ik.trajectory import IkTrajectory
+    from rrtik_ompl.goal import Goal, TipGoal
     from rrtik_ompl.robot import Robot
     from rrtik_ompl.world import World
 
@@ -38,20 +34,6 @@ class Setting(NamedTuple):
     world: World | None
     goal: Goal | None
     near: Vector | None
-
-
-class Solved(NamedTuple):
-    """Inverse kinematics of many poses: joint values, errors, reasons and details row by row.
-
-    Of a trajectory also a note for each row, such as a jump, and a line about the whole.
-    """
-
-    q: Matrix
-    residuals: Matrix
-    reasons: list[str]
-    details: list[str]
-    notes: list[str]
-    line: str = ""
 
 
 class Output(NamedTuple):
@@ -181,19 +163,7 @@ def _goal(
         return PoseGoal(pose(position, quaternion, "--position, --quaternion"), **tolerances)
     if rpy_deg:
         return PoseGoal(pose_from_rpy(position, np.radians(rpy_deg), "--position, --rpy-deg"), **tolerances)
-    return _point(position, tolerances)
-
-
-def _point(position: ArrayLike, tolerances: dict[str, float]) -> PositionGoal:
-    from rrtik_ompl import PositionGoal
-
-    _refuse_orientation(tolerances, "give --quaternion or --rpy-deg, or leave it out")
-    return PositionGoal(position, tolerances.get("position_tolerance", 1e-3))
-
-
-def _refuse_orientation(tolerances: dict[str, float], remedy: str) -> None:
-    if "orientation_tolerance" in tolerances:
-        raise InputError(f"--tolerance-deg is of an orientation, and a point has none: {remedy}")
+    return point(position, tolerances)
 
 
 def _one(given: Setting, goal: TipGoal, everything: bool, common: dict[str, Any], output: Output) -> int:
@@ -213,7 +183,7 @@ def _one(given: Setting, goal: TipGoal, everything: bool, common: dict[str, Any]
         checked = world if world is not None and world.scene.obstacles else None
         clearances = [] if checked is None else [checked.clearance(q) for q in result.solutions]
         more = f" and {sum(turns)} more by full turns of joints" if any(turns) else ""
-        say(f"{robot.name}, {result.method}: {_count(len(result.solutions), 'solution')}{more}, {_time(result)}")
+        say(f"{robot.name}, {result.method}: {count(len(result.solutions), 'solution')}{more}, {milliseconds(result)}")
         say(ik_report.solutions_table(robot, result, names, turns, clearances, MAX_ROWS))
         say(*_more(len(result.solutions)))
     if not result.found and not output.as_json:
@@ -239,9 +209,9 @@ def _many(
 
     robot, rows = given.robot, load_poses(file)
     if rows.ndim == 2:
-        _refuse_orientation(tolerances, "leave it out")
-    with progress(f"inverse kinematics of {_count(len(rows), 'pose')}"):
-        solve = _followed if trajectory else _each
+        refuse_orientation(tolerances, "leave it out")
+    with progress(f"inverse kinematics of {count(len(rows), 'pose')}"):
+        solve = followed if trajectory else each
         q, residuals, reasons, details, notes, line = solve(robot, rows, tolerances, common)
     found = sum(not reason for reason in reasons)
     line += next((f"; no. {k + 1}: {detail}" for k, detail in enumerate(details) if detail), "")
@@ -252,51 +222,13 @@ def _many(
         print(ik_report.rows_csv(robot, q, residuals, reasons, notes), end="")
     else:
         shown = slice(MAX_ROWS)
-        say(f"{robot.name}: {found} of {_count(len(rows), 'pose')} solved{line}")
+        say(f"{robot.name}: {found} of {count(len(rows), 'pose')} solved{line}")
         say(ik_report.rows_table(robot, q[shown], residuals[shown], reasons[shown], notes[shown]))
         say(*_more(len(rows)))
     good = q[~np.isnan(q[:, 0])]
     if len(good):
         _draw(given, None, good, output, moving=trajectory)
     return FOUND if found == len(rows) else NOT_FOUND
-
-
-def _each(robot: Robot, rows: NDArray[np.float64], tolerances: dict[str, float], common: dict[str, Any]) -> Solved:
-    """Joint values, residuals, reasons and details: poses as one batch unless tolerances are given, else singly."""
-    import numpy as np
-
-    from rrtik_ompl import PoseGoal, solve_ik, solve_ik_batch
-
-    if rows.ndim == 3 and not tolerances:
-        batch = solve_ik_batch(robot, rows, **common)
-        return Solved(batch.q, batch.residuals, list(batch.reasons), list(batch.details), [""] * len(rows))
-    q, residuals = np.full((len(rows), robot.dof), np.nan), np.full((len(rows), 2), np.nan)
-    reasons, details = [], []
-    for k, row in enumerate(rows):
-        goal = _point(row, tolerances) if rows.ndim == 2 else PoseGoal(row, **tolerances)
-        result = solve_ik(robot, goal, **{**common, "seed": common["seed"] + k})
-        reasons.append(result.reason)
-        details.append(result.detail)
-        if result.found:
-            q[k], residuals[k] = result.solutions[0], result.residuals[0]
-    return Solved(q, residuals, reasons, details, [""] * len(rows))
-
-
-def _followed(robot: Robot, rows: NDArray[np.float64], tolerances: dict[str, float], common: dict[str, Any]) -> Solved:
-    """The same, details of the first point without a solution alone, with a note for each: a jump, a collision."""
-    from rrtik_ompl import solve_ik_trajectory
-
-    options: dict[str, Any] = dict(tolerances)
-    done = solve_ik_trajectory(robot, rows, **common, **options)
-    notes, details = [""] * len(rows), [""] * len(rows)
-    for text, where in (("jump", done.jumps), ("collision on the way", done.blocked)):
-        for k in where:
-            notes[k] = f"{notes[k]}, {text}" if notes[k] else text
-    line = f", {_count(len(done.jumps), 'jump')}, {done.method}, {_time(done)}"
-    if done.detail:  # which names its point, counted from 0
-        first = next(k for k, reason in enumerate(done.reasons) if reason)
-        details[first] = done.detail.partition(": ")[2]
-    return Solved(done.q, done.residuals, list(done.reasons), details, notes, line)
 
 
 def _draw(given: Setting, goal: TipGoal | None, q: Matrix, output: Output, *, moving: bool = False) -> None:
@@ -310,20 +242,12 @@ def _draw(given: Setting, goal: TipGoal | None, q: Matrix, output: Output, *, mo
     shown = Shown(given.robot, Scene() if given.world is None else given.world.scene, goal, q[0])
     with progress("drawing"):
         if moving and len(q) > 1:
-            view(shown, q, html=output.html, title=f"{given.robot.name}: trajectory of {_count(len(q), 'point')}")
+            view(shown, q, html=output.html, title=f"{given.robot.name}: trajectory of {count(len(q), 'point')}")
         else:
-            view(shown, ghosts=q, html=output.html, title=f"{given.robot.name}: {_count(len(q), 'solution')}")
+            view(shown, ghosts=q, html=output.html, title=f"{given.robot.name}: {count(len(q), 'solution')}")
     if not output.as_json and not output.as_csv:
         say(f"wrote {output.html}")
 
 
 def _more(rows: int) -> list[str]:
     return [] if rows <= MAX_ROWS else [f"... {rows - MAX_ROWS} more: see --csv or --json"]
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"
-
-
-def _time(result: IkResult | IkTrajectory) -> str:
-    return f"{1e3 * result.seconds:.3g} ms"
