@@ -147,7 +147,7 @@ def _held(file: Path, suite: Suite, about: Mapping[str, Any], resume: bool) -> s
 
 
 def _warn_of_change(file: Path, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
-    """Reports tell the machine that a campaign was begun on."""
+    """Reports name the machine that a campaign was begun on."""
     other = [f"{name} {before[name]}, now {now[name]}" for name in records.MACHINE[:-1] if before[name] != now[name]]
     if other:
         warnings.warn(f"{file}: was begun with {'; '.join(other)}: times may not compare", stacklevel=4)

@@ -21,7 +21,7 @@ TAIL = 4000  # bytes of what a lost process has said
 
 
 class Closed(RrtikError):
-    """Asked to run after it was closed."""
+    """It was to run after it was closed."""
 
 
 class Guard:
@@ -104,7 +104,7 @@ class Guard:
 
 
 def _asked(process: subprocess.Popen[str], question: str) -> str:
-    """The line that a process answers; empty if it is lost."""
+    """The line that a process returns; empty if it is lost."""
     if process.stdin is None or process.stdout is None:
         return ""
     try:
@@ -116,7 +116,7 @@ def _asked(process: subprocess.Popen[str], question: str) -> str:
 
 
 class Guards:
-    """One guard for each thread that asks."""
+    """One guard for each thread that calls."""
 
     def __init__(self) -> None:
         self._mine = threading.local()

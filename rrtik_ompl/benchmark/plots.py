@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rrtik_ompl.benchmark.statistics import QUANTITIES, Result, by_label
 from rrtik_ompl.plots.joints import COLORS, DASHES, save_figure, tidy
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 
 PANELS = 24  # in a picture at most; tables hold the rest
 ACROSS = 3
@@ -50,7 +55,7 @@ Draw = Callable[[Any, Sequence[Result], Mapping[str, Any]], None]
 
 def _panels(
     groups: Mapping[str, list[Result]], planners: Sequence[str], draw: Draw, across: str | None, upward: str
-) -> Any:
+) -> Figure | None:
     """A panel for each group, with one legend; None without groups."""
     if not groups:
         return None
@@ -83,7 +88,7 @@ def _panels(
     return figure
 
 
-def _solved(panel: Any, results: Sequence[Result], styles: Mapping[str, Any]) -> None:
+def _solved(panel: Axes, results: Sequence[Result], styles: Mapping[str, Any]) -> None:
     latest = max((value for result in results for value in result.values("plan_seconds")), default=1.0)
     for result in results:
         times = np.sort(result.values("plan_seconds"))
@@ -95,7 +100,7 @@ def _solved(panel: Any, results: Sequence[Result], styles: Mapping[str, Any]) ->
 
 
 def _boxes(quantity: str) -> Draw:
-    def draw(panel: Any, results: Sequence[Result], styles: Mapping[str, Any]) -> None:
+    def draw(panel: Axes, results: Sequence[Result], styles: Mapping[str, Any]) -> None:
         values = [result.values(quantity) for result in results]
         boxes = panel.boxplot(values, whis=(5, 95), patch_artist=True, showfliers=False, widths=0.6)
         for patch, median, result in zip(boxes["boxes"], boxes["medians"], results, strict=True):
@@ -110,7 +115,7 @@ def _boxes(quantity: str) -> Draw:
     return draw
 
 
-def _scaling(panel: Any, results: Sequence[Result], styles: Mapping[str, Any]) -> None:
+def _scaling(panel: Axes, results: Sequence[Result], styles: Mapping[str, Any]) -> None:
     lines: dict[str, list[tuple[float, float, float, float]]] = {}
     for result in results:
         spread = result.spread("plan_seconds")

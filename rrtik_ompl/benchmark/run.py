@@ -97,7 +97,7 @@ def _sizes(path: JointPath, world: World) -> dict[str, float | bool | None]:
 def clearance(path: JointPath, world: World) -> float | None:
     """OMPL's measure [m]: the mean over the waypoints of the distance to contact; None if nothing can collide.
 
-    Of a path with many waypoints some are looked at, evenly, for each takes a millisecond or many.
+    Of a path with many waypoints some are checked, evenly, for each takes a millisecond or many.
     """
     rows = path.waypoints
     some = rows[np.unique(np.linspace(0, len(rows) - 1, LOOKED_AT).round().astype(int))]

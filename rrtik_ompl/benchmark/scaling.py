@@ -113,7 +113,7 @@ def _places(count: int, reach: float, rng: np.random.Generator) -> list[Any]:
     return [pin.SE3(pin.exp3(turn), centre) for turn, centre in zip(rng.normal(size=(count, 3)), centres, strict=True)]
 
 
-def _solid(number: int, place: Any, size: float) -> Obstacle:
+def _solid(number: int, place: pin.SE3, size: float) -> Obstacle:
     """Balls and boxes in turns."""
     if number % 2:
         return Obstacle(f"box{number}", Box([1.6 * size] * 3), place)

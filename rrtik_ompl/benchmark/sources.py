@@ -81,7 +81,7 @@ def folder_sources(folder: Path, robot: str | None) -> list[Source]:
     """All problems in a folder and below: problem files, and MotionBenchMaker's pairs by their scenes.
 
     Args:
-        folder: Where to look; problems of one folder are reported together.
+        folder: Where to search; problems of one folder are reported together.
         robot: In place of the one that the files name.
 
     Raises:

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rrtik_ompl.benchmark.guard import Closed, Guards
 from rrtik_ompl.errors import InputError, RrtikError
+
+if TYPE_CHECKING:
+    from distributed import Client
+
 
 CONNECT = 10  # [s] to reach a scheduler
 _here = Guards()  # of a worker of a cluster, which has no other place to keep them
@@ -74,7 +78,7 @@ def _version() -> str:
     return __version__
 
 
-def _check_workers(client: Any, address: str) -> None:
+def _check_workers(client: Client, address: str) -> None:
     from rrtik_ompl import __version__
 
     versions = client.run(_version)

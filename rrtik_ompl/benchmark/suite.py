@@ -15,7 +15,16 @@ from rrtik_ompl.benchmark.sources import (
     generated_sources,
     scaling_sources,
 )
-from rrtik_ompl.benchmark.suite_file import BY_KIND, NONE, Generated, Joints, Obstacles, PlannerGroup, SuiteFile
+from rrtik_ompl.benchmark.suite_file import (
+    BY_KIND,
+    NONE,
+    Generated,
+    Joints,
+    Obstacles,
+    PlannerGroup,
+    Resolution,
+    SuiteFile,
+)
 from rrtik_ompl.catalog import find_suite, load_robot
 from rrtik_ompl.errors import UnknownNameError
 from rrtik_ompl.files.sections import parse
@@ -111,7 +120,9 @@ def load_suite(name_or_file: str | os.PathLike[str], *, folder: Path | None = No
     )  # fmt: skip
 
 
-def _sources(document: YamlDocument, place: Location, item: Any) -> list[Source]:
+def _sources(
+    document: YamlDocument, place: Location, item: str | Generated | Obstacles | Joints | Resolution
+) -> list[Source]:
     with document.at(place):
         if isinstance(item, str):
             return [file_source(item, document.path.parent)]
@@ -132,7 +143,7 @@ def _sources(document: YamlDocument, place: Location, item: Any) -> list[Source]
         return scaling_sources("resolution", item.resolution.metres, base.arguments[0], group=group)
 
 
-def _entrant(document: YamlDocument, place: Location, item: Any, shorten: str) -> Entrant:
+def _entrant(document: YamlDocument, place: Location, item: str | PlannerGroup, shorten: str) -> Entrant:
     group = PlannerGroup.model_validate({"name": item}) if isinstance(item, str) else item
     at = place if isinstance(item, str) else (*place, "name")
     with document.at(at):

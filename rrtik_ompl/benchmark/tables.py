@@ -6,10 +6,14 @@ import csv
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from io import StringIO
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rrtik_ompl.benchmark.run import NOT_FOUND, SOLVED
 from rrtik_ompl.benchmark.statistics import QUANTITIES, Result, Spread
+
+if TYPE_CHECKING:
+    from rich.table import Table as RichTable
+
 
 OVERVIEW = (
     *("problem", "planner", "solved / valid / total", "planning, median / 95 % [s]", "shortening [s]"),
@@ -36,7 +40,7 @@ def overview(results: Iterable[Result]) -> list[tuple[str, ...]]:
     ]
 
 
-def terminal_table(results: Iterable[Result]) -> Any:
+def terminal_table(results: Iterable[Result]) -> RichTable:
     """The overview as a rich table."""
     from rich import box
     from rich.table import Table

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -48,7 +49,7 @@ def bench(
     so_far = Progress(0, total)
     with counter(campaign.name, total) as show:
 
-        def on_run(now: Progress, record: Any) -> None:
+        def on_run(now: Progress, record: Mapping[str, Any] | None) -> None:
             nonlocal so_far
             so_far = now
             outcomes.update([] if record is None else [record["status"]])

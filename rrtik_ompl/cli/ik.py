@@ -5,13 +5,21 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from rrtik_ompl.cli.ik_rows import count, each, followed, milliseconds, point, refuse_orientation
 from rrtik_ompl.cli.terminal import note, progress, say
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import check_target, comma_numbers
+
+if TYPE_CHECKING:
+    from rrtik_ompl.arrays import Matrix, Vector
+    from rrtik_ompl.goal import Goal, TipGoal
+    from rrtik_ompl.robot import Robot
+    from rrtik_ompl.world import World
+
 
 FOUND, NOT_FOUND = 0, 1
 MAX_ROWS = 40  # of a table; CSV and JSON have them all
@@ -19,17 +27,17 @@ MAX_ROWS = 40  # of a table; CSV and JSON have them all
 Triple = tuple[float, float, float]
 
 
-class Asked(NamedTuple):
+class Setting(NamedTuple):
     """The arm and what surrounds it: ``goal`` and ``near`` come from a problem, and are None without one."""
 
-    robot: Any
-    world: Any
-    goal: Any
-    near: Any
+    robot: Robot
+    world: World | None
+    goal: Goal | None
+    near: Vector | None
 
 
 class Output(NamedTuple):
-    """In which form the answer is wanted."""
+    """In which form results are printed."""
 
     as_json: bool
     as_csv: bool
@@ -80,18 +88,20 @@ def inverse_kinematics(
     if poses is not None and (position or quaternion or rpy_deg or everything):
         raise InputError("--poses brings its own poses, one answer each: leave out --position, orientation and --all")
     check_target(html, (".html", ".htm"))
-    asked = _asked(robot, problem, scene, near, near_deg)
+    given = _setting(robot, problem, scene, near, near_deg)
     output = Output(as_json, as_csv, html)
     tolerances = _tolerances(tolerance_mm, tolerance_deg)
-    common = {"method": method, "near": asked.near, "world": asked.world, "seed": seed}
+    common: dict[str, Any] = {"method": method, "near": given.near, "world": given.world, "seed": seed}
     common |= {} if seconds is None else {"seconds": seconds}
     if poses is not None:
-        return _many(asked, poses, trajectory, tolerances, common, output)
-    goal = _goal(asked, position, quaternion, rpy_deg, tolerances)
-    return _one(asked, goal, everything, common, output)
+        return _many(given, poses, trajectory, tolerances, common, output)
+    goal = _goal(given, position, quaternion, rpy_deg, tolerances)
+    return _one(given, goal, everything, common, output)
 
 
-def _asked(robot: str | None, problem: str | None, scene: Path | None, near: str | None, near_deg: str | None) -> Asked:
+def _setting(
+    robot: str | None, problem: str | None, scene: Path | None, near: str | None, near_deg: str | None
+) -> Setting:
     from rrtik_ompl import World, load_problem, load_robot, load_scene
 
     if (robot is None) == (problem is None):
@@ -100,11 +110,11 @@ def _asked(robot: str | None, problem: str | None, scene: Path | None, near: str
         if scene is not None:
             raise InputError("--problem brings its own scene: leave out --scene")
         question = load_problem(problem)
-        asked = Asked(question.robot, question.world, question.goal, question.start)
+        given = Setting(question.robot, question.world, question.goal, question.start)
     else:
         arm = load_robot(str(robot))
-        asked = Asked(arm, None if scene is None else World(arm, load_scene(scene)), None, None)
-    return asked._replace(near=_posture(asked, near, near_deg))
+        given = Setting(arm, None if scene is None else World(arm, load_scene(scene)), None, None)
+    return given._replace(near=_posture(given, near, near_deg))
 
 
 def _tolerances(millimetres: float | None, degrees: float | None) -> dict[str, float]:
@@ -116,18 +126,24 @@ def _tolerances(millimetres: float | None, degrees: float | None) -> dict[str, f
     return found if degrees is None else {**found, "orientation_tolerance": math.radians(degrees)}
 
 
-def _posture(asked: Asked, near: str | None, near_deg: str | None) -> Any:
+def _posture(given: Setting, near: str | None, near_deg: str | None) -> Vector | None:
     if near is not None and near_deg is not None:
         raise InputError("give one of --near and --near-deg, not both")
     if near is not None:
-        return asked.robot.posture(near)
+        return given.robot.posture(near)
     if near_deg is None:
-        return asked.near
-    return asked.robot.configuration_deg(comma_numbers(near_deg, "--near-deg"), "--near-deg")
+        return given.near
+    return given.robot.configuration_deg(comma_numbers(near_deg, "--near-deg"), "--near-deg")
 
 
-def _goal(asked: Asked, position: Any, quaternion: Any, rpy_deg: Any, tolerances: dict[str, float]) -> Any:
-    """The goal that is asked for; of a problem whose goal is joint values, the pose of the tip there."""
+def _goal(
+    given: Setting,
+    position: Triple | None,
+    quaternion: tuple[float, float, float, float] | None,
+    rpy_deg: Triple | None,
+    tolerances: dict[str, float],
+) -> TipGoal:
+    """The goal that the options describe; of a problem whose goal is joint values, the pose of the tip there."""
     import numpy as np
 
     from rrtik_ompl import JointGoal, PoseGoal
@@ -136,39 +152,27 @@ def _goal(asked: Asked, position: Any, quaternion: Any, rpy_deg: Any, tolerances
     if quaternion and rpy_deg:
         raise InputError("give one of --quaternion and --rpy-deg, not both")
     if position is None:
-        if quaternion or rpy_deg or asked.goal is None:
+        if quaternion or rpy_deg or given.goal is None:
             raise InputError("where to? give --position X Y Z, --problem NAME with a goal, or --poses FILE")
-        if isinstance(asked.goal, JointGoal):
-            return PoseGoal(asked.robot.fk(asked.goal.q), **tolerances)
+        if isinstance(given.goal, JointGoal):
+            return PoseGoal(given.robot.fk(given.goal.q), **tolerances)
         if tolerances:
             raise InputError("the goal of --problem has tolerances of its own: leave out --tolerance-mm and -deg")
-        return asked.goal
+        return given.goal
     if quaternion:
         return PoseGoal(pose(position, quaternion, "--position, --quaternion"), **tolerances)
     if rpy_deg:
         return PoseGoal(pose_from_rpy(position, np.radians(rpy_deg), "--position, --rpy-deg"), **tolerances)
-    return _point(position, tolerances)
+    return point(position, tolerances)
 
 
-def _point(position: Any, tolerances: dict[str, float]) -> Any:
-    from rrtik_ompl import PositionGoal
-
-    _refuse_orientation(tolerances, "give --quaternion or --rpy-deg, or leave it out")
-    return PositionGoal(position, tolerances.get("position_tolerance", 1e-3))
-
-
-def _refuse_orientation(tolerances: dict[str, float], remedy: str) -> None:
-    if "orientation_tolerance" in tolerances:
-        raise InputError(f"--tolerance-deg is of an orientation, and a point has none: {remedy}")
-
-
-def _one(asked: Asked, goal: Any, everything: bool, common: dict[str, Any], output: Output) -> int:
+def _one(given: Setting, goal: TipGoal, everything: bool, common: dict[str, Any], output: Output) -> int:
     from rrtik_ompl import solve_ik
     from rrtik_ompl.cli import ik_report
 
-    robot, world = asked.robot, asked.world
+    robot, world = given.robot, given.world
     with progress(f"inverse kinematics of {robot.name}"):
-        result, turns = ik_report.fold_full_turns(robot, solve_ik(robot, goal, all=everything, **common), asked.near)
+        result, turns = ik_report.fold_full_turns(robot, solve_ik(robot, goal, all=everything, **common), given.near)
     names = ik_report.branch_names(robot, goal, result.solutions)
     if output.as_json:
         print(json.dumps(ik_report.document(robot, result, names, turns)))
@@ -176,22 +180,22 @@ def _one(asked: Asked, goal: Any, everything: bool, common: dict[str, Any], outp
         reasons, notes = [""] * len(result.solutions), ik_report.solution_notes(names, turns)
         print(ik_report.rows_csv(robot, result.solutions, result.residuals, reasons, notes), end="")
     elif result.found:
-        obstacles = () if world is None else world.scene.obstacles
-        clearances = [world.clearance(q) for q in result.solutions] if obstacles else []
+        checked = world if world is not None and world.scene.obstacles else None
+        clearances = [] if checked is None else [checked.clearance(q) for q in result.solutions]
         more = f" and {sum(turns)} more by full turns of joints" if any(turns) else ""
-        say(f"{robot.name}, {result.method}: {_count(len(result.solutions), 'solution')}{more}, {_time(result)}")
+        say(f"{robot.name}, {result.method}: {count(len(result.solutions), 'solution')}{more}, {milliseconds(result)}")
         say(ik_report.solutions_table(robot, result, names, turns, clearances, MAX_ROWS))
         say(*_more(len(result.solutions)))
     if not result.found and not output.as_json:
         tell = note if output.as_csv else say
         tell(f"{robot.name}, {result.method}: no solution, {result.reason}: {result.detail}")
     if result.found:
-        _draw(asked, goal, result.solutions, output)
+        _draw(given, goal, result.solutions, output)
     return FOUND if result.found else NOT_FOUND
 
 
 def _many(
-    asked: Asked,
+    given: Setting,
     file: Path,
     trajectory: bool,
     tolerances: dict[str, float],
@@ -203,15 +207,12 @@ def _many(
     from rrtik_ompl.cli import ik_report
     from rrtik_ompl.problem_files.poses import load_poses
 
-    robot, rows = asked.robot, load_poses(file)
+    robot, rows = given.robot, load_poses(file)
     if rows.ndim == 2:
-        _refuse_orientation(tolerances, "leave it out")
-    with progress(f"inverse kinematics of {_count(len(rows), 'pose')}"):
-        if trajectory:
-            q, residuals, reasons, details, notes, line = _followed(robot, rows, tolerances, common)
-        else:
-            q, residuals, reasons, details = _each(robot, rows, tolerances, common)
-            notes, line = [""] * len(rows), ""
+        refuse_orientation(tolerances, "leave it out")
+    with progress(f"inverse kinematics of {count(len(rows), 'pose')}"):
+        solve = followed if trajectory else each
+        q, residuals, reasons, details, notes, line = solve(robot, rows, tolerances, common)
     found = sum(not reason for reason in reasons)
     line += next((f"; no. {k + 1}: {detail}" for k, detail in enumerate(details) if detail), "")
     if output.as_json:
@@ -221,54 +222,16 @@ def _many(
         print(ik_report.rows_csv(robot, q, residuals, reasons, notes), end="")
     else:
         shown = slice(MAX_ROWS)
-        say(f"{robot.name}: {found} of {_count(len(rows), 'pose')} solved{line}")
+        say(f"{robot.name}: {found} of {count(len(rows), 'pose')} solved{line}")
         say(ik_report.rows_table(robot, q[shown], residuals[shown], reasons[shown], notes[shown]))
         say(*_more(len(rows)))
     good = q[~np.isnan(q[:, 0])]
     if len(good):
-        _draw(asked, None, good, output, moving=trajectory)
+        _draw(given, None, good, output, moving=trajectory)
     return FOUND if found == len(rows) else NOT_FOUND
 
 
-def _each(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[str, Any]) -> Any:
-    """Joint values, residuals, reasons and details: poses as one batch unless tolerances are given, else singly."""
-    import numpy as np
-
-    from rrtik_ompl import PoseGoal, solve_ik, solve_ik_batch
-
-    if rows.ndim == 3 and not tolerances:
-        batch = solve_ik_batch(robot, rows, **common)
-        return batch.q, batch.residuals, list(batch.reasons), list(batch.details)
-    q, residuals = np.full((len(rows), robot.dof), np.nan), np.full((len(rows), 2), np.nan)
-    reasons, details = [], []
-    for k, row in enumerate(rows):
-        goal = _point(row, tolerances) if rows.ndim == 2 else PoseGoal(row, **tolerances)
-        result = solve_ik(robot, goal, **{**common, "seed": common["seed"] + k})
-        reasons.append(result.reason)
-        details.append(result.detail)
-        if result.found:
-            q[k], residuals[k] = result.solutions[0], result.residuals[0]
-    return q, residuals, reasons, details
-
-
-def _followed(robot: Any, rows: Any, tolerances: dict[str, float], common: dict[str, Any]) -> Any:
-    """The same, details of the first point without a solution alone, with a note for each: a jump, a collision."""
-    from rrtik_ompl import solve_ik_trajectory
-
-    options: dict[str, Any] = dict(tolerances)
-    done = solve_ik_trajectory(robot, rows, **common, **options)
-    notes, details = [""] * len(rows), [""] * len(rows)
-    for text, where in (("jump", done.jumps), ("collision on the way", done.blocked)):
-        for k in where:
-            notes[k] = f"{notes[k]}, {text}" if notes[k] else text
-    line = f", {_count(len(done.jumps), 'jump')}, {done.method}, {_time(done)}"
-    if done.detail:  # which names its point, counted from 0
-        first = next(k for k, reason in enumerate(done.reasons) if reason)
-        details[first] = done.detail.partition(": ")[2]
-    return done.q, done.residuals, list(done.reasons), details, notes, line
-
-
-def _draw(asked: Asked, goal: Any, q: Any, output: Output, *, moving: bool = False) -> None:
+def _draw(given: Setting, goal: TipGoal | None, q: Matrix, output: Output, *, moving: bool = False) -> None:
     """The page: the first solution as the arm and the others as ghosts, or the arm moving through all of them."""
     if output.html is None:
         return
@@ -276,23 +239,15 @@ def _draw(asked: Asked, goal: Any, q: Any, output: Output, *, moving: bool = Fal
     from rrtik_ompl.viewer import view
     from rrtik_ompl.viewer.subject import Shown
 
-    shown = Shown(asked.robot, Scene() if asked.world is None else asked.world.scene, goal, q[0])
+    shown = Shown(given.robot, Scene() if given.world is None else given.world.scene, goal, q[0])
     with progress("drawing"):
         if moving and len(q) > 1:
-            view(shown, q, html=output.html, title=f"{asked.robot.name}: trajectory of {_count(len(q), 'point')}")
+            view(shown, q, html=output.html, title=f"{given.robot.name}: trajectory of {count(len(q), 'point')}")
         else:
-            view(shown, ghosts=q, html=output.html, title=f"{asked.robot.name}: {_count(len(q), 'solution')}")
+            view(shown, ghosts=q, html=output.html, title=f"{given.robot.name}: {count(len(q), 'solution')}")
     if not output.as_json and not output.as_csv:
         say(f"wrote {output.html}")
 
 
 def _more(rows: int) -> list[str]:
     return [] if rows <= MAX_ROWS else [f"... {rows - MAX_ROWS} more: see --csv or --json"]
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"
-
-
-def _time(result: Any) -> str:
-    return f"{1e3 * result.seconds:.3g} ms"

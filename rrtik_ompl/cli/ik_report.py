@@ -1,4 +1,4 @@
-"""Answers of inverse kinematics in words and tables for a person (degrees, millimetres), as CSV, and for machines."""
+"""Results of inverse kinematics in words and tables for a person (degrees, millimetres), as CSV, and for machines."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import csv
 import io
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +21,15 @@ from rrtik_ompl.ik.solve import IkResult, different_rows, mid_range_configuratio
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.units import DEGREES
 
+if TYPE_CHECKING:
+    from rrtik_ompl.goal import TipGoal
+
+
 SAME = 1e-5  # [rad] or [m]; a double root is known to the square root of the rounding
 MILLIMETRES = 1e3
 
 
-def branch_names(robot: Robot, goal: Any, Q: Matrix) -> list[str]:
+def branch_names(robot: Robot, goal: TipGoal, Q: Matrix) -> list[str]:
     """What the arm's closed form calls each configuration, shape (k, dof); "" where it has no name for it.
 
     A branch such as ``front near up``; of a singular pose, which has a curve of solutions, its families too.
@@ -47,7 +51,7 @@ def branch_names(robot: Robot, goal: Any, Q: Matrix) -> list[str]:
 
 
 def fold_full_turns(robot: Robot, result: IkResult, near: Vector | None) -> tuple[IkResult, list[int]]:
-    """The result with one solution of those that differ by full turns of joints: the arm looks the same in all.
+    """The result with one solution of those that differ by full turns of joints: the arm is at the same place in all.
 
     Args:
         robot: The arm.
@@ -70,7 +74,7 @@ def fold_full_turns(robot: Robot, result: IkResult, near: Vector | None) -> tupl
     return folded, [int(number) - 1 for number in fitting.prod(axis=1)]
 
 
-def _targets(robot: Robot, goal: Any) -> NDArray[np.float64] | None:
+def _targets(robot: Robot, goal: TipGoal) -> NDArray[np.float64] | None:
     """The target of a goal as the robot's closed form takes it; None if there is no such form or it does not fit."""
     if not has_closed_form(robot) or tip_fault(robot, form_of(robot)):
         return None
@@ -168,7 +172,7 @@ def document(robot: Robot, result: IkResult, names: Sequence[str], turns: Sequen
 def rows_document(
     robot: Robot, q: Matrix, residuals: Matrix, reasons: Sequence[str], details: Sequence[str]
 ) -> dict[str, Any]:
-    """Answers for many poses for machines: rad and m; null where there is none."""
+    """Results for many poses for machines: rad and m; null where there is none."""
     return {
         "robot": robot.name,
         "joint_names": list(robot.joint_names),

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rrtik_ompl.cli.terminal import progress, say
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import check_target
+
+if TYPE_CHECKING:
+    from rrtik_ompl.reach.grid_map import ReachMap
+    from rrtik_ompl.robot import Robot
+    from rrtik_ompl.world import World
+
 
 MAP_FORMATS, PLOT_FORMATS, PAGE_FORMATS = (".npz", ".csv"), (".png", ".svg"), (".html", ".htm")
 LABELS = {
@@ -76,7 +82,7 @@ def _effective(robot: str, plot: Path | None) -> int:
     return 0
 
 
-def _draw(shown: Any, found: Any, plot: Path | None, html: Path | None) -> None:
+def _draw(shown: Robot | World, found: ReachMap, plot: Path | None, html: Path | None) -> None:
     title = f"{found.robot}: {LABELS[found.measure]}"
     if plot is not None:
         from rrtik_ompl.plots.reach import plot_slices
@@ -90,7 +96,7 @@ def _draw(shown: Any, found: Any, plot: Path | None, html: Path | None) -> None:
             view(shown, html=html, marks=reach_marks(found), title=f"{found.robot}: {found.measure} in reach")
 
 
-def _document(found: Any) -> dict[str, Any]:
+def _document(found: ReachMap) -> dict[str, Any]:
     values = found.values[found.reached]
     return {
         "robot": found.robot,
@@ -106,7 +112,7 @@ def _document(found: Any) -> dict[str, Any]:
     }
 
 
-def _summary(found: Any) -> list[str]:
+def _summary(found: ReachMap) -> list[str]:
     told = _document(found)
     if told["cells"] == 0:
         return [f"{found.robot}: no posture counted: all of them collide"]

@@ -60,7 +60,7 @@ def progress(message: str) -> Iterator[None]:
 
 @contextmanager
 def counter(message: str, total: int) -> Iterator[Callable[[int], object]]:
-    """A bar on standard error, told how many of ``total`` are done; nothing unless that is a terminal."""
+    """A bar on standard error, showing how many of ``total`` are done; nothing unless that is a terminal."""
     if not sys.stderr.isatty():
         yield lambda _: None
         return

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -178,7 +178,7 @@ def _always_colliding(
     return frozenset(frozenset((bodies[i].name, bodies[j].name)) for i, j in suspects)
 
 
-def _touch(first: Body, second: Body, frames: Any) -> bool:
+def _touch(first: Body, second: Body, frames: Sequence[pin.SE3]) -> bool:
     poses = [pin.SE3(frames[b.joint]) * b.placement for b in (first, second)]
     transforms = [coal.Transform3s(p.rotation, p.translation) for p in poses]
     result = coal.CollisionResult()

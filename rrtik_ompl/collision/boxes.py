@@ -1,10 +1,9 @@
-"""Bounding boxes of bodies in the world: a first look that never misses what touches."""
+"""Bounding boxes of bodies in the world: a first test that never misses what touches."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import coal
 import numpy as np
@@ -18,13 +17,13 @@ UNBOUNDED_METRES = 1e9  # [m] half extent of a half-space's box
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedBoxes:
-    """Axis-parallel boxes around bodies at m configurations of the arm; what stands still is held once.
+    """Axis-parallel boxes around bodies at m configurations of the arm; what does not move is held once.
 
     Attributes:
         centres, halves: Centres and half extents [m], shape (rows, 3) each; see :meth:`rows`.
         poses: Poses of the bodies, shape (rows, 4, 4).
         place: For each body its row in the first configuration.
-        step: For each body how many rows further on the next configuration is, 0 for what stands still.
+        step: For each body how many rows further on the next configuration is, 0 for what does not move.
     """
 
     centres: Matrix
@@ -85,7 +84,7 @@ def _local_boxes(bodies: Sequence[Body]) -> tuple[Matrix, Matrix]:
     return centres, halves
 
 
-def half_extents(geometry: Any) -> Vector:
+def half_extents(geometry: coal.CollisionGeometry) -> Vector:
     """Half extents of a coal geometry's own bounding box, shape (3,)."""
     box = geometry.aabb_local
     return 0.5 * np.array([box.width(), box.height(), box.depth()])

@@ -7,7 +7,7 @@ support points as a first guess and have been seen to miss about 3 overlaps in 1
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import coal
 import numpy as np
@@ -21,8 +21,8 @@ from rrtik_ompl.collision.margins import kept_apart, request
 from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.robot import Robot
 
-MAX_PAIR_CHECKS = 1 << 16  # runs of rows times pairs that are looked at together, to bound memory
-RUNS = (64, 16, 4, 1)  # rows that are looked at together
+MAX_PAIR_CHECKS = 1 << 16  # runs of rows times pairs checked together, to bound memory
+RUNS = (64, 16, 4, 1)  # rows that are checked together
 DISTANCE_TOLERANCE = 1e-5  # [m] for rounding, in our arithmetic and in coal's distances
 
 Numbers: TypeAlias = NDArray[np.int64]
@@ -57,8 +57,8 @@ class Certificate:
     def _first(self, Q: Matrix) -> list[tuple[int, ...]]:
         """For each row of Q the numbers of one colliding pair of bodies, or ().
 
-        Neighbouring rows are looked at together: where two bodies are farther apart at the middle one than they can
-        come nearer within the run of rows, they are apart in all of it. What is left open is looked at in shorter runs.
+        Neighbouring rows are checked together: where two bodies are farther apart at the middle one than they can
+        come nearer within the run of rows, they are apart in all of it. What is left open is checked in shorter runs.
         """
         found: list[tuple[int, ...]] = [()] * len(Q)
         together = RUNS[0] * max(1, MAX_PAIR_CHECKS // max(1, len(self._pairs)))
@@ -76,7 +76,7 @@ class Certificate:
     def _open(
         self, Q: Matrix, begins: Numbers, size: int, run: Numbers, pair: Numbers, found: list[tuple[int, ...]]
     ) -> Mask:
-        """Which of some pairs, shape (k,), may touch somewhere in the runs of rows asked for, shape (k,).
+        """Which of some pairs, shape (k,), may touch somewhere in the runs of rows given, shape (k,).
 
         Adds to found.
         """
@@ -108,8 +108,8 @@ class Certificate:
         """Which of the pairs may be of a body inside a hollow one, in the middle of their runs, shape (k,)."""
         reached = np.zeros(len(pair), dtype=bool)
         for places in self._hollow[pair].T:
-            asked = np.flatnonzero(places >= 0)
-            reached[asked] |= self._containment.reached(places[asked], frames[run[asked]])
+            given = np.flatnonzero(places >= 0)
+            reached[given] |= self._containment.reached(places[given], frames[run[given]])
         return reached
 
     def _gaps(self, placed: PlacedBoxes, run: Numbers, pair: Numbers) -> Vector:
@@ -142,7 +142,7 @@ def fixed_contact(robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int
 def _shorter(
     begins: Numbers, run: Numbers, pair: Numbers, size: int, shorter: int, end: int
 ) -> tuple[Numbers, Numbers, Numbers]:
-    """Begins of shorter runs in the place of those named by ``run``, and what is to be asked about them."""
+    """Begins of shorter runs in the place of those named by ``run``, and what is to be checked of them."""
     named, place = np.unique(run, return_inverse=True)
     parts = size // shorter
     starts = (begins[named, None] + np.arange(0, size, shorter)).ravel()
@@ -152,10 +152,16 @@ def _shorter(
     return starts[: int((starts < end).sum())], runs[inside], pairs[inside]
 
 
-def distance(first: Any, first_pose: Matrix, second: Any, second_pose: Matrix, margin: float = 0.0) -> float | None:
+def distance(
+    first: coal.CollisionGeometry,
+    first_pose: Matrix,
+    second: coal.CollisionGeometry,
+    second_pose: Matrix,
+    margin: float = 0.0,
+) -> float | None:
     """A lower bound of the distance of two coal geometries at poses, shape (4, 4), less a margin [m].
 
-    None if the margin is not kept. Asked with fresh request and result.
+    None if the margin is not kept. Computed with a fresh request and result.
     """
     transforms = [coal.Transform3s(pose[:3, :3], pose[:3, 3]) for pose in (first_pose, second_pose)]
     result = coal.CollisionResult()
@@ -167,7 +173,7 @@ def distance(first: Any, first_pose: Matrix, second: Any, second_pose: Matrix, m
 def _half_space_pairs(
     bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]
 ) -> dict[int, tuple[int, Vector, float]]:
-    """Pairs with a half-space that stands still, by number: side of the other body, outward normal and offset."""
+    """Pairs with a half-space that does not move, by number: side of the other body, outward normal and offset."""
     found = {}
     for k, pair in enumerate(pairs):
         for side in (0, 1):

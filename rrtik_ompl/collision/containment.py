@@ -126,13 +126,13 @@ def _has_inside(body: Body) -> bool:
     return is_mesh(body.geometry) and (body.kind == "link" or is_closed(body.geometry))
 
 
-def _may_hold(outer: Any, inner: Any) -> bool:
+def _may_hold(outer: coal.CollisionGeometry, inner: coal.CollisionGeometry) -> bool:
     if isinstance(inner, coal.Halfspace):
         return False
     return bool(half_extents(inner).max() <= outer.aabb_radius)
 
 
-def _end_points(geometry: Any) -> Matrix:
+def _end_points(geometry: coal.CollisionGeometry) -> Matrix:
     """Six points of the body in its own frame, its extremes along the axes, shape (6, 3)."""
     if is_mesh(geometry):
         vertices, triangles = mesh_arrays(geometry)

@@ -7,13 +7,17 @@ than about a cell are closed by that; a surface with a wide opening encloses not
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.solids import SameObject, mesh_arrays
+
+if TYPE_CHECKING:
+    import coal
+
 
 CELLS = 32  # along the longest side of the mesh
 HALVINGS = 24  # of triangles, at most: until they are smaller than a cell
@@ -53,7 +57,7 @@ class Enclosure:
         return bool(self.inside[tuple(cells[known].T)].any())
 
 
-def enclosure(geometry: Any) -> Enclosure:
+def enclosure(geometry: coal.CollisionGeometry) -> Enclosure:
     """What a coal mesh encloses."""
     return _enclosure(SameObject(geometry))
 

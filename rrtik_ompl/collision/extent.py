@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rrtik_ompl.collision.shape_table import pieces
 from rrtik_ompl.shapes import Shape
 
+if TYPE_CHECKING:
+    import pinocchio as pin
 
-def farthest(shape: Shape, pose: Any) -> float:
+
+def farthest(shape: Shape, pose: pin.SE3) -> float:
     """An upper bound of the distance of a shape's points from the origin [m]; of a half-space that is infinite.
 
     Args:

@@ -1,8 +1,6 @@
-"""How far bodies must stay apart, and how coal is asked whether they do."""
+"""How far bodies must stay apart, and the request by which coal checks it."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import coal
 
@@ -12,13 +10,13 @@ from rrtik_ompl.collision.bodies import Body
 def kept_apart(first: Body, second: Body) -> float:
     """How far two bodies must stay apart [m]: the margin of an obstacle, 0 between links.
 
-    No margin between bodies that both stand still, for no posture of the arm would give what is missing: they must
+    No margin between bodies of which neither moves, for no posture of the arm would give what is missing: they must
     only not touch.
     """
     return 0.0 if first.joint == second.joint == 0 else first.margin + second.margin
 
 
-def request(margin: float) -> Any:
+def request(margin: float) -> coal.DistanceRequest:
     """A fresh request to coal: do two geometries touch, or stay no farther than ``margin`` [m] apart."""
     asked = coal.CollisionRequest()
     asked.security_margin = margin

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import coal
 import pinocchio as pin
@@ -53,6 +52,6 @@ class OverlapDepth:
         both_move = first.joint > 0 and second.joint > 0
         return max(0.5 * depth if both_move else depth, 0.0)
 
-    def _transform(self, body: Body) -> Any:
+    def _transform(self, body: Body) -> coal.Transform3s:
         pose = self._data.oMi[body.joint] * body.placement
         return coal.Transform3s(pose.rotation, pose.translation)

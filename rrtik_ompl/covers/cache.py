@@ -25,7 +25,7 @@ ALGORITHM = 3  # counts up when rrtik_ompl.covers.spheres makes other spheres of
 PIECES = 2  # counts up when rrtik_ompl.covers.mesh_pieces makes other pieces of the same mesh
 
 
-def cached_outer_cover(geometry: Any, *, protrusion: float | None = None) -> Matrix:
+def cached_outer_cover(geometry: coal.CollisionGeometry, *, protrusion: float | None = None) -> Matrix:
     """``outer_cover``, from the cache if it is there."""
 
     def make() -> Matrix:
@@ -36,7 +36,7 @@ def cached_outer_cover(geometry: Any, *, protrusion: float | None = None) -> Mat
     return _cached(geometry, f"outer {protrusion!r}", make)
 
 
-def cached_inner_spheres(geometry: Any, *, count: int | None = None) -> Matrix:
+def cached_inner_spheres(geometry: coal.CollisionGeometry, *, count: int | None = None) -> Matrix:
     """``inner_spheres``, from the cache if they are there."""
 
     def make() -> Matrix:
@@ -47,7 +47,7 @@ def cached_inner_spheres(geometry: Any, *, count: int | None = None) -> Matrix:
     return _cached(geometry, f"inner {count!r}", make)
 
 
-def cached_convex_pieces(mesh: Any) -> tuple[list[Matrix], ...]:
+def cached_convex_pieces(mesh: coal.BVHModelBase) -> tuple[list[Matrix], ...]:
     """``convex_pieces``, from the cache if they are there; as rows of a corner and a number of piece and kind."""
 
     def make() -> Matrix:
@@ -63,7 +63,7 @@ def cached_convex_pieces(mesh: Any) -> tuple[list[Matrix], ...]:
     return tuple([rows[rows[:, 3] == k, :3] for k in numbers if k % 3 == kind] for kind in range(3))
 
 
-def geometry_bytes(geometry: Any) -> bytes | None:
+def geometry_bytes(geometry: coal.CollisionGeometry) -> bytes | None:
     """All that a cover depends on, or None for a kind that is not cached."""
     numbers: list[Any]
     sizes = sizes_of(geometry)
@@ -82,7 +82,7 @@ def geometry_bytes(geometry: Any) -> bytes | None:
     return b"\0".join(parts)
 
 
-def _cached(geometry: Any, parameters: str, make: Callable[[], Matrix]) -> Matrix:
+def _cached(geometry: coal.CollisionGeometry, parameters: str, make: Callable[[], Matrix]) -> Matrix:
     folder, data = cache_folder("covers"), geometry_bytes(geometry)
     if folder is None or data is None:
         return make()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,10 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.enclosure import enclosure
 from rrtik_ompl.collision.solids import inside_mesh, is_closed, mesh_arrays
 from rrtik_ompl.covers.planes import most_different
+
+if TYPE_CHECKING:
+    import coal
+
 
 MAX_PIECES = 12
 MAX_TRIANGLES = 300_000
@@ -94,7 +98,7 @@ class _Part:
         )
 
 
-def convex_pieces(mesh: Any) -> tuple[list[Matrix], list[Matrix], list[Matrix]]:
+def convex_pieces(mesh: coal.BVHModelBase) -> tuple[list[Matrix], list[Matrix], list[Matrix]]:
     """Convex pieces whose union contains a coal mesh and what it encloses, convex pieces inside it, and points of it.
 
     The cell whose pieces come out smallest is cut first (compare [44]), until cuts gain little. A
@@ -188,7 +192,7 @@ def _parts(parts: list[_Part]) -> list[_Part]:
 
 
 def _sketch(surface: Triangles) -> Triangles:
-    """Fewer triangles that look about the same: corners moved to a grid, what coincides left out."""
+    """Fewer triangles of about the same shape: corners moved to a grid, what coincides left out."""
     low = surface.min(axis=(0, 1))
     size = max(float(np.ptp(surface, axis=(0, 1)).max()) / GRID, 1e-12)
     steps = np.round((surface - low) / size).astype(np.int64)
@@ -237,7 +241,7 @@ def _crossed(first: Matrix, second: Matrix, axis: int, place: float) -> Matrix:
 def _hull(points: Matrix) -> tuple[Matrix, Matrix]:
     """Planes (outward unit normal, offset) of the hull of points and the points that span it.
 
-    No planes and all of the points if they are too flat to tell.
+    No planes and all of the points if they are too flat to decide.
     """
     try:
         hull = ConvexHull(points)

@@ -2,7 +2,7 @@
 
 A ball sticks out by at most its radius minus the depth of its centre. Greedy set cover [41] with a bisection
 of the protrusion finds a first set of balls; then elements and balls are matched and every ball is moved to where it
-sticks out least, in turns, and balls that others can stand in for are moved to where the protrusion is largest (after
+sticks out least, in turns, and balls that others can replace are moved to where the protrusion is largest (after
 [42]). All this only searches for good places: whatever they are, each ball is made large enough for its elements, so
 the cover holds the solid.
 """
@@ -10,7 +10,6 @@ the cover holds the solid.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +38,7 @@ class Places:
     centres: Matrix
     depth: Vector
 
-    def __getitem__(self, rows: Any) -> Places:
+    def __getitem__(self, rows: NDArray[np.int64] | NDArray[np.bool_] | slice) -> Places:
         return Places(self.centres[rows], self.depth[rows])
 
 
@@ -171,7 +170,7 @@ def _refined(
 def _moved_elsewhere(
     places: Places, needs: Needs, spare: Places, spare_needs: Needs, limit: int
 ) -> tuple[Places, Needs]:
-    """Balls that others can stand in for moved (or, below the limit, new ones put) to where the protrusion is worst."""
+    """Balls that others can replace moved (or, below the limit, new ones put) to where the protrusion is worst."""
     centres, depth, needs = places.centres.copy(), places.depth.copy(), needs.copy()
     for _ in range(MOVES):
         owner = needs.argmin(axis=0)

@@ -9,8 +9,6 @@ holds within 1e-9 of the size of the solid [m per m].
 
 from __future__ import annotations
 
-from typing import Any
-
 import coal
 import numpy as np
 from scipy.spatial import QhullError, cKDTree
@@ -43,7 +41,7 @@ from rrtik_ompl.covers.solids import (
 BALLS_PER_METRE, MIN_BALLS, MAX_BALLS = 70.0, 2, 32  # 32: four full clusters of the kernels; 36 make eight
 BALLS_OF_OPEN = 3  # times as many for a mere surface: nothing of a ball on it is inside
 INNER_SHARE = 1.5  # inner balls for each outer one
-MAX_BALLS_ON_REQUEST = 512  # balls, where a protrusion is asked for
+MAX_BALLS_ON_REQUEST = 512  # balls, where a protrusion is given
 # A mesh of more triangles or open edges is taken as its bounding box, and nothing is proven to collide with it.
 MAX_TRIANGLES, MAX_OPEN_EDGES = 300_000, 4000
 CROSSED_CELLS = 1500  # at most
@@ -52,7 +50,7 @@ SURFACE_POINTS = 6000
 SMALLEST = 1e-12  # [m]; what is smaller counts as a point
 
 
-def outer_cover(geometry: Any, *, protrusion: float | None = None) -> Matrix:
+def outer_cover(geometry: coal.CollisionGeometry, *, protrusion: float | None = None) -> Matrix:
     """Balls whose union contains a solid, shape (n, 4).
 
     Args:
@@ -60,7 +58,7 @@ def outer_cover(geometry: Any, *, protrusion: float | None = None) -> Matrix:
             if it is open, what it encloses (:mod:`rrtik_ompl.collision.enclosure`). A kind that is not known here gets
             one ball (of infinite radius if the kind has no bounds).
         protrusion: How far a ball may reach beyond the solid [m]; if that takes too many balls or too fine a cut, the
-            cover reaches farther (``protrusion_bound`` tells). None: what a number of balls that suits the size of
+            cover reaches farther (see ``protrusion_bound``). None: what a number of balls that suits the size of
             the solid allows.
     """
     swept, core = _swept_radius(geometry), core_of(geometry)
@@ -83,7 +81,7 @@ def outer_cover(geometry: Any, *, protrusion: float | None = None) -> Matrix:
     return _grown(cover, swept)
 
 
-def inner_spheres(geometry: Any, *, count: int | None = None) -> Matrix:
+def inner_spheres(geometry: coal.CollisionGeometry, *, count: int | None = None) -> Matrix:
     """Balls inside a solid, shape (n, 4), the most useful first; none for an open mesh or an unknown kind.
 
     Args:
@@ -104,7 +102,7 @@ def inner_spheres(geometry: Any, *, count: int | None = None) -> Matrix:
     return np.asarray(found[found[:, 3] > 0.0], dtype=np.float64)
 
 
-def protrusion_bound(geometry: Any, spheres: Matrix) -> float:
+def protrusion_bound(geometry: coal.CollisionGeometry, spheres: Matrix) -> float:
     """How far balls, shape (n, 4), reach beyond a solid at most [m]; infinite for kinds that are not known here.
 
     An open mesh counts with caps that close it.
@@ -129,7 +127,7 @@ def balls_for(extent: float) -> int:
     return int(np.clip(round(BALLS_PER_METRE * extent), MIN_BALLS, MAX_BALLS))
 
 
-def _swept_radius(geometry: Any) -> float:
+def _swept_radius(geometry: coal.CollisionGeometry) -> float:
     return float(geometry.getSweptSphereRadius()) if hasattr(geometry, "getSweptSphereRadius") else 0.0
 
 
@@ -137,7 +135,7 @@ def _grown(spheres: Matrix, by: float) -> Matrix:
     return np.asarray(spheres + np.array([0.0, 0.0, 0.0, by]))
 
 
-def _solid(geometry: Any) -> tuple[Solid, Frame] | None:
+def _solid(geometry: coal.CollisionGeometry) -> tuple[Solid, Frame] | None:
     """The geometry as a solid of about unit size, or None if its kind is not known or it has no volume to speak of."""
     core = core_of(geometry)
     if core is not None and core.disc is not None:
@@ -159,7 +157,7 @@ def _solid(geometry: Any) -> tuple[Solid, Frame] | None:
         return None
 
 
-def _mesh(geometry: Any) -> tuple[Solid, Frame] | None:
+def _mesh(geometry: coal.CollisionGeometry) -> tuple[Solid, Frame] | None:
     vertices, triangles = mesh_arrays(geometry)
     used = vertices[np.unique(triangles)]
     if not len(used) or not np.isfinite(used).all() or not np.ptp(used, axis=0).max() > SMALLEST:
@@ -174,7 +172,7 @@ def _mesh(geometry: Any) -> tuple[Solid, Frame] | None:
     return convex_solid(box_corners(thick) + 0.5 * (low + high))
 
 
-def _closed(geometry: Any, solid: Solid) -> bool:
+def _closed(geometry: coal.CollisionGeometry, solid: Solid) -> bool:
     """Whether a body that touches a ball inside the geometry surely collides with it.
 
     Coal's meshes are hollow: a body collides with one if it meets the surface, or if its reference point is inside. A
@@ -202,7 +200,7 @@ def _round_inner(core: Core, count: int | None) -> Matrix:
     return row_on_z(spread(half, number if count is None else min(count, number)), radius)
 
 
-def _bounding_ball(geometry: Any, swept: float) -> Matrix:
+def _bounding_ball(geometry: coal.CollisionGeometry, swept: float) -> Matrix:
     geometry.computeLocalAABB()
     centre, radius = np.array(geometry.aabb_center), float(geometry.aabb_radius)
     if not (_finite(geometry) and np.isfinite(centre).all() and np.isfinite(radius) and np.abs(centre).max() < 1e300):
@@ -210,15 +208,15 @@ def _bounding_ball(geometry: Any, swept: float) -> Matrix:
     return np.array([[*centre, radius * (1.0 + 1e-12) + 1e-15 * float(np.abs(centre).max()) + swept]])
 
 
-def _finite(geometry: Any) -> bool:
+def _finite(geometry: coal.CollisionGeometry) -> bool:
     """Whether all vertices are finite numbers; coal's box leaves out those that are not."""
     if is_mesh(geometry):
         return bool(np.isfinite(mesh_arrays(geometry)[0]).all())
     return not isinstance(geometry, coal.ConvexBase) or bool(np.isfinite(np.array(geometry.points())).all())
 
 
-def _better(geometry: Any, first: Matrix, second: Matrix, protrusion: float | None) -> bool:
-    """Whether the first cover is better: it sticks out less or, if both stay within what is asked for, is smaller."""
+def _better(geometry: coal.CollisionGeometry, first: Matrix, second: Matrix, protrusion: float | None) -> bool:
+    """Whether the first cover is better: it sticks out less or, if both stay within what is required, is smaller."""
     reach = [protrusion_bound(geometry, cover) for cover in (first, second)]
     if protrusion is not None and max(reach) <= protrusion * (1.0 + 1e-9):
         return len(first) <= len(second)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
@@ -17,6 +17,10 @@ from rrtik_ompl.description.tree import Joint, Link, Solid, Tree
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.shapes import Capsule
+
+if TYPE_CHECKING:
+    from rrtik_ompl.description.robot_source import BasePose
+
 
 CONVENTIONS = ("standard", "modified")
 ROW_KINDS = ("revolute", "continuous", "prismatic")
@@ -63,7 +67,7 @@ def robot_from_dh(
     floor_gap: float = 0.0,
     tool: Any | None = None,
     tip: str = "tip",
-    base_pose: Any | None = None,
+    base_pose: BasePose = None,
     postures: Mapping[str, ArrayLike] | None = None,
     self_collision: bool = True,
     planar: bool = False,
@@ -102,7 +106,7 @@ def robot_from_dh(
     before, after = _fixed_parts(table, convention, T_last_tip)
     names = ["base", *(f"link{k}" for k in range(1, len(table) + 1))]
     joints = [
-        Joint(row.joint, row.kind, parent, child, placement, (0, 0, 1), *_bounds(row), row.velocity)
+        Joint(row.joint, row.kind, parent, child, placement, (0, 0, 1), **_bounds(row), velocity=row.velocity)
         for row, placement, (parent, child) in zip(table, before, pairwise(names), strict=True)
     ]
     joints.append(Joint("tip_joint", "fixed", names[-1], "tip", after))
@@ -149,8 +153,9 @@ def _radii(name: str, radius: float | Sequence[float], count: int) -> list[float
     return [max(float(value), SMALLEST_RADIUS) for value in values]
 
 
-def _bounds(row: DhRow) -> tuple[float, float]:
-    return (-np.inf, np.inf) if row.kind == "continuous" else row.limits
+def _bounds(row: DhRow) -> dict[str, float]:
+    lower, upper = (-np.inf, np.inf) if row.kind == "continuous" else row.limits
+    return {"lower": lower, "upper": upper}
 
 
 def _posture(name: str, key: str, values: ArrayLike, table: Sequence[DhRow]) -> dict[str, float]:
@@ -158,12 +163,12 @@ def _posture(name: str, key: str, values: ArrayLike, table: Sequence[DhRow]) -> 
     return {row.joint: float(value) for row, value in zip(table, numbers, strict=True)}
 
 
-def _z_part(row: DhRow) -> Any:
+def _z_part(row: DhRow) -> pin.SE3:
     """Rz(theta) Tz(d)."""
     return pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, row.theta), np.array([0.0, 0.0, row.d]))
 
 
-def _x_part(row: DhRow) -> Any:
+def _x_part(row: DhRow) -> pin.SE3:
     """Tx(a) Rx(alpha), which is the same as Rx(alpha) Tx(a)."""
     return pin.SE3(pin.rpy.rpyToMatrix(row.alpha, 0.0, 0.0), np.array([row.a, 0.0, 0.0]))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -24,6 +24,10 @@ from rrtik_ompl.files.sections import (
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
 from rrtik_ompl.poses import IDENTITY_QUATERNION, pose
 from rrtik_ompl.robot import Robot
+
+if TYPE_CHECKING:
+    from rrtik_ompl.description.robot_source import BasePose
+
 
 DH_OPTIONS = ("base_pose", "tip")
 
@@ -69,7 +73,7 @@ class DhFile(Section):
     postures_deg: dict[str, Numbers] = Field({}, description="named configurations [deg, m if prismatic]")
 
 
-def robot_from_dh_file(path: str | os.PathLike[str], *, tip: str = "tip", base_pose: Any | None = None) -> Robot:
+def robot_from_dh_file(path: str | os.PathLike[str], *, tip: str = "tip", base_pose: BasePose = None) -> Robot:
     """Load a robot from a DH table file.
 
     Args:

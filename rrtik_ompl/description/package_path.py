@@ -1,4 +1,4 @@
-"""Where a mesh named in a URDF stands: ``package://``, ``file://``, absolute, or beside the URDF."""
+"""Where a mesh named in a URDF lies: ``package://``, ``file://``, absolute, or beside the URDF."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MESH_SUFFIXES = (".stl", ".obj", ".dae")
 def resolve_mesh(uri: str, folder: Path | None, packages: Iterable[Path], where: str) -> Path:
     """Absolute path of an existing mesh file.
 
-    ``package://NAME/REST`` is looked for as DIR/NAME/REST in ``packages``, in the URDF's folder and in every folder
+    ``package://NAME/REST`` is sought as DIR/NAME/REST in ``packages``, in the URDF's folder and in every folder
     above it, and as DIR/REST where DIR itself is called NAME.
 
     Args:

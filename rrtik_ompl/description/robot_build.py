@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
@@ -15,6 +15,9 @@ from rrtik_ompl.description.tree import Joint, Tree
 from rrtik_ompl.description.tree_model import build_models
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.robot import Chain, Robot
+
+if TYPE_CHECKING:
+    from rrtik_ompl.description.robot_source import BasePose
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +49,7 @@ def build_robot(
     mimics: Iterable[Mimic] = (),
     locked: Mapping[str, float] | None = None,
     tip: str | None = None,
-    base_pose: Any | None = None,
+    base_pose: BasePose = None,
     limits: Mapping[str, JointLimits] | None = None,
     postures: Mapping[str, Mapping[str, float]] | None = None,
     allowed_collisions: Iterable[Iterable[str]] = (),
@@ -155,7 +158,7 @@ def _held_values(
     return {joint: value for joint, value in values.items() if joint not in moving}
 
 
-def _chain(model: Any, actuated: tuple[str, ...], ties: Mapping[str, Mimic]) -> Chain:
+def _chain(model: pin.Model, actuated: tuple[str, ...], ties: Mapping[str, Mimic]) -> Chain:
     count = model.njoints - 1
     axis, prismatic = np.zeros((count, 3)), np.zeros(count, dtype=bool)
     gain, offset = np.zeros((count, len(actuated))), np.zeros(count)

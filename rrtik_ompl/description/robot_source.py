@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -14,6 +14,7 @@ import pinocchio as pin
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.poses import pose, pose_from_rpy, quaternion_xyzw
 
+BasePose: TypeAlias = "pin.SE3 | Mapping[str, Sequence[float]] | None"
 POSE_KEYS = ("xyz", "quat_xyzw", "rpy_deg")
 
 
@@ -40,7 +41,7 @@ def source_entry(options: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in entry.items() if value is not None and value != [] and value != {}}
 
 
-def base_pose(value: Any, what: str = "base_pose") -> Any | None:
+def base_pose(value: BasePose, what: str = "base_pose") -> pin.SE3 | None:
     """A base pose given as ``pinocchio.SE3`` or as ``{xyz: .., quat_xyzw: .. | rpy_deg: ..}``.
 
     Raises:

@@ -20,7 +20,7 @@ MAX_MESH_BYTES = 256 * 1024 * 1024
 _NOT_FINITE = re.compile(rb"[\s>][-+]?(nan|inf)(inity)?[\s<]", re.IGNORECASE)
 
 
-def build_models(tree: Tree, T_world_base: Any | None = None) -> tuple[Any, Any, Any]:
+def build_models(tree: Tree, T_world_base: pin.SE3 | None = None) -> tuple[Any, Any, Any]:
     """Pinocchio model, collision geometry and visual geometry of a tree.
 
     Args:
@@ -33,7 +33,7 @@ def build_models(tree: Tree, T_world_base: Any | None = None) -> tuple[Any, Any,
     model = pin.Model()
     model.name = tree.where
     links = {link.name: link for link in tree.links}
-    # Pinocchio looks frames up by name alone in places, so a joint that is called like a link gets no frame.
+    # Pinocchio finds frames by name alone in places, so a joint that is called like a link gets no frame.
     framed = {joint.name for joint in tree.joints} - set(links)
     places = {tree.root.name: _Place(0, pin.SE3.Identity() if T_world_base is None else T_world_base, 0)}
     _add_link(model, tree.root, places)
@@ -58,7 +58,7 @@ class _Place:
     frame: int
 
 
-def _add_joint(model: Any, joint: Joint, parent: _Place) -> _Place:
+def _add_joint(model: pin.Model, joint: Joint, parent: _Place) -> _Place:
     placement = parent.T_joint_link * joint.T_parent_joint
     if joint.kind == "fixed":
         return _Place(parent.joint, placement, parent.frame)
@@ -94,14 +94,14 @@ def _joint_model(joint: Joint) -> tuple[Any, Any]:
     return getattr(pin, f"JointModel{long}Unaligned")(np.array(joint.axis)), identity
 
 
-def _add_link(model: Any, link: Link, places: dict[str, _Place]) -> None:
+def _add_link(model: pin.Model, link: Link, places: dict[str, _Place]) -> None:
     place = places[link.name]
     place.frame = model.addBodyFrame(link.name, place.joint, place.T_joint_link, place.frame)
     if link.inertia is not None:
         model.appendBodyToJoint(place.joint, link.inertia, place.T_joint_link)
 
 
-def _geometry(tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any], which: str) -> Any:
+def _geometry(tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any], which: str) -> coal.CollisionGeometry:
     geometry = pin.GeometryModel()
     for link in tree.links:
         place = places[link.name]
@@ -123,7 +123,7 @@ def _geometry(tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any]
     return geometry
 
 
-def _load(mesh: MeshFile, meshes: dict[MeshFile, Any], where: str) -> Any:
+def _load(mesh: MeshFile, meshes: dict[MeshFile, Any], where: str) -> coal.CollisionGeometry:
     if mesh not in meshes:
         if not _finite(read_bytes(mesh.path, MAX_MESH_BYTES)):
             raise InputError(f"{where}: mesh {mesh.path} holds numbers that are not finite; export it again")

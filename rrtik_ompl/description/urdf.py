@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rrtik_ompl.description.joint_limits import merge_limits, read_joint_limits
 from rrtik_ompl.description.robot_build import JointLimits, build_robot
@@ -15,6 +15,10 @@ from rrtik_ompl.description.urdf_read import UrdfDescription, located, read_urdf
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.text import read_text
 from rrtik_ompl.robot import Robot
+
+if TYPE_CHECKING:
+    from rrtik_ompl.description.robot_source import BasePose
+
 
 FilePath = str | os.PathLike[str]
 URDF_OPTIONS = ("base_pose", "group", "joint_limits", "joints", "locked", "packages", "srdf", "tip")
@@ -50,7 +54,7 @@ def robot_from_urdf_text(
     joint_limits: FilePath | None = None,
     packages: FilePath | Iterable[FilePath] = (),
     locked: Mapping[str, float] | None = None,
-    base_pose: Any | None = None,
+    base_pose: BasePose = None,
     limits: Mapping[str, JointLimits] | None = None,
     postures: Mapping[str, Mapping[str, float]] | None = None,
     allowed_collisions: Iterable[Iterable[str]] = (),
@@ -74,7 +78,7 @@ def robot_from_urdf_text(
         joints: Actuated joints, in the order wanted.
         tip: Link that goals refer to.
         joint_limits: File in the format of MoveIt's ``joint_limits.yaml``.
-        packages: Folders in which ``package://`` names are looked for first.
+        packages: Folders in which ``package://`` names are sought first.
         locked: Values [rad or m] of joints that are held still; 0, moved into the limits, if absent.
         base_pose: ``pinocchio.SE3`` T_world_base.
         limits: Limits that replace those of the URDF and of ``joint_limits``, by joint name.

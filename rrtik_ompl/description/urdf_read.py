@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -200,7 +199,8 @@ class _Reader:
         lower, upper, velocity = _limit(element.find("limit"), kind, where)
         with located(self.where):
             axis = [1.0, 0.0, 0.0] if kind == "fixed" else axis
-            return Joint(name, kind, parent, child, _origin(element, where), axis, lower, upper, velocity)
+            origin = _origin(element, where)
+            return Joint(name, kind, parent, child, origin, axis, lower=lower, upper=upper, velocity=velocity)
 
     def mimics(self, element: Element) -> Iterator[Mimic]:
         tie = element.find("mimic")
@@ -238,7 +238,7 @@ def _limit(limit: Element | None, kind: str, where: str) -> tuple[float, float, 
     return lower, upper, velocity or np.inf
 
 
-def _origin(element: Element, where: str) -> Any:
+def _origin(element: Element, where: str) -> pin.SE3:
     origin = element.find("origin")
     if origin is None:
         return pin.SE3.Identity()
@@ -246,7 +246,7 @@ def _origin(element: Element, where: str) -> Any:
     return pose_from_rpy(numbers(origin, "xyz", 3, zero, where), numbers(origin, "rpy", 3, zero, where), where)
 
 
-def _inertia(inertial: Element | None, where: str) -> Any | None:
+def _inertia(inertial: Element | None, where: str) -> pin.Inertia | None:
     mass = None if inertial is None else inertial.find("mass")
     tensor = None if inertial is None else inertial.find("inertia")
     if inertial is None or mass is None or tensor is None:

@@ -27,7 +27,7 @@ def load_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
     """Read a triangle mesh.
 
     Polygons are cut into triangles, equal vertices merged, triangles without area dropped. A closed mesh whose
-    triangles all look inwards is turned inside out. The unit that a DAE file states is honoured, its up axis is not.
+    triangles all face inwards is turned inside out. The unit that a DAE file states is honoured, its up axis is not.
 
     Args:
         path: File whose name ends in .stl, .obj or .dae.
@@ -78,7 +78,7 @@ def _reason(error: Exception) -> str:
 
 
 def _stated_unit(path: str | os.PathLike[str], data: bytes) -> float:
-    """Metres per unit as a COLLADA file states it, which coal does not look at; 1 for the other formats."""
+    """Metres per unit as a COLLADA file states it, which coal ignores; 1 for the other formats."""
     if Path(path).suffix.lower() != ".dae":
         return 1.0
     try:
@@ -93,7 +93,7 @@ def _stated_unit(path: str | os.PathLike[str], data: bytes) -> float:
 
 
 def _volume(mesh: Mesh) -> float:
-    """Signed volume [m^3] by the divergence theorem: positive if the triangles look outwards."""
+    """Signed volume [m^3] by the divergence theorem: positive if the triangles face outwards."""
     a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from difflib import get_close_matches
-from typing import Annotated, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, describe
 from rrtik_ompl.files.text import is_number
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
+
 
 LARGEST, SMALLEST = 1e6, 1e-6  # [m]; geometry beyond is a slip of the pen and breaks collision checking
 
@@ -26,7 +30,7 @@ Vector4 = Annotated[list[Number], Field(min_length=4, max_length=4)]
 Numbers = Annotated[list[Number], Field(min_length=1)]
 
 
-def _one(value: Any) -> Any:
+def _one(value: object) -> Any:
     if value is True:  # equal to 1 in Python, but not what a file should say
         raise PydanticCustomError("version", "must be 1, found true")
     return value
@@ -34,7 +38,7 @@ def _one(value: Any) -> Any:
 
 Version = Annotated[Literal[1], BeforeValidator(_one)]
 
-_TAG = "<"  # tags of unions begin with it, so that they can be told from the keys in an error's location
+_TAG = "<"  # tags of unions begin with it, so that they differ from the keys in an error's location
 
 
 class Section(BaseModel):
@@ -70,7 +74,7 @@ def told_apart_by(*keys: str, what: str, text: str | None = None) -> Discriminat
     """Choose the member of a union by which of ``keys`` is there; members are tagged ``tag(key)``.
 
     Args:
-        keys: The keys that tell the members apart.
+        keys: The keys that distinguish the members.
         what: Name of the union in the message if none of them is there.
         text: Tag word of the member that is plain text, if there is one.
     """
@@ -138,13 +142,13 @@ def without_null(schema: Any) -> Any:
     return cleaned | ({"anyOf": choices} if choices else {})
 
 
-def _location(error: Any) -> Location:
+def _location(error: ErrorDetails) -> Location:
     parts = tuple(part for part in error["loc"] if not (isinstance(part, str) and part.startswith(_TAG)))
     key = error.get("ctx", {}).get("key")
     return parts if key is None else (*parts, key)
 
 
-def _message(error: Any) -> str:
+def _message(error: ErrorDetails) -> str:
     write = _MESSAGES.get(error["type"])
     found = describe(error["input"])
     if write is not None:

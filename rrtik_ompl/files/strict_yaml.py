@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 import yaml
 
@@ -35,7 +35,7 @@ _WORDS |= {sign + form: float(sign + "inf") for form in (".inf", ".Inf", ".INF")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class YamlDocument:
-    """A YAML file that was read: its values and where each of them stands.
+    """A YAML file that was read: its values and where each of them is.
 
     Attributes:
         path: The file, as it was named by the caller.
@@ -48,7 +48,7 @@ class YamlDocument:
     lines: Mapping[Location, int]
 
     def place(self, location: Location) -> str:
-        """``FILE:LINE: key.path`` of a location (of its nearest parent that stands in the file, for the line)."""
+        """``FILE:LINE: key.path`` of a location (of its nearest parent that is in the file, for the line)."""
         known = location
         while known and known not in self.lines:
             known = known[:-1]
@@ -150,7 +150,7 @@ class _Builder:
     _stack: list[_Open] = field(default_factory=list)
     _anchors: dict[str, tuple[Any, int, int]] = field(default_factory=dict)  # value, size, height
 
-    def take(self, event: Any) -> None:
+    def take(self, event: yaml.Event) -> None:
         """Digest the next event of the parser."""
         if isinstance(event, yaml.DocumentStartEvent):
             self.documents += 1
@@ -171,7 +171,7 @@ class _Builder:
     def _wants_key(self) -> bool:
         return bool(self._stack) and isinstance(self._stack[-1].value, dict) and self._stack[-1].key is None
 
-    def _take_key(self, event: Any) -> None:
+    def _take_key(self, event: yaml.Event) -> None:
         parent = self._stack[-1]
         if not isinstance(event, yaml.ScalarEvent):
             raise self._error(event, "a key must be a word, found a list or a group")
@@ -181,22 +181,23 @@ class _Builder:
         parent.key = event.value
         self.lines[(*parent.location, event.value)] = _line(event)
 
-    def _take_value(self, event: Any) -> None:
+    def _take_value(self, event: yaml.Event) -> None:
         location = self._location()
         self.lines.setdefault(location, _line(event))
         if isinstance(event, yaml.CollectionStartEvent):
-            value: Any = {} if isinstance(event, yaml.MappingStartEvent) else []
-            self._stack.append(_Open(value, location, event.anchor))
+            group: Any = {} if isinstance(event, yaml.MappingStartEvent) else []
+            self._stack.append(_Open(group, location, event.anchor))
             self._check_depth(event, 0)
         elif isinstance(event, yaml.AliasEvent):
             if event.anchor not in self._anchors:
                 raise self._error(event, f"alias '*{event.anchor}' stands for nothing that ended before it")
             self._add(*self._anchors[event.anchor], None, event)
         else:
-            plain = event.implicit[0]
-            self._add(plain_value(event.value) if plain else event.value, 1, 1, event.anchor, event)
+            scalar = cast(yaml.ScalarEvent, event)
+            value = plain_value(scalar.value) if scalar.implicit[0] else scalar.value
+            self._add(value, 1, 1, scalar.anchor, event)
 
-    def _add(self, value: Any, size: int, height: int, anchor: str | None, event: Any) -> None:
+    def _add(self, value: Any, size: int, height: int, anchor: str | None, event: yaml.Event) -> None:
         """Put a finished value where it belongs and keep count of what the file unfolds to."""
         if anchor is not None:
             self._anchors[anchor] = (value, size, height)
@@ -215,7 +216,7 @@ class _Builder:
         if parent.size > MAX_VALUES:
             raise self._error(event, f"the file unfolds to more than {MAX_VALUES} values; use fewer aliases")
 
-    def _check_depth(self, event: Any, below: int) -> None:
+    def _check_depth(self, event: yaml.Event, below: int) -> None:
         if len(self._stack) + below > MAX_DEPTH:
             raise self._error(event, f"nested deeper than {MAX_DEPTH} levels")
 
@@ -227,13 +228,13 @@ class _Builder:
             return (*parent.location, len(parent.value))
         return parent.location if parent.key is None else (*parent.location, parent.key)
 
-    def _error(self, event: Any, message: str) -> InputError:
+    def _error(self, event: yaml.Event, message: str) -> InputError:
         location = key_path(self._location()[:6])
         return InputError(f"{self.path}:{_line(event)}: {location + ': ' if location else ''}{message}")
 
 
-def _line(event: Any) -> int:
-    return int(event.start_mark.line) + 1
+def _line(event: yaml.Event) -> int:
+    return 1 if event.start_mark is None else int(event.start_mark.line) + 1
 
 
 def plain_value(text: str) -> Any:
@@ -261,11 +262,11 @@ def _syntax(path: Path, text: str, error: yaml.MarkedYAMLError) -> str:
 class _Dumper(yaml.SafeDumper):
     """Quotes every text that this module would otherwise read back as a number or a word."""
 
-    def ignore_aliases(self, data: Any) -> bool:
+    def ignore_aliases(self, data: object) -> bool:
         return True
 
 
-def _represent_text(dumper: _Dumper, text: str) -> Any:
+def _represent_text(dumper: _Dumper, text: str) -> yaml.ScalarNode:
     style = None if isinstance(plain_value(text), str) else "'"
     return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
 

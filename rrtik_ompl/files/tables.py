@@ -90,7 +90,7 @@ def _from_table(text: str, separator: str | None) -> dict[str, Any]:
 
 
 def table_rows(text: str, separator: str | None) -> tuple[list[str] | None, list[list[float]]]:
-    """Names (if there is a separator, then they stand in the first line) and numbers of a table.
+    """Names (if there is a separator, then they are in the first line) and numbers of a table.
 
     Raises:
         InputError: If a line is malformed; the message names it.

@@ -26,7 +26,7 @@ class IkBatch:
     """One answer per pose.
 
     Attributes:
-        q: The solution nearest to the posture asked for (of a closed form), or the first found from it, shape
+        q: The solution nearest to the given posture (of a closed form), or the first found from it, shape
             (m, dof); NaN where there is none.
         found: Where there is one, shape (m,).
         residuals: Distance [m] and angle [rad] by forward kinematics, shape (m, 2); NaN where there is none.

@@ -28,7 +28,7 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.task_region import TaskRegion
 
 STARTS = 48  # of inverse kinematics in one round
-FEWEST = 4  # for each part, to tell how near the arm came
+FEWEST = 4  # for each part, to say how near the arm came
 PARTS = 6  # of a grasp set, among which the starts of a round are shared out
 MAX_ROUNDS = 4  # at most, until one free configuration is found
 LAST_ROUND = 64
@@ -61,9 +61,9 @@ def goal_configurations(problem: Problem, rng: np.random.Generator, *, all_turns
 class GoalSearch:
     """Free configurations at the goal of a problem, more of them round after round, the same for the same generator.
 
-    The first round asks the closed form for all branches, or numeric inverse kinematics from many starts; the second
-    the tree of MB-RRT; further ones draw further targets from a goal that leaves freedom, and start anew from random
-    postures.
+    The first round takes all branches of the analytic solver, or numeric inverse kinematics from many starts; the
+    second the tree of MB-RRT; further ones draw further targets from a goal that leaves freedom, and start anew from
+    random postures.
 
     Attributes:
         rows: Those found so far, each round's nearest to the start first, shape (k, dof).

@@ -1,4 +1,4 @@
-"""What a method of inverse kinematics is asked, what it answers, and what a method is."""
+"""The interface of inverse kinematics methods: request, response, and the method itself."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ Target: TypeAlias = PoseGoal | PositionGoal
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IkRequest:
-    """What a method is asked.
+    """One inverse kinematics problem as methods get it.
 
     Attributes:
         robot: The arm.
-        goal: What is wanted.
+        goal: The goal.
         targets: Goals without freedom drawn from it, for methods that need such; one of them is enough.
-        near: Posture near which a solution is wanted, shape (dof,).
+        near: Posture near which a solution is preferred, shape (dof,).
         accept: Which of some configurations, shape (k, dof), inside the limits and at the goal, will do.
-        all: Whether every solution is wanted that the method can find, not just one.
+        all: Whether to return every solution that the method can find, not just one.
         deadline: Time of ``time.monotonic`` at which to stop.
         random: Random numbers.
-        world: What ``accept`` asks about collisions, for methods that place the arm link by link.
+        world: What ``accept`` checks collisions with, for methods that place the arm link by link.
     """
 
     robot: Robot
@@ -68,7 +68,7 @@ class IkResponse:
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """A method: ``misfit`` says why it does not fit a robot and a target ("" if it does); ``run`` answers."""
+    """A method: ``misfit`` says why it does not fit a robot and a target ("" if it does); ``run`` solves."""
 
     misfit: Callable[[Robot, Target], str]
     run: Callable[[IkRequest], IkResponse]

@@ -31,7 +31,7 @@ SUFFICIENT_STARTS = 4  # starts that arrive before the others of a round are giv
 
 
 def load_kernels(robot: Robot) -> None:
-    """Load what the methods may ask before the clock starts: compiling it for the first time is no part of a search."""
+    """Load what the methods may call before the clock starts: to compile it the first time is no part of a search."""
     library(ik_layout.KERNELS)
     if has_closed_form(robot) and form_of(robot).kernel:
         library(branch_layout.KERNELS)
@@ -52,7 +52,7 @@ def _closed_form(request: IkRequest) -> IkResponse:
     hints = np.array([request.near] * len(targets))
     found = branches_of(robot, poses, hints, check=False)
     q = found.branches[found.valid]
-    if len(q) and request.accept(q).any():  # the usual case; forward kinematics judges what is returned
+    if len(q) and request.accept(q).any():  # the usual case; forward kinematics checks what is returned
         return IkResponse(q, request.near)
     found = branches_of(robot, poses, hints)
     rows, owner = found.branches.reshape(-1, robot.dof), np.repeat(np.arange(len(targets)), found.real.shape[1])
@@ -91,7 +91,7 @@ def _fits_all(robot: Robot, target: Target) -> str:
     return ""
 
 
-def _stands_alone(robot: Robot, target: Target) -> str:
+def _uncoupled(robot: Robot, target: Target) -> str:
     del target
     return coupled_fault(robot)
 
@@ -105,7 +105,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
         "projection": Method(_fits_all, projection),
         "damped": Method(_fits_all, _walks(partial(damped_least_squares, enough=SUFFICIENT_STARTS))),
         "pinocchio": Method(_fits_all, _walks(pinocchio_iteration, starts=1, rounds=64)),
-        "ccd": Method(_stands_alone, _walks(partial(ccd, enough=SUFFICIENT_STARTS))),
+        "ccd": Method(_uncoupled, _walks(partial(ccd, enough=SUFFICIENT_STARTS))),
         "fabrik": Method(fabrik_misfit, _walks(partial(fabrik, enough=SUFFICIENT_STARTS))),
         "pso": Method(_fits_all, _walks(pso, starts=4 * PARTICLES)),
         "pso-resampled": Method(_fits_all, _walks(resampled_pso, starts=4 * PARTICLES)),

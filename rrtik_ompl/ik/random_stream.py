@@ -1,4 +1,4 @@
-"""Random numbers from a seed, begun when the first one is asked for: to begin takes as long as some whole answers."""
+"""Random numbers from a seed, begun when the first one is drawn: to begin takes as long as some whole solutions."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.robot import Robot
 
 SHARE = 0.01  # of the tolerance: a solution on the rim would not survive rounding
-NEAR_HALF_TURN = 1e-4  # [rad] from pi, where the skew part of a rotation no longer tells its axis
+NEAR_HALF_TURN = 1e-4  # [rad] from pi, where the skew part of a rotation no longer determines its axis
 
 
 def well_inside(robot: Robot, goal: Target, Q: Matrix) -> Mask:

@@ -26,7 +26,7 @@ class SingularityReport:
         manipulability: Their product, sqrt(det(J J^T)) [31].
         nearness: The singular cases that the robot names, 0 at the singularity: sines, or metres.
         active: The cases at which it is.
-        at_limits: Joints that stand at a limit.
+        at_limits: Joints that are at a limit.
         rank_inside_limits: Rank without the joints at their limits: what is left of the motion when they are stopped.
     """
 
@@ -74,7 +74,7 @@ def manipulability(robot: Robot, Q: ArrayLike) -> Vector:
 
 
 def limit_active(robot: Robot, q: ArrayLike, tolerance: float = LIMIT_TOLERANCE) -> Mask:
-    """Which joints of a configuration stand at a limit, within ``tolerance`` [rad or m]. Shape (dof,)."""
+    """Which joints of a configuration are at a limit, within ``tolerance`` [rad or m]. Shape (dof,)."""
     values = robot.configuration(q)
     stopped: Mask = (values <= robot.lower + tolerance) | (values >= robot.upper - tolerance)
     return stopped

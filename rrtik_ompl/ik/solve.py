@@ -85,7 +85,7 @@ def solve_ik(
         all: Every solution that the method finds, not just one: a closed form gives all there are (of a singular
             pose representatives), a numeric one those it comes across, full turns of a joint counted apart.
         world: If given, solutions in collision are left out. Its robot must be this one.
-        seconds: Time that a numeric method may take; it is looked at between rounds, of which the first is done.
+        seconds: Time that a numeric method may take; the clock is read between rounds, of which the first is done.
         seed: Of the random numbers; the same seed gives the same answer as long as the time does not cut in.
 
     Raises:
@@ -170,9 +170,9 @@ def free_of_collision(world: World | None, Q: Matrix) -> Mask:
 
 
 def _tried(request: IkRequest, name: str) -> tuple[IkResponse, Matrix, Matrix, Mask]:
-    """What a method answers: of that the rows at the goal, shape (k, dof), their residuals, and which are accepted.
+    """What a method returns: of that the rows at the goal, shape (k, dof), their residuals, and which are accepted.
 
-    If one is enough, the nearest is looked at first and alone: mostly it will do.
+    If one is enough, the nearest is checked first and alone: mostly it is accepted.
     """
     robot, answer = request.robot, METHODS[name].run(request)
     inside = robot.clamp(answer.q[robot.within_limits(answer.q)])

@@ -63,7 +63,7 @@ class IkTrajectory:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
-    """What a way of following a trajectory is asked; see `solve_ik_trajectory`."""
+    """One trajectory as the methods that follow it get it; see `solve_ik_trajectory`."""
 
     robot: Robot
     poses: Matrix
@@ -261,9 +261,9 @@ def _why(task: Task, name: str, q: Matrix) -> tuple[tuple[str, ...], str]:
         left = task.deadline - time.monotonic()
         reasons[k], line = "time", f"method '{name}' came to its limit before it found a way there"
         if left > 0.0 and (name != "genetic" or not detail):
-            asked = "numeric" if name == "genetic" else name
+            method = "numeric" if name == "genetic" else name
             alone = solve_ik(
-                task.robot, task.goals[k], method=asked, world=task.world, seconds=min(left, SECONDS_A_POINT)
+                task.robot, task.goals[k], method=method, world=task.world, seconds=min(left, SECONDS_A_POINT)
             )
             reasons[k], line = alone.reason or "time", alone.detail or line
         detail = detail or f"point {k}: {line}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from io import BytesIO
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,9 +14,15 @@ from rrtik_ompl.files.text import file_name, write_bytes
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.trajectory import Trajectory
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+
 FORMATS = (".png", ".svg")
 SAMPLES = 2000  # times at which a motion is drawn, beside its knots
-# Told apart by colour-blind people too: Okabe and Ito, Color Universal Design, 2008; black and grey for the rest.
+# Colour-blind people can distinguish them too [55]; black and grey for the rest.
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#1d2733", "#8494a5")
 DASHES = ("solid", (0, (5, 2)), (0, (1, 1.5)))  # for the ninth joint and those after it
 
@@ -64,7 +70,7 @@ def plot_format(file: str | os.PathLike[str]) -> str:
     return ending
 
 
-def save_figure(figure: Any, file: str | os.PathLike[str], *, dpi: int = 150) -> None:
+def save_figure(figure: Figure, file: str | os.PathLike[str], *, dpi: int = 150) -> None:
     """Write a matplotlib figure so that the same figure gives the same file, whole or not at all.
 
     Raises:
@@ -79,7 +85,7 @@ def save_figure(figure: Any, file: str | os.PathLike[str], *, dpi: int = 150) ->
     write_bytes(file, picture.getvalue())
 
 
-def tidy(panel: Any, *, grid: bool = True) -> None:
+def tidy(panel: Axes, *, grid: bool = True) -> None:
     """Leave out the frame's upper and right side; a pale grid behind everything."""
     if grid:
         panel.grid(color="#e3e9ef", linewidth=0.8)
@@ -100,10 +106,11 @@ def _rows(motion: Trajectory | JointPath) -> tuple[Vector, str, list[tuple[str, 
     return clock, "time [s]", [*values, ("acceleration", "/s²", state.accelerations)]
 
 
-def _draw(panel: Any, over: Vector, values: Matrix, mask: Any, motion: Trajectory | JointPath) -> None:
+def _draw(panel: Axes, over: Vector, values: Matrix, mask: NDArray[np.bool_], motion: Trajectory | JointPath) -> None:
     for k in np.flatnonzero(mask):
-        style = {"color": COLORS[k % len(COLORS)], "linestyle": DASHES[k // len(COLORS) % len(DASHES)]}
-        marker = {"marker": "o", "markersize": 3} if isinstance(motion, JointPath) else {}
+        style: dict[str, Any] = {"color": COLORS[k % len(COLORS)]}
+        style["linestyle"] = DASHES[k // len(COLORS) % len(DASHES)]
+        marker: dict[str, Any] = {"marker": "o", "markersize": 3} if isinstance(motion, JointPath) else {}
         panel.plot(over, values[:, k], label=motion.joint_names[k], linewidth=1.6, **style, **marker)
     tidy(panel)
     panel.margins(x=0.01)

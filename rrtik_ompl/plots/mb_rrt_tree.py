@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.ik.mb_rrt.run import TreeSearch
 from rrtik_ompl.plots.joints import COLORS, plot_format, save_figure, tidy
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 
 MAX_COLORS = 6  # one an index; then they repeat
 INK, GREY = COLORS[6], COLORS[7]
@@ -49,7 +53,7 @@ def _color(index: int) -> str:
     return COLORS[(index - 1) % MAX_COLORS]
 
 
-def _region(panel: Any, run: TreeSearch, index: int) -> None:
+def _region(panel: Axes, run: TreeSearch, index: int) -> None:
     """The ring about the goal in which the joint of an index can be part of a solution."""
     from matplotlib.patches import Annulus, Circle
 
@@ -61,7 +65,7 @@ def _region(panel: Any, run: TreeSearch, index: int) -> None:
     panel.add_patch(Circle((x, y), far, fill=False, edgecolor=_color(index), linewidth=1.0, alpha=0.8, zorder=1))
 
 
-def _links(panel: Any, run: TreeSearch) -> None:
+def _links(panel: Axes, run: TreeSearch) -> None:
     """Every edge of the tree, and nodes outside their region as crosses."""
     from matplotlib.collections import LineCollection
 
@@ -80,14 +84,14 @@ def _links(panel: Any, run: TreeSearch) -> None:
             panel.plot(*level[far].T, linestyle="none", marker="x", markersize=4.5, color=_color(index), zorder=3)
 
 
-def _chain(panel: Any, run: TreeSearch) -> None:
+def _chain(panel: Axes, run: TreeSearch) -> None:
     chain = run.chain
     panel.plot(*chain.T, color=INK, linewidth=2.6, marker="o", markersize=5, zorder=5, label="solution")
     panel.plot(*run.goal, marker="*", markersize=15, color=COLORS[1], markeredgecolor="white", zorder=6)
     panel.plot(0.0, 0.0, marker="s", markersize=8, color=INK, zorder=6)
 
 
-def _frame(panel: Any, run: TreeSearch) -> None:
+def _frame(panel: Axes, run: TreeSearch) -> None:
     reach = 1.06 * run.links.reach
     low = np.minimum(-0.35 * reach, run.goal - run.links.remaining[1] * 1.04)
     high = np.maximum(0.35 * reach, run.goal + run.links.remaining[1] * 1.04)

@@ -218,7 +218,7 @@ GoalSection: TypeAlias = Annotated[
 
 
 def build_goal(section: GoalSection, robot: Robot) -> Goal:
-    """The goal that a section asks for.
+    """The goal that a section describes.
 
     Raises:
         InputError: If it does not fit the robot: number of joints, name of a posture, length of a quaternion.

@@ -79,7 +79,7 @@ class UrdfRobot(_Mounted):
     group: Name | None = Field(None, description="group of the SRDF whose joints move")
     joints: Annotated[list[Name], Field(min_length=1)] | None = Field(None, description="joints that move, in order")
     joint_limits: Name | None = Field(None, description="file in the format of joint_limits.yaml")
-    packages: list[Name] | Name | None = Field(None, description="folders in which package:// names are looked for")
+    packages: list[Name] | Name | None = Field(None, description="folders in which package:// names are sought")
     locked: dict[Name, Number] | None = Field(None, description="values of joints that are held still [rad or m]")
 
 

@@ -30,7 +30,7 @@ class ReachMap:
         size: Side of a cell [m].
         values: Shape (x, y, z), 0 where no sample came.
         samples: Postures that counted.
-        base: Where the arm stands, shape (3,) [m].
+        base: Where the arm's base is, shape (3,) [m].
     """
 
     robot: str
@@ -128,7 +128,7 @@ class Slice:
         values: Shape (m, n).
         boxes: Rectangles to draw: low x, low y, high x, high y.
         points: Places to mark, each x, y.
-        base: Where the arm stands in this plane.
+        base: Where the arm's base is in this plane.
     """
 
     title: str

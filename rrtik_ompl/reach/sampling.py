@@ -21,7 +21,7 @@ BLOCK = 20_000  # postures at a time
 TURNS = 16  # of the first joint for each of them: the whole arm turns as one body, which needs no kinematics
 CELLS = 18  # of the grid across the farthest reach, if no size is given
 MAX_CELLS = 4_000_000
-PROBE = 4096  # postures that tell how large the grid must be
+PROBE = 4096  # postures that determine how large the grid must be
 BELOW = 1e-3  # of a cell: the layer of a planar arm ends so far above the arm, which is seen from above
 PROBE_MARGIN = 1.1  # how much larger than what the probe reached
 
@@ -45,7 +45,7 @@ def reach_map(
             seen, sqrt(det(J J^T)) from six joints on [31], metres and radians as they are;
             ``samples``: how many came.
         cell: Side of a cell [m]; about an 18th of the reach if None.
-        samples: Postures to draw; where nothing but the arm is looked at, each in 16 turns of the first joint.
+        samples: Postures to draw; where nothing but the arm is considered, each in 16 turns of the first joint.
         world: If given, only postures that are free count. Its robot must be this one.
         axis: Of the tip's frame, "x", "y" or "z": what points, for ``orientations``; z if None, of planar arms x.
         seed: Of the random numbers.

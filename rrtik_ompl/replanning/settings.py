@@ -143,12 +143,11 @@ def refuse_renamed(options: Mapping[str, object]) -> None:
 def make_planner(settings: ReplanSettings, world: MovingWorld, lower: Vector, upper: Vector) -> DrrtCon:
     """The replanner of the name, for a world and a box of configurations to sample in."""
     edge, seed = settings.edge_length(world.robot), settings.seed
+    cuts = KernelCuts(world, seed) if has_kernels(world, *KERNELS) else None
     if settings.planner == SingleTree.name:
-        return SingleTree(
-            lower, upper, edge, seed, post=KernelCuts(world, seed) if has_kernels(world, *KERNELS) else None
-        )
+        return SingleTree(lower, upper, edge, seed, post=cuts)
     forgetting = settings.planner == FromScratch.name
-    if has_kernels(world, *KERNELS):
+    if cuts is not None:
         return KernelDrrtCon(world, lower, upper, edge, seed, forgetting=forgetting)
     kind = FromScratch if forgetting else DrrtCon
     return kind(PlainConnect(lower, upper, edge, seed), edge)

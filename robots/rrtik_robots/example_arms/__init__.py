@@ -6,11 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rrtik_ompl.description.urdf import robot_from_urdf
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
+
+if TYPE_CHECKING:
+    from rrtik_ompl.description.robot_source import BasePose
+
 
 PACKAGE = "example-robot-data"
 INSIDE = "cmeel.prefix/share/example-robot-data/robots"
@@ -52,7 +56,7 @@ class ExampleArm:
     postures: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     def __call__(
-        self, *, tip: str | None = None, locked: Mapping[str, float] | None = None, base_pose: Any | None = None
+        self, *, tip: str | None = None, locked: Mapping[str, float] | None = None, base_pose: BasePose = None
     ) -> Robot:
         """Load the arm.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +12,10 @@ from rrtik_ompl.arrays import finite_array
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
+
+if TYPE_CHECKING:
+    from rrtik_ompl.description.robot_source import BasePose
+
 
 LIMITS_PLANAR3_DEG = ((-45.0, 270.0), (-180.0, 180.0), (-180.0, 180.0))
 SLATE = (0.36, 0.42, 0.49, 1.0)  # unlike the colours of start, goal and obstacles
@@ -23,7 +27,7 @@ def planar(
     limits_deg: ArrayLike | None = None,
     radius: float = 0.0,
     tip: str = "tip",
-    base_pose: Any | None = None,
+    base_pose: BasePose = None,
 ) -> Robot:
     """A planar arm, stretched along x at zero; its links do not collide with each other.
 
@@ -40,23 +44,23 @@ def planar(
     return _arm("planar", lengths, limits_deg, radius, tip, base_pose)
 
 
-def planar3(*, radius: float = 0.0, tip: str = "tip", base_pose: Any | None = None) -> Robot:
+def planar3(*, radius: float = 0.0, tip: str = "tip", base_pose: BasePose = None) -> Robot:
     """Three links of 1 m with the limits of the published planar tests."""
     return _arm("planar3", (1.0,) * 3, LIMITS_PLANAR3_DEG, radius, tip, base_pose)
 
 
-def planar6(*, radius: float = 0.0, tip: str = "tip", base_pose: Any | None = None) -> Robot:
+def planar6(*, radius: float = 0.0, tip: str = "tip", base_pose: BasePose = None) -> Robot:
     """Six links of 0.7 m, joints turn by 150 degrees to either side."""
     return _arm("planar6", (0.7,) * 6, [(-150.0, 150.0)] * 6, radius, tip, base_pose)
 
 
-def planar10(*, radius: float = 0.0, tip: str = "tip", base_pose: Any | None = None) -> Robot:
+def planar10(*, radius: float = 0.0, tip: str = "tip", base_pose: BasePose = None) -> Robot:
     """Ten links of 0.1 m, joints turn by 180 degrees to either side."""
     return _arm("planar10", (0.1,) * 10, None, radius, tip, base_pose)
 
 
 def _arm(
-    name: str, lengths: ArrayLike, limits_deg: ArrayLike | None, radius: float, tip: str, base_pose: Any | None
+    name: str, lengths: ArrayLike, limits_deg: ArrayLike | None, radius: float, tip: str, base_pose: BasePose
 ) -> Robot:
     sizes = finite_array(lengths, (None,), f"{name}: lengths")
     if len(sizes) == 0 or (sizes <= 0.0).any():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -14,6 +14,10 @@ from rrtik_ompl.description.tree import Joint, Link, Solid, Tree
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.shapes import Cylinder, Sphere
 
+if TYPE_CHECKING:
+    from rrtik_ompl.description.robot_source import BasePose
+
+
 SMALLEST_RADIUS = 1e-4  # [m], stands for a radius of 0
 SLATE = (0.36, 0.42, 0.49, 1.0)  # unlike the colours of start, goal and obstacles
 
@@ -23,7 +27,7 @@ def point2d(
     radius: float = 0.0,
     bounds: ArrayLike = ((0.0, 10.0), (0.0, 10.0)),
     tip: str = "disc",
-    base_pose: Any | None = None,
+    base_pose: BasePose = None,
 ) -> Robot:
     """A disc with the two sliding joints x and y.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -13,6 +13,10 @@ from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.errors import UnknownNameError
 from rrtik_ompl.robot import Robot
 from rrtik_robots.puma560.inverse import PumaGeometry, five_joint_form, pose_form, position_form
+
+if TYPE_CHECKING:
+    from rrtik_ompl.description.robot_source import BasePose
+
 
 INCH = 0.0254  # [m]
 RIGHT = np.pi / 2
@@ -40,7 +44,7 @@ LIMITS_CUT_DEG = ((-170.0, 170.0), (-225.0, 45.0), (-250.0, 75.0), (-135.0, 135.
 START_CUT_DEG = (15.3319, 7.1738, 24.5756, 0.0, 0.0)  # wrist at (7, 7, -17) in, where the published trajectories begin
 
 
-def puma560(*, base_height: float = 0.672, tip: str = "tip", base_pose: Any | None = None) -> Robot:
+def puma560(*, base_height: float = 0.672, tip: str = "tip", base_pose: BasePose = None) -> Robot:
     """The six-joint arm, standard DH; its tip is the wrist centre with the axes of the last DH frame.
 
     Args:
@@ -68,9 +72,7 @@ def puma560(*, base_height: float = 0.672, tip: str = "tip", base_pose: Any | No
     )
 
 
-def puma560_3dof(
-    *, lengths: Mapping[str, float] | None = None, tip: str = "tip", base_pose: Any | None = None
-) -> Robot:
+def puma560_3dof(*, lengths: Mapping[str, float] | None = None, tip: str = "tip", base_pose: BasePose = None) -> Robot:
     """The first three joints; the tip is the wrist centre. Modified DH.
 
     Args:
@@ -81,9 +83,7 @@ def puma560_3dof(
     return _cut("puma560_3dof", 3, lengths, tip, base_pose)
 
 
-def puma560_5dof(
-    *, lengths: Mapping[str, float] | None = None, tip: str = "tip", base_pose: Any | None = None
-) -> Robot:
+def puma560_5dof(*, lengths: Mapping[str, float] | None = None, tip: str = "tip", base_pose: BasePose = None) -> Robot:
     """Five joints; the tip is the end of a segment of length d7 beyond the wrist. Modified DH.
 
     Args:
@@ -94,7 +94,7 @@ def puma560_5dof(
     return _cut("puma560_5dof", 5, lengths, tip, base_pose)
 
 
-def _cut(name: str, joints: int, lengths: Mapping[str, float] | None, tip: str, base_pose: Any | None) -> Robot:
+def _cut(name: str, joints: int, lengths: Mapping[str, float] | None, tip: str, base_pose: BasePose) -> Robot:
     known = {key: value for key, value in LENGTHS_CUT.items() if joints == 5 or key != "d7"}
     for key in lengths or {}:
         if key not in known:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rrtik_ompl.description.robot_build import JointLimits
 from rrtik_ompl.description.urdf import robot_from_urdf_text
@@ -20,6 +20,10 @@ from rrtik_robots.titan4.geometry import (
 from rrtik_robots.titan4.inverse import closed_form
 from rrtik_robots.titan4.urdf import titan4_urdf
 
+if TYPE_CHECKING:
+    from rrtik_ompl.description.robot_source import BasePose
+
+
 __all__ = ["JOINTS", "LIMITS_ENVELOPE_DEG", "LIMITS_PLANNING_DEG", "TitanGeometry", "titan4", "titan4_urdf"]
 
 FOLDER = Path(__file__).parent
@@ -30,7 +34,7 @@ def titan4(
     limits: str = "planning",
     lengths: Mapping[str, float] | TitanGeometry | None = None,
     tip: str = "grip_point",
-    base_pose: Any | None = None,
+    base_pose: BasePose = None,
 ) -> Robot:
     """The arm, its world origin on the azimuth axis at the height of the shoulder, x forward, z up.
 

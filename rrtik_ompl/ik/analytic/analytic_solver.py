@@ -42,7 +42,7 @@ class AnalyticSolver:
         kind: ``"pose"``; or ``"position"`` if the orientation of the targets is ignored.
         branches: A label for each branch.
         families: Names of the kinds of singular poses.
-        free: The joints that tell where on a family's curve a configuration lies (see ``solve``).
+        free: The joints that determine where on a family's curve a configuration lies (see ``solve``).
         solve: From T_base_frame, shape (m, 4, 4), ``near``, shape (m, dof) or None, and a slack, to `Branches`. The
             representatives of a singular pose are the members of its curve nearest to the values that the free joints
             have in ``near`` (0 if None), and to these values turned by half a turn. The number is the slack [m, sine]:

@@ -28,7 +28,7 @@ class Track:
     Attributes:
         q: Shape (k, dof); NaN where no branch reaches the target inside the limits.
         branch: Label of the branch of each point, "" where there is none.
-        jumps: Points at which a joint moves by more than the jump that was asked for, or that follow a gap.
+        jumps: Points at which a joint moves by more than the allowed jump, or that follow a gap.
         changes: Points at which the label changes. Past a singularity that is no jump.
         gaps: Points without a configuration.
     """
@@ -45,7 +45,7 @@ def nearest(
 ) -> tuple[Matrix, Mask]:
     """For each target the solution inside the limits that is nearest to a posture; of equals, the farthest from limits.
 
-    Of a singular target the whole curve of solutions is looked at, not only its representatives.
+    Of a singular target the whole curve of solutions is considered, not only its representatives.
 
     Args:
         robot: An arm with a closed form.

@@ -76,7 +76,7 @@ def solutions(
             of their curve nearest to it, and full turns are chosen to lie near it. Zeros if None.
         slack: A target that is this near to a singular one [m, sine of an angle] is answered as if it were singular,
             with residuals up to about that; for targets that are only known so well.
-        check: Whether forward kinematics judges every answer (``residuals``); that takes most of the time.
+        check: Whether forward kinematics checks every solution (``residuals``); that takes most of the time.
 
     Raises:
         InputError: If the robot has no closed form, or a target is no pose or lies beyond numbers.

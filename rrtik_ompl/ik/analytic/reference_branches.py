@@ -57,7 +57,7 @@ def _block(
 
 
 def _placed(robot: Robot, form: AnalyticSolver, poses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """T_base_frame for T_world_tip: the base may stand anywhere, and the tip may be another frame of the last link."""
+    """T_base_frame for T_world_tip: the base may be anywhere, and the tip may be another frame of the last link."""
     T_base_world, T_tip_frame = mountings(robot, form)
     if T_base_world is not None:
         poses = T_base_world @ poses

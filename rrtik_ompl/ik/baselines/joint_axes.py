@@ -31,7 +31,7 @@ class Joint:
 
 
 def coupled_fault(robot: Robot) -> str:
-    """Why joints cannot be moved one at a time: "" if every one of them stands alone."""
+    """Why joints cannot be moved one at a time: "" if none is coupled."""
     used = robot.chain.gain != 0.0
     alone = (used.sum(axis=1) <= 1).all() and (used.sum(axis=0) == 1).all()
     return "" if alone else "it moves one joint at a time, and this robot couples some"
@@ -66,7 +66,7 @@ class Swing:
 
     @classmethod
     def about(cls, axis: Matrix, vectors: NDArray[np.float64]) -> Swing:
-        """Look at vectors, shape (m, k, 3), from axes, shape (m, 3)."""
+        """Rotation of vectors, shape (m, k, 3), from axes, shape (m, 3)."""
         cross = (axis @ CROSS).reshape(-1, 3, 3)  # v @ cross = axis x v
         ahead = vectors @ cross
         return cls(vectors, -(ahead @ cross), ahead)

@@ -39,7 +39,7 @@ def resampled_pso(robot: Robot, goal: Target, starts: Matrix) -> tuple[Matrix, i
 def swarm(
     robot: Robot, goal: Target, starts: Matrix, move: Move, *, iterations: int = ITERATIONS
 ) -> tuple[Matrix, int]:
-    """Let swarms look for a goal, until one of them is there.
+    """Let swarms search for a goal, until one of them is there.
 
     Args:
         robot: The arm.

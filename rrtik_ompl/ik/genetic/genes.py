@@ -1,4 +1,4 @@
-"""Chromosomes: 16 bits of Gray code a joint, and the window of joint values that they stand for.
+"""Chromosomes: 16 bits of Gray code a joint, and the window of joint values that they encode.
 
 Source: [2], equation 1. Every chromosome is a configuration inside its window, so that limits need no penalty.
 """

@@ -18,7 +18,7 @@ GENERATIONS = 40  # of each; most that reach the goal do so in ten
 
 
 def genetic(request: IkRequest) -> IkResponse:
-    """One population after another, each until it reaches a target or stands still; the targets take turns."""
+    """One population after another, each until it reaches a target or stalls; the targets take turns."""
     options = replace(REFINED, generations=GENERATIONS, stall=None, start_over=None)
     found, generations = np.zeros((0, request.robot.dof)), 0
     for number in range(MAX_ROUNDS):

@@ -35,7 +35,7 @@ def score(
 ) -> Score:
     """Score configurations, shape (m, dof).
 
-    The fitness in [2] is 100 inches less the distance; as a tournament asks only who is better, the distance does.
+    The fitness in [2] is 100 inches less the distance; as a tournament only compares, the distance serves as well.
 
     Args:
         robot: The arm.

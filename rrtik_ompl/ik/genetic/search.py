@@ -103,7 +103,7 @@ class GaRun:
         self.begin()
 
     def begin(self) -> None:
-        """Stand before the first point, with a random population in the whole range."""
+        """Begin before the first point, with a random population in the whole range."""
         self.points: list[Vector] = []
         self.costs: list[int] = []
         self.window = whole_range(self.robot)
@@ -121,7 +121,7 @@ class GaRun:
 
     @property
     def last(self) -> Vector | None:
-        """The configuration before the one that is looked for."""
+        """The configuration before the one that is sought."""
         return self.points[-1] if self.points else self.near
 
     def step(self) -> None:

@@ -18,14 +18,14 @@ from rrtik_ompl.ik.residual import twist
 from rrtik_ompl.ik.tip_columns import tip_columns
 from rrtik_ompl.robot import Robot
 
-REACH_PER_TURN = 1.0  # a full turn of the tip counts as far as so many times the reach, unless told otherwise
+REACH_PER_TURN = 1.0  # a full turn of the tip counts as far as so many times the reach, unless given
 JOINT_RADIUS = 1e-3  # [rad] from a goal configuration, which is then reached exactly
 INSIDE = 0.99  # of the tolerances, or what is just inside in the metric would be outside after rounding
 NEAREST_START = 0.1  # of the reach: mu does not grow further when the tip starts nearer to the goal
 
 
 class Metric(Protocol):
-    """A distance from the goal, and how many configurations it was asked about.
+    """A distance from the goal, and how many configurations it was computed for.
 
     Attributes:
         evaluations: Configurations so far.

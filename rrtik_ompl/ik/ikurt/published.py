@@ -28,7 +28,7 @@ class Steps:
 
 
 class PublishedSearch:
-    """One tree, greedy in the workspace, with one step of a plain RRT after every failure.
+    """One tree, greedy in the workspace, with one step of a basic RRT after every failure.
 
     Args:
         metric: Distance from the goal.

@@ -3,7 +3,7 @@
 What differs from :mod:`rrtik_ompl.ik.ikurt.published`: CONNECT tries many directions at once, the cheap metric before
 the collision check, takes the best free one, and lives through misses; directions are isotropic, so that joints reach
 their limits; vertices that have failed are penalised; a failure is followed by a whole batch of exploration. With
-``jacobian`` descents look for goal configurations from the vertices where that is worth it, and from anywhere; those
+``jacobian`` descents search for goal configurations from the vertices where that is worth it, and from anywhere; those
 found and not reached at once become roots of a second tree, and the exploration joins the two.
 """
 
@@ -30,7 +30,7 @@ NEARER = 0.5  # a new descent from the way of CONNECT when the distance has fall
 MAX_EXPLORATIONS = 256  # batches of exploration between two CONNECTs; one before the first, then always twice as many,
 MAX_EXPLORATIONS_WITH_CONNECT = 4  # but no more than these as long as CONNECT alone can reach the goal
 SAMPLES = 24  # of one batch of exploration
-PIECES = (0.2, 0.5, 1.0)  # shares of the exploration's step, asked about one after the other as long as they are free
+PIECES = (0.2, 0.5, 1.0)  # shares of the exploration's step, checked one after the other as long as they are free
 TOWARDS_OTHER = 0.5  # share of the samples that are the newest vertices of the other tree
 DESCENTS = 2  # from vertices of a batch of exploration,
 SCOUTS = 22  # and from samples anywhere, for other goal configurations
@@ -57,7 +57,7 @@ class Options:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IkurtValidity:
-    """What the search asks: which configurations are free; which straight motions are; whether to stop."""
+    """Callbacks of the search: which configurations are free; which straight motions are; whether to stop."""
 
     free: Callable[[Matrix], Mask]
     motions_free: Callable[[Matrix, Matrix], Mask]
@@ -191,7 +191,7 @@ class BatchedSearch:
         return None
 
     def _grow(self, tree: IkurtTree) -> NDArray[np.int64]:
-        """Steps of a plain RRT, many at once; the new vertices."""
+        """Steps of a basic RRT, many at once; the new vertices."""
         samples = self._rng.uniform(self._lower, self._upper, (SAMPLES, len(self._lower)))
         drawn = min(int(TOWARDS_OTHER * SAMPLES), len(self._newest)) if self.back.size else 0
         samples[:drawn] = self._newest[:drawn]

@@ -12,7 +12,7 @@ from rrtik_ompl.ik.mb_rrt.links import Links, joints_to_chain
 from rrtik_ompl.ik.mb_rrt.run import TreeSearch, first_hit
 
 STEP = np.radians(3.0)  # "3 units" of the published demonstration
-BLOCK = 500  # vertices between two looks at the goal
+BLOCK = 500  # vertices between two tests of the goal
 
 
 def grow_in_joint_space(

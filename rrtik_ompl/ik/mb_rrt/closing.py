@@ -1,4 +1,4 @@
-"""MB-RRT whose last two links are closed exactly: the elbow stands where the two circles about node and goal meet.
+"""MB-RRT whose last two links are closed exactly: the elbow is where the two circles about node and goal meet.
 
 Surface sampling and rule B up to index n - 2. Planar.
 """

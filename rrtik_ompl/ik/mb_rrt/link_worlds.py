@@ -15,7 +15,7 @@ from rrtik_ompl.world import World
 
 
 class LinkWorlds:
-    """Asks the World about the links up to one joint, with all that they hold.
+    """Checks by World the links up to one joint, with all that they hold.
 
     Args:
         world: The whole arm and its scene.

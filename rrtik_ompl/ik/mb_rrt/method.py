@@ -10,11 +10,11 @@ from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target
 from rrtik_ompl.ik.numeric.restarts import nearest_posture
 from rrtik_ompl.robot import Robot
 
-ROUNDS_FOR_ALL = 8  # of the workspace tree where every solution is wanted
+ROUNDS_FOR_ALL = 8  # of the workspace tree if every solution is requested
 
 
 def mb_rrt_misfit(robot: Robot, target: Target) -> str:
-    """Why the tree cannot stand for a robot's links; "" if it can."""
+    """Why the tree cannot model a robot's links; "" if it can."""
     del target
     return misfit(robot)
 

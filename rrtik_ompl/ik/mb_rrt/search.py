@@ -25,7 +25,7 @@ from rrtik_ompl.world import World
 WIDTH = 16  # passes at a time
 MAX_ROUNDS = 64  # after which it gives up
 FIRST_STEPS = 12  # of the polish, after which most branches that get to the goal at all are there
-POSTURE_ONLY_ROUNDS = 2  # that look at whole postures alone; where free ones are common, that is faster
+POSTURE_ONLY_ROUNDS = 2  # that check whole postures alone; where free ones are common, that is faster
 
 
 @dataclass(frozen=True, slots=True, eq=False)

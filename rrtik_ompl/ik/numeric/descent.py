@@ -56,7 +56,7 @@ def descend(robot: Robot, goal: TipGoal, starts: Matrix, *, iterations: int = ST
 class Search:
     """Solutions of many goals, one after the other for each: first from a posture, then from the seeds nearest to it.
 
-    The same arguments give the same solutions, whatever else is asked in between.
+    The same arguments give the same solutions, whatever else is solved in between.
 
     Args:
         robot: The arm.

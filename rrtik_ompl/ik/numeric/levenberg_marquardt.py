@@ -14,7 +14,7 @@ from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS, Search, walk
 from rrtik_ompl.ik.numeric.restarts import MAX_ROUNDS, STARTS, aims_of, nearest_posture
 from rrtik_ompl.robot import Robot
 
-AT_ONCE = 32  # members of a goal, before the clock is looked at and others have their turn
+AT_ONCE = 32  # members of a goal, between two readings of the clock, when others have their turn
 
 
 def numeric_ik(robot: Robot, goal: TipGoal, starts: Matrix, *, iterations: int = STEPS) -> Matrix:

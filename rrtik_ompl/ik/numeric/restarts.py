@@ -30,7 +30,7 @@ def restarted(method: Walk, request: IkRequest, *, starts: int = STARTS, rounds:
 
     Args:
         method: What walks; what it leads to outside the joint limits is left out.
-        request: What is asked.
+        request: The problem.
         starts: In one round.
         rounds: At most, but one for each target; these take turns.
     """
@@ -57,7 +57,7 @@ def nearest_posture(request: IkRequest, *, searched: bool = False) -> Vector:
     It is one inside the limits if such a one reaches the goal; otherwise the joints may turn without limits.
 
     Args:
-        request: What was asked.
+        request: The problem.
         searched: Whether `Search` is known to find nothing inside the limits.
     """
     robot, aims = request.robot, aims_of(request)

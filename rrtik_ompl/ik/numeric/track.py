@@ -22,7 +22,7 @@ SAME_POSTURE = 1e-3  # [rad] or [m]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tracker:
-    """What a numeric tracker is told.
+    """One trajectory as numeric trackers get it.
 
     Attributes:
         robot: The arm.
