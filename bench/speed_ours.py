@@ -14,7 +14,7 @@ from ompl import geometric as og
 from rrtik_ompl import Problem, World
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.fast.search.connect import ConnectSearch
-from rrtik_ompl.fast.search.motions.motion_table import MotionTable
+from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.ompl_bridge.attempt import attempt
 from rrtik_ompl.ompl_bridge.setup import planning_bounds, unjudged_space
@@ -98,10 +98,10 @@ def warm_up(problem: Problem) -> None:
     problem.world.valid_batch(problem.start[None])
 
 
-def _motions_by_length(world: World, per_radian: float) -> MotionTable:
+def _motions_by_length(world: World, per_radian: float) -> FastMotions:
     """The rule that divides a motion by its length in configuration space alone."""
     rule = {"weights": np.zeros(world.robot.dof), "resolution": world.motion_resolution, "steps_per_unit": per_radian}
-    return MotionTable(world.fast, world.robot.chain.gain, world.robot.chain.offset, **rule)
+    return FastMotions(world.fast, world.robot.chain.gain, world.robot.chain.offset, **rule)
 
 
 def _kernel_search(problem: Problem, goals: Matrix, seconds: float, per_radian: float | None) -> Search:

@@ -10,7 +10,7 @@ from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast import FREE
 from rrtik_ompl.fast.search.motions.motion_kernels import check_motion, configuration_free, resolves, step_count
-from rrtik_ompl.fast.search.motions.motion_table import MotionTable, step_counts
+from rrtik_ompl.fast.search.motions.motion_table import FastMotions, step_counts
 from rrtik_ompl.fast.search.motions.row_kernels import row_at
 from rrtik_ompl.fast.simd.compiled import entry
 from rrtik_ompl.fast.simd.lanes import set_int
@@ -44,7 +44,7 @@ def write_free(motions: int, dof: int, rows: int, count: int, sink: int) -> int:
     return count
 
 
-def steps_in_kernels(motions: MotionTable, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+def steps_in_kernels(motions: FastMotions, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
     found = np.zeros(len(starts), dtype=np.int32)
     places = starts.ctypes.data, ends.ctypes.data, len(starts), found.ctypes.data
     write_steps(motions.address, motions.dof, *places)
@@ -91,7 +91,7 @@ def test_steps_by_length_are_taken_where_they_are_more() -> None:
     world = arm_world("ur5")
     chain, starts, ends = world.robot.chain, *motions_within(world, 1000, 0.3)
     rule = {"weights": world.weights, "resolution": world.motion_resolution}
-    motions = MotionTable(world.fast, chain.gain, chain.offset, **rule, steps_per_unit=100.0)
+    motions = FastMotions(world.fast, chain.gain, chain.offset, **rule, steps_per_unit=100.0)
     by_length = np.ceil(100.0 * np.linalg.norm(ends - starts, axis=1) - 1e-9)
     expected = np.maximum(step_counts(starts, ends, **rule), by_length)
     np.testing.assert_array_equal(steps_in_kernels(motions, starts, ends), expected)
@@ -170,4 +170,4 @@ def test_a_rule_that_makes_no_sense_is_refused(wrong: dict[str, object], words: 
     chain = world.robot.chain
     rule = {"gain": chain.gain, "offset": chain.offset, "weights": world.weights, "resolution": 0.01}
     with pytest.raises(InputError, match=words):
-        MotionTable(world.fast, **{**rule, **wrong})
+        FastMotions(world.fast, **{**rule, **wrong})

@@ -10,7 +10,7 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector, positive
 from rrtik_ompl.fast.search.connect import ConnectSearch
 from rrtik_ompl.fast.search.connect_layout import KERNELS
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
-from rrtik_ompl.fast.search.motions.motion_table import MotionTable
+from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.ompl_bridge import MotionChecker, SafePlanner, SearchResult, WorldLike
 from rrtik_planners.connect_loop import ConnectRules, connect
@@ -95,7 +95,7 @@ class FastRRTConnect(SafePlanner):
             self._kept = motions, bounds, self._made(motions, *bounds)
         return self._kept[2]
 
-    def _made(self, motions: MotionTable | None, lower: Vector, upper: Vector) -> ConnectSearch | None:
+    def _made(self, motions: FastMotions | None, lower: Vector, upper: Vector) -> ConnectSearch | None:
         if motions is None or library(KERNELS) is None:
             return None
         world: Any = self._world
