@@ -14,7 +14,7 @@ from ompl import geometric as og
 from rrtik_ompl import Problem, World
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.fast.search.connect import ConnectSearch
-from rrtik_ompl.fast.search.motions.motion_table import MotionTable
+from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.ompl_bridge.attempt import attempt
 from rrtik_ompl.ompl_bridge.setup import planning_bounds, unchecked_space
@@ -98,12 +98,12 @@ def warm_up(problem: Problem) -> None:
     problem.world.valid_batch(problem.start[None])
 
 
-def _motions_by_length(world: World, per_radian: float) -> MotionTable:
+def _motions_by_length(world: World, per_radian: float) -> FastMotions:
     """The rule that divides a motion by its length in configuration space alone."""
     assert world.fast is not None
     chain, weights = world.robot.chain, np.zeros(world.robot.dof)
     resolution = world.motion_resolution
-    return MotionTable(
+    return FastMotions(
         world.fast, chain.gain, chain.offset, weights=weights, resolution=resolution, steps_per_unit=per_radian
     )
 

@@ -10,7 +10,7 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector, positive
 from rrtik_ompl.fast.search.connect import ConnectSearch
 from rrtik_ompl.fast.search.connect_layout import KERNELS
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
-from rrtik_ompl.fast.search.motions.motion_table import MotionTable
+from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.search.rrt_connect import ConnectRules, RrtConnect, straight_path
@@ -107,7 +107,7 @@ class FastRRTConnect(SafePlanner):
             self._kept = world.motions, bounds, self._made(world.motions, world.robot, *bounds)
         return self._kept[2]
 
-    def _made(self, motions: MotionTable, robot: Robot, lower: Vector, upper: Vector) -> ConnectSearch:
+    def _made(self, motions: FastMotions, robot: Robot, lower: Vector, upper: Vector) -> ConnectSearch:
         range_, domain = connect_lengths(lower, upper, *self._lengths)
         lower, upper = np.maximum(lower, robot.lower), np.minimum(upper, robot.upper)  # unknown to the kernels
         return ConnectSearch(motions, lower, upper, range_=range_, domain=domain)

@@ -16,7 +16,7 @@ from rrtik_ompl.collision.contacts import inside, measured
 from rrtik_ompl.collision.motion_bound import displacement_weights
 from rrtik_ompl.errors import InputError, MeshWarning, UnknownNameError, require
 from rrtik_ompl.fast import FastWorld
-from rrtik_ompl.fast.search.motions.motion_table import MotionTable, motions_of, step_counts
+from rrtik_ompl.fast.search.motions.motion_table import FastMotions, motions_of, step_counts
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.world.exact_checks import ExactChecker
@@ -64,7 +64,7 @@ class World:
 
     Args:
         robot: The arm.
-        scene: Its surroundings; empty if None. Moving obstacles stand where they are at time 0.
+        scene: Its surroundings; empty if None. Moving obstacles are where they are at time 0.
         motion_resolution: Largest step of any point of the arm between two checked configurations [m].
         accuracy: "exact" or "conservative".
 
@@ -100,7 +100,7 @@ class World:
         self.pairs = pairs
         self.accuracy = _accuracy(accuracy)
         self._certificate = Certificate(robot, self.bodies, pairs)
-        self._motions: MotionTable | None = None
+        self._motions: FastMotions | None = None
         self._checks = ExactChecker(robot, self.bodies, moving, conservative=accuracy == "conservative")
         standing = tuple(p for p in pairs if all(self.bodies[i].joint == 0 for i in p))
         self._always_colliding = fixed_contact(robot, self.bodies, standing) is not None
@@ -115,7 +115,7 @@ class World:
         return tables if tables.address and not self._always_colliding else None
 
     @property
-    def motions(self) -> MotionTable | None:
+    def motions(self) -> FastMotions | None:
         """How motions are checked, for searches in kernels: one table for all of them. None where ``fast`` is."""
         self._motions = motions_of(self, self._motions)
         return self._motions

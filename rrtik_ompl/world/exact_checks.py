@@ -1,6 +1,6 @@
 """Which configurations and motions are free of collision: kernels first, coal where these are in doubt.
 
-The kernels (:mod:`rrtik_ompl.fast`) answer in three ways. Their "free" and "colliding", by sphere covers and a narrow
+The kernels (:mod:`rrtik_ompl.fast`) give three answers. Their "free" and "colliding", by sphere covers and a narrow
 phase of convex solids, are certain. What stays undecided falls back to coal, pair by pair and only for the pairs that
 are in doubt, so every answer is coal's own. Coal is called with fresh requests: reused collision data start from the
 last support points and have been seen to miss overlaps.

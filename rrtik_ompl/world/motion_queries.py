@@ -17,7 +17,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.fast import FastWorld
-from rrtik_ompl.fast.search.motions.motion_table import MotionTable
+from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.robot import Chain, Robot
 
@@ -66,7 +66,7 @@ class KernelWorld(MotionQueries, Protocol):
         """The tables that kernels read."""
 
     @property
-    def motions(self) -> MotionTable:
+    def motions(self) -> FastMotions:
         """How kernels check motions: tables, joint values, step rule."""
 
     @property

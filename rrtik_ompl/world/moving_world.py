@@ -17,7 +17,7 @@ from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.certificate import fixed_contact
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast import FREE, FastWorld
-from rrtik_ompl.fast.search.motions.motion_table import MotionTable, motions_of, step_counts
+from rrtik_ompl.fast.search.motions.motion_table import FastMotions, motions_of, step_counts
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import same_shape
@@ -26,7 +26,7 @@ from rrtik_ompl.world.arm_cache import arm_cache
 
 
 class MovingWorld:
-    """Checks of a robot among obstacles that may be moved; stands in for a conservative ``World``.
+    """Checks of a robot among obstacles that may be moved; replaces a conservative ``World``.
 
     A configuration is free if it is within the limits, proven free of self-collision, and proven to be farther than
     margin and ``inflation`` from every obstacle. Motions are checked as a ``World`` does. While an obstacle overlaps
@@ -44,7 +44,7 @@ class MovingWorld:
     Args:
         world: The robot and the scene, obstacles at their first places.
         moving: Names of the obstacles that may be moved; all of them if None.
-        copies: In how many places at once each of these may stand (where it is, and where it will be).
+        copies: In how many places at once each of these may be (where it is, and where it will be).
         self_collision: False leaves out what does not concern obstacles, so that :meth:`clearance` is of them alone.
     """
 
@@ -65,7 +65,7 @@ class MovingWorld:
             kept = tuple(p for p in kept if any(self._bodies[i].kind == "obstacle" for i in p))
         arm = arm_cache(self.robot)
         self._fast = arm.pack(self._bodies, kept, arm.covers_of(self._bodies), share=self_collision)
-        self._motions: MotionTable | None = None
+        self._motions: FastMotions | None = None
         self._inflation = [0.0] * len(self._bodies)
         self._fixed = tuple(p for p in world.pairs if all(self._bodies[i].joint == 0 for i in p))
         self.blocked = self._contact_of_base()
@@ -76,7 +76,7 @@ class MovingWorld:
         return self._fast if self._fast.address and not self.blocked else None
 
     @property
-    def motions(self) -> MotionTable | None:
+    def motions(self) -> FastMotions | None:
         """How motions are checked, for searches in kernels, wherever obstacles are moved; None where ``fast`` is."""
         self._motions = motions_of(self, self._motions)
         return self._motions
@@ -90,7 +90,7 @@ class MovingWorld:
         """Put the obstacles where they are now, and their copies where they will be.
 
         Args:
-            *scenes: The scene now, then one for each further copy; the last one stands for those that are missing.
+            *scenes: The scene now, then one for each further copy; the last one for those that are missing as well.
             inflation: How far the arm has to stay from obstacles beyond their margins [m]; what is not named keeps
                 its own.
 

@@ -14,7 +14,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast import FastWorld, needs_covers
 from rrtik_ompl.fast.search import connect
 from rrtik_ompl.fast.search.connect import ConnectSearch
-from rrtik_ompl.fast.search.motions.motion_table import MotionTable
+from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.ompl_bridge import StateIO
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box, Sphere
@@ -81,7 +81,7 @@ def search_in(world, **options):
         "offset": chain.offset,
     }
     own = {name: options.pop(name) for name in ("range_", "domain", "patience") if name in options}
-    motions = MotionTable(world.fast, **{**rules, **options})
+    motions = FastMotions(world.fast, **{**rules, **options})
     return ConnectSearch(motions, world.robot.lower, world.robot.upper, **own)
 
 

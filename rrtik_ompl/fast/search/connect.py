@@ -13,7 +13,7 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.search import connect_layout
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
-from rrtik_ompl.fast.search.motions.motion_table import MotionTable
+from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.fast.search.tree_layout import CAPACITY, SIZE
 from rrtik_ompl.fast.search.tree_memory import grow, tree_table
 from rrtik_ompl.fast.simd.halton import inverse_bases
@@ -54,7 +54,7 @@ class ConnectSearch:
 
     def __init__(
         self,
-        motions: MotionTable,
+        motions: FastMotions,
         lower: ArrayLike,
         upper: ArrayLike,
         *,
@@ -79,7 +79,7 @@ class ConnectSearch:
         self._search = _search_table(motions, self._trees, box, numbers)
         self._search.header[connect_layout.PATIENCE] = patience
         self._roots = [np.empty((0, dof)), np.empty((0, dof))]
-        self._places = [0, 0]  # addresses of the roots in memory, which numpy takes a microsecond to tell
+        self._places = [0, 0]  # addresses of the roots in memory, which numpy takes a microsecond to find
         for side in range(2):
             self._make_room(side, FIRST_ROOTS)
         self._make_path_room(FIRST_PATH)
@@ -95,7 +95,7 @@ class ConnectSearch:
         stop: Callable[[], object] | None = None,
         max_iterations: int | None = None,
     ) -> Matrix | None:
-        """Look for a path from any start to any goal.
+        """Search for a path from any start to any goal.
 
         Args:
             starts: Free configurations, shape (s, n), s at least 1.
@@ -219,7 +219,7 @@ _QUESTIONS = (connect_layout.QUESTION_STARTS, connect_layout.QUESTION_ENDS)
 _COUNTS = slice(connect_layout.ITERATIONS, connect_layout.CHECKED + 1)
 
 
-def _search_table(motions: MotionTable, trees: list[Table], box: tuple[Vector, Vector], numbers: Vector) -> Table:
+def _search_table(motions: FastMotions, trees: list[Table], box: tuple[Vector, Vector], numbers: Vector) -> Table:
     """The table of a search; fields that are not named here are numbers that the kernels set."""
     dof, asked = motions.dof, connect_layout.MAX_QUESTIONS
     fields: dict[int, int | NDArray[Any]] = dict.fromkeys(range(connect_layout.FIELD_COUNT), 0)

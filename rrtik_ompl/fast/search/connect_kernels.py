@@ -41,7 +41,7 @@ The search runs in short calls of :func:`resume`. Nothing depends on how its wor
 from __future__ import annotations
 
 from rrtik_ompl.fast.search import connect_layout
-from rrtik_ompl.fast.search.connect_layout import ConnectAddress
+from rrtik_ompl.fast.search.connect_layout import ConnectTable
 from rrtik_ompl.fast.search.connect_motions import (
     aim_at_sample,
     aim_at_vertex,
@@ -55,9 +55,9 @@ from rrtik_ompl.fast.search.connect_motions import (
 )
 from rrtik_ompl.fast.search.connect_outcomes import ask_for_candidate, on_blocked, on_free, resume_after_answers
 from rrtik_ompl.fast.search.motions.motion_kernels import configuration_free
-from rrtik_ompl.fast.search.motions.row_kernels import Row, copy_row, distance, row_at
+from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row, distance, row_at
 from rrtik_ompl.fast.search.tree_kernels import add_vertex, clear_tree, is_full, parent_of, row_of
-from rrtik_ompl.fast.search.tree_layout import CERTAIN, NO_PARENT, OPEN, TreeAddress
+from rrtik_ompl.fast.search.tree_layout import CERTAIN, NO_PARENT, OPEN, TreeTable
 from rrtik_ompl.fast.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field
 from rrtik_ompl.fast.simd.random_kernels import next_share, start_points
@@ -68,7 +68,7 @@ BOX_TOLERANCE = 1e-6
 
 
 @kernel
-def candidate(search: ConnectAddress) -> bool:
+def candidate(search: ConnectTable) -> bool:
     """Choose the next motion to check; False if there is none this time."""
     phase = field(search, connect_layout.PHASE)
     if phase == connect_layout.CONNECT:
@@ -84,7 +84,7 @@ def candidate(search: ConnectAddress) -> bool:
 
 
 @kernel
-def advance(search: ConnectAddress) -> int:
+def advance(search: ConnectTable) -> int:
     """Check one motion and do what follows from that; returns the status."""
     if not candidate(search):
         return connect_layout.RUNNING
@@ -101,21 +101,21 @@ def advance(search: ConnectAddress) -> int:
 
 
 @inlined
-def lacks_room(search: ConnectAddress) -> bool:
+def lacks_room(search: ConnectTable) -> bool:
     """Whether one of the trees has no room for one more vertex."""
     full: bool = is_full(tree_of(search, 0)) or is_full(tree_of(search, 1))
     return full
 
 
 @inlined
-def samples_spent(search: ConnectAddress) -> bool:
+def samples_spent(search: ConnectTable) -> bool:
     """Whether the next motion wants a sample, and there may be no more."""
     spent: bool = field(search, connect_layout.ITERATIONS) >= field(search, connect_layout.LIMIT)
     return spent and field(search, connect_layout.PHASE) == connect_layout.EXTEND
 
 
 @entry
-def resume(search: ConnectAddress, budget: int) -> int:
+def resume(search: ConnectTable, budget: int) -> int:
     """Search on for at most ``budget`` motions or samples; returns the status.
 
     ASKING: there are QUESTIONS in the table; write the ANSWERS (1 for free) and call again. FULL: a tree needs room.
@@ -136,7 +136,7 @@ def resume(search: ConnectAddress, budget: int) -> int:
 
 
 @kernel
-def load_row(search: ConnectAddress, source: Row) -> bool:
+def load_row(search: ConnectTable, source: Configuration) -> bool:
     """Set ROW to a configuration; False if that is outside the box."""
     lower, upper, row = (
         field(search, connect_layout.LOWER),
@@ -153,7 +153,7 @@ def load_row(search: ConnectAddress, source: Row) -> bool:
 
 
 @kernel
-def plant_roots(search: ConnectAddress, side: int, rows: Row, count: int) -> int:
+def plant_roots(search: ConnectTable, side: int, rows: Configuration, count: int) -> int:
     """Make the rows the roots of a tree; returns the number of the first one outside the box, or -1."""
     tree = tree_of(search, side)
     row, values = field(search, connect_layout.ROW), field(search, connect_layout.ROW_VALUES)
@@ -166,7 +166,7 @@ def plant_roots(search: ConnectAddress, side: int, rows: Row, count: int) -> int
 
 
 @entry
-def rows_free(search: ConnectAddress, rows: Row, count: int) -> int:
+def rows_free(search: ConnectTable, rows: Configuration, count: int) -> int:
     """Whether all of some configurations are in the box and proven free: 1 if they are, 0 if one may not be."""
     for k in range(count):
         if not load_row(search, row_at(rows, dof_in(search), k)):
@@ -177,7 +177,9 @@ def rows_free(search: ConnectAddress, rows: Row, count: int) -> int:
 
 
 @kernel
-def begin_between(search: ConnectAddress, start_rows: Row, starts: int, goal_rows: Row, goals: int, seed: int) -> int:
+def begin_between(
+    search: ConnectTable, start_rows: Configuration, starts: int, goal_rows: Configuration, goals: int, seed: int
+) -> int:
     """Start anew from roots at two addresses; returns -1, or the number of a root that is outside the box."""
     for place in (
         connect_layout.ITERATIONS,
@@ -202,14 +204,14 @@ def begin_between(search: ConnectAddress, start_rows: Row, starts: int, goal_row
 
 
 @entry
-def begin(search: ConnectAddress, starts: int, goals: int, seed: int) -> int:
+def begin(search: ConnectTable, starts: int, goals: int, seed: int) -> int:
     """:func:`begin_between` the roots in the table."""
     start_rows, goal_rows = field(search, connect_layout.START_ROWS), field(search, connect_layout.GOAL_ROWS)
     return begin_between(search, start_rows, starts, goal_rows, goals, seed)
 
 
 @kernel
-def depth(tree: TreeAddress, vertex: int) -> int:
+def depth(tree: TreeTable, vertex: int) -> int:
     """Number of vertices from a vertex to its root."""
     count = 0
     while vertex >= 0:
@@ -219,7 +221,7 @@ def depth(tree: TreeAddress, vertex: int) -> int:
 
 
 @entry
-def write_path(search: ConnectAddress, rows: Row, capacity: int) -> int:
+def write_path(search: ConnectTable, rows: Configuration, capacity: int) -> int:
     """Write the path that was found, start first, if there is room for it; returns its number of rows."""
     starts, goals, dof = tree_of(search, 0), tree_of(search, 1), dof_in(search)
     vertex, other = meeting_of(search, 0), meeting_of(search, 1)

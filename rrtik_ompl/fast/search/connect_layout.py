@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NewType
 
 KERNELS = "search.connect_kernels"  # the library of these searches
-ConnectAddress = NewType("ConnectAddress", int)  # of the table of a search
+ConnectTable = NewType("ConnectTable", int)  # of the table of a search
 
 # What a search works on: the motion table of the world, its trees, the box of configurations, the numbers below, the
 # inverse bases of the sequence of samples ...

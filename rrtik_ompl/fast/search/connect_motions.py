@@ -8,7 +8,7 @@ import numpy as np
 
 from rrtik_ompl.fast.checks.check_kernels import check_part
 from rrtik_ompl.fast.search import connect_layout
-from rrtik_ompl.fast.search.connect_layout import ConnectAddress
+from rrtik_ompl.fast.search.connect_layout import ConnectTable
 from rrtik_ompl.fast.search.motions.motion_kernels import (
     descends,
     dof_of,
@@ -16,10 +16,10 @@ from rrtik_ompl.fast.search.motions.motion_kernels import (
     step_count,
     world_of,
 )
-from rrtik_ompl.fast.search.motions.motion_layout import MotionAddress
-from rrtik_ompl.fast.search.motions.row_kernels import Row, copy_row, distance
+from rrtik_ompl.fast.search.motions.motion_layout import FastMotions
+from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row, distance
 from rrtik_ompl.fast.search.tree_kernels import live_of, nearest_vertex, radius_of, row_of, values_of
-from rrtik_ompl.fast.search.tree_layout import TreeAddress
+from rrtik_ompl.fast.search.tree_layout import TreeTable
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field, set_float
 from rrtik_ompl.fast.simd.random_kernels import next_point
@@ -30,51 +30,51 @@ RANGE_TOLERANCE = 1e-9  # of the range, by which a motion of the trees may be lo
 
 
 @inlined
-def motions_of(search: ConnectAddress) -> MotionAddress:
+def motions_of(search: ConnectTable) -> FastMotions:
     """The motion table of the world."""
-    motions: MotionAddress = field(search, connect_layout.MOTIONS)
+    motions: FastMotions = field(search, connect_layout.MOTIONS)
     return motions
 
 
 @inlined
-def dof_in(search: ConnectAddress) -> Any:
+def dof_in(search: ConnectTable) -> Any:
     """How many numbers a configuration has."""
     return dof_of(motions_of(search))
 
 
 @inlined
-def tree_of(search: ConnectAddress, side: int) -> TreeAddress:
+def tree_of(search: ConnectTable, side: int) -> TreeTable:
     """The tree from the starts (0) or from the goals (1)."""
-    tree: TreeAddress = field(search, connect_layout.START_TREE + side)
+    tree: TreeTable = field(search, connect_layout.START_TREE + side)
     return tree
 
 
 @inlined
-def meeting_of(search: ConnectAddress, side: int) -> Any:
+def meeting_of(search: ConnectTable, side: int) -> Any:
     """The vertex of a tree at which it meets the other one."""
     return field(search, connect_layout.START_MEETING + side)
 
 
 @inlined
-def set_meeting(search: ConnectAddress, side: int, vertex: int) -> None:
+def set_meeting(search: ConnectTable, side: int, vertex: int) -> None:
     """Set the vertex of a tree at which it meets the other one."""
     set_field(search, connect_layout.START_MEETING + side, vertex)
 
 
 @inlined
-def number_of(search: ConnectAddress, place: int) -> Any:
+def number_of(search: ConnectTable, place: int) -> Any:
     """RANGE, DOMAIN or SPREAD."""
     return double_at(field(search, connect_layout.NUMBERS), place)
 
 
 @inlined
-def count_up(search: ConnectAddress, place: int) -> None:
+def count_up(search: ConnectTable, place: int) -> None:
     """Add 1 to a field."""
     set_field(search, place, field(search, place) + 1)
 
 
 @kernel
-def set_row_values(search: ConnectAddress) -> None:
+def set_row_values(search: ConnectTable) -> None:
     """Joint values of ROW, unless they are the configuration itself."""
     row, values = field(search, connect_layout.ROW), field(search, connect_layout.ROW_VALUES)
     if row != values:
@@ -82,7 +82,7 @@ def set_row_values(search: ConnectAddress) -> None:
 
 
 @kernel
-def nearest_to(search: ConnectAddress, side: int, row: Row) -> Any:
+def nearest_to(search: ConnectTable, side: int, row: Configuration) -> Any:
     """The vertex of a tree that is nearest to a configuration."""
     query = field(search, connect_layout.QUERY)
     for k in range(dof_in(search)):
@@ -91,8 +91,8 @@ def nearest_to(search: ConnectAddress, side: int, row: Row) -> Any:
 
 
 @kernel
-def steer(search: ConnectAddress, start: Row, aim: Row, length: float) -> Any:
-    """Set ROW to ``aim``, or to the point at the range on the motion to it; tells whether it is ``aim``."""
+def steer(search: ConnectTable, start: Configuration, aim: Configuration, length: float) -> Any:
+    """Set ROW to ``aim``, or to the point at the range on the motion to it; returns whether it is ``aim``."""
     row, span = field(search, connect_layout.ROW), number_of(search, connect_layout.RANGE)
     reached = length <= span * (1.0 + RANGE_TOLERANCE)
     for k in range(dof_in(search)):
@@ -106,7 +106,7 @@ def steer(search: ConnectAddress, start: Row, aim: Row, length: float) -> Any:
 
 
 @kernel
-def check_candidate(search: ConnectAddress) -> int:
+def check_candidate(search: ConnectTable) -> int:
     """Check the motion from FROM to ROW at the configurations that are checked in either direction.
 
     The ends that are vertices are left out: they were checked with the motion that led to them, or as roots.
@@ -125,7 +125,7 @@ def check_candidate(search: ConnectAddress) -> int:
 
 
 @inlined
-def set_candidate(search: ConnectAddress, side: int, start: int, bridge: int) -> None:
+def set_candidate(search: ConnectTable, side: int, start: int, bridge: int) -> None:
     """The motion to ROW starts at a vertex of tree ``side``; ``bridge`` is 1 if it ends at a vertex of the other."""
     set_field(search, connect_layout.GROWING, side)
     set_field(search, connect_layout.FROM, start)
@@ -133,7 +133,7 @@ def set_candidate(search: ConnectAddress, side: int, start: int, bridge: int) ->
 
 
 @kernel
-def aim_at_vertex(search: ConnectAddress, side: int, start: int, target: int) -> None:
+def aim_at_vertex(search: ConnectTable, side: int, start: int, target: int) -> None:
     """The next motion: from a vertex of tree ``side`` towards a vertex of the other tree."""
     goal = row_of(tree_of(search, 1 - side), target)
     begin = row_of(tree_of(search, side), start)
@@ -143,7 +143,7 @@ def aim_at_vertex(search: ConnectAddress, side: int, start: int, target: int) ->
 
 
 @kernel
-def aim_straight(search: ConnectAddress) -> bool:
+def aim_straight(search: ConnectTable) -> bool:
     """The next motion: a whole one from the nearest start to the next goal. False when no goal is left."""
     goal = field(search, connect_layout.STRAIGHT_TRIED)
     if goal >= min(field(search, connect_layout.GOAL_COUNT), MAX_STRAIGHT_MOTIONS):
@@ -158,7 +158,7 @@ def aim_straight(search: ConnectAddress) -> bool:
 
 
 @kernel
-def place_sample(search: ConnectAddress) -> None:
+def place_sample(search: ConnectTable) -> None:
     """Set ROW to where POINT, a point of the unit box, lies in the box of samples; the next box is larger."""
     spread = number_of(search, connect_layout.SPREAD)
     for k in range(dof_in(search)):
@@ -172,7 +172,7 @@ def place_sample(search: ConnectAddress) -> None:
 
 
 @kernel
-def aim_at_sample(search: ConnectAddress) -> bool:
+def aim_at_sample(search: ConnectTable) -> bool:
     """The next motion: from the nearest vertex of a tree towards a sample. False if that is outside its domain."""
     count_up(search, connect_layout.ITERATIONS)
     side = 1 - field(search, connect_layout.GROWER)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rrtik_ompl.fast.search import connect_layout
-from rrtik_ompl.fast.search.connect_layout import ConnectAddress
+from rrtik_ompl.fast.search.connect_layout import ConnectTable
 from rrtik_ompl.fast.search.connect_motions import (
     count_up,
     dof_in,
@@ -13,7 +13,7 @@ from rrtik_ompl.fast.search.connect_motions import (
     set_meeting,
     tree_of,
 )
-from rrtik_ompl.fast.search.motions.row_kernels import Row, copy_row, row_at
+from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row, row_at
 from rrtik_ompl.fast.search.tree_kernels import (
     add_vertex,
     cut_branch,
@@ -29,13 +29,13 @@ from rrtik_ompl.fast.simd.lanes import field, int_at, set_field, set_int
 
 
 @kernel
-def shrink_domain(search: ConnectAddress, side: int, vertex: int) -> None:
+def shrink_domain(search: ConnectTable, side: int, vertex: int) -> None:
     """A vertex that was blocked is given a domain."""
     set_radius(tree_of(search, side), vertex, number_of(search, connect_layout.DOMAIN))
 
 
 @kernel
-def on_blocked(search: ConnectAddress) -> None:
+def on_blocked(search: ConnectTable) -> None:
     """The motion is not free."""
     if field(search, connect_layout.PHASE) == connect_layout.EXTEND:
         shrink_domain(search, field(search, connect_layout.GROWING), field(search, connect_layout.FROM))
@@ -44,7 +44,7 @@ def on_blocked(search: ConnectAddress) -> None:
 
 
 @kernel
-def on_free(search: ConnectAddress, state: int) -> int:
+def on_free(search: ConnectTable, state: int) -> int:
     """The motion is free, or taken to be for now; returns the status."""
     side, start = field(search, connect_layout.GROWING), field(search, connect_layout.FROM)
     if field(search, connect_layout.BRIDGE) != 0:
@@ -65,7 +65,7 @@ def on_free(search: ConnectAddress, state: int) -> int:
 
 
 @kernel
-def ask(search: ConnectAddress, kind: int, start: Row, end: Row, side: int, vertex: int) -> None:
+def ask(search: ConnectTable, kind: int, start: Configuration, end: Configuration, side: int, vertex: int) -> None:
     """Ask whether the motion from ``start`` to ``end`` is free, which leads to a vertex of a tree or to NO_VERTEX."""
     place, dof = field(search, connect_layout.QUESTIONS), dof_in(search)
     copy_row(dof, start, row_at(field(search, connect_layout.QUESTION_STARTS), dof, place))
@@ -77,7 +77,7 @@ def ask(search: ConnectAddress, kind: int, start: Row, end: Row, side: int, vert
 
 
 @kernel
-def ask_for_candidate(search: ConnectAddress) -> None:
+def ask_for_candidate(search: ConnectTable) -> None:
     """Ask whether the motion to ROW is free, before it is inserted."""
     tree = tree_of(search, field(search, connect_layout.GROWING))
     start, end = row_of(tree, field(search, connect_layout.FROM)), field(search, connect_layout.ROW)
@@ -86,7 +86,7 @@ def ask_for_candidate(search: ConnectAddress) -> None:
 
 
 @kernel
-def finish_or_ask(search: ConnectAddress) -> int:
+def finish_or_ask(search: ConnectTable) -> int:
     """The trees have met: SOLVED if all motions of the path are certain, else the open ones are asked for."""
     kind, most = connect_layout.PATH_QUESTION, connect_layout.MAX_QUESTIONS
     set_field(search, connect_layout.QUESTIONS, 0)
@@ -107,7 +107,7 @@ def finish_or_ask(search: ConnectAddress) -> int:
 
 
 @kernel
-def apply_path_answers(search: ConnectAddress) -> int:
+def apply_path_answers(search: ConnectTable) -> int:
     """Use the answers for the motions of a path; returns the status."""
     rejected = 0
     for k in range(field(search, connect_layout.QUESTIONS)):
@@ -132,7 +132,7 @@ def apply_path_answers(search: ConnectAddress) -> int:
 
 
 @kernel
-def resume_after_answers(search: ConnectAddress) -> int:
+def resume_after_answers(search: ConnectTable) -> int:
     """Go on from the answers to what was asked; returns the status."""
     kind = field(search, connect_layout.ASKED)
     set_field(search, connect_layout.ASKED, connect_layout.NO_QUESTION)

@@ -11,7 +11,7 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.search import repair_layout
 from rrtik_ompl.fast.search.connect import FIRST_BUDGET, ConnectSearch
-from rrtik_ompl.fast.search.motions.motion_table import MotionTable
+from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.fast.search.shortcut import ShortcutSearch
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.tables.robot_tables import aligned, table
@@ -43,7 +43,7 @@ class PathRepair:
 
     def __init__(
         self,
-        motions: MotionTable,
+        motions: FastMotions,
         lower: Vector,
         upper: Vector,
         *,
@@ -110,7 +110,7 @@ class PathRepair:
         self._cuts = ShortcutSearch(self._motions, self._given, asking=False)
         self._path = self._zeros(2 * rows + self._cuts.capacity)
         header[repair_layout.SEARCH] = self._search.serve(rows, self._iterations)
-        header[repair_layout.CUTS], header[repair_layout.ROOM] = self._cuts.address, rows
+        header[repair_layout.CUTS], header[repair_layout.CAPACITY] = self._cuts.address, rows
         for place, memory in (
             (repair_layout.GIVEN, self._given),
             (repair_layout.POINTS, self._points),

@@ -11,7 +11,7 @@ from typing import Any
 
 from rrtik_ompl.fast.search import connect_layout, repair_layout, shortcut_layout
 from rrtik_ompl.fast.search.connect_kernels import begin_between, resume, write_path
-from rrtik_ompl.fast.search.connect_layout import ConnectAddress
+from rrtik_ompl.fast.search.connect_layout import ConnectTable
 from rrtik_ompl.fast.search.connect_motions import meeting_of, tree_of
 from rrtik_ompl.fast.search.motions.motion_kernels import (
     check_motion,
@@ -20,13 +20,13 @@ from rrtik_ompl.fast.search.motions.motion_kernels import (
     step_count,
     whole_steps,
 )
-from rrtik_ompl.fast.search.motions.motion_layout import MotionAddress
-from rrtik_ompl.fast.search.motions.row_kernels import Row, copy_row, distance, row_at
-from rrtik_ompl.fast.search.repair_layout import RepairAddress
+from rrtik_ompl.fast.search.motions.motion_layout import FastMotions
+from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row, distance, row_at
+from rrtik_ompl.fast.search.repair_layout import RepairTable
 from rrtik_ompl.fast.search.shortcut_kernels import resume as resume_shortcuts
-from rrtik_ompl.fast.search.shortcut_layout import ShortcutAddress
+from rrtik_ompl.fast.search.shortcut_layout import ShortcutTable
 from rrtik_ompl.fast.search.tree_kernels import parent_of
-from rrtik_ompl.fast.search.tree_layout import TreeAddress
+from rrtik_ompl.fast.search.tree_layout import TreeTable
 from rrtik_ompl.fast.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field
 from rrtik_ompl.fast.tables.layout import FREE
@@ -35,59 +35,59 @@ DIRECTION_TOLERANCE = 1e-9  # change of a unit vector that is none
 
 
 @inlined
-def motions_of(repair: RepairAddress) -> MotionAddress:
+def motions_of(repair: RepairTable) -> FastMotions:
     """The motion table of the world."""
-    motions: MotionAddress = field(repair, repair_layout.MOTIONS)
+    motions: FastMotions = field(repair, repair_layout.MOTIONS)
     return motions
 
 
 @inlined
-def search_of(repair: RepairAddress) -> ConnectAddress:
+def search_of(repair: RepairTable) -> ConnectTable:
     """The table of the RRT-Connect search."""
-    search: ConnectAddress = field(repair, repair_layout.SEARCH)
+    search: ConnectTable = field(repair, repair_layout.SEARCH)
     return search
 
 
 @inlined
-def cuts_of(repair: RepairAddress) -> ShortcutAddress:
+def cuts_of(repair: RepairTable) -> ShortcutTable:
     """The table of the random shortcuts."""
-    cuts: ShortcutAddress = field(repair, repair_layout.CUTS)
+    cuts: ShortcutTable = field(repair, repair_layout.CUTS)
     return cuts
 
 
 @inlined
-def number_of(repair: RepairAddress, place: int) -> Any:
+def number_of(repair: RepairTable, place: int) -> Any:
     """STEP or BOX_RATIO."""
     return double_at(field(repair, repair_layout.NUMBERS), place)
 
 
 @inlined
-def given(repair: RepairAddress, number: int) -> Any:
+def given(repair: RepairTable, number: int) -> Any:
     """Address of a waypoint of the path as it was given."""
     return row_at(field(repair, repair_layout.GIVEN), dof_of(motions_of(repair)), number)
 
 
 @inlined
-def point_of(repair: RepairAddress, number: int) -> Any:
+def point_of(repair: RepairTable, number: int) -> Any:
     """Address of a point along the path."""
     return row_at(field(repair, repair_layout.POINTS), dof_of(motions_of(repair)), number)
 
 
 @inlined
-def repaired(repair: RepairAddress, number: int) -> Any:
+def repaired(repair: RepairTable, number: int) -> Any:
     """Address of a waypoint of the repaired path."""
     return row_at(field(repair, repair_layout.PATH), dof_of(motions_of(repair)), number)
 
 
 @kernel
-def divide(repair: RepairAddress, rows: int) -> bool:
+def divide(repair: RepairTable, rows: int) -> bool:
     """Set POINTS to points along the path as it was given, all its waypoints among them; False if there is no room."""
     dof, count, step = dof_of(motions_of(repair)), 1, number_of(repair, repair_layout.STEP)
     copy_row(dof, given(repair, 0), point_of(repair, 0))
     for k in range(rows - 1):
         here, there = given(repair, k), given(repair, k + 1)
         parts = whole_steps(distance(dof, here, there) / step)
-        if count + parts > field(repair, repair_layout.ROOM):
+        if count + parts > field(repair, repair_layout.CAPACITY):
             set_field(repair, repair_layout.COUNT, count + parts)
             return False
         for part in range(1, parts + 1):
@@ -100,14 +100,14 @@ def divide(repair: RepairAddress, rows: int) -> bool:
 
 
 @kernel
-def edge_free(repair: RepairAddress, edge: int) -> bool:
+def edge_free(repair: RepairTable, edge: int) -> bool:
     """Whether the motion between a point and the next one is proven free."""
     answer: int = check_motion(motions_of(repair), point_of(repair, edge), point_of(repair, edge + 1), False)
     return answer == FREE
 
 
 @entry
-def check_path(repair: RepairAddress, rows: int) -> int:
+def check_path(repair: RepairTable, rows: int) -> int:
     """Check the given path; the first blocked edge is searched for from either end. HIT, FREE_PATH or NO_ROOM."""
     if not divide(repair, rows):
         return repair_layout.NO_ROOM
@@ -128,13 +128,13 @@ def check_path(repair: RepairAddress, rows: int) -> int:
 
 
 @inlined
-def set_spread(search: ConnectAddress, spread: float) -> None:
+def set_spread(search: ConnectTable, spread: float) -> None:
     """Set half the side of the box in which the next sample lies."""
     set_double(field(search, connect_layout.NUMBERS), connect_layout.SPREAD, spread)
 
 
 @kernel
-def sample_near(repair: RepairAddress, first: int, second: int) -> None:
+def sample_near(repair: RepairTable, first: int, second: int) -> None:
     """Let the first samples lie around the middle of two points."""
     search, dof = search_of(repair), dof_of(motions_of(repair))
     a, b = point_of(repair, first), point_of(repair, second)
@@ -144,7 +144,7 @@ def sample_near(repair: RepairAddress, first: int, second: int) -> None:
 
 
 @entry
-def repair_path(repair: RepairAddress, seed: int, forgetting: int, budget: int) -> int:
+def repair_path(repair: RepairTable, seed: int, forgetting: int, budget: int) -> int:
     """After a check that found the path hit: join its pieces, or plan from scratch if ``forgetting``.
 
     Returns the number of rows of the new PATH. UNFINISHED: the search needs more than ``budget`` motions, or room; go
@@ -175,7 +175,7 @@ def repair_path(repair: RepairAddress, seed: int, forgetting: int, budget: int) 
 
 
 @kernel
-def root_of(tree: TreeAddress, vertex: int) -> int:
+def root_of(tree: TreeTable, vertex: int) -> int:
     """The root that a vertex hangs on."""
     while parent_of(tree, vertex) >= 0:
         vertex = parent_of(tree, vertex)
@@ -183,7 +183,7 @@ def root_of(tree: TreeAddress, vertex: int) -> int:
 
 
 @kernel
-def append(repair: RepairAddress, count: int, row: Row) -> int:
+def append(repair: RepairTable, count: int, row: Configuration) -> int:
     """Add a row to PATH, in place of the last one if the path goes straight on there; the number of rows then."""
     dof = dof_of(motions_of(repair))
     if count > 0 and distance(dof, repaired(repair, count - 1), row) == 0.0:
@@ -202,7 +202,7 @@ def append(repair: RepairAddress, count: int, row: Row) -> int:
 
 
 @kernel
-def shorten(repair: RepairAddress, rows: int, seed: int) -> None:
+def shorten(repair: RepairTable, rows: int, seed: int) -> None:
     """Shorten the route of CUTS, which has that many rows."""
     cuts = cuts_of(repair)
     for place in (shortcut_layout.TRIES, shortcut_layout.FAILURES, shortcut_layout.GAINS, shortcut_layout.QUESTIONS):
@@ -215,14 +215,14 @@ def shorten(repair: RepairAddress, rows: int, seed: int) -> None:
 
 
 @entry
-def finish(repair: RepairAddress, seed: int) -> int:
+def finish(repair: RepairTable, seed: int) -> int:
     """Write the PATH that a search has found, what is new of it shortened; its rows, or TOO_LONG without room."""
     search, cuts = search_of(repair), cuts_of(repair)
     dof, route = dof_of(motions_of(repair)), field(cuts, shortcut_layout.ROUTE)
     begin = root_of(tree_of(search, 0), meeting_of(search, 0))
     end = field(repair, repair_layout.LAST) + 1 + root_of(tree_of(search, 1), meeting_of(search, 1))
-    new = write_path(search, route, field(repair, repair_layout.ROOM))
-    if new > field(repair, repair_layout.ROOM):
+    new = write_path(search, route, field(repair, repair_layout.CAPACITY))
+    if new > field(repair, repair_layout.CAPACITY):
         return repair_layout.TOO_LONG
     shorten(repair, new, seed)
     rows = 0

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import NewType
 
 KERNELS = "search.repair_kernels"  # their library
-RepairAddress = NewType("RepairAddress", int)  # of the table of a repair
+RepairTable = NewType("RepairTable", int)  # of the table of a repair
 
 # MOTIONS: the motion table of the world · SEARCH, CUTS: tables of an RRT-Connect search and of random shortcuts in that
 # world · NUMBERS: doubles, see below · GIVEN: the path as it was given · POINTS: points along it · PATH: the repaired
-# one · ROOM: of each, in rows
-MOTIONS, SEARCH, CUTS, NUMBERS, GIVEN, POINTS, PATH, ROOM = range(8)
+# one · CAPACITY: of each, in rows
+MOTIONS, SEARCH, CUTS, NUMBERS, GIVEN, POINTS, PATH, CAPACITY = range(8)
 # Numbers that the kernels set. COUNT: of points · FIRST, LAST: blocked edges between points, seen from both ends
 # CHECKED: configurations that the check of a path counts · TRIES, PATIENCE: of the shortcuts
 COUNT, FIRST, LAST, CHECKED, TRIES, PATIENCE, FIELD_COUNT = range(8, 15)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.search import shortcut_layout
-from rrtik_ompl.fast.search.motions.motion_table import MotionTable
+from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.tables.robot_tables import table
 
@@ -40,7 +40,7 @@ class ShortcutSearch:
 
     def __init__(
         self,
-        motions: MotionTable,
+        motions: FastMotions,
         waypoints: ArrayLike,
         *,
         seed: int = 0,

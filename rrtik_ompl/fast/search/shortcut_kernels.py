@@ -15,9 +15,9 @@ import numpy as np
 
 from rrtik_ompl.fast.search import shortcut_layout
 from rrtik_ompl.fast.search.motions.motion_kernels import check_motion, dof_of
-from rrtik_ompl.fast.search.motions.motion_layout import MotionAddress
-from rrtik_ompl.fast.search.motions.row_kernels import Row, copy_row, row_at
-from rrtik_ompl.fast.search.shortcut_layout import FIRST_INSIDE, SECOND_INSIDE, ShortcutAddress
+from rrtik_ompl.fast.search.motions.motion_layout import FastMotions
+from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row, row_at
+from rrtik_ompl.fast.search.shortcut_layout import FIRST_INSIDE, SECOND_INSIDE, ShortcutTable
 from rrtik_ompl.fast.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field
 from rrtik_ompl.fast.simd.random_kernels import next_share
@@ -29,58 +29,58 @@ WAYPOINT_TOLERANCE = 1e-9  # of the length of an edge: nearer to a waypoint is a
 
 
 @inlined
-def motions_of(search: ShortcutAddress) -> MotionAddress:
+def motions_of(search: ShortcutTable) -> FastMotions:
     """The motion table of the world."""
-    motions: MotionAddress = field(search, shortcut_layout.MOTIONS)
+    motions: FastMotions = field(search, shortcut_layout.MOTIONS)
     return motions
 
 
 @inlined
-def dof_in(search: ShortcutAddress) -> Any:
+def dof_in(search: ShortcutTable) -> Any:
     """How many numbers a configuration has."""
     return dof_of(motions_of(search))
 
 
 @inlined
-def waypoint(search: ShortcutAddress, number: int) -> Any:
+def waypoint(search: ShortcutTable, number: int) -> Any:
     """Address of a waypoint."""
     return row_at(field(search, shortcut_layout.ROUTE), dof_in(search), number)
 
 
 @inlined
-def end(search: ShortcutAddress, number: int) -> Any:
+def end(search: ShortcutTable, number: int) -> Any:
     """Address of an end of the shortcut, 0 or 1."""
     return row_at(field(search, shortcut_layout.ENDS), dof_in(search), number)
 
 
 @inlined
-def probability(search: ShortcutAddress, place: int) -> Any:
+def probability(search: ShortcutTable, place: int) -> Any:
     """WAYPOINT_END or PULL_TRY."""
     return double_at(field(search, shortcut_layout.PROBABILITIES), place)
 
 
 @kernel
-def metric_distance(search: ShortcutAddress, a: Row, b: Row) -> float:
+def metric_distance(search: ShortcutTable, a: Configuration, b: Configuration) -> float:
     """Length of the straight motion between two configurations."""
     total = 0.0
     for k in range(dof_in(search)):
-        way = double_at(b, k) - double_at(a, k)
-        total += double_at(field(search, shortcut_layout.METRIC), k) * way * way
+        gap = double_at(b, k) - double_at(a, k)
+        total += double_at(field(search, shortcut_layout.METRIC), k) * gap * gap
     length: float = np.sqrt(total)
     return length
 
 
 @kernel
-def measure_route(search: ShortcutAddress, start: int) -> None:
+def measure_route(search: ShortcutTable, start: int) -> None:
     """Length of the route up to each waypoint after ``start``."""
     places = field(search, shortcut_layout.ARC_LENGTHS)
     for k in range(start + 1, field(search, shortcut_layout.COUNT)):
-        way = metric_distance(search, waypoint(search, k - 1), waypoint(search, k))
-        set_double(places, k, double_at(places, k - 1) + way)
+        length = metric_distance(search, waypoint(search, k - 1), waypoint(search, k))
+        set_double(places, k, double_at(places, k - 1) + length)
 
 
 @kernel
-def edge_of(search: ShortcutAddress, place: float) -> int:
+def edge_of(search: ShortcutTable, place: float) -> int:
     """Number of the edge on which a place of the route lies, by bisection."""
     places, low, high = field(search, shortcut_layout.ARC_LENGTHS), 0, field(search, shortcut_layout.COUNT) - 1
     while high - low > 1:
@@ -93,7 +93,7 @@ def edge_of(search: ShortcutAddress, place: float) -> int:
 
 
 @kernel
-def random_place(search: ShortcutAddress) -> Any:
+def random_place(search: ShortcutTable) -> Any:
     """A random place on the route: its waypoint or edge, how much of the edge lies before it, and where that is."""
     places, count = field(search, shortcut_layout.ARC_LENGTHS), field(search, shortcut_layout.COUNT)
     if next_share(search, shortcut_layout.RANDOM) < probability(search, shortcut_layout.WAYPOINT_END):
@@ -111,7 +111,7 @@ def random_place(search: ShortcutAddress) -> Any:
 
 
 @kernel
-def set_end(search: ShortcutAddress, number: int, edge: int, share: float) -> None:
+def set_end(search: ShortcutTable, number: int, edge: int, share: float) -> None:
     """Place an end of the shortcut, never outside the box between the waypoints around it."""
     a, target = waypoint(search, edge), end(search, number)
     if share == 0.0:
@@ -125,7 +125,7 @@ def set_end(search: ShortcutAddress, number: int, edge: int, share: float) -> No
 
 
 @kernel
-def propose_pull(search: ShortcutAddress) -> bool:
+def propose_pull(search: ShortcutTable) -> bool:
     """Draw a pull; whether it would gain something."""
     chosen = 1 + int(next_share(search, shortcut_layout.RANDOM) * (field(search, shortcut_layout.COUNT) - 2))
     before, here, after = (waypoint(search, chosen - 1), waypoint(search, chosen), waypoint(search, chosen + 1))
@@ -148,7 +148,7 @@ def propose_pull(search: ShortcutAddress) -> bool:
 
 
 @kernel
-def propose_shortcut(search: ShortcutAddress) -> bool:
+def propose_shortcut(search: ShortcutTable) -> bool:
     """Draw a shortcut; whether it would gain something."""
     first, share, place = random_place(search)
     second, other_share, other_place = random_place(search)
@@ -174,7 +174,7 @@ def propose_shortcut(search: ShortcutAddress) -> bool:
 
 
 @kernel
-def check_edge(search: ShortcutAddress, a: Row, b: Row) -> int:
+def check_edge(search: ShortcutTable, a: Configuration, b: Configuration) -> int:
     """Check a straight motion; one that is left undecided becomes a question. The same from both sides."""
     resolve = field(search, shortcut_layout.RESOLVE) != 0
     answer: int = check_motion(motions_of(search), a, b, resolve)
@@ -187,7 +187,7 @@ def check_edge(search: ShortcutAddress, a: Row, b: Row) -> int:
 
 
 @inlined
-def ends_of_part(search: ShortcutAddress, part: int) -> Any:
+def ends_of_part(search: ShortcutTable, part: int) -> Any:
     """Both ends of a motion to be checked: of a pull 0 and 1, else 0 for the shortcut, 1 and 2 for what is beside it.
 
     A part that does not exist has two ends that are the same.
@@ -204,7 +204,7 @@ def ends_of_part(search: ShortcutAddress, part: int) -> Any:
 
 
 @kernel
-def check_parts(search: ShortcutAddress) -> int:
+def check_parts(search: ShortcutTable) -> int:
     """Check all motions that a shortcut or a pull would bring."""
     set_field(search, shortcut_layout.QUESTIONS, 0)
     worst = FREE
@@ -218,7 +218,7 @@ def check_parts(search: ShortcutAddress) -> int:
 
 
 @kernel
-def take_shortcut(search: ShortcutAddress) -> None:
+def take_shortcut(search: ShortcutTable) -> None:
     """Put the shortcut in place of what it cuts off."""
     dof, count = dof_in(search), field(search, shortcut_layout.COUNT)
     first, second = field(search, shortcut_layout.FIRST), field(search, shortcut_layout.SECOND)
@@ -243,13 +243,13 @@ def take_shortcut(search: ShortcutAddress) -> None:
 
 
 @inlined
-def count_up(search: ShortcutAddress, place: int) -> None:
+def count_up(search: ShortcutTable, place: int) -> None:
     """Add 1 to a field."""
     set_field(search, place, field(search, place) + 1)
 
 
 @kernel
-def accept_or_reject(search: ShortcutAddress, free: bool) -> None:
+def accept_or_reject(search: ShortcutTable, free: bool) -> None:
     """Take the shortcut or the pull, or count a failure."""
     if not free:
         count_up(search, shortcut_layout.FAILURES)
@@ -265,7 +265,7 @@ def accept_or_reject(search: ShortcutAddress, free: bool) -> None:
 
 
 @inlined
-def is_done(search: ShortcutAddress) -> Any:
+def is_done(search: ShortcutTable) -> Any:
     """Whether no further try is to be made."""
     spent = field(search, shortcut_layout.TRIES) >= field(search, shortcut_layout.MAX_TRIES)
     stuck = field(search, shortcut_layout.FAILURES) >= field(search, shortcut_layout.PATIENCE)
@@ -273,7 +273,7 @@ def is_done(search: ShortcutAddress) -> Any:
 
 
 @entry
-def resume(search: ShortcutAddress, budget: int) -> int:
+def resume(search: ShortcutTable, budget: int) -> int:
     """Go on for at most ``budget`` tries. Returns DONE, RUNNING or ASKING."""
     if field(search, shortcut_layout.TRIES) == 0:
         measure_route(search, 0)

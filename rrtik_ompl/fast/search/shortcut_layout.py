@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NewType
 
 KERNELS = "search.shortcut_kernels"  # their library
-ShortcutAddress = NewType("ShortcutAddress", int)  # of the table of a search
+ShortcutTable = NewType("ShortcutTable", int)  # of the table of a search
 
 # What resume() returns: all tries are spent, the budget is spent, questions must be answered first.
 DONE, RUNNING, ASKING = range(3)

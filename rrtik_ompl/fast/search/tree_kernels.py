@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.fast.search.motions.row_kernels import Row, Values, copy_row, row_at
+from rrtik_ompl.fast.search.motions.row_kernels import Configuration, JointValues, copy_row, row_at
 from rrtik_ompl.fast.search.tree_layout import (
     CAPACITY,
     CUT,
@@ -24,7 +24,7 @@ from rrtik_ompl.fast.search.tree_layout import (
     SIZE,
     STATES,
     VALUES,
-    TreeAddress,
+    TreeTable,
 )
 from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import (
@@ -51,55 +51,55 @@ ZERO = np.float32(0.0)
 
 
 @inlined
-def row_of(tree: TreeAddress, vertex: int) -> Any:
+def row_of(tree: TreeTable, vertex: int) -> Any:
     """Address of a vertex's configuration."""
     return row_at(field(tree, ROWS), field(tree, DOF), vertex)
 
 
 @inlined
-def values_of(tree: TreeAddress, vertex: int) -> Any:
+def values_of(tree: TreeTable, vertex: int) -> Any:
     """Address of a vertex's joint values."""
     return row_at(field(tree, VALUES), field(tree, JOINTS), vertex)
 
 
 @inlined
-def parent_of(tree: TreeAddress, vertex: int) -> Any:
+def parent_of(tree: TreeTable, vertex: int) -> Any:
     """The parent of a vertex, -1 for a root."""
     return int_at(field(tree, PARENTS), vertex)
 
 
 @inlined
-def state_of(tree: TreeAddress, vertex: int) -> Any:
+def state_of(tree: TreeTable, vertex: int) -> Any:
     """CERTAIN, OPEN or CUT."""
     return int_at(field(tree, STATES), vertex)
 
 
 @inlined
-def set_state(tree: TreeAddress, vertex: int, state: int) -> None:
+def set_state(tree: TreeTable, vertex: int, state: int) -> None:
     """Set whether a vertex is CERTAIN, OPEN or CUT."""
     set_int(field(tree, STATES), vertex, state)
 
 
 @inlined
-def radius_of(tree: TreeAddress, vertex: int) -> Any:
+def radius_of(tree: TreeTable, vertex: int) -> Any:
     """Radius of a vertex's domain [unit of the configurations]."""
     return float_at(field(tree, RADII), vertex)
 
 
 @inlined
-def set_radius(tree: TreeAddress, vertex: int, radius: float) -> None:
+def set_radius(tree: TreeTable, vertex: int, radius: float) -> None:
     """Set the radius of a vertex's domain."""
     set_float(field(tree, RADII), vertex, np.float32(radius))
 
 
 @inlined
-def live_of(tree: TreeAddress) -> Any:
+def live_of(tree: TreeTable) -> Any:
     """How many vertices are not cut off."""
     return field(tree, LIVE)
 
 
 @inlined
-def is_full(tree: TreeAddress) -> Any:
+def is_full(tree: TreeTable) -> Any:
     """Whether a tree has no room for one more vertex."""
     return field(tree, SIZE) >= field(tree, CAPACITY)
 
@@ -111,7 +111,7 @@ def lane_place(dof: int, vertex: int, coordinate: int) -> Any:
 
 
 @kernel
-def nearest_vertex(tree: TreeAddress, query: int) -> Any:
+def nearest_vertex(tree: TreeTable, query: int) -> Any:
     """The vertex nearest to ``DOF`` floats; of several the first one."""
     dof, points = field(tree, DOF), field(tree, POINTS)
     least, place = spread(UNBOUNDED_SQUARE), spread(ZERO)
@@ -129,7 +129,7 @@ def nearest_vertex(tree: TreeAddress, query: int) -> Any:
 
 
 @kernel
-def add_vertex(tree: TreeAddress, row: Row, values: Values, parent: int, state: int, radius: float) -> Any:
+def add_vertex(tree: TreeTable, row: Configuration, values: JointValues, parent: int, state: int, radius: float) -> Any:
     """Append a vertex; there must be room. Returns its number."""
     dof, vertex = field(tree, DOF), field(tree, SIZE)
     points = field(tree, POINTS)
@@ -149,7 +149,7 @@ def add_vertex(tree: TreeAddress, row: Row, values: Values, parent: int, state: 
 
 
 @kernel
-def cut_vertex(tree: TreeAddress, vertex: int) -> int:
+def cut_vertex(tree: TreeTable, vertex: int) -> int:
     """Cut one vertex off, not its descendants."""
     set_state(tree, vertex, CUT)
     set_field(tree, LIVE, field(tree, LIVE) - 1)
@@ -158,7 +158,7 @@ def cut_vertex(tree: TreeAddress, vertex: int) -> int:
 
 
 @kernel
-def cut_branch(tree: TreeAddress, vertex: int) -> Any:
+def cut_branch(tree: TreeTable, vertex: int) -> Any:
     """Cut a vertex and all its descendants off; returns how many vertices are left."""
     if state_of(tree, vertex) != CUT:
         cut_vertex(tree, vertex)
@@ -170,7 +170,7 @@ def cut_branch(tree: TreeAddress, vertex: int) -> Any:
 
 
 @kernel
-def clear_tree(tree: TreeAddress) -> int:
+def clear_tree(tree: TreeTable) -> int:
     """Forget all vertices."""
     set_field(tree, SIZE, 0)
     set_field(tree, LIVE, 0)

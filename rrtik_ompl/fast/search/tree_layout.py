@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NewType
 
-TreeAddress = NewType("TreeAddress", int)  # of the table of a tree
+TreeTable = NewType("TreeTable", int)  # of the table of a tree
 
 # Tree. Vertex: ``DOF`` floats in lanes, block by block; a row of ``DOF`` and one of ``JOINTS`` doubles (the joint
 # values; the same memory where they are the same); the parent, -1 for a root; radius of its domain; state.

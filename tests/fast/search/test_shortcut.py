@@ -10,7 +10,7 @@ import pytest
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast import FREE, UNDECIDED, FastWorld
-from rrtik_ompl.fast.search.motions.motion_table import MotionTable
+from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.fast.search.shortcut import ShortcutSearch
 from rrtik_ompl.transitions import route_length
 from rrtik_tests.random_cases import KINDS, Case, arm, joint_values
@@ -31,7 +31,7 @@ def judge(world, chain, a, b, weights):
 
 def shortcuts(world, chain, route, *, weights, resolution, **options):
     """The search in a world whose motions are checked by this rule."""
-    motions = MotionTable(world, chain.gain, chain.offset, weights=weights, resolution=resolution)
+    motions = FastMotions(world, chain.gain, chain.offset, weights=weights, resolution=resolution)
     return ShortcutSearch(motions, route, **options)
 
 

@@ -6,20 +6,20 @@ from typing import Any
 
 from rrtik_ompl.fast.search.crdt import layout as crdt_layout
 from rrtik_ompl.fast.search.crdt.fields import dof_in, extension_row, rule_of
-from rrtik_ompl.fast.search.crdt.layout import CrdtAddress
+from rrtik_ompl.fast.search.crdt.layout import CrdtTable
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
 from rrtik_ompl.fast.simd.lanes import field, int_at, set_double, set_int
 from rrtik_ompl.fast.simd.random_kernels import next_share
 
 
 @inlined
-def draw(search: CrdtAddress) -> Any:
+def draw(search: CrdtTable) -> Any:
     """The next number of the stream, from 0 to 1, less than 1."""
     return next_share(search, crdt_layout.RANDOM)
 
 
 @inlined
-def sample(search: CrdtAddress) -> None:
+def sample(search: CrdtTable) -> None:
     """Draw a target within the bounds."""
     for axis in range(dof_in(search)):
         low = rule_of(search, crdt_layout.SAMPLE_LOWER, axis)
@@ -29,7 +29,7 @@ def sample(search: CrdtAddress) -> None:
 
 
 @kernel
-def shuffle(search: CrdtAddress) -> None:
+def shuffle(search: CrdtTable) -> None:
     """The axes that may move, in random order."""
     order, count = field(search, crdt_layout.ORDER), field(search, crdt_layout.AXIS_COUNT)
     for k in range(count):
@@ -42,7 +42,7 @@ def shuffle(search: CrdtAddress) -> None:
 
 
 @inlined
-def to_front(search: CrdtAddress, axis: int) -> None:
+def to_front(search: CrdtTable, axis: int) -> None:
     """Let an axis go first and the others keep their order."""
     order, k = field(search, crdt_layout.ORDER), 0
     while int_at(order, k) != axis:

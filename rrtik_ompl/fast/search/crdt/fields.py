@@ -5,71 +5,71 @@ from __future__ import annotations
 from typing import Any
 
 from rrtik_ompl.fast.search.crdt import layout as crdt_layout
-from rrtik_ompl.fast.search.crdt.layout import CrdtAddress, CrdtTreeAddress
+from rrtik_ompl.fast.search.crdt.layout import CrdtTable, CrdtTreeTable
 from rrtik_ompl.fast.search.motions.motion_kernels import dof_of
-from rrtik_ompl.fast.search.motions.motion_layout import MotionAddress
+from rrtik_ompl.fast.search.motions.motion_layout import FastMotions
 from rrtik_ompl.fast.search.motions.row_kernels import row_at
 from rrtik_ompl.fast.simd.compiled import inlined
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_field
 
 
 @inlined
-def motions_of(search: CrdtAddress) -> MotionAddress:
+def motions_of(search: CrdtTable) -> FastMotions:
     """The motion table of the world."""
-    motions: MotionAddress = field(search, crdt_layout.MOTIONS)
+    motions: FastMotions = field(search, crdt_layout.MOTIONS)
     return motions
 
 
 @inlined
-def dof_in(search: CrdtAddress) -> Any:
+def dof_in(search: CrdtTable) -> Any:
     """How many numbers a configuration has."""
     return dof_of(motions_of(search))
 
 
 @inlined
-def tree_of(search: CrdtAddress, side: int) -> CrdtTreeAddress:
+def tree_of(search: CrdtTable, side: int) -> CrdtTreeTable:
     """The first (0) or the second tree."""
-    tree: CrdtTreeAddress = field(search, crdt_layout.TREE + side)
+    tree: CrdtTreeTable = field(search, crdt_layout.TREE + side)
     return tree
 
 
 @inlined
-def rule_row(search: CrdtAddress, rule: int) -> Any:
+def rule_row(search: CrdtTable, rule: int) -> Any:
     """Address of a rule's numbers, one for each axis."""
     return row_at(field(search, crdt_layout.RULES), dof_in(search), rule)
 
 
 @inlined
-def rule_of(search: CrdtAddress, rule: int, axis: int) -> Any:
+def rule_of(search: CrdtTable, rule: int, axis: int) -> Any:
     """A rule's number for an axis."""
     return double_at(rule_row(search, rule), axis)
 
 
 @inlined
-def extension_row(search: CrdtAddress, row: int) -> Any:
+def extension_row(search: CrdtTable, row: int) -> Any:
     """Address of a row of the extension, such as TARGET or CURRENT."""
     return row_at(field(search, crdt_layout.EXTENSION), dof_in(search), row)
 
 
 @inlined
-def edge_start(search: CrdtAddress, edge: int) -> Any:
+def edge_start(search: CrdtTable, edge: int) -> Any:
     """Address of the start of an edge of the extension."""
     return extension_row(search, crdt_layout.EDGES + edge)
 
 
 @inlined
-def edge_end(search: CrdtAddress, edge: int) -> Any:
+def edge_end(search: CrdtTable, edge: int) -> Any:
     """Address of the end of an edge of the extension."""
     return extension_row(search, crdt_layout.EDGES + dof_in(search) + 1 + edge)
 
 
 @inlined
-def goal_row(search: CrdtAddress, goal: int) -> Any:
+def goal_row(search: CrdtTable, goal: int) -> Any:
     """Address of a goal of a single tree."""
     return row_at(field(search, crdt_layout.GOALS), dof_in(search), goal)
 
 
 @inlined
-def count_up(search: CrdtAddress, place: int) -> None:
+def count_up(search: CrdtTable, place: int) -> None:
     """Add 1 to a field."""
     set_field(search, place, field(search, place) + 1)

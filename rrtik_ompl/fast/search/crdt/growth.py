@@ -10,7 +10,7 @@ from typing import Any
 from rrtik_ompl.fast.search.crdt import layout as crdt_layout
 from rrtik_ompl.fast.search.crdt.draws import draw, shuffle, to_front
 from rrtik_ompl.fast.search.crdt.fields import dof_in, edge_end, edge_start, extension_row, motions_of, rule_of
-from rrtik_ompl.fast.search.crdt.layout import BACK, BETWEEN, BEYOND, ONWARD, CrdtAddress, CrdtTreeAddress
+from rrtik_ompl.fast.search.crdt.layout import BACK, BETWEEN, BEYOND, ONWARD, CrdtTable, CrdtTreeTable
 from rrtik_ompl.fast.search.crdt.tree_kernels import (
     add_crdt_vertex,
     coordinate,
@@ -20,14 +20,14 @@ from rrtik_ompl.fast.search.crdt.tree_kernels import (
     size_of,
 )
 from rrtik_ompl.fast.search.motions.motion_kernels import check_motion, resolves
-from rrtik_ompl.fast.search.motions.row_kernels import Row, copy_row
+from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, field, int_at, set_double, set_field, set_int
 from rrtik_ompl.fast.tables.layout import COLLIDING, FREE, UNDECIDED
 
 
 @inlined
-def hold_idle_axes(search: CrdtAddress, tree: CrdtTreeAddress, near: int) -> None:
+def hold_idle_axes(search: CrdtTable, tree: CrdtTreeTable, near: int) -> None:
     """Let each coordinate of the target stay as it is at a vertex if it does not take part this time."""
     for axis in range(dof_in(search)):
         chance = rule_of(search, crdt_layout.CHANCE, axis)
@@ -36,7 +36,7 @@ def hold_idle_axes(search: CrdtAddress, tree: CrdtTreeAddress, near: int) -> Non
 
 
 @inlined
-def remembered_axis(search: CrdtAddress, tree: CrdtTreeAddress, vertex: int, parent: int) -> int:
+def remembered_axis(search: CrdtTable, tree: CrdtTreeTable, vertex: int, parent: int) -> int:
     """The axis of the edge that leads to a vertex."""
     axis = 0
     while axis < dof_in(search) - 1 and coordinate(tree, vertex, axis) == coordinate(tree, parent, axis):
@@ -45,7 +45,7 @@ def remembered_axis(search: CrdtAddress, tree: CrdtTreeAddress, vertex: int, par
 
 
 @kernel
-def add_edge(search: CrdtAddress, axis: int, start: Any, end: Any) -> None:
+def add_edge(search: CrdtTable, axis: int, start: Any, end: Any) -> None:
     """Put an edge along an axis through the current row on the list."""
     count, dof = field(search, crdt_layout.EDGE_COUNT), dof_in(search)
     current = extension_row(search, crdt_layout.CURRENT)
@@ -76,10 +76,10 @@ def shortest_piece(turn: int, came_from: Any, here: Any, there: Any) -> Any:
 
 
 @kernel
-def lay_out(search: CrdtAddress, tree: CrdtTreeAddress, near: int, exactly: bool) -> None:
-    """Lay out the way from a vertex to the target, one axis after the other: the axis that led to the vertex first.
+def lay_out(search: CrdtTable, tree: CrdtTreeTable, near: int, exactly: bool) -> None:
+    """Lay out an extension from a vertex to the target, axis after axis, first the one that led to the vertex.
 
-    A leg shorter than the smallest move ends the way; towards a target that need not be met exactly it is left out.
+    A leg shorter than the smallest move ends the extension; if the target need not be met exactly, it is left out.
     """
     parent, current = crdt_parent_of(tree, near), extension_row(search, crdt_layout.CURRENT)
     if not exactly:
@@ -108,7 +108,7 @@ def lay_out(search: CrdtAddress, tree: CrdtTreeAddress, near: int, exactly: bool
             continue
         if turn in (ONWARD, BETWEEN):
             add_edge(search, axis, here, there)
-        if turn in (BETWEEN, BEYOND):  # the edge to the vertex is split, or left out: the way has no turn
+        if turn in (BETWEEN, BEYOND):  # the edge to the vertex is split, or left out
             add_edge(search, axis, came_from, there)
         if legs == 0:
             set_field(search, crdt_layout.TURN, turn)
@@ -118,7 +118,7 @@ def lay_out(search: CrdtAddress, tree: CrdtTreeAddress, near: int, exactly: bool
 
 
 @kernel
-def check_edge(search: CrdtAddress, start: Row, end: Row) -> int:
+def check_edge(search: CrdtTable, start: Configuration, end: Configuration) -> int:
     """Check the motion between two configurations as the world does, whatever its direction."""
     for axis in range(dof_in(search)):
         a, b = double_at(start, axis), double_at(end, axis)
@@ -131,7 +131,7 @@ def check_edge(search: CrdtAddress, start: Row, end: Row) -> int:
 
 
 @kernel
-def check_extension(search: CrdtAddress) -> int:
+def check_extension(search: CrdtTable) -> int:
     """Check the edges of the extension up to the first that is not free; returns how many want an answer."""
     count, open_, resolve = field(search, crdt_layout.EDGE_COUNT), 0, resolves(motions_of(search))
     for edge in range(count):
@@ -147,7 +147,7 @@ def check_extension(search: CrdtAddress) -> int:
 
 
 @inlined
-def count_free(search: CrdtAddress) -> int:
+def count_free(search: CrdtTable) -> int:
     """How many edges at the beginning of the extension are free."""
     free = 0
     while free < field(search, crdt_layout.EDGE_COUNT) and int_at(field(search, crdt_layout.VERDICTS), free) == FREE:
@@ -156,7 +156,7 @@ def count_free(search: CrdtAddress) -> int:
 
 
 @kernel
-def add_free_edges(search: CrdtAddress, tree: CrdtTreeAddress) -> int:
+def add_free_edges(search: CrdtTable, tree: CrdtTreeTable) -> int:
     """Add the free leading part of the extension to the tree; returns what was achieved."""
     count, first = field(search, crdt_layout.EDGE_COUNT), field(search, crdt_layout.FIRST_EDGES)
     near, turn = field(search, crdt_layout.NEAR), field(search, crdt_layout.TURN)

@@ -12,7 +12,7 @@ from rrtik_ompl.fast.search.crdt import layout as crdt_layout
 from rrtik_ompl.fast.search.crdt.draws import sample
 from rrtik_ompl.fast.search.crdt.fields import count_up, dof_in, extension_row, goal_row, rule_row, tree_of
 from rrtik_ompl.fast.search.crdt.growth import add_free_edges, check_extension, lay_out
-from rrtik_ompl.fast.search.crdt.layout import CrdtAddress, CrdtTreeAddress
+from rrtik_ompl.fast.search.crdt.layout import CrdtTable, CrdtTreeTable
 from rrtik_ompl.fast.search.crdt.tree_kernels import coordinate, nearest_crdt_vertex, read_vertex, size_of
 from rrtik_ompl.fast.search.motions.row_kernels import copy_row
 from rrtik_ompl.fast.simd.compiled import entry, inlined
@@ -20,27 +20,27 @@ from rrtik_ompl.fast.simd.lanes import double_at, field, set_field
 
 
 @inlined
-def nearest_to_target(search: CrdtAddress, tree: CrdtTreeAddress) -> Any:
+def nearest_to_target(search: CrdtTable, tree: CrdtTreeTable) -> Any:
     """The vertex of a tree that is nearest to TARGET."""
     target, scale = extension_row(search, crdt_layout.TARGET), rule_row(search, crdt_layout.SCALE)
     return nearest_crdt_vertex(tree, dof_in(search), target, scale, field(search, crdt_layout.NEAREST))
 
 
 @inlined
-def has_room(search: CrdtAddress, tree: CrdtTreeAddress) -> Any:
+def has_room(search: CrdtTable, tree: CrdtTreeTable) -> Any:
     """Whether a tree can take a whole extension."""
     return size_of(tree) + dof_in(search) <= field(tree, crdt_layout.CAPACITY)
 
 
 @inlined
-def swap(search: CrdtAddress) -> None:
+def swap(search: CrdtTable) -> None:
     """Let the other tree grow."""
     set_field(search, crdt_layout.GROWING, 1 - field(search, crdt_layout.GROWING))
     set_field(search, crdt_layout.NEXT, crdt_layout.BEGIN)
 
 
 @entry
-def resume_pair(search: CrdtAddress, budget: int) -> int:
+def resume_pair(search: CrdtTable, budget: int) -> int:
     """Go on with two trees that grow in turn, for at most ``budget`` iterations. Returns a status.
 
     ASKING: the edges whose verdict is UNDECIDED want an answer. FULL: both trees want more room.
@@ -83,17 +83,17 @@ def resume_pair(search: CrdtAddress, budget: int) -> int:
 
 
 @inlined
-def goal_in_reach(search: CrdtAddress, tree: CrdtTreeAddress, vertex: int, goal: int) -> Any:
+def goal_in_reach(search: CrdtTable, tree: CrdtTreeTable, vertex: int, goal: int) -> Any:
     """Whether a goal lies within the tolerance around a vertex."""
     total = 0.0
     for axis in range(dof_in(search)):
-        way = double_at(goal_row(search, goal), axis) - coordinate(tree, vertex, axis)
-        total += way * way
+        gap = double_at(goal_row(search, goal), axis) - coordinate(tree, vertex, axis)
+        total += gap * gap
     return total <= double_at(field(search, crdt_layout.GOAL_TOLERANCE), 0)
 
 
 @inlined
-def choose_goal(search: CrdtAddress, tree: CrdtTreeAddress) -> bool:
+def choose_goal(search: CrdtTable, tree: CrdtTreeTable) -> bool:
     """Go on to the next vertex and goal that are near each other; False if there are none."""
     while field(search, crdt_layout.VERTEX) < field(search, crdt_layout.VERTEX_END):
         while field(search, crdt_layout.GOAL) < field(search, crdt_layout.GOAL_COUNT):
@@ -106,7 +106,7 @@ def choose_goal(search: CrdtAddress, tree: CrdtTreeAddress) -> bool:
 
 
 @entry
-def resume_single(search: CrdtAddress, budget: int) -> int:
+def resume_single(search: CrdtTable, budget: int) -> int:
     """Go on with one tree whose vertices near a goal try to reach it; else as :func:`resume_pair`."""
     tree, done = tree_of(search, 0), 0
     while True:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import NewType
 
-CrdtAddress = NewType("CrdtAddress", int)  # of the table of a search
-CrdtTreeAddress = NewType("CrdtTreeAddress", int)  # of the table of a tree
+CrdtTable = NewType("CrdtTable", int)  # of the table of a search
+CrdtTreeTable = NewType("CrdtTreeTable", int)  # of the table of a tree
 
 ROOT = -1
 
 # Statuses of a search.
 RUNNING, ASKING, FULL, SOLVED, EXHAUSTED = range(5)
-# What an extension achieved: nothing, a part of the way, its target exactly.
+# What an extension achieved: nothing, a part of it, its target exactly.
 TRAPPED, ADVANCED, REACHED = range(3)
 # What a search does next.
 BEGIN, GROW, MEET, CHOOSE_GOAL, REACH_GOAL = range(5)

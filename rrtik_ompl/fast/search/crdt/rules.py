@@ -20,7 +20,7 @@ class CrdtRules:
         lower, upper: Samples are drawn between them, shapes (n,); a coordinate for which they are equal never moves.
         scale: Weight of each coordinate in the metric of the nearest neighbour, shape (n,).
         smallest_move: No edge is shorter, shape (n,) [rad or m].
-        chance: How probably a coordinate takes part in the way to a sample, shape (n,); otherwise it stays.
+        chance: How probably a coordinate takes part in the extension to a sample, shape (n,); otherwise it stays.
     """
 
     lower: Vector

@@ -17,7 +17,7 @@ from rrtik_ompl.errors import PlannerError
 from rrtik_ompl.fast.search.crdt import layout as crdt_layout
 from rrtik_ompl.fast.search.crdt.rules import KERNELS, CrdtRules
 from rrtik_ompl.fast.search.crdt.tree_memory import TreeMemory
-from rrtik_ompl.fast.search.motions.motion_table import MotionTable
+from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.fast.tables.layout import COLLIDING, FREE, UNDECIDED
@@ -152,7 +152,7 @@ class CrdtSearch:
         return int(self._table.header[place])
 
 
-def _search_table(motions: MotionTable, robot: Robot, rules: CrdtRules, first: dict[int, int | NDArray[Any]]) -> Table:
+def _search_table(motions: FastMotions, robot: Robot, rules: CrdtRules, first: dict[int, int | NDArray[Any]]) -> Table:
     """The table of a search from what it begins with; fields that nobody names are numbers that the kernels set."""
     dof, fields = motions.dof, dict.fromkeys(range(crdt_layout.FIELD_COUNT), 0)
     limits = robot.lower - LIMIT_TOLERANCE, robot.upper + LIMIT_TOLERANCE

@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import Any
 
 from rrtik_ompl.fast.search.crdt import layout as crdt_layout
-from rrtik_ompl.fast.search.crdt.layout import CrdtTreeAddress
-from rrtik_ompl.fast.search.motions.row_kernels import Row
+from rrtik_ompl.fast.search.crdt.layout import CrdtTreeTable
+from rrtik_ompl.fast.search.motions.row_kernels import Configuration
 from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import (
     choose,
@@ -30,38 +30,38 @@ UNBOUNDED_SQUARE = 1e300  # [squared unit of the scaled metric] more than any sq
 
 
 @inlined
-def size_of(tree: CrdtTreeAddress) -> Any:
+def size_of(tree: CrdtTreeTable) -> Any:
     """Number of vertices."""
     return field(tree, crdt_layout.SIZE)
 
 
 @inlined
-def coordinate(tree: CrdtTreeAddress, vertex: int, axis: int) -> Any:
+def coordinate(tree: CrdtTreeTable, vertex: int, axis: int) -> Any:
     """A coordinate of a vertex."""
     return double_at(field(tree, crdt_layout.COORDINATES), axis * field(tree, crdt_layout.CAPACITY) + vertex)
 
 
 @inlined
-def crdt_parent_of(tree: CrdtTreeAddress, vertex: int) -> Any:
+def crdt_parent_of(tree: CrdtTreeTable, vertex: int) -> Any:
     """The parent of a vertex, ROOT for a root."""
     return int_at(field(tree, crdt_layout.PARENTS), vertex)
 
 
 @inlined
-def set_crdt_parent(tree: CrdtTreeAddress, vertex: int, parent: int) -> None:
+def set_crdt_parent(tree: CrdtTreeTable, vertex: int, parent: int) -> None:
     """Hang a vertex on another one."""
     set_int(field(tree, crdt_layout.PARENTS), vertex, parent)
 
 
 @inlined
-def read_vertex(tree: CrdtTreeAddress, dof: int, vertex: int, sink: Row) -> None:
+def read_vertex(tree: CrdtTreeTable, dof: int, vertex: int, sink: Configuration) -> None:
     """Copy the coordinates of a vertex to an address."""
     for axis in range(dof):
         set_double(sink, axis, coordinate(tree, vertex, axis))
 
 
 @inlined
-def add_crdt_vertex(tree: CrdtTreeAddress, dof: int, row: Row, parent: int) -> Any:
+def add_crdt_vertex(tree: CrdtTreeTable, dof: int, row: Configuration, parent: int) -> Any:
     """Add the coordinates at an address to a tree that has room; returns the number of the vertex."""
     vertex, coordinates = size_of(tree), field(tree, crdt_layout.COORDINATES)
     for axis in range(dof):
@@ -72,7 +72,9 @@ def add_crdt_vertex(tree: CrdtTreeAddress, dof: int, row: Row, parent: int) -> A
 
 
 @kernel
-def nearest_crdt_vertex(tree: CrdtTreeAddress, dof: int, target: Row, scale: Row, nearest: int) -> int:
+def nearest_crdt_vertex(
+    tree: CrdtTreeTable, dof: int, target: Configuration, scale: Configuration, nearest: int
+) -> int:
     """The vertex nearest to a target in the scaled metric; among equals the oldest. ``nearest``: two wide lanes."""
     coordinates = field(tree, crdt_layout.COORDINATES)
     count, run = size_of(tree), field(tree, crdt_layout.CAPACITY) // WIDTH
@@ -80,8 +82,8 @@ def nearest_crdt_vertex(tree: CrdtTreeAddress, dof: int, target: Row, scale: Row
     for block in range((count + WIDTH - 1) // WIDTH):
         total = spread_wide(0.0)
         for axis in range(dof):
-            way = (wide_lanes_at(coordinates, axis * run + block) - double_at(target, axis)) * double_at(scale, axis)
-            total = rounded_sum(total, way * way)
+            gap = (wide_lanes_at(coordinates, axis * run + block) - double_at(target, axis)) * double_at(scale, axis)
+            total = rounded_sum(total, gap * gap)
         numbers = lane_numbers() + float(block * WIDTH)
         total = choose(numbers < float(count), total, spread_wide(UNBOUNDED_SQUARE))
         nearer = total < lowest

@@ -24,35 +24,35 @@ from rrtik_ompl.fast.search.motions.motion_layout import (
     STEPS_PER_UNIT,
     WEIGHTS,
     WORLD,
-    MotionAddress,
+    FastMotions,
 )
-from rrtik_ompl.fast.search.motions.row_kernels import Row, Values, distance, row_at
+from rrtik_ompl.fast.search.motions.row_kernels import Configuration, JointValues, distance, row_at
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_double
 from rrtik_ompl.fast.tables.layout import FREE
 
 
 @inlined
-def dof_of(motions: MotionAddress) -> Any:
+def dof_of(motions: FastMotions) -> Any:
     """How many numbers a configuration has."""
     return field(motions, DOF)
 
 
 @inlined
-def world_of(motions: MotionAddress) -> Any:
+def world_of(motions: FastMotions) -> Any:
     """The tables of the checks."""
     return field(motions, WORLD)
 
 
 @inlined
-def resolves(motions: MotionAddress) -> bool:
+def resolves(motions: FastMotions) -> bool:
     """Whether doubtful motions are resolved in this world."""
     resolve: bool = field(motions, RESOLVE) != 0
     return resolve
 
 
 @kernel
-def set_joint_values(motions: MotionAddress, row: Row, values: Values) -> None:
+def set_joint_values(motions: FastMotions, row: Configuration, values: JointValues) -> None:
     """Write the joint values of a configuration."""
     dof, gain, offset = field(motions, DOF), field(motions, GAIN), field(motions, OFFSET)
     for joint in range(field(motions, JOINTS)):
@@ -69,7 +69,7 @@ def whole_steps(steps: float) -> Any:
 
 
 @kernel
-def step_count(motions: MotionAddress, start: Row, end: Row) -> Any:
+def step_count(motions: FastMotions, start: Configuration, end: Configuration) -> Any:
     """Number of steps in which a motion is checked; :func:`rrtik_ompl.fast.search.motions.motion_table.step_counts`."""
     dof, weights, numbers = field(motions, DOF), field(motions, WEIGHTS), field(motions, NUMBERS)
     travel = 0.0
@@ -82,7 +82,7 @@ def step_count(motions: MotionAddress, start: Row, end: Row) -> Any:
 
 
 @kernel
-def descends(dof: int, start: Row, end: Row) -> Any:
+def descends(dof: int, start: Configuration, end: Configuration) -> Any:
     """Whether the start comes after the end in the order of their coordinates."""
     for k in range(dof):
         if double_at(start, k) != double_at(end, k):
@@ -91,7 +91,7 @@ def descends(dof: int, start: Row, end: Row) -> Any:
 
 
 @kernel
-def check_motion(motions: MotionAddress, start: Row, end: Row, resolve: bool) -> Any:
+def check_motion(motions: FastMotions, start: Configuration, end: Configuration, resolve: bool) -> Any:
     """Check the motion between two configurations: FREE, UNDECIDED or COLLIDING.
 
     Without ``resolve`` the outer balls alone decide, and what they do not prove free is UNDECIDED.
@@ -105,7 +105,7 @@ def check_motion(motions: MotionAddress, start: Row, end: Row, resolve: bool) ->
 
 
 @kernel
-def configuration_free(motions: MotionAddress, row: Row) -> bool:
+def configuration_free(motions: FastMotions, row: Configuration) -> bool:
     """Whether the outer balls prove a configuration free."""
     values = field(motions, ENDS)
     set_joint_values(motions, row, values)

@@ -34,7 +34,7 @@ def step_counts(starts: Matrix, ends: Matrix, weights: Vector, resolution: float
     return counts
 
 
-class MotionTable:
+class FastMotions:
     """What kernels need to check straight motions in a world; all searches in the world read this one table.
 
     Obstacles may be moved meanwhile: the table holds where the tables of the checks are, not what they say.
@@ -107,7 +107,7 @@ class MotionTable:
     def require_covered(self, lower: Vector, upper: Vector) -> None:
         """Refuse a box of configurations that the checks' margin against rounding does not cover; shapes (dof,).
 
-        The kernels do not look at it again.
+        The kernels do not check it again.
 
         Raises:
             InputError: It names the joint.
@@ -132,7 +132,7 @@ class KernelWorld(Protocol):
         """The tables of the checks, None where nothing can be checked in kernels."""
 
 
-def motions_of(world: KernelWorld, kept: MotionTable | None) -> MotionTable | None:
+def motions_of(world: KernelWorld, kept: FastMotions | None) -> FastMotions | None:
     """The motion table of a world: the one that was kept while it still fits, None where kernels cannot be used."""
     fast, resolve = world.fast, world.accuracy == "exact"
     if fast is None:
@@ -145,4 +145,4 @@ def motions_of(world: KernelWorld, kept: MotionTable | None) -> MotionTable | No
     ):
         return kept
     chain, resolution = world.robot.chain, world.motion_resolution
-    return MotionTable(fast, chain.gain, chain.offset, weights=world.weights, resolution=resolution, resolve=resolve)
+    return FastMotions(fast, chain.gain, chain.offset, weights=world.weights, resolution=resolution, resolve=resolve)

@@ -9,8 +9,8 @@ import numpy as np
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, set_double
 
-Row = NewType("Row", int)  # address of a configuration, float64
-Values = NewType("Values", int)  # address of the joint values of a configuration, float64
+Configuration = NewType("Configuration", int)  # address of a configuration, float64
+JointValues = NewType("JointValues", int)  # address of the joint values of a configuration, float64
 NUMBER_BYTES = 8  # of a float64
 
 
@@ -28,7 +28,7 @@ def copy_row(length: int, source: int, sink: int) -> None:
 
 
 @kernel
-def distance(dof: int, one: Row, two: Row) -> float:
+def distance(dof: int, one: Configuration, two: Configuration) -> float:
     """Euclidean distance of two configurations."""
     total = 0.0
     for k in range(dof):
