@@ -11,8 +11,9 @@ import numpy as np
 
 from rrtik_ompl.fast.checks.check_kernels import check_edge
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
-from rrtik_ompl.fast.simd.lanes import double_at, field, set_double
-from rrtik_ompl.fast.tables.layout import ARM, JOINT_COUNT
+from rrtik_ompl.fast.simd.lanes import double_at, set_double
+from rrtik_ompl.fast.tables.accessors import arm_of, joint_count_of, joint_row
+from rrtik_ompl.fast.tables.layout import JointValues, WorldTable
 
 SLACK = 1e-9  # a motion this little longer than a number of steps is checked in that number of steps
 
@@ -60,11 +61,20 @@ def descends(dof: int, start: int, end: int) -> Any:
 
 @kernel
 def check_motion(
-    world: int, dof: int, gain: int, offset: int, start: int, end: int, steps: int, values: int, resolve: bool
+    world: WorldTable,
+    dof: int,
+    gain: int,
+    offset: int,
+    start: int,
+    end: int,
+    steps: int,
+    values: JointValues,
+    resolve: bool,
 ) -> Any:
     """Check the motion between two configurations; ``values`` has room for the joint values of both."""
-    joints = field(field(world, ARM), JOINT_COUNT)
+    joints = joint_count_of(arm_of(world))
+    others = joint_row(values, joints, 1)
     first, second = (end, start) if descends(dof, start, end) else (start, end)
     joint_values(dof, joints, gain, offset, first, values)
-    joint_values(dof, joints, gain, offset, second, values + 8 * joints)
-    return check_edge(world, values, values + 8 * joints, steps, resolve)
+    joint_values(dof, joints, gain, offset, second, others)
+    return check_edge(world, values, others, steps, resolve)
