@@ -52,6 +52,7 @@ def short_sweeps(world, rng, count):
     return np.clip(rows, lower, upper).reshape(-1, world.robot.dof)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_on_millions_of_configurations_the_world_says_what_coal_says(name, dented_cube):
     robot = load_robot(name)
