@@ -8,6 +8,8 @@ import pytest
 
 from rrtik_tests.places import ROOT
 
+pytestmark = pytest.mark.slow
+
 SCRIPT = ROOT / "bench" / "speed" / "report.py"
 PACKAGES = os.pathsep.join(str(ROOT / folder) for folder in (".", "planners", "robots", "bench"))
 

@@ -10,6 +10,8 @@ from rrtik_ompl.benchmark.suite import load_suite
 from rrtik_ompl.cli.app import run
 from rrtik_tests.campaigns import SUITE, TOTAL, found
 
+pytestmark = pytest.mark.slow
+
 
 def test_every_run_is_recorded_with_what_it_measured(campaign):
     records = list(read_records(campaign / NAME))

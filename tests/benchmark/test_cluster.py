@@ -12,6 +12,8 @@ from rrtik_ompl.benchmark.suite import load_suite
 from rrtik_ompl.cli.app import run
 from rrtik_tests.campaigns import found
 
+pytestmark = pytest.mark.slow
+
 
 def test_a_scheduler_that_does_not_answer_is_one_line(suite, tmp_path, capsys, monkeypatch):
     pytest.importorskip("distributed", reason="needs Dask: pip install 'rrtik-ompl[cluster]'")

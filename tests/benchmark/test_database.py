@@ -18,6 +18,8 @@ import pytest
 from rrtik_ompl.benchmark.records import NAME, read_records
 from rrtik_tests.campaigns import TOTAL
 
+pytestmark = pytest.mark.slow
+
 
 def test_the_database_is_sound_and_has_ompls_columns_and_ours(campaign):
     with closing(sqlite3.connect(campaign / "benchmark.db")) as base:

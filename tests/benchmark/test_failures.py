@@ -16,6 +16,8 @@ from rrtik_ompl.benchmark.suite import load_suite
 from rrtik_ompl.cli.app import run
 from rrtik_ompl.errors import InputError
 
+pytestmark = pytest.mark.slow
+
 BAD_PLANNERS = """\
 import ctypes, os, numpy as np
 from ompl import base as ob

@@ -9,6 +9,8 @@ from rrtik_ompl.benchmark.report import write_report
 from rrtik_ompl.cli.app import run
 from rrtik_ompl.errors import InputError
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize(
     ("line", "words"),

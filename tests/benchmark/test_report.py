@@ -6,12 +6,15 @@ import sqlite3
 from contextlib import closing
 
 import numpy as np
+import pytest
 
 from rrtik_ompl.benchmark.records import NAME, RecordFile, key_of, read_head, read_records
 from rrtik_ompl.benchmark.report import write_report
 from rrtik_ompl.benchmark.statistics import QUANTITIES, results, spread
 from rrtik_ompl.benchmark.tables import remark
 from rrtik_tests.campaigns import TOTAL
+
+pytestmark = pytest.mark.slow
 
 
 def test_records_of_an_earlier_version_are_still_reported(campaign, tmp_path):

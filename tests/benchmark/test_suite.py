@@ -43,6 +43,7 @@ def test_a_typo_in_a_suite_is_one_line_that_names_its_place(tmp_path, capsys, ol
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_a_parameter_of_the_wrong_kind_is_told_and_the_other_planners_run(tmp_path, capsys):
     file = tmp_path / "s.yaml"
     file.write_text(SUITE.replace("range: 0.3", "range: soon").replace("runs: 3", "runs: 1"))

@@ -89,17 +89,20 @@ def test_open_meshes_have_no_inner_balls(name):
     assert inner_spheres(mesh_solid(name)).shape == (0, 4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["titan4", "panda", "ur5"])
 def test_links_of_real_robots_are_covered_and_hold_their_inner_balls(robot):
     for solid in robot_solids(load_robot(robot)):
         check_covers(solid)
 
 
+@pytest.mark.slow
 def test_links_with_many_triangles_are_covered_and_hold_their_inner_balls():
     for solid in robot_solids(load_robot("kinova"))[:7:3]:
         check_covers(solid, count=20000)
 
 
+@pytest.mark.slow
 @FEW
 @given(st.integers(0, 10**6), st.integers(4, 60), st.floats(-7, 0), st.floats(-3, 3))
 def test_random_hulls_are_covered(seed, count, flatness, size):
@@ -116,6 +119,7 @@ def test_random_hulls_are_covered(seed, count, flatness, size):
     assert gap_outside(sample, cover) <= TOLERANCE
 
 
+@pytest.mark.slow
 @FEW
 @given(st.tuples(*[st.floats(-4, 1)] * 3))
 def test_random_boxes_are_covered_and_hold_their_inner_balls(sides):
@@ -124,6 +128,7 @@ def test_random_boxes_are_covered_and_hold_their_inner_balls(sides):
     assert_inside(inner_spheres(solid), solid)
 
 
+@pytest.mark.slow
 @FEW
 @given(st.floats(-3, 0.5), st.integers(3, 9))
 def test_prisms_are_covered_and_hold_their_inner_balls(height, corners):

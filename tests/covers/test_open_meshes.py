@@ -48,6 +48,7 @@ def test_a_huge_mesh_is_taken_as_its_box(monkeypatch):
     assert len(inner_spheres(fine)) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shared", [False, True])
 def test_a_mesh_of_open_edges_only_is_taken_as_its_box(shared):
     rng = np.random.default_rng(1)
@@ -77,6 +78,7 @@ def test_no_point_inside_an_open_mesh_is_left_out(share):
     assert _worst_near_half(solid, outer_cover(solid), np.random.default_rng(0)) == []
 
 
+@pytest.mark.slow
 def test_no_point_inside_the_open_links_of_robots_is_left_out():
     solids = robot_solids(load_robot("ur10"))[3], robot_solids(load_robot("ur3"))[4]
     for solid in solids:

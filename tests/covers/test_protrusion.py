@@ -49,6 +49,7 @@ def test_small_parts_get_few_balls():
     assert len(inner_spheres(coal.Box(0.02, 0.015, 0.02))) <= 4
 
 
+@pytest.mark.slow
 def test_the_same_solid_gets_the_same_balls():
     for solid in (SOLIDS["box"], SOLIDS["cylinder"], mesh_solid("torus"), mesh_solid("hole")):
         assert np.array_equal(outer_cover(solid), outer_cover(solid))

@@ -130,6 +130,7 @@ def test_what_cannot_be_drawn_is_one_line(capsys, tmp_path, monkeypatch, change,
 # --- from photographs to a plan ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_commands_of_the_page_on_sensing_lead_from_photographs_to_a_film(capsys, tmp_path, monkeypatch):
     page = (ROOT / "docs" / "sensing.md").read_text()
     (block,) = (b for b in page.split("```")[1::2] if "rrtik markers sense" in b)

@@ -13,6 +13,7 @@ from rrtik_ompl.world import World
 from rrtik_tests.pilot_session import PROBLEM, ROBOT, WORLD
 
 
+@pytest.mark.slow
 def test_no_command_of_many_leads_beyond_limits_or_into_anything():
     rng = np.random.default_rng(0)
     q, accepted = np.array(PROBLEM.start), []

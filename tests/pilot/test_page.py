@@ -141,6 +141,7 @@ def choose(browser, color):
     raise AssertionError(f"no {color} lamp")
 
 
+@pytest.mark.slow
 def test_from_start_to_grasp_by_keys_alone(browser, tmp_path):
     record = tmp_path / "session.jsonl"
     with Running(SessionOptions("titan4_sdu", record=record)) as running:

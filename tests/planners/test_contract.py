@@ -80,6 +80,7 @@ main()
 """
 
 
+@pytest.mark.slow
 def test_contract_holds_with_a_memory_that_shows_misuse() -> None:
     run = run_strictly(CHECK_ALL)
     assert (run.returncode, run.stdout.strip()) == (0, "kept"), run.stderr[-2000:]
@@ -115,6 +116,7 @@ main()
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="reads the memory in use from /proc")
 def test_ten_thousand_solves_leave_the_memory_flat() -> None:
     run = run_strictly(SOAK_ALL)

@@ -29,6 +29,7 @@ print(resident() - settled)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(600)
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="resident memory is read from /proc")
 def test_memory_is_flat_over_ten_thousand_solves():

@@ -66,6 +66,7 @@ def test_a_motion_keeps_its_limits_on_a_dense_grid_and_in_its_peaks(task):
     assert (peaks.jerk <= limits.jerk * (1 + 1e-9)).all()
 
 
+@pytest.mark.slow
 @settings(max_examples=80)
 @given(tasks())
 def test_a_motion_stays_on_the_path_and_keeps_its_ends(task):

@@ -60,6 +60,7 @@ def file(text: str, tmp_path: Path) -> Path:
     return target
 
 
+@pytest.mark.slow
 def test_a_browser_shows_obstacles_trail_ghosts_and_a_robot_that_moves(file: Path) -> None:
     at_start, later = screenshot(file, ""), screenshot(file, "#waypoint=2")
     for picture in (at_start, later):

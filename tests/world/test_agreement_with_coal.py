@@ -52,6 +52,7 @@ def short_sweeps(world, rng, count):
     return np.clip(rows, lower, upper).reshape(-1, world.robot.dof)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_on_millions_of_configurations_the_world_says_what_coal_says(name, dented_cube):
     robot = load_robot(name)
@@ -95,6 +96,7 @@ def test_a_conservative_world_calls_nothing_free_that_is_not(name, dented_cube):
     np.testing.assert_array_equal(careful, covered)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["titan4", "panda", "ur5", "z1"])
 def test_what_kernels_are_sure_of_is_true_and_they_leave_little_open(name, dented_cube):
     robot, rng = load_robot(name), np.random.default_rng(17)
@@ -106,6 +108,7 @@ def test_what_kernels_are_sure_of_is_true_and_they_leave_little_open(name, dente
     assert (answers == UNDECIDED).mean() < 0.03
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["titan4", "ur5", "panda_primitives"])
 def test_the_certificate_says_the_same_in_whatever_order_rows_come(name, dented_cube):
     robot, rng = load_robot(name), np.random.default_rng(13)

@@ -33,6 +33,7 @@ def test_joint_frames_are_the_robots_own_far_within_the_margin(name):
     assert error[..., :3, :3].max() < 5e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ARMS)
 def test_a_free_or_colliding_answer_never_contradicts_the_slow_computation(name):
     for seed in range(8):

@@ -14,6 +14,7 @@ from rrtik_tests.random_cases import ARMS, KINDS, SLIDER, Case, arm, configurati
 pytestmark = pytest.mark.kernels
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ARMS)
 def test_rounding_never_decides_at_the_very_contact(name):
     at_contact = 0
@@ -47,6 +48,7 @@ def test_the_margin_covers_the_rounding_of_frames_far_from_the_origin(away):
     assert np.linalg.norm(error[..., :3, 3], axis=-1).max() < 0.25 * margin
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["titan4", "slider"])
 def test_only_a_band_of_a_few_margins_is_left_undecided(name):
     for seed in range(6):
@@ -90,6 +92,7 @@ def standing_pairs(case):
     return [p for p in case.pairs if all(case.bodies[k].joint == 0 for k in p)]
 
 
+@pytest.mark.slow
 def test_large_worlds_get_a_larger_margin_and_stay_right():
     for seed in range(3):
         case = Case("slider", seed, size=40.0)

@@ -81,6 +81,7 @@ def cached(filled, tmp_path, monkeypatch):
     return file
 
 
+@pytest.mark.slow
 def test_what_one_process_compiled_the_next_loads_without_numba(filled):
     assert finished(start(RRTIK_CACHE=str(filled[0]))) == (filled[1], "llvmlite", "")
 
@@ -96,12 +97,14 @@ def test_plain_numpy_answers_the_same(filled):
     assert finished(start(plain, RRTIK_CACHE=str(filled[0]))) == (filled[1], "numpy", "")
 
 
+@pytest.mark.slow
 def test_both_widths_answer_the_same(filled, tmp_path):
     for width in ("8", "16"):
         answers, _, said = finished(start(RRTIK_CACHE=str(tmp_path), RRTIK_LANES=width))
         assert (answers, said) == (filled[1], "compiling\n")
 
 
+@pytest.mark.slow
 def test_processes_that_start_at_once_do_not_disturb_each_other(filled, tmp_path):
     for process in [start(RRTIK_CACHE=str(tmp_path)) for _ in range(2)]:
         assert finished(process)[0] == filled[1]
@@ -214,6 +217,7 @@ def test_a_compiler_that_fails_is_told_once_and_replaced_by_numpy(cached, monkey
     assert library.library(KERNELS) is None
 
 
+@pytest.mark.slow
 def test_warming_up_makes_all_kernels(cached, capsys):
     before = cached.read_bytes()
     cached.unlink()
@@ -338,6 +342,7 @@ print(*[calls[name]() for name in sys.argv[1:]])
 """
 
 
+@pytest.mark.slow
 def test_code_for_other_kinds_of_arguments_is_not_taken_from_numbas_cache(tmp_path):
     """Two processes that fill it at once can leave each other's code under a name."""
     source, folder = tmp_path / "kinds.py", tmp_path / "numba"

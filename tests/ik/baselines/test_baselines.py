@@ -47,6 +47,7 @@ def test_a_point_is_reached_inside_the_limits(name, method):
         assert robot.within_limits(result.solutions, 0.0).all()
 
 
+@pytest.mark.slow
 @LIMITED
 def test_a_point_out_of_reach_says_by_how_much(method):
     robot = rrtik.load_robot("planar3")
