@@ -31,7 +31,7 @@ from rrtik_ompl.ik.goal_rows import pose_rows
 from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS
 from rrtik_ompl.ik.numeric.kernel_call import KernelCall
 from rrtik_ompl.ik.serial_chain import seeded_limb_of
-from rrtik_ompl.ik.solve import list_ik_methods, usual_posture
+from rrtik_ompl.ik.solve import list_ik_methods, mid_range_configuration
 from rrtik_ompl.robot import Robot
 
 ARMS = ("ur5", "panda", "puma560", "titan4")
@@ -111,7 +111,7 @@ def by_face(robot: Robot, method: str, pose: np.ndarray) -> np.ndarray | None:
 def single(robot: Robot, poses: np.ndarray, budget: float, methods: Sequence[str]) -> tuple[dict[str, Runs], list[str]]:
     """Methods of ours and the peers' on the poses, taking turns; and who is absent."""
     runs, absent = {}, []
-    start = usual_posture(robot)
+    start = mid_range_configuration(robot)
     for method in methods:
         try:
             if method == KERNEL:

@@ -12,6 +12,7 @@ import numpy as np
 
 from rrtik_ompl import catalog
 from rrtik_ompl.arrays import Matrix, positive, whole_number
+from rrtik_ompl.choices import Accuracy
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.goal import JointGoal
@@ -62,7 +63,7 @@ def plan(
     seed: int | None = None,
     restarts: int = RESTARTS,
     parameters: Mapping[str, Any] | None = None,
-    accuracy: str | None = None,
+    accuracy: Accuracy | None = None,
 ) -> Plan:
     """Find a collision-free path from the start to the goal of a problem.
 

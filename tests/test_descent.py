@@ -18,7 +18,7 @@ from rrtik_ompl.ik.numeric.descent import Search, walk
 from rrtik_ompl.ik.numeric.levenberg_marquardt import descent, numeric_ik
 from rrtik_ompl.ik.numeric.reference_descent import walk_plainly
 from rrtik_ompl.ik.serial_chain import SEEDS
-from rrtik_ompl.ik.solve import usual_posture
+from rrtik_ompl.ik.solve import mid_range_configuration
 from rrtik_ompl.shapes import Box
 
 MIXED = """
@@ -84,7 +84,7 @@ def test_kernels_and_numpy_find_the_same_solutions(name, monkeypatch):
     found, everything = [], np.arange(12)
     for kernels in (library, lambda name: None):
         monkeypatch.setattr(descent, "library", kernels)
-        search = Search(robot, rows, usual_posture(robot))
+        search = Search(robot, rows, mid_range_configuration(robot))
         found += [search.advance(everything), search.q.copy(), search.advance(everything), search.q.copy()]
     assert found[0].all()
     assert found[2].all()
@@ -114,12 +114,12 @@ def test_a_goal_out_of_reach_has_no_solution(kernels, monkeypatch):
 def test_what_else_is_asked_changes_no_answer():
     robot = rrtik.load_robot("panda")
     rows = pose_rows(robot.fk_batch(random_rows(robot, 20, seed=5)))
-    together, alone = Search(robot, rows, usual_posture(robot)), Search(robot, rows, usual_posture(robot))
+    together, alone = (Search(robot, rows, mid_range_configuration(robot)) for _ in range(2))
     together.advance(np.arange(20))
     alone.advance(np.array([7, 3]))
     assert alone.q[[3, 7]].tolist() == together.q[[3, 7]].tolist()
     with ThreadPoolExecutor(2) as pool:
-        searches = [Search(robot, rows, usual_posture(robot)) for _ in range(8)]
+        searches = [Search(robot, rows, mid_range_configuration(robot)) for _ in range(8)]
         list(pool.map(lambda each: each.advance(np.arange(20)), searches))
     assert all(np.array_equal(each.q, together.q) for each in searches)
 

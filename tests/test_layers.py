@@ -13,7 +13,7 @@ import rrtik_ompl
 
 ROOT = Path(__file__).resolve().parent.parent
 RUNGS = (
-    "errors arrays shapes files poses transitions robot",
+    "errors choices arrays shapes files poses transitions robot",
     "tip_distance task_region scene goal collision covers fast description catalog",
     "world search path problem ik problem_files moves reach",
     "ompl_bridge planning shortening generated_problems",

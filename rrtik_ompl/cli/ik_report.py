@@ -17,7 +17,7 @@ from rrtik_ompl.arrays import TAU, Matrix, Vector, frozen
 from rrtik_ompl.goal import PoseGoal, PositionGoal, joint_difference
 from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form, solutions
 from rrtik_ompl.ik.analytic.reference_branches import tip_fault
-from rrtik_ompl.ik.solve import IkResult, different_rows, usual_posture
+from rrtik_ompl.ik.solve import IkResult, different_rows, mid_range_configuration
 from rrtik_ompl.robot import Robot
 
 SAME = 1e-5  # [rad] or [m]; a double root is known to the square root of the rounding
@@ -58,7 +58,7 @@ def fold_full_turns(robot: Robot, result: IkResult, near: Vector | None) -> tupl
         The result, nearest first, and for each of its solutions how many more there are inside the limits by full
         turns, found or not. Joints that turn without limits are not counted.
     """
-    posture = usual_posture(robot) if near is None else near
+    posture = mid_range_configuration(robot) if near is None else near
     counted = ~(robot.prismatic | robot.continuous)
     turned = result.solutions - TAU * np.round((result.solutions - posture) / TAU)
     Q = np.where(counted & (robot.lower <= turned) & (turned <= robot.upper), turned, result.solutions)

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from rrtik_ompl.choices import one_of
 from rrtik_ompl.cli.terminal import progress, say
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
@@ -106,6 +107,7 @@ def time_path(
 def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> Any:
     """The path as single-joint moves."""
     from rrtik_ompl import load_path, load_problem, one_joint_moves
+    from rrtik_ompl.shortening import METHODS
     from rrtik_ompl.shortening import shorten as shortened
 
     if problem is None:
@@ -123,7 +125,7 @@ def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> Any:
         if not route.one_joint_at_a_time:
             route = one_joint_moves(route, question)
         if shorten is not None:
-            route = shortened(route, question, method=shorten)
+            route = shortened(route, question, method=one_of(METHODS, shorten, "shortening method"))
     return route
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, not_negative, whole_number
+from rrtik_ompl.choices import IkMethod
 from rrtik_ompl.goal import PoseGoal, joint_difference
 from rrtik_ompl.ik.analytic.closed_form import branches_of, check_poses, form_of
 from rrtik_ompl.ik.analytic.reference_branches import tip_residuals
@@ -16,7 +17,7 @@ from rrtik_ompl.ik.goal_rows import POSE, pose_rows
 from rrtik_ompl.ik.method_interface import tolerances
 from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ik.numeric.descent import Search
-from rrtik_ompl.ik.solve import SECONDS, chosen_method, free_of_collision, solve_ik, usual_posture
+from rrtik_ompl.ik.solve import SECONDS, chosen_method, free_of_collision, mid_range_configuration, solve_ik
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World, check_world
 
@@ -45,7 +46,7 @@ def solve_ik_batch(
     robot: Robot,
     poses: ArrayLike,
     *,
-    method: str = "auto",
+    method: IkMethod = "auto",
     near: ArrayLike | None = None,
     world: World | None = None,
     seconds: float = SECONDS,
@@ -70,7 +71,7 @@ def solve_ik_batch(
     load_kernels(robot)
     begin = time.monotonic()
     targets = finite_array(poses, (None, 4, 4), "poses")
-    posture = usual_posture(robot) if near is None else robot.configuration(near, "near")
+    posture = mid_range_configuration(robot) if near is None else robot.configuration(near, "near")
     limit, first_seed = not_negative(seconds, "seconds"), whole_number(seed, "seed")
     q, residuals = np.full((len(targets), robot.dof), np.nan), np.full((len(targets), 2), np.nan)
     reasons, details = [""] * len(targets), [""] * len(targets)

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, positive, whole_number
-from rrtik_ompl.errors import InputError, UnknownNameError, require
+from rrtik_ompl.choices import ShorteningMethod, one_of
+from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.moves.axis_cut import double_axis_cut
 from rrtik_ompl.moves.axis_cut_rounds import axis_cut_rounds
 from rrtik_ompl.moves.rules import MoveRules
@@ -67,7 +68,7 @@ def _fewest_moves(route: Matrix, task: Task, problem: Problem) -> Matrix:
     return fewest_moves(route, judge, seed=task.seed, stop=task.expired, rules=task.rules).route
 
 
-METHODS: Mapping[str, Method] = MappingProxyType(
+METHODS: Mapping[ShorteningMethod, Method] = MappingProxyType(
     {
         "axis": Method(_axis, keeps_moves=True),
         "axis-rounds": Method(_axis_rounds, keeps_moves=True),
@@ -87,7 +88,7 @@ def shorten(
     path: JointPath,
     problem: Problem,
     *,
-    method: str = "axis",
+    method: ShorteningMethod = "axis",
     seconds: float | None = None,
     seed: int = 0,
     one_joint: bool = False,
@@ -160,13 +161,12 @@ def _parts(route: Matrix, rules: MoveRules | None) -> tuple[Matrix, Matrix]:
 
 
 def _checked(
-    path: JointPath, problem: Problem, method: str, seconds: float | None, seed: int, one_joint: bool
+    path: JointPath, problem: Problem, method: ShorteningMethod, seconds: float | None, seed: int, one_joint: bool
 ) -> Method:
     """The method, if the request makes sense."""
     require(path, JointPath, "path to shorten", "a plan has one if plan.found")
     require(problem, Problem, "problem of a path to shorten")
-    if method not in METHODS:
-        raise UnknownNameError("shortening method", method, METHODS)
+    chosen = METHODS[one_of(METHODS, method, "shortening method")]
     if seconds is not None:
         positive(seconds, "seconds")
     whole_number(seed, "seed")
@@ -177,6 +177,6 @@ def _checked(
         raise InputError(f"path to shorten: edge {faults[0].edge + 1} is not valid: {faults[0].reason}")
     if one_joint and not path.one_joint_at_a_time:
         raise InputError("path to shorten: it moves several joints at once, so one_joint cannot be kept")
-    if one_joint and not METHODS[method].can_keep_moves:
+    if one_joint and not chosen.can_keep_moves:
         raise InputError(f"shortening method '{method}' cannot keep one joint at a time; use axis or auto")
-    return METHODS[method]
+    return chosen
