@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.search.crdt.rules import KERNELS, AxisRules
 from rrtik_ompl.fast.search.crdt.search import AxisSearch
 from rrtik_ompl.moves.rules import Joints, PerJoint
-from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_planners.crdt_stream import CrdtStream
 from rrtik_planners.crdt_tree import CrdtTree, Outcome
@@ -39,7 +39,7 @@ class CRDT(OneJointPlanner):
 
     def __init__(
         self,
-        si: Any,
+        si: ob.SpaceInformation,
         *,
         world: MotionQueries | None = None,
         seed: int | None = None,
@@ -82,7 +82,7 @@ class CRDT(OneJointPlanner):
             raise InputError(f"goal_tolerance: expected a number greater than 0, got {goal_tolerance!r}")
         self.goal_tolerance = goal_tolerance
 
-    def between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+    def between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`OneJointPlanner.between`."""
         lower, upper = self.bounds()
         tolerance = self.goal_tolerance or GOAL_TOLERANCE_SHARE * float(np.linalg.norm(upper - lower))
@@ -136,7 +136,7 @@ class OneTreeSearch:
         """Vertices of the tree."""
         return self._tree.size
 
-    def advance(self, stop: Callable[[], Any]) -> bool:
+    def advance(self, stop: Stop) -> bool:
         """Go on to the next solution; False if ``stop()`` or the limit of iterations came first."""
         while not stop():
             while self._waiting:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix, Vector, positive
 from rrtik_ompl.fast.search.connect_layout import KERNELS
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
-from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_ompl.replanning.connecting import KERNELS as LIBRARIES
 from rrtik_ompl.replanning.connecting import KernelConnect, PlainConnect
 from rrtik_ompl.replanning.drrt_con import DrrtCon, points_along
@@ -31,7 +32,12 @@ class DRRTCon(SafePlanner):
     kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
 
     def __init__(
-        self, si: Any, *, world: MotionQueries | None = None, seed: int | None = None, range: float | None = None
+        self,
+        si: ob.SpaceInformation,
+        *,
+        world: MotionQueries | None = None,
+        seed: int | None = None,
+        range: float | None = None,
     ) -> None:
         """Make a planner.
 
@@ -53,7 +59,7 @@ class DRRTCon(SafePlanner):
         super().clear()
         self._core = None
 
-    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         core = self._core
         reused = core is not None and core.path is not None and self._from_kept(core, starts, goals, checker, ptc)
@@ -65,7 +71,7 @@ class DRRTCon(SafePlanner):
         statistics = {"iterations": core.connect.samples, "repairs": core.repairs, "reused": int(reused)}
         return SearchResult(core.path if core.free else None, statistics)
 
-    def _from_kept(self, core: DrrtCon, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> bool:
+    def _from_kept(self, core: DrrtCon, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> bool:
         """Whether the kept path could be made to lead from a start to a goal."""
         assert core.path is not None
         start, passed = _nearest_place(core.path, starts, 0.5 * core.eps)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from ompl import base as ob
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, positive
+from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast.search.connect import ConnectSearch
 from rrtik_ompl.fast.search.connect_layout import KERNELS
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
-from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_ompl.search.rrt_connect import ConnectRules, RrtConnect, straight_path
 from rrtik_ompl.world.motion_queries import has_kernels, is_conservative, kernel_tables
 from rrtik_planners.one_joint_options import iteration_limit
@@ -29,7 +31,7 @@ class FastRRTConnect(SafePlanner):
 
     def __init__(
         self,
-        si: Any,
+        si: ob.SpaceInformation,
         *,
         world: MotionQueries | None = None,
         seed: int | None = None,
@@ -54,9 +56,9 @@ class FastRRTConnect(SafePlanner):
         self.range = None if range is None else positive(range, "range")
         self.domain = None if domain is None else positive(domain, "domain")
         self.max_iterations = iteration_limit(max_iterations)
-        self._kept: tuple[Any, Any, ConnectSearch | None] | None = None  # world, bounds, and the search made for them
+        self._kept: tuple[FastWorld | None, tuple[Vector, Vector], ConnectSearch | None] | None = None
 
-    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         kernels = self._kernels()
         if kernels is None:
@@ -81,7 +83,7 @@ class FastRRTConnect(SafePlanner):
         checker.checked_states += len(rows)
         return np.ones(len(rows), dtype=bool)
 
-    def _in_python(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+    def _in_python(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """The same search, where every motion is decided at once."""
         lower, upper = self.bounds()
         range_, domain = connect_lengths(lower, upper, *self._lengths)

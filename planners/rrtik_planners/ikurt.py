@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+
+from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix, positive
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import Goal
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
 from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
-from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.world import World
 from rrtik_planners.tip_seeker import TipSeeker, misses
 
@@ -27,7 +28,7 @@ class IKURT(TipSeeker):
 
     def __init__(
         self,
-        si: Any,
+        si: ob.SpaceInformation,
         *,
         world: MotionQueries | None = None,
         seed: int | None = None,
@@ -64,7 +65,7 @@ class IKURT(TipSeeker):
         self.options = Options(positive(step, "step"), positive(stride, "stride"), jacobian, most_vertices)
         self.metres_per_radian = None if metres_per_radian is None else positive(metres_per_radian, "metres_per_radian")
 
-    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         metric = self._metric(goals)
         validity = IkurtValidity(checker.valid_batch, checker.motion_valid_batch, ptc)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import Goal, JointGoal
 from rrtik_ompl.ik.mb_rrt.aims import tree_aims
 from rrtik_ompl.ik.mb_rrt.axes import misfit
-from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, space_bounds
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop, space_bounds
 from rrtik_ompl.world import World
 from rrtik_planners.bicrdt import BiCRDT
 
@@ -27,7 +28,7 @@ class MBRRT(BiCRDT):
 
     def __init__(
         self,
-        si: Any,
+        si: ob.SpaceInformation,
         *,
         world: MotionQueries | None = None,
         seed: int | None = None,
@@ -59,7 +60,7 @@ class MBRRT(BiCRDT):
         if self.goal is not None:
             _check_fit(world)
 
-    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         aims = self._aims(starts)
         result = super().search(starts, aims if len(aims) else goals, checker, ptc)

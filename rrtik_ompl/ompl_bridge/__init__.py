@@ -5,7 +5,7 @@ from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner, SearchResult
 from rrtik_ompl.ompl_bridge.states import StateIO, space_bounds
-from rrtik_ompl.world.motion_queries import MotionQueries
+from rrtik_ompl.world.motion_queries import MotionQueries, Stop
 
 __all__ = [
     "GoalSampler",
@@ -15,6 +15,7 @@ __all__ = [
     "SearchResult",
     "SpaceChecker",
     "StateIO",
+    "Stop",
     "WorldChecker",
     "check_planner",
     "space_bounds",

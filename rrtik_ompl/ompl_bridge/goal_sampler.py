@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from ompl import base as ob
 
@@ -29,7 +27,9 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
     second. AORRTC takes a second goal for a path of no length and gives up.
     """
 
-    def __init__(self, problem: Problem, si: Any = None, *, seed: int = 0, most: int = MOST) -> None:
+    def __init__(
+        self, problem: Problem, si: ob.SpaceInformation | None = None, *, seed: int = 0, most: int = MOST
+    ) -> None:
         """Make a goal.
 
         Args:
@@ -86,7 +86,7 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
             self._search.more()
         return len(self.rows) > known
 
-    def states(self, most: int = 1) -> Any:
+    def states(self, most: int = 1) -> ob.GoalStates:
         """The first configurations as ``ompl.base.GoalStates``, which OMPL asks without the interpreter."""
         si = self.getSpaceInformation()
         states, state = ob.GoalStates(si), si.allocState()
@@ -95,7 +95,7 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
             states.addState(state)
         return states
 
-    def sampleGoal(self, state: Any) -> None:
+    def sampleGoal(self, state: ob.State) -> None:
         """Write the next configuration into a state, the first again after the last; called by OMPL."""
         if self._given >= len(self.rows):
             self.more()
@@ -111,7 +111,7 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
         """Whether there is any: nothing is computed beside OMPL, so that it need not wait for one; called by OMPL."""
         return len(self.rows) > 0
 
-    def distanceGoal(self, state: Any) -> float:
+    def distanceGoal(self, state: ob.State) -> float:
         """0 at the goal, else its distance [m; rad or m for a goal in joint values]; called by OMPL."""
         robot, goal, q = self._problem.world.robot, self._problem.goal, self._io.read(state)[None]
         return 0.0 if goal.satisfied(robot, q)[0] else float(goal.distance(robot, q)[0])

@@ -23,7 +23,7 @@ from rrtik_ompl.errors import InputError, PlannerError
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker
 from rrtik_ompl.ompl_bridge.states import StateIO, real_vector_space, space_bounds
-from rrtik_ompl.world.motion_queries import MotionQueries
+from rrtik_ompl.world.motion_queries import MotionQueries, Stop
 
 GOAL_SAMPLES = 32  # how often a goal that can give any number of configurations is asked for one
 WAIT_FOR_GOAL = 0.002  # [s] between two questions to a goal that is still computing its first sample
@@ -34,7 +34,7 @@ NONE_USABLE = "none is given, or all are in collision or outside the bounds"
 class _Refused(Exception):
     """The problem definition gives nothing to search between."""
 
-    def __init__(self, status: Any, reason: str) -> None:
+    def __init__(self, status: ob.PlannerStatus, reason: str) -> None:
         super().__init__(reason)
         self.status, self.reason = status, reason
 
@@ -101,7 +101,9 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     path_statistics: ClassVar[tuple[str, ...]] = ()
     kernels: ClassVar[tuple[str, ...]] = ()
 
-    def __init__(self, si: Any, name: str, *, world: MotionQueries | None = None, seed: int | None = None) -> None:
+    def __init__(
+        self, si: ob.SpaceInformation, name: str, *, world: MotionQueries | None = None, seed: int | None = None
+    ) -> None:
         """Make a planner.
 
         Args:
@@ -132,7 +134,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         parameters = list(inspect.signature(cls).parameters.values())[1:]  # the first one is the space information
         return {each.name: each.default for each in parameters if each.name not in GIVEN_OPTIONS}
 
-    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """Look for a path from any start to any goal until ``ptc()`` is true. For subclasses.
 
         Args:
@@ -147,7 +149,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         """Whether the search needs goal configurations. For subclasses that can do without."""
         return True
 
-    def solve(self, ptc: Any) -> Any:
+    def solve(self, ptc: ob.PlannerTerminationCondition | float) -> ob.PlannerStatus:
         """Solve the problem of the problem definition; called by OMPL.
 
         Args:
@@ -193,7 +195,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         known: tuple[Vector, Vector] = self._known_bounds[1]
         return known
 
-    def _solve(self, ptc: Any) -> Any:
+    def _solve(self, ptc: ob.PlannerTerminationCondition) -> ob.PlannerStatus:
         si, pdef = self.getSpaceInformation(), self.getProblemDefinition()
         if pdef is None:
             raise PlannerError(f"{self.getName()}: no problem definition; use SimpleSetup or setProblemDefinition()")
@@ -211,7 +213,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self.reason = result.reason
         return self._report(result)
 
-    def _inputs(self, checker: MotionChecker, ptc: Any) -> tuple[Matrix, Matrix]:
+    def _inputs(self, checker: MotionChecker, ptc: Stop) -> tuple[Matrix, Matrix]:
         """Starts and, if needed, goals of the problem definition, shapes (s, n) and (g, n), at least one each."""
         inputs, io = self.getPlannerInputStates(), self._io
         inputs.restart()
@@ -239,7 +241,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
             raise _Refused(ob.PlannerStatus.INVALID_GOAL, f"no valid goal: {NONE_USABLE}")
         return rows[:split][free[:split]], rows[split:][free[split:]]
 
-    def _starts(self, inputs: Any, io: StateIO) -> list[Vector]:
+    def _starts(self, inputs: ob.PlannerInputStates, io: StateIO) -> list[Vector]:
         rows = []
         while inputs.haveMoreStartStates():
             state = inputs.nextStart()  # borrowed; None if invalid
@@ -248,7 +250,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
             del state
         return _different(rows)
 
-    def _goals(self, inputs: Any, io: StateIO, goal: Any, ptc: Any) -> list[Vector]:
+    def _goals(self, inputs: ob.PlannerInputStates, io: StateIO, goal: ob.Goal, ptc: Stop) -> list[Vector]:
         """Goal configurations: all of a finite goal; else a number of samples, or as many as it takes to find one.
 
         Of a :class:`GoalSampler` those that it has.
@@ -271,7 +273,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
                 break
         return _different(rows)
 
-    def _report(self, result: SearchResult) -> Any:
+    def _report(self, result: SearchResult) -> ob.PlannerStatus:
         """Hand the path to OMPL; returns the status."""
         if result.path is None:
             return ob.PlannerStatus.TIMEOUT
@@ -286,7 +288,7 @@ def _different(rows: list[Vector]) -> list[Vector]:
     return rows if len(rows) < 2 else list({row.tobytes(): row for row in rows}.values())
 
 
-def _condition(ptc: Any) -> Any:
+def _condition(ptc: ob.PlannerTerminationCondition | float) -> ob.PlannerTerminationCondition:
     """A termination condition from what OMPL or a person hands to solve."""
     return ob.timedPlannerTerminationCondition(float(ptc)) if isinstance(ptc, (int, float)) else ptc
 

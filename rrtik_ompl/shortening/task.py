@@ -12,7 +12,7 @@ from rrtik_ompl.fast.search.shortcut_layout import KERNELS
 from rrtik_ompl.moves.axis_cut import axis_moves
 from rrtik_ompl.moves.rules import MoveRules
 from rrtik_ompl.transitions import edge_keys, route_length, transitions
-from rrtik_ompl.world.motion_queries import KernelWorld, MotionQueries, has_kernels
+from rrtik_ompl.world.motion_queries import KernelWorld, MotionQueries, Stop, has_kernels
 
 
 class Task:
@@ -49,7 +49,7 @@ class Task:
         one_joint: bool = False,
         rules: MoveRules | None = None,
         on_better: Callable[[Matrix], object] | None = None,
-        stop: Callable[[], bool] | None = None,
+        stop: Stop | None = None,
     ) -> None:
         self.motions = motions
         self.seed, self.one_joint, self.rules = seed, one_joint, rules
