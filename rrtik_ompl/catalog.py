@@ -2,7 +2,7 @@
 
 Another package adds its own by entry points in the groups ``rrtik_ompl.robots`` (name -> a function that takes keyword
 options and returns a `Robot`), ``rrtik_ompl.planners`` (name -> a class), ``rrtik_ompl.default_planner`` (the same, of
-the one planner that is used where none is asked for), ``rrtik_ompl.problems`` (any name -> the ``Path`` of a folder of
+the one planner that is used where none is named), ``rrtik_ompl.problems`` (any name -> the ``Path`` of a folder of
 problem files), ``rrtik_ompl.suites`` (the same of suites for ``rrtik bench``) and ``rrtik_ompl.workspaces`` (name of a
 robot -> a function that returns slices of its effective workspace, see `rrtik_ompl.reach.grid_map.Slice`).
 """
@@ -62,7 +62,7 @@ def find_planner(name: str) -> Any:
 
 
 def default_planner() -> str:
-    """Name of the planner that is used where none is asked for.
+    """Name of the planner that is used where none is named.
 
     It is data of the packages: the first entry of the group ``rrtik_ompl.default_planner``, or the first planner that
     there is.

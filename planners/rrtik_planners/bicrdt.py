@@ -1,4 +1,4 @@
-"""BiCRDT: two trees that move one joint at a time and meet exactly. Source: the C-RDT paper, algorithm 11."""
+"""BiCRDT: two trees that move one joint at a time and meet exactly. Source: [1, ch. 6.3, algorithm 11]."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class TwoTreeSearch:
 
     Attributes:
         iterations: Samples drawn so far.
-        motions: Edges that were asked about without the checker's knowledge: none.
+        motions: Edges checked without the checker's knowledge: none.
     """
 
     motions = 0
@@ -78,7 +78,7 @@ class TwoTreeSearch:
         return False
 
     def meeting(self) -> tuple[Matrix, Matrix]:
-        """The way from the root of each tree to the vertex at which they met, shapes (k, n)."""
+        """From the root of each tree the branch to the vertex at which they met, shapes (k, n)."""
         return self._trees[0].branch(self._met[0]), self._trees[1].branch(self._met[1])
 
     def _step(self) -> bool:

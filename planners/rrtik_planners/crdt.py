@@ -1,4 +1,4 @@
-"""C-RDT: a rapidly exploring tree that moves one joint at a time. Source: the C-RDT paper, algorithms 9 and 10."""
+"""C-RDT: a rapidly exploring tree that moves one joint at a time. Source: [1, ch. 6.3, algorithms 9 and 10]."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ class CRDT(OneJointPlanner):
 
     The basic algorithm ends when a vertex is close enough to the goal. Here every vertex that is close enough tries to
     reach the goal exactly, one axis at a time, so that an exact solution ends in the goal itself. If time runs out
-    first, the way to the vertex nearest to a goal is reported as an approximate solution.
+    first, the path to the vertex nearest to a goal is reported as an approximate solution.
 
     A small goal tolerance needs very many iterations for an arm of six joints, since nothing draws the tree towards the
-    goal; the default is meant to be met soon. The paper's comparison with RRT used the step length of the RRT.
+    goal; the default is meant to be met soon. The comparison with RRT in [1] used the step length of the RRT.
 
     In a world with kernels the whole search runs there; it finds the same path as the search in Python.
     """
@@ -109,7 +109,7 @@ class OneTreeSearch:
 
     Attributes:
         iterations: Samples drawn so far.
-        motions: Edges that were asked about without the checker's knowledge: none.
+        motions: Edges checked without the checker's knowledge: none.
     """
 
     motions = 0
@@ -155,11 +155,11 @@ class OneTreeSearch:
         return False
 
     def ending(self) -> Matrix:
-        """The way from the root to the goal that was reached, shape (k, n)."""
+        """The path from the root to the goal that was reached, shape (k, n)."""
         return self._tree.branch(self._ending)
 
     def branch(self, number: int, vertex: int) -> Matrix:
-        """The way from the root to a vertex, shape (k, n); there is only one tree, number 0."""
+        """The path from the root to a vertex, shape (k, n); there is only one tree, number 0."""
         return self._tree.branch(vertex)
 
     def tree(self, number: int) -> Matrix:

@@ -1,4 +1,4 @@
-"""DRRT-Con: a planner for scenes that change. What it found is kept, and repaired when it is asked again."""
+"""DRRT-Con: a planner for scenes that change. Its path is kept, and repaired by the next ``solve``."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class DRRTCon(SafePlanner):
 
     The first ``solve`` is RRT-Connect and the sequential cut. A later one starts from the kept path: what lies behind
     the start is dropped, the rest is checked in one call, cut at the first blocked motion seen from either end and
-    reconnected; while no way is found it stays. The start may move along the path or near it, the goal may move, and
-    the validity checker may change its mind. ``clear()`` forgets. Source: DRRT-Con paper, algorithms 6 to 8; the
+    reconnected; while none is found it stays. The start may move along the path or near it, the goal may move, and
+    the answers of the validity checker may change. ``clear()`` forgets. Source: [1, ch. 5.2, algorithms 6 to 8]; the
     search: :mod:`rrtik_ompl.replanning`.
     """
 
@@ -43,7 +43,7 @@ class DRRTCon(SafePlanner):
 
         Args:
             si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
-            world: Asked instead of ``si`` whether configurations and motions are free, if given.
+            world: Checks configurations and motions instead of ``si``, if given.
             seed: At least 0; drawn from OMPL's if None.
             range: Longest motion of the trees [unit of the space]; what suits the bounds if None.
 

@@ -22,8 +22,8 @@ class FastRRTConnect(SafePlanner):
     """RRT-Connect with dynamic domain and balanced trees; the straight motion is tried first.
 
     With a world that has kernels (``world.fast``) the search runs in them and a path comes back in microseconds.
-    Motions that they cannot decide are asked of the world once they stand on a path, and never in a conservative
-    world. With any other world, or none, a plain loop does the same on one motion at a time.
+    Motions that they cannot decide are checked by the world once they are part of a path, and never in a
+    conservative world. With any other world, or none, a plain loop does the same on one motion at a time.
     """
 
     kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
@@ -43,7 +43,7 @@ class FastRRTConnect(SafePlanner):
 
         Args:
             si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
-            world: Asked instead of ``si`` whether configurations and motions are free, if given.
+            world: Checks configurations and motions instead of ``si``, if given.
             seed: At least 0; drawn from OMPL's if None.
             range: Length of a motion of the trees, at most [unit of the space]; what suits the bounds if None.
             domain: Radius in which a vertex is extended once it was blocked [unit of the space]; as with ``range``.
@@ -72,7 +72,7 @@ class FastRRTConnect(SafePlanner):
             max_iterations=self.max_iterations,
         )
         counts = kernels.statistics()
-        checker.checked_motions += int(counts["motions"] - counts["questions"])  # those it was asked it has counted
+        checker.checked_motions += int(counts["motions"] - counts["questions"])  # the questions it has counted
         return SearchResult(path, {**counts, "edges": counts["vertices"] - len(starts) - len(goals)})
 
     def ends_free(self, rows: Matrix, checker: MotionChecker) -> Mask:

@@ -28,7 +28,7 @@ from rrtik_planners.one_joint_planner import OneJointPlanner
 SEARCHES, ROUNDS = 5, 10
 BRIEF_ITERATIONS = 1000  # of BiCRDT, before it is started anew
 SAMPLED_ITERATIONS = 20_000  # of RRT-Connect
-FEW_NODES = 256  # of a lattice, where each motion is asked about by itself
+FEW_NODES = 256  # of a lattice, where each motion is checked by itself
 
 
 class FewestMoves(OneJointPlanner):

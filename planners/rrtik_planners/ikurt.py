@@ -19,11 +19,11 @@ from rrtik_planners.tip_seeker import TipSeeker, misses
 class IKURT(TipSeeker):
     """Extended inverse kinematics: a tree in joint space, drawn to the goal by the distance of the tip from it.
 
-    Source: the IKURT paper, made faster and more robust (:mod:`rrtik_ompl.ik.ikurt.search`);
+    Source: [1, ch. 5.1], made faster and more robust (:mod:`rrtik_ompl.ik.ikurt.search`);
     :class:`rrtik_planners.ikurt_published.IKURTPublished` is the algorithm to the letter. Where the goals are
     configurations, as in plain OMPL, the distance is that in joint space.
 
-    ``statistics`` tells how far from the goal the tip ends: ``position_error`` [m], ``orientation_error`` [rad].
+    ``statistics`` says how far from the goal the tip ends: ``position_error`` [m], ``orientation_error`` [rad].
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class IKURT(TipSeeker):
 
         Args:
             si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
-            world: Asked instead of ``si`` whether configurations and motions are free, if given.
+            world: Checks configurations and motions instead of ``si``, if given.
             seed: At least 0; drawn from OMPL's if None.
             goal: What the tip has to reach; needs a world. If None, the configurations of the problem definition are
                 the goals.

@@ -1,4 +1,4 @@
-"""IKURT to the letter, beside which the improved one is measured. Source: the IKURT paper, algorithms 4 and 5."""
+"""IKURT to the letter, beside which the improved one is measured. Source: [1, ch. 5.1, algorithms 4 and 5]."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ THRESHOLD_REACH = 0.13  # of the reach, for positions
 class IKURTPublished(TipSeeker):
     """Extended inverse kinematics as published: one sample at a time, no Jacobian; slow where goals lie on limits.
 
-    The paper gives no numbers; the defaults are a proposal. ``statistics`` as of :class:`rrtik_planners.ikurt.IKURT`.
+    [1] gives no numbers; the defaults are a proposal. ``statistics`` as of :class:`rrtik_planners.ikurt.IKURT`.
     """
 
     def __init__(

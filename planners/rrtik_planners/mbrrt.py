@@ -1,4 +1,4 @@
-"""MB-RRT as a planner: a tree in the workspace finds goal configurations, two trees in joint space the way there."""
+"""MB-RRT as a planner: a tree in the workspace finds goal configurations, two trees in joint space the path there."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rrtik_planners.bicrdt import BiCRDT
 class MBRRT(BiCRDT):
     """Reaches a pose, a position or a region: its configurations by MB-RRT, the path to one of them by BiCRDT.
 
-    Source: the MB-RRT paper, which names this use and leaves the path to a planner. In plain OMPL give the problem
+    Source: [3], which names this use and leaves the path to a planner. In plain OMPL give the problem
     definition a :class:`rrtik_ompl.GoalSampler`, or any goal of configurations; these are taken as they are.
     """
 
@@ -41,7 +41,7 @@ class MBRRT(BiCRDT):
 
         Args:
             si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
-            world: Asked instead of ``si`` whether configurations and motions are free, if given.
+            world: Checks configurations and motions instead of ``si``, if given.
             seed: At least 0; drawn from OMPL's if None.
             goal: What the tip has to reach; needs a world. If None, or where the tree finds nothing, the
                 configurations of the problem definition are the goals.

@@ -91,7 +91,7 @@ def plan(
 
 
 def _shortened(path: Any, problem: Any, method: str, seed: int, rules: dict[str, Any]) -> tuple[Any, float]:
-    """The path made shorter, keeping to what the planner was told of single-joint moves; and the time [s]."""
+    """The path made shorter, by the rules of single-joint moves that the planner had; and the time [s]."""
     from rrtik_ompl.shortening import METHODS, MoveRules, shorten
 
     if path is None or method == "none" or len(path.waypoints) < 2:

@@ -1,4 +1,4 @@
-"""The goal of a problem as OMPL knows goals: free configurations, more of them as a planner asks for more."""
+"""The goal of a problem as OMPL knows goals: free configurations, and more of them as a planner wants more."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
     """Free configurations at the goal of a problem, for every OMPL planner that samples its goal.
 
     Those of the first rounds of inverse kinematics are looked for when the sampler is made; further ones when a
-    planner has been given all of these and asks for more (:class:`rrtik_ompl.ik.goal_configurations.GoalSearch`).
+    planner has been given all of these and wants more (:class:`rrtik_ompl.ik.goal_configurations.GoalSearch`).
     Configurations that the space information refuses, being out of its bounds or invalid, are left out.
 
-    Three planners of OMPL need one goal that is not Python's: give them :meth:`states`. PRM and PRMstar ask for goals
+    Three planners of OMPL need one goal that is not Python's: give them :meth:`states`. PRM and PRMstar sample goals
     in a second thread, which waits for the interpreter for ever, as the first one holds it while it waits for the
     second. AORRTC takes a second goal for a path of no length and gives up.
     """
@@ -34,8 +34,8 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
 
         Args:
             problem: Its goal is what is to be reached; its start is what configurations shall be near to.
-            si: ``ompl.base.SpaceInformation`` over the robot's joints; one that asks the problem's world if None, to
-                be had by ``getSpaceInformation()``.
+            si: ``ompl.base.SpaceInformation`` over the robot's joints; if None, one that checks by the problem's
+                world, to be had by ``getSpaceInformation()``.
             seed: The same seed gives the same configurations in the same order.
             most: Configurations at most.
 
@@ -87,7 +87,7 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
         return len(self.rows) > known
 
     def states(self, most: int = 1) -> ob.GoalStates:
-        """The first configurations as ``ompl.base.GoalStates``, which OMPL asks without the interpreter."""
+        """The first configurations as ``ompl.base.GoalStates``, which OMPL samples without the interpreter."""
         si = self.getSpaceInformation()
         states, state = ob.GoalStates(si), si.allocState()
         for row in self.rows[:most]:

@@ -25,7 +25,7 @@ class PlannerTraits:
             motions are checked as densely as by the second check.
         one_goal: It gets the first goal configuration alone.
         finds_goals: A goal of the tip, given as the option ``goal``, is enough for it.
-        straight_first: The straight motion to the nearest goal is tried before it is asked at all.
+        straight_first: The straight motion to the nearest goal is tried before it.
         has_graph: Its trees can be counted afterwards.
         supports_iteration_limit: A short attempt, ended by a number of iterations (the option ``max_iterations`` of a
             SafePlanner) or of checked motions (any other), can be of use.

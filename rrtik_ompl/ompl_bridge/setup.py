@@ -17,10 +17,10 @@ from rrtik_ompl.world import World
 
 @dataclass(slots=True, eq=False)
 class ValidityCallback:
-    """Counts the questions of a C++ planner and remembers the first error, which must not be raised inside OMPL.
+    """Counts the checks of a C++ planner and remembers the first error, which must not be raised inside OMPL.
 
-    After the ``deadline`` [s, of ``time.monotonic``] every answer is no, for some planners ask hundreds of questions
-    between two looks at their time. After ``most_motions`` too, and the planner is stopped.
+    After the ``deadline`` [s, of ``time.monotonic``] every answer is no, for some planners call for hundreds of checks
+    between two readings of their clock. After ``most_motions`` too, and the planner is stopped.
     """
 
     world: World
@@ -54,7 +54,7 @@ class ValidityCallback:
         return free
 
     def counts(self) -> dict[str, int]:
-        """Of the questions, and of the motions that were found free."""
+        """Numbers of checks, and of the motions that were found free."""
         return {
             "checked_states": self.states,
             "checked_motions": self.motions,
@@ -105,9 +105,9 @@ def space_information(problem: Problem, goals: Matrix, validity: ValidityCallbac
 
 
 def unchecked_space(problem: Problem, goals: Matrix) -> ob.SpaceInformation:
-    """As :func:`space_information`, but nothing is checked: for planners that ask the world themselves.
+    """As :func:`space_information`, but nothing is checked: for planners that use the world themselves.
 
-    OMPL asks about each start and goal that it hands out, and a question to Python costs more than some searches.
+    OMPL checks each start and goal that it hands out, and a call of Python costs more than some searches.
     """
     si = _bounded(problem, goals)
     si.setStateValidityChecker(ob.AllValidStateValidityChecker(si))

@@ -13,9 +13,8 @@ from typing import ClassVar
 import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.path import subdivided
 from rrtik_ompl.replanning.connecting import Connect, Joined
-from rrtik_ompl.transitions import without_repeats
+from rrtik_ompl.transitions import subdivided, without_repeats
 from rrtik_ompl.world.motion_queries import MotionQueries, Stop, no_stop
 
 MOST_CUTS = 24  # ends that are tried from one point of a path
@@ -152,7 +151,7 @@ def without_points_between(path: Matrix) -> Matrix:
 def dense_sequential_cut(path: Matrix, step: float, motions: MotionQueries) -> Matrix:
     """Shorten a free path: from each kept point straight to the last point that can be reached.
 
-    Post-processing paper, method 1, as DRRT-Con uses it: points every ``step`` along the path are tried, ``MOST_CUTS``
+    [1, ch. 5.3, method 1], as DRRT-Con uses it: points every ``step`` along the path are tried, ``MOST_CUTS``
     of them in one call; :func:`rrtik_ompl.shortening.sequential.sequential_cut` tries every waypoint and no others.
     """
     done, rest = [path[:1]], path
