@@ -128,9 +128,12 @@ else:
     _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
     __all__ = sorted(_HOME_OF)
 
+    RENAMED = {"GoalRegion": "GoalSet", "Run": "ReplanRun", "Waypoints": "TimedPoses", "timed": "time_parameterize"}
+
     def __getattr__(name: str) -> Any:
         if name not in _HOME_OF:
-            raise AttributeError(f"module 'rrtik_ompl' has no attribute '{name}'")
+            hint = f": {name} is now {RENAMED[name]}" if name in RENAMED else ""
+            raise AttributeError(f"module 'rrtik_ompl' has no attribute '{name}'{hint}")
         value = getattr(import_module(f"rrtik_ompl.{_HOME_OF[name]}"), name)
         globals()[name] = value
         return value

@@ -2,7 +2,7 @@
 
 Another package adds its own by entry points in the groups ``rrtik_ompl.robots`` (name -> a function that takes keyword
 options and returns a `Robot`), ``rrtik_ompl.planners`` (name -> a class), ``rrtik_ompl.default_planner`` (the same, of
-the one planner that is used where none is asked for), ``rrtik_ompl.problems`` (any name -> the ``Path`` of a folder of
+the one planner that is used where none is named), ``rrtik_ompl.problems`` (any name -> the ``Path`` of a folder of
 problem files), ``rrtik_ompl.suites`` (the same of suites for ``rrtik bench``), ``rrtik_ompl.tables`` (any name ->
 published tables for ``rrtik reproduce``, see `rrtik_bench.tables.Collection`) and ``rrtik_ompl.workspaces`` (name of a
 robot -> a function that returns slices of its effective workspace, see `rrtik_ompl.reach.grid_map.Slice`).
@@ -13,12 +13,16 @@ from __future__ import annotations
 import inspect
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
 
 from rrtik_ompl.description.dh_file import DH_OPTIONS, robot_from_dh_file
 from rrtik_ompl.description.robot_cache import RobotCache
@@ -27,6 +31,11 @@ from rrtik_ompl.description.urdf import URDF_OPTIONS, robot_from_urdf
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.robot import Robot
+
+# What an option of a robot can be: a name, a number, a file, a pose, or groups and lists of these.
+RobotOption: TypeAlias = (
+    str | float | os.PathLike[str] | Mapping[str, object] | Sequence[object] | NDArray[np.float64] | pin.SE3 | None
+)
 
 FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh")
 FILE_KINDS = (".urdf", ".xml", ".yaml", ".yml")
@@ -54,7 +63,7 @@ def find_planner(name: str) -> Any:
 
 
 def default_planner() -> str:
-    """Name of the planner that is used where none is asked for.
+    """Name of the planner that is used where none is named.
 
     It is data of the packages: the first entry of the group ``rrtik_ompl.default_planner``, or the first planner that
     there is.
@@ -126,7 +135,7 @@ def problem_folders() -> tuple[Path, ...]:
     return _folders("problem", "problems")
 
 
-def load_robot(name: str | os.PathLike[str], **options: Any) -> Robot:
+def load_robot(name: str | os.PathLike[str], **options: RobotOption) -> Robot:
     """Load a robot by name or from a file; the same call gives the same object, unless a file of it has changed.
 
     Args:

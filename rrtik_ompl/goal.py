@@ -11,6 +11,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Vector, finite_array, frozen, positive
+from rrtik_ompl.choices import FrameAxis
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.poses import rigid, rotation_angles
 from rrtik_ompl.robot import Robot
@@ -113,12 +114,12 @@ class GoalSet:
     """
 
     members: tuple[GoalPart, ...]
-    free_rotation_axis: str | None = None
+    free_rotation_axis: FrameAxis | None = None
     box: Vector = field(default_factory=lambda: NO_BOX)
     parts: tuple[GoalPart, ...] = ()
 
     def __init__(
-        self, members: Iterable[GoalPart], free_rotation_axis: str | None = None, box: ArrayLike = NO_BOX
+        self, members: Iterable[GoalPart], free_rotation_axis: FrameAxis | None = None, box: ArrayLike = NO_BOX
     ) -> None:
         goals = tuple(members) if isinstance(members, Iterable) else ()
         if not goals or not all(isinstance(goal, PoseGoal | PositionGoal | TaskRegion) for goal in goals):
@@ -204,7 +205,7 @@ def pose_errors(tips: NDArray[np.float64], target: Any) -> tuple[Vector, Vector]
     return position, rotation_angles(target.rotation.T @ tips[:, :3, :3])
 
 
-def _freed(goal: PoseGoal, free_rotation_axis: str | None, box: Vector) -> TaskRegion:
+def _freed(goal: PoseGoal, free_rotation_axis: FrameAxis | None, box: Vector) -> TaskRegion:
     bounds = np.zeros((6, 2))
     bounds[:3] = np.outer(box, [-0.5, 0.5])
     if free_rotation_axis is not None:

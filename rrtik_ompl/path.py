@@ -16,7 +16,7 @@ from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.files.tables import dumps, loads, path_format
 from rrtik_ompl.files.text import read_text, write_text
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.transitions import SAME, merge_moves, moved, route_length, single_joint, transitions
+from rrtik_ompl.transitions import SAME, merge_moves, moved, route_length, single_joint, subdivided, transitions
 from rrtik_ompl.units import joint_units
 from rrtik_ompl.world import World
 
@@ -27,7 +27,7 @@ AT_ONCE = 200_000  # of them, so that a long path needs no more memory than a sh
 
 
 class Move(NamedTuple):
-    """One joint moves, all others stand still.
+    """One joint moves, all others rest.
 
     Attributes:
         joint: Its name.
@@ -192,7 +192,7 @@ class JointPath:
     def violations(self, world: World, *, resolution: float | None = None) -> tuple[Violation, ...]:
         """Check the path again, densely and independently of the planner that made it.
 
-        Every edge is looked at in steps in which no point of the arm moves more than half of the world's motion
+        Every edge is checked in steps in which no point of the arm moves more than half of the world's motion
         resolution (or ``resolution`` [m], if given), by :meth:`World.certify`.
 
         Returns:
@@ -217,7 +217,7 @@ class JointPath:
         if counts.sum() > MAX_CHECKS:
             raise InputError(
                 f"path: {counts.sum():.1e} checks are too many (at most {MAX_CHECKS:.0e}); "
-                f"raise motion_resolution, or look whether the joint values are rad and m"
+                f"raise motion_resolution, or check whether the joint values are rad and m"
             )
         found: list[Violation] = []
         for part in _in_parts(counts):
@@ -261,16 +261,6 @@ def _in_parts(counts: Vector) -> list[NDArray[np.int64]]:
 def verification_resolution(world: World) -> float:
     """Largest step of any point of the arm between two configurations of the second check [m]."""
     return world.motion_resolution / VERIFICATION_DENSITY
-
-
-def subdivided(rows: Matrix, counts: Vector) -> tuple[Matrix, Vector]:
-    """Cut edge i of a polyline, shape (k, n), into ``counts[i]`` equal parts; also the edge number of every point."""
-    points, edges = [rows[:1]], [np.zeros(1, dtype=np.int64)]
-    for i, count in enumerate(np.maximum(counts, 1.0).astype(np.int64)):
-        shares = (np.arange(1, count + 1) / count)[:, None]
-        points.append((1.0 - shares) * rows[i] + shares * rows[i + 1])
-        edges.append(np.full(count, i, dtype=np.int64))
-    return np.vstack(points), np.concatenate(edges)
 
 
 def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> JointPath:

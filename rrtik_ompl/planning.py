@@ -6,12 +6,13 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rrtik_ompl import catalog
 from rrtik_ompl.arrays import Matrix, positive, whole_number
+from rrtik_ompl.choices import Accuracy
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.goal import JointGoal
@@ -62,7 +63,7 @@ def plan(
     seed: int | None = None,
     restarts: int = RESTARTS,
     parameters: Mapping[str, Any] | None = None,
-    accuracy: str | None = None,
+    accuracy: Accuracy | None = None,
 ) -> Plan:
     """Find a collision-free path from the start to the goal of a problem.
 
@@ -109,13 +110,13 @@ def plan(
     if isinstance(restarts, bool) or not isinstance(restarts, int) or not 0 <= restarts <= MAX_RESTARTS:
         raise InputError(f"restarts must be a whole number from 0 to {MAX_RESTARTS}, got {restarts!r}")
     name, factory = (planner, find_planner(planner)) if isinstance(planner, str) else (planner.__name__, planner)
-    used = _seed(seed)
+    used = int(np.random.default_rng().integers(2**31)) if seed is None else whole_number(seed, "seed")
     problem = problem if accuracy is None else problem.with_accuracy(accuracy)
     seeds = [int(child) for child in np.random.SeedSequence(used).generate_state(restarts + 1, np.uint32)]
     _load_kernels(problem, factory)
     begin = time.perf_counter()
     search = _Search(problem, factory, name, begin + limit, seeds, parameters or {})
-    if _nothing_to_do(problem):  # some planners wander off and come back, others break
+    if _nothing_to_do(problem):  # some planners return a detour, others crash
         path: JointPath | None = JointPath.of(problem.robot, problem.start[None])
     else:
         path = search.run()
@@ -128,7 +129,7 @@ def plan(
 
 
 def _load_kernels(problem: Problem, factory: PlannerFactory) -> None:
-    """Load what the search will ask for: compiling it for the first time is no part of planning."""
+    """Load what the search will use: compiling it for the first time is no part of planning."""
     if not isinstance(problem.goal, JointGoal):
         load_kernels(problem.robot)
     if problem.world.fast is not None:
@@ -193,7 +194,7 @@ class _Search:
         return self._long_ways and number == 0
 
     def _aims(self, number: int) -> Matrix:
-        """What an attempt aims at: all that is known, the newest first, for some planners heed the first alone."""
+        """What an attempt aims at: all that is known, the newest first, for some planners take the first alone."""
         if self._aimless:
             return np.zeros((0, self._problem.robot.dof))
         known = len(self._goals.rows)
@@ -209,16 +210,16 @@ class _Search:
         aims = aims[proven.world.valid_batch(aims)]
         if len(aims) == 0 or not proven.world.valid(proven.start):
             return None
-        return _judged(self._problem, self._attempt(proven, 0, aims, self._left(), effort=1), self._name)[0]
+        return _verified(self._problem, self._attempt(proven, 0, aims, self._left(), effort=1), self._name).path
 
     def _path(self, number: int, aims: Matrix) -> JointPath | None:
-        """Of an attempt that asks exactly; from the first path on that was rejected, as densely as the second check."""
+        """Of an attempt with exact checks; from the first path on that was rejected, as densely as the second check."""
         share = 0.5 if self._short_way(number) else 1.0  # before the long way is tried too
         limited = self._traits.supports_iteration_limit and self._others(number)
         effort = 2**number if limited else None
         seconds = share * max(self._left(), SHORTEST)
         outcome = self._attempt(self._asked, number, aims, seconds, effort)
-        path, self.reason = _judged(self._problem, outcome, self._name)
+        path, self.reason = _verified(self._problem, outcome, self._name)
         if path is None and outcome.rows is not None:
             self.totals["rejected"] += 1
             self._asked = densely_checked(self._problem)
@@ -276,18 +277,23 @@ def find_planner(name: str) -> PlannerFactory:
     raise UnknownNameError("planner", name, list_planners())
 
 
-def _judged(problem: Problem, outcome: Attempt, name: str) -> tuple[JointPath | None, str]:
-    """The path of an attempt if the second check accepts it, or the reason why there is none."""
+class _Verified(NamedTuple):
+    """The path of an attempt if the second check accepts it, else None and the reason."""
+
+    path: JointPath | None
+    reason: str = ""
+
+
+def _verified(problem: Problem, outcome: Attempt, name: str) -> _Verified:
+    """The second check of what an attempt has found."""
     if outcome.rows is None:
-        return None, f"{name} ended with '{outcome.status}'" + (f": {outcome.reason}" if outcome.reason else "")
+        return _Verified(
+            None, f"{name} ended with '{outcome.status}'" + (f": {outcome.reason}" if outcome.reason else "")
+        )
     path = JointPath.of(problem.world.robot, outcome.rows)
     faults: tuple[Violation, ...] = path.violations(problem.world)
     if faults:
-        return None, f"the path of {name} was rejected by the second check: {faults[0].reason}"
+        return _Verified(None, f"the path of {name} was rejected by the second check: {faults[0].reason}")
     if not (path.start == problem.start).all() or not problem.reached(path.end):
-        return None, f"the path of {name} does not lead from the start to the goal"
-    return path, ""
-
-
-def _seed(seed: int | None) -> int:
-    return int(np.random.default_rng().integers(2**31)) if seed is None else whole_number(seed, "seed")
+        return _Verified(None, f"the path of {name} does not lead from the start to the goal")
+    return _Verified(path)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import TAU, Vector, frozen
+from rrtik_ompl.choices import Accuracy
 from rrtik_ompl.errors import ProblemError, require
 from rrtik_ompl.goal import Goal, JointGoal
 from rrtik_ompl.path import verification_resolution
@@ -64,7 +65,7 @@ class Problem:
         other.world = self.world.with_resolution(motion_resolution)
         return other
 
-    def with_accuracy(self, accuracy: str) -> Problem:
+    def with_accuracy(self, accuracy: Accuracy) -> Problem:
         """The same problem, its world "exact" or "conservative" (see :meth:`rrtik_ompl.World.with_accuracy`)."""
         other = copy.copy(self)
         other.world = self.world.with_accuracy(accuracy)

@@ -220,7 +220,7 @@ class Robot:
             poses[k] = pin.updateFramePlacement(self.model, data, frame).homogeneous
         return poses
 
-    def fk(self, q: ArrayLike, frame: str | None = None) -> Any:
+    def fk(self, q: ArrayLike, frame: str | None = None) -> pin.SE3:
         """Forward kinematics: T_world_tip (or another frame) as ``pinocchio.SE3`` for q, shape (dof,)."""
         return pin.SE3(self.fk_batch(self.configuration(q)[None], frame)[0])
 

@@ -1,6 +1,6 @@
 """Routes as lists of single-joint moves: what counts as a move, how many a route has, how few it could have.
 
-Source: the metric and the count of routes of the C-RDT paper.
+Source: the metric and the count of routes of [1, ch. 6.3].
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from math import factorial, radians
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Matrix, finite_array
+from rrtik_ompl.arrays import Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
 
 SAME = radians(1e-6)  # [rad] or [m]; a joint that changes by no more than this has not moved
 
 
 def moved(a: ArrayLike, b: ArrayLike, tolerance: float = SAME) -> NDArray[np.bool_]:
-    """The paper's sigma: which joints differ between a and b by more than ``tolerance``. Shape of a and b."""
+    """Sigma of [1, ch. 6.3]: which joints differ between a and b by more than ``tolerance``. Shape of a and b."""
     difference = np.abs(np.asarray(a, dtype=np.float64) - np.asarray(b, dtype=np.float64))
     mask: NDArray[np.bool_] = difference > tolerance
     return mask
@@ -124,3 +124,13 @@ def _rows(waypoints: ArrayLike) -> Matrix:
 def edge_keys(route: Matrix) -> list[tuple[bytes, bytes]]:
     """The edges of a route as keys."""
     return list(pairwise(row.tobytes() for row in route))
+
+
+def subdivided(rows: Matrix, counts: Vector) -> tuple[Matrix, Vector]:
+    """Cut edge i of a polyline, shape (k, n), into ``counts[i]`` equal parts; also the edge number of every point."""
+    points, edges = [rows[:1]], [np.zeros(1, dtype=np.int64)]
+    for i, count in enumerate(np.maximum(counts, 1.0).astype(np.int64)):
+        shares = (np.arange(1, count + 1) / count)[:, None]
+        points.append((1.0 - shares) * rows[i] + shares * rows[i + 1])
+        edges.append(np.full(count, i, dtype=np.int64))
+    return np.vstack(points), np.concatenate(edges)

@@ -24,6 +24,7 @@ from bench.peers.libraries.eaik import eaik_robot, turned_back
 from bench.shared.pages import add_out
 from rrtik_bench.report.machine import versions
 from rrtik_bench.report.page import Report
+from rrtik_ompl.choices import IkMethod, one_of
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.ik.ik_layout import KERNELS
 from rrtik_ompl.fast.simd.library import library
@@ -106,7 +107,7 @@ def kernel_alone(robot: Robot, start: np.ndarray) -> Solver:
     return solve
 
 
-def by_face(robot: Robot, method: str, pose: np.ndarray) -> np.ndarray | None:
+def by_face(robot: Robot, method: IkMethod, pose: np.ndarray) -> np.ndarray | None:
     found = rrtik.solve_ik(robot, rrtik.PoseGoal(pose), method=method, seconds=2.0).solutions
     return found[0] if len(found) else None
 
@@ -120,8 +121,9 @@ def single(robot: Robot, poses: np.ndarray, budget: float, methods: Sequence[str
             if method == KERNEL:
                 runs[method] = Runs(kernel_alone(robot, start), budget)
                 continue
-            by_face(robot, method, poses[0])
-            runs[method] = Runs(partial(by_face, robot, method), budget)
+            named = one_of(list_ik_methods(), method, "IK method")
+            by_face(robot, named, poses[0])
+            runs[method] = Runs(partial(by_face, robot, named), budget)
         except InputError as error:
             absent.append(f"{robot.name}, {method}: {str(error).split(';')[0]}")
     for name, solver in solvers(robot, start).items():
@@ -160,7 +162,7 @@ def batches(robot: Robot, poses: np.ndarray, repeats: int = 5) -> dict[str, tupl
     return {name: (shares[name], float(np.median(each[1:]))) for name, each in times.items()}
 
 
-def _batch_share(robot: Robot, poses: np.ndarray, method: str) -> float:
+def _batch_share(robot: Robot, poses: np.ndarray, method: IkMethod) -> float:
     return float(rrtik.solve_ik_batch(robot, poses, method=method).found.mean())
 
 

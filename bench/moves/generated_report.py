@@ -19,6 +19,7 @@ from bench.shared.problems import goal_joints
 from rrtik_bench.crdt.runs import histogram, sound
 from rrtik_bench.report.machine import processes
 from rrtik_bench.report.page import Report
+from rrtik_ompl.choices import ShorteningMethod
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.generated_problems import FAMILIES, generated_problem
 from rrtik_ompl.path import JointPath
@@ -87,7 +88,9 @@ def _converted(scene: Scene, problem: Problem, path: JointPath, seconds: float, 
     _chain(scene, problem, moves, so_far, {CONVERTED_FEWEST: _fewer(problem, "fewest-moves", seed, MAKE_FEWER)})
 
 
-def _fewer(problem: Problem, method: str, seed: int, seconds: float | None = None) -> Callable[[JointPath], JointPath]:
+def _fewer(
+    problem: Problem, method: ShorteningMethod, seed: int, seconds: float | None = None
+) -> Callable[[JointPath], JointPath]:
     return lambda path: rrtik.shorten(path, problem, method=method, seconds=seconds, seed=seed)
 
 

@@ -20,6 +20,7 @@ from bench.shared.parts import Parts, add_options
 from rrtik_bench.report.machine import processes
 from rrtik_bench.report.page import Report
 from rrtik_ompl import load_problem, load_robot, one_joint_moves, shorten
+from rrtik_ompl.choices import ShorteningMethod
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.generated_problems import FAMILIES, generated_problem
 from rrtik_ompl.path import JointPath
@@ -62,7 +63,7 @@ def random_paths(problem: Problem, rng: np.random.Generator) -> Iterator[JointPa
             yield path
 
 
-def shortened(path: JointPath, problem: Problem, method: str, seed: int) -> JointPath:
+def shortened(path: JointPath, problem: Problem, method: ShorteningMethod, seed: int) -> JointPath:
     """By one method; one that takes single-joint moves alone is given such."""
     if METHODS[method].moves_only:
         path = one_joint_moves(path, problem)

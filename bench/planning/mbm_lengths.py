@@ -18,6 +18,7 @@ from bench.shared.pages import add_out
 from rrtik_bench.crdt.runs import sound
 from rrtik_bench.report.page import Report
 from rrtik_ompl import one_joint_moves, plan, shorten
+from rrtik_ompl.choices import ShorteningMethod
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
@@ -25,7 +26,7 @@ from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
 
 PUBLISHED = 4.90  # [rad], median after simplification; of VAMP, whose path before it has 7.76
 LIMIT = 10.0  # [s] of a plan
-METHODS = ("corners", "ompl")  # beside auto, without a limit of time
+METHODS: tuple[ShorteningMethod, ...] = ("corners", "ompl")  # beside auto, without a limit of time
 CONVERTED = 5  # problems of each family whose paths are turned into single-joint moves
 
 
@@ -52,7 +53,8 @@ def measured(files: list[Path], urdf: Path, seconds: float) -> Iterator[Measured
             raise SystemExit(f"{file}: {found.reason}")
         raw = found.path
         paths, times = {"raw": raw}, {"raw": found.seconds}
-        for method in ("auto", *METHODS):
+        names: tuple[ShorteningMethod, ...] = ("auto", *METHODS)
+        for method in names:
             begin = perf_counter()
             paths[method] = shorten(raw, problem, method=method, seconds=seconds if method == "auto" else None)
             times[method] = perf_counter() - begin

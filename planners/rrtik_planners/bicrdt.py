@@ -1,16 +1,15 @@
-"""BiCRDT: two trees that move one joint at a time and meet exactly. Source: the C-RDT paper, algorithm 11."""
+"""BiCRDT: two trees that move one joint at a time and meet exactly. Source: [1, ch. 6.3, algorithm 11]."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.fast.search.crdt.rules import KERNELS, CrdtRules
 from rrtik_ompl.fast.search.crdt.search import CrdtSearch
-from rrtik_ompl.ompl_bridge import MotionChecker, SearchResult
+from rrtik_ompl.ompl_bridge import MotionChecker, SearchResult, Stop
 from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_planners.crdt_stream import CrdtStream
 from rrtik_planners.crdt_tree import CrdtTree, Outcome
@@ -28,7 +27,7 @@ class BiCRDT(OneJointPlanner):
     ompl_name: ClassVar[str] = "BiCRDT"
     supports_iteration_limit: ClassVar[bool] = True
 
-    def between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+    def between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`OneJointPlanner.between`."""
         rules, seed = self.options.growth(*self.bounds(), starts[0]), int(self.rng.integers(2**63))
         limit, path = self.options.max_iterations, _common_row(starts, goals)
@@ -50,7 +49,7 @@ class TwoTreeSearch:
 
     Attributes:
         iterations: Samples drawn so far.
-        motions: Edges that were asked about without the checker's knowledge: none.
+        motions: Edges checked without the checker's knowledge: none.
     """
 
     motions = 0
@@ -70,7 +69,7 @@ class TwoTreeSearch:
         """Vertices of both trees."""
         return sum(tree.size for tree in self._trees)
 
-    def advance(self, stop: Callable[[], Any]) -> bool:
+    def advance(self, stop: Stop) -> bool:
         """Go on to the next solution; False if ``stop()`` or the limit of iterations came first."""
         while self.iterations != self._limit and not stop():
             self.iterations += 1
@@ -79,7 +78,7 @@ class TwoTreeSearch:
         return False
 
     def meeting(self) -> tuple[Matrix, Matrix]:
-        """The way from the root of each tree to the vertex at which they met, shapes (k, n)."""
+        """From the root of each tree the branch to the vertex at which they met, shapes (k, n)."""
         return self._trees[0].branch(self._met[0]), self._trees[1].branch(self._met[1])
 
     def _step(self) -> bool:

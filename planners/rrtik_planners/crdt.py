@@ -1,18 +1,18 @@
-"""C-RDT: a rapidly exploring tree that moves one joint at a time. Source: the C-RDT paper, algorithms 9 and 10."""
+"""C-RDT: a rapidly exploring tree that moves one joint at a time. Source: [1, ch. 6.3, algorithms 9 and 10]."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.search.crdt.rules import KERNELS, CrdtRules
 from rrtik_ompl.fast.search.crdt.search import CrdtSearch
 from rrtik_ompl.moves.rules import Joints, PerJoint
-from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_planners.crdt_stream import CrdtStream
 from rrtik_planners.crdt_tree import CrdtTree, Outcome
@@ -26,10 +26,10 @@ class CRDT(OneJointPlanner):
 
     The basic algorithm ends when a vertex is close enough to the goal. Here every vertex that is close enough tries to
     reach the goal exactly, one axis at a time, so that an exact solution ends in the goal itself. If time runs out
-    first, the way to the vertex nearest to a goal is reported as an approximate solution.
+    first, the path to the vertex nearest to a goal is reported as an approximate solution.
 
     A small goal tolerance needs very many iterations for an arm of six joints, since nothing draws the tree towards the
-    goal; the default is meant to be met soon. The paper's comparison with RRT used the step length of the RRT.
+    goal; the default is meant to be met soon. The comparison with RRT in [1] used the step length of the RRT.
 
     In a world with kernels the whole search runs there; it finds the same path as the search in Python.
     """
@@ -39,7 +39,7 @@ class CRDT(OneJointPlanner):
 
     def __init__(
         self,
-        si: Any,
+        si: ob.SpaceInformation,
         *,
         world: MotionQueries | None = None,
         seed: int | None = None,
@@ -82,7 +82,7 @@ class CRDT(OneJointPlanner):
             raise InputError(f"goal_tolerance: expected a number greater than 0, got {goal_tolerance!r}")
         self.goal_tolerance = goal_tolerance
 
-    def between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+    def between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`OneJointPlanner.between`."""
         lower, upper = self.bounds()
         tolerance = self.goal_tolerance or GOAL_TOLERANCE_SHARE * float(np.linalg.norm(upper - lower))
@@ -109,7 +109,7 @@ class OneTreeSearch:
 
     Attributes:
         iterations: Samples drawn so far.
-        motions: Edges that were asked about without the checker's knowledge: none.
+        motions: Edges checked without the checker's knowledge: none.
     """
 
     motions = 0
@@ -136,7 +136,7 @@ class OneTreeSearch:
         """Vertices of the tree."""
         return self._tree.size
 
-    def advance(self, stop: Callable[[], Any]) -> bool:
+    def advance(self, stop: Stop) -> bool:
         """Go on to the next solution; False if ``stop()`` or the limit of iterations came first."""
         while not stop():
             while self._waiting:
@@ -155,11 +155,11 @@ class OneTreeSearch:
         return False
 
     def ending(self) -> Matrix:
-        """The way from the root to the goal that was reached, shape (k, n)."""
+        """The path from the root to the goal that was reached, shape (k, n)."""
         return self._tree.branch(self._ending)
 
     def branch(self, number: int, vertex: int) -> Matrix:
-        """The way from the root to a vertex, shape (k, n); there is only one tree, number 0."""
+        """The path from the root to a vertex, shape (k, n); there is only one tree, number 0."""
         return self._tree.branch(vertex)
 
     def tree(self, number: int) -> Matrix:

@@ -25,22 +25,22 @@ class Endings:
         goals: Shape (g, n).
         joints: Those that move last, in this order.
         smallest_move: Goals that need a shorter last move are left out, shape (n,).
-        checker: Asked about the last moves.
+        checker: Checks the last moves.
     """
 
     def __init__(
         self, start: Vector, goals: Matrix, joints: Sequence[int], smallest_move: Vector, checker: MotionChecker
     ) -> None:
-        ways = [_last_moves(start, goal, joints) for goal in goals]
+        endings = [_last_moves(start, goal, joints) for goal in goals]
         if joints:
-            ways = [way for way in ways if long_enough(way, smallest_move) and _free(way, checker)]
-        self._ways = ways
-        self.aims: Matrix = np.array([way[0] for way in ways]).reshape(-1, goals.shape[1])
+            endings = [ending for ending in endings if long_enough(ending, smallest_move) and _free(ending, checker)]
+        self._endings = endings
+        self.aims: Matrix = np.array([ending[0] for ending in endings]).reshape(-1, goals.shape[1])
 
     def completed(self, path: Matrix) -> Matrix:
         """A path to one of the aims, shape (k, n), and the last moves after it."""
         reached = int((self.aims == path[-1]).all(axis=1).argmax())
-        return np.vstack([path, self._ways[reached][1:]])
+        return np.vstack([path, self._endings[reached][1:]])
 
 
 def _last_moves(start: Vector, goal: Vector, joints: Sequence[int]) -> Matrix:
@@ -56,7 +56,7 @@ def _last_moves(start: Vector, goal: Vector, joints: Sequence[int]) -> Matrix:
     return np.array(rows)
 
 
-def _free(way: Matrix, checker: MotionChecker) -> bool:
-    if len(way) == 1:
+def _free(ending: Matrix, checker: MotionChecker) -> bool:
+    if len(ending) == 1:
         return True
-    return checker.valid(way[0]) and bool(checker.motion_valid_batch(way[:-1], way[1:]).all())
+    return checker.valid(ending[0]) and bool(checker.motion_valid_batch(ending[:-1], ending[1:]).all())

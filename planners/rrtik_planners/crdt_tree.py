@@ -1,4 +1,4 @@
-"""The tree of C-RDT, every edge of which moves one coordinate. Source: the C-RDT paper, EXTEND and REWRITE."""
+"""The tree of C-RDT, every edge of which moves one coordinate. Source: [1, ch. 6.3, EXTEND and REWRITE]."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FIRST_CAPACITY = 256
 
 
 class Outcome(Enum):
-    """What an extension achieved: nothing, a part of the way, or the target exactly."""
+    """What an extension achieved: nothing, a part of the extension, or the target exactly."""
 
     TRAPPED = auto()
     ADVANCED = auto()
@@ -75,11 +75,11 @@ class CrdtTree:
         return int(np.add.reduce(difference * difference, axis=0).argmin())  # adds up in the order of the kernels
 
     def branch(self, i: int) -> Matrix:
-        """The way from the root to vertex i, shape (k, n)."""
-        way = [i]
-        while self._parents[way[-1]] != ROOT:
-            way.append(int(self._parents[way[-1]]))
-        return np.ascontiguousarray(self._coordinates[:, way[::-1]].T)
+        """The path from the root to vertex i, shape (k, n)."""
+        vertices = [i]
+        while self._parents[vertices[-1]] != ROOT:
+            vertices.append(int(self._parents[vertices[-1]]))
+        return np.ascontiguousarray(self._coordinates[:, vertices[::-1]].T)
 
     def extend(self, target: Vector, checker: MotionChecker, rng: Random, *, exactly: bool = True) -> Extension:
         """Grow from the vertex nearest to ``target`` towards it, one axis after the other (algorithm 10)."""
@@ -98,9 +98,9 @@ class CrdtTree:
         Args:
             near: Number of a vertex.
             target: Where to go.
-            checker: Asked about motions.
+            checker: Checks motions.
             rng: Gives the order of the axes.
-            exactly: Whether a leg that is shorter than the smallest move ends the way, for the target would be missed;
+            exactly: Whether a leg shorter than the smallest move ends the extension, for the target would be missed;
                 otherwise it is left out.
         """
         current, known = near, self.size

@@ -1,15 +1,16 @@
-"""DRRT-Con: a planner for scenes that change. What it found is kept, and repaired when it is asked again."""
+"""DRRT-Con: a planner for scenes that change. Its path is kept, and repaired by the next ``solve``."""
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix, Vector, positive
 from rrtik_ompl.fast.search.connect_layout import KERNELS
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
-from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_ompl.replanning.connecting import KERNELS as LIBRARIES
 from rrtik_ompl.replanning.connecting import KernelConnect, PlainConnect
 from rrtik_ompl.replanning.drrt_con import DrrtCon, points_along
@@ -23,21 +24,26 @@ class DRRTCon(SafePlanner):
 
     The first ``solve`` is RRT-Connect and the sequential cut. A later one starts from the kept path: what lies behind
     the start is dropped, the rest is checked in one call, cut at the first blocked motion seen from either end and
-    reconnected; while no way is found it stays. The start may move along the path or near it, the goal may move, and
-    the validity checker may change its mind. ``clear()`` forgets. Source: DRRT-Con paper, algorithms 6 to 8; the
+    reconnected; while none is found it stays. The start may move along the path or near it, the goal may move, and
+    the answers of the validity checker may change. ``clear()`` forgets. Source: [1, ch. 5.2, algorithms 6 to 8]; the
     search: :mod:`rrtik_ompl.replanning`.
     """
 
     kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
 
     def __init__(
-        self, si: Any, *, world: MotionQueries | None = None, seed: int | None = None, range: float | None = None
+        self,
+        si: ob.SpaceInformation,
+        *,
+        world: MotionQueries | None = None,
+        seed: int | None = None,
+        range: float | None = None,
     ) -> None:
         """Make a planner.
 
         Args:
             si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
-            world: Asked instead of ``si`` whether configurations and motions are free, if given.
+            world: Checks configurations and motions instead of ``si``, if given.
             seed: At least 0; drawn from OMPL's if None.
             range: Longest motion of the trees [unit of the space]; what suits the bounds if None.
 
@@ -53,7 +59,7 @@ class DRRTCon(SafePlanner):
         super().clear()
         self._core = None
 
-    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         core = self._core
         reused = core is not None and core.path is not None and self._from_kept(core, starts, goals, checker, ptc)
@@ -65,7 +71,7 @@ class DRRTCon(SafePlanner):
         statistics = {"iterations": core.connect.samples, "repairs": core.repairs, "reused": int(reused)}
         return SearchResult(core.path if core.free else None, statistics)
 
-    def _from_kept(self, core: DrrtCon, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> bool:
+    def _from_kept(self, core: DrrtCon, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> bool:
         """Whether the kept path could be made to lead from a start to a goal."""
         assert core.path is not None
         start, passed = _nearest_place(core.path, starts, 0.5 * core.max_edge)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from ompl import base as ob
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, positive
 from rrtik_ompl.fast.search.connect import ConnectSearch
 from rrtik_ompl.fast.search.connect_layout import KERNELS
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions
-from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.search.rrt_connect import ConnectRules, RrtConnect, straight_path
 from rrtik_ompl.world.motion_queries import has_kernels, is_conservative
@@ -22,8 +23,8 @@ class FastRRTConnect(SafePlanner):
     """RRT-Connect with dynamic domain and balanced trees; the straight motion is tried first.
 
     With a world that has kernels (``world.motions``) the search runs in them and a path comes back in microseconds.
-    Motions that they cannot decide are asked of the world once they stand on a path, and never in a conservative
-    world. With any other world, or none, a plain loop does the same on one motion at a time.
+    Motions that they cannot decide are checked by the world once they are part of a path, and never in a
+    conservative world. With any other world, or none, a plain loop does the same on one motion at a time.
     """
 
     kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
@@ -31,7 +32,7 @@ class FastRRTConnect(SafePlanner):
 
     def __init__(
         self,
-        si: Any,
+        si: ob.SpaceInformation,
         *,
         world: MotionQueries | None = None,
         seed: int | None = None,
@@ -43,7 +44,7 @@ class FastRRTConnect(SafePlanner):
 
         Args:
             si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
-            world: Asked instead of ``si`` whether configurations and motions are free, if given.
+            world: Checks configurations and motions instead of ``si``, if given.
             seed: At least 0; drawn from OMPL's if None.
             range: Length of a motion of the trees, at most [unit of the space]; what suits the bounds if None.
             domain: Radius in which a vertex is extended once it was blocked [unit of the space]; as with ``range``.
@@ -56,9 +57,9 @@ class FastRRTConnect(SafePlanner):
         self.range = None if range is None else positive(range, "range")
         self.domain = None if domain is None else positive(domain, "domain")
         self.max_iterations = iteration_limit(max_iterations)
-        self._kept: tuple[Any, Any, ConnectSearch | None] | None = None  # motions, bounds, and the search made for them
+        self._kept: tuple[FastMotions, tuple[Vector, Vector], ConnectSearch] | None = None
 
-    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         kernels = self._kernels()
         if kernels is None:
@@ -72,7 +73,7 @@ class FastRRTConnect(SafePlanner):
             max_iterations=self.max_iterations,
         )
         counts = kernels.statistics()
-        checker.checked_motions += int(counts["motions"] - counts["questions"])  # those it was asked it has counted
+        checker.checked_motions += int(counts["motions"] - counts["questions"])  # the questions it has counted
         return SearchResult(path, {**counts, "edges": counts["vertices"] - len(starts) - len(goals)})
 
     def ends_free(self, rows: Matrix, checker: MotionChecker) -> Mask:
@@ -83,7 +84,7 @@ class FastRRTConnect(SafePlanner):
         checker.checked_states += len(rows)
         return np.ones(len(rows), dtype=bool)
 
-    def _in_python(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+    def _in_python(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """The same search, where every motion is decided at once."""
         lower, upper = self.bounds()
         range_, domain = connect_lengths(lower, upper, *self._lengths)

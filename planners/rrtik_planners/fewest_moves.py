@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
@@ -14,7 +15,7 @@ from rrtik_ompl.moves.lower_bounds import sharper_bound
 from rrtik_ompl.moves.rules import Joints, PerJoint
 from rrtik_ompl.moves.search import MOST_NODES, MoveSearch
 from rrtik_ompl.moves.staircase import one_joint_moves
-from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.shortening import Task
 from rrtik_ompl.shortening.random_cut import shortcut
@@ -27,7 +28,7 @@ from rrtik_planners.one_joint_planner import OneJointPlanner
 SEARCHES, ROUNDS = 5, 10
 BRIEF_ITERATIONS = 1000  # of BiCRDT, before it is started anew
 SAMPLED_ITERATIONS = 20_000  # of RRT-Connect
-FEW_NODES = 256  # of a lattice, where each motion is asked about by itself
+FEW_NODES = 256  # of a lattice, where each motion is checked by itself
 
 
 class FewestMoves(OneJointPlanner):
@@ -45,7 +46,7 @@ class FewestMoves(OneJointPlanner):
 
     def __init__(
         self,
-        si: Any,
+        si: ob.SpaceInformation,
         *,
         world: MotionQueries | None = None,
         seed: int | None = None,
@@ -91,7 +92,7 @@ class FewestMoves(OneJointPlanner):
         bound = found.statistics["lower_bound"] + transitions(path) - transitions(found.path)
         return replace(found, path=path, statistics={**found.statistics, "lower_bound": bound})
 
-    def between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+    def between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`OneJointPlanner.between`."""
         frozen, world = self.options.staying, self._world
         movable = [joint for joint in range(starts.shape[1]) if joint not in frozen]
@@ -115,7 +116,7 @@ class FewestMoves(OneJointPlanner):
         counts = {"iterations": iterations, "rounds": moves.rounds, "lower_bound": moves.bound}
         return SearchResult(moves.route, {**counts, "gap": moves.moves - moves.bound})
 
-    def _quick_routes(self, moves: MoveSearch, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> int:
+    def _quick_routes(self, moves: MoveSearch, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> int:
         """Offer the routes of several runs of BiCRDT, or others if it finds none; returns its iterations."""
         iterations, seeds = 0, self.rng.integers(2**31, size=self.searches).tolist()
         for seed in seeds:
@@ -147,7 +148,7 @@ class FewestMoves(OneJointPlanner):
             max_iterations=iterations,
         )
 
-    def _converted(self, seed: int, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> Matrix | None:
+    def _converted(self, seed: int, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> Matrix | None:
         """RRT-Connect's route, made shorter and turned into single-joint moves; None if there is none."""
         world = self._world
         if not isinstance(world, World) or self.options.staying:

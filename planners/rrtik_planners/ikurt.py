@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+
+from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix, positive
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import Goal
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
 from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
-from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.world import World
 from rrtik_planners.tip_seeker import TipSeeker, misses
 
@@ -18,16 +19,16 @@ from rrtik_planners.tip_seeker import TipSeeker, misses
 class IKURT(TipSeeker):
     """Extended inverse kinematics: a tree in joint space, drawn to the goal by the distance of the tip from it.
 
-    Source: the IKURT paper, made faster and more robust (:mod:`rrtik_ompl.ik.ikurt.search`);
+    Source: [1, ch. 5.1], made faster and more robust (:mod:`rrtik_ompl.ik.ikurt.search`);
     :class:`rrtik_planners.ikurt_published.IKURTPublished` is the algorithm to the letter. Where the goals are
     configurations, as in plain OMPL, the distance is that in joint space.
 
-    ``statistics`` tells how far from the goal the tip ends: ``position_error`` [m], ``orientation_error`` [rad].
+    ``statistics`` says how far from the goal the tip ends: ``position_error`` [m], ``orientation_error`` [rad].
     """
 
     def __init__(
         self,
-        si: Any,
+        si: ob.SpaceInformation,
         *,
         world: MotionQueries | None = None,
         seed: int | None = None,
@@ -42,7 +43,7 @@ class IKURT(TipSeeker):
 
         Args:
             si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
-            world: Asked instead of ``si`` whether configurations and motions are free, if given.
+            world: Checks configurations and motions instead of ``si``, if given.
             seed: At least 0; drawn from OMPL's if None.
             goal: What the tip has to reach; needs a world. If None, the configurations of the problem definition are
                 the goals.
@@ -64,7 +65,7 @@ class IKURT(TipSeeker):
         self.options = Options(positive(step, "step"), positive(stride, "stride"), jacobian, most_vertices)
         self.metres_per_radian = None if metres_per_radian is None else positive(metres_per_radian, "metres_per_radian")
 
-    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         metric = self._metric(goals)
         validity = IkurtValidity(checker.valid_batch, checker.motion_valid_batch, ptc)

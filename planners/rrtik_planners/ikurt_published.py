@@ -1,15 +1,16 @@
-"""IKURT to the letter, beside which the improved one is measured. Source: the IKURT paper, algorithms 4 and 5."""
+"""IKURT to the letter, beside which the improved one is measured. Source: [1, ch. 5.1, algorithms 4 and 5]."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+
+from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix, positive
 from rrtik_ompl.goal import Goal
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric, reach
 from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
-from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.world import World
 from rrtik_planners.tip_seeker import TipSeeker, misses
 
@@ -20,12 +21,12 @@ THRESHOLD_REACH = 0.13  # of the reach, for positions
 class IKURTPublished(TipSeeker):
     """Extended inverse kinematics as published: one sample at a time, no Jacobian; slow where goals lie on limits.
 
-    The paper gives no numbers; the defaults are a proposal. ``statistics`` as of :class:`rrtik_planners.ikurt.IKURT`.
+    [1] gives no numbers; the defaults are a proposal. ``statistics`` as of :class:`rrtik_planners.ikurt.IKURT`.
     """
 
     def __init__(
         self,
-        si: Any,
+        si: ob.SpaceInformation,
         *,
         world: MotionQueries | None = None,
         seed: int | None = None,
@@ -58,7 +59,7 @@ class IKURTPublished(TipSeeker):
         self.threshold = None if threshold is None else positive(threshold, "threshold")
         self.accuracy = None if accuracy is None else positive(accuracy, "accuracy")
 
-    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`; only the first start is used, as published."""
         start = starts[0]
         metric: TipMetric | ConfigurationMetric = ConfigurationMetric(goals)

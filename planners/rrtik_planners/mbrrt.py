@@ -1,17 +1,18 @@
-"""MB-RRT as a planner: a tree in the workspace finds goal configurations, two trees in joint space the way there."""
+"""MB-RRT as a planner: a tree in the workspace finds goal configurations, two trees in joint space the path there."""
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import Goal, JointGoal
 from rrtik_ompl.ik.mb_rrt.aims import tree_aims
 from rrtik_ompl.ik.mb_rrt.axes import misfit
-from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, space_bounds
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop, space_bounds
 from rrtik_ompl.world import World
 from rrtik_planners.bicrdt import BiCRDT
 
@@ -19,7 +20,7 @@ from rrtik_planners.bicrdt import BiCRDT
 class MBRRT(BiCRDT):
     """Reaches a pose, a position or a region: its configurations by MB-RRT, the path to one of them by BiCRDT.
 
-    Source: the MB-RRT paper, which names this use and leaves the path to a planner. In plain OMPL give the problem
+    Source: [3], which names this use and leaves the path to a planner. In plain OMPL give the problem
     definition a :class:`rrtik_ompl.GoalSampler`, or any goal of configurations; these are taken as they are.
     """
 
@@ -27,7 +28,7 @@ class MBRRT(BiCRDT):
 
     def __init__(
         self,
-        si: Any,
+        si: ob.SpaceInformation,
         *,
         world: MotionQueries | None = None,
         seed: int | None = None,
@@ -40,7 +41,7 @@ class MBRRT(BiCRDT):
 
         Args:
             si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
-            world: Asked instead of ``si`` whether configurations and motions are free, if given.
+            world: Checks configurations and motions instead of ``si``, if given.
             seed: At least 0; drawn from OMPL's if None.
             goal: What the tip has to reach; needs a world. If None, or where the tree finds nothing, the
                 configurations of the problem definition are the goals.
@@ -59,7 +60,7 @@ class MBRRT(BiCRDT):
         if self.goal is not None:
             _check_fit(world)
 
-    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         aims = self._aims(starts)
         result = super().search(starts, aims if len(aims) else goals, checker, ptc)

@@ -74,7 +74,7 @@ class OneJointOptions(MoveRules):
         return long_enough(path, self.smallest_move)
 
 
-def joint_names(world: Any) -> Sequence[str]:
+def joint_names(world: object) -> Sequence[str]:
     """Names of the joints of a world's robot, none if it has no robot."""
     names: Sequence[str] = getattr(getattr(world, "robot", None), "joint_names", ())
     return names

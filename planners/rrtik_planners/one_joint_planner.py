@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import ClassVar
+
+from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.fast.search.crdt.rules import KERNELS
 from rrtik_ompl.moves.rules import Joints, PerJoint
-from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_planners.crdt_endings import NO_ENDING, Endings
 from rrtik_planners.one_joint_options import OneJointOptions, joint_names
 
@@ -26,7 +28,7 @@ class OneJointPlanner(SafePlanner):
 
     def __init__(
         self,
-        si: Any,
+        si: ob.SpaceInformation,
         *,
         world: MotionQueries | None = None,
         seed: int | None = None,
@@ -44,7 +46,7 @@ class OneJointPlanner(SafePlanner):
             world: Checks configurations and motions instead of ``si``, if given.
             seed: At least 0; drawn from OMPL's if None.
             scale_by_range: Divide each coordinate by its range in the metric of the nearest neighbour.
-            max_iterations: The K of the paper; without limit if None.
+            max_iterations: K of [1, algorithms 9 to 11]; without limit if None.
             joint_costs: Cost of a joint's motion, greater than 0, shape (n,): a slow or risky joint costs more. The
                 metric multiplies its coordinate by it, and of the samples it takes part only in the share lowest cost /
                 its cost, so that it moves less often; where it has to, it still does. All equal if None.
@@ -71,7 +73,7 @@ class OneJointPlanner(SafePlanner):
             last_joints=last_joints,
         )
 
-    def between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+    def between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """Look for a path between starts and goals, shapes (s, n) and (g, n), that agree in the joints that stay."""
         raise NotImplementedError(f"{type(self).__name__} has no between()")
 
@@ -79,7 +81,7 @@ class OneJointPlanner(SafePlanner):
         """The result with the last moves: its path goes on to ``path``. For subclasses whose statistics count moves."""
         return replace(found, path=path)
 
-    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         starts, goals = self.options.agreeing(starts, goals)
         last = self.options.last_joints

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import Goal, JointGoal, PoseGoal
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
@@ -26,7 +27,9 @@ class TipSeeker(SafePlanner):
     finds_goals: ClassVar[bool] = True
     path_statistics: ClassVar[tuple[str, ...]] = ("position_error", "orientation_error")
 
-    def __init__(self, si: Any, name: str, *, world: MotionQueries | None, seed: int | None, goal: Goal | None) -> None:
+    def __init__(
+        self, si: ob.SpaceInformation, name: str, *, world: MotionQueries | None, seed: int | None, goal: Goal | None
+    ) -> None:
         """See :class:`rrtik_planners.ikurt.IKURT`."""
         super().__init__(si, name, world=world, seed=seed)
         self.goal = None if isinstance(goal, JointGoal) else goal
@@ -61,7 +64,7 @@ class TipSeeker(SafePlanner):
         return SearchResult(path, {**counts, "metric_evaluations": metric.evaluations, **tip}, difference)
 
 
-def misses(metric: TipMetric, q: Any, what: str) -> str:
+def misses(metric: TipMetric, q: Vector, what: str) -> str:
     """A line that says by how much a configuration misses the goal."""
     away, angle = metric.errors(q)
     turned = f" and {np.degrees(angle):.3g} deg" if any(isinstance(t, PoseGoal) for t in metric.targets) else ""

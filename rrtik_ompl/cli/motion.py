@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rrtik_ompl.choices import one_of
 from rrtik_ompl.cli.terminal import progress, say
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
@@ -116,6 +117,7 @@ def time_path(
 def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> JointPath:
     """The path as single-joint moves."""
     from rrtik_ompl import load_path, load_problem, one_joint_moves
+    from rrtik_ompl.shortening import METHODS
     from rrtik_ompl.shortening import shorten as shortened
 
     if problem is None:
@@ -133,7 +135,7 @@ def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> Join
         if not route.one_joint_at_a_time:
             route = one_joint_moves(route, task)
         if shorten is not None:
-            route = shortened(route, task, method=shorten)
+            route = shortened(route, task, method=one_of(METHODS, shorten, "shortening method"))
     return route
 
 

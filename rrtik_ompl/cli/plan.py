@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import time
-from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 import typer
 
+from rrtik_ompl.choices import ShorteningMethod, one_of
 from rrtik_ompl.cli.terminal import progress, say
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
@@ -18,25 +18,21 @@ from rrtik_ompl.files.text import check_target
 RULES = ("joint_costs", "frozen_joints", "last_joints", "smallest_move")  # of single-joint moves, see MoveRules
 
 
-class Shorten(str, Enum):
-    """What `rrtik plan` does to the raw path; `auto` is fewest-moves for a path of single-joint moves."""
+SHORTEN: tuple[str, ...] = (*get_args(ShorteningMethod), "none")
 
-    auto = "auto"
-    axis = "axis"
-    axis_rounds = "axis-rounds"
-    sequential = "sequential"
-    random = "random"
-    shortcut = "shortcut"
-    retraction = "retraction"
-    corners = "corners"
-    ompl = "ompl"
-    fewest_moves = "fewest-moves"
-    none = "none"
+
+def _method(name: str) -> str:
+    """What to do to the raw path: the name of a method of shortening, or "none"."""
+    if name not in SHORTEN:
+        raise typer.BadParameter(f"'{name}' is not one of {', '.join(map(repr, SHORTEN))}.")
+    return name
 
 
 def plan(
     problem: Annotated[str, typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.")],
-    planner: Annotated[str, typer.Option(help="See: rrtik list planners.")] = "bicrdt",
+    planner: Annotated[
+        str | None, typer.Option(help="See: rrtik list planners. If left out, the default of the installed packages.")
+    ] = None,
     seconds: Annotated[float, typer.Option(help="Time limit [s].")] = 5.0,
     seed: Annotated[int | None, typer.Option(help="The same seed gives the same path; drawn if left out.")] = None,
     restarts: Annotated[int, typer.Option(help="New attempts at most, if one gives up early.")] = 20,
@@ -45,8 +41,13 @@ def plan(
         typer.Option("--set", metavar="NAME=VALUE", help="An option of the planner, in JSON; repeatable."),
     ] = None,
     shorten: Annotated[
-        Shorten, typer.Option(help="How the path is made shorter; auto: fewest-moves for single-joint moves.")
-    ] = Shorten.auto,
+        str,
+        typer.Option(
+            parser=_method,
+            metavar=f"[{'|'.join(SHORTEN)}]",
+            help="How the path is made shorter; auto: fewest-moves for single-joint moves.",
+        ),
+    ] = "auto",
     out: Annotated[Path | None, typer.Option(help="Save the path: .json, .csv or .txt (OMPL matrix).")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
@@ -58,10 +59,12 @@ def plan(
     check_target(out, PATH_FORMATS)
     check_target(html, (".html", ".htm"))
     from rrtik_ompl import load_problem
+    from rrtik_ompl.catalog import default_planner
     from rrtik_ompl.cli import plan_report as report
     from rrtik_ompl.planning import find_planner
     from rrtik_ompl.planning import plan as find_path
 
+    planner = default_planner() if planner is None else planner
     find_planner(planner)
     options = _parameters(parameter or [])
     question = load_problem(problem)
@@ -87,16 +90,17 @@ def plan(
     return 0 if found.found else 1
 
 
-def _shortened(path: Any, problem: Any, method: Shorten, seed: int, rules: dict[str, Any]) -> tuple[Any, float]:
-    """The path made shorter, keeping to what the planner was told of single-joint moves; and the time [s]."""
-    from rrtik_ompl.shortening import MoveRules, shorten
+def _shortened(path: Any, problem: Any, method: str, seed: int, rules: dict[str, Any]) -> tuple[Any, float]:
+    """The path made shorter, by the rules of single-joint moves that the planner had; and the time [s]."""
+    from rrtik_ompl.shortening import METHODS, MoveRules, shorten
 
-    if path is None or method is Shorten.none or len(path.waypoints) < 2:
+    if path is None or method == "none" or len(path.waypoints) < 2:
         return path, 0.0
     begin = time.perf_counter()
-    wanted = Shorten.fewest_moves if method is Shorten.auto and path.one_joint_at_a_time else method
+    wanted = "fewest-moves" if method == "auto" and path.one_joint_at_a_time else method
     kept = MoveRules(problem.robot.joint_names, **rules) if rules and path.one_joint_at_a_time else None
-    return shorten(path, problem, method=wanted.value, seed=seed, rules=kept), time.perf_counter() - begin
+    shorter = shorten(path, problem, method=one_of(METHODS, wanted, "shortening method"), seed=seed, rules=kept)
+    return shorter, time.perf_counter() - begin
 
 
 def _parameters(pairs: list[str]) -> dict[str, Any]:

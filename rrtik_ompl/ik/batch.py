@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, not_negative, whole_number
+from rrtik_ompl.choices import IkMethod
 from rrtik_ompl.goal import PoseGoal, joint_difference
 from rrtik_ompl.ik.analytic.closed_form import branches_of, check_poses, form_of
 from rrtik_ompl.ik.analytic.reference_branches import tip_residuals
@@ -45,7 +46,7 @@ def solve_ik_batch(
     robot: Robot,
     poses: ArrayLike,
     *,
-    method: str = "auto",
+    method: IkMethod = "auto",
     near: ArrayLike | None = None,
     world: World | None = None,
     seconds: float = SECONDS,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rrtik_ompl.arrays import TAU, Matrix, Vector, frozen
+from rrtik_ompl.choices import IkMethod
 from rrtik_ompl.goal import (
     GoalSet,
     JointGoal,
@@ -146,7 +147,7 @@ def nearest_miss(robot: Robot, goal: TipGoal) -> tuple[float, float]:
     return float(distance[best]), float(angle[best])
 
 
-def _fits(method: str, robot: Robot, drawn: list[Target]) -> bool:
+def _fits(method: IkMethod, robot: Robot, drawn: list[Target]) -> bool:
     return not any(METHODS[method].misfit(robot, target) for target in drawn)
 
 

@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.choices import IkMethod
 from rrtik_ompl.fast.ik import branch_layout, ik_layout
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.goal import PositionGoal
@@ -96,7 +97,7 @@ def _uncoupled(robot: Robot, target: Target) -> str:
     return coupled_fault(robot)
 
 
-METHODS: Mapping[str, Method] = MappingProxyType(
+METHODS: Mapping[IkMethod, Method] = MappingProxyType(
     {
         "closed-form": Method(_closed_form_misfit, _closed_form),
         "numeric": Method(_fits_all, numeric),

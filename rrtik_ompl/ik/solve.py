@@ -5,12 +5,14 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen, not_negative
-from rrtik_ompl.errors import InputError, UnknownNameError, require
+from rrtik_ompl.choices import IkMethod, one_of
+from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import PositionGoal, TipGoal, has_task_regions, joint_difference, parts_of, tip_errors
 from rrtik_ompl.ik.mb_rrt.search import out_of_reach
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target, tolerances
@@ -47,7 +49,7 @@ class IkResult:
     reason: str
     detail: str
     iterations: int
-    method: str
+    method: IkMethod
     seconds: float
 
     @property
@@ -56,7 +58,7 @@ class IkResult:
         return len(self.solutions) > 0
 
 
-def list_ik_methods() -> tuple[str, ...]:
+def list_ik_methods() -> tuple[IkMethod, ...]:
     """Names that `solve_ik` takes as a method, beside "auto"."""
     return tuple(METHODS)
 
@@ -65,7 +67,7 @@ def solve_ik(
     robot: Robot,
     goal: TipGoal,
     *,
-    method: str = "auto",
+    method: IkMethod = "auto",
     near: ArrayLike | None = None,
     all: bool = False,
     world: World | None = None,
@@ -133,7 +135,7 @@ def mid_range_configuration(robot: Robot) -> Vector:
     return frozen(0.5 * np.sum(robot.finite_range(), axis=0))
 
 
-def chosen_method(robot: Robot, drawn: tuple[Target, ...], method: str) -> str:
+def chosen_method(robot: Robot, drawn: tuple[Target, ...], method: IkMethod) -> IkMethod:
     """The name of the method for targets: the first that fits if it is "auto".
 
     Raises:
@@ -141,14 +143,12 @@ def chosen_method(robot: Robot, drawn: tuple[Target, ...], method: str) -> str:
         InputError: If it does not fit.
     """
 
-    def misfit(name: str) -> str:
+    def misfit(name: IkMethod) -> str:
         return next((m for m in (METHODS[name].misfit(robot, target) for target in drawn) if m), "")
 
     if method == "auto":
         return next(name for name in METHODS if not misfit(name))
-    if method not in METHODS:
-        raise UnknownNameError("inverse kinematics method", method, ("auto", *METHODS))
-    fault = misfit(method)
+    fault = misfit(one_of(get_args(IkMethod), method, "inverse kinematics method"))
     if fault:
         raise InputError(
             f"method '{method}' does not fit robot '{robot.name}' and this goal: {fault}; "
@@ -169,7 +169,7 @@ def free_of_collision(world: World | None, Q: Matrix) -> Mask:
     return free
 
 
-def _tried(request: IkRequest, name: str) -> tuple[IkResponse, Matrix, Matrix, Mask]:
+def _tried(request: IkRequest, name: IkMethod) -> tuple[IkResponse, Matrix, Matrix, Mask]:
     """What a method returns: of that the rows at the goal, shape (k, dof), their residuals, and which are accepted.
 
     If one is enough, the nearest is checked first and alone: mostly it is accepted.
@@ -223,7 +223,7 @@ def _why(request: IkRequest, answer: IkResponse, name: str, q: Matrix) -> tuple[
     return "unreachable", f"{away} from the goal"
 
 
-def _walker(goal: TipGoal) -> str:
+def _walker(goal: TipGoal) -> IkMethod:
     """The method for goals with freedom that walks to all of them, not to targets drawn from them."""
     return "projection" if has_task_regions(goal) else "numeric"
 

@@ -6,12 +6,14 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, not_negative, positive
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.choices import FrameAxis, GeneticPreset, IkMethod, TrajectoryIkMethod, one_of
+from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal, TipGoal, joint_difference, tip_errors
 from rrtik_ompl.ik.analytic.branch_choice import JUMP, follow
 from rrtik_ompl.ik.analytic.closed_form import check_poses, form_of
@@ -51,7 +53,7 @@ class IkTrajectory:
     detail: str
     jumps: tuple[int, ...]
     blocked: tuple[int, ...]
-    method: str
+    method: TrajectoryIkMethod
     iterations: int
     seconds: float
 
@@ -90,14 +92,14 @@ def solve_ik_trajectory(
     robot: Robot,
     poses: ArrayLike,
     *,
-    method: str = "auto",
+    method: TrajectoryIkMethod = "auto",
     near: ArrayLike | None = None,
     world: World | None = None,
     position_tolerance: float = 1e-3,
     orientation_tolerance: float = 1e-2,
-    free_rotation_axis: str | None = None,
+    free_rotation_axis: FrameAxis | None = None,
     jump: float = JUMP,
-    options: GeneticOptions | str = "refined",
+    options: GeneticOptions | GeneticPreset = "refined",
     seconds: float = SECONDS,
     seed: int = 0,
 ) -> IkTrajectory:
@@ -174,7 +176,7 @@ def _target(row: Matrix, position_tolerance: float, orientation_tolerance: float
     return PoseGoal(row, position_tolerance, orientation_tolerance)
 
 
-def _freed(targets: tuple[Target, ...], axis: str | None) -> tuple[TipGoal, ...]:
+def _freed(targets: tuple[Target, ...], axis: FrameAxis | None) -> tuple[TipGoal, ...]:
     if axis is None:
         return targets
     if isinstance(targets[0], PositionGoal):
@@ -182,17 +184,14 @@ def _freed(targets: tuple[Target, ...], axis: str | None) -> tuple[TipGoal, ...]
     return tuple(GoalSet([target], free_rotation_axis=axis) for target in targets)
 
 
-def _options(options: GeneticOptions | str) -> GeneticOptions:
+def _options(options: GeneticOptions | GeneticPreset) -> GeneticOptions:
     if isinstance(options, GeneticOptions):
         return options
-    if options not in PRESETS:
-        raise UnknownNameError("preset of the genetic algorithm", options, PRESETS)
-    return PRESETS[options]
+    return PRESETS[one_of(PRESETS, options, "preset of the genetic algorithm")]
 
 
-def _chosen(task: Task, method: str) -> str:
-    if method != "auto" and method not in FOLLOWERS:
-        raise UnknownNameError("inverse kinematics method for trajectories", method, ("auto", *FOLLOWERS))
+def _chosen(task: Task, method: TrajectoryIkMethod) -> TrajectoryIkMethod:
+    one_of(get_args(TrajectoryIkMethod), method, "inverse kinematics method for trajectories")
     misfits = {name: METHODS[name].misfit(task.robot, task.targets[0]) for name in FOLLOWERS}
     if not misfits["closed-form"] and form_of(task.robot).kind == "position" and task.poses.ndim == 3:
         misfits["closed-form"] = "its closed form knows positions alone; give points, shape (k, 3)"
@@ -233,7 +232,7 @@ def _numeric(task: Task) -> tuple[Matrix, int]:
     return Tracker(task.robot, task.goals, task.accept, task.jump, task.rng, task.deadline).follow(task.near)
 
 
-FOLLOWERS: Mapping[str, Callable[[Task], tuple[Matrix, int]]] = MappingProxyType(
+FOLLOWERS: Mapping[TrajectoryIkMethod, Callable[[Task], tuple[Matrix, int]]] = MappingProxyType(
     {"closed-form": _closed_form, "numeric": _numeric, "genetic": _genetic}
 )
 
@@ -250,7 +249,7 @@ def _keep_only_checked(task: Task, q: Matrix) -> Matrix:
     return residuals
 
 
-def _why(task: Task, name: str, q: Matrix) -> tuple[tuple[str, ...], str]:
+def _why(task: Task, name: TrajectoryIkMethod, q: Matrix) -> tuple[tuple[str, ...], str]:
     """Reasons of all points, and the first of them in a line.
 
     A genetic algorithm knows nothing of the points after the one where it stopped; there and where the time is up the
@@ -261,7 +260,7 @@ def _why(task: Task, name: str, q: Matrix) -> tuple[tuple[str, ...], str]:
         left = task.deadline - time.monotonic()
         reasons[k], line = "time", f"method '{name}' came to its limit before it found a way there"
         if left > 0.0 and (name != "genetic" or not detail):
-            method = "numeric" if name == "genetic" else name
+            method: IkMethod = "numeric" if name == "genetic" else name
             alone = solve_ik(
                 task.robot, task.goals[k], method=method, world=task.world, seconds=min(left, SECONDS_A_POINT)
             )

@@ -1,6 +1,6 @@
-"""Fewer single-joint moves: the axis post-processor. Source: the C-RDT paper, algorithm 12, and its double pass.
+"""Fewer single-joint moves: the axis post-processor. Source: [1, ch. 6.3, algorithm 12].
 
-Works on arrays: a route is (k, n) waypoints, every edge of which should move one joint; ``motions_free(A, B)`` tells
+Works on arrays: a route is (k, n) waypoints, every edge of which should move one joint; ``motions_free(A, B)`` says
 for batches which straight motions are free.
 """
 
@@ -17,7 +17,7 @@ from rrtik_ompl.transitions import merge_moves
 from rrtik_ompl.world.motion_queries import MotionsFree, Stop, no_stop
 
 PART, LONGER = 16, 4  # moves of the first parts that are cut, and how many times longer they are the next time
-FIRST_TESTS, MORE_TESTS = 4, 4  # waypoints asked about together from a pivot, and how many times more the next time
+FIRST_TESTS, MORE_TESTS = 4, 4  # waypoints tried together from a pivot, and how many times more the next time
 
 
 def axis_cut(
@@ -33,7 +33,7 @@ def axis_cut(
             is where no sequence of single-joint moves replaces it.
         motions_free: Which straight motions are free, for batches of shape (m, n).
         axes: Order of the joints within a sequence; the last joint first if None, because distal joints sweep less.
-        stop: Asked at every pivot; true leaves the rest of the route as it is.
+        stop: Called at every pivot; true leaves the rest of the route as it is.
 
     Returns:
         Shape (m, n), start first, ends as given, with no more moves than the route had.
@@ -41,7 +41,7 @@ def axis_cut(
     Raises:
         InputError: If the waypoints are no (k, n) numbers or ``axes`` is no permutation of the joints.
     """
-    return _backward_pass(_route(waypoints), ask_once(motions_free), axes, stop)[::-1]
+    return _backward_pass(_route(waypoints), check_once(motions_free), axes, stop)[::-1]
 
 
 def double_axis_cut(
@@ -51,14 +51,14 @@ def double_axis_cut(
 
     Each pass turns the route round, so the second one cuts the other way and restores the direction.
     """
-    ask = ask_once(motions_free)
-    return _backward_pass(_backward_pass(_route(waypoints), ask, axes, stop), ask, axes, stop)
+    free = check_once(motions_free)
+    return _backward_pass(_backward_pass(_route(waypoints), free, axes, stop), free, axes, stop)
 
 
 def cut_parts(waypoints: ArrayLike, motions_free: MotionsFree, *, stop: Stop = no_stop) -> Matrix:
     """The double cut of short parts of a long route, then of longer ones of what is left, up to the whole.
 
-    The cut of a whole route asks about the square of its moves, and far waypoints come first; most of what it gains is
+    The cut of a whole route checks about the square of its moves, and far waypoints come first; most of its gain is
     near. See :func:`axis_cut`.
     """
     route, size = _route(waypoints), PART
@@ -78,14 +78,14 @@ def axis_moves(a: Vector, b: Vector, axes: Sequence[int]) -> Matrix:
     return steps
 
 
-def ask_once(motions_free: MotionsFree) -> MotionsFree:
-    """The same test, but each motion is asked once, from its lexicographically smaller end.
+def check_once(motions_free: MotionsFree) -> MotionsFree:
+    """The same test, but each motion is checked once, from its lexicographically smaller end.
 
-    So both directions have one answer, and what an earlier pass has asked is remembered.
+    So both directions have one answer, and what an earlier pass has checked is remembered.
     """
     answers: dict[bytes, bool] = {}
 
-    def ask(A: Matrix, B: Matrix) -> Mask:
+    def free(A: Matrix, B: Matrix) -> Mask:
         turned = np.array([a > b for a, b in zip(A.tolist(), B.tolist(), strict=True)], dtype=bool)[:, None]
         first, second = np.where(turned, B, A), np.where(turned, A, B)
         keys = [motion.tobytes() for motion in np.hstack([first, second])]
@@ -95,7 +95,7 @@ def ask_once(motions_free: MotionsFree) -> MotionsFree:
             answers.update(zip(fresh, motions_free(first[rows], second[rows]).tolist(), strict=True))
         return np.array([answers[key] for key in keys], dtype=bool)
 
-    return ask
+    return free
 
 
 def _backward_pass(route: Matrix, motions_free: MotionsFree, axes: Sequence[int] | None, stop: Stop) -> Matrix:
@@ -131,9 +131,9 @@ def _reached(a: Vector, goals: Matrix, motions_free: MotionsFree, order: Sequenc
         here[:, order[:k]] = goals[:, order[:k]]
         there = here.copy()
         there[:, axis] = goals[:, axis]
-        asked = np.flatnonzero(reached & (there[:, axis] != here[:, axis]))
-        if len(asked):
-            reached[asked] = motions_free(here[asked], there[asked])
+        open_ = np.flatnonzero(reached & (there[:, axis] != here[:, axis]))
+        if len(open_):
+            reached[open_] = motions_free(here[open_], there[open_])
     return reached
 
 

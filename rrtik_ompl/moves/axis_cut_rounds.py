@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.moves.axis_cut import ask_once, axis_cut, double_axis_cut
+from rrtik_ompl.moves.axis_cut import axis_cut, check_once, double_axis_cut
 from rrtik_ompl.transitions import lower_bound, route_length, transitions
 from rrtik_ompl.world.motion_queries import MotionsFree, Stop, no_stop
 
@@ -29,7 +29,7 @@ def axis_cut_rounds(
         motions_free: Which straight motions are free, for batches of shape (m, n).
         rounds: Number of further passes, at least 0.
         seed: Of the random orders.
-        stop: Asked often; true ends the work, and the best so far is returned.
+        stop: Called often; true ends the work, and the best so far is returned.
 
     Returns:
         Shape (m, n), start first: the route with the fewest transitions seen, the shortest among those.
@@ -39,13 +39,13 @@ def axis_cut_rounds(
     """
     if rounds < 0:
         raise InputError(f"rounds: expected at least 0, got {rounds}")
-    rng, ask = np.random.default_rng(seed), ask_once(motions_free)
-    route = best = double_axis_cut(waypoints, ask, stop=stop)
+    rng, free = np.random.default_rng(seed), check_once(motions_free)
+    route = best = double_axis_cut(waypoints, free, stop=stop)
     fewest = lower_bound(best[0], best[-1])
     for k in range(rounds):
         if transitions(best) == fewest or stop():
             break
-        route = axis_cut(route[::-1], ask, axes=rng.permutation(route.shape[1]).tolist(), stop=stop)
+        route = axis_cut(route[::-1], free, axes=rng.permutation(route.shape[1]).tolist(), stop=stop)
         best = min(best, route[::-1] if k % 2 == 0 else route, key=route_rank)
     return best
 

@@ -1,4 +1,4 @@
-"""The best route of single-joint moves so far, and the ways in which a better one takes its place."""
+"""The best route of single-joint moves so far, and how a better one takes its place."""
 
 from __future__ import annotations
 
@@ -25,14 +25,16 @@ class BestRoute:
         route: Shape (k, n), or None.
 
     Args:
-        ask: Judges motions.
+        queries: Checks motions.
         costs: Cost of each joint's travel, shape (n,).
         order: All joints; among equal routes on a lattice the one whose last moves come first here.
         smallest_move: A route with a shorter move is not kept, shape (n,).
     """
 
-    def __init__(self, ask: BatchedMotionQueries, costs: Vector, order: Sequence[int], smallest_move: Vector) -> None:
-        self._ask, self._costs, self._order, self._smallest_move = ask, costs, order, smallest_move
+    def __init__(
+        self, queries: BatchedMotionQueries, costs: Vector, order: Sequence[int], smallest_move: Vector
+    ) -> None:
+        self._queries, self._costs, self._order, self._smallest_move = queries, costs, order, smallest_move
         self.route: Matrix | None = None
 
     @property
@@ -57,11 +59,13 @@ class BestRoute:
 
         As far as it comes in time; what has been cut by then stays cut.
         """
-        return self._confirmed_cut(double_axis_cut(route, self._ask.in_time, axes=axes, stop=self._ask.stop), route)
+        return self._confirmed_cut(
+            double_axis_cut(route, self._queries.in_time, axes=axes, stop=self._queries.stop), route
+        )
 
     def cut_parts(self, route: Matrix) -> Matrix:
         """Cuts of parts of a free route that get longer: much of what the cut of the whole gains, much sooner."""
-        return self._confirmed_cut(cut_parts(route, self._ask.in_time, stop=self._ask.stop), route)
+        return self._confirmed_cut(cut_parts(route, self._queries.in_time, stop=self._queries.stop), route)
 
     def search(self, values: Values, start: Vector, goal: Vector) -> Matrix | None:
         """The best route between a start and a goal on a lattice of values, if there is one.
@@ -75,7 +79,7 @@ class BestRoute:
         return found
 
     def replace(self, route: Matrix, first: int, last: int, values: Values) -> None:
-        """Take in a free route whose waypoints from ``first`` to ``last`` give way to the best part on a lattice.
+        """Take in a free route whose waypoints from ``first`` to ``last`` are replaced by the best part on a lattice.
 
         Raises:
             OutOfTime: If it is time to stop.
@@ -91,9 +95,9 @@ class BestRoute:
 
     def _confirmed_cut(self, found: Matrix, route: Matrix) -> Matrix:
         """The cut of a route if it is free, else the route. That is found out even when it is time to stop."""
-        stop, self._ask.stop = self._ask.stop, no_stop
+        stop, self._queries.stop = self._queries.stop, no_stop
         confirmed = self._confirmed(found, route)
-        self._ask.stop = stop
+        self._queries.stop = stop
         if not confirmed:
             return route
         self.take(found)
@@ -102,12 +106,12 @@ class BestRoute:
     def _lattice_route(self, values: Values, start: Vector, goal: Vector) -> Matrix | None:
         if lattice_size(values) < 2:
             return None
-        lattice = MoveLattice(values, self._ask, self._costs)
+        lattice = MoveLattice(values, self._queries, self._costs)
         found = lattice.best_route(start, goal, self._order)
         return found if found is not None and self._confirmed(found, start[None]) else None
 
     def _confirmed(self, route: Matrix, known: Matrix) -> bool:
-        """Whether every edge of a route is free; those of the known one are. A run is asked about in pieces before."""
+        """Whether every edge of a route is free; those of the known one are. Runs have been checked in pieces."""
         old = set(edge_keys(known))
         fresh = [k for k, edge in enumerate(edge_keys(route)) if edge not in old]
-        return not fresh or bool(self._ask(route[fresh], route[np.add(fresh, 1)]).all())
+        return not fresh or bool(self._queries(route[fresh], route[np.add(fresh, 1)]).all())

@@ -1,6 +1,6 @@
 """A lattice of joint values, and the best single-joint moves on it: fewest moves first, least travel second.
 
-Source: the C-RDT paper's level sets of free runs, on values that may stand at any distance from each other.
+Source: the level sets of free runs of [1, ch. 6.3], on values at any distance from each other.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ class MoveLattice:
 
     Args:
         values: For each joint the values it may take, in any order.
-        motions_free: Which straight motions are free, for batches of shape (m, n). Asked about
-            all configurations, as motions of no length, and about those between free neighbours.
+        motions_free: Which straight motions are free, for batches of shape (m, n). Checks
+            all configurations, as motions of no length, and those between free neighbours.
         costs: Cost of each joint's travel, shape (n,).
     """
 

@@ -2,7 +2,7 @@
 
 A route of one move more than joints must move has a single free value: where the joint that moves twice turns back.
 The same holds for three moves if one joint must move: another leaves and returns. The free value's range is halved
-until each part is refuted: a collision so deep that no value of the part avoids it stands in every way.
+until each part is refuted: on every route is a collision so deep that no value of the part avoids it.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from rrtik_ompl.world.motion_queries import Stop
 
 MOST_WORK = 4096  # parts of a range, times the corners of the other joints
 SMALLEST_PART = 1e-5  # of a range
-PROBES = 4  # stretches of a colliding motion in the middle of which the depth is asked for
+PROBES = 4  # stretches of a colliding motion in the middle of which the depth is computed
 MOST_CORNERS = 256
-START, FREE, GOAL = range(3)  # where the free joint stands
+START, FREE, GOAL = range(3)  # where the free joint is
 
-Place: TypeAlias = tuple[int, int]  # which of the other joints have arrived, a set of bits; where the free joint stands
+Place: TypeAlias = tuple[int, int]  # which of the other joints have arrived, a set of bits; where the free joint is
 Step: TypeAlias = tuple[Place, Place]
 
 
@@ -33,7 +33,7 @@ def sharper_bound(world: World, joints: Sequence[int], start: Vector, goal: Vect
     """A lower bound of the moves between two configurations, shape (n,), that are not joined by the least number.
 
     Args:
-        world: Judges; its motions are taken as they are, without regard to their resolution.
+        world: Checks motions, which are taken as they are, without regard to their resolution.
         joints: Those that may move.
         start: Where the moves begin.
         goal: Where they end.
@@ -54,7 +54,7 @@ class OneFreeValue:
     """All routes in which each joint that differs moves once, but one joint moves twice and so has a free value.
 
     Args:
-        world: Judges.
+        world: Checks motions.
         start: Shape (n,).
         goal: Shape (n,).
         joint: The one that moves twice.
@@ -83,28 +83,28 @@ class OneFreeValue:
             if not parts:
                 return True
             low, high = parts.pop()
-            verdict = None if self._stop() else self._judged(low, high)
+            verdict = None if self._stop() else self._verdict(low, high)
             if verdict is None or high - low < SMALLEST_PART * (self._upper - self._lower):
                 return False
             if verdict is False:
                 parts += [(low, 0.5 * (low + high)), (0.5 * (low + high), high)]
         return False
 
-    def _judged(self, low: float, high: float) -> bool | None:
+    def _verdict(self, low: float, high: float) -> bool | None:
         """Whether no value of a part makes a free route; None if its middle does."""
         middle, refuted = 0.5 * (low + high), set[Step]()
         while True:
-            way = self._way(low, high, refuted)
-            if way is None:
+            route = self._route(low, high, refuted)
+            if route is None:
                 return True
-            free = [step for step in pairwise(way) if step[0][1] == step[1][1] == FREE]
+            free = [step for step in pairwise(route) if step[0][1] == step[1][1] == FREE]
             fresh = {step for step in free if self._collides_deeply(step, middle, 0.5 * (high - low))}
             if not fresh:
-                return None if all(self._is_free(step, middle) for step in pairwise(way)) else False
+                return None if all(self._is_free(step, middle) for step in pairwise(route)) else False
             refuted |= fresh
 
-    def _way(self, low: float, high: float, refuted: set[Step]) -> list[Place] | None:
-        """A way from start to goal on which nothing is known to collide for all values of a part, or None."""
+    def _route(self, low: float, high: float, refuted: set[Step]) -> list[Place] | None:
+        """A route from start to goal on which nothing is known to collide for all values of a part, or None."""
         origin: dict[Place, Place | None] = {(0, START): None}
         for here in ((mask, state) for state in (START, FREE, GOAL) for mask in range(self._full + 1)):
             if here in origin:
@@ -113,14 +113,14 @@ class OneFreeValue:
         place: Place | None = (self._full, GOAL)
         if place not in origin:
             return None
-        way = []
+        route = []
         while place is not None:
-            way.append(place)
+            route.append(place)
             place = origin[place]
-        return way[::-1]
+        return route[::-1]
 
     def _open_from(self, here: Place, low: float, high: float, refuted: set[Step]) -> Iterator[Place]:
-        """The next places of a way."""
+        """The next places of a route."""
         mask, state = here
         for step in self._steps_from(here):
             if step in self._standing if state != FREE else step not in refuted:
@@ -151,7 +151,7 @@ class OneFreeValue:
         return self._world.motion_valid(*(self._configuration(place, value) for place in step))
 
     def _stretch(self, mask: int, end: int) -> tuple[float, float]:
-        """Between which values the free joint could move to or from an end of its way, the other joints standing."""
+        """Between which values the free joint could move to or from an end of its motion, while the others rest."""
         rows = self._between(*((mask, FREE, value) for value in (self._lower, self._upper)))
         here = self._configuration((mask, end), 0.0)[self._joint]
         hits = rows[~self._world.valid_batch(rows), self._joint]
@@ -165,7 +165,7 @@ class OneFreeValue:
         return rows
 
     def _collides_deeply(self, step: Step, value: float, reach: float) -> bool:
-        """Whether a move collides wherever the free joint stands within ``reach`` of a value."""
+        """Whether a move collides wherever the free joint is within ``reach`` of a value."""
         rows = self._between(*((mask, state, value) for mask, state in step))
         needed = float(self._world.weights[self._joint]) * reach
         hits = np.flatnonzero(~self._world.valid_batch(rows))

@@ -1,4 +1,4 @@
-"""What a pilot asks of a list of single-joint moves, so that planners and shortening keep to the same."""
+"""Rules for a list of single-joint moves, so that planners and shortening keep to the same."""
 
 from __future__ import annotations
 

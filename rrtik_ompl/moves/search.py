@@ -48,7 +48,7 @@ class MoveSearch:
         frozen: Joints that must not move.
         smallest_move: No move is shorter, shape (n,); any may be if None.
         most_nodes: Size of the lattices.
-        prove: Sharpens the bound between a start and a goal; asked once, when one move more than it remains.
+        prove: Sharpens the bound between a start and a goal; called once, when one move more than it remains.
     """
 
     def __init__(
@@ -70,12 +70,12 @@ class MoveSearch:
         self._bounds = [lower_bound(s, g) for s, g in self.pairs]
         self._differing = min(self._bounds)
         self._lower, self._upper = lower, upper
-        self._ask = BatchedMotionQueries(motions_free)
+        self._queries = BatchedMotionQueries(motions_free)
         self._rng = np.random.default_rng(seed)
         count = starts.shape[1]
         order = self._rng.permutation(count).tolist()
         shortest = np.zeros(count) if smallest_move is None else smallest_move
-        self._best = BestRoute(self._ask, np.ones(count) if costs is None else costs, order, shortest)
+        self._best = BestRoute(self._queries, np.ones(count) if costs is None else costs, order, shortest)
         self._movable = [j for j in range(count) if j not in frozen and lower[j] < upper[j]]
         self._most_nodes = most_nodes
         self._prove = prove
@@ -109,8 +109,8 @@ class MoveSearch:
 
     @property
     def motions(self) -> int:
-        """How many straight motions have been asked about."""
-        return self._ask.asked
+        """How many straight motions have been checked."""
+        return self._queries.asked
 
     def raise_bound(self, pair: int, bound: int) -> None:
         """Take note that no route between a start and a goal, counted as in ``pairs``, has fewer moves."""
@@ -126,9 +126,9 @@ class MoveSearch:
         """Find out for each start and goal whether they are joined without a detour of any joint; sharpens the bound.
 
         Such routes have no free values: they pass the corners of the box between start and goal, all of which are
-        looked at. If there is none, a joint has to move twice. A joint alone cannot: another has to leave and return.
+        tried. If there is none, a joint has to move twice. A joint alone cannot: another has to leave and return.
         """
-        self._ask.stop = stop
+        self._queries.stop = stop
         with suppress(OutOfTime):
             for number, (start, goal) in enumerate(self.pairs):
                 values = values_of(np.array([start, goal]))
@@ -146,7 +146,7 @@ class MoveSearch:
         """
         if self.direct:
             return
-        self._ask.stop = stop
+        self._queries.stop = stop
         with suppress(OutOfTime):
             if not self.proven:
                 self._offers = [self._cut(offered) for offered in self._offers]
@@ -169,14 +169,14 @@ class MoveSearch:
             self._less_travel()
 
     def _cut(self, offered: Matrix) -> Matrix:
-        """A free route cut in both ways, whichever is better."""
+        """A free route cut by both methods, whichever is better."""
         return min(self._best.cut_parts(offered), self._best.cut(offered), key=self._best.rank)
 
     def _cut_again(self) -> None:
         """Further cuts of the best route, joints in random orders, until several in a row gain no move."""
         idle = 0
         while self.route is not None and not self.proven and idle < CUTS:
-            if self._ask.stop():
+            if self._queries.stop():
                 raise OutOfTime
             before = self.moves
             self._best.cut(self.route, self._rng.permutation(self.route.shape[1]).tolist())
@@ -204,7 +204,7 @@ class MoveSearch:
         prove, self._prove = self._prove, None
         for number, (start, goal) in enumerate(self.pairs):
             if lower_bound(start, goal) < self._bounds[number] < self.moves:  # its corners are settled
-                self.raise_bound(number, prove(start, goal, self._ask.stop))
+                self.raise_bound(number, prove(start, goal, self._queries.stop))
 
     def _free_values(self, joints: Sequence[int]) -> None:
         """Routes from corner to corner, some joints free."""

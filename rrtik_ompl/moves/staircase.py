@@ -1,7 +1,7 @@
 """From any path to one that moves one joint at a time: staircases beside its edges, as coarse as the world allows.
 
-Source: the C-RDT paper's discretisation of an ordinary route. The ``n!`` orders of a piece are not tried one by one:
-together they pass no more than the ``2^n`` corners of the piece's box, and its edges are what is judged.
+Source: the discretisation of an ordinary route of [1, ch. 6.3]. The ``n!`` orders of a piece are not tried one by one:
+together they pass no more than the ``2^n`` corners of the piece's box, and its edges are what is checked.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def one_joint_moves(path: JointPath, problem: Problem | World, *, finest: float 
 
     Args:
         path: A valid path.
-        problem: Its problem, or the world that judges the moves.
+        problem: Its problem, or the world that checks the moves.
         finest: Where no point of the arm moves farther than this [m], a piece is not halved again; a 64th of the
             motion resolution if None.
 
@@ -60,8 +60,8 @@ def one_joint_moves(path: JointPath, problem: Problem | World, *, finest: float 
     if not least > 0.0:
         raise InputError(f"finest must be greater than 0 metres, got {least:g}")
     for density in DENSITIES:
-        judge = world.with_resolution(world.motion_resolution / density)
-        converted = path.with_waypoints(_converted(path.waypoints, judge, least))
+        finer = world.with_resolution(world.motion_resolution / density)
+        converted = path.with_waypoints(_converted(path.waypoints, finer, least))
         if not converted.violations(world):
             return converted
     raise InputError("path to convert: its single-joint moves do not pass the second check; lower motion_resolution")
@@ -131,7 +131,7 @@ class _Piece:
 
 
 def _converted(waypoints: Matrix, world: World, finest: float) -> Matrix:
-    """Waypoints of the staircases along a route: all pieces of a level are judged together, then the next level."""
+    """Waypoints of the staircases along a route: all pieces of a level are checked together, then the next level."""
     rows = _without_tremble(waypoints)
     pieces = [_Piece(a, b, edge, []) for edge, (a, b) in enumerate(pairwise(rows)) if (a != b).any()]
     while any(not piece.orders for piece in pieces):

@@ -1,11 +1,12 @@
-"""The one room where arrays become OMPL states and back: validity, motions, ownership rules, the safe planner base."""
+"""The one package where arrays become OMPL states and back: validity, motions, ownership rules, base of planners."""
 
 from rrtik_ompl.ompl_bridge.contract import check_planner
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker
-from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner, SearchResult
+from rrtik_ompl.ompl_bridge.results import SearchResult
+from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
 from rrtik_ompl.ompl_bridge.states import StateIO, space_bounds
-from rrtik_ompl.world.motion_queries import MotionQueries
+from rrtik_ompl.world.motion_queries import MotionQueries, Stop
 
 __all__ = [
     "GoalSampler",
@@ -15,6 +16,7 @@ __all__ = [
     "SearchResult",
     "SpaceChecker",
     "StateIO",
+    "Stop",
     "WorldChecker",
     "check_planner",
     "space_bounds",

@@ -107,7 +107,7 @@ def attempt(
         return Attempt(rows, str(status), {**validity.counts(), **graph}, counting=time.perf_counter() - begin)
 
 
-def _raise_failure(planner: Any, name: str, status: Any, error: Exception | None) -> None:
+def _raise_failure(planner: ob.Planner, name: str, status: ob.PlannerStatus, error: Exception | None) -> None:
     """Raise what broke a planner: an error in one of its callbacks, or a failure of its own that it has kept.
 
     Raises:
@@ -127,7 +127,7 @@ def in_short(error: Exception) -> str:
     return (str(error).splitlines() or [type(error).__name__])[-1]
 
 
-def _graph(planner: Any, si: Any) -> dict[str, int]:
+def _graph(planner: ob.Planner, si: ob.SpaceInformation) -> dict[str, int]:
     """Size of the trees or the roadmap of a planner of the wheel; one that is written in Python may end the process."""
     graph = ob.PlannerData(si)
     planner.getPlannerData(graph)
@@ -152,7 +152,7 @@ def quiet() -> Iterator[None]:
 
 
 @contextmanager
-def interrupt_ends(condition: Any) -> Iterator[None]:
+def interrupt_ends(condition: ob.PlannerTerminationCondition) -> Iterator[None]:
     """Ctrl-C ends the planner through its termination condition and is raised afterwards.
 
     Raised inside a callback it would end the process under planners that run a second thread.
@@ -162,7 +162,7 @@ def interrupt_ends(condition: Any) -> Iterator[None]:
         return
     interrupted = False
 
-    def stop(*_: Any) -> None:
+    def stop(*_: object) -> None:
         nonlocal interrupted
         interrupted = True
         condition.terminate()

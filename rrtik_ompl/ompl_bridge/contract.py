@@ -20,7 +20,7 @@ from rrtik_ompl.errors import PlannerError
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.transitions import single_joint
 
-Factory = Callable[..., Any]  # factory(si) and factory(si, seed=...) make a planner
+Factory = Callable[..., ob.Planner]  # factory(si) and factory(si, seed=...) make a planner
 Clause = Callable[[Factory], None]
 
 DOF = 3
@@ -46,10 +46,10 @@ def check_planner(factory: Factory, *, single_joint_moves: bool = False) -> None
 
 
 def small_problem(
-    valid: Callable[[Any], bool] | None = None,
+    valid: Callable[[ob.State], bool] | None = None,
     starts: Iterable[ArrayLike] = (START,),
     goals: Iterable[ArrayLike] = (GOAL,),
-) -> Any:
+) -> og.SimpleSetup:
     """A SimpleSetup in three dimensions with an upright bar as the obstacle, and a Python validity checker.
 
     Args:
@@ -75,12 +75,12 @@ def small_problem(
     return setup
 
 
-def outside_bar(state: Any) -> bool:
+def outside_bar(state: ob.State) -> bool:
     """The validity checker of :func:`small_problem`: outside a bar with the third axis as its axis."""
     return bool(abs(state[0]) > 0.5 or abs(state[1]) > 0.5)
 
 
-def solution_rows(setup: Any) -> Matrix | None:
+def solution_rows(setup: og.SimpleSetup) -> Matrix | None:
     """The path that a SimpleSetup holds, shape (k, n), or None."""
     path = setup.getProblemDefinition().getSolutionPath()
     if path is None:
@@ -163,7 +163,7 @@ def survives_a_broken_checker(factory: Factory) -> None:
     """An exception in the validity checker gives CRASH with its text in ``error``; the planner is usable again."""
     calls, broken = [0], [True]
 
-    def valid(state: Any) -> bool:
+    def valid(state: ob.State) -> bool:
         calls[0] += 1
         if broken[0] and calls[0] > 10:
             raise ValueError("the checker broke")
@@ -183,7 +183,7 @@ def lets_interrupts_pass(factory: Factory) -> None:
     for interrupt in (KeyboardInterrupt, SystemExit):
         calls = [0]
 
-        def valid(state: Any, calls: list[int] = calls, interrupt: type[BaseException] = interrupt) -> bool:
+        def valid(state: ob.State, calls: list[int] = calls, interrupt: type[BaseException] = interrupt) -> bool:
             calls[0] += 1
             if calls[0] > 10:
                 raise interrupt
@@ -230,7 +230,7 @@ CONTRACT: tuple[Clause, ...] = (
 )
 
 
-def _attempt(factory: Factory, *, seed: int = 1, **problem: Any) -> tuple[Any, Any, Any]:
+def _attempt(factory: Factory, *, seed: int = 1, **problem: Any) -> tuple[og.SimpleSetup, ob.PlannerStatus, ob.Planner]:
     """A solve of the small problem: the setup, the status, the planner."""
     setup = small_problem(**problem)
     planner = factory(setup.getSpaceInformation(), seed=seed)
@@ -238,7 +238,7 @@ def _attempt(factory: Factory, *, seed: int = 1, **problem: Any) -> tuple[Any, A
     return setup, setup.solve(SECONDS), planner
 
 
-def _solved(factory: Factory, *, seed: int = 1) -> tuple[Any, Matrix, Any]:
+def _solved(factory: Factory, *, seed: int = 1) -> tuple[og.SimpleSetup, Matrix, ob.Planner]:
     """A solve that must succeed: the setup, the path, the planner."""
     setup, status, planner = _attempt(factory, seed=seed)
     _require_status(status, "Exact solution", "the small problem")
@@ -248,15 +248,15 @@ def _solved(factory: Factory, *, seed: int = 1) -> tuple[Any, Matrix, Any]:
     return setup, rows, planner
 
 
-def _behind_wall(state: Any) -> bool:
+def _behind_wall(state: ob.State) -> bool:
     return bool(abs(state[0]) > 0.5)
 
 
-def _require_status(status: Any, wanted: str, what: str) -> None:
+def _require_status(status: ob.PlannerStatus, wanted: str, what: str) -> None:
     if str(status) != wanted:
         raise PlannerError(f"check_planner: {what}: expected the status '{wanted}', got '{status}'")
 
 
-def _require(condition: bool, what: str, found: Any) -> None:
+def _require(condition: bool, what: str, found: object) -> None:
     if not condition:
         raise PlannerError(f"check_planner: {what}: {found}")

@@ -1,8 +1,6 @@
-"""The goal of a problem as OMPL knows goals: free configurations, more of them as a planner asks for more."""
+"""The goal of a problem as OMPL knows goals: free configurations, and more of them as a planner wants more."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 from ompl import base as ob
@@ -21,21 +19,23 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
     """Free configurations at the goal of a problem, for every OMPL planner that samples its goal.
 
     Those of the first rounds of inverse kinematics are looked for when the sampler is made; further ones when a
-    planner has been given all of these and asks for more (:class:`rrtik_ompl.ik.goal_configurations.GoalSearch`).
+    planner has been given all of these and wants more (:class:`rrtik_ompl.ik.goal_configurations.GoalSearch`).
     Configurations that the space information refuses, being out of its bounds or invalid, are left out.
 
-    Three planners of OMPL need one goal that is not Python's: give them :meth:`states`. PRM and PRMstar ask for goals
+    Three planners of OMPL need one goal that is not Python's: give them :meth:`states`. PRM and PRMstar sample goals
     in a second thread, which waits for the interpreter for ever, as the first one holds it while it waits for the
     second. AORRTC takes a second goal for a path of no length and gives up.
     """
 
-    def __init__(self, problem: Problem, si: Any = None, *, seed: int = 0, most: int = MOST) -> None:
+    def __init__(
+        self, problem: Problem, si: ob.SpaceInformation | None = None, *, seed: int = 0, most: int = MOST
+    ) -> None:
         """Make a goal.
 
         Args:
             problem: Its goal is what is to be reached; its start is what configurations shall be near to.
-            si: ``ompl.base.SpaceInformation`` over the robot's joints; one that asks the problem's world if None, to
-                be had by ``getSpaceInformation()``.
+            si: ``ompl.base.SpaceInformation`` over the robot's joints; if None, one that checks by the problem's
+                world, to be had by ``getSpaceInformation()``.
             seed: The same seed gives the same configurations in the same order.
             most: Configurations at most.
 
@@ -86,8 +86,8 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
             self._search.more()
         return len(self.rows) > known
 
-    def states(self, most: int = 1) -> Any:
-        """The first configurations as ``ompl.base.GoalStates``, which OMPL asks without the interpreter."""
+    def states(self, most: int = 1) -> ob.GoalStates:
+        """The first configurations as ``ompl.base.GoalStates``, which OMPL samples without the interpreter."""
         si = self.getSpaceInformation()
         states, state = ob.GoalStates(si), si.allocState()
         for row in self.rows[:most]:
@@ -95,7 +95,7 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
             states.addState(state)
         return states
 
-    def sampleGoal(self, state: Any) -> None:
+    def sampleGoal(self, state: ob.State) -> None:
         """Write the next configuration into a state, the first again after the last; called by OMPL."""
         if self._given >= len(self.rows):
             self.more()
@@ -111,7 +111,7 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
         """Whether there is any: nothing is computed beside OMPL, so that it need not wait for one; called by OMPL."""
         return len(self.rows) > 0
 
-    def distanceGoal(self, state: Any) -> float:
+    def distanceGoal(self, state: ob.State) -> float:
         """0 at the goal, else its distance [m; rad or m for a goal in joint values]; called by OMPL."""
         robot, goal, q = self._problem.world.robot, self._problem.goal, self._io.read(state)[None]
         return 0.0 if goal.satisfied(robot, q)[0] else float(goal.distance(robot, q)[0])

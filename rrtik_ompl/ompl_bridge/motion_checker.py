@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
+from ompl import base as ob
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.ompl_bridge.states import StateIO
@@ -62,7 +63,7 @@ class SpaceChecker:
     Holds C++ objects: for local variables only.
     """
 
-    def __init__(self, si: Any) -> None:
+    def __init__(self, si: ob.SpaceInformation) -> None:
         if not si.isSetup():  # before setup, checkMotion looks at the end point alone
             si.setup()
         self._si = si

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from ompl import base as ob
 from ompl import geometric as og
 
-PlannerFactory: TypeAlias = Callable[..., Any]  # a planner's class, or what makes one from a SpaceInformation
+PlannerFactory: TypeAlias = Callable[..., ob.Planner]  # a planner's class, or what makes one from a SpaceInformation
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class PlannerTraits:
             motions are checked as densely as by the second check.
         one_goal: It gets the first goal configuration alone.
         finds_goals: A goal of the tip, given as the option ``goal``, is enough for it.
-        straight_first: The straight motion to the nearest goal is tried before it is asked at all.
+        straight_first: The straight motion to the nearest goal is tried before it.
         has_graph: Its trees can be counted afterwards.
         supports_iteration_limit: A short attempt, ended by a number of iterations (the option ``max_iterations`` of a
             SafePlanner) or of checked motions (any other), can be of use.
@@ -67,7 +67,7 @@ _LISTED = {
 }
 
 
-def ompl_planners() -> dict[str, Any]:
+def ompl_planners() -> dict[str, type[ob.Planner]]:
     """OMPL's geometric planners of the installed wheel by their names."""
     found = {key: value for key, value in vars(og).items() if isinstance(value, type) and issubclass(value, ob.Planner)}
     return {key: value for key, value in found.items() if value is not ob.Planner}

@@ -30,7 +30,12 @@ def planner_options(factory: PlannerFactory) -> tuple[str, ...]:
 
 
 def safe_planner(
-    factory: type[SafePlanner], name: str, si: Any, problem: Problem, seed: int, options: Mapping[str, Any]
+    factory: type[SafePlanner],
+    name: str,
+    si: ob.SpaceInformation,
+    problem: Problem,
+    seed: int,
+    options: Mapping[str, Any],
 ) -> SafePlanner:
     """A planner derived from SafePlanner, for a problem.
 
@@ -46,7 +51,13 @@ def safe_planner(
         raise InputError(f"planner {name}: {error}") from None
 
 
-def other_planner(factory: PlannerFactory, name: str, si: Any, definition: Any, options: Mapping[str, Any]) -> Any:
+def other_planner(
+    factory: PlannerFactory,
+    name: str,
+    si: ob.SpaceInformation,
+    definition: ob.ProblemDefinition,
+    options: Mapping[str, Any],
+) -> ob.Planner:
     """A planner of OMPL, or any other, whose options are set through setters: ``goal_bias`` through ``setGoalBias``.
 
     Raises:
@@ -72,7 +83,7 @@ def _check_names(factory: PlannerFactory, name: str, keys: Iterable[str]) -> Non
             raise UnknownNameError(f"parameter of planner {name}", key, options)
 
 
-def _set(planner: Any, name: str, key: str, value: Any) -> None:
+def _set(planner: ob.Planner, name: str, key: str, value: object) -> None:
     setter = next(s for s in dir(planner) if s.startswith("set") and _snake(s) == key)
     if isinstance(value, float):
         finite_array(value, (), f"planner {name}: parameter {key}")

@@ -1,4 +1,4 @@
-"""The base of every planner of the house: it handles OMPL's objects so that a planner only sees arrays.
+"""The base of every planner of ours: it handles OMPL's objects so that a planner only sees arrays.
 
 OMPL's Python bindings hand out borrowed C++ objects that must not outlive their owner, and an exception that leaves
 ``solve`` ends a whole benchmark. Hence the rules kept here: C++ objects live in local variables, states are copied to
@@ -9,9 +9,6 @@ from __future__ import annotations
 
 import inspect
 import time
-import traceback
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -19,54 +16,17 @@ from ompl import base as ob
 from ompl import util as ou
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen, whole_number
-from rrtik_ompl.errors import InputError, PlannerError
+from rrtik_ompl.errors import PlannerError
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker
+from rrtik_ompl.ompl_bridge.results import Failure, IllPosed, SearchResult, explained, failure_of
 from rrtik_ompl.ompl_bridge.states import StateIO, real_vector_space, space_bounds
-from rrtik_ompl.world.motion_queries import MotionQueries
+from rrtik_ompl.world.motion_queries import MotionQueries, Stop
 
-GOAL_SAMPLES = 32  # how often a goal that can give any number of configurations is asked for one
-WAIT_FOR_GOAL = 0.002  # [s] between two questions to a goal that is still computing its first sample
+GOAL_SAMPLES = 32  # how often a goal that can give any number of configurations is sampled
+WAIT_FOR_GOAL = 0.002  # [s] between two samples of a goal that is still computing its first sample
 GIVEN_OPTIONS = ("world", "seed", "goal")  # that `plan()` fills in
 NONE_USABLE = "none is given, or all are in collision or outside the bounds"
-
-
-class _Refused(Exception):
-    """The problem definition gives nothing to search between."""
-
-    def __init__(self, status: Any, reason: str) -> None:
-        super().__init__(reason)
-        self.status, self.reason = status, reason
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SearchResult:
-    """What a search brings back.
-
-    Attributes:
-        path: Start first, shape (k, n), or None if there is none.
-        statistics: Plain counts of the search.
-        difference: Distance from the end of the path to the goal [unit of the space]; 0 if the path is exact.
-        reason: Why there is no exact path, if the search can say it.
-    """
-
-    path: Matrix | None
-    statistics: Mapping[str, int | float] = field(default_factory=dict)
-    difference: float = 0.0
-    reason: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Failure:
-    """Why a ``solve`` broke off.
-
-    Attributes:
-        refused: Whether the planner refused its options or what they mean for the problem: an InputError.
-        summary: In one line, without the type of an InputError.
-    """
-
-    refused: bool
-    summary: str
 
 
 class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
@@ -101,13 +61,15 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     path_statistics: ClassVar[tuple[str, ...]] = ()
     kernels: ClassVar[tuple[str, ...]] = ()
 
-    def __init__(self, si: Any, name: str, *, world: MotionQueries | None = None, seed: int | None = None) -> None:
+    def __init__(
+        self, si: ob.SpaceInformation, name: str, *, world: MotionQueries | None = None, seed: int | None = None
+    ) -> None:
         """Make a planner.
 
         Args:
             si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
             name: Name for OMPL's reports.
-            world: Asked instead of ``si`` whether configurations and motions are free, if given.
+            world: Checks configurations and motions instead of ``si``, if given.
             seed: At least 0.
 
         Raises:
@@ -132,13 +94,13 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         parameters = list(inspect.signature(cls).parameters.values())[1:]  # the first one is the space information
         return {each.name: each.default for each in parameters if each.name not in GIVEN_OPTIONS}
 
-    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Any) -> SearchResult:
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """Look for a path from any start to any goal until ``ptc()`` is true. For subclasses.
 
         Args:
             starts: Free configurations, shape (s, n), s at least 1.
             goals: Free configurations, shape (g, n), g at least 1, or 0 if :meth:`needs_goals` says so.
-            checker: Judges configurations and motions.
+            checker: Checks configurations and motions.
             ptc: Call it: true when it is time to stop.
         """
         raise NotImplementedError(f"{type(self).__name__} has no search()")
@@ -147,7 +109,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         """Whether the search needs goal configurations. For subclasses that can do without."""
         return True
 
-    def solve(self, ptc: Any) -> Any:
+    def solve(self, ptc: ob.PlannerTerminationCondition | float) -> ob.PlannerStatus:
         """Solve the problem of the problem definition; called by OMPL.
 
         Args:
@@ -159,10 +121,10 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self._forget()
         try:
             status = self._solve(_condition(ptc))
-        except _Refused as refused:
+        except IllPosed as refused:
             status, self.error = refused.status, refused.reason
         except Exception as error:
-            self.failure, self.error = _failure(error), _explain(error)
+            self.failure, self.error = failure_of(error), explained(error)
             status = ob.PlannerStatus.CRASH
         return ob.PlannerStatus(status)
 
@@ -193,7 +155,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         known: tuple[Vector, Vector] = self._known_bounds[1]
         return known
 
-    def _solve(self, ptc: Any) -> Any:
+    def _solve(self, ptc: ob.PlannerTerminationCondition) -> ob.PlannerStatus:
         si, pdef = self.getSpaceInformation(), self.getProblemDefinition()
         if pdef is None:
             raise PlannerError(f"{self.getName()}: no problem definition; use SimpleSetup or setProblemDefinition()")
@@ -211,35 +173,35 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self.reason = result.reason
         return self._report(result)
 
-    def _inputs(self, checker: MotionChecker, ptc: Any) -> tuple[Matrix, Matrix]:
+    def _inputs(self, checker: MotionChecker, ptc: Stop) -> tuple[Matrix, Matrix]:
         """Starts and, if needed, goals of the problem definition, shapes (s, n) and (g, n), at least one each."""
         inputs, io = self.getPlannerInputStates(), self._io
         inputs.restart()
         starts = self._starts(inputs, io)
         if not starts:
-            raise _Refused(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
+            raise IllPosed(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
         if not self.needs_goals():
             rows = np.array(starts)
             rows = rows[checker.valid_batch(rows)]
             if len(rows) == 0:
-                raise _Refused(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
+                raise IllPosed(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
             return rows, rows[:0]
         goal = self.getProblemDefinition().getGoal()
         if goal is not None and not isinstance(goal, ob.GoalSampleableRegion):
             text = "the goal cannot be sampled; use a GoalState, GoalStates or a GoalSampleableRegion"
-            raise _Refused(ob.PlannerStatus.UNRECOGNIZED_GOAL_TYPE, text)
+            raise IllPosed(ob.PlannerStatus.UNRECOGNIZED_GOAL_TYPE, text)
         goals = self._goals(inputs, io, goal, ptc)
         rows, split = np.array([*starts, *goals]), len(starts)
-        free = self.ends_free(rows, checker).tolist()  # all at once: a question costs more than its answer
+        free = self.ends_free(rows, checker).tolist()  # all at once: a call costs more than a check
         if goals and all(free):
             return rows[:split], rows[split:]
         if not any(free[:split]):
-            raise _Refused(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
+            raise IllPosed(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
         if not any(free[split:]):
-            raise _Refused(ob.PlannerStatus.INVALID_GOAL, f"no valid goal: {NONE_USABLE}")
+            raise IllPosed(ob.PlannerStatus.INVALID_GOAL, f"no valid goal: {NONE_USABLE}")
         return rows[:split][free[:split]], rows[split:][free[split:]]
 
-    def _starts(self, inputs: Any, io: StateIO) -> list[Vector]:
+    def _starts(self, inputs: ob.PlannerInputStates, io: StateIO) -> list[Vector]:
         rows = []
         while inputs.haveMoreStartStates():
             state = inputs.nextStart()  # borrowed; None if invalid
@@ -248,7 +210,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
             del state
         return _different(rows)
 
-    def _goals(self, inputs: Any, io: StateIO, goal: Any, ptc: Any) -> list[Vector]:
+    def _goals(self, inputs: ob.PlannerInputStates, io: StateIO, goal: ob.Goal, ptc: Stop) -> list[Vector]:
         """Goal configurations: all of a finite goal; else a number of samples, or as many as it takes to find one.
 
         Of a :class:`GoalSampler` those that it has.
@@ -257,10 +219,10 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         limit = len(goal.rows) if isinstance(goal, GoalSampler) else limit
         lazy = isinstance(goal, ob.GoalLazySamples)
         rows: list[Vector] = []
-        asked = 0
-        while (asked < limit or not rows) and not ptc():
+        sampled = 0
+        while (sampled < limit or not rows) and not ptc():
             if inputs.haveMoreGoalStates():
-                asked += 1
+                sampled += 1
                 state = inputs.nextGoal()  # borrowed, one buffer for all; None if invalid
                 if state is not None:
                     rows.append(io.read(state))
@@ -271,7 +233,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
                 break
         return _different(rows)
 
-    def _report(self, result: SearchResult) -> Any:
+    def _report(self, result: SearchResult) -> ob.PlannerStatus:
         """Hand the path to OMPL; returns the status."""
         if result.path is None:
             return ob.PlannerStatus.TIMEOUT
@@ -286,33 +248,10 @@ def _different(rows: list[Vector]) -> list[Vector]:
     return rows if len(rows) < 2 else list({row.tobytes(): row for row in rows}.values())
 
 
-def _condition(ptc: Any) -> Any:
+def _condition(ptc: ob.PlannerTerminationCondition | float) -> ob.PlannerTerminationCondition:
     """A termination condition from what OMPL or a person hands to solve."""
     return ob.timedPlannerTerminationCondition(float(ptc)) if isinstance(ptc, (int, float)) else ptc
 
 
 def _seed(seed: int | None) -> int:
     return int(ou.RNG().uniformInt(0, 2**31 - 1)) if seed is None else whole_number(seed, "seed")
-
-
-def _failure(error: BaseException) -> Failure:
-    if isinstance(error, InputError):
-        return Failure(True, str(error))
-    return Failure(False, traceback.format_exception_only(error)[-1].strip().splitlines()[-1] + _hint(error))
-
-
-def _hint(error: BaseException) -> str:
-    """What probably caused an exception of the bindings that does not say so."""
-    if "bad_cast" not in str(error):
-        return ""
-    return "; a callback returned a value of the wrong type: a validity checker must return a Python bool"
-
-
-def _explain(error: BaseException) -> str:
-    """The text of an exception. Drops the frames, which would keep borrowed states of a callback alive."""
-    text = "".join(traceback.format_exception(error)).strip() + _hint(error)
-    link: BaseException | None = error
-    while link is not None:
-        link.__traceback__ = None
-        link = link.__context__
-    return text

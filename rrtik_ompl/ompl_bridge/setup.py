@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from ompl import base as ob
@@ -18,10 +17,10 @@ from rrtik_ompl.world import World
 
 @dataclass(slots=True, eq=False)
 class ValidityCallback:
-    """Counts the questions of a C++ planner and remembers the first error, which must not be raised inside OMPL.
+    """Counts the checks of a C++ planner and remembers the first error, which must not be raised inside OMPL.
 
-    After the ``deadline`` [s, of ``time.monotonic``] every answer is no, for some planners ask hundreds of questions
-    between two looks at their time. After ``most_motions`` too, and the planner is stopped.
+    After the ``deadline`` [s, of ``time.monotonic``] every answer is no, for some planners call for hundreds of checks
+    between two readings of their clock. After ``most_motions`` too, and the planner is stopped.
     """
 
     world: World
@@ -41,7 +40,7 @@ class ValidityCallback:
     def valid(self, q: Vector) -> bool:
         """Whether q, shape (n,), is free; False from the first error on."""
         self.states += 1
-        return self._ask(self.world.valid, q)
+        return self._checked(self.world.valid, q)
 
     def motion_valid(self, a: Vector, b: Vector) -> bool:
         """Whether the motion a -> b is free; False from the first error on."""
@@ -50,23 +49,23 @@ class ValidityCallback:
             if self.stop is not None:
                 self.stop()
             return False
-        free = self._ask(self.world.motion_valid, a, b)
+        free = self._checked(self.world.motion_valid, a, b)
         self.free_motions += free
         return free
 
     def counts(self) -> dict[str, int]:
-        """Of the questions, and of the motions that were found free."""
+        """Numbers of checks, and of the motions that were found free."""
         return {
             "checked_states": self.states,
             "checked_motions": self.motions,
             "free_motions": self.free_motions,
         }
 
-    def _ask(self, question: Any, *arguments: Vector) -> bool:
+    def _checked(self, check: Callable[..., bool], *arguments: Vector) -> bool:
         if self.error is not None or self.late:
             return False
         try:
-            return bool(question(*arguments))
+            return bool(check(*arguments))
         except Exception as error:  # an exception that leaves a callback ends the process under some planners
             self.error = error.with_traceback(None)
             if self.stop is not None:
@@ -77,11 +76,11 @@ class ValidityCallback:
 class _Motions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no types
     """Motions checked by the world. It must not hold the SpaceInformation, or neither is ever freed."""
 
-    def __init__(self, si: Any, validity: ValidityCallback, states: StateIO) -> None:
+    def __init__(self, si: ob.SpaceInformation, validity: ValidityCallback, states: StateIO) -> None:
         super().__init__(si)
         self._validity, self._states = validity, states
 
-    def checkMotion(self, first: Any, second: Any, *_: Any) -> bool:
+    def checkMotion(self, first: ob.State, second: ob.State, *_: object) -> bool:
         """Whether the motion between two states is free."""
         return self._validity.motion_valid(self._states.read(first), self._states.read(second))
 
@@ -95,7 +94,7 @@ def planning_bounds(problem: Problem, goals: Matrix) -> tuple[Vector, Vector]:
     return lower, upper
 
 
-def space_information(problem: Problem, goals: Matrix, validity: ValidityCallback) -> Any:
+def space_information(problem: Problem, goals: Matrix, validity: ValidityCallback) -> ob.SpaceInformation:
     """A set-up ``ompl.base.SpaceInformation`` of a RealVectorStateSpace whose checks are the world's."""
     si = _bounded(problem, goals)
     states = StateIO(si)
@@ -105,10 +104,10 @@ def space_information(problem: Problem, goals: Matrix, validity: ValidityCallbac
     return si
 
 
-def unchecked_space(problem: Problem, goals: Matrix) -> Any:
-    """As :func:`space_information`, but nothing is checked: for planners that ask the world themselves.
+def unchecked_space(problem: Problem, goals: Matrix) -> ob.SpaceInformation:
+    """As :func:`space_information`, but nothing is checked: for planners that use the world themselves.
 
-    OMPL asks about each start and goal that it hands out, and a question to Python costs more than some searches.
+    OMPL checks each start and goal that it hands out, and a call of Python costs more than some searches.
     """
     si = _bounded(problem, goals)
     si.setStateValidityChecker(ob.AllValidStateValidityChecker(si))
@@ -116,7 +115,7 @@ def unchecked_space(problem: Problem, goals: Matrix) -> Any:
     return si
 
 
-def _bounded(problem: Problem, goals: Matrix) -> Any:
+def _bounded(problem: Problem, goals: Matrix) -> ob.SpaceInformation:
     """A SpaceInformation whose space has the bounds of a problem."""
     lower, upper = planning_bounds(problem, goals)
     space = ob.RealVectorStateSpace(len(lower))
@@ -128,7 +127,7 @@ def _bounded(problem: Problem, goals: Matrix) -> Any:
     return ob.SpaceInformation(space)
 
 
-def problem_definition(problem: Problem, goals: Matrix, si: Any) -> Any:
+def problem_definition(problem: Problem, goals: Matrix, si: ob.SpaceInformation) -> ob.ProblemDefinition:
     """``ompl.base.ProblemDefinition`` with the start of the problem and goal configurations, shape (k, n)."""
     states, state, definition = StateIO(si), si.allocState(), ob.ProblemDefinition(si)
     states.write(state, problem.start)
@@ -141,7 +140,7 @@ def problem_definition(problem: Problem, goals: Matrix, si: Any) -> Any:
     return definition
 
 
-def exact_path(definition: Any, si: Any) -> Matrix | None:
+def exact_path(definition: ob.ProblemDefinition, si: ob.SpaceInformation) -> Matrix | None:
     """The best exact solution of a problem definition as rows, shape (k, n), or None."""
     if not definition.hasExactSolution():
         return None

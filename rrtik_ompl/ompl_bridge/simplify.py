@@ -19,9 +19,9 @@ ENDLESS = 1e9  # [s]
 
 
 def simplified(problem: Problem, route: Matrix, *, seconds: float, seed: int) -> tuple[Matrix, int]:
-    """Let ``ompl.geometric.PathSimplifier`` shorten a route, shape (k, n); also how many motions it has asked about.
+    """Let ``ompl.geometric.PathSimplifier`` shorten a route, shape (k, n); also how many motions were checked.
 
-    Its last step asks configurations alone about what it has bent, so the answer must be checked. When the time is up
+    Its last step checks configurations alone of what it has bent, so the result must be checked. When the time is up
     no motion counts as free, and what was found so far is returned.
 
     Raises:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from ompl import base as ob
@@ -14,7 +13,7 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.errors import InputError
 
 
-def real_vector_space(si: Any) -> Any:
+def real_vector_space(si: ob.SpaceInformation) -> ob.RealVectorStateSpace:
     """The state space of a SpaceInformation.
 
     Raises:
@@ -28,7 +27,7 @@ def real_vector_space(si: Any) -> Any:
     return space
 
 
-def space_bounds(si: Any) -> tuple[Vector, Vector]:
+def space_bounds(si: ob.SpaceInformation) -> tuple[Vector, Vector]:
     """Lower and upper bounds of a RealVectorStateSpace, shapes (n,).
 
     Raises:
@@ -56,7 +55,7 @@ class StateIO:
     For one thread. It holds the space and no state, so whatever a space does not lead to may keep it.
     """
 
-    def __init__(self, si: Any) -> None:
+    def __init__(self, si: ob.SpaceInformation) -> None:
         self._space = real_vector_space(si)
         self.dof = int(self._space.getDimension())
         self._buffer = np.zeros(self.dof)
@@ -68,14 +67,14 @@ class StateIO:
         bounds = self._space.getBounds()
         return list(bounds.low), list(bounds.high)
 
-    def read(self, state: Any) -> Vector:
+    def read(self, state: ob.State) -> Vector:
         """A private copy of the coordinates of a state, shape (n,)."""
         if not self.fast:
             return np.array(state[0 : self.dof], dtype=np.float64)
         self._space.serialize(self._capsule, state)
         return self._buffer.copy()
 
-    def write(self, state: Any, q: Vector) -> None:
+    def write(self, state: ob.State, q: Vector) -> None:
         """Set the coordinates of a state to q, shape (n,)."""
         if not self.fast:
             state[0 : self.dof] = q.tolist()
@@ -83,7 +82,7 @@ class StateIO:
         self._buffer[:] = q
         self._space.deserialize(state, self._capsule)
 
-    def path(self, si: Any, rows: Matrix) -> Any:
+    def path(self, si: ob.SpaceInformation, rows: Matrix) -> og.PathGeometric:
         """Rows, shape (k, n), as an ``ompl.geometric.PathGeometric``."""
         path, state = og.PathGeometric(si), si.allocState()
         append = path.append  # copies
@@ -92,11 +91,11 @@ class StateIO:
             append(state)
         return path
 
-    def rows(self, path: Any) -> Matrix:
+    def rows(self, path: og.PathGeometric) -> Matrix:
         """The states of a PathGeometric as rows, shape (k, n)."""
         return np.array([self.read(path.getState(k)) for k in range(path.getStateCount())])
 
-    def _capsule_works(self, si: Any) -> bool:
+    def _capsule_works(self, si: ob.SpaceInformation) -> bool:
         state, probe = si.allocState(), np.arange(1.0, self.dof + 1.0)
         if self._space.getSerializationLength() != self._buffer.nbytes:
             return False
@@ -111,10 +110,10 @@ class StateIO:
         return written and bool((self._buffer == -probe).all())
 
 
-def _capsule(buffer: Vector) -> Any:
+def _capsule(buffer: Vector) -> object:
     """A capsule around the address of ``buffer``, or None where the interpreter cannot make one."""
     try:
-        new: Callable[..., Any] = ctypes.pythonapi.PyCapsule_New
+        new: Callable[..., object] = ctypes.pythonapi.PyCapsule_New
     except AttributeError:
         return None
     new.restype = ctypes.py_object  # type: ignore[attr-defined]

@@ -1,6 +1,6 @@
 """RRT-Connect between two pieces of a path, each used as a tree from the beginning: in a kernel, or in Python.
 
-Source: DRRT-Con paper, algorithms 1 to 5; in Python as printed but for three slips: EXTEND has reached a target when
+Source: [1, ch. 5.2, algorithms 1 to 5]; in Python as printed but for three slips: EXTEND has reached a target when
 its new vertex is the target, the second tree is extended until it is trapped, and samples are uniform.
 """
 
@@ -27,11 +27,11 @@ CUTS, PATIENCE = 100, 40  # tries of random shortcuts, and without gain
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Joined:
-    """Two pieces of a path and the way between them.
+    """Two pieces of a path and the connection between them.
 
     Attributes:
         path: From the begin of one to the end of the other, shape (k, n).
-        begin, end: Numbers of the waypoints between which the way is new.
+        begin, end: Numbers of the waypoints between which the path is new.
     """
 
     path: Matrix
@@ -40,7 +40,7 @@ class Joined:
 
 
 class Connect(Protocol):
-    """Looks for a way between two pieces of a path.
+    """Connects two pieces of a path.
 
     Attributes:
         samples: Drawn so far.
@@ -51,7 +51,7 @@ class Connect(Protocol):
     def __call__(
         self, first: Matrix, second: Matrix, motions: MotionQueries, stop: Stop, *, chain: bool = True
     ) -> Joined | None:
-        """The whole path from ``first[0]`` by a way from one piece to the other, or None.
+        """The whole path from ``first[0]`` by a connection from one piece to the other, or None.
 
         Args:
             first: Configurations from the robot on, a free chain, shape (a, n).

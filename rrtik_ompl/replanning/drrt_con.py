@@ -13,9 +13,8 @@ from typing import ClassVar
 import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.path import subdivided
 from rrtik_ompl.replanning.connecting import Connect, Joined
-from rrtik_ompl.transitions import without_repeats
+from rrtik_ompl.transitions import subdivided, without_repeats
 from rrtik_ompl.world.motion_queries import MotionQueries, Stop, no_stop
 
 MAX_CUTS = 24  # shortcut ends that are tried from one point of a path

@@ -1,7 +1,6 @@
 """RRT-Connect in Python, for any motion check; :mod:`rrtik_ompl.fast.search.connect_kernels` is its twin in kernels.
 
-Source: Kuffner and LaValle, RRT-Connect: an efficient approach to single-query path planning, 2000; the dynamic domain
-is Yershova et al.'s (2005), the balance of the trees as in Kuffner and LaValle's later work (2005).
+Sources: [4]; the smaller tree grows: [5]; the dynamic domain, in which a vertex that was blocked is extended: [6].
 """
 
 from __future__ import annotations
@@ -146,7 +145,7 @@ def reach(
 
 
 def path_between(first: Matrix, second: Matrix) -> Matrix:
-    """A branch from a start, then a branch from a goal the other way, shapes (k, n); an end of both stands once."""
+    """A branch from a start, then a branch from a goal in reverse, shapes (k, n); an end of both occurs once."""
     shared = bool((first[-1] == second[-1]).all())
     return np.vstack([first, second[::-1][int(shared) :]])
 

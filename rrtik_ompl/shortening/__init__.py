@@ -1,4 +1,4 @@
-"""Post-processing behind one face: a valid path in, a path with the same ends that is no worse out."""
+"""Post-processing behind one interface: a valid path in, a path with the same ends that is no worse out."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, positive, whole_number
-from rrtik_ompl.errors import InputError, UnknownNameError, require
+from rrtik_ompl.choices import ShorteningMethod, one_of
+from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.moves.axis_cut import double_axis_cut
 from rrtik_ompl.moves.axis_cut_rounds import axis_cut_rounds
 from rrtik_ompl.moves.rules import MoveRules
@@ -31,13 +32,13 @@ __all__ = ["METHODS", "Method", "MoveRules", "Task", "shorten"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Method:
-    """A way to shorten.
+    """A method of shortening.
 
     Attributes:
-        run: Shortens a route, shape (k, n), of a problem, as a task asks for it.
-        keeps_moves: Whether a path of single-joint moves stays one, asked or not, and has no more moves afterwards;
+        run: Shortens a route, shape (k, n), of a problem, as a task says.
+        keeps_moves: Whether a path of single-joint moves stays one, wanted or not, and has no more moves afterwards;
             its length may grow then.
-        can_keep_moves: Whether it stays one if that is asked for.
+        can_keep_moves: Whether it stays one if that is wanted.
         moves_only: Whether it takes nothing but such a path.
     """
 
@@ -48,8 +49,8 @@ class Method:
 
 
 def _ompl(route: Matrix, task: Task, problem: Problem) -> Matrix:
-    rows, asked = simplified(problem, route, seconds=task.seconds_left, seed=task.seed)
-    task.asked += asked
+    rows, checked = simplified(problem, route, seconds=task.seconds_left, seed=task.seed)
+    task.asked += checked
     return rows
 
 
@@ -62,12 +63,12 @@ def _axis_rounds(route: Matrix, task: Task, _: Problem) -> Matrix:
 
 
 def _fewest_moves(route: Matrix, task: Task, problem: Problem) -> Matrix:
-    """What travels little touches what it goes round, so it is judged as densely as by the second check."""
-    judge = densely_checked(problem).world
-    return fewest_moves(route, judge, seed=task.seed, stop=task.expired, rules=task.rules).route
+    """A route of little travel touches what it goes round, so it is checked as densely as by the second check."""
+    world = densely_checked(problem).world
+    return fewest_moves(route, world, seed=task.seed, stop=task.expired, rules=task.rules).route
 
 
-METHODS: Mapping[str, Method] = MappingProxyType(
+METHODS: Mapping[ShorteningMethod, Method] = MappingProxyType(
     {
         "axis": Method(_axis, keeps_moves=True),
         "axis-rounds": Method(_axis_rounds, keeps_moves=True),
@@ -87,7 +88,7 @@ def shorten(
     path: JointPath,
     problem: Problem,
     *,
-    method: str = "axis",
+    method: ShorteningMethod = "axis",
     seconds: float | None = None,
     seed: int = 0,
     one_joint: bool = False,
@@ -99,7 +100,7 @@ def shorten(
 
     Args:
         path: A valid path of the problem.
-        problem: Whose world judges the new motions.
+        problem: Its world checks the new motions.
         method: "axis" is the published double axis cut: fewer moves of one joint at a time. "axis-rounds" goes on with
             twenty passes in random joint orders: fewer moves still, several times as long. "fewest-moves" takes
             single-joint moves and looks for the fewest, with the least travel among those. "sequential", "random" and
@@ -114,8 +115,8 @@ def shorten(
         one_joint: Keep a path of single-joint moves one: fewer moves first, length second.
         rules: What the path, of single-joint moves, keeps to and has to keep to: joints that must not move or move
             last, the smallest move, costs. Its last moves, of the joints that move last, stay as they are.
-        on_better: Called with every better path on the way; these have not yet passed the second check.
-        stop: Asked from time to time; True ends the work, and the best so far is returned.
+        on_better: Called with every better path in between; these have not yet passed the second check.
+        stop: Called from time to time; True ends the work, and the best so far is returned.
 
     Returns:
         A path with the same ends. It passes the same second check as a plan: if a shortened path does not, its
@@ -125,7 +126,7 @@ def shorten(
     Raises:
         UnknownNameError: If there is no such method.
         InputError: If the path is not valid for the problem, does not keep to the rules or has one waypoint, the time
-            is not positive, the seed is negative, or the method cannot do what is asked.
+            is not positive, the seed is negative, or the method cannot do it.
     """
     one_joint = one_joint or rules is not None
     chosen = _checked(path, problem, method, seconds, seed, one_joint)
@@ -135,12 +136,12 @@ def shorten(
     end = time.monotonic() + (np.inf if seconds is None else float(seconds))
     listener = None if on_better is None else lambda rows: on_better(path.with_waypoints(np.vstack([rows, tail])))
     # What is as short as can be touches what it goes round, so most methods check as densely as the second check.
-    refined = densely_checked(problem)
-    for asked in (problem, refined) if chosen.keeps_moves else (refined,):
+    dense = densely_checked(problem)
+    for checked in (problem, dense) if chosen.keeps_moves else (dense,):
         left = end - time.monotonic()
         limits: dict[str, Any] = {"seconds": left, "on_better": listener, "stop": stop}
-        task = Task(asked.world, seed=seed, one_joint=one_joint, rules=rules, **limits)
-        rows = np.vstack([chosen.run(head, task, asked), tail])
+        task = Task(checked.world, seed=seed, one_joint=one_joint, rules=rules, **limits)
+        rows = np.vstack([chosen.run(head, task, checked), tail])
         worse = not chosen.keeps_moves and task.rank(rows) > task.rank(path.waypoints)
         same_ends = (rows[[0, -1]] == path.waypoints[[0, -1]]).all()
         shorter = path.with_waypoints(rows)
@@ -160,13 +161,12 @@ def _parts(route: Matrix, rules: MoveRules | None) -> tuple[Matrix, Matrix]:
 
 
 def _checked(
-    path: JointPath, problem: Problem, method: str, seconds: float | None, seed: int, one_joint: bool
+    path: JointPath, problem: Problem, method: ShorteningMethod, seconds: float | None, seed: int, one_joint: bool
 ) -> Method:
     """The method, if the request makes sense."""
     require(path, JointPath, "path to shorten", "a plan has one if plan.found")
     require(problem, Problem, "problem of a path to shorten")
-    if method not in METHODS:
-        raise UnknownNameError("shortening method", method, METHODS)
+    chosen = METHODS[one_of(METHODS, method, "shortening method")]
     if seconds is not None:
         positive(seconds, "seconds")
     whole_number(seed, "seed")
@@ -177,6 +177,6 @@ def _checked(
         raise InputError(f"path to shorten: edge {faults[0].edge + 1} is not valid: {faults[0].reason}")
     if one_joint and not path.one_joint_at_a_time:
         raise InputError("path to shorten: it moves several joints at once, so one_joint cannot be kept")
-    if one_joint and not METHODS[method].can_keep_moves:
+    if one_joint and not chosen.can_keep_moves:
         raise InputError(f"shortening method '{method}' cannot keep one joint at a time; use axis or auto")
-    return METHODS[method]
+    return chosen

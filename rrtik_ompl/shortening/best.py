@@ -12,7 +12,7 @@ from rrtik_ompl.transitions import route_length
 
 STARTS = 8  # searches from the input: random shortcuts end in different classes of routes
 QUICK_TRIES = 1000  # of a search that leaves out what the kernels cannot decide
-TRIES = 300  # of one that asks
+TRIES = 300  # of one that has those checked by the world
 ROUNDS = 3  # of improvement where there is no end to the time, at most
 LEAST_GAIN = 1e-4  # of the length, or a round gained nothing
 MOST_HALVINGS = 4  # of the steps of retraction

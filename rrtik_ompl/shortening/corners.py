@@ -1,10 +1,10 @@
-"""Corner snapping: every bend is pulled by bisection to the corner that it goes round. Post-processing page, "Beat".
+"""Corner snapping: every bend is pulled by bisection to the corner that it goes round.
 
 Three waypoints span a triangle, in which the bend between the other two is moved: along its second edge to the last
 place that the first waypoint sees, then back along that sight line to the last place that the third one sees. With one
 corner in the triangle both sight lines touch it, and the bend is there. With several, or with something round, chords
-then cut the bend off. What a question could gain at most is known before it is asked (the triangle inequality), so no
-question is asked that cannot gain.
+then cut the bend off. What a motion could gain at most is known before it is checked (the triangle inequality), so no
+motion is checked that cannot gain.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ def snap_corners(route: Matrix, task: Task) -> Matrix:
     """Pull a route, shape (k, n), taut; deterministic.
 
     Parts of free motions count as free on the way, and the answer is checked as a whole; if that fails (checks at a
-    finite density may miss a graze that others hit) the work is done again with every part asked about.
+    finite density may miss a graze that others hit) the work is done again with every part checked.
 
     Args:
         route: Free, start first.
-        task: Whom to ask. Its answers concern straight motions, so single-joint moves are lost.
+        task: Checks motions, straight ones, so single-joint moves are lost.
 
     Returns:
         The new route, or the given one if that is not worse.
@@ -50,11 +50,11 @@ def snap_corners(route: Matrix, task: Task) -> Matrix:
 
 
 class _Corners:
-    """The answers so far, and how small a gain is worth a question.
+    """The answers so far, and how small a gain is worth a check.
 
     Attributes:
-        least: The smallest gain of length that is asked for.
-        careful: Whether parts of free motions are asked about too.
+        least: The smallest gain of length that is worth a check.
+        careful: Whether parts of free motions are checked too.
     """
 
     def __init__(self, task: Task, careful: bool) -> None:
@@ -137,7 +137,7 @@ class _Corners:
         first = _first_below(length, length(0.0) - self.least) if nearly_done else 1.0
         seen, hidden = _bracket(visible, first)
         if nearly_done and seen == 0.0:
-            return near  # and what is nearer than the first place is not worth a question
+            return near  # and what is nearer than the first place is not worth a check
         while length(seen) - length(hidden) > self.least:
             middle = 0.5 * (seen + hidden)
             seen, hidden = (middle, hidden) if visible(middle) else (seen, middle)
@@ -187,7 +187,7 @@ def _length(rows: list[Vector]) -> float:
 
 
 def _detour(a: Vector, bend: Vector, b: Vector) -> float:
-    """How much longer the way from a to b is over the bend."""
+    """How much longer the path from a to b is over the bend."""
     return float(np.linalg.norm(bend - a) + np.linalg.norm(b - bend) - np.linalg.norm(b - a))
 
 

@@ -57,11 +57,11 @@ def fewest_moves(
 
     Args:
         waypoints: A free route, shape (k, n), every edge of which moves one joint.
-        world: Judges motions.
+        world: Checks motions.
         rounds: Of improvement at most, after the first; the work ends earlier if it is proven that no route has fewer
             moves. The same number and seed give the same route.
         seed: Of all random choices.
-        stop: Asked often; True ends the work, and the best so far is returned.
+        stop: Called often; True ends the work, and the best so far is returned.
         rules: Kept by the route and by what comes out. Joints that move last stay where they are.
 
     Returns:
@@ -112,7 +112,7 @@ def least_moves(problem: Problem) -> int:
 
 
 def grid_route(problem: Problem, step: float) -> Matrix | None:
-    """The route with the fewest moves on a regular grid, least travel second: the C-RDT paper's oracle for few joints.
+    """The route with the fewest moves on a regular grid, least travel second: the oracle of [1, ch. 6.3].
 
     Args:
         problem: Of at most 3 joints, its goal a configuration.

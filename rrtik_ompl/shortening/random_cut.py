@@ -1,4 +1,4 @@
-"""Random cut: straight from one random place of the route to another. Post-processing paper, method 2.
+"""Random cut: straight from one random place of the route to another. Source: [1, ch. 5.3, method 2].
 
 Where the world has kernels the whole loop runs in one (:mod:`rrtik_ompl.fast.search.shortcut`): first without the
 shortcuts that the kernels cannot decide, for those take a hundred times as long, then with them.
@@ -41,7 +41,7 @@ def _cut(route: Matrix, task: Task, tries: int, *, share: float, pull: float) ->
 
 
 def kernel_search(route: Matrix, task: Task, *, seed: int, share: float, pull: float, asking: bool) -> ShortcutSearch:
-    """A search in the kernels of a task's world, which must have them; a conservative world is not asked."""
+    """A search in the kernels of a task's world, which must have them; a conservative one checks nothing itself."""
     world = task.kernel_world
     assert world is not None
     return ShortcutSearch(
@@ -87,9 +87,9 @@ def _one_cut(route: Matrix, task: Task, rng: np.random.Generator, share: float) 
     if i == j:
         return None
     a, b = _point(route, places, i, first), _point(route, places, j, second)
-    way = np.vstack([a[None], task.moves(a, b)])
-    new = without_repeats(np.vstack([route[: i + 1], way, route[j + 1 :]]))
-    if task.rank(new) >= task.rank(route) or not task.free_batch(way[:-1], way[1:]).all():
+    cut = np.vstack([a[None], task.moves(a, b)])
+    new = without_repeats(np.vstack([route[: i + 1], cut, route[j + 1 :]]))
+    if task.rank(new) >= task.rank(route) or not task.free_batch(cut[:-1], cut[1:]).all():
         return None
     return new if task.confirmed(new, route) else None
 

@@ -1,6 +1,6 @@
 """Retraction: bends slide back along the lines of sight until they touch what they go round.
 
-Source: the post-processing paper, method 3, in three phases with bisection. Visibility is not monotone along a route,
+Source: [1, ch. 5.3, method 3], in three phases with bisection. Visibility is not monotone along a route,
 so a bisection finds some visible point that an invisible one follows, not the farthest.
 """
 
@@ -11,9 +11,8 @@ from collections.abc import Callable
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.path import subdivided
 from rrtik_ompl.shortening.task import Task
-from rrtik_ompl.transitions import merge_moves, route_length, without_repeats
+from rrtik_ompl.transitions import merge_moves, route_length, subdivided, without_repeats
 
 STEPS = 40  # of the planner along a route, where nobody says how large they are
 FINENESS = 5.0  # the third phase's steps are this many times as small
@@ -24,7 +23,7 @@ def retract(route: Matrix, task: Task, *, step: float | None = None, fineness: f
 
     Args:
         route: Free, start first.
-        task: Whom to ask.
+        task: Checks motions.
         step: Of the second phase, in the unit of the route's length; a fortieth of the route if None.
         fineness: How many times smaller the steps of the third phase are.
 
@@ -97,5 +96,5 @@ def _divided(corners: Matrix, step: float) -> Matrix:
     counts = np.ceil(np.linalg.norm(np.diff(corners, axis=0), axis=1) / step - 1e-9)
     points, edges = subdivided(corners, counts)
     a, b = corners[edges], corners[edges + 1]
-    divided: Matrix = np.clip(points, np.minimum(a, b), np.maximum(a, b))  # a joint that stands still stays to the bit
+    divided: Matrix = np.clip(points, np.minimum(a, b), np.maximum(a, b))  # a joint that does not move stays to the bit
     return divided

@@ -1,4 +1,4 @@
-"""Sequential cut: from each waypoint straight to the last one that can be reached. Post-processing paper, method 1."""
+"""Sequential cut: from each waypoint straight to the last one that can be reached. Source: [1, ch. 5.3, method 1]."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rrtik_ompl.transitions import without_repeats
 def sequential_cut(route: Matrix, task: Task) -> Matrix:
     """Cut a route, shape (k, n), from its start; deterministic.
 
-    Waypoints are tried from the last one on back to the next, which needs no question.
+    Waypoints are tried from the last one on back to the next, which needs no check.
     """
     kept, pivot, last = [route[:1]], 0, len(route) - 1
     while pivot < last:

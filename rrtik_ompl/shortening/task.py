@@ -1,4 +1,4 @@
-"""What a method of shortening is given: the questions it may ask, its time, its seed, and who listens."""
+"""What a method of shortening is given: a check of motions, its time, its seed, and a listener."""
 
 from __future__ import annotations
 
@@ -12,32 +12,32 @@ from rrtik_ompl.fast.search.shortcut_layout import KERNELS
 from rrtik_ompl.moves.axis_cut import axis_moves
 from rrtik_ompl.moves.rules import MoveRules
 from rrtik_ompl.transitions import edge_keys, route_length, transitions
-from rrtik_ompl.world.motion_queries import KernelWorld, MotionQueries, has_kernels
+from rrtik_ompl.world.motion_queries import KernelWorld, MotionQueries, Stop, has_kernels
 
 
 class Task:
     """One request to shorten a route.
 
-    When the time is up, nothing else counts as free, so that a method that heeds its answers ends soon with a free
+    When the time is up, nothing else counts as free, so that a method ends soon with a free
     route: whatever it has replaced by then stays replaced.
 
     Attributes:
-        motions: Who judges, as given.
+        motions: As given.
         seed: Of all random choices.
-        one_joint: Whether every edge of the answer must move one joint, as the edges of the question do.
+        one_joint: Whether every edge of the result must move one joint, as the edges of the given route do.
         rules: What single-joint moves have to keep to, or None.
         bounded: Whether there is an end to the time.
-        asked: How many straight motions have been asked about.
-        confirmed_again: How many of an answer's motions have been checked on top of that, as parts of free ones.
+        asked: How many straight motions have been checked.
+        confirmed_again: How many motions of a result have been checked on top of that, as parts of free ones.
 
     Args:
-        motions: A world, or anything that judges straight motions.
+        motions: A world, or anything else that checks straight motions.
         seconds: Time limit [s].
         seed: See above.
         one_joint: See above.
         rules: See above.
         on_better: Called with every better route, shape (k, n).
-        stop: Asked between two questions; True ends the time.
+        stop: Called between two checks; True ends the time.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class Task:
         one_joint: bool = False,
         rules: MoveRules | None = None,
         on_better: Callable[[Matrix], object] | None = None,
-        stop: Callable[[], bool] | None = None,
+        stop: Stop | None = None,
     ) -> None:
         self.motions = motions
         self.seed, self.one_joint, self.rules = seed, one_joint, rules
@@ -57,7 +57,7 @@ class Task:
         self.bounded = bool(np.isfinite(seconds))
         self._deadline = time.monotonic() + seconds
         self._known: set[tuple[bytes, bytes]] = set()
-        self._on_better, self._stop, self._told = on_better, stop, (np.inf, np.inf)
+        self._on_better, self._stop, self._reported = on_better, stop, (np.inf, np.inf)
 
     @property
     def seconds_left(self) -> float:
@@ -81,20 +81,20 @@ class Task:
         if len(A) == 0 or self.expired():
             return np.zeros(len(A), dtype=bool)
         self.asked += len(A)
-        return self._ask(A, B)
+        return self._checked(A, B)
 
     def confirmed(self, new: Matrix, old: Matrix) -> bool:
         """Whether every edge of a route, shape (k, n), is free; those of the old route and those found free are known.
 
-        Parts of free edges are checked at other configurations than the whole, so they count as new. This is asked
+        Parts of free edges are checked at other configurations than the whole, so they count as new. They are checked
         even when the time is up.
         """
         known = self._known.union(edge_keys(old))
         fresh = [k for k, edge in enumerate(edge_keys(new)) if edge not in known and edge[::-1] not in known]
         self.confirmed_again += len(fresh)
-        return not fresh or bool(self._ask(new[fresh], new[np.add(fresh, 1)]).all())
+        return not fresh or bool(self._checked(new[fresh], new[np.add(fresh, 1)]).all())
 
-    def _ask(self, A: Matrix, B: Matrix) -> Mask:
+    def _checked(self, A: Matrix, B: Matrix) -> Mask:
         free: Mask = self.motions.motion_valid_batch(A, B)
         self._known.update((A[k].tobytes(), B[k].tobytes()) for k in np.flatnonzero(free))
         return free
@@ -104,30 +104,30 @@ class Task:
         return bool(self.free_batch(a[None], b[None])[0])
 
     def moves(self, a: Vector, b: Vector) -> Matrix:
-        """The waypoints after a on the way to b, shape (k, n): b alone, or those of single-joint moves."""
+        """The waypoints after a on the path to b, shape (k, n): b alone, or those of single-joint moves."""
         if not self.one_joint:
             return b[None]
         return axis_moves(a, b, range(len(a))[::-1])
 
     def link(self, a: Vector, b: Vector) -> Matrix | None:
-        """The waypoints after a of a free way to b, shape (k, n), or None."""
+        """The waypoints after a of a free path to b, shape (k, n), or None."""
         found = self.first_link(a, b[None])
         return None if found is None else found[1]
 
     def first_link(self, a: Vector, goals: Matrix) -> tuple[int, Matrix] | None:
-        """The first of the goals, shape (m, n), to which there is a free way, and its waypoints after a; or None.
+        """The first of the goals, shape (m, n), to which there is a free path, and its waypoints after a; or None.
 
-        The first goal is asked about alone, then twice as many together each time.
+        The first goal is checked alone, then twice as many together each time.
         """
         first, count = 0, 1
         while first < len(goals) and not self.expired():
-            ways = [self.moves(a, goal) for goal in goals[first : first + count]]
-            starts = [np.vstack([a[None], way])[:-1] for way in ways]
-            free = self.free_batch(np.vstack(starts), np.vstack(ways))
-            ends = np.cumsum([len(way) for way in ways])
-            for number, (end, way) in enumerate(zip(ends.tolist(), ways, strict=True)):
-                if free[end - len(way) : end].all():
-                    return first + number, way
+            paths = [self.moves(a, goal) for goal in goals[first : first + count]]
+            starts = [np.vstack([a[None], path])[:-1] for path in paths]
+            free = self.free_batch(np.vstack(starts), np.vstack(paths))
+            ends = np.cumsum([len(path) for path in paths])
+            for number, (end, path) in enumerate(zip(ends.tolist(), paths, strict=True)):
+                if free[end - len(path) : end].all():
+                    return first + number, path
             first, count = first + count, 2 * count
         return None
 
@@ -140,7 +140,7 @@ class Task:
         return min(routes, key=self.rank)
 
     def report(self, route: Matrix) -> None:
-        """Tell whoever listens of a route that is better than those told before."""
-        if self._on_better is not None and self.rank(route) < self._told:
-            self._told = self.rank(route)
+        """Pass a route to the listener if it is better than those before."""
+        if self._on_better is not None and self.rank(route) < self._reported:
+            self._reported = self.rank(route)
             self._on_better(route)

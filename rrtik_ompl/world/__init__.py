@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import copy
 import warnings
+from typing import get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Matrix, finite_array, positive
+from rrtik_ompl.choices import Accuracy, one_of
 from rrtik_ompl.collision.bodies import colliding_pairs, link_bodies, scene_bodies
 from rrtik_ompl.collision.certificate import Certificate, fixed_contact
 from rrtik_ompl.collision.contacts import Contact as Contact
 from rrtik_ompl.collision.contacts import inside, measured
 from rrtik_ompl.collision.motion_bound import displacement_weights
-from rrtik_ompl.errors import InputError, MeshWarning, UnknownNameError, require
+from rrtik_ompl.errors import InputError, MeshWarning, require
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions, motions_of, step_counts
 from rrtik_ompl.robot import Robot
@@ -22,7 +24,7 @@ from rrtik_ompl.scene import Scene
 from rrtik_ompl.world.exact_checks import ExactChecker
 
 MOTION_RESOLUTION = 0.01  # [m]
-ACCURACIES = ("exact", "conservative")
+ACCURACIES: tuple[Accuracy, ...] = get_args(Accuracy)
 FINEST_RESOLUTION = 1e-5  # [m]; a motion across an arm's reach is then some hundred thousand checks
 
 
@@ -79,7 +81,7 @@ class World:
         scene: Scene | None = None,
         *,
         motion_resolution: float = MOTION_RESOLUTION,
-        accuracy: str = "exact",
+        accuracy: Accuracy = "exact",
     ) -> None:
         self.robot = robot
         self.scene = Scene() if scene is None else scene
@@ -98,7 +100,7 @@ class World:
         pairs = colliding_pairs(robot, self.scene, self.bodies)
         moving = tuple(p for p in pairs if any(self.bodies[i].joint > 0 for i in p))
         self.pairs = pairs
-        self.accuracy = _accuracy(accuracy)
+        self.accuracy = one_of(ACCURACIES, accuracy, "accuracy")
         self._certificate = Certificate(robot, self.bodies, pairs)
         self._motions: FastMotions | None = None
         self._checks = ExactChecker(robot, self.bodies, moving, conservative=accuracy == "conservative")
@@ -120,14 +122,14 @@ class World:
         self._motions = motions_of(self, self._motions)
         return self._motions
 
-    def with_accuracy(self, accuracy: str) -> World:
+    def with_accuracy(self, accuracy: Accuracy) -> World:
         """The same world, "exact" or "conservative"; shares everything else.
 
         Raises:
             UnknownNameError: If there is no such accuracy.
         """
         other = copy.copy(self)
-        other.accuracy = _accuracy(accuracy)
+        other.accuracy = one_of(ACCURACIES, accuracy, "accuracy")
         other._checks = self._checks.as_conservative(accuracy == "conservative")
         return other
 
@@ -246,9 +248,3 @@ def _one_way(starts: Matrix, ends: Matrix) -> tuple[Matrix, Matrix]:
     first_difference = (starts != ends).argmax(axis=1)[:, None]
     turned = np.take_along_axis(starts, first_difference, axis=1) > np.take_along_axis(ends, first_difference, axis=1)
     return np.where(turned, ends, starts), np.where(turned, starts, ends)
-
-
-def _accuracy(name: str) -> str:
-    if name not in ACCURACIES:
-        raise UnknownNameError("accuracy", str(name), ACCURACIES)
-    return name

@@ -16,6 +16,7 @@ from typing import Protocol, TypeAlias, TypeGuard
 import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.choices import Accuracy
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.fast.simd.library import library
@@ -78,8 +79,8 @@ class KernelWorld(MotionQueries, Protocol):
         """Largest step of any point of the arm between two checked configurations [m]."""
 
     @property
-    def accuracy(self) -> str:
-        """The name of the accuracy: "exact" or "conservative"."""
+    def accuracy(self) -> Accuracy:
+        """What counts as free where the kernels cannot decide."""
 
 
 def kernel_tables(world: object) -> FastWorld | None:

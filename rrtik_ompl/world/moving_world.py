@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Vector, finite_array
+from rrtik_ompl.choices import Accuracy
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.certificate import fixed_contact
 from rrtik_ompl.errors import InputError, UnknownNameError, require
@@ -48,7 +49,7 @@ class MovingWorld:
         self_collision: False leaves out what does not concern obstacles, so that :meth:`clearance` is of them alone.
     """
 
-    accuracy = "conservative"
+    accuracy: Accuracy = "conservative"
 
     def __init__(
         self, world: World, *, moving: Sequence[str] | None = None, copies: int = 1, self_collision: bool = True

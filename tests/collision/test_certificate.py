@@ -9,9 +9,9 @@ from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.collision.boxes import Boxes
 from rrtik_ompl.collision.certificate import RUNS, Certificate
 from rrtik_ompl.collision.margins import kept_apart, request
-from rrtik_ompl.path import subdivided
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere
+from rrtik_ompl.transitions import subdivided
 from rrtik_ompl.world import World
 
 

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.path import JointPath, Move, load_path, subdivided
+from rrtik_ompl.path import JointPath, Move, load_path
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box
+from rrtik_ompl.transitions import subdivided
 from rrtik_ompl.world import World
 
 

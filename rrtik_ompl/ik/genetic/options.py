@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from rrtik_ompl.arrays import whole_number
+from rrtik_ompl.choices import GeneticPreset
 from rrtik_ompl.errors import InputError
 
 DEGREE = float(np.pi / 180.0)
@@ -78,6 +79,6 @@ STANDARD = GeneticOptions()
 HISTORICAL = GeneticOptions(bit_mutation=0.0, gene_mutation=0.007, stall=1500, start_over=None)
 # a little weight on motion keeps joints at rest that the target leaves free, and the extrapolation from running away
 REFINED = GeneticOptions(refined=10, motion_weight=0.005)
-PRESETS: Mapping[str, GeneticOptions] = MappingProxyType(
+PRESETS: Mapping[GeneticPreset, GeneticOptions] = MappingProxyType(
     {"standard": STANDARD, "historical": HISTORICAL, "refined": REFINED}
 )

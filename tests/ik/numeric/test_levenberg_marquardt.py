@@ -114,10 +114,7 @@ def test_a_goal_out_of_reach_has_no_solution(kernels, monkeypatch):
 def test_what_else_is_asked_changes_no_answer():
     robot = rrtik.load_robot("panda")
     rows = pose_rows(robot.fk_batch(random_rows(robot, 20, seed=5)))
-    together, alone = (
-        Search(robot, rows, mid_range_configuration(robot)),
-        Search(robot, rows, mid_range_configuration(robot)),
-    )
+    together, alone = (Search(robot, rows, mid_range_configuration(robot)) for _ in range(2))
     together.advance(np.arange(20))
     alone.advance(np.array([7, 3]))
     assert alone.q[[3, 7]].tolist() == together.q[[3, 7]].tolist()

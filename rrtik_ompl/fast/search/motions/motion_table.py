@@ -125,7 +125,10 @@ class KernelWorld(Protocol):
     robot: Any
     weights: Vector
     motion_resolution: float
-    accuracy: str
+
+    @property
+    def accuracy(self) -> str:
+        """Whether doubtful motions are resolved: "exact" or "conservative"."""
 
     @property
     def fast(self) -> FastWorld | None:

@@ -1,0 +1,59 @@
+"""The names that a caller chooses from, as types: each list stands here once, for editors, checks and commands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Literal, TypeAlias, TypeVar
+
+from rrtik_ompl.errors import UnknownNameError
+
+Accuracy: TypeAlias = Literal["exact", "conservative"]
+ShorteningMethod: TypeAlias = Literal[
+    "auto",
+    "axis",
+    "axis-rounds",
+    "sequential",
+    "random",
+    "shortcut",
+    "retraction",
+    "corners",
+    "ompl",
+    "fewest-moves",
+]
+IkMethod: TypeAlias = Literal[
+    "auto",
+    "closed-form",
+    "numeric",
+    "genetic",
+    "mb-rrt",
+    "projection",
+    "damped",
+    "pinocchio",
+    "ccd",
+    "fabrik",
+    "pso",
+    "pso-resampled",
+]
+TrajectoryIkMethod: TypeAlias = Literal["auto", "closed-form", "numeric", "genetic"]
+GeneticPreset: TypeAlias = Literal["standard", "historical", "refined"]
+FrameAxis: TypeAlias = Literal["x", "y", "z"]
+
+Name = TypeVar("Name", bound=str)
+
+
+def one_of(names: Iterable[Name], name: str, kind: str) -> Name:
+    """A name that was given as text, as one of those that there are.
+
+    Args:
+        names: Those that there are.
+        name: The name that was given.
+        kind: What is named, for the error message.
+
+    Raises:
+        UnknownNameError: If it is none of them.
+    """
+    known = tuple(names)
+    for each in known:
+        if each == name:
+            return each
+    raise UnknownNameError(kind, str(name), known)

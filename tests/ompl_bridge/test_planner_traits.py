@@ -1,0 +1,122 @@
+"""What the library knows of planners: traits that their classes state, and no name of any."""
+
+import ast
+from pathlib import Path
+from typing import ClassVar, get_args
+
+import numpy as np
+import pytest
+
+import rrtik
+import rrtik_ompl
+import rrtik_planners
+from rrtik_ompl import catalog, choices
+from rrtik_ompl.errors import PlannerError
+from rrtik_ompl.ik.genetic.options import PRESETS
+from rrtik_ompl.ik.trajectory import list_ik_trajectory_methods
+from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult
+from rrtik_ompl.ompl_bridge.ompl_planners import OMPL_TRAITS, PlannerTraits, ompl_planners, traits_of
+from rrtik_ompl.ompl_bridge.planner_options import planner_options
+from rrtik_ompl.planning import find_planner
+from rrtik_ompl.shortening import METHODS
+from rrtik_ompl.world import ACCURACIES
+
+LIBRARY = Path(rrtik_ompl.__file__).parent
+# These ask for a planner by its name, as a user does: generated problems and the pilot's tool are made with certain
+# ones. Replanners and methods of shortening have names of their own, some of them the same.
+BY_NAME = ("ompl_bridge/ompl_planners.py", "generated_problems/", "pilot/", "reproduce/", "replanning/", "shortening/")
+BY_NAME += ("cli/replan.py", "cli/plan.py", "choices.py", "problem_files/run.py", "replanning/scenario.py")
+
+
+class Foreign(SafePlanner):
+    """A planner of somebody else that goes on improving."""
+
+    anytime: ClassVar[bool] = True
+    one_goal: ClassVar[bool] = True
+    path_statistics: ClassVar[tuple[str, ...]] = ("cost",)
+
+    def __init__(self, si, *, world=None, seed=None, patience=3):
+        super().__init__(si, "Foreign", world=world, seed=seed)
+        self.patience = patience
+
+    def search(self, starts, goals, checker, ptc):
+        assert len(goals) == 1
+        attempts = getattr(Foreign, "attempts", 0)
+        Foreign.attempts = attempts + 1
+        path = np.array([starts[0], goals[0]]) if attempts else None
+        return SearchResult(path, {"cost": 7, "work": 7})
+
+
+def test_the_classes_of_the_planners_state_their_traits():
+    assert traits_of(rrtik_planners.FewestMoves).anytime
+    assert traits_of(rrtik_planners.IKURT).finds_goals
+    assert set(traits_of(rrtik_planners.FewestMoves).path_statistics) == {"lower_bound", "gap"}
+    anytime = {name for name, planner in ompl_planners().items() if traits_of(planner).anytime}
+    assert anytime == {"AORRTC", "BITstar", "InformedRRTstar", "PRMstar", "RRTstar", "SORRTstar"}
+
+
+@pytest.mark.parametrize("name", catalog.list_planners())
+def test_a_planner_with_an_iteration_limit_has_the_option(name):
+    factory = find_planner(name)
+    assert traits_of(factory).supports_iteration_limit == ("max_iterations" in planner_options(factory))
+
+
+def test_a_planner_of_somebody_else_is_the_equal_of_ours():
+    assert traits_of(Foreign) == PlannerTraits(
+        anytime=True, one_goal=True, supports_iteration_limit=False, path_statistics=("cost",)
+    )
+    assert Foreign.default_options() == {"patience": 3}
+    problem = rrtik_ompl.Problem(rrtik_ompl.World(rrtik_ompl.load_robot("planar3")), [0, 0, 0], [0.5, 0, 0])
+    Foreign.attempts = 0
+    found = rrtik_ompl.plan(problem, Foreign, seed=1, parameters={"patience": 1})
+    assert found.found
+    assert (found.statistics["attempts"], found.statistics["cost"], found.statistics["work"]) == (2, 7, 14)
+
+
+def test_a_factory_that_states_nothing_has_the_default_traits():
+    assert traits_of(lambda si: None) == PlannerTraits()
+    assert set(OMPL_TRAITS) == set(ompl_planners().values())
+
+
+def test_options_that_a_problem_does_not_allow_are_refused_without_a_word_of_breaking():
+    problem = rrtik_ompl.load_problem("planar3_b")
+    with pytest.raises(PlannerError, match=r"^planner BiCRDT: frozen_joints: joint "):
+        rrtik_ompl.plan(problem, "bicrdt", seed=1, parameters={"frozen_joints": [0]})
+
+
+def test_the_default_planner_is_data_of_the_packages():
+    assert catalog.default_planner() == "bicrdt"
+    problem = rrtik_ompl.load_problem("planar3_b")
+    assert rrtik_ompl.plan(problem, seed=1).planner == "bicrdt"
+
+
+@pytest.mark.parametrize("file", sorted(LIBRARY.rglob("*.py")), ids=lambda file: str(file.relative_to(LIBRARY)))
+def test_the_library_knows_no_planner_by_name(file):
+    tree = ast.parse(file.read_text())
+    names = {*catalog.list_planners(), *ompl_planners(), *rrtik_planners.__all__}
+    found = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and node.value in names}
+    place = file.relative_to(LIBRARY).as_posix()
+    assert not found or place.startswith(BY_NAME), f"{place} names {found}"
+    compared = [ast.unparse(node) for node in ast.walk(tree) if isinstance(node, ast.Compare)]
+    assert not [text for text in compared if "__name__" in text and "__main__" not in text]
+
+
+def test_the_names_to_choose_from_stand_once():
+    assert set(get_args(choices.ShorteningMethod)) == set(METHODS)
+    assert set(get_args(choices.IkMethod)) == {"auto", *rrtik_ompl.list_ik_methods()}
+    assert set(get_args(choices.TrajectoryIkMethod)) == {"auto", *list_ik_trajectory_methods()}
+    assert set(get_args(choices.GeneticPreset)) == set(PRESETS)
+    assert get_args(choices.Accuracy) == ACCURACIES
+
+
+def test_the_short_name_is_the_same_package():
+    assert rrtik.load_robot is rrtik_ompl.load_robot
+    assert rrtik.__version__ == rrtik_ompl.__version__
+    assert dir(rrtik) == dir(rrtik_ompl)
+
+
+def test_an_old_name_says_the_new_one():
+    for old, new in rrtik_ompl.RENAMED.items():
+        if old not in dir(rrtik_ompl):
+            with pytest.raises(AttributeError, match=f"{old} is now {new}"):
+                getattr(rrtik_ompl, old)
