@@ -31,7 +31,7 @@ def titan():
 
 @pytest.fixture(scope="session")
 def published():
-    """The tables of the C-RDT paper by name; its lists of moves in degrees as printed (TITAN-4's joint 5 plus 90)."""
+    """The tables of [1, ch. 6.3] by name; its lists of moves in degrees as printed (TITAN-4's joint 5 plus 90)."""
     return vars(crdt_published)
 
 

@@ -1,4 +1,4 @@
-"""What goes beyond the GA-REB paper, with figures: restarts, small motion, gains, refinement, poses, obstacles."""
+"""What goes beyond [2], with figures: restarts, small motion, gains, refinement, poses, obstacles."""
 
 from __future__ import annotations
 

@@ -187,7 +187,7 @@ COUNTS = {
 }
 HEAD = ["", "solved", "median s", "mean s (a failure counts the limit)"]
 INTRODUCTION = (
-    "Literal: the published algorithm with the default numbers of the specification, poses to 1e-2 in its metric, as "
+    "Literal: the published algorithm with the default numbers chosen here, poses to 1e-2 in its metric, as "
     "acceptance wants it. Improved: the default, to the tolerances of the shipped problems (1 mm and 0.01 rad, or as "
     "the file says), which are tighter. No Jacobian: the improved one with `jacobian=False`, on the looser goals. All "
     "through `plan()`, whose second check every path has passed. Evaluations are forward kinematics; `worst metric` is "

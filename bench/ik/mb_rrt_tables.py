@@ -54,7 +54,7 @@ def _table(report: Report, count: int, results: dict[str, dict[float, Measured]]
 
 
 READINGS = [
-    "How the figures that differ are read (rows of the specification's section 11):",
+    "How the figures that differ are read (rows of the tables of [3]):",
     "",
     "- Tables 6 and 7 are rows of 8 and 9 (C-space, Uniforme A, Superficie A) but for two entries: Uniforme A mu",
     "  2681.2731 (8: 2681.2577, a misprint) and Superficie A rho 0.22309, 0.21782 in table 6, which repeats the",
@@ -63,7 +63,7 @@ READINGS = [
     "- C-space, 3 joints, is nearer to the print at 0.2 cm, the tolerance of the 2-joint demonstration (row 3);",
     "  T_C of Uniforme B and mu of Superficie B are printed between what 0.2 and 0.3 cm give. Success is",
     "  strict `<`, once a pass (row 13); mu is over converged goals (row 2).",
-    "- Superficie A, 3 joints: other goal clouds gave the specification 17 to 43 %; the paper's is not known (row 6).",
+    "- Superficie A, 3 joints: other goal clouds gave 17 to 43 %; the paper's is not known (row 6).",
     "- Uniforme A*, 10 joints: the rate is as printed, mu is a tenth of it. In the trap success comes early or never;",
     "  no reading of the rules gives 1672.",
     "- Uniforme B*, 10 joints: printed 71 % with mean 1333; a ring of radius d_n around the goal gives 100 % and",

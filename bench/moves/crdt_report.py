@@ -1,4 +1,4 @@
-"""Measure the acceptance rows of the C-RDT paper's method and write them as Markdown.
+"""Measure the acceptance rows of C-RDT [1, ch. 6.3] and write them as Markdown.
 
 Usage: ``python bench/moves/crdt_report.py [--runs 1000] [--arm-runs 200] [--quick] [--out bench/reports/crdt.md]``
 """
@@ -45,7 +45,7 @@ def statistics(runs: list[TreeRun]) -> list[np.ndarray]:
 
 
 def environment_e(report: Report, problem: Problem, count: int) -> None:
-    """Section 6.1 of the test plan: RRT and C-RDT side by side with the two published tables."""
+    """RRT and C-RDT side by side with the two published tables."""
     rrt = [rrt_run(problem, seed) for seed in range(count)]
     crdt = [crdt_run(problem, seed) for seed in range(count)]
     ours_rrt, ours_crdt = statistics(rrt), statistics(crdt)

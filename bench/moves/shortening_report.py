@@ -1,7 +1,7 @@
 """Measure the published ways to shorten a path against the exact shortest route of the same class.
 
 Run: ``python bench/moves/shortening_report.py`` (some minutes). Writes ``bench/reports/shortening.md``; exit code 0
-if every bar of the post-processing page holds, else 1.
+if every bar of the [1, ch. 5.3] holds, else 1.
 """
 
 from __future__ import annotations

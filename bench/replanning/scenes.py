@@ -1,4 +1,4 @@
-"""The scenes of the DRRT-Con paper (its figures give no numbers; these are the proposals of its test plan)."""
+"""The scenes of [1, ch. 5.2] (its figures give no numbers; these are proposals of this project)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The test scenes of the DRRT-Con paper: figures without numbers, so that what is compared is what its text says."""
+"""The test scenes of [1, ch. 5.2]: figures without numbers, so that what is compared is what its text says."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rrtik_ompl.replanning.scenario import Scenario, load_scenario
 from rrtik_ompl.transitions import route_length
 from rrtik_ompl.world.moving_world import MovingWorld
 
-SOURCE = "DRRT-Con paper"
+SOURCE = "[1, ch. 5.2]"
 SCENE = "coordinates, speeds and steps chosen here: none is printed"
 REPAIR_SECONDS = 2.0  # [s] for a repair, so that a run does not depend on how busy the machine is
 FASTEST = 2.5  # [m/s]: no triangle is faster

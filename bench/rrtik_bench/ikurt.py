@@ -1,4 +1,4 @@
-"""The examples of the IKURT paper: figures without numbers, so that what is compared is what its text says of them."""
+"""The examples of [1, ch. 5.1]: figures without numbers, so that what is compared is what its text says of them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rrtik_ompl.goal import PoseGoal, PositionGoal
 from rrtik_ompl.ik.ikurt.metric import TipMetric
 from rrtik_ompl.problem import Problem
 
-SOURCE = "IKURT paper"
+SOURCE = "[1, ch. 5.1]"
 METRIC = 1e-2  # accuracy of poses in the published metric
 EXAMPLES = {
     "planar3_boxes": "1, planar arm of three joints, two boxes",

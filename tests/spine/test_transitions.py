@@ -17,7 +17,7 @@ from rrtik_ompl.transitions import (
     transitions,
 )
 
-# What RRT-Connect gives for the prism test in the C-RDT paper, degrees, joint 5 as printed.
+# What RRT-Connect gives for the prism test in [1, ch. 6.3], degrees, joint 5 as printed.
 RRT_CONNECT = np.deg2rad(
     [
         [0, 0, 0, 0, 90, 0],

@@ -1,4 +1,4 @@
-"""What the C-RDT paper compares with: the basic RRT, and collision checks counted as point tests along an edge."""
+"""What [1, ch. 6.3] compares with: the basic RRT, and collision checks counted as point tests along an edge."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The tables and lists of the C-RDT paper."""
+"""The tables and lists of [1, ch. 6.3]."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rrtik_bench.report.rows import Row, verdict, within
 from rrtik_bench.tables import Table
 from rrtik_ompl.transitions import lower_bound, route_length, routes, transitions
 
-SOURCE = "C-RDT paper"
+SOURCE = "[1, ch. 6.3]"
 COLUMNS = ("iterations", "vertices", "collision checks", "time [s]")
 LOST = "the drawing is lost: environment E is a reconstruction; a check is a point test every 0.2 along an edge"
 SQUARES = "the squares are lost; case {case} of three proposals, optimum {optimum}"

@@ -1,4 +1,4 @@
-"""What the GA-REB paper gives: its trajectories, its tables, its expanded kinematics. Lengths in inches, as there."""
+"""What [2] gives: its trajectories, its tables, its expanded kinematics. Lengths in inches, as there."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables 4 and 5 of the GA-REB paper, its first points and its other statements."""
+"""Tables 4 and 5 of [2], its first points and its other statements."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rrtik_bench.report.rows import Row, verdict, within
 from rrtik_bench.tables import Table
 from rrtik_ompl.ik.genetic.options import HISTORICAL, STANDARD, GeneticOptions
 
-SOURCE = "GA-REB paper"
+SOURCE = "[2]"
 SLOW = replace(HISTORICAL, gene_mutation=0.005, stall=None)  # the fit for five joints
 RUNS, FEW = 5, 1  # in full, quickly
 FACTOR = 2.0  # between single runs of one setting

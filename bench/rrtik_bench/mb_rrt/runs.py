@@ -1,4 +1,4 @@
-"""Tables 6 to 11 of the MB-RRT paper, and the searches that are measured beside them. Lengths in cm."""
+"""Tables 6 to 11 of [3], and the searches that are measured beside them. Lengths in cm."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables 6 to 11 of the MB-RRT paper and its worked example."""
+"""Tables 6 to 11 of [3] and its worked example."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from rrtik_bench.report.rows import Row, Verdict, verdict, within
 from rrtik_bench.tables import Table
 from rrtik_ompl.ik.mb_rrt.links import Links
 
-SOURCE = "MB-RRT paper"
+SOURCE = "[3]"
 SIGMAS = 3.0  # of a share counted on so many goals
 MOST = 20.0  # [%]; a larger difference is one, however few the goals
 FACTOR = 1.5  # between two means of passes

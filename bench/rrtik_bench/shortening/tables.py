@@ -79,7 +79,7 @@ def shortening(quick: bool) -> list[Row]:
 
 
 def pilots_route(quick: bool) -> list[Row]:
-    """The time of one route of the shared-control tool: RRT-Connect, then sequential cut."""
+    """The time of one route of the pilot's tool of [1, ch. 6]: RRT-Connect, then sequential cut."""
     problem = rrtik.load_problem("titan4_sdu")
     search, cut = [], []
     for seed in range(5 if quick else 25):
@@ -100,8 +100,8 @@ def pilots_route(quick: bool) -> list[Row]:
 
 
 TABLES = (
-    Table("shortening-4", "Sequential cut, random cut, retraction", "Post-processing paper, table of section 4",
+    Table("shortening-4", "Sequential cut, random cut, retraction", "[1, ch. 5.3], table of the three methods",
           shortening, 20, 4),
-    Table("pilot-route", "Time of a route in the shared-control tool", "Shared-control tool, section 5",
+    Table("pilot-route", "Time of a route in the pilot's tool of [1, ch. 6]", "[1, ch. 6]",
           pilots_route, 1, 1),
 )  # fmt: skip

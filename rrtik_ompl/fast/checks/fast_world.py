@@ -92,7 +92,7 @@ class FastWorld:
         self._pairs = kept
         solids = [NO_SOLIDS] * len(bodies) if solids is None else solids
         same = like._arm if like is not None and like._joints == self._joints else None
-        self._arm: ArmTables = arm_tables(chain, bodies, moving, kept, outer, inner, solids, self._limits, same)
+        self._arm: ArmTables = arm_tables(chain, bodies, moving, kept, outer, inner, solids, self._limits, like=same)
         self._checked = checked_table(moving, standing, kept)
         self._primitives = standing_tables(bodies, standing, self._checked, outer, inner)
         self._standing, self._outer, self._placed = standing, outer, PlacedPrimitives()

@@ -154,12 +154,24 @@ def nearest_on_triangle(a: Any, b: Any, c: Any) -> Any:
     if d6 >= 0.0 and d5 <= d6:
         return c
     of_c, of_b, of_a = d1 * d4 - d3 * d2, d5 * d2 - d1 * d6, d3 * d6 - d5 * d4
-    if of_c <= 0.0 and d1 >= 0.0 >= d3 and d1 > d3:
+    if nearest_to_edge(of_c, d1, d3):
         return minus(a, scaled(ab, -d1 / (d1 - d3)))
-    if of_b <= 0.0 and d2 >= 0.0 >= d6 and d2 > d6:
+    if nearest_to_edge(of_b, d2, d6):
         return minus(a, scaled(ac, -d2 / (d2 - d6)))
     if of_a <= 0.0 and d4 >= d3 and d5 >= d6 and (d4 - d3) + (d5 - d6) > 0.0:
         return minus(b, scaled(minus(c, b), -(d4 - d3) / ((d4 - d3) + (d5 - d6))))
+    return mean_of_corners(a, ab, ac, of_a, of_b, of_c)
+
+
+@inlined
+def nearest_to_edge(outside: float, begin: float, end: float) -> bool:
+    """Whether the origin lies beyond an edge of a triangle and between its ends, given its projections on the edge."""
+    return outside <= 0.0 and begin >= 0.0 >= end and begin > end
+
+
+@inlined
+def mean_of_corners(a: Any, ab: Any, ac: Any, of_a: float, of_b: float, of_c: float) -> Any:
+    """The point of a triangle with barycentric coordinates in proportion to three numbers; a corner where they fail."""
     whole = 1.0 / (of_a + of_b + of_c)
     v, w = of_b * whole, of_c * whole
     if not (v >= 0.0 and w >= 0.0 and v + w <= 1.0):

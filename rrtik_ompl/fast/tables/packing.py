@@ -89,6 +89,7 @@ def arm_tables(
     inner: Sequence[Spheres],
     solids: Sequence[Solids],
     limits: Vector,
+    *,
     like: ArmTables | None,
 ) -> ArmTables:
     """Tables of the moving bodies (see :func:`alike`); those of ``like`` if they are the same."""

@@ -1,4 +1,4 @@
-"""The published tree and the arcs of intersection: figures of the specification over random states, and properties."""
+"""The published tree and the arcs of intersection: published figures [3] over random states, and properties."""
 
 import numpy as np
 import pytest

@@ -1,6 +1,6 @@
 """Kernels that lay out, check and keep an extension of a C-RDT tree.
 
-The rules are those of the planners' own ``AxisTree``. Source: the C-RDT paper, EXTEND and REWRITE.
+The rules are those of the planners' own ``CrdtTree``. Source: [1, ch. 6.3, algorithms 9 to 11], EXTEND and REWRITE.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Searches in kernels with C-RDT trees. Source: the C-RDT paper, algorithms 9 to 11.
+"""Searches in kernels with C-RDT trees. Source: [1, ch. 6.3, algorithms 9 to 11].
 
 A search finds the same path to the bit as the one in Python, with the same random stream. It stops and goes on where it
 was: all that it remembers is in its table, and how far it runs at a time changes nothing.
