@@ -52,6 +52,35 @@ def meets_row(rows: Table, number: int, points: NDArray[np.float64], radii: NDAr
     return np.asarray(np.hypot(np.maximum(np.abs(along) - row[6], 0.0), np.maximum(across - row[7], 0.0)) < radii)
 
 
+def row_gap(rows: Table, number: int, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Signed distance of points, shape (..., 3), from a row, negative inside. Shape (...)."""
+    row = rows[layout.ROWS].reshape(-1, layout.ROW_FLOATS)[number].astype(np.float64)
+    kind, _, start, end = rows[layout.NUMBERS].reshape(-1, 4)[number]
+    if kind == layout.HALF_SPACE:
+        return np.asarray(points @ row[:3] - row[3])
+    if kind == layout.CONVEX:
+        planes = rows[layout.PLANES].astype(np.float64).reshape(-1, 4)[start:end]
+        height = (points @ planes[:, :3].T - planes[:, 3]).max(axis=-1)
+        return np.asarray(height if row[0] else np.where(height < 0.0, height, np.inf))
+    away = points - row[:3]
+    if kind == layout.BALL:
+        return np.asarray(np.linalg.norm(away, axis=-1) - row[3])
+    if kind == layout.BOX:
+        return _outside(np.abs(away @ row[3:12].reshape(3, 3).T) - row[12:15])
+    along = away @ row[3:6]
+    if kind == layout.CAPSULE:
+        foot = np.clip(along * row[6], 0.0, 1.0)[..., None] * row[3:6]
+        return np.asarray(np.linalg.norm(away - foot, axis=-1) - row[7])
+    across = np.linalg.norm(away - along[..., None] * row[3:6], axis=-1)
+    return _outside(np.stack([np.abs(along) - row[6], across - row[7]], axis=-1))
+
+
+def _outside(beyond: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Signed distance from a set that is given by how far a point lies beyond each of its orthogonal faces."""
+    inside = np.minimum(beyond.max(axis=-1), 0.0)
+    return np.asarray(np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + inside)
+
+
 class PlainChecks:
     """The three-valued checks on the tables of a world."""
 

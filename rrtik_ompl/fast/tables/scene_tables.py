@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.collision.shape_table import Core, core_of
 from rrtik_ompl.collision.solids import SameObject
 from rrtik_ompl.covers.planes import most_different
 from rrtik_ompl.fast.tables.layout import (
@@ -123,7 +124,8 @@ def outer_rows(body: Any, cover: Spheres, room: float = 0.0) -> list[Row]:
 
 def inner_rows(body: Any, inner: Spheres) -> list[Row]:
     """Rows that lie within the margin around a standing body, or inside it."""
-    stays_round = isinstance(body.geometry, (coal.Sphere, coal.Capsule, coal.Halfspace))
+    core = core_of(body.geometry)
+    stays_round = isinstance(body.geometry, coal.Halfspace) if core is None else core.rounded
     rows = _exact(body, grow=-1.0, room=body.margin if stays_round else 0.0)
     if rows is None or isinstance(body.geometry, coal.ConvexBase):
         balls = np.asarray(inner, dtype=np.float64).reshape(-1, 4)
@@ -149,25 +151,26 @@ def _exact(body: Any, grow: float, room: float = 0.0) -> list[Row] | None:
     if isinstance(solid, coal.ConvexBase):
         planes = _known_planes(SameObject(solid))
         return None if planes is None else _convex(solid, pose, planes, grow, room)
-    if not isinstance(solid, (coal.Sphere, coal.Capsule, coal.Box, coal.Cylinder)):
+    core = core_of(solid)
+    if core is None:
         return None
-    row = _primitive(solid, np.array(pose.rotation), np.array(pose.translation), grow, room)
+    row = _primitive(core, np.array(pose.rotation), np.array(pose.translation), grow, room)
     return [] if row is None else [row]
 
 
-def _primitive(solid: Any, rotation: Matrix, centre: Vector, grow: float, room: float) -> Row | None:
+def _primitive(core: Core, rotation: Matrix, centre: Vector, grow: float, room: float) -> Row | None:
     """Row of a ball, capsule, box or cylinder, or None if nothing is left of it."""
     z = rotation[:, 2]
-    if isinstance(solid, coal.Box):
-        half = np.array(solid.halfSide)
+    half = core.half_sides
+    if half is not None:
         half = half + grow * _slack(centre, float(np.linalg.norm(half))) + room
         spread = np.abs(rotation) @ half
         return _row(BOX, [*centre, *rotation.T.ravel(), *half], centre, spread, half.min())
-    length = 0.0 if isinstance(solid, coal.Sphere) else float(solid.halfLength)
-    radius = float(solid.radius) + grow * _slack(centre, float(solid.radius) + length) + room
-    if isinstance(solid, coal.Sphere):
+    length, radius = core.half_length, core.radius if core.disc is None else core.disc
+    radius = radius + grow * _slack(centre, radius + length) + room
+    if len(core.corners) == 1:
         return _row(BALL, [*centre, radius], centre, np.full(3, radius), radius)
-    if isinstance(solid, coal.Capsule):
+    if core.disc is None:
         way = 2.0 * length * z
         share = 1.0 / float(way @ way) if length > 1e-9 else 0.0
         spread = length * np.abs(z) + radius
