@@ -9,14 +9,15 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import coal
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.collision.solids import bvh, convexified, hull, is_mesh, measured, mesh_arrays
+from rrtik_ompl.arrays import Matrix, Vector, frozen
+from rrtik_ompl.collision.solids import SameObject, bvh, convexified, hull, is_mesh, measured, mesh_arrays
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
 from rrtik_ompl.shapes.polygons import convex_parts
 
@@ -88,7 +89,7 @@ class ShapeRow:
 
 def box_corners(half: Vector) -> Matrix:
     """Corners of a box about the origin with these half sides, shape (8, 3)."""
-    return np.asarray(BOX_CORNERS * half)
+    return frozen(BOX_CORNERS * half)
 
 
 def _radius_and_half_length(geometry: Any) -> Vector:
@@ -96,7 +97,7 @@ def _radius_and_half_length(geometry: Any) -> Vector:
 
 
 def _ends(half_length: float) -> Matrix:
-    return np.array([[0.0, 0.0, half_length], [0.0, 0.0, -half_length]])
+    return frozen([[0.0, 0.0, half_length], [0.0, 0.0, -half_length]])
 
 
 def _extruded(polygon: Matrix, height: float) -> Matrix:
@@ -128,7 +129,7 @@ ROWS = (
             coal.Sphere,
             sizes=lambda geometry: np.array([geometry.radius]),
             shape=Sphere,
-            core=lambda radius: Core(np.zeros((1, 3)), radius=radius),
+            core=lambda radius: Core(frozen(np.zeros((1, 3))), radius=radius),
         ),
     ),
     ShapeRow(
@@ -198,8 +199,13 @@ def sizes_of(geometry: Any) -> Vector | None:
 
 def core_of(geometry: Any) -> Core | None:
     """The core of a coal geometry; None if it has none of the simple ones."""
-    row = _BY_GEOMETRY.get(type(geometry))
-    return None if row is None or row.core is None else row.core(*row.sizes(geometry).tolist())
+    return _core(SameObject(geometry)) if type(geometry) in _BY_GEOMETRY else None
+
+
+@lru_cache(maxsize=4096)  # a solid that moves keeps its own
+def _core(key: SameObject) -> Core | None:
+    row = _BY_GEOMETRY[type(key.geometry)]
+    return None if row.core is None else row.core(*row.sizes(key.geometry).tolist())
 
 
 def shape_of(geometry: Any) -> Shape | None:

@@ -9,7 +9,7 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.shape_table import Core
 from rrtik_ompl.covers.solids import ROUNDING
 
-CAPSULE_PROTRUSION = 0.06  # share of the radius
+ROD_PROTRUSION = 0.06  # share of the radius
 
 
 def balls_on_axis(radius: float, half: float, protrusion: float) -> int:
@@ -20,9 +20,9 @@ def balls_on_axis(radius: float, half: float, protrusion: float) -> int:
     return int(min(np.ceil(2.0 * half / step), 1e6)) + 1 if step > 0.0 else 10**6
 
 
-def capsule_cover(radius: float, half: float, limit: int, protrusion: float | None) -> Matrix:
+def rod_cover(radius: float, half: float, limit: int, protrusion: float | None) -> Matrix:
     """Equal balls in a row along z that hold a capsule, at most ``limit`` (but 2), shape (n, 4)."""
-    number = balls_on_axis(radius, half, CAPSULE_PROTRUSION * radius if protrusion is None else protrusion)
+    number = balls_on_axis(radius, half, ROD_PROTRUSION * radius if protrusion is None else protrusion)
     number = max(min(number, max(limit, 2)), 1 if half <= 0.0 else 2)
     step = 2.0 * half / max(number - 1, 1)
     return row_on_z(spread(half, number), np.hypot(radius, 0.5 * step) * (1.0 + ROUNDING))

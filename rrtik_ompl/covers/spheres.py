@@ -20,10 +20,10 @@ from rrtik_ompl.collision.solids import is_closed, is_mesh, mesh_arrays
 from rrtik_ompl.covers.cells import elements
 from rrtik_ompl.covers.inner import inscribed
 from rrtik_ompl.covers.regular import (
-    CAPSULE_PROTRUSION,
+    ROD_PROTRUSION,
     balls_on_axis,
-    capsule_cover,
     regular_cover,
+    rod_cover,
     row_on_z,
     spread,
 )
@@ -188,7 +188,7 @@ def _round_cover(core: Core, protrusion: float | None) -> Matrix:
     if len(core.corners) == 1:
         return np.array([[0.0, 0.0, 0.0, radius]])
     limit = balls_for(2.0 * (half + radius)) if protrusion is None else MAX_BALLS_ON_REQUEST
-    return capsule_cover(radius, half, limit, protrusion)
+    return rod_cover(radius, half, limit, protrusion)
 
 
 def _round_inner(core: Core, count: int | None) -> Matrix:
@@ -196,7 +196,7 @@ def _round_inner(core: Core, count: int | None) -> Matrix:
     radius, half = core.radius, core.half_length
     if len(core.corners) == 1:
         return np.array([[0.0, 0.0, 0.0, radius]])[:count]
-    number = min(balls_on_axis(radius, half, CAPSULE_PROTRUSION * radius), balls_for(2.0 * (half + radius)))
+    number = min(balls_on_axis(radius, half, ROD_PROTRUSION * radius), balls_for(2.0 * (half + radius)))
     return row_on_z(spread(half, number if count is None else min(count, number)), radius)
 
 

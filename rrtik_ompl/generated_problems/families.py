@@ -8,7 +8,6 @@ thick, or whose wrist stands off to one side, is given more room beside the way 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
@@ -16,10 +15,9 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.scene import Obstacle
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, Sphere
+from rrtik_ompl.shapes import Box, Capsule, Cylinder, Shape, Sphere
 
-Solid: TypeAlias = Box | Sphere | Cylinder | Capsule
-Solids: TypeAlias = list[tuple[Solid, Any]]  # shapes and their poses in the frame of the place, in shares of the reach
+Solids: TypeAlias = list[tuple[Shape, Any]]  # shapes and their poses in the frame of the place, in shares of the reach
 Builder: TypeAlias = Callable[[np.random.Generator, float], Solids]  # of a random stream and the room: 1 or more
 
 THICKNESS = 0.03  # of boards and plates
@@ -28,7 +26,7 @@ CLUTTER = 25  # solids
 FREE_AROUND = 0.09  # pipes leave so much room about the way of the forearm
 
 
-def _board(low: tuple[float, float, float], high: tuple[float, float, float]) -> tuple[Solid, Any]:
+def _board(low: tuple[float, float, float], high: tuple[float, float, float]) -> tuple[Shape, Any]:
     """A box from one corner to the other."""
     corners = np.array([low, high])
     return Box(corners[1] - corners[0]), pin.SE3(np.eye(3), corners.mean(axis=0))
@@ -81,7 +79,7 @@ def frame(rng: np.random.Generator, room: float) -> Solids:
     return solids
 
 
-def _beam(centre: tuple[float, float, float], half: tuple[float, float, float]) -> tuple[Solid, Any]:
+def _beam(centre: tuple[float, float, float], half: tuple[float, float, float]) -> tuple[Shape, Any]:
     return Box(2.0 * np.array(half)), pin.SE3(np.eye(3), np.array(centre))
 
 
@@ -112,7 +110,7 @@ def clutter(rng: np.random.Generator, room: float) -> Solids:
     solids: Solids = []
     for _ in range(CLUTTER):
         kind, size = rng.integers(3), rng.uniform(0.03, 0.12, 3)
-        shape: Solid = (Box(size), Cylinder(0.5 * size[0], 2.0 * size[1]), Sphere(0.6 * size[0]))[kind]
+        shape: Shape = (Box(size), Cylinder(0.5 * size[0], 2.0 * size[1]), Sphere(0.6 * size[0]))[kind]
         way = rng.normal(size=3)
         centre = way / np.linalg.norm(way) * rng.uniform(room * 0.1, 0.9)
         solids.append((shape, pin.SE3(pin.exp3(rng.normal(size=3)), centre)))
@@ -150,6 +148,6 @@ def obstacles(
     return tuple(found)
 
 
-def _scaled(shape: Solid, factor: float) -> Solid:
-    """The same shape in another size; all measures of these kinds are lengths."""
-    return replace(shape, **{measure.name: factor * getattr(shape, measure.name) for measure in shape.measures})
+def _scaled(shape: Shape, factor: float) -> Shape:
+    """The same shape in another size; all measures of those above are lengths."""
+    return type(shape)(**{measure.name: factor * getattr(shape, measure.name) for measure in shape.measures})

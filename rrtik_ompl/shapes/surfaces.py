@@ -33,17 +33,21 @@ def extruded(polygon: Matrix, height: float) -> Triangles:
     return Triangles(vertices, np.asarray(index, dtype=np.int64).reshape(-1, 3))
 
 
-def capsule(radius: float, length: float, segments: int = 24) -> Triangles:
-    """Capsule along z about the origin; ``length`` is the distance between the two cap centres."""
-    rings = segments // 4
-    angles = np.linspace(0.0, 0.5 * np.pi, rings + 1)
-    lift = np.concatenate([np.full(rings + 1, -0.5 * length), np.full(rings + 1, 0.5 * length)])
-    latitude = np.concatenate([-angles[::-1], angles])
-    radii, heights = radius * np.cos(latitude), radius * np.sin(latitude) + lift
+def revolved(radii: Vector, heights: Vector, segments: int) -> Triangles:
+    """Circles about z with these radii and heights, shape (k,) each, from below, and the surface between them."""
     turn = np.linspace(0.0, 2.0 * np.pi, segments, endpoint=False)
     x, y = np.outer(radii, np.cos(turn)), np.outer(radii, np.sin(turn))
     circles = np.stack([x, y, np.broadcast_to(heights[:, None], x.shape)], 2)
     return Triangles(circles.reshape(-1, 3), wrap(len(radii), segments))
+
+
+def round_ended(radius: float, length: float, segments: int) -> Triangles:
+    """A ball, cut in two and drawn apart by a length along z."""
+    rings = segments // 4
+    angles = np.linspace(0.0, 0.5 * np.pi, rings + 1)
+    lift = np.concatenate([np.full(rings + 1, -0.5 * length), np.full(rings + 1, 0.5 * length)])
+    latitude = np.concatenate([-angles[::-1], angles])
+    return revolved(radius * np.cos(latitude), radius * np.sin(latitude) + lift, segments)
 
 
 def rounded(outline: Matrix, turn: Vector, length: float, radius: float, rings: int = 6) -> Triangles:

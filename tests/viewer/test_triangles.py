@@ -7,7 +7,7 @@ import pytest
 
 from rrtik_ompl.collision.shape_table import pieces
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
-from rrtik_ompl.shapes.surfaces import capsule, extruded
+from rrtik_ompl.shapes.surfaces import extruded
 from rrtik_ompl.viewer.drawing.meshes import half_space_plate, look_of_coal, look_of_shape, thickened
 from rrtik_ompl.viewer.drawing.triangles import split_creases, thin_out, tube
 
@@ -43,7 +43,7 @@ def test_splitting_moves_no_corner_of_any_triangle() -> None:
 
 
 def test_a_thinned_mesh_keeps_to_the_limit_and_nearly_to_its_box() -> None:
-    vertices, faces = capsule(0.3, 1.0, segments=160)
+    vertices, faces = Capsule(0.3, 1.0).surface(segments=160)
     thin_vertices, thin_faces = thin_out(vertices, faces, 2000)
     assert 500 < len(thin_faces) <= 2000 < len(faces)
     assert np.allclose(np.ptp(thin_vertices, axis=0), [0.6, 0.6, 1.6], atol=0.1)

@@ -15,6 +15,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.shape_table import Core, core_of
 from rrtik_ompl.collision.solids import SameObject
 from rrtik_ompl.covers.planes import most_different
 from rrtik_ompl.fast.tables.layout import (
@@ -77,7 +78,8 @@ def outer_primitives(body: Body, cover: Spheres, inflation: float = 0.0) -> list
 
 def inner_primitives(body: Body, inner: Spheres) -> list[Primitive]:
     """Rows that lie within the margin around a standing body, or inside it."""
-    stays_round = isinstance(body.geometry, (coal.Sphere, coal.Capsule, coal.Halfspace))
+    core = core_of(body.geometry)
+    stays_round = isinstance(body.geometry, coal.Halfspace) if core is None else core.rounded
     primitives = _exact(body, grow=-1.0, inflation=body.margin if stays_round else 0.0)
     if primitives is None or isinstance(body.geometry, coal.ConvexBase):
         balls = np.asarray(inner, dtype=np.float64).reshape(-1, 4)
@@ -105,31 +107,27 @@ def _exact(body: Body, grow: float, inflation: float = 0.0) -> list[Primitive] |
     if isinstance(solid, coal.ConvexBase):
         planes = _known_planes(SameObject(solid))
         return None if planes is None else _convex(solid, pose, planes, grow, inflation)
-    if not isinstance(solid, (coal.Sphere, coal.Capsule, coal.Box, coal.Cylinder)):
+    core = core_of(solid)
+    if core is None:
         return None
-    primitive = _primitive(solid, np.array(pose.rotation), np.array(pose.translation), grow, inflation)
+    primitive = _primitive(core, np.array(pose.rotation), np.array(pose.translation), grow, inflation)
     return [] if primitive is None else [primitive]
 
 
-def _primitive(solid: Any, rotation: Matrix, centre: Vector, grow: float, inflation: float) -> Primitive | None:
+def _primitive(core: Core, rotation: Matrix, centre: Vector, grow: float, inflation: float) -> Primitive | None:
     """Primitive of a ball, capsule, box or cylinder, or None if nothing is left of it."""
     z = rotation[:, 2]
-    if isinstance(solid, coal.Box):
-        half = np.array(solid.halfSide)
+    half = core.half_sides
+    if half is not None:
         half = half + grow * _slack(centre, float(np.linalg.norm(half))) + inflation
         spread = np.abs(rotation) @ half
-        return _bounded_primitive(
-            BOX,
-            {SHAPE_CENTRE: centre, BOX_AXES: rotation.T.ravel(), BOX_HALF_SIZES: half},
-            centre,
-            spread,
-            half.min(),
-        )
-    length = 0.0 if isinstance(solid, coal.Sphere) else float(solid.halfLength)
-    radius = float(solid.radius) + grow * _slack(centre, float(solid.radius) + length) + inflation
-    if isinstance(solid, coal.Sphere):
+        numbers = {SHAPE_CENTRE: centre, BOX_AXES: rotation.T.ravel(), BOX_HALF_SIZES: half}
+        return _bounded_primitive(BOX, numbers, centre, spread, half.min())
+    length, radius = core.half_length, core.radius if core.disc is None else core.disc
+    radius = radius + grow * _slack(centre, radius + length) + inflation
+    if len(core.corners) == 1:
         return _ball(centre, radius)
-    if isinstance(solid, coal.Capsule):
+    if core.disc is None:
         axis = 2.0 * length * z
         share = 1.0 / float(axis @ axis) if length > 1e-9 else 0.0
         spread = length * np.abs(z) + radius

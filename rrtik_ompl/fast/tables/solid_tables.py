@@ -17,6 +17,7 @@ import coal
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.collision.shape_table import core_of
 from rrtik_ompl.collision.solids import SameObject, is_mesh
 from rrtik_ompl.covers.cache import cached_convex_pieces
 from rrtik_ompl.fast.simd.processor import WIDTH
@@ -50,7 +51,6 @@ from rrtik_ompl.fast.tables.layout import (
 )
 from rrtik_ompl.fast.tables.memory import Table, record, table, whole_records
 
-BOX_CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 MAX_COMPARED_SIZE = 1e4  # [m]; what is larger or farther away is not compared
 SLACK_PER_METRE = 2e-6  # rounding of corners and of their heights in float32, relative to the coordinates
 
@@ -154,19 +154,14 @@ def _own_solid(solid: Any) -> ConvexSolid | None:
         if solid.getSweptSphereRadius() != 0.0:
             return None
         return ConvexSolid(np.zeros((1, 3)), disc=float(solid.d), axis=np.array(solid.n), kind=HALF_SPACE_SOLID)
-    if not isinstance(solid, (coal.Box, coal.Sphere, coal.Capsule, coal.Cylinder, coal.ConvexBase)):
-        return None
-    swept = float(solid.getSweptSphereRadius())
-    if isinstance(solid, coal.Box):
-        return ConvexSolid(BOX_CORNERS * np.array(solid.halfSide), radius=swept)
+    core = core_of(solid)
+    if core is not None:
+        radius = core.radius + float(solid.getSweptSphereRadius())
+        return ConvexSolid(core.corners, disc=core.disc or 0.0, radius=radius)
     if isinstance(solid, coal.ConvexBase):
-        return ConvexSolid(np.array(solid.points(), dtype=np.float64).reshape(-1, 3), radius=swept)
-    if isinstance(solid, coal.Sphere):
-        return ConvexSolid(np.zeros((1, 3)), radius=float(solid.radius) + swept)
-    ends = np.array([[0.0, 0.0, float(solid.halfLength)], [0.0, 0.0, -float(solid.halfLength)]])
-    if isinstance(solid, coal.Capsule):
-        return ConvexSolid(ends, radius=float(solid.radius) + swept)
-    return ConvexSolid(ends, disc=float(solid.radius), radius=swept)
+        points = np.array(solid.points(), dtype=np.float64).reshape(-1, 3)
+        return ConvexSolid(points, radius=float(solid.getSweptSphereRadius()))
+    return None
 
 
 def solid_table(bodies: Sequence[tuple[int, Sequence[Solids]]]) -> Table:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix, frozen
-from rrtik_ompl.shapes.surfaces import Faces, capsule
+from rrtik_ompl.shapes.surfaces import Faces, round_ended
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.meshes import look_of_triangles
 from rrtik_ompl.viewer.drawing.triangles import tube
@@ -71,7 +71,7 @@ def tubes(name: str, color: str, lines: Iterable[ArrayLike], radius: float, **op
 
 def balls(name: str, color: str, centres: ArrayLike, radius: float, **options: Unpack[MarkOptions]) -> Mark:
     """Balls of one radius [m] at points, shape (k, 3)."""
-    vertices, faces = capsule(radius, 0.0, BALL_SEGMENTS)
+    vertices, faces = round_ended(radius, 0.0, BALL_SEGMENTS)
     points = np.asarray(centres, dtype=np.float64)
     return _joined(name, color, ((vertices + point, faces) for point in points), options)
 
