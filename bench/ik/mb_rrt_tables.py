@@ -1,4 +1,4 @@
-"""Tables 6 to 11 of the MB-RRT paper, printed beside what these searches measure, and why they differ where they do."""
+"""Tables 6 to 11 of the source [3], printed beside what these searches measure, and why they differ where they do."""
 
 from __future__ import annotations
 

@@ -24,8 +24,19 @@ from rrtik_ompl.world import ACCURACIES
 LIBRARY = Path(rrtik_ompl.__file__).parent
 # These ask for a planner by its name, as a user does: generated problems and the pilot's tool are made with certain
 # ones. Replanners and methods of shortening have names of their own, some of them the same.
-BY_NAME = ("ompl_bridge/ompl_planners.py", "generated_problems/", "pilot/", "reproduce/", "replanning/", "shortening/")
-BY_NAME += ("cli/replan.py", "cli/plan.py", "choices.py", "problem_files/run.py", "replanning/scenario.py")
+BY_NAME: tuple[str, ...] = (
+    "ompl_bridge/ompl_planners.py",
+    "generated_problems/",
+    "pilot/",
+    "reproduce/",
+    "replanning/",
+    "shortening/",
+    "cli/replan.py",
+    "cli/plan.py",
+    "choices.py",
+    "problem_files/run.py",
+    "replanning/scenario.py",
+)
 
 
 class Foreign(SafePlanner):

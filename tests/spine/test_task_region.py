@@ -183,7 +183,7 @@ BAD = {
     "upside down": (lambda: TaskRegion(AT, [*FIXED[:4].tolist(), [0.3, 0.1], [0, 0]]), "pitch goes from 0.3 up to 0.1"),
     "a frame that scales": (lambda: TaskRegion(2.0 * np.eye(4), FIXED), "T_world_w"),
     "a tip that mirrors": (lambda: TaskRegion(AT, FIXED, np.diag([1.0, 1, -1, 1])), "T_w_tip.*orthonormal"),
-    "no tolerance": (lambda: TaskRegion(AT, FIXED, position_tolerance=0.0), "position_tolerance must be greater"),
+    "no tolerance": (lambda: TaskRegion(AT, FIXED, position_tolerance=0.0), "position_tolerance: must be greater"),
     "a long axis": (lambda: TaskRegion.about_axis(AT, [0, 2, 0]), "axis must have length 1, but has 2"),
     "an axis of nothing": (lambda: TaskRegion.about_axis(AT, [0, 0, 0]), "axis must have length 1"),
     "a slide upside down": (
