@@ -7,10 +7,12 @@ and :func:`kinds_known` says so.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from rrtik_ompl.fast.simd.access import float_reader, vector_reader
 from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import (
     absolute,
@@ -29,24 +31,13 @@ from rrtik_ompl.fast.simd.lanes import (
 )
 from rrtik_ompl.fast.tables import layout
 from rrtik_ompl.fast.tables.accessors import (
-    ball_radius_of,
+    Vector,
     boxes_of,
-    capsule_axis_of,
-    capsule_radius_of,
-    centre_of,
-    cylinder_axis_of,
-    cylinder_radius_of,
     end_plane_of,
-    first_axis_of,
     first_plane_of,
-    half_length_of,
-    half_sizes_of,
-    half_space_normal_of,
-    half_space_offset_of,
     head_at,
     head_of,
     heads_of,
-    inverse_square_of,
     kind_of,
     normal_of,
     offset_of,
@@ -54,13 +45,10 @@ from rrtik_ompl.fast.tables.accessors import (
     plane_at,
     planes_of,
     primitive_count_of,
-    second_axis_of,
     shape_at,
     shape_of,
     shapes_of,
-    share_of,
     standing_body_of,
-    third_axis_of,
 )
 from rrtik_ompl.fast.tables.layout import (
     KIND_COUNT,
@@ -73,6 +61,23 @@ from rrtik_ompl.fast.tables.layout import (
     PrimitiveShape,
     PrimitiveTable,
 )
+
+# Numbers of the shapes of primitives
+centre_of: Callable[[PrimitiveShape], Vector] = vector_reader(layout.SHAPE_CENTRE)
+ball_radius_of: Callable[[PrimitiveShape], float] = float_reader(layout.BALL_RADIUS)
+capsule_axis_of: Callable[[PrimitiveShape], Vector] = vector_reader(layout.CAPSULE_AXIS)
+inverse_square_of: Callable[[PrimitiveShape], float] = float_reader(layout.CAPSULE_INVERSE_SQUARE)
+capsule_radius_of: Callable[[PrimitiveShape], float] = float_reader(layout.CAPSULE_RADIUS)
+first_axis_of: Callable[[PrimitiveShape], Vector] = vector_reader(layout.BOX_AXES)
+second_axis_of: Callable[[PrimitiveShape], Vector] = vector_reader(layout.BOX_AXES + 3)
+third_axis_of: Callable[[PrimitiveShape], Vector] = vector_reader(layout.BOX_AXES + 6)
+half_sizes_of: Callable[[PrimitiveShape], Vector] = vector_reader(layout.BOX_HALF_SIZES)
+cylinder_axis_of: Callable[[PrimitiveShape], Vector] = vector_reader(layout.CYLINDER_AXIS)
+half_length_of: Callable[[PrimitiveShape], float] = float_reader(layout.CYLINDER_HALF_LENGTH)
+cylinder_radius_of: Callable[[PrimitiveShape], float] = float_reader(layout.CYLINDER_RADIUS)
+half_space_normal_of: Callable[[PrimitiveShape], Vector] = vector_reader(layout.HALF_SPACE_NORMAL)
+half_space_offset_of: Callable[[PrimitiveShape], float] = float_reader(layout.HALF_SPACE_OFFSET)
+share_of: Callable[[PrimitiveShape], float] = float_reader(layout.CONVEX_SHARE)
 
 ALL_LANES = (1 << WIDTH) - 1
 ZERO, ONE = np.float32(0.0), np.float32(1.0)

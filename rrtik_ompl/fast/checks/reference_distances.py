@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.fast.checks.reference import CHUNK, PrimitiveView, frames, heads, placed_balls, refuse_kind
+from rrtik_ompl.fast.checks.reference import CHUNK, frames, heads, placed_balls, primitive_gap
 from rrtik_ompl.fast.tables import layout
 from rrtik_ompl.fast.tables.memory import Table
 
@@ -42,33 +42,3 @@ def _all_gaps(poses: NDArray[np.float64], balls: Table, primitives: Table) -> tu
         gaps.append((apart - radii[i][:, None] - radii[j]).min(axis=(1, 2)))
         numbers.append(body_count * standing + k)
     return np.reshape(gaps, (-1, len(poses))).T, np.array(numbers, dtype=np.int32)
-
-
-def primitive_gap(primitives: Table, number: int, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Signed distance of points, shape (..., 3), from a primitive, negative inside. Shape (...).
-
-    Raises:
-        InputError: If it is of an unknown kind.
-    """
-    own = PrimitiveView(primitives, number)
-    if own.kind == layout.HALF_SPACE:
-        return own.half_space_gap(points)
-    if own.kind == layout.CONVEX:
-        height = own.heights(points)
-        return np.asarray(height if own.number(layout.CONVEX_SHARE) else np.where(height < 0.0, height, np.inf))
-    away = points - own.vector(layout.SHAPE_CENTRE)
-    if own.kind == layout.BALL:
-        return np.asarray(np.linalg.norm(away, axis=-1) - own.number(layout.BALL_RADIUS))
-    if own.kind == layout.BOX:
-        return _outside(own.beyond_faces(away))
-    if own.kind == layout.CAPSULE:
-        return np.asarray(own.to_capsule(away) - own.number(layout.CAPSULE_RADIUS))
-    if own.kind == layout.CYLINDER:
-        return _outside(np.stack(own.beyond_ends(away), axis=-1))
-    refuse_kind(own.kind)
-
-
-def _outside(beyond: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Signed distance from a set that is given by how far a point lies beyond each of its orthogonal faces."""
-    inside = np.minimum(beyond.max(axis=-1), 0.0)
-    return np.asarray(np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + inside)

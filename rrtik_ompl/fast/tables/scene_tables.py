@@ -121,8 +121,13 @@ def _primitive(core: Core, rotation: Matrix, centre: Vector, grow: float, inflat
     if half is not None:
         half = half + grow * _slack(centre, float(np.linalg.norm(half))) + inflation
         spread = np.abs(rotation) @ half
-        numbers = {SHAPE_CENTRE: centre, BOX_AXES: rotation.T.ravel(), BOX_HALF_SIZES: half}
-        return _bounded_primitive(BOX, numbers, centre, spread, half.min())
+        return _bounded_primitive(
+            BOX,
+            {SHAPE_CENTRE: centre, BOX_AXES: rotation.T.ravel(), BOX_HALF_SIZES: half},
+            centre,
+            spread,
+            half.min(),
+        )
     length, radius = core.half_length, core.radius if core.disc is None else core.disc
     radius = radius + grow * _slack(centre, radius + length) + inflation
     if len(core.corners) == 1:

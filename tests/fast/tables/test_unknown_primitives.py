@@ -9,7 +9,7 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.collision.bodies import scene_bodies
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast import FastWorld
-from rrtik_ompl.fast.checks import reference, reference_distances
+from rrtik_ompl.fast.checks import reference
 from rrtik_ompl.fast.tables import layout
 from rrtik_ompl.fast.tables.primitive_tables import primitive_table
 from rrtik_ompl.fast.tables.scene_tables import outer_primitives
@@ -59,7 +59,7 @@ def test_until_python_hears_of_it_the_primitive_is_in_the_way_everywhere():
     assert found[0] == layout.UNDECIDED
 
 
-@pytest.mark.parametrize("twin", [reference.meets_primitive, reference_distances.primitive_gap])
+@pytest.mark.parametrize("twin", [reference.meets_primitive, reference.primitive_gap])
 def test_each_twin_refuses_it(twin):
     given = (np.zeros((1, 3)), np.ones(1)) if twin is reference.meets_primitive else (np.zeros((1, 3)),)
     with pytest.raises(InputError, match=f"unknown kind {UNKNOWN}"):
