@@ -9,7 +9,7 @@ from rrtik_ompl.fast.simd.compiled import WIDTH, kernel
 from rrtik_ompl.fast.simd.lanes import set_wide_lanes, wide_lanes_at
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.simd.wide_angles import arc_sine, arc_tangent, opposite, wide_sine_and_cosine, within_half_turn
-from rrtik_ompl.fast.tables.robot_tables import aligned
+from rrtik_ompl.fast.tables.memory import aligned
 from rrtik_ompl.ik.analytic import kernel_branches as module
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
 from rrtik_ompl.ik.analytic.closed_form import form_of, solutions

@@ -11,7 +11,7 @@ from rrtik_ompl.fast.search.tree_memory import grow, tree_table
 from rrtik_ompl.fast.simd.compiled import WIDTH, entry
 from rrtik_ompl.fast.simd.halton import inverse_bases
 from rrtik_ompl.fast.simd.random_kernels import next_point, next_share, start_points
-from rrtik_ompl.fast.tables.robot_tables import table
+from rrtik_ompl.fast.tables.memory import table
 
 
 @entry

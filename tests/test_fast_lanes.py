@@ -5,10 +5,11 @@ import operator
 import numpy as np
 import pytest
 
-from rrtik_ompl.fast.checks.check_kernels import ALL_LANES, sine_and_cosine
+from rrtik_ompl.fast.checks.kinematics import sine_and_cosine
+from rrtik_ompl.fast.checks.obstacle_kernels import ALL_LANES
 from rrtik_ompl.fast.simd import lanes
 from rrtik_ompl.fast.simd.compiled import WIDTH, kernel
-from rrtik_ompl.fast.tables.robot_tables import aligned
+from rrtik_ompl.fast.tables.memory import aligned
 
 UNITS = np.finfo(np.float32).eps
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, frozen
-from rrtik_ompl.fast.ik import ik_layout as layout
-from rrtik_ompl.fast.tables.robot_tables import Table, table
+from rrtik_ompl.fast.ik import ik_layout
+from rrtik_ompl.fast.tables.memory import Table, table
 from rrtik_ompl.ik.numeric.reference_descent import (
     DAMPING,
     DAMPING_SHARE,
@@ -52,19 +52,19 @@ def limb_of(robot: Robot) -> Table | None:
     numbers = [1.0 / reach_of(robot), PER_CHORD, DAMPING, DAMPING_SHARE, SHARE_GROWTH, LARGEST_STEP, STALLED]
     return table(
         {
-            layout.JOINTS: len(columns),
-            layout.DOF: robot.dof,
-            layout.FIXED: pose_numbers(tip.fixed),
-            layout.SLIDING: tip.prismatic.astype(np.int32),
-            layout.COLUMN: columns.astype(np.int32),
-            layout.GAIN: tip.gain[np.arange(len(columns)), columns],
-            layout.OFFSET: tip.offset,
-            layout.LOWER: np.asarray(robot.lower),
-            layout.UPPER: np.asarray(robot.upper),
-            layout.SEED_COUNT: 0,
-            layout.SEEDS: 0,
-            layout.SEED_TIPS: 0,
-            layout.NUMBERS: np.array(numbers),
+            ik_layout.JOINTS: len(columns),
+            ik_layout.DOF: robot.dof,
+            ik_layout.FIXED: pose_numbers(tip.fixed),
+            ik_layout.SLIDING: tip.prismatic.astype(np.int32),
+            ik_layout.COLUMN: columns.astype(np.int32),
+            ik_layout.GAIN: tip.gain[np.arange(len(columns)), columns],
+            ik_layout.OFFSET: tip.offset,
+            ik_layout.LOWER: np.asarray(robot.lower),
+            ik_layout.UPPER: np.asarray(robot.upper),
+            ik_layout.SEED_COUNT: 0,
+            ik_layout.SEEDS: 0,
+            ik_layout.SEED_TIPS: 0,
+            ik_layout.NUMBERS: np.array(numbers),
         }
     )
 
@@ -76,7 +76,11 @@ def seeded_limb_of(robot: Robot) -> Table | None:
     if bare is None:
         return None
     fields: dict[int, Any] = {place: bare.arrays.get(place, int(number)) for place, number in enumerate(bare.header)}
-    fields |= {layout.SEED_COUNT: len(seeds.q), layout.SEEDS: seeds.q, layout.SEED_TIPS: pose_numbers(seeds.tips)}
+    fields |= {
+        ik_layout.SEED_COUNT: len(seeds.q),
+        ik_layout.SEEDS: seeds.q,
+        ik_layout.SEED_TIPS: pose_numbers(seeds.tips),
+    }
     return table(fields)
 
 

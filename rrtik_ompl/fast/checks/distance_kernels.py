@@ -1,7 +1,7 @@
 """Kernels that bound the distance between the arm and what it must not touch, ``WIDTH`` configurations at a time.
 
 The distance between two sets of solids is at least that between sets that contain them and at most that between sets
-inside them, so the tables of :mod:`rrtik_ompl.fast.checks.sphere_kernels` serve here too. Groups, neighbourhoods and
+inside them, so the tables of :mod:`rrtik_ompl.fast.checks.sphere_kernels` serve here too. Groups, clusters and
 primitives that cannot come nearer than the nearest pair found so far are passed over in all lanes together.
 """
 
@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from rrtik_ompl.fast.checks.check_kernels import forward_kinematics, load_row
+from rrtik_ompl.fast.checks.check_kernels import load_row, sound_count
+from rrtik_ompl.fast.checks.kinematics import forward_kinematics
 from rrtik_ompl.fast.checks.obstacle_kernels import (
     UNBOUNDED_DISTANCE,
     ZERO,
@@ -17,11 +18,10 @@ from rrtik_ompl.fast.checks.obstacle_kernels import (
     primitives_in_reach,
     squared,
 )
-from rrtik_ompl.fast.checks.sphere_kernels import FRAME_BYTES, place_cluster, placed, prepare, stored
+from rrtik_ompl.fast.checks.sphere_kernels import place_cluster, placed_centre, prepare
 from rrtik_ompl.fast.simd.compiled import WIDTH, entry, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import (
     bits,
-    field,
     first_bit,
     float_at,
     highest,
@@ -36,70 +36,126 @@ from rrtik_ompl.fast.simd.lanes import (
     spread,
     square_root,
 )
-from rrtik_ompl.fast.tables import layout
-from rrtik_ompl.fast.tables.layout import ARM, BEST, CENTRES, FOUND, FRAMES, GAPS, GROUP_CENTRES, SCRATCH, WHICH
+from rrtik_ompl.fast.tables.accessors import (
+    arm_of,
+    balls_of,
+    best_of,
+    body_balls_of,
+    body_count_of,
+    body_of,
+    body_of_cluster,
+    centres_of,
+    checked_of,
+    cluster_balls_of,
+    cluster_of,
+    end_ball_of,
+    end_cluster_of_body,
+    end_cluster_of_group,
+    end_pair_of,
+    first_ball_of,
+    first_cluster_of_body,
+    first_cluster_of_group,
+    first_pair_of,
+    found_of,
+    frame_at,
+    frame_of_body,
+    frame_of_cluster,
+    frames_of,
+    gaps_of,
+    group_balls_of,
+    group_centres_of,
+    group_count_of,
+    group_of,
+    head_of,
+    one_body_of,
+    one_group_of,
+    other_body_of,
+    other_group_of,
+    pair_group_count_of,
+    pair_group_of,
+    pair_of,
+    radius_at,
+    scratch_of,
+    standing_body_of,
+    standing_count_of,
+    stored_centre,
+    which_of,
+)
+from rrtik_ompl.fast.tables.layout import (
+    BallTable,
+    DoubleArray,
+    IntArray,
+    JointValues,
+    PrimitiveTable,
+    ProbeTable,
+    ScratchTable,
+    WorldTable,
+)
 
 
 @inlined
-def could_be_nearer(probe: int, gap: Any) -> bool:
+def could_be_nearer(probe: ProbeTable, gap: Any) -> bool:
     """Whether in any lane a distance is below the smallest one so far."""
-    nearer: bool = bits(gap < lanes_at(field(probe, BEST), 0)) != 0
+    nearer: bool = bits(gap < lanes_at(best_of(probe), 0)) != 0
     return nearer
 
 
 @kernel
-def note(probe: int, gap: Any, pair: int) -> None:
+def note(probe: ProbeTable, gap: Any, pair: int) -> None:
     """Keep the distance of a pair in the lanes in which it is the smallest one so far."""
-    best = lanes_at(field(probe, BEST), 0)
+    best = lanes_at(best_of(probe), 0)
     nearer = bits(gap < best)
     if nearer != 0:
-        set_lanes(field(probe, BEST), 0, smaller(gap, best))
+        set_lanes(best_of(probe), 0, smaller(gap, best))
     while nearer != 0:
-        set_int(field(probe, WHICH), first_bit(nearer), pair)
+        set_int(which_of(probe), first_bit(nearer), pair)
         nearer &= nearer - 1
 
 
 @kernel
-def cluster_to_primitive(balls: int, primitives: int, scratch: int, probe: int, cluster: int, number: int) -> None:
+def cluster_to_primitive(
+    balls: BallTable, primitives: PrimitiveTable, scratch: ScratchTable, probe: ProbeTable, place: int, number: int
+) -> None:
     """Measure the balls of a cluster against a primitive."""
-    numbers = field(balls, layout.CLUSTERS) + 16 * cluster
-    body, frame = int_at(numbers, 0), field(scratch, FRAMES) + FRAME_BYTES * int_at(numbers, 1)
-    pair = body * field(primitives, layout.STANDING_COUNT) + int_at(field(primitives, layout.NUMBERS), 4 * number + 1)
-    if int_at(field(primitives, layout.CHECKED), pair) == 0:
+    cluster = cluster_of(balls, place)
+    frame = frame_at(frames_of(scratch), frame_of_cluster(cluster))
+    pair = body_of_cluster(cluster) * standing_count_of(primitives) + standing_body_of(head_of(primitives, number))
+    if int_at(checked_of(primitives), pair) == 0:
         return
-    around = field(balls, layout.CLUSTER_BALLS)
-    x, y, z = placed(frame, around, cluster)
-    if not could_be_nearer(probe, primitive_gap(primitives, number, x, y, z, True) - float_at(around, 4 * cluster + 3)):
+    around = cluster_balls_of(balls)
+    x, y, z = placed_centre(frame, around, place)
+    if not could_be_nearer(probe, primitive_gap(primitives, number, x, y, z, True) - radius_at(around, place)):
         return
-    place_cluster(balls, scratch, cluster)
-    for ball in range(int_at(numbers, 2), int_at(numbers, 3)):
-        x, y, z = stored(field(scratch, CENTRES), ball)
-        note(
-            probe,
-            primitive_gap(primitives, number, x, y, z, False) - float_at(field(balls, layout.BALLS), 4 * ball + 3),
-            pair,
-        )
+    place_cluster(balls, scratch, place)
+    for ball in range(first_ball_of(cluster), end_ball_of(cluster)):
+        x, y, z = stored_centre(centres_of(scratch), ball)
+        gap = primitive_gap(primitives, number, x, y, z, False) - radius_at(balls_of(balls), ball)
+        note(probe, gap, pair)
 
 
 @kernel
-def group_to_primitive(balls: int, primitives: int, scratch: int, probe: int, group: int, number: int) -> None:
+def group_to_primitive(
+    balls: BallTable, primitives: PrimitiveTable, scratch: ScratchTable, probe: ProbeTable, place: int, number: int
+) -> None:
     """Measure the clusters of a group against a primitive."""
-    groups = field(balls, layout.GROUPS)
-    for cluster in range(int_at(groups, 3 * group + 1), int_at(groups, 3 * group + 2)):
+    group = group_of(balls, place)
+    for cluster in range(first_cluster_of_group(group), end_cluster_of_group(group)):
         cluster_to_primitive(balls, primitives, scratch, probe, cluster, number)
 
 
 @kernel
-def primitives_near_group(balls: int, primitives: int, scratch: int, probe: int, group: int) -> Any:
+def primitives_near_group(
+    balls: BallTable, primitives: PrimitiveTable, scratch: ScratchTable, probe: ProbeTable, group: int
+) -> Any:
     """List the primitives that could be nearer to a group than the best so far, and their distances from its ball.
 
     Returns:
         Their number, and the place in the list of the one that is nearest in any lane.
     """
-    x, y, z = stored(field(scratch, GROUP_CENTRES), group)
-    radius = float_at(field(balls, layout.GROUP_BALLS), 4 * group + 3)
-    found, gaps = field(scratch, FOUND), field(probe, GAPS)
-    reach = radius + max(highest(lanes_at(field(probe, BEST), 0)), ZERO)
+    x, y, z = stored_centre(group_centres_of(scratch), group)
+    radius = radius_at(group_balls_of(balls), group)
+    found, gaps = found_of(scratch), gaps_of(probe)
+    reach = radius + max(highest(lanes_at(best_of(probe), 0)), ZERO)
     kept, first, nearest = 0, 0, UNBOUNDED_DISTANCE
     for k in range(primitives_in_reach(primitives, x, y, z, reach, found)):
         gap = primitive_gap(primitives, int_at(found, k), x, y, z, True) - radius
@@ -113,10 +169,10 @@ def primitives_near_group(balls: int, primitives: int, scratch: int, probe: int,
 
 
 @kernel
-def measure_scene(balls: int, primitives: int, scratch: int, probe: int) -> None:
+def measure_scene(balls: BallTable, primitives: PrimitiveTable, scratch: ScratchTable, probe: ProbeTable) -> None:
     """Measure the arm against the primitives; the most promising one of a group first, so that it rules out others."""
-    found, gaps = field(scratch, FOUND), field(probe, GAPS)
-    for group in range(field(balls, layout.GROUP_COUNT)):
+    found, gaps = found_of(scratch), gaps_of(probe)
+    for group in range(group_count_of(balls)):
         kept, first = primitives_near_group(balls, primitives, scratch, probe, group)
         if kept > 0:
             group_to_primitive(balls, primitives, scratch, probe, group, int_at(found, first))
@@ -126,87 +182,97 @@ def measure_scene(balls: int, primitives: int, scratch: int, probe: int) -> None
 
 
 @inlined
-def within_best(probe: int, x: Any, y: Any, z: Any, centre: Any, reach: float) -> bool:
+def within_best(probe: ProbeTable, x: Any, y: Any, z: Any, centre: Any, reach: float) -> bool:
     """Whether in any lane two balls, whose radii add up to ``reach``, are nearer to each other than the best so far."""
-    most = larger(lanes_at(field(probe, BEST), 0) + reach, ZERO)
+    most = larger(lanes_at(best_of(probe), 0) + reach, ZERO)
     nearer: bool = bits(squared(x - centre[0], y - centre[1], z - centre[2]) < most * most) != 0
     return nearer
 
 
 @kernel
-def measure_clusters(balls: int, scratch: int, probe: int, first: int, second: int, pair: int) -> None:
+def measure_clusters(
+    balls: BallTable, scratch: ScratchTable, probe: ProbeTable, first: int, second: int, pair: int
+) -> None:
     """Measure the balls of one cluster against those of another."""
     place_cluster(balls, scratch, first)
     place_cluster(balls, scratch, second)
-    centres, all_balls = field(scratch, CENTRES), field(balls, layout.BALLS)
-    mine, others = field(balls, layout.CLUSTERS) + 16 * first, field(balls, layout.CLUSTERS) + 16 * second
-    for ball in range(int_at(mine, 2), int_at(mine, 3)):
-        x, y, z = stored(centres, ball)
-        for other in range(int_at(others, 2), int_at(others, 3)):
-            reach = float_at(all_balls, 4 * ball + 3) + float_at(all_balls, 4 * other + 3)
-            centre = stored(centres, other)
+    centres, all_balls = centres_of(scratch), balls_of(balls)
+    mine, others = cluster_of(balls, first), cluster_of(balls, second)
+    for ball in range(first_ball_of(mine), end_ball_of(mine)):
+        x, y, z = stored_centre(centres, ball)
+        for other in range(first_ball_of(others), end_ball_of(others)):
+            reach = radius_at(all_balls, ball) + radius_at(all_balls, other)
+            centre = stored_centre(centres, other)
             if within_best(probe, x, y, z, centre, reach):
                 apart = square_root(squared(x - centre[0], y - centre[1], z - centre[2]))
                 note(probe, apart - reach, pair)
 
 
 @kernel
-def measure_bodies(balls: int, scratch: int, probe: int, first: int, second: int, pair: int) -> None:
+def measure_bodies(
+    balls: BallTable, scratch: ScratchTable, probe: ProbeTable, first: int, second: int, pair: int
+) -> None:
     """Measure two bodies of the arm against each other."""
-    frames, bodies = field(scratch, FRAMES), field(balls, layout.BODIES)
-    around, hulls = field(balls, layout.CLUSTER_BALLS), field(balls, layout.BODY_BALLS)
-    first_frame = frames + FRAME_BYTES * int_at(bodies, 3 * first)
-    second_frame = frames + FRAME_BYTES * int_at(bodies, 3 * second)
-    hull, radius = placed(second_frame, hulls, second), float_at(hulls, 4 * second + 3)
-    for mine in range(int_at(bodies, 3 * first + 1), int_at(bodies, 3 * first + 2)):
-        x, y, z = placed(first_frame, around, mine)
-        extent = float_at(around, 4 * mine + 3)
+    frames, one, two = frames_of(scratch), body_of(balls, first), body_of(balls, second)
+    around, hulls = cluster_balls_of(balls), body_balls_of(balls)
+    first_frame, second_frame = frame_at(frames, frame_of_body(one)), frame_at(frames, frame_of_body(two))
+    hull, radius = placed_centre(second_frame, hulls, second), radius_at(hulls, second)
+    for mine in range(first_cluster_of_body(one), end_cluster_of_body(one)):
+        x, y, z = placed_centre(first_frame, around, mine)
+        extent = radius_at(around, mine)
         if not within_best(probe, x, y, z, hull, extent + radius):
             continue
-        for other in range(int_at(bodies, 3 * second + 1), int_at(bodies, 3 * second + 2)):
-            reach = extent + float_at(around, 4 * other + 3)
-            if within_best(probe, x, y, z, placed(second_frame, around, other), reach):
+        for other in range(first_cluster_of_body(two), end_cluster_of_body(two)):
+            reach = extent + radius_at(around, other)
+            if within_best(probe, x, y, z, placed_centre(second_frame, around, other), reach):
                 measure_clusters(balls, scratch, probe, mine, other, pair)
 
 
 @kernel
-def measure_self(balls: int, scratch: int, probe: int, start: int) -> None:
+def measure_self(balls: BallTable, scratch: ScratchTable, probe: ProbeTable, start: int) -> None:
     """Measure the arm against itself; the pairs are numbered from ``start``."""
-    groups, pairs = field(balls, layout.PAIR_GROUPS), field(balls, layout.PAIRS)
-    around, centres = field(balls, layout.GROUP_BALLS), field(scratch, GROUP_CENTRES)
-    for k in range(field(balls, layout.PAIR_GROUP_COUNT)):
-        first, second = int_at(groups, 4 * k), int_at(groups, 4 * k + 1)
-        x, y, z = stored(centres, first)
-        reach = float_at(around, 4 * first + 3) + float_at(around, 4 * second + 3)
-        if within_best(probe, x, y, z, stored(centres, second), reach):
-            for pair in range(int_at(groups, 4 * k + 2), int_at(groups, 4 * k + 3)):
-                measure_bodies(
-                    balls, scratch, probe, int_at(pairs, 2 * pair), int_at(pairs, 2 * pair + 1), start + pair
-                )
+    around, centres = group_balls_of(balls), group_centres_of(scratch)
+    for k in range(pair_group_count_of(balls)):
+        group = pair_group_of(balls, k)
+        first, second = one_group_of(group), other_group_of(group)
+        x, y, z = stored_centre(centres, first)
+        reach = radius_at(around, first) + radius_at(around, second)
+        if within_best(probe, x, y, z, stored_centre(centres, second), reach):
+            for number in range(first_pair_of(group), end_pair_of(group)):
+                pair = pair_of(balls, number)
+                measure_bodies(balls, scratch, probe, one_body_of(pair), other_body_of(pair), start + number)
 
 
 @entry
 def measure(
-    world: int, balls: int, primitives: int, values: int, count: int, probe: int, distances: int, pairs: int
+    world: WorldTable,
+    balls: BallTable,
+    primitives: PrimitiveTable,
+    values: JointValues,
+    count: int,
+    probe: ProbeTable,
+    distances: DoubleArray,
+    pairs: IntArray,
 ) -> int:
     """Distances (float64) and numbers of the nearest pairs (int32) for ``count`` rows of joint values (float64).
 
-    Pairs of moving and standing bodies come first, then those of moving bodies; -1 where there is none.
+    Pairs of moving and standing bodies come first, then those of moving bodies; -1 where there is none. Returns
+    ``count``, or UNSOUND.
     """
-    scratch = field(world, SCRATCH)
-    crossing = field(balls, layout.BODY_COUNT) * field(primitives, layout.STANDING_COUNT)
-    best, which = field(probe, BEST), field(probe, WHICH)
+    scratch = scratch_of(world)
+    crossing = body_count_of(balls) * standing_count_of(primitives)
+    best, which = best_of(probe), which_of(probe)
     for start in range(0, count, WIDTH):
         filled = min(WIDTH, count - start)
         for lane in range(WIDTH):
             load_row(world, values, start + min(lane, filled - 1), lane)
             set_int(which, lane, -1)
         set_lanes(best, 0, spread(UNBOUNDED_DISTANCE))
-        forward_kinematics(field(world, ARM), scratch)
+        forward_kinematics(arm_of(world), scratch)
         prepare(balls, scratch)
         measure_self(balls, scratch, probe, crossing)
         measure_scene(balls, primitives, scratch, probe)
         for lane in range(filled):
             set_double(distances, start + lane, float_at(best, lane))
             set_int(pairs, start + lane, int_at(which, lane))
-    return count
+    return sound_count(world, count)

@@ -1,25 +1,27 @@
 """Batched collision checks on plain tables, many configurations at a time, with three answers.
 
 ``FREE``: spheres that contain the moving bodies, or convex solids that do, are clear of all they are checked against.
-``COLLIDING``: spheres inside them hit, or solids do. ``UNDECIDED``: neither; only an exact check can tell. Rounding is
+``COLLIDING``: spheres inside them hit, or solids do. ``UNDECIDED``: neither; only an exact check decides. Rounding is
 covered by a margin, so the first two answers are certain.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
+from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.checks import reference_distances
 from rrtik_ompl.fast.checks.clearance import Clearance, rounded
+from rrtik_ompl.fast.checks.inputs import LARGEST_ANGLE, STROKE, joint_limits, step_counts
 from rrtik_ompl.fast.checks.reference import ReferenceChecks
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.tables.layout import INNER_LAST, MARKS, OUTER_PRIMITIVES, STANDING_SOLIDS, UNDECIDED
+from rrtik_ompl.fast.tables.memory import Table, table
 from rrtik_ompl.fast.tables.packing import (
     ArmTables,
     PlacedPrimitives,
@@ -30,15 +32,12 @@ from rrtik_ompl.fast.tables.packing import (
     standing_solids,
     standing_tables,
 )
-from rrtik_ompl.fast.tables.robot_tables import Spheres, Table, table
-from rrtik_ompl.fast.tables.scene_tables import primitive_table
+from rrtik_ompl.fast.tables.primitive_tables import primitive_table
+from rrtik_ompl.fast.tables.robot_tables import Spheres
 from rrtik_ompl.fast.tables.scratch import probe_table, scratch_table
 from rrtik_ompl.fast.tables.solid_tables import NO_SOLIDS, Solids
 from rrtik_ompl.robot import Chain
 
-LARGEST_ANGLE = 1e8  # [rad]; float64 cannot hold larger ones to the precision of the margin
-STROKE = 4.0  # [m] a sliding joint may go this far from its zero unless told otherwise
-MOST_STEPS = 2**30
 MARKED_ROWS = 8  # at a time; every width has that many lanes
 
 
@@ -61,7 +60,7 @@ class FastWorld:
         outer: For each body spheres (x, y, z, r) in its own frame whose union contains it, shape (n, 4); none stand
             for the bounding ball.
         inner: For each body spheres inside it, shape (n, 4), possibly none.
-        solids: For each body convex solids around and inside it; None leaves what spheres cannot tell undecided.
+        solids: For each body convex solids around and inside it; None leaves undecided what spheres do not decide.
         strokes: Largest value of sliding joints [m], a number or shape (joints,).
         like: A world of the same arm in another scene: what has not changed is not packed again.
         compiled: Whether to use the kernels; False for plain numpy.
@@ -73,7 +72,7 @@ class FastWorld:
     def __init__(
         self,
         chain: Chain,
-        bodies: Sequence[Any],
+        bodies: Sequence[Body],
         pairs: Sequence[tuple[int, int]],
         *,
         outer: Sequence[Spheres],
@@ -84,7 +83,7 @@ class FastWorld:
         compiled: bool = True,
     ) -> None:
         self._joints = len(chain.parent)
-        self._limits = _limits(chain, strokes)
+        self._limits = joint_limits(chain, strokes)
         self._smallest_limit = float(self._limits.min(initial=LARGEST_ANGLE))
         kept = [(i, j) for i, j in pairs if bodies[i].joint > 0 or bodies[j].joint > 0]
         concerned = sorted({k for pair in kept for k in pair})
@@ -111,7 +110,7 @@ class FastWorld:
             self.address = self._world.address
             self._marks = self._scratch[MARKS]
 
-    def update_obstacles(self, bodies: Sequence[Any], inflation: Sequence[float]) -> None:
+    def update_obstacles(self, bodies: Sequence[Body], inflation: Sequence[float]) -> None:
         """Put what stands still elsewhere, in place: the arm, the pairs and addresses stay as they are.
 
         From then on no contact with them is proven, only freedom from it.
@@ -136,6 +135,13 @@ class FastWorld:
                 self._world.header[STANDING_SOLIDS] = self._solids.address
             self._scratch[INNER_LAST][:] = -1  # what met last is there no more
 
+    def intact(self) -> bool:
+        """Whether no kernel has written beyond its own memory; tests check it after each call."""
+        tables = [self._arm.arm, *self._arm.balls, *self._primitives, self._arm.solids]
+        if self._kernels is not None:
+            tables += [self._scratch, self._solids, self._world]
+        return all(each.intact() for each in tables) and (self._probe is None or self._probe.intact())
+
     @property
     def margin(self) -> float:
         """What is added to outer and taken from inner radii against rounding [m]."""
@@ -143,7 +149,7 @@ class FastWorld:
 
     @property
     def limits(self) -> Vector:
-        """Largest absolute value of each joint for which kernels can be asked directly [rad or m], shape (joints,)."""
+        """Largest absolute value of each joint that kernels can be given directly [rad or m], shape (joints,)."""
         return self._limits
 
     def classify(self, V: ArrayLike, *, narrow_phase: bool = True) -> NDArray[np.int8]:
@@ -161,7 +167,8 @@ class FastWorld:
             answers = self._reference.classify(rows, narrow_phase=narrow_phase)
         else:
             found = np.empty(len(rows), dtype=np.int32)
-            self._kernels.classify(self.address, rows.ctypes.data, len(rows), found.ctypes.data, narrow_phase)
+            places = (rows.ctypes.data, len(rows), found.ctypes.data)
+            _require_sound(self._kernels.classify(self.address, *places, narrow_phase))
             answers = found.astype(np.int8)
         return answers if beyond is None else np.where(beyond, np.int8(UNDECIDED), answers)
 
@@ -182,7 +189,7 @@ class FastWorld:
             InputError: If shapes do not fit, a value is not finite or a number of steps is not a positive integer.
         """
         (starts, first), (ends, second) = self._values(A, "starts"), self._values(B, "ends")
-        steps = _steps(counts, len(starts))
+        steps = step_counts(counts, len(starts))
         if len(starts) != len(ends):
             raise InputError(f"motions need as many starts as ends, got {len(starts)} and {len(ends)}")
         if self._kernels is None:
@@ -190,7 +197,8 @@ class FastWorld:
         else:
             found = np.empty(len(starts), dtype=np.int32)
             places = (starts.ctypes.data, ends.ctypes.data, steps.ctypes.data)
-            self._kernels.classify_edges(self.address, *places, len(starts), found.ctypes.data, narrow_phase)
+            sink = found.ctypes.data
+            _require_sound(self._kernels.classify_edges(self.address, *places, len(starts), sink, narrow_phase))
             answers = found.astype(np.int8)
         for beyond in (first, second):
             answers = answers if beyond is None else np.where(beyond, np.int8(UNDECIDED), answers)
@@ -209,7 +217,7 @@ class FastWorld:
 
         Args:
             V: Joint values [rad or m].
-            upper: Whether to look for an upper bound too, which takes as long again.
+            upper: Whether to find an upper bound too, which takes as long again.
 
         Raises:
             InputError: If V has the wrong shape or a value that is not finite.
@@ -233,7 +241,7 @@ class FastWorld:
             self._probe = probe_table(self._primitives)
         found, pairs = np.empty(len(rows)), np.empty(len(rows), dtype=np.int32)
         tables = (self.address, balls.address, scene.address, rows.ctypes.data, len(rows), self._probe.address)
-        kernels.measure(*tables, found.ctypes.data, pairs.ctypes.data)
+        _require_sound(kernels.measure(*tables, found.ctypes.data, pairs.ctypes.data))
         return np.where(pairs < 0, np.inf, found), pairs
 
     def undecided_pairs(self, V: ArrayLike) -> list[list[tuple[int, int]]]:
@@ -258,7 +266,7 @@ class FastWorld:
         """Flags of the pairs that are not proven free, shape (m, flags), for a few rows."""
         if self._kernels is None:
             return self._reference.marks(rows)
-        count = self._kernels.mark_pairs(self.address, rows.ctypes.data, len(rows))
+        count = _require_sound(self._kernels.mark_pairs(self.address, rows.ctypes.data, len(rows)))
         lanes = np.arange(len(rows), dtype=np.int32)[:, None]
         return np.asarray((self._marks[:count] >> lanes) & 1, dtype=bool)
 
@@ -275,17 +283,8 @@ class FastWorld:
         return (np.where(beyond[:, None], 0.0, rows), beyond) if beyond.any() else (rows, None)
 
 
-def _limits(chain: Chain, strokes: ArrayLike) -> Vector:
-    """Largest absolute value of each joint that the margin covers, shape (joints,)."""
-    given = np.asarray(strokes, dtype=np.float64)
-    if given.shape not in ((), chain.prismatic.shape) or not (np.isfinite(given) & (given >= 0.0)).all():
-        raise InputError(f"strokes: expected one number of metres or {len(chain.parent)}, none negative")
-    return np.where(chain.prismatic, given, LARGEST_ANGLE)
-
-
-def _steps(counts: ArrayLike, count: int) -> NDArray[np.int32]:
-    """Numbers of steps, checked."""
-    values = finite_array(counts, (count,), "steps of motions")
-    if len(values) and (values.min() < 1.0 or values.max() > MOST_STEPS or not np.array_equal(values, values.round())):
-        raise InputError(f"steps of motions: expected whole numbers from 1 to {MOST_STEPS}")
-    return values.astype(np.int32)
+def _require_sound(count: int) -> int:
+    """What a kernel returns, unless it has met a primitive of a kind that it does not know."""
+    if count < 0:
+        raise InputError("collision check: a primitive is of a kind that the kernels do not know")
+    return count

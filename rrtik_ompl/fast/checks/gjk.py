@@ -1,4 +1,4 @@
-"""Kernels that compare two convex solids: apart, overlapping or neither.
+"""GJK in kernels: whether two convex solids are apart, overlap, or neither is proven.
 
 Each verdict is a proof with a margin. Two solids are apart if a plane is found between them; they overlap if points of
 their difference surround the origin or a point of both is found. How plane and points are found (Gilbert, Johnson and
@@ -8,30 +8,29 @@ Keerthi 1988) can then do no harm: a poor search only leaves a pair undecided. S
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
-from rrtik_ompl.fast.simd.lanes import (
-    bits,
-    choose,
-    double_at,
-    field,
-    first_bit,
-    float_at,
-    highest,
-    int_at,
-    lanes_at,
-    set_lanes,
-    spread,
-)
+from rrtik_ompl.fast.simd.lanes import bits, choose, first_bit, float_at, highest, set_lanes, spread
 from rrtik_ompl.fast.tables import layout
-from rrtik_ompl.fast.tables.layout import (
-    COLLIDING,
-    FREE,
-    UNDECIDED,
+from rrtik_ompl.fast.tables.accessors import (
+    axis_of,
+    corner_block,
+    corners_of,
+    disc_of,
+    end_block_of,
+    first_block_of,
+    is_inside,
+    round_of,
+    sizes_of,
+    slack_of,
+    solid_of,
 )
+from rrtik_ompl.fast.tables.layout import COLLIDING, FREE, UNDECIDED, CornerArray, Frame, LaneArray, SolidTable
+
+Frames: TypeAlias = tuple[Frame, Frame, LaneArray]  # of the first and the second solid; lanes to write to
 
 MOST_STEPS = 24
 CONVERGED = 1e-7  # [m]
@@ -67,51 +66,72 @@ def scaled(a: Any, factor: float) -> Any:
 
 
 @inlined
-def entry_of(frame: int, lane: int, place: int) -> float:
+def entry_of(frame: Frame, lane: int, place: int) -> float:
     """A number of a frame in one lane."""
     number: float = np.float64(float_at(frame, place * WIDTH + lane))
     return number
 
 
 @inlined
-def carried(frame: int, lane: int, p: Any) -> Any:
+def frame_row(frame: Frame, lane: int, row: int) -> Any:
+    """A row of a frame's rotation in one lane."""
+    place = layout.ROTATION + 3 * row
+    return entry_of(frame, lane, place), entry_of(frame, lane, place + 1), entry_of(frame, lane, place + 2)
+
+
+@inlined
+def frame_origin(frame: Frame, lane: int) -> Any:
+    """A frame's origin in one lane."""
+    place = layout.ORIGIN
+    return entry_of(frame, lane, place), entry_of(frame, lane, place + 1), entry_of(frame, lane, place + 2)
+
+
+@inlined
+def carried(frame: Frame, lane: int, p: Any) -> Any:
     """A point of a frame in the world."""
-    x = entry_of(frame, lane, 0) * p[0] + entry_of(frame, lane, 1) * p[1] + entry_of(frame, lane, 2) * p[2]
-    y = entry_of(frame, lane, 3) * p[0] + entry_of(frame, lane, 4) * p[1] + entry_of(frame, lane, 5) * p[2]
-    z = entry_of(frame, lane, 6) * p[0] + entry_of(frame, lane, 7) * p[1] + entry_of(frame, lane, 8) * p[2]
-    return x + entry_of(frame, lane, 9), y + entry_of(frame, lane, 10), z + entry_of(frame, lane, 11)
+    x, y, z = dot(frame_row(frame, lane, 0), p), dot(frame_row(frame, lane, 1), p), dot(frame_row(frame, lane, 2), p)
+    origin = frame_origin(frame, lane)
+    return x + origin[0], y + origin[1], z + origin[2]
+
+
+@inlined
+def corner_at(corners: CornerArray, block: int, lane: int) -> Any:
+    """One corner of a solid."""
+    place = 3 * WIDTH * block + lane
+    return (
+        np.float64(float_at(corners, place)),
+        np.float64(float_at(corners, place + WIDTH)),
+        np.float64(float_at(corners, place + 2 * WIDTH)),
+    )
 
 
 @kernel
-def farthest(solids: int, number: int, frame: int, note: int, lane: int, way: Any) -> Any:
+def farthest(solids: SolidTable, number: int, frame: Frame, note: LaneArray, lane: int, direction: Any) -> Any:
     """The point of a solid's core that lies farthest along a unit vector, in the world. Here lanes hold corners.
 
     ``note`` is the address of lanes to write to.
     """
-    x = entry_of(frame, lane, 0) * way[0] + entry_of(frame, lane, 3) * way[1] + entry_of(frame, lane, 6) * way[2]
-    y = entry_of(frame, lane, 1) * way[0] + entry_of(frame, lane, 4) * way[1] + entry_of(frame, lane, 7) * way[2]
-    z = entry_of(frame, lane, 2) * way[0] + entry_of(frame, lane, 5) * way[1] + entry_of(frame, lane, 8) * way[2]
+    first_row, second_row, third_row = frame_row(frame, lane, 0), frame_row(frame, lane, 1), frame_row(frame, lane, 2)
+    x = first_row[0] * direction[0] + second_row[0] * direction[1] + third_row[0] * direction[2]
+    y = first_row[1] * direction[0] + second_row[1] * direction[1] + third_row[1] * direction[2]
+    z = first_row[2] * direction[0] + second_row[2] * direction[1] + third_row[2] * direction[2]
     a, b, c = np.float32(x), np.float32(y), np.float32(z)
-    numbers, corners = field(solids, layout.SOLIDS) + 16 * number, field(solids, layout.CORNERS)
+    solid, corners = solid_of(solids, number), corners_of(solids)
     best, where = spread(LOWEST), spread(np.float32(0.0))
-    for block in range(int_at(numbers, 1), int_at(numbers, 2)):
-        height = lanes_at(corners, 3 * block) * a + lanes_at(corners, 3 * block + 1) * b
-        height = height + lanes_at(corners, 3 * block + 2) * c
+    for block in range(first_block_of(solid), end_block_of(solid)):
+        along_x, along_y, along_z = corner_block(corners, block)
+        height = along_x * a + along_y * b
+        height = height + along_z * c
         higher = height > best
         best = choose(higher, height, best)
         where = choose(higher, spread(np.float32(block)), where)
     first = first_bit(bits(best >= highest(best)))
     set_lanes(note, 0, where)
-    corner = 3 * WIDTH * int(float_at(note, first)) + first
-    p = (
-        np.float64(float_at(corners, corner)),
-        np.float64(float_at(corners, corner + WIDTH)),
-        np.float64(float_at(corners, corner + 2 * WIDTH)),
-    )
-    sizes = field(solids, layout.SIZES) + 8 * layout.SIZE_COUNT * number
-    radius = double_at(sizes, layout.DISC)
+    p = corner_at(corners, int(float_at(note, first)), first)
+    sizes = sizes_of(solids, number)
+    radius = disc_of(sizes)
     if radius > 0.0:
-        axis = double_at(sizes, layout.AXIS), double_at(sizes, layout.AXIS + 1), double_at(sizes, layout.AXIS + 2)
+        axis = axis_of(sizes)
         across = minus((x, y, z), scaled(axis, dot(axis, (x, y, z))))
         length = sqrt(dot(across, across))
         if length > SHORTEST:
@@ -171,48 +191,51 @@ def depth_inside(a: Any, b: Any, c: Any, d: Any) -> float:
 
 
 @inlined
-def difference(mine: int, first: int, others: int, second: int, frames: Any, lane: int, way: Any) -> Any:
+def difference(
+    mine: SolidTable, first: int, others: SolidTable, second: int, frames: Frames, lane: int, direction: Any
+) -> Any:
     """The point of (first solid - second solid) that lies farthest against a unit vector."""
-    p = farthest(mine, first, frames[0], frames[2], lane, scaled(way, -1.0))
-    return minus(p, farthest(others, second, frames[1], frames[2], lane, way))
+    p = farthest(mine, first, frames[0], frames[2], lane, scaled(direction, -1.0))
+    return minus(p, farthest(others, second, frames[1], frames[2], lane, direction))
 
 
 @inlined
-def size_of(solids: int, number: int, place: int) -> float:
-    """A number of a solid."""
-    size: float = double_at(field(solids, layout.SIZES) + 8 * layout.SIZE_COUNT * number, place)
-    return size
+def slack_between(mine: SolidTable, first: int, others: SolidTable, second: int) -> float:
+    """How far rounding may misplace two solids towards each other [m]."""
+    return slack_of(sizes_of(mine, first)) + slack_of(sizes_of(others, second))
 
 
 @kernel
-def compare(mine: int, first: int, others: int, second: int, frames: Any, lane: int, way: Any) -> Any:
-    """Compare two solids in one lane, beginning with a plane across the unit vector ``way``.
+def compare(
+    mine: SolidTable, first: int, others: SolidTable, second: int, frames: Frames, lane: int, direction: Any
+) -> Any:
+    """Compare two solids in one lane, beginning with a plane across the unit vector ``direction``.
 
     Returns:
         FREE, UNDECIDED or COLLIDING, and the unit vector across the last plane, from the second solid to the first.
     """
-    reach = size_of(mine, first, layout.ROUND) + size_of(others, second, layout.ROUND)
-    slack = size_of(mine, first, layout.SLACK) + size_of(others, second, layout.SLACK)
-    solid = int_at(field(mine, layout.SOLIDS), 4 * first + 3) & int_at(field(others, layout.SOLIDS), 4 * second + 3)
-    a = difference(mine, first, others, second, frames, lane, way)
-    if dot(way, a) > reach + slack:
-        return FREE, way
+    reach = round_of(sizes_of(mine, first)) + round_of(sizes_of(others, second))
+    slack = slack_between(mine, first, others, second)
+    solid = is_inside(solid_of(mine, first)) & is_inside(solid_of(others, second))
+    a = difference(mine, first, others, second, frames, lane, direction)
+    if dot(direction, a) > reach + slack:
+        return FREE, direction
     b, c, v = a, a, a
     for _ in range(MOST_STEPS):
         length = sqrt(dot(v, v))
         if length < reach - slack and solid:
-            return COLLIDING, way
+            return COLLIDING, direction
         if length < SHORTEST:
             break
-        way = scaled(v, 1.0 / length)
-        d = difference(mine, first, others, second, frames, lane, way)
-        height = dot(way, d)
+        direction = scaled(v, 1.0 / length)
+        d = difference(mine, first, others, second, frames, lane, direction)
+        height = dot(direction, d)
         if height > reach + slack:
-            return FREE, way
+            return FREE, direction
         if height <= 0.0:
             depth = depth_inside(a, b, c, d)
             if depth > slack and solid:
-                return COLLIDING, way
+                return COLLIDING, direction
             if depth >= 0.0:
                 break
         if length - height < CONVERGED:
@@ -225,4 +248,4 @@ def compare(mine: int, first: int, others: int, second: int, frames: Any, lane: 
             a, v = d, q
         else:
             b, v = d, r
-    return UNDECIDED, way
+    return UNDECIDED, direction

@@ -1,6 +1,7 @@
-"""The narrow phase: kernels that compare bodies that balls leave in doubt, by the solids around and inside them.
+"""The narrow phase in kernels: bodies that balls leave in doubt, compared by the solids around and inside them.
 
-Lanes are bits of an integer. Solids: see :mod:`rrtik_ompl.fast.tables.solid_tables`.
+It goes body by body, in the lanes in doubt; what it does not decide is left to an exact checker. A set of lanes is an
+integer, one bit a lane. Solids: see :mod:`rrtik_ompl.fast.tables.solid_tables`.
 """
 
 from __future__ import annotations
@@ -8,65 +9,109 @@ from __future__ import annotations
 from math import sqrt
 from typing import Any
 
-from rrtik_ompl.fast.checks.gjk import SHORTEST, carried, compare, dot, farthest, minus, scaled, size_of
+from rrtik_ompl.fast.checks.gjk import (
+    SHORTEST,
+    Frames,
+    carried,
+    compare,
+    dot,
+    farthest,
+    minus,
+    scaled,
+    slack_between,
+)
 from rrtik_ompl.fast.checks.obstacle_kernels import primitive_gap
-from rrtik_ompl.fast.checks.sphere_kernels import FRAME_BYTES, prepare, scene_collision, self_collision
+from rrtik_ompl.fast.checks.self_kernels import self_collision
+from rrtik_ompl.fast.checks.sphere_kernels import prepare, scene_collision
 from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
-from rrtik_ompl.fast.simd.lanes import double_at, field, first_bit, float_at, int_at, lanes_at, lowest, set_int
+from rrtik_ompl.fast.simd.lanes import first_bit, float_at, int_at, lowest, set_int
 from rrtik_ompl.fast.tables import layout
+from rrtik_ompl.fast.tables.accessors import (
+    axis_of,
+    body_count_of,
+    bound_centre_of,
+    bound_radius_of,
+    corner_block,
+    corners_of,
+    disc_of,
+    end_around_of,
+    end_block_of,
+    end_inside_of,
+    first_around_of,
+    first_block_of,
+    first_inside_of,
+    frame_at,
+    frame_of_span,
+    frames_of,
+    inner_primitives_of,
+    is_inside,
+    kind_of_solid,
+    marks_of,
+    marks_row,
+    moving_solids_of,
+    note_of,
+    one_body_of,
+    other_body_of,
+    outer_balls_of,
+    outer_last_of,
+    outer_primitives_of,
+    own_of,
+    pair_count_of,
+    pair_of,
+    round_of,
+    scratch_of,
+    sizes_of,
+    slack_of,
+    solid_of,
+    span_of,
+    standing_count_of,
+    standing_solids_of,
+)
 from rrtik_ompl.fast.tables.layout import (
     COLLIDING,
-    FRAMES,
     FREE,
-    INNER_PRIMITIVES,
-    MARKS,
-    MOVING_SOLIDS,
-    OUTER,
-    OUTER_LAST,
-    OUTER_PRIMITIVES,
-    SCRATCH,
-    STANDING_SOLIDS,
     UNDECIDED,
+    Frame,
+    PrimitiveTable,
+    ScratchTable,
+    SolidTable,
+    WorldTable,
 )
 
 
 @inlined
-def outset(mine: int, first: int, others: int, second: int, frames: Any, lane: int) -> Any:
-    """Where the bounding ball of the first solid lies as seen from that of the second: the way, and the gap."""
-    sizes = field(mine, layout.SIZES) + 8 * layout.SIZE_COUNT * first
-    centre = double_at(sizes, layout.BOUND), double_at(sizes, layout.BOUND + 1), double_at(sizes, layout.BOUND + 2)
-    p = carried(frames[0], lane, centre)
-    sizes = field(others, layout.SIZES) + 8 * layout.SIZE_COUNT * second
-    centre = double_at(sizes, layout.BOUND), double_at(sizes, layout.BOUND + 1), double_at(sizes, layout.BOUND + 2)
-    way = minus(p, carried(frames[1], lane, centre))
-    length = sqrt(dot(way, way))
-    gap = length - size_of(mine, first, layout.BOUND + 3) - size_of(others, second, layout.BOUND + 3)
+def outset(mine: SolidTable, first: int, others: SolidTable, second: int, frames: Frames, lane: int) -> Any:
+    """Where the bounding ball of the first solid lies as seen from that of the second: the direction, and the gap."""
+    own, other = sizes_of(mine, first), sizes_of(others, second)
+    p = carried(frames[0], lane, bound_centre_of(own))
+    direction = minus(p, carried(frames[1], lane, bound_centre_of(other)))
+    length = sqrt(dot(direction, direction))
+    gap = length - bound_radius_of(own) - bound_radius_of(other)
     if length < SHORTEST:
         return (1.0, 0.0, 0.0), gap
-    return scaled(way, 1.0 / length), gap
+    return scaled(direction, 1.0 / length), gap
 
 
 @kernel
-def beyond_plane(mine: int, first: int, others: int, second: int, frames: Any, lane: int) -> int:
+def beyond_plane(mine: SolidTable, first: int, others: SolidTable, second: int, frames: Frames, lane: int) -> int:
     """Compare a solid with a half-space that stands still."""
-    sizes = field(others, layout.SIZES) + 8 * layout.SIZE_COUNT * second
-    normal = double_at(sizes, layout.AXIS), double_at(sizes, layout.AXIS + 1), double_at(sizes, layout.AXIS + 2)
+    half_space = sizes_of(others, second)
+    normal = axis_of(half_space)
     p = farthest(mine, first, frames[0], frames[2], lane, scaled(normal, -1.0))
-    height = dot(normal, p) - size_of(others, second, layout.DISC) - size_of(mine, first, layout.ROUND)
-    slack = size_of(mine, first, layout.SLACK) + size_of(others, second, layout.SLACK)
+    height = dot(normal, p) - disc_of(half_space) - round_of(sizes_of(mine, first))
+    slack = slack_between(mine, first, others, second)
     if height > slack:
         return FREE
-    return COLLIDING if height < -slack and int_at(field(mine, layout.SOLIDS), 4 * first + 3) != 0 else UNDECIDED
+    return COLLIDING if height < -slack and is_inside(solid_of(mine, first)) != 0 else UNDECIDED
 
 
 @kernel
-def compare_solids(mine: int, first: int, others: int, second: int, frames: Any, wanted: int) -> Any:
+def compare_solids(mine: SolidTable, first: int, others: SolidTable, second: int, frames: Frames, wanted: int) -> Any:
     """Lanes among ``wanted`` in which two solids are not proven apart, and those in which they are proven to overlap.
 
     A plane that lies between two solids in one lane often does in the next.
     """
-    kind = int_at(field(others, layout.SOLIDS), 4 * second)
-    own = int_at(field(mine, layout.SOLIDS), 4 * first)
+    kind, own = kind_of_solid(solid_of(others, second)), kind_of_solid(solid_of(mine, first))
     if own != layout.CONVEX_SOLID or (kind != layout.CONVEX_SOLID and kind != layout.HALF_SPACE_SOLID):
         return wanted, 0
     open_, overlapping, known, last = 0, 0, False, (1.0, 0.0, 0.0)
@@ -76,10 +121,10 @@ def compare_solids(mine: int, first: int, others: int, second: int, frames: Any,
         if kind == layout.HALF_SPACE_SOLID:
             answer = beyond_plane(mine, first, others, second, frames, lane)
         else:
-            way, gap = outset(mine, first, others, second, frames, lane)
-            if gap > size_of(mine, first, layout.SLACK) + size_of(others, second, layout.SLACK):
+            direction, gap = outset(mine, first, others, second, frames, lane)
+            if gap > slack_between(mine, first, others, second):
                 continue
-            answer, last = compare(mine, first, others, second, frames, lane, last if known else way)
+            answer, last = compare(mine, first, others, second, frames, lane, last if known else direction)
             known = True
         if answer != FREE:
             open_ |= 1 << lane
@@ -89,60 +134,64 @@ def compare_solids(mine: int, first: int, others: int, second: int, frames: Any,
 
 
 @kernel
-def compare_bodies(scratch: int, mine: int, first: int, others: int, second: int, wanted: int) -> Any:
+def compare_bodies(
+    scratch: ScratchTable, mine: SolidTable, first: int, others: SolidTable, second: int, wanted: int
+) -> Any:
     """As ``compare_solids``, for bodies: the solids around them, and then those inside them where they differ."""
-    spans, other_spans = field(mine, layout.SPANS) + 20 * first, field(others, layout.SPANS) + 20 * second
+    own, other_own = span_of(mine, first), span_of(others, second)
     frames = (
-        field(scratch, FRAMES) + FRAME_BYTES * int_at(spans, 0),
-        field(scratch, FRAMES) + FRAME_BYTES * int_at(other_spans, 0),
-        field(scratch, layout.NOTE),
+        frame_at(frames_of(scratch), frame_of_span(own)),
+        frame_at(frames_of(scratch), frame_of_span(other_own)),
+        note_of(scratch),
     )
     open_, overlapping = 0, 0
-    for one in range(int_at(spans, 1), int_at(spans, 2)):
-        for other in range(int_at(other_spans, 1), int_at(other_spans, 2)):
+    for one in range(first_around_of(own), end_around_of(own)):
+        for other in range(first_around_of(other_own), end_around_of(other_own)):
             left, hit = compare_solids(mine, one, others, other, frames, wanted & ~overlapping)
             open_ |= left
             overlapping |= hit
-    if int_at(spans, 1) == int_at(spans, 3) and int_at(other_spans, 1) == int_at(other_spans, 3):
+    if first_around_of(own) == first_inside_of(own) and first_around_of(other_own) == first_inside_of(other_own):
         return open_, overlapping
-    for one in range(int_at(spans, 3), int_at(spans, 4)):
-        for other in range(int_at(other_spans, 3), int_at(other_spans, 4)):
+    for one in range(first_inside_of(own), end_inside_of(own)):
+        for other in range(first_inside_of(other_own), end_inside_of(other_own)):
             _, hit = compare_solids(mine, one, others, other, frames, open_ & ~overlapping)
             overlapping |= hit
     return open_, overlapping
 
 
-@inlined
-def carried_axis(frame: int, lane: int, axis: int, a: Any, b: Any, c: Any) -> Any:
+@kernel
+def carried_axis(frame: Frame, lane: int, axis: int, a: Any, b: Any, c: Any) -> Any:
     """A coordinate in the world of points of a frame. Here lanes hold points; ``lane`` is that of the frame."""
-    place = 3 * axis * WIDTH + lane
+    place = (layout.ROTATION + 3 * axis) * WIDTH + lane
     turned = a * float_at(frame, place) + b * float_at(frame, place + WIDTH) + c * float_at(frame, place + 2 * WIDTH)
-    return turned + float_at(frame, (9 + axis) * WIDTH + lane)
+    return turned + float_at(frame, (layout.ORIGIN + axis) * WIDTH + lane)
 
 
 @kernel
-def corner_inside(mine: int, one: int, frame: int, lane: int, primitives: int, primitive: int) -> bool:
+def corner_inside(
+    mine: SolidTable, one: int, frame: Frame, lane: int, primitives: PrimitiveTable, primitive: int
+) -> bool:
     """Whether a corner of a solid lies inside a primitive, in one lane."""
-    numbers, corners = field(mine, layout.SOLIDS) + 16 * one, field(mine, layout.CORNERS)
-    for block in range(int_at(numbers, 1), int_at(numbers, 2)):
-        a, b, c = lanes_at(corners, 3 * block), lanes_at(corners, 3 * block + 1), lanes_at(corners, 3 * block + 2)
+    solid, corners = solid_of(mine, one), corners_of(mine)
+    for block in range(first_block_of(solid), end_block_of(solid)):
+        a, b, c = corner_block(corners, block)
         x, y = carried_axis(frame, lane, 0, a, b, c), carried_axis(frame, lane, 1, a, b, c)
         gap = primitive_gap(primitives, primitive, x, y, carried_axis(frame, lane, 2, a, b, c), False)
-        if lowest(gap) < -size_of(mine, one, layout.SLACK):
+        if lowest(gap) < -slack_of(sizes_of(mine, one)):
             return True
     return False
 
 
 @kernel
-def corners_inside(world: int, body: int, standing: int, wanted: int) -> int:
+def corners_inside(world: WorldTable, body: int, standing: int, wanted: int) -> int:
     """Lanes among ``wanted`` in which a point of a moving body lies inside one that stands still."""
-    mine, primitives, overlapping = field(world, MOVING_SOLIDS), field(world, INNER_PRIMITIVES), 0
-    primitive, spans = int_at(field(primitives, layout.OWN), standing), field(mine, layout.SPANS) + 20 * body
-    frame = field(field(world, SCRATCH), FRAMES) + FRAME_BYTES * int_at(spans, 0)
+    mine, primitives, overlapping = moving_solids_of(world), inner_primitives_of(world), 0
+    primitive, span = int_at(own_of(primitives), standing), span_of(mine, body)
+    frame = frame_at(frames_of(scratch_of(world)), frame_of_span(span))
     if primitive < 0:
         return 0
-    for one in range(int_at(spans, 3), int_at(spans, 4)):
-        if int_at(field(mine, layout.SOLIDS), 4 * one) == layout.MERE_CORNERS:
+    for one in range(first_inside_of(span), end_inside_of(span)):
+        if kind_of_solid(solid_of(mine, one)) == layout.MERE_CORNERS:
             left = wanted & ~overlapping
             while left != 0:
                 lane = first_bit(left)
@@ -153,46 +202,47 @@ def corners_inside(world: int, body: int, standing: int, wanted: int) -> int:
 
 
 @kernel
-def mark(world: int, wanted: int) -> int:
+def mark(world: WorldTable, wanted: int) -> int:
     """Collect for each pair of bodies the lanes in which the outer balls cannot prove it free; returns their number.
 
     The numbers of moving and standing bodies come first, then those of the pairs of moving bodies.
     """
-    scratch, balls, primitives = field(world, SCRATCH), field(world, OUTER), field(world, OUTER_PRIMITIVES)
+    scratch, balls, primitives = scratch_of(world), outer_balls_of(world), outer_primitives_of(world)
     prepare(balls, scratch)
-    marks = field(scratch, MARKS)
-    crossing = field(balls, layout.BODY_COUNT) * field(primitives, layout.STANDING_COUNT)
-    total: int = crossing + field(balls, layout.PAIR_COUNT)
+    marks = marks_of(scratch)
+    crossing = body_count_of(balls) * standing_count_of(primitives)
+    total = crossing + pair_count_of(balls)
     for k in range(total):
         set_int(marks, k, 0)
-    scene_collision(balls, primitives, scratch, wanted, marks, wanted < 0, field(scratch, OUTER_LAST))
-    self_collision(balls, scratch, wanted, marks + 4 * crossing, wanted < 0)
+    scene_collision(balls, primitives, scratch, wanted, marks, wanted < 0, outer_last_of(scratch))
+    self_collision(balls, scratch, wanted, marks_row(marks, crossing, 1), wanted < 0)
     return total
 
 
 @kernel
-def narrow_phase(world: int, wanted: int) -> Any:
-    """Look at the pairs of bodies that the outer balls leave open in the lanes ``wanted``, solid by solid.
+def narrow_phase(world: WorldTable, wanted: int) -> Any:
+    """Compare the pairs of bodies that the outer balls leave open in the lanes ``wanted``, solid by solid.
 
-    The marks of what is proven apart are taken back. A lane in which something overlaps is not looked at further.
+    The marks of what is proven apart are taken back. A lane in which something overlaps is not compared further.
 
     Returns:
         Lanes in which something remains open, and lanes that are colliding.
     """
     total = mark(world, wanted)
-    scratch, balls, mine = field(world, SCRATCH), field(world, OUTER), field(world, MOVING_SOLIDS)
-    standing = field(field(world, OUTER_PRIMITIVES), layout.STANDING_COUNT)
-    crossing = field(balls, layout.BODY_COUNT) * standing
-    marks, pairs = field(scratch, MARKS), field(balls, layout.PAIRS)
+    scratch, balls, mine = scratch_of(world), outer_balls_of(world), moving_solids_of(world)
+    standing = standing_count_of(outer_primitives_of(world))
+    crossing = body_count_of(balls) * standing
+    marks = marks_of(scratch)
     open_, colliding = 0, 0
     for k in range(total):
         marked = int_at(marks, k) & ~colliding
         if marked == 0:
             continue
         if k < crossing:
-            first, second, others = k // standing, k % standing, field(world, STANDING_SOLIDS)
+            first, second, others = k // standing, k % standing, standing_solids_of(world)
         else:
-            first, second, others = int_at(pairs, 2 * (k - crossing)), int_at(pairs, 2 * (k - crossing) + 1), mine
+            pair = pair_of(balls, k - crossing)
+            first, second, others = one_body_of(pair), other_body_of(pair), mine
         left, hit = compare_bodies(scratch, mine, first, others, second, marked)
         if k < crossing and left != hit:
             hit |= corners_inside(world, first, second, left & ~hit)

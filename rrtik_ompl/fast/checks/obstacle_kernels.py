@@ -1,6 +1,8 @@
-"""Kernels that test a ball, in all lanes at once, against what stands still.
+"""Kernels of one ball against one primitive: whether it meets the ball, and how far it is away, in all lanes at once.
 
-Lanes are bits of an integer. Rows: see :mod:`rrtik_ompl.fast.tables.layout`.
+The broad phase, that is which primitives are in reach of a ball, stands here too. A set of lanes is an integer, one bit
+a lane. Primitives: see :mod:`rrtik_ompl.fast.tables.layout`; a primitive of an unknown kind counts as met everywhere,
+and its table says so.
 """
 
 from __future__ import annotations
@@ -14,21 +16,59 @@ from rrtik_ompl.fast.simd.lanes import (
     absolute,
     bits,
     choose,
-    field,
     first_bit,
-    float_at,
     highest,
     int_at,
     lanes_at,
     larger,
     lowest,
+    set_field,
     set_int,
     smaller,
     spread,
     square_root,
 )
 from rrtik_ompl.fast.tables import layout
+from rrtik_ompl.fast.tables.accessors import (
+    ball_radius_of,
+    boxes_of,
+    capsule_axis_of,
+    capsule_radius_of,
+    centre_of,
+    cylinder_axis_of,
+    cylinder_radius_of,
+    end_plane_of,
+    first_axis_of,
+    first_plane_of,
+    half_length_of,
+    half_sizes_of,
+    half_space_normal_of,
+    half_space_offset_of,
+    head_of,
+    inverse_square_of,
+    kind_of,
+    normal_of,
+    offset_of,
+    padded_count_of,
+    plane_at,
+    planes_of,
+    second_axis_of,
+    shape_of,
+    share_of,
+    standing_body_of,
+    third_axis_of,
+)
+from rrtik_ompl.fast.tables.layout import (
+    NO_MARKS,
+    LaneArray,
+    Marks,
+    PlaneArray,
+    PrimitiveList,
+    PrimitiveShape,
+    PrimitiveTable,
+)
 
+ALL_LANES = (1 << WIDTH) - 1
 ZERO, ONE = np.float32(0.0), np.float32(1.0)
 UNBOUNDED_DISTANCE = np.float32(1e18)  # [m] where there is nothing to measure; its square is a float32 still
 
@@ -40,132 +80,149 @@ def squared(x: Any, y: Any, z: Any) -> Any:
 
 
 @inlined
-def along(row: int, place: int, x: Any, y: Any, z: Any) -> Any:
-    """Dot product with the three numbers of a row from ``place`` on."""
-    return x * float_at(row, place) + y * float_at(row, place + 1) + z * float_at(row, place + 2)
+def along(vector: Any, x: Any, y: Any, z: Any) -> Any:
+    """Dot product of lanes of points with three numbers."""
+    return x * vector[0] + y * vector[1] + z * vector[2]
 
 
 @inlined
-def to_capsule(row: int, x: Any, y: Any, z: Any) -> Any:
+def to_capsule(capsule: PrimitiveShape, x: Any, y: Any, z: Any) -> Any:
     """Squared distance from a capsule's axis; x, y, z from its first end."""
-    share = smaller(larger(along(row, 3, x, y, z) * float_at(row, 6), ZERO), ONE)
-    return squared(x - share * float_at(row, 3), y - share * float_at(row, 4), z - share * float_at(row, 5))
+    axis = capsule_axis_of(capsule)
+    share = smaller(larger(along(axis, x, y, z) * inverse_square_of(capsule), ZERO), ONE)
+    return squared(x - share * axis[0], y - share * axis[1], z - share * axis[2])
 
 
 @inlined
-def to_box(row: int, x: Any, y: Any, z: Any) -> Any:
-    """Squared distance from a box; x, y, z from its centre."""
-    return squared(
-        larger(absolute(along(row, 3, x, y, z)) - float_at(row, 12), ZERO),
-        larger(absolute(along(row, 6, x, y, z)) - float_at(row, 13), ZERO),
-        larger(absolute(along(row, 9, x, y, z)) - float_at(row, 14), ZERO),
+def beyond_faces(box: PrimitiveShape, x: Any, y: Any, z: Any) -> Any:
+    """How far a point lies beyond each pair of a box's faces; x, y, z from its centre."""
+    half = half_sizes_of(box)
+    return (
+        absolute(along(first_axis_of(box), x, y, z)) - half[0],
+        absolute(along(second_axis_of(box), x, y, z)) - half[1],
+        absolute(along(third_axis_of(box), x, y, z)) - half[2],
     )
 
 
 @inlined
-def to_cylinder(row: int, x: Any, y: Any, z: Any) -> Any:
-    """Squared distance from a cylinder; x, y, z from its centre."""
-    height = along(row, 3, x, y, z)
-    across = squared(x - height * float_at(row, 3), y - height * float_at(row, 4), z - height * float_at(row, 5))
-    beyond = larger(absolute(height) - float_at(row, 6), ZERO)
-    outside = larger(square_root(across) - float_at(row, 7), ZERO)
-    return beyond * beyond + outside * outside
+def beyond_ends(cylinder: PrimitiveShape, x: Any, y: Any, z: Any) -> Any:
+    """How far a point lies beyond a cylinder's ends, and beyond its side; x, y, z from its centre."""
+    axis = cylinder_axis_of(cylinder)
+    height = along(axis, x, y, z)
+    across = squared(x - height * axis[0], y - height * axis[1], z - height * axis[2])
+    return absolute(height) - half_length_of(cylinder), square_root(across) - cylinder_radius_of(cylinder)
+
+
+@inlined
+def plane_gap(planes: PlaneArray, number: int, x: Any, y: Any, z: Any) -> Any:
+    """Signed distance of a point from a plane, positive in front of it."""
+    plane = plane_at(planes, number)
+    return along(normal_of(plane), x, y, z) - offset_of(plane)
+
+
+@inlined
+def half_space_gap(half_space: PrimitiveShape, x: Any, y: Any, z: Any) -> Any:
+    """Signed distance of a point from a half-space."""
+    return along(half_space_normal_of(half_space), x, y, z) - half_space_offset_of(half_space)
 
 
 @kernel
-def meets_convex(planes: int, start: int, end: int, share: Any, x: Any, y: Any, z: Any, radius: float) -> Any:
-    """Lanes in which no plane has a ball in front of it. Share 0 asks for the centre only."""
+def meets_convex(planes: PlaneArray, start: int, end: int, share: Any, x: Any, y: Any, z: Any, radius: float) -> Any:
+    """Lanes in which no plane has a ball in front of it. Share 0 stands for the centre only."""
     meeting = bits(spread(ZERO) < ONE)
     for plane in range(start, end):
-        height = along(planes, 4 * plane, x, y, z) - float_at(planes, 4 * plane + 3)
-        meeting &= bits(height < share * radius)
+        meeting &= bits(plane_gap(planes, plane, x, y, z) < share * radius)
         if meeting == 0:
             break
     return meeting
 
 
 @inlined
-def meets_primitive(primitives: int, number: int, x: Any, y: Any, z: Any, radius: float, bound: bool) -> Any:
-    """Lanes in which a ball meets a row; ``bound`` tells that the ball only stands for balls inside it."""
-    row = field(primitives, layout.PRIMITIVES) + 4 * layout.PRIMITIVE_FLOATS * number
-    numbers = field(primitives, layout.NUMBERS) + 16 * number
-    kind = int_at(numbers, 0)
+def meets_primitive(primitives: PrimitiveTable, number: int, x: Any, y: Any, z: Any, radius: float, bound: bool) -> Any:
+    """Lanes in which a ball meets a primitive; ``bound``: the ball only stands for balls inside it."""
+    shape, head = shape_of(primitives, number), head_of(primitives, number)
+    kind = kind_of(head)
     if kind == layout.HALF_SPACE:
-        return bits(along(row, 0, x, y, z) - float_at(row, 3) < radius)
+        return bits(half_space_gap(shape, x, y, z) < radius)
     if kind == layout.CONVEX:
-        planes = field(primitives, layout.PLANES)
-        share = ONE if bound else float_at(row, 0)
-        return meets_convex(planes, int_at(numbers, 2), int_at(numbers, 3), share, x, y, z, radius)
-    x, y, z = x - float_at(row, 0), y - float_at(row, 1), z - float_at(row, 2)
+        share = ONE if bound else share_of(shape)
+        return meets_convex(planes_of(primitives), first_plane_of(head), end_plane_of(head), share, x, y, z, radius)
+    centre = centre_of(shape)
+    x, y, z = x - centre[0], y - centre[1], z - centre[2]
     if kind == layout.BOX:
-        return bits(to_box(row, x, y, z) < radius * radius)
+        a, b, c = beyond_faces(shape, x, y, z)
+        return bits(squared(larger(a, ZERO), larger(b, ZERO), larger(c, ZERO)) < radius * radius)
     if kind == layout.BALL:
-        reach = radius + float_at(row, 3)
+        reach = radius + ball_radius_of(shape)
         return bits(squared(x, y, z) < reach * reach)
     if kind == layout.CAPSULE:
-        reach = radius + float_at(row, 7)
-        return bits(to_capsule(row, x, y, z) < reach * reach)
-    return bits(to_cylinder(row, x, y, z) < radius * radius)
+        reach = radius + capsule_radius_of(shape)
+        return bits(to_capsule(shape, x, y, z) < reach * reach)
+    if kind == layout.CYLINDER:
+        height, outside = beyond_ends(shape, x, y, z)
+        beyond, outside = larger(height, ZERO), larger(outside, ZERO)
+        return bits(beyond * beyond + outside * outside < radius * radius)
+    set_field(primitives, layout.FAULT, layout.UNSOUND)
+    return ALL_LANES
 
 
 @kernel
-def to_convex(planes: int, start: int, end: int, x: Any, y: Any, z: Any) -> Any:
-    """Largest height over the planes of a convex row; no more than the distance from it."""
-    height = along(planes, 4 * start, x, y, z) - float_at(planes, 4 * start + 3)
+def to_convex(planes: PlaneArray, start: int, end: int, x: Any, y: Any, z: Any) -> Any:
+    """Largest height over the planes of a convex primitive; no more than the distance from it."""
+    height = plane_gap(planes, start, x, y, z)
     for plane in range(start + 1, end):
-        height = larger(height, along(planes, 4 * plane, x, y, z) - float_at(planes, 4 * plane + 3))
+        height = larger(height, plane_gap(planes, plane, x, y, z))
     return height
 
 
 @kernel
-def primitive_gap(primitives: int, number: int, x: Any, y: Any, z: Any, bound: bool) -> Any:
-    """Signed distance of a point from a row, negative inside; ``bound`` tells that it stands for points near it."""
-    row = field(primitives, layout.PRIMITIVES) + 4 * layout.PRIMITIVE_FLOATS * number
-    numbers = field(primitives, layout.NUMBERS) + 16 * number
-    kind = int_at(numbers, 0)
+def primitive_gap(primitives: PrimitiveTable, number: int, x: Any, y: Any, z: Any, bound: bool) -> Any:
+    """Signed distance of a point from a primitive, negative inside; ``bound``: the point stands for others near it."""
+    shape, head = shape_of(primitives, number), head_of(primitives, number)
+    kind = kind_of(head)
     if kind == layout.HALF_SPACE:
-        return along(row, 0, x, y, z) - float_at(row, 3)
+        return half_space_gap(shape, x, y, z)
     if kind == layout.CONVEX:
-        height = to_convex(field(primitives, layout.PLANES), int_at(numbers, 2), int_at(numbers, 3), x, y, z)
-        if bound or float_at(row, 0) != ZERO:
+        height = to_convex(planes_of(primitives), first_plane_of(head), end_plane_of(head), x, y, z)
+        if bound or share_of(shape) != ZERO:
             return height
         # Outside, the height is too small for an inner primitive.
         return choose(height < ZERO, height, spread(UNBOUNDED_DISTANCE))
-    x, y, z = x - float_at(row, 0), y - float_at(row, 1), z - float_at(row, 2)
+    centre = centre_of(shape)
+    x, y, z = x - centre[0], y - centre[1], z - centre[2]
     if kind == layout.BALL:
-        return square_root(squared(x, y, z)) - float_at(row, 3)
+        return square_root(squared(x, y, z)) - ball_radius_of(shape)
     if kind == layout.CAPSULE:
-        return square_root(to_capsule(row, x, y, z)) - float_at(row, 7)
+        return square_root(to_capsule(shape, x, y, z)) - capsule_radius_of(shape)
     if kind == layout.BOX:
-        a = absolute(along(row, 3, x, y, z)) - float_at(row, 12)
-        b = absolute(along(row, 6, x, y, z)) - float_at(row, 13)
-        c = absolute(along(row, 9, x, y, z)) - float_at(row, 14)
+        a, b, c = beyond_faces(shape, x, y, z)
         outside = square_root(squared(larger(a, ZERO), larger(b, ZERO), larger(c, ZERO)))
         return outside + smaller(larger(larger(a, b), c), ZERO)
-    height = along(row, 3, x, y, z)
-    across = squared(x - height * float_at(row, 3), y - height * float_at(row, 4), z - height * float_at(row, 5))
-    a, b = absolute(height) - float_at(row, 6), square_root(across) - float_at(row, 7)
-    outside = square_root(larger(a, ZERO) * larger(a, ZERO) + larger(b, ZERO) * larger(b, ZERO))
-    return outside + smaller(larger(a, b), ZERO)
+    if kind == layout.CYLINDER:
+        a, b = beyond_ends(shape, x, y, z)
+        outside = square_root(larger(a, ZERO) * larger(a, ZERO) + larger(b, ZERO) * larger(b, ZERO))
+        return outside + smaller(larger(a, b), ZERO)
+    set_field(primitives, layout.FAULT, layout.UNSOUND)
+    return spread(-UNBOUNDED_DISTANCE)
 
 
 @kernel
 def meets_primitives(
-    primitives: int,
+    primitives: PrimitiveTable,
     x: Any,
     y: Any,
     z: Any,
     radius: float,
     bound: bool,
     wanted: int,
-    source: int,
+    source: PrimitiveList,
     count: int,
-    sink: int,
-    marks: int,
+    sink: PrimitiveList,
+    marks: Marks,
 ) -> Any:
     """Lanes among ``wanted`` in which a ball meets one of the primitives of a list; those that it meets go to ``sink``.
 
-    Unless 0, ``marks`` is the address of one number for each standing body, which collects the lanes that meet it.
+    Unless ``NO_MARKS``, ``marks`` are one number for each standing body, which collects the lanes that meet it.
     """
     meeting, kept = 0, 0
     for k in range(count):
@@ -175,14 +232,20 @@ def meets_primitives(
             meeting |= found
             set_int(sink, kept, number)
             kept += 1
-            if marks != 0:
-                body = int_at(field(primitives, layout.NUMBERS), 4 * number + 1)
+            if marks != NO_MARKS:
+                body = standing_body_of(head_of(primitives, number))
                 set_int(marks, body, int_at(marks, body) | found)
     return meeting, kept
 
 
+@inlined
+def box_side(boxes: LaneArray, side: int, run: int, block: int) -> Any:
+    """A side of ``WIDTH`` bounding boxes."""
+    return lanes_at(boxes, side * run + block)
+
+
 @kernel
-def primitives_in_reach(primitives: int, x: Any, y: Any, z: Any, radius: float, found: int) -> int:
+def primitives_in_reach(primitives: PrimitiveTable, x: Any, y: Any, z: Any, radius: float, found: PrimitiveList) -> int:
     """List the primitives whose bounding box meets the box around a ball in all lanes; returns their number.
 
     Here the lanes hold primitives, not configurations.
@@ -190,13 +253,13 @@ def primitives_in_reach(primitives: int, x: Any, y: Any, z: Any, radius: float, 
     low_x, high_x = lowest(x) - radius, highest(x) + radius
     low_y, high_y = lowest(y) - radius, highest(y) + radius
     low_z, high_z = lowest(z) - radius, highest(z) + radius
-    boxes = field(primitives, layout.BOXES)
-    steps = field(primitives, layout.PADDED_COUNT) // WIDTH
+    boxes = boxes_of(primitives)
+    run = padded_count_of(primitives) // WIDTH
     count = 0
-    for k in range(steps):
-        inside_x = (lanes_at(boxes, k) < high_x) & (lanes_at(boxes, steps + k) > low_x)
-        inside_y = (lanes_at(boxes, 2 * steps + k) < high_y) & (lanes_at(boxes, 3 * steps + k) > low_y)
-        inside_z = (lanes_at(boxes, 4 * steps + k) < high_z) & (lanes_at(boxes, 5 * steps + k) > low_z)
+    for k in range(run):
+        inside_x = (box_side(boxes, layout.LOW_X, run, k) < high_x) & (box_side(boxes, layout.HIGH_X, run, k) > low_x)
+        inside_y = (box_side(boxes, layout.LOW_Y, run, k) < high_y) & (box_side(boxes, layout.HIGH_Y, run, k) > low_y)
+        inside_z = (box_side(boxes, layout.LOW_Z, run, k) < high_z) & (box_side(boxes, layout.HIGH_Z, run, k) > low_z)
         left = bits(inside_x & inside_y & inside_z)
         while left != 0:
             set_int(found, count, k * WIDTH + first_bit(left))

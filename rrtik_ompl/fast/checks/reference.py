@@ -1,26 +1,33 @@
-"""The kernels' answers in plain numpy, ball by ball: for computers without numba, and some thousand times slower."""
+"""The reference implementation of the collision checks: the kernels' answers in plain numpy, ball by ball.
+
+For computers without numba, and to test the kernels; some thousand times slower.
+"""
 
 from __future__ import annotations
+
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix
+from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.tables import layout
-from rrtik_ompl.fast.tables.robot_tables import Table
+from rrtik_ompl.fast.tables.memory import Table
 
 CHUNK = 64  # configurations at a time, to bound memory
 
 
 def frames(arm: Table, values: Matrix) -> NDArray[np.float64]:
     """Joint frames as rotation and origin, world first, shape (m, joints + 1, 3, 4)."""
-    fixed = arm[layout.PLACEMENTS].astype(np.float64).reshape(-1, 12)
+    fixed = arm[layout.PLACEMENTS].astype(np.float64).reshape(-1, layout.POSE_NUMBERS)
+    turns, origins = fixed[:, layout.ROTATION : layout.ROTATION + 9], fixed[:, layout.ORIGIN : layout.ORIGIN + 3]
     found = np.zeros((len(values), len(fixed) + 1, 3, 4))
     found[:, 0, :, :3] = np.eye(3)
     for joint, (parent, sliding) in enumerate(zip(arm[layout.PARENTS], arm[layout.SLIDING], strict=True)):
         above = found[:, parent]
-        rotation = above[:, :, :3] @ fixed[joint, :9].reshape(3, 3)
-        origin = above[:, :, 3] + above[:, :, :3] @ fixed[joint, 9:]
+        rotation = above[:, :, :3] @ turns[joint].reshape(3, 3)
+        origin = above[:, :, 3] + above[:, :, :3] @ origins[joint]
         value = values[:, joint, None]
         x, y, z = rotation[:, :, 0], rotation[:, :, 1], rotation[:, :, 2]
         sine, cosine = np.sin(value), np.cos(value)
@@ -29,27 +36,97 @@ def frames(arm: Table, values: Matrix) -> NDArray[np.float64]:
     return found
 
 
+class PrimitiveView:
+    """One primitive of a table, as numpy reads it.
+
+    Attributes:
+        kind: Of the layout.
+        standing: Number of the standing body that it belongs to.
+    """
+
+    def __init__(self, primitives: Table, number: int) -> None:
+        shapes = primitives[layout.PRIMITIVES].reshape(-1, layout.SHAPE_FLOATS)
+        head = heads(primitives)[number]
+        self._shape: Vector = shapes[number].astype(np.float64)
+        self.kind, self.standing = int(head[layout.KIND]), int(head[layout.STANDING_BODY])
+        self._planes = primitives[layout.PLANES].reshape(-1, layout.PLANE_FLOATS)
+        self._span = slice(head[layout.FIRST_PLANE], head[layout.END_PLANE])
+
+    def number(self, place: int) -> float:
+        """One of its numbers."""
+        return float(self._shape[place])
+
+    def vector(self, place: int) -> Vector:
+        """Three of its numbers."""
+        return self._shape[place : place + 3]
+
+    def heights(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Largest signed distance of points, shape (..., 3), from the planes of a convex one. Shape (...)."""
+        planes = self._planes[self._span].astype(np.float64)
+        normals = planes[:, layout.PLANE_NORMAL : layout.PLANE_NORMAL + 3]
+        return np.asarray((points @ normals.T - planes[:, layout.PLANE_OFFSET]).max(axis=-1))
+
+    def half_space_gap(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Signed distance of points, shape (..., 3), from a half-space. Shape (...)."""
+        normal, offset = self.vector(layout.HALF_SPACE_NORMAL), self.number(layout.HALF_SPACE_OFFSET)
+        return np.asarray(points @ normal - offset)
+
+    def beyond_faces(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far points, shape (..., 3) and seen from its centre, lie beyond each pair of a box's faces."""
+        axes = self._shape[layout.BOX_AXES : layout.BOX_AXES + 9].reshape(3, 3)
+        return np.asarray(np.abs(away @ axes.T) - self.vector(layout.BOX_HALF_SIZES))
+
+    def to_capsule(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distance of points, shape (..., 3) and seen from a capsule's first end, from its axis. Shape (...)."""
+        axis = self.vector(layout.CAPSULE_AXIS)
+        share = np.clip((away @ axis) * self.number(layout.CAPSULE_INVERSE_SQUARE), 0.0, 1.0)
+        return np.asarray(np.linalg.norm(away - share[..., None] * axis, axis=-1))
+
+    def beyond_ends(self, away: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """How far points, seen from its centre, lie beyond a cylinder's ends and beyond its side."""
+        axis = self.vector(layout.CYLINDER_AXIS)
+        along = away @ axis
+        across = np.linalg.norm(away - along[..., None] * axis, axis=-1)
+        beyond = np.abs(along) - self.number(layout.CYLINDER_HALF_LENGTH)
+        return beyond, across - self.number(layout.CYLINDER_RADIUS)
+
+
+def heads(primitives: Table) -> NDArray[np.int32]:
+    """Heads of all primitives, shape (k, ``HEAD_INTS``)."""
+    return primitives[layout.NUMBERS].reshape(-1, layout.HEAD_INTS)
+
+
+def refuse_kind(kind: int) -> NoReturn:
+    """Raise the error of a primitive of a kind that has no formula.
+
+    Raises:
+        InputError: Always.
+    """
+    raise InputError(f"collision check: a primitive is of unknown kind {kind}; have 0 to {layout.KINDS.stop - 1}")
+
+
 def meets_primitive(primitives: Table, number: int, points: NDArray[np.float64], radii: NDArray[np.float64]) -> Mask:
-    """Which balls, centres of shape (..., 3), meet a row. Shape (...)."""
-    row = primitives[layout.PRIMITIVES].reshape(-1, layout.PRIMITIVE_FLOATS)[number].astype(np.float64)
-    kind, _, start, end = primitives[layout.NUMBERS].reshape(-1, 4)[number]
-    if kind == layout.HALF_SPACE:
-        return np.asarray(points @ row[:3] - row[3] < radii)
-    if kind == layout.CONVEX:
-        planes = primitives[layout.PLANES].astype(np.float64).reshape(-1, 4)[start:end]
-        return np.asarray((points @ planes[:, :3].T - planes[:, 3]).max(axis=-1) < row[0] * radii)
-    away = points - row[:3]
-    if kind == layout.BOX:
-        outside = np.maximum(np.abs(away @ row[3:12].reshape(3, 3).T) - row[12:15], 0.0)
-        return np.asarray(np.linalg.norm(outside, axis=-1) < radii)
-    if kind == layout.BALL:
-        return np.asarray(np.linalg.norm(away, axis=-1) < radii + row[3])
-    along = away @ row[3:6]
-    if kind == layout.CAPSULE:
-        foot = np.clip(along * row[6], 0.0, 1.0)[..., None] * row[3:6]
-        return np.asarray(np.linalg.norm(away - foot, axis=-1) < radii + row[7])
-    across = np.linalg.norm(away - along[..., None] * row[3:6], axis=-1)
-    return np.asarray(np.hypot(np.maximum(np.abs(along) - row[6], 0.0), np.maximum(across - row[7], 0.0)) < radii)
+    """Which balls, centres of shape (..., 3), meet a primitive. Shape (...).
+
+    Raises:
+        InputError: If it is of an unknown kind.
+    """
+    own = PrimitiveView(primitives, number)
+    if own.kind == layout.HALF_SPACE:
+        return np.asarray(own.half_space_gap(points) < radii)
+    if own.kind == layout.CONVEX:
+        return np.asarray(own.heights(points) < own.number(layout.CONVEX_SHARE) * radii)
+    away = points - own.vector(layout.SHAPE_CENTRE)
+    if own.kind == layout.BOX:
+        return np.asarray(np.linalg.norm(np.maximum(own.beyond_faces(away), 0.0), axis=-1) < radii)
+    if own.kind == layout.BALL:
+        return np.asarray(np.linalg.norm(away, axis=-1) < radii + own.number(layout.BALL_RADIUS))
+    if own.kind == layout.CAPSULE:
+        return np.asarray(own.to_capsule(away) < radii + own.number(layout.CAPSULE_RADIUS))
+    if own.kind == layout.CYLINDER:
+        ends, side = own.beyond_ends(away)
+        return np.asarray(np.hypot(np.maximum(ends, 0.0), np.maximum(side, 0.0)) < radii)
+    refuse_kind(own.kind)
 
 
 class ReferenceChecks:
@@ -90,16 +167,16 @@ class ReferenceChecks:
         """Which bodies meet, shape (m, moving * standing + pairs of moving bodies)."""
         table, primitives = self._balls[level], self._primitives[level]
         body_count, standing = int(table.header[layout.BODY_COUNT]), int(primitives.header[layout.STANDING_COUNT])
-        pairs = table[layout.PAIRS].reshape(-1, 2)
+        pairs = table[layout.PAIRS].reshape(-1, layout.PAIR_INTS)
         found = np.zeros((len(poses), body_count * standing + len(pairs)), dtype=bool)
         points, radii = placed_balls(poses, table)
         checked = primitives[layout.CHECKED].reshape(body_count, standing)
-        for number, (_, stands, _, _) in enumerate(primitives[layout.NUMBERS].reshape(-1, 4)):
+        for number, stands in enumerate(heads(primitives)[:, layout.STANDING_BODY]):
             for body in np.flatnonzero(checked[:, stands]):
                 found[:, body * standing + stands] |= meets_primitive(
                     primitives, number, points[body], radii[body]
                 ).any(axis=1)
-        for k, (i, j) in enumerate(pairs):
+        for k, (i, j) in enumerate(zip(pairs[:, layout.PAIR_ONE], pairs[:, layout.PAIR_OTHER], strict=True)):
             gaps = np.linalg.norm(points[i][:, :, None] - points[j][:, None], axis=3)
             found[:, body_count * standing + k] = (gaps < radii[i][:, None] + radii[j]).any(axis=(1, 2))
         return found
@@ -109,11 +186,16 @@ def placed_balls(
     poses: NDArray[np.float64], table: Table
 ) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
     """Centres in the world, shape (m, n, 3), and radii, shape (n,), of each body's balls."""
-    balls, clusters = table[layout.BALLS].astype(np.float64).reshape(-1, 4), table[layout.CLUSTERS].reshape(-1, 4)
+    balls = table[layout.BALLS].astype(np.float64).reshape(-1, layout.BALL_FLOATS)
+    clusters = table[layout.CLUSTERS].reshape(-1, layout.CLUSTER_INTS)
+    centres = balls[:, layout.CENTRE : layout.CENTRE + 3]
     points, radii = [], []
-    for frame, first, end in table[layout.BODIES].reshape(-1, 3):
-        span = slice(clusters[first, 2], clusters[end - 1, 3]) if end > first else slice(0, 0)
-        pose = poses[:, frame]
-        points.append(np.einsum("mij,nj->mni", pose[:, :, :3], balls[span, :3]) + pose[:, None, :, 3])
-        radii.append(balls[span, 3])
+    for body in table[layout.BODIES].reshape(-1, layout.BODY_INTS):
+        first, end = body[layout.BODY_FIRST], body[layout.BODY_END]
+        span = slice(0, 0)
+        if end > first:
+            span = slice(clusters[first, layout.CLUSTER_FIRST], clusters[end - 1, layout.CLUSTER_END])
+        pose = poses[:, body[layout.BODY_FRAME]]
+        points.append(np.einsum("mij,nj->mni", pose[:, :, :3], centres[span]) + pose[:, None, :, 3])
+        radii.append(balls[span, layout.RADIUS])
     return points, radii

@@ -1,4 +1,4 @@
-"""The distance kernels' answers in plain numpy, ball by ball: for computers without numba."""
+"""The reference implementation of the distances: the kernels' answers in plain numpy, ball by ball."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.fast.checks.reference import CHUNK, frames, placed_balls
+from rrtik_ompl.fast.checks.reference import CHUNK, PrimitiveView, frames, heads, placed_balls, refuse_kind
 from rrtik_ompl.fast.tables import layout
-from rrtik_ompl.fast.tables.robot_tables import Table
+from rrtik_ompl.fast.tables.memory import Table
 
 
 def measure(arm: Table, balls: Table, primitives: Table, values: Matrix) -> tuple[Vector, NDArray[np.int32]]:
@@ -31,12 +31,13 @@ def _all_gaps(poses: NDArray[np.float64], balls: Table, primitives: Table) -> tu
     points, radii = placed_balls(poses, balls)
     gaps: list[Vector] = []
     numbers: list[int] = []
-    for number, (_, stands, _, _) in enumerate(primitives[layout.NUMBERS].reshape(-1, 4)):
+    for number, stands in enumerate(heads(primitives)[:, layout.STANDING_BODY]):
         for body in np.flatnonzero(checked[:, stands]):
             if len(radii[body]):
                 gaps.append((primitive_gap(primitives, number, points[body]) - radii[body]).min(axis=1))
                 numbers.append(int(body) * standing + int(stands))
-    for k, (i, j) in enumerate(balls[layout.PAIRS].reshape(-1, 2)):
+    pairs = balls[layout.PAIRS].reshape(-1, layout.PAIR_INTS)
+    for k, (i, j) in enumerate(zip(pairs[:, layout.PAIR_ONE], pairs[:, layout.PAIR_OTHER], strict=True)):
         apart = np.linalg.norm(points[i][:, :, None] - points[j][:, None], axis=3)
         gaps.append((apart - radii[i][:, None] - radii[j]).min(axis=(1, 2)))
         numbers.append(body_count * standing + k)
@@ -44,26 +45,27 @@ def _all_gaps(poses: NDArray[np.float64], balls: Table, primitives: Table) -> tu
 
 
 def primitive_gap(primitives: Table, number: int, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Signed distance of points, shape (..., 3), from a row, negative inside. Shape (...)."""
-    row = primitives[layout.PRIMITIVES].reshape(-1, layout.PRIMITIVE_FLOATS)[number].astype(np.float64)
-    kind, _, start, end = primitives[layout.NUMBERS].reshape(-1, 4)[number]
-    if kind == layout.HALF_SPACE:
-        return np.asarray(points @ row[:3] - row[3])
-    if kind == layout.CONVEX:
-        planes = primitives[layout.PLANES].astype(np.float64).reshape(-1, 4)[start:end]
-        height = (points @ planes[:, :3].T - planes[:, 3]).max(axis=-1)
-        return np.asarray(height if row[0] else np.where(height < 0.0, height, np.inf))
-    away = points - row[:3]
-    if kind == layout.BALL:
-        return np.asarray(np.linalg.norm(away, axis=-1) - row[3])
-    if kind == layout.BOX:
-        return _outside(np.abs(away @ row[3:12].reshape(3, 3).T) - row[12:15])
-    along = away @ row[3:6]
-    if kind == layout.CAPSULE:
-        foot = np.clip(along * row[6], 0.0, 1.0)[..., None] * row[3:6]
-        return np.asarray(np.linalg.norm(away - foot, axis=-1) - row[7])
-    across = np.linalg.norm(away - along[..., None] * row[3:6], axis=-1)
-    return _outside(np.stack([np.abs(along) - row[6], across - row[7]], axis=-1))
+    """Signed distance of points, shape (..., 3), from a primitive, negative inside. Shape (...).
+
+    Raises:
+        InputError: If it is of an unknown kind.
+    """
+    own = PrimitiveView(primitives, number)
+    if own.kind == layout.HALF_SPACE:
+        return own.half_space_gap(points)
+    if own.kind == layout.CONVEX:
+        height = own.heights(points)
+        return np.asarray(height if own.number(layout.CONVEX_SHARE) else np.where(height < 0.0, height, np.inf))
+    away = points - own.vector(layout.SHAPE_CENTRE)
+    if own.kind == layout.BALL:
+        return np.asarray(np.linalg.norm(away, axis=-1) - own.number(layout.BALL_RADIUS))
+    if own.kind == layout.BOX:
+        return _outside(own.beyond_faces(away))
+    if own.kind == layout.CAPSULE:
+        return np.asarray(own.to_capsule(away) - own.number(layout.CAPSULE_RADIUS))
+    if own.kind == layout.CYLINDER:
+        return _outside(np.stack(own.beyond_ends(away), axis=-1))
+    refuse_kind(own.kind)
 
 
 def _outside(beyond: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,250 +1,223 @@
-"""Kernels that find the lanes in which balls of the arm meet the surroundings or each other.
+"""Kernels of the broad and the sphere phase: the lanes in which balls of the arm meet the scene.
 
-Balls are tested in three levels: all that a joint carries, neighbourhoods of a body, single balls. A level is left as
-soon as no lane that is still open can touch. Lanes are bits of an integer. Rows and balls: see the tables' modules.
+Balls are tested in three levels: all that a joint carries, clusters of a body, single balls. A level is left as soon as
+no lane that is still open can touch. A set of lanes is an integer, one bit a lane. Primitives and balls: see
+:mod:`rrtik_ompl.fast.tables.layout`.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from rrtik_ompl.fast.checks.obstacle_kernels import meets_primitives, primitives_in_reach, squared
-from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
-from rrtik_ompl.fast.simd.lanes import bits, field, float_at, int_at, lanes_at, set_int, set_lanes
-from rrtik_ompl.fast.tables import layout
-from rrtik_ompl.fast.tables.layout import CENTRES, FOUND, FRAMES, GROUP_CENTRES, MET, NEAR, PLACED
-
-FRAME_BYTES = 12 * 4 * WIDTH
+from rrtik_ompl.fast.checks.obstacle_kernels import meets_primitives, primitives_in_reach
+from rrtik_ompl.fast.simd.compiled import inlined, kernel
+from rrtik_ompl.fast.simd.lanes import int_at, set_int
+from rrtik_ompl.fast.tables.accessors import (
+    ball_x,
+    ball_y,
+    ball_z,
+    balls_of,
+    body_of_cluster,
+    centres_of,
+    checked_of,
+    checked_row,
+    cluster_balls_of,
+    cluster_count_of,
+    cluster_of,
+    end_ball_of,
+    end_cluster_of_group,
+    excluding_of,
+    first_ball_of,
+    first_cluster_of_group,
+    found_of,
+    frame_at,
+    frame_of_cluster,
+    frame_of_group,
+    frames_of,
+    group_balls_of,
+    group_centres_of,
+    group_count_of,
+    group_of,
+    head_of,
+    last_ball_of,
+    last_frame_of,
+    last_primitive_list,
+    last_primitive_of,
+    marks_row,
+    met_of,
+    near_of,
+    origin_at,
+    placed_flags_of,
+    primitive_count_of,
+    radius_at,
+    remember_hit,
+    rotation_row,
+    standing_body_of,
+    standing_count_of,
+    store_centre,
+    stored_centre,
+)
+from rrtik_ompl.fast.tables.layout import (
+    NO_MARKS,
+    BallArray,
+    BallTable,
+    Frame,
+    LastHit,
+    Marks,
+    PrimitiveList,
+    PrimitiveTable,
+    ScratchTable,
+)
 
 
 @inlined
-def placed(frame: int, balls: int, number: int) -> Any:
-    """Centre of a ball in the world; ``frame`` is the address of its frame."""
-    x, y, z = float_at(balls, 4 * number), float_at(balls, 4 * number + 1), float_at(balls, 4 * number + 2)
-    return (
-        lanes_at(frame, 0) * x + lanes_at(frame, 1) * y + lanes_at(frame, 2) * z + lanes_at(frame, 9),
-        lanes_at(frame, 3) * x + lanes_at(frame, 4) * y + lanes_at(frame, 5) * z + lanes_at(frame, 10),
-        lanes_at(frame, 6) * x + lanes_at(frame, 7) * y + lanes_at(frame, 8) * z + lanes_at(frame, 11),
-    )
+def carried(frame: Frame, row: int, x: float, y: float, z: float) -> Any:
+    """A coordinate in the world of a point of a frame."""
+    a, b, c = rotation_row(frame, row)
+    return a * x + b * y + c * z + origin_at(frame, row)
 
 
 @inlined
-def stored(centres: int, number: int) -> Any:
-    """Centre number ``number`` of a run of centres."""
-    return lanes_at(centres, 3 * number), lanes_at(centres, 3 * number + 1), lanes_at(centres, 3 * number + 2)
+def placed_centre(frame: Frame, balls: BallArray, number: int) -> Any:
+    """Centre of a ball in the world."""
+    x, y, z = ball_x(balls, number), ball_y(balls, number), ball_z(balls, number)
+    return carried(frame, 0, x, y, z), carried(frame, 1, x, y, z), carried(frame, 2, x, y, z)
 
 
 @inlined
-def store(centres: int, number: int, x: Any, y: Any, z: Any) -> None:
-    """Set a centre of a run of centres."""
-    set_lanes(centres, 3 * number, x)
-    set_lanes(centres, 3 * number + 1, y)
-    set_lanes(centres, 3 * number + 2, z)
-
-
-@inlined
-def checked_primitives(primitives: int, body: int, source: int, count: int, sink: int) -> int:
+def checked_primitives(
+    primitives: PrimitiveTable, body: int, source: PrimitiveList, count: int, sink: PrimitiveList
+) -> int:
     """Copy a list of primitives without those that a body need not keep clear of; returns how many are left."""
-    everything = int_at(field(primitives, layout.EXCLUDING), body) == 0
-    checked = field(primitives, layout.CHECKED) + 4 * body * field(primitives, layout.STANDING_COUNT)
-    numbers = field(primitives, layout.NUMBERS)
+    everything = int_at(excluding_of(primitives), body) == 0
+    checked = checked_row(checked_of(primitives), standing_count_of(primitives), body)
     kept = 0
     for k in range(count):
         number = int_at(source, k)
-        if everything or int_at(checked, int_at(numbers, 4 * number + 1)) != 0:
+        if everything or int_at(checked, standing_body_of(head_of(primitives, number))) != 0:
             set_int(sink, kept, number)
             kept += 1
     return kept
 
 
 @kernel
-def prepare(balls: int, scratch: int) -> None:
+def prepare(balls: BallTable, scratch: ScratchTable) -> None:
     """Place the groups' centres and forget the balls' centres of the last block."""
-    frames, groups = field(scratch, FRAMES), field(balls, layout.GROUPS)
-    for group in range(field(balls, layout.GROUP_COUNT)):
-        frame = frames + FRAME_BYTES * int_at(groups, 3 * group)
-        x, y, z = placed(frame, field(balls, layout.GROUP_BALLS), group)
-        store(field(scratch, GROUP_CENTRES), group, x, y, z)
-    flags = field(scratch, PLACED)
-    for cluster in range(field(balls, layout.CLUSTER_COUNT)):
+    frames = frames_of(scratch)
+    for group in range(group_count_of(balls)):
+        frame = frame_at(frames, frame_of_group(group_of(balls, group)))
+        x, y, z = placed_centre(frame, group_balls_of(balls), group)
+        store_centre(group_centres_of(scratch), group, x, y, z)
+    flags = placed_flags_of(scratch)
+    for cluster in range(cluster_count_of(balls)):
         set_int(flags, cluster, 0)
 
 
 @inlined
-def place_cluster(balls: int, scratch: int, cluster: int) -> None:
+def place_cluster(balls: BallTable, scratch: ScratchTable, number: int) -> None:
     """Place the centres of a cluster's balls if they are not yet."""
-    if int_at(field(scratch, PLACED), cluster) != 0:
+    if int_at(placed_flags_of(scratch), number) != 0:
         return
-    set_int(field(scratch, PLACED), cluster, 1)
-    numbers = field(balls, layout.CLUSTERS) + 16 * cluster
-    frame = field(scratch, FRAMES) + FRAME_BYTES * int_at(numbers, 1)
-    centres, all_balls = field(scratch, CENTRES), field(balls, layout.BALLS)
-    for ball in range(int_at(numbers, 2), int_at(numbers, 3)):
-        x, y, z = placed(frame, all_balls, ball)
-        store(centres, ball, x, y, z)
+    set_int(placed_flags_of(scratch), number, 1)
+    cluster = cluster_of(balls, number)
+    frame = frame_at(frames_of(scratch), frame_of_cluster(cluster))
+    centres, all_balls = centres_of(scratch), balls_of(balls)
+    for ball in range(first_ball_of(cluster), end_ball_of(cluster)):
+        x, y, z = placed_centre(frame, all_balls, ball)
+        store_centre(centres, ball, x, y, z)
 
 
 @kernel
 def cluster_meets(
-    balls: int, primitives: int, scratch: int, cluster: int, count: int, wanted: int, marks: int, one: bool, last: int
+    balls: BallTable,
+    primitives: PrimitiveTable,
+    scratch: ScratchTable,
+    number: int,
+    count: int,
+    wanted: int,
+    marks: Marks,
+    one: bool,
+    last: LastHit,
 ) -> int:
     """Lanes in which a ball of a cluster meets one of the first ``count`` primitives found; see ``scene_collision``."""
-    numbers = field(balls, layout.CLUSTERS) + 16 * cluster
-    body, frame = int_at(numbers, 0), field(scratch, FRAMES) + FRAME_BYTES * int_at(numbers, 1)
-    near, met = field(scratch, NEAR), field(scratch, MET)
-    count = checked_primitives(primitives, body, field(scratch, FOUND), count, near)
+    cluster = cluster_of(balls, number)
+    body, frame = body_of_cluster(cluster), frame_at(frames_of(scratch), frame_of_cluster(cluster))
+    near, met = near_of(scratch), met_of(scratch)
+    count = checked_primitives(primitives, body, found_of(scratch), count, near)
     if count == 0:
         return 0
-    around = field(balls, layout.CLUSTER_BALLS)
-    x, y, z = placed(frame, around, cluster)
-    close, count = meets_primitives(
-        primitives, x, y, z, float_at(around, 4 * cluster + 3), True, wanted, near, count, near, 0
-    )
+    around = cluster_balls_of(balls)
+    x, y, z = placed_centre(frame, around, number)
+    radius = radius_at(around, number)
+    close, count = meets_primitives(primitives, x, y, z, radius, True, wanted, near, count, near, NO_MARKS)
     if close == 0:
         return 0
-    place_cluster(balls, scratch, cluster)
-    centres, all_balls = field(scratch, CENTRES), field(balls, layout.BALLS)
-    flags = 0 if marks == 0 else marks + 4 * body * field(primitives, layout.STANDING_COUNT)
+    place_cluster(balls, scratch, number)
+    centres, all_balls = centres_of(scratch), balls_of(balls)
+    own_marks = NO_MARKS if marks == NO_MARKS else marks_row(marks, standing_count_of(primitives), body)
     meeting = 0
-    for ball in range(int_at(numbers, 2), int_at(numbers, 3)):
-        x, y, z = stored(centres, ball)
-        still = close if marks != 0 else close & ~meeting
-        radius = float_at(all_balls, 4 * ball + 3)
-        found, _ = meets_primitives(primitives, x, y, z, radius, False, still, near, count, met, flags)
+    for ball in range(first_ball_of(cluster), end_ball_of(cluster)):
+        x, y, z = stored_centre(centres, ball)
+        still = close if marks != NO_MARKS else close & ~meeting
+        radius = radius_at(all_balls, ball)
+        found, _ = meets_primitives(primitives, x, y, z, radius, False, still, near, count, met, own_marks)
         if found != 0:
             meeting |= found
-            set_int(last, 0, ball)
-            set_int(last, 1, int_at(numbers, 1))
-            set_int(last, 2, int_at(met, 0))
-        if marks == 0 and (meeting == close or (one and meeting != 0)):
+            remember_hit(last, ball, frame_of_cluster(cluster), int_at(met, 0))
+        if marks == NO_MARKS and (meeting == close or (one and meeting != 0)):
             break
     return meeting
 
 
 @kernel
-def scene_collision(balls: int, primitives: int, scratch: int, wanted: int, marks: int, one: bool, last: int) -> int:
-    """Lanes among ``wanted`` in which the arm meets a row; if ``one`` is enough, not all of them.
+def scene_collision(
+    balls: BallTable,
+    primitives: PrimitiveTable,
+    scratch: ScratchTable,
+    wanted: int,
+    marks: Marks,
+    one: bool,
+    last: LastHit,
+) -> int:
+    """Lanes among ``wanted`` in which the arm meets a primitive; if ``one`` is enough, not all of them.
 
-    What met is written to ``last``. Unless 0, ``marks`` is the address of one number for each moving and standing
-    body, which collects the lanes in which the two meet.
+    What met is written to ``last``. Unless ``NO_MARKS``, ``marks`` are one number for each moving and standing body,
+    which collects the lanes in which the two meet.
     """
-    if field(primitives, layout.PRIMITIVE_COUNT) == 0:
+    if primitive_count_of(primitives) == 0:
         return 0
-    groups, around = field(balls, layout.GROUPS), field(balls, layout.GROUP_BALLS)
-    found = field(scratch, FOUND)
+    around, found = group_balls_of(balls), found_of(scratch)
     meeting = 0
-    for group in range(field(balls, layout.GROUP_COUNT)):
-        x, y, z = stored(field(scratch, GROUP_CENTRES), group)
-        radius = float_at(around, 4 * group + 3)
-        still = wanted if marks != 0 else wanted & ~meeting
+    for number in range(group_count_of(balls)):
+        x, y, z = stored_centre(group_centres_of(scratch), number)
+        radius = radius_at(around, number)
+        still = wanted if marks != NO_MARKS else wanted & ~meeting
         count = primitives_in_reach(primitives, x, y, z, radius, found)
         if count == 0:
             continue
-        close, count = meets_primitives(primitives, x, y, z, radius, True, still, found, count, found, 0)
+        close, count = meets_primitives(primitives, x, y, z, radius, True, still, found, count, found, NO_MARKS)
         if close == 0:
             continue
-        for cluster in range(int_at(groups, 3 * group + 1), int_at(groups, 3 * group + 2)):
-            left = close if marks != 0 else close & ~meeting
+        group = group_of(balls, number)
+        for cluster in range(first_cluster_of_group(group), end_cluster_of_group(group)):
+            left = close if marks != NO_MARKS else close & ~meeting
             meeting |= cluster_meets(balls, primitives, scratch, cluster, count, left, marks, one, last)
-            if one and meeting != 0 and marks == 0:
+            if one and meeting != 0 and marks == NO_MARKS:
                 return meeting
-        if meeting == wanted and marks == 0:
+        if meeting == wanted and marks == NO_MARKS:
             break
     return meeting
 
 
 @kernel
-def recheck_last_hit(balls: int, primitives: int, scratch: int, wanted: int, last: int) -> int:
-    """Lanes among ``wanted`` in which the ball and the row meet that met last: often the quickest way to an answer."""
-    if int_at(last, 2) < 0:
+def recheck_last_hit(
+    balls: BallTable, primitives: PrimitiveTable, scratch: ScratchTable, wanted: int, last: LastHit
+) -> int:
+    """Lanes among ``wanted`` in which the ball and the primitive meet that met last: often the quickest answer."""
+    if last_primitive_of(last) < 0:
         return 0
-    ball, all_balls = int_at(last, 0), field(balls, layout.BALLS)
-    x, y, z = placed(field(scratch, FRAMES) + FRAME_BYTES * int_at(last, 1), all_balls, ball)
-    radius = float_at(all_balls, 4 * ball + 3)
-    found, _ = meets_primitives(primitives, x, y, z, radius, False, wanted, last + 8, 1, field(scratch, MET), 0)
+    ball, all_balls = last_ball_of(last), balls_of(balls)
+    x, y, z = placed_centre(frame_at(frames_of(scratch), last_frame_of(last)), all_balls, ball)
+    radius, source = radius_at(all_balls, ball), last_primitive_list(last)
+    found, _ = meets_primitives(primitives, x, y, z, radius, False, wanted, source, 1, met_of(scratch), NO_MARKS)
     return int(found)
-
-
-@inlined
-def within(x: Any, y: Any, z: Any, centre: Any, reach: float) -> Any:
-    """Lanes in which two points are nearer to each other than ``reach``."""
-    return bits(squared(x - centre[0], y - centre[1], z - centre[2]) < reach * reach)
-
-
-@kernel
-def clusters_meet(balls: int, scratch: int, first: int, second: int, wanted: int) -> int:
-    """Lanes in which a ball of one cluster meets a ball of another."""
-    place_cluster(balls, scratch, first)
-    place_cluster(balls, scratch, second)
-    centres, all_balls = field(scratch, CENTRES), field(balls, layout.BALLS)
-    around, frames = field(balls, layout.CLUSTER_BALLS), field(scratch, FRAMES)
-    mine, others = field(balls, layout.CLUSTERS) + 16 * first, field(balls, layout.CLUSTERS) + 16 * second
-    hull = placed(frames + FRAME_BYTES * int_at(others, 1), around, second)
-    meeting = 0
-    for ball in range(int_at(mine, 2), int_at(mine, 3)):
-        x, y, z = stored(centres, ball)
-        radius = float_at(all_balls, 4 * ball + 3)
-        if within(x, y, z, hull, radius + float_at(around, 4 * second + 3)) & wanted & ~meeting == 0:
-            continue
-        for other in range(int_at(others, 2), int_at(others, 3)):
-            meeting |= within(x, y, z, stored(centres, other), radius + float_at(all_balls, 4 * other + 3)) & wanted
-        if meeting == wanted:
-            break
-    return meeting
-
-
-@kernel
-def bodies_meet(balls: int, scratch: int, first: int, second: int, wanted: int) -> int:
-    """Lanes in which a ball of one body meets a ball of another."""
-    frames, bodies = field(scratch, FRAMES), field(balls, layout.BODIES)
-    around, hulls = field(balls, layout.CLUSTER_BALLS), field(balls, layout.BODY_BALLS)
-    first_frame = frames + FRAME_BYTES * int_at(bodies, 3 * first)
-    second_frame = frames + FRAME_BYTES * int_at(bodies, 3 * second)
-    hull, radius = placed(second_frame, hulls, second), float_at(hulls, 4 * second + 3)
-    x, y, z = placed(first_frame, hulls, first)
-    close = within(x, y, z, hull, radius + float_at(hulls, 4 * first + 3)) & wanted
-    meeting = 0
-    if close == 0:
-        return meeting
-    for mine in range(int_at(bodies, 3 * first + 1), int_at(bodies, 3 * first + 2)):
-        x, y, z = placed(first_frame, around, mine)
-        extent = float_at(around, 4 * mine + 3)
-        near = within(x, y, z, hull, radius + extent) & close & ~meeting
-        if near == 0:
-            continue
-        for other in range(int_at(bodies, 3 * second + 1), int_at(bodies, 3 * second + 2)):
-            centre = placed(second_frame, around, other)
-            both = within(x, y, z, centre, extent + float_at(around, 4 * other + 3)) & near & ~meeting
-            if both != 0:
-                meeting |= clusters_meet(balls, scratch, mine, other, both)
-        if meeting == close:
-            break
-    return meeting
-
-
-@kernel
-def self_collision(balls: int, scratch: int, wanted: int, marks: int, one: bool) -> int:
-    """Lanes among ``wanted`` in which two bodies of the arm meet; if ``one`` is enough, not all of them.
-
-    Unless 0, ``marks`` is the address of one number for each pair, which collects the lanes.
-    """
-    groups, pairs = field(balls, layout.PAIR_GROUPS), field(balls, layout.PAIRS)
-    around, centres = field(balls, layout.GROUP_BALLS), field(scratch, GROUP_CENTRES)
-    meeting = 0
-    for k in range(field(balls, layout.PAIR_GROUP_COUNT)):
-        first, second = int_at(groups, 4 * k), int_at(groups, 4 * k + 1)
-        x, y, z = stored(centres, first)
-        reach = float_at(around, 4 * first + 3) + float_at(around, 4 * second + 3)
-        close = within(x, y, z, stored(centres, second), reach) & wanted
-        if marks == 0:
-            close &= ~meeting
-        if close == 0:
-            continue
-        for pair in range(int_at(groups, 4 * k + 2), int_at(groups, 4 * k + 3)):
-            found = bodies_meet(balls, scratch, int_at(pairs, 2 * pair), int_at(pairs, 2 * pair + 1), close)
-            meeting |= found
-            if marks != 0 and found != 0:
-                set_int(marks, pair, int_at(marks, pair) | found)
-        if marks == 0 and (meeting == wanted or (one and meeting != 0)):
-            break
-    return meeting

@@ -4,16 +4,53 @@ from __future__ import annotations
 
 from typing import Any
 
-from rrtik_ompl.fast.ik import branch_layout as table
-from rrtik_ompl.fast.ik import ik_layout
+from rrtik_ompl.fast.ik import branch_layout, ik_layout
+from rrtik_ompl.fast.ik.branch_accessors import (
+    answer,
+    fits_of,
+    frame_column,
+    frame_origin,
+    frame_row,
+    from_world_of,
+    highest_of,
+    hint_of,
+    limb_of,
+    load_target,
+    load_target_origin,
+    lowest_of,
+    matrix_entry,
+    near_of,
+    pose_of,
+    q_of,
+    residuals_of,
+    row_count_of,
+    scratch_of,
+    set_lane,
+    set_placed_entry,
+    set_placed_origin,
+    target_column,
+    target_origin,
+    target_row,
+    to_frame_of,
+    turning_of,
+)
+from rrtik_ompl.fast.ik.branch_layout import ArmTable, CallTable, Frame, Lanes
+from rrtik_ompl.fast.ik.ik_accessors import (
+    column_of,
+    fixed_of,
+    gain_of,
+    next_pose,
+    offset_of,
+    pose_column,
+    pose_origin,
+    pose_row,
+)
 from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import (
     double_at,
-    field,
     floor,
     int_at,
     lane_numbers,
-    set_double,
     set_truths,
     set_wide_lanes,
     smaller,
@@ -23,128 +60,126 @@ from rrtik_ompl.fast.simd.lanes import (
 )
 from rrtik_ompl.fast.simd.wide_angles import TAU, arc_sine, wide_sine_and_cosine, within_half_turn
 
-POSE_BYTES = 128
 MAX_COORDINATE = 1e9  # [m] squares of what is farther away could leave the numbers; it is out of reach all the same
 
 
 @kernel
-def load(arm: int, call: int, block: int) -> None:
+def load(arm: ArmTable, call: CallTable, block: int) -> None:
     """Read a block of targets and place them; behind the last target come copies of it."""
-    scratch = field(call, table.SCRATCH)
+    scratch = scratch_of(call)
     for lane in range(WIDTH):
-        row = min(WIDTH * block + lane, field(call, table.ROWS) - 1)
-        pose = field(call, table.POSES) + POSE_BYTES * row
+        row = min(WIDTH * block + lane, row_count_of(call) - 1)
+        pose = pose_of(call, row)
         for k in range(3):
             for column in range(3):
-                set_double(scratch, WIDTH * (3 * k + column) + lane, double_at(pose, 4 * k + column))
-            set_double(
-                scratch, WIDTH * (9 + k) + lane, min(max(double_at(pose, 4 * k + 3), -MAX_COORDINATE), MAX_COORDINATE)
-            )
-        if field(call, table.NEAR) != 0:
-            for joint in range(6):
-                value = double_at(field(call, table.NEAR), 6 * row + joint)
-                set_double(scratch, WIDTH * (table.HINT + joint) + lane, value)
-    place(arm, scratch)
+                load_target(scratch, lane, k, column, matrix_entry(pose, k, column))
+            value = min(max(matrix_entry(pose, k, 3), -MAX_COORDINATE), MAX_COORDINATE)
+            load_target_origin(scratch, lane, k, value)
+        if near_of(call) != 0:
+            for joint in range(branch_layout.DOF):
+                set_lane(scratch, branch_layout.HINT + joint, lane, hint_of(call, row, joint))
+    place_targets(arm, scratch)
 
 
 @inlined
-def place(arm: int, scratch: int) -> None:
+def place_targets(arm: ArmTable, scratch: Lanes) -> None:
     """T_base_frame of T_world_tip."""
-    before, after = field(arm, table.FROM_WORLD), field(arm, table.TO_FRAME)
+    before, after = from_world_of(arm), to_frame_of(arm)
     for row in range(3):
         a, b, c = turned_row(before, row, scratch)
-        o = weighed(before, row, wide_lanes_at(scratch, 9), wide_lanes_at(scratch, 10), wide_lanes_at(scratch, 11))
-        o = o + double_at(before, 9 + row)
+        o = along(
+            frame_row(before, row), target_origin(scratch, 0), target_origin(scratch, 1), target_origin(scratch, 2)
+        )
+        o = o + double_at(before, branch_layout.ORIGIN + row)
         for k in range(3):
-            entry = a * double_at(after, k) + b * double_at(after, 3 + k) + c * double_at(after, 6 + k)
-            set_wide_lanes(scratch, table.FRAME + 3 * row + k, entry)
-        lever = a * double_at(after, 9) + b * double_at(after, 10) + c * double_at(after, 11)
-        set_wide_lanes(scratch, table.FRAME + 9 + row, o + lever)
+            set_placed_entry(scratch, row, k, along(frame_column(after, k), a, b, c))
+        lever = along(frame_origin(after), a, b, c)
+        set_placed_origin(scratch, row, o + lever)
 
 
 @inlined
-def weighed(frame: int, row: int, x: Any, y: Any, z: Any) -> Any:
-    """A row of a frame's rotation times a vector in lanes."""
-    return double_at(frame, 3 * row) * x + double_at(frame, 3 * row + 1) * y + double_at(frame, 3 * row + 2) * z
+def along(vector: Any, x: Any, y: Any, z: Any) -> Any:
+    """Dot product of lanes of vectors with three numbers."""
+    return x * vector[0] + y * vector[1] + z * vector[2]
 
 
 @inlined
-def turned_row(frame: int, row: int, scratch: int) -> Any:
+def turned_row(frame: Frame, row: int, scratch: Lanes) -> Any:
     """A row of a rotation times the rotation of the target as given."""
-    x = weighed(frame, row, wide_lanes_at(scratch, 0), wide_lanes_at(scratch, 3), wide_lanes_at(scratch, 6))
-    y = weighed(frame, row, wide_lanes_at(scratch, 1), wide_lanes_at(scratch, 4), wide_lanes_at(scratch, 7))
-    z = weighed(frame, row, wide_lanes_at(scratch, 2), wide_lanes_at(scratch, 5), wide_lanes_at(scratch, 8))
-    return x, y, z
-
-
-@inlined
-def answer(call: int, joint: int, branch: int, block: int) -> Any:
-    """Place of a joint's values among the answers, in wide lanes."""
-    return (table.BRANCHES * joint + branch) * field(call, table.BLOCKS) + block
+    own = frame_row(frame, row)
+    first, second, third = target_column(scratch, 0), target_column(scratch, 1), target_column(scratch, 2)
+    return (
+        along(own, first[0], first[1], first[2]),
+        along(own, second[0], second[1], second[2]),
+        along(own, third[0], third[1], third[2]),
+    )
 
 
 @kernel
-def check_branches(arm: int, call: int, block: int) -> None:
+def check_branches(arm: ArmTable, call: CallTable, block: int) -> None:
     """Turn the branches of a block into the limits, say which fit, and measure them."""
-    for branch in range(table.BRANCHES):
+    for branch in range(branch_layout.BRANCHES):
         hold(arm, call, branch, block)
-        if field(call, table.RESIDUALS) != 0:
+        if residuals_of(call) != 0:
             measure(arm, call, branch, block)
 
 
 @inlined
-def hold(arm: int, call: int, branch: int, block: int) -> None:
-    """Turn joints by full turns into their limits, towards the hint if there is room; which configurations fit."""
+def hold(arm: ArmTable, call: CallTable, branch: int, block: int) -> None:
+    """Turn joints by full turns into their limits, towards the hint where they allow it; which configurations fit."""
     fits = lane_numbers() >= 0.0
-    for joint in range(6):
-        low, high = double_at(field(arm, table.LOWEST), joint), double_at(field(arm, table.HIGHEST), joint)
+    for joint in range(branch_layout.DOF):
+        low, high = double_at(lowest_of(arm), joint), double_at(highest_of(arm), joint)
         place = answer(call, joint, branch, block)
-        value = wide_lanes_at(field(call, table.Q), place)
-        if int_at(field(arm, table.TURNING), joint) != 0:
+        value = wide_lanes_at(q_of(call), place)
+        if int_at(turning_of(arm), joint) != 0:
             near = spread_wide(0.0)
-            if field(call, table.NEAR) != 0:
-                near = wide_lanes_at(field(call, table.SCRATCH), table.HINT + joint)
+            if near_of(call) != 0:
+                near = wide_lanes_at(scratch_of(call), branch_layout.HINT + joint)
             value = near + within_half_turn(value - near)
             value = value + TAU * floor(smaller(high - value, 0.0) * (1.0 / TAU))
             value = value - TAU * floor(smaller(value - low, 0.0) * (1.0 / TAU))
-            set_wide_lanes(field(call, table.Q), place, value)
+            set_wide_lanes(q_of(call), place, value)
         fits = fits & (value >= low) & (value <= high)
-    set_truths(field(call, table.FITS), WIDTH * answer(call, 0, branch, block), fits)
+    set_truths(fits_of(call), WIDTH * answer(call, 0, branch, block), fits)
 
 
 @inlined
-def measure(arm: int, call: int, branch: int, block: int) -> None:
+def measure(arm: ArmTable, call: CallTable, branch: int, block: int) -> None:
     """Distance and angle between the target and where a branch brings the tip."""
-    limb, scratch = field(arm, table.LIMB), field(call, table.SCRATCH)
-    for joint in range(6):
-        column = int_at(field(limb, ik_layout.COLUMN), joint)
-        value = wide_lanes_at(field(call, table.Q), answer(call, column, branch, block))
-        value = value * double_at(field(limb, ik_layout.GAIN), joint) + double_at(field(limb, ik_layout.OFFSET), joint)
+    limb, scratch = limb_of(arm), scratch_of(call)
+    for joint in range(branch_layout.DOF):
+        column = int_at(column_of(limb), joint)
+        value = wide_lanes_at(q_of(call), answer(call, column, branch, block))
+        value = value * double_at(gain_of(limb), joint) + double_at(offset_of(limb), joint)
         sine, cosine = wide_sine_and_cosine(value)
-        set_wide_lanes(scratch, table.SINES + joint, sine)
-        set_wide_lanes(scratch, table.COSINES + joint, cosine)
+        set_wide_lanes(scratch, branch_layout.SINES + joint, sine)
+        set_wide_lanes(scratch, branch_layout.COSINES + joint, cosine)
     away, turned = spread_wide(0.0), spread_wide(0.0)
     for row in range(3):
-        x, y, z, o = row_of_tip(field(limb, ik_layout.FIXED), scratch, row)
-        x, y = x - wide_lanes_at(scratch, 3 * row), y - wide_lanes_at(scratch, 3 * row + 1)
-        z, o = z - wide_lanes_at(scratch, 3 * row + 2), o - wide_lanes_at(scratch, 9 + row)
+        x, y, z, o = row_of_tip(fixed_of(limb), scratch, row)
+        a, b, c = target_row(scratch, row)
+        x, y, z, o = x - a, y - b, z - c, o - target_origin(scratch, row)
         away, turned = away + o * o, turned + (x * x + y * y + z * z)
     angle = 2.0 * arc_sine(smaller(square_root(turned * 0.125), 1.0))
-    set_wide_lanes(field(call, table.RESIDUALS), answer(call, 0, branch, block), square_root(away))
-    set_wide_lanes(field(call, table.RESIDUALS), answer(call, 1, branch, block), angle)
+    set_wide_lanes(residuals_of(call), answer(call, 0, branch, block), square_root(away))
+    set_wide_lanes(residuals_of(call), answer(call, 1, branch, block), angle)
 
 
 @inlined
-def row_of_tip(fixed: int, scratch: int, row: int) -> Any:
+def row_of_tip(fixed: ik_layout.Pose, scratch: Lanes, row: int) -> Any:
     """A row of the tip's frame: of its three axes and its origin. All joints turn about their z."""
-    x, y = spread_wide(double_at(fixed, 3 * row)), spread_wide(double_at(fixed, 3 * row + 1))
-    z, o = spread_wide(double_at(fixed, 3 * row + 2)), spread_wide(double_at(fixed, 9 + row))
-    for joint in range(6):
-        fixed += ik_layout.FRAME_BYTES
-        sine, cosine = wide_lanes_at(scratch, table.SINES + joint), wide_lanes_at(scratch, table.COSINES + joint)
+    first, start = pose_row(fixed, row), pose_origin(fixed, row)
+    x, y, z, o = spread_wide(first[0]), spread_wide(first[1]), spread_wide(first[2]), spread_wide(start)
+    for joint in range(branch_layout.DOF):
+        fixed = next_pose(fixed)
+        sine = wide_lanes_at(scratch, branch_layout.SINES + joint)
+        cosine = wide_lanes_at(scratch, branch_layout.COSINES + joint)
         a, b = cosine * x + sine * y, cosine * y - sine * x
-        o = o + (a * double_at(fixed, 9) + b * double_at(fixed, 10) + z * double_at(fixed, 11))
-        x = a * double_at(fixed, 0) + b * double_at(fixed, 3) + z * double_at(fixed, 6)
-        y = a * double_at(fixed, 1) + b * double_at(fixed, 4) + z * double_at(fixed, 7)
-        z = a * double_at(fixed, 2) + b * double_at(fixed, 5) + z * double_at(fixed, 8)
+        o = o + (a * pose_origin(fixed, 0) + b * pose_origin(fixed, 1) + z * pose_origin(fixed, 2))
+        x, y, z = (
+            along(pose_column(fixed, 0), a, b, z),
+            along(pose_column(fixed, 1), a, b, z),
+            along(pose_column(fixed, 2), a, b, z),
+        )
     return x, y, z, o

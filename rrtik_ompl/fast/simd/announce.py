@@ -14,7 +14,7 @@ _told = False
 
 
 def announce_compiling() -> None:
-    """Tell that kernels are being compiled, unless that has been told."""
+    """Report that kernels are being compiled, once."""
     global _told
     if not _told:
         _told = True

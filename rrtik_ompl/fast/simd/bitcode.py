@@ -30,7 +30,7 @@ def compiled_module(name: str) -> Code:
     """
     module = import_module(f"rrtik_ompl.fast.{name}")
     functions = compiled.entries(module.__name__)
-    linked = llvm.parse_assembly(str(_doors(functions)))
+    linked = llvm.parse_assembly(str(_entry_points(functions)))
     for function in functions.values():
         overload = _overload(function)
         code = overload.library._get_module_for_linking().clone()
@@ -55,19 +55,19 @@ def _overload(function: Any) -> Any:
     return function.overloads[kinds]
 
 
-def _doors(functions: dict[str, Any]) -> Any:
+def _entry_points(functions: dict[str, Any]) -> Any:
     """C functions of whole numbers that call those of numba, which return a status and the result at an address."""
-    module = ir.Module("doors")
+    module = ir.Module("entry_points")
     for entry, function in functions.items():
         overload, count = _overload(function), _count(function)
         convention = cpu_target.target_context.call_conv
         kind = convention.get_function_type(types.int64, (types.int64,) * count)
         inner = ir.Function(module, kind, overload.fndesc.llvm_func_name)
-        door = ir.Function(module, ir.FunctionType(WHOLE, [WHOLE] * count), PREFIX + entry)
-        builder = ir.IRBuilder(door.append_basic_block())
+        outer = ir.Function(module, ir.FunctionType(WHOLE, [WHOLE] * count), PREFIX + entry)
+        builder = ir.IRBuilder(outer.append_basic_block())
         result, trouble = builder.alloca(WHOLE), builder.alloca(kind.args[1].pointee)
         builder.store(ir.Constant(WHOLE, 0), result)
-        builder.call(inner, [result, trouble, *door.args])
+        builder.call(inner, [result, trouble, *outer.args])
         builder.ret(builder.load(result))
     return module
 

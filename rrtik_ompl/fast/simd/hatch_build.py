@@ -16,7 +16,7 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-ASKED = os.environ.get("RRTIK_KERNELS", "")
+SETTING = os.environ.get("RRTIK_KERNELS", "")
 WIDTHS = ("8", "16")
 PATIENCE = 600.0  # [s]
 PORTABLE = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}  # nothing that only this processor can do
@@ -29,11 +29,11 @@ class KernelBitcode(BuildHookInterface):  # type: ignore[misc]
 
     def dependencies(self) -> list[str]:
         """What the build environment needs besides hatch."""
-        return [] if ASKED == "0" else ["numba>=0.68.1"]
+        return [] if SETTING == "0" else ["numba>=0.68.1"]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile before the wheel is packed."""
-        if version == "editable" or ASKED == "0":
+        if version == "editable" or SETTING == "0":
             return
         try:
             self._made = tempfile.TemporaryDirectory(prefix="rrtik-kernels-")

@@ -2,7 +2,7 @@
 
 A value of these types lives in one or two vector registers of the processor. Arithmetic and comparison work lane by
 lane and mix with scalars. Memory is addressed by integers (``array.ctypes.data``), without bounds checks: the tables
-own their arrays, and whoever packs them answers for every index in them.
+own their arrays, and the packer guarantees every index in them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from rrtik_ompl.fast.tables.layout import ALIGNMENT
 # Values are finite by contract and signs of zero do not matter; sums are not reordered, so error bounds hold.
 FAST_MATH = ("nnan", "ninf", "nsz", "contract")
 
-_SINGLE, _DOUBLE, _INDEX = ir.FloatType(), ir.DoubleType(), ir.IntType(32)
+SINGLE, DOUBLE, INDEX, WHOLE = ir.FloatType(), ir.DoubleType(), ir.IntType(32), ir.IntType(64)
 
 
 def _lowered(function: Callable[..., Any]) -> Any:
@@ -62,15 +62,15 @@ class _MaskModel(models.PrimitiveModel):  # type: ignore[misc]
 
 
 def _vector(lane_type: LaneType) -> Any:
-    return ir.VectorType(_SINGLE if lane_type.scalar == types.float32 else _DOUBLE, WIDTH)
+    return ir.VectorType(SINGLE if lane_type.scalar == types.float32 else DOUBLE, WIDTH)
 
 
 def _spread(builder: Any, value: Any) -> Any:
     """A vector with the same scalar in every lane."""
     vector = ir.VectorType(value.type, WIDTH)
     blank = ir.Constant(vector, ir.Undefined)
-    single = builder.insert_element(blank, value, ir.Constant(_INDEX, 0))
-    return builder.shuffle_vector(single, blank, ir.Constant(ir.VectorType(_INDEX, WIDTH), [0] * WIDTH))
+    single = builder.insert_element(blank, value, ir.Constant(INDEX, 0))
+    return builder.shuffle_vector(single, blank, ir.Constant(ir.VectorType(INDEX, WIDTH), [0] * WIDTH))
 
 
 def _vectors(builder: Any, sig: Any, args: Any) -> list[Any]:
@@ -139,7 +139,7 @@ def _lane_function(name: str, count: int) -> Any:
 
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         vector = _vector(sig.return_type)
-        full = f"{name}.v{WIDTH}f{32 if vector.element == _SINGLE else 64}"
+        full = f"{name}.v{WIDTH}f{32 if vector.element == SINGLE else 64}"
         called = cgutils.get_or_insert_function(builder.module, ir.FunctionType(vector, [vector] * count), full)
         return builder.call(called, _vectors(builder, sig, args), fastmath=FAST_MATH)
 
@@ -162,7 +162,7 @@ larger = _lane_function("llvm.maxnum", 2)
 
 def _reduction(name: str) -> Any:
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        kind = ir.FunctionType(_SINGLE, [args[0].type])
+        kind = ir.FunctionType(SINGLE, [args[0].type])
         called = cgutils.get_or_insert_function(builder.module, kind, f"llvm.vector.reduce.{name}.v{WIDTH}f32")
         return builder.call(called, args, fastmath=FAST_MATH)
 
@@ -188,7 +188,7 @@ def bits(typingctx: Any, mask: Any) -> Any:
     """A mask as an integer, lane 0 in the lowest bit."""
 
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.zext(builder.bitcast(args[0], ir.IntType(WIDTH)), ir.IntType(64))
+        return builder.zext(builder.bitcast(args[0], ir.IntType(WIDTH)), WHOLE)
 
     return types.int64(mask), emit
 
@@ -218,7 +218,7 @@ def lane_numbers(typingctx: Any) -> Any:
     """Wide lanes 0, 1, 2, ..."""
 
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return ir.Constant(_vector(WIDE_LANES), [ir.Constant(_DOUBLE, float(k)) for k in range(WIDTH)])
+        return ir.Constant(_vector(WIDE_LANES), [ir.Constant(DOUBLE, float(k)) for k in range(WIDTH)])
 
     return signature(WIDE_LANES), emit
 
@@ -244,7 +244,8 @@ spread = _spreader(LANES)
 spread_wide = _spreader(WIDE_LANES)
 
 
-def _pointer(builder: Any, element: Any, address: Any, index: Any) -> Any:
+def pointer(builder: Any, element: Any, address: Any, index: Any) -> Any:
+    """LLVM's pointer to element number ``index`` of an array at an address."""
     return builder.gep(builder.inttoptr(address, element.as_pointer()), [index])
 
 
@@ -252,8 +253,8 @@ def _reader(element: Any, result: Any, align: int) -> Any:
     """Function (address, index) that reads element number ``index`` of an array at an address."""
 
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        value = builder.load(_pointer(builder, element, *args), align=align)
-        return builder.sext(value, ir.IntType(64)) if element == _INDEX else value
+        value = builder.load(pointer(builder, element, *args), align=align)
+        return builder.sext(value, WHOLE) if element == INDEX else value
 
     return intrinsic(lambda typingctx, address, index: (result(types.int64, types.int64), emit))
 
@@ -263,7 +264,7 @@ def _writer(element: Any, value_type: Any, align: int) -> Any:
 
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         value = builder.trunc(args[2], element) if value_type == types.int64 else args[2]
-        builder.store(value, _pointer(builder, element, *args[:2]), align=align)
+        builder.store(value, pointer(builder, element, *args[:2]), align=align)
         return context.get_dummy_value()
 
     return intrinsic(lambda typingctx, address, index, value: (types.void(types.int64, types.int64, value_type), emit))
@@ -284,13 +285,13 @@ def set_truths(typingctx: Any, address: Any, index: Any, mask: Any) -> Any:
 
 lanes_at = _reader(_vector(LANES), LANES, ALIGNMENT // 2)
 wide_lanes_at = _reader(_vector(WIDE_LANES), WIDE_LANES, ALIGNMENT)
-double_at = _reader(_DOUBLE, types.float64, 8)
-float_at = _reader(_SINGLE, types.float32, 4)
-int_at = _reader(_INDEX, types.int64, 4)
-field = _reader(ir.IntType(64), types.int64, 8)  # of a table: see :mod:`rrtik_ompl.fast.tables.layout`
+double_at = _reader(DOUBLE, types.float64, 8)
+float_at = _reader(SINGLE, types.float32, 4)
+int_at = _reader(INDEX, types.int64, 4)
+field = _reader(WHOLE, types.int64, 8)  # of a table: see :mod:`rrtik_ompl.fast.tables.layout`
 set_lanes = _writer(_vector(LANES), LANES, ALIGNMENT // 2)
 set_wide_lanes = _writer(_vector(WIDE_LANES), WIDE_LANES, ALIGNMENT)
-set_double = _writer(_DOUBLE, types.float64, 8)
-set_int = _writer(_INDEX, types.int64, 4)
-set_float = _writer(_SINGLE, types.float32, 4)
-set_field = _writer(ir.IntType(64), types.int64, 8)
+set_double = _writer(DOUBLE, types.float64, 8)
+set_int = _writer(INDEX, types.int64, 4)
+set_float = _writer(SINGLE, types.float32, 4)
+set_field = _writer(WHOLE, types.int64, 8)

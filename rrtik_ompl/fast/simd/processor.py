@@ -1,6 +1,6 @@
 """The processor that kernels run on: how many lanes fill its registers, and what LLVM needs to know to make its code.
 
-Nothing here needs numba. Without llvmlite there are no kernels, and what stands here is not asked.
+Nothing here needs numba. Without llvmlite there are no kernels, and nothing here is used.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ WIDTH_VARIABLE = "RRTIK_LANES"
 
 @cache
 def _features() -> dict[str, bool]:
-    """Features of this processor as LLVM names them; none where LLVM cannot tell."""
+    """Features of this processor as LLVM names them; none where LLVM does not know."""
     try:
         import llvmlite.binding as llvm
 
@@ -29,9 +29,9 @@ def processor_width() -> int:
     Eight lanes are right everywhere: LLVM spreads them over as many registers as they need, one with AVX, two with
     SSE or NEON (AArch64).
     """
-    asked = os.environ.get(WIDTH_VARIABLE, "")
-    if asked in ("8", "16"):
-        return int(asked)
+    chosen = os.environ.get(WIDTH_VARIABLE, "")
+    if chosen in ("8", "16"):
+        return int(chosen)
     return 16 if _features().get("avx512f", False) else 8
 
 

@@ -1,60 +1,145 @@
-"""Where things stand in the tables that Python packs and kernels read.
+"""Where things stand in the tables that Python packs and kernels read, and the types of their addresses.
 
-A table is an int64 array of fields; a field is a number or the address of an array. The names below are the fields'
-places. Frames are counted like Pinocchio's joints: 0 is the world. This module imports nothing, so that packing needs
-no compiler and compiling no collision library.
+A table is an int64 array of fields; a field is a number or the address of an array. An array holds records, each of so
+many numbers. The names below are the places of the fields in a table and of the numbers in a record; packers, kernels
+and the reference implementation in numpy all use these names, so that every place stands here once. Kernels read by the
+named functions of :mod:`rrtik_ompl.fast.tables.accessors`.
+
+Frames are counted like Pinocchio's joints: 0 is the world. This module imports no library, so that packing needs no
+compiler and compiling no collision library.
 """
 
 from __future__ import annotations
 
+from typing import NewType
+
 ALIGNMENT = 64  # [bytes] of every array that whole vectors are read from
+INT_BYTES, FLOAT_BYTES, DOUBLE_BYTES = 4, 4, 8
 FREE, UNDECIDED, COLLIDING = 0, 1, 2  # answers
+UNSOUND = -1  # what an entry returns in place of a count if a table holds what no kernel knows
+
+# Addresses of tables.
+WorldTable = NewType("WorldTable", int)
+ArmTable = NewType("ArmTable", int)
+BallTable = NewType("BallTable", int)
+PrimitiveTable = NewType("PrimitiveTable", int)
+SolidTable = NewType("SolidTable", int)
+ScratchTable = NewType("ScratchTable", int)
+ProbeTable = NewType("ProbeTable", int)
+
+# Addresses of arrays, by what they hold.
+IntArray = NewType("IntArray", int)
+DoubleArray = NewType("DoubleArray", int)
+LaneArray = NewType("LaneArray", int)
+JointValues = NewType("JointValues", int)  # rows of float64, one number for each joint
+BallArray = NewType("BallArray", int)
+PlaneArray = NewType("PlaneArray", int)
+FrameArray = NewType("FrameArray", int)
+CentreArray = NewType("CentreArray", int)  # of points, lanes of x, of y and of z each
+CornerArray = NewType("CornerArray", int)
+PrimitiveList = NewType("PrimitiveList", int)  # numbers of primitives, int32
+Marks = NewType("Marks", int)  # for each pair of bodies the lanes in which it is in doubt, int32
+NO_MARKS = Marks(0)
+
+# Addresses of records.
+Placement = NewType("Placement", int)
+Frame = NewType("Frame", int)
+Group = NewType("Group", int)
+Cluster = NewType("Cluster", int)
+MovingBody = NewType("MovingBody", int)
+PairGroup = NewType("PairGroup", int)
+Pair = NewType("Pair", int)
+PrimitiveHead = NewType("PrimitiveHead", int)
+PrimitiveShape = NewType("PrimitiveShape", int)
+Plane = NewType("Plane", int)
+Span = NewType("Span", int)
+Solid = NewType("Solid", int)
+SolidSizes = NewType("SolidSizes", int)
+LastHit = NewType("LastHit", int)
 
 # World: addresses of the tables that a check needs.
 ARM, OUTER, INNER, OUTER_PRIMITIVES, INNER_PRIMITIVES, SCRATCH, MOVING_SOLIDS, STANDING_SOLIDS = range(8)
 
-# Arm: placements are 12 floats a joint, the rotation row by row and then the translation.
+# Arm. PARENTS: frame that carries each joint · SLIDING: whether a joint slides · PLACEMENTS: of each joint in its
+# parent's frame
 JOINT_COUNT, PARENTS, SLIDING, PLACEMENTS = range(4)
+# Placement (of floats) and frame (of lanes): the rotation row by row, then the origin.
+POSE_NUMBERS = 12
+ROTATION, ORIGIN = 0, 9
 
-# Balls (of the outer cover, or inner ones). Balls are 4 floats: centre in the joint frame and radius.
-# group: frame, clusters from, to · cluster: body, frame, balls from, to · body: frame, clusters from, to
-# pair group: group, group, pairs from, to · pair: body, body
+# Balls (of the outer cover, or inner ones) in three levels: groups (all that a joint carries) of clusters of balls;
+# a body is a run of clusters too. GROUP_BALLS, CLUSTER_BALLS, BODY_BALLS: a ball around each group, cluster, body.
 GROUP_COUNT, GROUPS, GROUP_BALLS, CLUSTERS, CLUSTER_BALLS, BALLS, BODIES, BODY_BALLS = range(8)
 PAIR_GROUP_COUNT, PAIR_GROUPS, PAIRS, CLUSTER_COUNT, BODY_COUNT, PAIR_COUNT = range(8, 14)
+# Ball (floats): centre in the joint frame, radius.
+BALL_FLOATS = 4
+CENTRE, RADIUS = 0, 3
+# Group (ints): frame, clusters from, to.
+GROUP_INTS = 3
+GROUP_FRAME, GROUP_FIRST, GROUP_END = range(3)
+# Cluster (ints): number of its body, frame, balls from, to.
+CLUSTER_INTS = 4
+CLUSTER_BODY, CLUSTER_FRAME, CLUSTER_FIRST, CLUSTER_END = range(4)
+# Body (ints): frame, clusters from, to.
+BODY_INTS = 3
+BODY_FRAME, BODY_FIRST, BODY_END = range(3)
+# Pair group (ints): numbers of two groups, pairs of their bodies from, to.
+PAIR_GROUP_INTS = 4
+PAIR_GROUP_ONE, PAIR_GROUP_OTHER, PAIR_GROUP_FIRST, PAIR_GROUP_END = range(4)
+# Pair (ints): numbers of two bodies.
+PAIR_INTS = 2
+PAIR_ONE, PAIR_OTHER = range(2)
 
-# Primitives: what stands still. BOXES: 6 runs of PADDED_COUNT floats, lowest x, highest x, lowest y, ... · numbers:
-# kind, body, planes from, to · PLANES: outward normal and offset · CHECKED: one int for each moving and standing body,
-# 0 to ignore that pair · EXCLUDING: for each moving body whether it has a pair to ignore · OWN: for each standing body
-# the primitive that has its formula, or any of its balls, -1 if it has none
+# Primitives: what stands still. BOXES: BOX_RUNS of PADDED_COUNT floats · NUMBERS: the heads · PRIMITIVES: the
+# shapes · CHECKED: one int for each moving and standing body, 0 to ignore that pair ·
+# EXCLUDING: for each moving body whether it has a pair to ignore · OWN: for each standing body the primitive that has
+# its formula, or any of its balls, -1 if it has none · FAULT: not 0 once a kernel has met a kind that it does not know
 PRIMITIVE_COUNT, PADDED_COUNT, BOXES, PRIMITIVES, NUMBERS, PLANES, STANDING_COUNT, CHECKED, EXCLUDING, OWN = range(10)
+FAULT = 10
+LOW_X, HIGH_X, LOW_Y, HIGH_Y, LOW_Z, HIGH_Z = BOX_RUNS = range(6)
+# Head of a primitive (ints): kind, number of its standing body, planes from, to.
+HEAD_INTS = 4
+KIND, STANDING_BODY, FIRST_PLANE, END_PLANE = range(4)
+# Plane (floats): outward normal, offset.
+PLANE_FLOATS = 4
+PLANE_NORMAL, PLANE_OFFSET = 0, 3
 
-# Kinds of primitives, and their floats.
-BALL = 0  # centre, radius
-CAPSULE = 1  # one end, the way to the other end, 1 / length^2 (0 for a ball), radius
-BOX = 2  # centre, axes, half sizes
-CYLINDER = 3  # centre, axis, half length, radius
-HALF_SPACE = 4  # outward normal, offset
-CONVEX = 5  # 1 if a ball meets it that reaches behind all planes, 0 if the ball's centre must lie behind them
-PRIMITIVE_FLOATS = 16
+# Kinds of primitives. A new one needs a branch in `meets_primitive` and `primitive_gap`, in kernels and in numpy.
+BALL, CAPSULE, BOX, CYLINDER, HALF_SPACE, CONVEX = KINDS = range(6)
+# Shape of a primitive (floats): all but half-spaces and convex ones begin with their centre, a capsule with one end.
+SHAPE_FLOATS = 16
+SHAPE_CENTRE = 0
+BALL_RADIUS = 3
+CAPSULE_AXIS, CAPSULE_INVERSE_SQUARE, CAPSULE_RADIUS = 3, 6, 7  # vector to the other end; 1 / length^2 (0 for a ball)
+BOX_AXES, BOX_HALF_SIZES = 3, 12
+CYLINDER_AXIS, CYLINDER_HALF_LENGTH, CYLINDER_RADIUS = 3, 6, 7
+HALF_SPACE_NORMAL, HALF_SPACE_OFFSET = 0, 3  # outward
+CONVEX_SHARE = 0  # 1 if a ball meets it that reaches behind all planes, 0 if the ball's centre must lie behind them
 
-# Solids of bodies, moving ones or those that stand still · span: of a body, frame, solids around it from, to, solids
-# inside it from, to · solid: kind, blocks of corners from, to, whether it is inside its body · block: WIDTH floats of
-# x, of y, of z
+# Solids of bodies, moving ones or those that stand still. CORNERS: blocks of WIDTH floats of x, of y, of z
 SPANS, SOLIDS, SIZES, CORNERS = range(4)
-
-# Sizes of a solid: radius of its disc (offset of a half-space), axis, radius of its ball, slack, bounding ball.
-DISC, AXIS, ROUND, SLACK, BOUND = 0, 1, 4, 5, 6
-SIZE_COUNT = 10
+# Span of a body (ints): frame, solids around the body from, to, solids inside it from, to.
+SPAN_INTS = 5
+SPAN_FRAME, AROUND_FIRST, AROUND_END, INSIDE_FIRST, INSIDE_END = range(5)
+# Solid (ints): kind, blocks of corners from, to, whether it is inside its body.
+SOLID_INTS = 4
+SOLID_KIND, FIRST_BLOCK, END_BLOCK, IS_INSIDE = range(4)
 UNKNOWN_SOLID, CONVEX_SOLID, HALF_SPACE_SOLID, MERE_CORNERS = range(4)  # the last: nothing between
+# Sizes of a solid (doubles): radius of its disc (offset of a half-space), axis, radius of its ball, slack, bounding
+# ball (centre, radius).
+SIZE_COUNT = 10
+DISC, AXIS, ROUND, SLACK, BOUND_CENTRE, BOUND_RADIUS = 0, 1, 4, 5, 6, 9
 
-# Scratch memory: wide lanes of joint values; lanes of frames (rotation row by row, then origin), of the groups' centres
-# and of the balls' centres; flags of clusters whose balls are placed; three lists of primitives; flags of what meets;
-# configurations that wait for a second check; for the outer and the inner balls what met last: ball, frame and
-# primitive (-1: nothing yet); lanes for a note.
+# Scratch memory. VALUES: wide lanes of joint values · FRAMES · GROUP_CENTRES, CENTRES: of balls · PLACED: flags of the
+# clusters whose balls are placed · FOUND, NEAR, MET: lists of primitives · MARKS: see above, moving and standing bodies
+# first · WAITING: configurations that wait for a second check · OUTER_LAST, INNER_LAST: what met last · NOTE: lanes
 VALUES, FRAMES, GROUP_CENTRES, CENTRES, PLACED, FOUND, NEAR, MET, MARKS, WAITING, OUTER_LAST, INNER_LAST, NOTE = range(
     13
 )
+# What met last (ints): ball, its frame, primitive (-1: nothing yet).
+LAST_INTS = 3
+LAST_BALL, LAST_FRAME, LAST_PRIMITIVE = range(3)
 
-# Probe, for distances: lanes of the smallest distance so far, ints of the pair that has it, lanes of distances of
-# listed primitives.
+# Probe, for distances. BEST: lanes of the smallest distance so far · WHICH: ints of the pair that has it · GAPS: lanes
+# of distances of listed primitives
 BEST, WHICH, GAPS = range(3)

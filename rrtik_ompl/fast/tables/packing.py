@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Vector
-from rrtik_ompl.fast.tables.layout import PAIRS
+from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.fast.tables.layout import PAIR_INTS, PAIR_ONE, PAIR_OTHER, PAIRS
+from rrtik_ompl.fast.tables.memory import Table
+from rrtik_ompl.fast.tables.primitive_tables import Primitive, primitive_table
 from rrtik_ompl.fast.tables.robot_tables import (
     MovingBody,
     Spheres,
-    Table,
     arm_table,
     axis_turns,
     ball_table,
@@ -22,7 +23,7 @@ from rrtik_ompl.fast.tables.robot_tables import (
     rounding_margin,
     usable_cover,
 )
-from rrtik_ompl.fast.tables.scene_tables import Primitive, inner_primitives, outer_primitives, primitive_table
+from rrtik_ompl.fast.tables.scene_tables import inner_primitives, outer_primitives
 from rrtik_ompl.fast.tables.solid_tables import Solids, solid_table
 from rrtik_ompl.robot import Chain
 
@@ -31,7 +32,7 @@ from rrtik_ompl.robot import Chain
 class ArmTables:
     """All that depends on the moving bodies alone."""
 
-    bodies: tuple[Any, ...]
+    bodies: tuple[Body, ...]
     sizes: tuple[int, ...]
     covers: tuple[Spheres, ...]
     solids_of: tuple[Solids, ...]
@@ -44,7 +45,7 @@ class ArmTables:
 
     def serves(
         self,
-        bodies: Sequence[Any],
+        bodies: Sequence[Body],
         sizes: Sequence[int],
         covers: Sequence[Spheres],
         solids_of: Sequence[Solids],
@@ -63,7 +64,7 @@ class ArmTables:
         )
 
 
-def alike(bodies: Sequence[Any], pairs: Sequence[tuple[int, int]]) -> list[tuple[int, ...]]:
+def alike(bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> list[tuple[int, ...]]:
     """Numbers of the moving bodies in sets that one joint carries and that have the same bodies to keep clear of.
 
     To the kernels a set is one body: a link of many small solids costs no more than one with a cover of as many balls.
@@ -81,7 +82,7 @@ def alike(bodies: Sequence[Any], pairs: Sequence[tuple[int, int]]) -> list[tuple
 
 def arm_tables(
     chain: Chain,
-    bodies: Sequence[Any],
+    bodies: Sequence[Body],
     moving: Sequence[tuple[int, ...]],
     pairs: Sequence[tuple[int, int]],
     outer: Sequence[Spheres],
@@ -109,7 +110,7 @@ def arm_tables(
     return ArmTables(carried, sizes, covers, solids_of, own, limits, margin, *tables)
 
 
-def _carried(chain: Chain, body: Any, solids: Solids, margin: float) -> Solids:
+def _carried(chain: Chain, body: Body, solids: Solids, margin: float) -> Solids:
     """A body's solids in the turned frame of its joint."""
     turn = axis_turns(chain)[body.joint - 1].T
     return solids.placed(turn @ np.array(body.placement.rotation), turn @ np.array(body.placement.translation), margin)
@@ -131,7 +132,7 @@ def checked_table(
 
 
 def standing_tables(
-    bodies: Sequence[Any],
+    bodies: Sequence[Body],
     standing: Sequence[int],
     checked: NDArray[np.bool_],
     outer: Sequence[Spheres],
@@ -147,10 +148,10 @@ class PlacedPrimitives:
     """Primitives around standing bodies; those of a body that has not changed are kept."""
 
     def __init__(self) -> None:
-        self._known: dict[int, tuple[Any, float, list[Primitive]]] = {}
+        self._known: dict[int, tuple[Body, float, list[Primitive]]] = {}
 
     def primitives(
-        self, bodies: Sequence[Any], standing: Sequence[int], outer: Sequence[Spheres], inflation: Sequence[float]
+        self, bodies: Sequence[Body], standing: Sequence[int], outer: Sequence[Spheres], inflation: Sequence[float]
     ) -> list[tuple[int, Primitive]]:
         """Primitives around all within margin and ``inflation`` [m] of bodies, with their places in ``standing``."""
         for k in standing:
@@ -160,7 +161,7 @@ class PlacedPrimitives:
         return [(place, primitive) for place, k in enumerate(standing) for primitive in self._known[k][2]]
 
 
-def standing_solids(bodies: Sequence[Any], standing: Sequence[int], solids: Sequence[Solids]) -> Table:
+def standing_solids(bodies: Sequence[Body], standing: Sequence[int], solids: Sequence[Solids]) -> Table:
     """Solids of what stands still, each with its margin around it."""
     poses = [(np.array(bodies[k].placement.rotation), np.array(bodies[k].placement.translation)) for k in standing]
     grown = [solids[k].grown(bodies[k].margin) for k in standing]
@@ -178,19 +179,20 @@ def flag_places(
         return [listed[pair] for pair in both if pair in listed]
 
     crossing = [between(members, (j,)) for members in moving for j in standing]
-    own = [between(moving[i], moving[j]) for i, j in arm.balls[0][PAIRS].reshape(-1, 2)]
+    pairs_of_arm = arm.balls[0][PAIRS].reshape(-1, PAIR_INTS)
+    own = [between(moving[pair[PAIR_ONE]], moving[pair[PAIR_OTHER]]) for pair in pairs_of_arm]
     return dict(enumerate(crossing + own))
 
 
-def _reach(body: Any, outer: Spheres) -> float:
+def _reach(body: Body, outer: Spheres) -> float:
     """Distance of the farthest point of a body's outer spheres from its joint's frame [m]."""
     spheres = usable_cover(body.geometry, outer)
     centres = spheres[:, :3] @ np.array(body.placement.rotation).T + np.array(body.placement.translation)
     return float((np.linalg.norm(centres, axis=1) + spheres[:, 3]).max())
 
 
-def _same(first: Any, second: Any) -> bool:
-    """Whether two bodies are the same solid carried in the same way."""
+def _same(first: Body, second: Body) -> bool:
+    """Whether two bodies are the same solid on the same joint, placed alike."""
     return (
         first.joint == second.joint
         and first.geometry is second.geometry

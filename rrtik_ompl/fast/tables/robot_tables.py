@@ -6,39 +6,67 @@ holds. Every joint frame is turned so that its axis is z; the balls and the fram
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.fast.tables.layout import (
-    ALIGNMENT,
+    BALL_FLOATS,
     BALLS,
     BODIES,
     BODY_BALLS,
     BODY_COUNT,
+    BODY_END,
+    BODY_FIRST,
+    BODY_FRAME,
+    BODY_INTS,
     CLUSTER_BALLS,
+    CLUSTER_BODY,
     CLUSTER_COUNT,
+    CLUSTER_END,
+    CLUSTER_FIRST,
+    CLUSTER_FRAME,
+    CLUSTER_INTS,
     CLUSTERS,
     GROUP_BALLS,
     GROUP_COUNT,
+    GROUP_END,
+    GROUP_FIRST,
+    GROUP_FRAME,
+    GROUP_INTS,
     GROUPS,
     JOINT_COUNT,
+    ORIGIN,
     PAIR_COUNT,
     PAIR_GROUP_COUNT,
+    PAIR_GROUP_END,
+    PAIR_GROUP_FIRST,
+    PAIR_GROUP_INTS,
+    PAIR_GROUP_ONE,
+    PAIR_GROUP_OTHER,
     PAIR_GROUPS,
+    PAIR_INTS,
+    PAIR_ONE,
+    PAIR_OTHER,
     PAIRS,
     PARENTS,
     PLACEMENTS,
+    POSE_NUMBERS,
+    ROTATION,
     SLIDING,
 )
+from rrtik_ompl.fast.tables.memory import Table as Table
+from rrtik_ompl.fast.tables.memory import aligned as aligned
+from rrtik_ompl.fast.tables.memory import table as table
+from rrtik_ompl.fast.tables.memory import whole_records
 from rrtik_ompl.robot import Chain
 
 Spheres: TypeAlias = NDArray[np.float64]  # shape (n, 4): centre and radius [m]
-Header: TypeAlias = NDArray[np.int64]
 
 CLUSTER_SIZE = 8  # balls in the smallest neighbourhood, at most
 UNBOUNDED_RADIUS = 1e6  # [m] radius of the ball that stands for a body without end
@@ -46,37 +74,6 @@ UNBOUNDED_RADIUS = 1e6  # [m] radius of the ball that stands for a body without 
 SMALLEST_MARGIN = 2e-5  # [m]
 MARGIN_PER_LEVER = 1e-6  # a joint's rotation in float32 errs by less than this angle [rad]
 MARGIN_PER_METRE = 5e-6  # relative error of a coordinate in float32, with room for all that is added up
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Table:
-    """Fields for the kernels, where they are, and the arrays whose addresses they hold."""
-
-    header: Header
-    arrays: dict[int, NDArray[Any]]
-    address: int = field(init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "address", int(self.header.ctypes.data))
-
-    def __getitem__(self, place: int) -> NDArray[Any]:
-        return self.arrays[place]
-
-
-def table(fields: Mapping[int, int | NDArray[Any]]) -> Table:
-    """A table from its fields; every place from 0 up has one."""
-    arrays = {place: aligned(value) for place, value in fields.items() if isinstance(value, np.ndarray)}
-    header = [arrays[place].ctypes.data if place in arrays else fields[place] for place in range(len(fields))]
-    return Table(np.array(header, dtype=np.int64), arrays)
-
-
-def aligned(array: NDArray[Any]) -> NDArray[Any]:
-    """A copy that starts on a multiple of ``ALIGNMENT`` bytes and is never empty (so that it has an address)."""
-    memory = np.zeros(array.nbytes + 2 * ALIGNMENT, dtype=np.uint8)
-    start = -memory.ctypes.data % ALIGNMENT
-    copy = memory[start : start + array.nbytes].view(array.dtype)
-    copy[:] = array.ravel()
-    return copy
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,11 +88,11 @@ class MovingBody:
 def arm_table(chain: Chain) -> Table:
     """The joints of a tree."""
     turns = axis_turns(chain)
-    placements = np.empty((len(chain.parent), 12))
+    placements = np.empty((len(chain.parent), POSE_NUMBERS))
     for row, parent in enumerate(chain.parent):
         back = turns[parent].T if parent >= 0 else np.eye(3)
-        placements[row, :9] = (back @ chain.placement[row][:3, :3] @ turns[row]).ravel()
-        placements[row, 9:] = back @ chain.placement[row][:3, 3]
+        placements[row, ROTATION : ROTATION + 9] = (back @ chain.placement[row][:3, :3] @ turns[row]).ravel()
+        placements[row, ORIGIN : ORIGIN + 3] = back @ chain.placement[row][:3, 3]
     return table(
         {
             JOINT_COUNT: len(chain.parent),
@@ -116,7 +113,7 @@ def axis_turns(chain: Chain) -> NDArray[np.float64]:
     return turns
 
 
-def moving_body(chain: Chain, body: Any, outer: Spheres, inner: Spheres, margin: float) -> MovingBody:
+def moving_body(chain: Chain, body: Body, outer: Spheres, inner: Spheres, margin: float) -> MovingBody:
     """A body's balls in the turned frame of its joint, the outer ones grown and the inner ones shrunk by ``margin``.
 
     A body without outer cover is given its bounding ball.
@@ -184,41 +181,42 @@ def ball_table(bodies: Sequence[MovingBody], pairs: Sequence[tuple[int, int]], *
     """
     shapes = [body.inner if inner else body.outer for body in bodies]
     frames = sorted({b.frame for b, balls in zip(bodies, shapes, strict=True) if len(balls)}, reverse=True)
-    groups: list[tuple[int, int, int]] = []
-    clusters: list[tuple[int, int, int, int]] = []
+    groups: list[dict[int, int]] = []
+    clusters: list[dict[int, int]] = []
     balls: list[Spheres] = []
-    spans = np.zeros((len(bodies), 3), dtype=np.int32)
+    spans = [{BODY_FRAME: 0, BODY_FIRST: 0, BODY_END: 0} for _ in bodies]
     for frame in frames:
         start = len(clusters)
         for number, body in enumerate(bodies):
             if body.frame == frame and len(shapes[number]):
-                parts = neighbourhoods(shapes[number])
-                spans[number] = frame, len(clusters), len(clusters) + len(parts)
-                for part in parts:
+                first_cluster = len(clusters)
+                for part in neighbourhoods(shapes[number]):
                     first = sum(len(b) for b in balls)
-                    clusters.append((number, frame, first, first + len(part)))
+                    span = {CLUSTER_FIRST: first, CLUSTER_END: first + len(part)}
+                    clusters.append({CLUSTER_BODY: number, CLUSTER_FRAME: frame} | span)
                     balls.append(part)
-        groups.append((frame, start, len(clusters)))
-    stacked = np.concatenate([np.zeros((0, 4)), *balls])
+                spans[number] = {BODY_FRAME: frame, BODY_FIRST: first_cluster, BODY_END: len(clusters)}
+        groups.append({GROUP_FRAME: frame, GROUP_FIRST: start, GROUP_END: len(clusters)})
+    stacked = np.concatenate([np.zeros((0, BALL_FLOATS)), *balls])
     group_of = {frame: k for k, frame in enumerate(frames)}
-    body_balls = [enclosing_ball(s) if len(s) else np.zeros(4) for s in shapes]
+    body_balls = [enclosing_ball(s) if len(s) else np.zeros(BALL_FLOATS) for s in shapes]
     present = [(i, j) for i, j in pairs if len(shapes[i]) and len(shapes[j])]
     present.sort(key=lambda p: sorted(group_of[bodies[k].frame] for k in p))
     pair_groups = _pair_groups([(group_of[bodies[i].frame], group_of[bodies[j].frame]) for i, j in present])
-    group_balls = [enclosing_ball(stacked[clusters[a][2] : clusters[b - 1][3]]) for _, a, b in groups]
+    runs = [(clusters[g[GROUP_FIRST]][CLUSTER_FIRST], clusters[g[GROUP_END] - 1][CLUSTER_END]) for g in groups]
     return table(
         {
             GROUP_COUNT: len(groups),
-            GROUPS: np.array(groups, dtype=np.int32),
-            GROUP_BALLS: np.array(group_balls, dtype=np.float32),
-            CLUSTERS: np.array(clusters, dtype=np.int32),
+            GROUPS: whole_records(GROUP_INTS, groups),
+            GROUP_BALLS: np.array([enclosing_ball(stacked[a:b]) for a, b in runs], dtype=np.float32),
+            CLUSTERS: whole_records(CLUSTER_INTS, clusters),
             CLUSTER_BALLS: np.array([enclosing_ball(b) for b in balls], dtype=np.float32),
             BALLS: stacked.astype(np.float32),
-            BODIES: spans,
+            BODIES: whole_records(BODY_INTS, spans),
             BODY_BALLS: np.array(body_balls, dtype=np.float32),
             PAIR_GROUP_COUNT: len(pair_groups),
-            PAIR_GROUPS: np.array(pair_groups, dtype=np.int32),
-            PAIRS: np.array(present, dtype=np.int32),
+            PAIR_GROUPS: whole_records(PAIR_GROUP_INTS, pair_groups),
+            PAIRS: whole_records(PAIR_INTS, [{PAIR_ONE: i, PAIR_OTHER: j} for i, j in present]),
             CLUSTER_COUNT: len(clusters),
             BODY_COUNT: len(bodies),
             PAIR_COUNT: len(present),
@@ -226,14 +224,15 @@ def ball_table(bodies: Sequence[MovingBody], pairs: Sequence[tuple[int, int]], *
     )
 
 
-def _pair_groups(groups: Sequence[tuple[int, int]]) -> list[tuple[int, int, int, int]]:
-    """Runs of pairs between the same two groups: group, group, first pair, end."""
-    runs: list[tuple[int, int, int, int]] = []
-    for k, (first, second) in enumerate(groups):
-        if runs and {first, second} == set(runs[-1][:2]):
-            runs[-1] = (*runs[-1][:3], k + 1)
+def _pair_groups(groups: Sequence[tuple[int, int]]) -> list[dict[int, int]]:
+    """Runs of pairs between the same two groups."""
+    runs: list[dict[int, int]] = []
+    for k, (one, other) in enumerate(groups):
+        if runs and {one, other} == {runs[-1][PAIR_GROUP_ONE], runs[-1][PAIR_GROUP_OTHER]}:
+            runs[-1][PAIR_GROUP_END] = k + 1
         else:
-            runs.append((first, second, k, k + 1))
+            span = {PAIR_GROUP_FIRST: k, PAIR_GROUP_END: k + 1}
+            runs.append({PAIR_GROUP_ONE: one, PAIR_GROUP_OTHER: other} | span)
     return runs
 
 

@@ -1,4 +1,4 @@
-"""Memory that kernels compute in."""
+"""Scratch memory: what kernels compute in."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.fast.tables import layout
-from rrtik_ompl.fast.tables.robot_tables import Table, table
+from rrtik_ompl.fast.tables.memory import Table, table
 
 
 def scratch_table(arm: Table, balls: tuple[Table, ...], primitives: tuple[Table, ...]) -> Table:
@@ -15,9 +15,9 @@ def scratch_table(arm: Table, balls: tuple[Table, ...], primitives: tuple[Table,
     def most(tables: tuple[Table, ...], place: int) -> int:
         return max(int(t.header[place]) for t in tables)
 
-    frames = np.zeros((int(arm.header[layout.JOINT_COUNT]) + 1, 12, WIDTH), dtype=np.float32)
-    frames[0, [0, 4, 8]] = 1.0
-    ball_count = max(len(t[layout.BALLS]) // 4 for t in balls)
+    frames = np.zeros((int(arm.header[layout.JOINT_COUNT]) + 1, layout.POSE_NUMBERS, WIDTH), dtype=np.float32)
+    frames[0, layout.ROTATION : layout.ROTATION + 9] = np.eye(3).reshape(9, 1)
+    ball_count = max(len(t[layout.BALLS]) // layout.BALL_FLOATS for t in balls)
     numbers = np.zeros(most(primitives, layout.PADDED_COUNT), dtype=np.int32)
     crossing = most(balls, layout.BODY_COUNT) * most(primitives, layout.STANDING_COUNT)
     return table(
@@ -31,8 +31,8 @@ def scratch_table(arm: Table, balls: tuple[Table, ...], primitives: tuple[Table,
             layout.NEAR: numbers,
             layout.MET: numbers,
             layout.WAITING: np.zeros(WIDTH, dtype=np.int32),
-            layout.OUTER_LAST: np.full(3, -1, dtype=np.int32),
-            layout.INNER_LAST: np.full(3, -1, dtype=np.int32),
+            layout.OUTER_LAST: np.full(layout.LAST_INTS, -1, dtype=np.int32),
+            layout.INNER_LAST: np.full(layout.LAST_INTS, -1, dtype=np.int32),
             layout.NOTE: np.zeros(WIDTH, dtype=np.float32),
             layout.MARKS: np.zeros(crossing + most(balls, layout.PAIR_COUNT), dtype=np.int32),
         }

@@ -21,17 +21,34 @@ from rrtik_ompl.collision.solids import SameObject, is_mesh
 from rrtik_ompl.covers.cache import cached_convex_pieces
 from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.fast.tables.layout import (
+    AROUND_END,
+    AROUND_FIRST,
+    AXIS,
+    BOUND_CENTRE,
+    BOUND_RADIUS,
     CONVEX_SOLID,
     CORNERS,
+    DISC,
+    END_BLOCK,
+    FIRST_BLOCK,
     HALF_SPACE_SOLID,
+    INSIDE_END,
+    INSIDE_FIRST,
+    IS_INSIDE,
     MERE_CORNERS,
+    ROUND,
     SIZE_COUNT,
     SIZES,
+    SLACK,
+    SOLID_INTS,
+    SOLID_KIND,
     SOLIDS,
+    SPAN_FRAME,
+    SPAN_INTS,
     SPANS,
     UNKNOWN_SOLID,
 )
-from rrtik_ompl.fast.tables.robot_tables import Table, table
+from rrtik_ompl.fast.tables.memory import Table, record, table, whole_records
 
 BOX_CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 MAX_COMPARED_SIZE = 1e4  # [m]; what is larger or farther away is not compared
@@ -78,12 +95,13 @@ class ConvexSolid:
             return UNKNOWN
         return replace(self, corners=corners, axis=axis, slack=slack + SLACK_PER_METRE * (1.0 + size))
 
-    def sizes(self) -> list[float]:
+    def sizes(self) -> Vector:
         """Numbers for the kernels, see the layout."""
         low, high = self.corners.min(axis=0), self.corners.max(axis=0)
         centre = 0.5 * (low + high)
         around = float(np.linalg.norm(self.corners - centre, axis=1).max()) + abs(self.disc) + self.radius
-        return [self.disc, *self.axis, self.radius, self.slack, *centre, around]
+        own: dict[int, float | Vector] = {DISC: self.disc, AXIS: self.axis, ROUND: self.radius, SLACK: self.slack}
+        return record(SIZE_COUNT, own | {BOUND_CENTRE: centre, BOUND_RADIUS: around})
 
 
 UNKNOWN = ConvexSolid(np.zeros((1, 3)), inside=False, kind=UNKNOWN_SOLID)
@@ -163,14 +181,19 @@ def solid_table(bodies: Sequence[tuple[int, Sequence[Solids]]]) -> Table:
         inside = [solid for part in parts for solid in part.inside]
         start, middle = len(solids), len(solids) + len(around)
         solids += around if inside == around else around + inside
-        spans.append((frame, start, middle, start if inside == around else middle, len(solids)))
+        first_inside = start if inside == around else middle
+        span = {AROUND_FIRST: start, AROUND_END: middle, INSIDE_FIRST: first_inside, INSIDE_END: len(solids)}
+        spans.append({SPAN_FRAME: frame} | span)
     blocks = [_blocks(solid.corners) for solid in solids]
     starts = list(accumulate(map(len, blocks), initial=0))
-    numbers = [(s.kind, a, b, int(s.inside)) for s, a, b in zip(solids, starts[:-1], starts[1:], strict=True)]
+    numbers = [
+        {SOLID_KIND: s.kind, FIRST_BLOCK: a, END_BLOCK: b, IS_INSIDE: int(s.inside)}
+        for s, a, b in zip(solids, starts[:-1], starts[1:], strict=True)
+    ]
     return table(
         {
-            SPANS: np.array(spans, dtype=np.int32),
-            SOLIDS: np.array(numbers, dtype=np.int32),
+            SPANS: whole_records(SPAN_INTS, spans),
+            SOLIDS: whole_records(SOLID_INTS, numbers),
             SIZES: np.array([s.sizes() for s in solids], dtype=np.float64).reshape(-1, SIZE_COUNT),
             CORNERS: np.concatenate([np.zeros((0, 3, WIDTH)), *blocks]).astype(np.float32),
         }

@@ -10,15 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.fast.ik import branch_layout as layout
-from rrtik_ompl.fast.ik import ik_layout
+from rrtik_ompl.fast.ik import branch_layout, ik_layout
 from rrtik_ompl.fast.ik.branch_layout import BRANCHES, DOF
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.simd.processor import WIDTH
-from rrtik_ompl.fast.tables.robot_tables import Table, table
+from rrtik_ompl.fast.tables.memory import WORD, PlannedTable, Table, TablePlan, table
 from rrtik_ompl.ik.analytic.analytic_solver import ClosedFormSolver
 from rrtik_ompl.ik.analytic.reference_branches import mountings, reference_branches
-from rrtik_ompl.ik.call_memory import WORD, CallLayout, CallMemory
 from rrtik_ompl.ik.serial_chain import limb_of, pose_numbers
 from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
 
@@ -29,7 +27,7 @@ def kernel_branches(
     robot: Robot, form: ClosedFormSolver, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool
 ) -> list[NDArray[Any]] | None:
     """As `reference_branches`, which answers the poses that are singular; None if there is no kernel for the arm."""
-    kernels = library(layout.KERNELS) if form.kernel else None
+    kernels = library(branch_layout.KERNELS) if form.kernel else None
     arm = None if kernels is None else _arm_of(robot, form)
     if kernels is None or arm is None:
         return None
@@ -61,13 +59,13 @@ def _arm_of(robot: Robot, form: ClosedFormSolver) -> _Arm | None:
     placements = np.array([np.eye(4) if each is None else each for each in mountings(robot, form)])
     from_world, to_frame = pose_numbers(placements)
     fields: dict[int, int | NDArray[Any]] = {
-        layout.FROM_WORLD: from_world,
-        layout.TO_FRAME: to_frame,
-        layout.NUMBERS: np.array(form.numbers),
-        layout.LOWEST: np.maximum(robot.lower - LIMIT_TOLERANCE, -UNBOUNDED_ANGLE),
-        layout.HIGHEST: np.minimum(robot.upper + LIMIT_TOLERANCE, UNBOUNDED_ANGLE),
-        layout.TURNING: ((robot.lower < -np.pi) | (robot.upper > np.pi)).astype(np.int32),
-        layout.LIMB: limb.address,
+        branch_layout.FROM_WORLD: from_world,
+        branch_layout.TO_FRAME: to_frame,
+        branch_layout.NUMBERS: np.array(form.numbers),
+        branch_layout.LOWEST: np.maximum(robot.lower - LIMIT_TOLERANCE, -UNBOUNDED_ANGLE),
+        branch_layout.HIGHEST: np.minimum(robot.upper + LIMIT_TOLERANCE, UNBOUNDED_ANGLE),
+        branch_layout.TURNING: ((robot.lower < -np.pi) | (robot.upper > np.pi)).astype(np.int32),
+        branch_layout.LIMB: limb.address,
     }
     return _Arm(table(fields), limb)
 
@@ -78,43 +76,46 @@ class _Call:
     def __init__(self, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool) -> None:
         self._count, self._shape = len(poses), (BRANCHES, WIDTH * _blocks(len(poses)))
         self._checked = int(check)
-        self._memory = memory = CallMemory(_layout_of(len(poses), hints is not None, check))
+        self._memory = memory = PlannedTable(_plan_of(len(poses), hints is not None, check))
         self.address = memory.address
-        memory[layout.POSES].reshape(poses.shape)[:] = poses
-        memory[layout.SLACK][:] = slack
+        memory[branch_layout.POSES].reshape(poses.shape)[:] = poses
+        memory[branch_layout.SLACK][:] = slack
         if hints is not None:
-            memory[layout.NEAR].reshape(hints.shape)[:] = hints
+            memory[branch_layout.NEAR].reshape(hints.shape)[:] = hints
 
     @property
     def odd(self) -> NDArray[np.bool_]:
         """Which targets are to be answered otherwise, shape (m,)."""
-        return self._memory[layout.ODD].view(np.bool_)[: self._count]
+        return self._memory[branch_layout.ODD].view(np.bool_)[: self._count]
 
     def answers(self) -> list[NDArray[Any]]:
         """As of `reference_branches`."""
         memory, own = self._memory, slice(self._count)
-        q = memory[layout.Q].reshape(DOF, *self._shape)[:, :, own]
-        residuals = memory[layout.RESIDUALS].reshape(2 * self._checked, *self._shape)[:, :, own]
-        real, fits = (memory[place].view(np.bool_).reshape(self._shape)[:, own] for place in (layout.REAL, layout.FITS))
+        q = memory[branch_layout.Q].reshape(DOF, *self._shape)[:, :, own]
+        residuals = memory[branch_layout.RESIDUALS].reshape(2 * self._checked, *self._shape)[:, :, own]
+        real, fits = (
+            memory[place].view(np.bool_).reshape(self._shape)[:, own]
+            for place in (branch_layout.REAL, branch_layout.FITS)
+        )
         return [q, real, real & fits, np.zeros(self._count, dtype=np.uint8), residuals]
 
 
 @lru_cache(maxsize=64)
-def _layout_of(count: int, hinted: bool, check: bool) -> CallLayout:
+def _plan_of(count: int, hinted: bool, check: bool) -> TablePlan:
     blocks = _blocks(count)
     lanes = WIDTH * blocks
     arrays = {
-        layout.Q: DOF * BRANCHES * lanes,
-        layout.RESIDUALS: 2 * BRANCHES * lanes if check else 0,
-        layout.SCRATCH: layout.SCRATCH_LANES * WIDTH,
-        layout.POSES: 16 * count,
-        layout.NEAR: DOF * count if hinted else 0,
-        layout.SLACK: 1,
-        layout.REAL: BRANCHES * lanes // WORD,
-        layout.FITS: BRANCHES * lanes // WORD,
-        layout.ODD: -(-lanes // WORD),
+        branch_layout.Q: DOF * BRANCHES * lanes,
+        branch_layout.RESIDUALS: 2 * BRANCHES * lanes if check else 0,
+        branch_layout.SCRATCH: branch_layout.SCRATCH_LANES * WIDTH,
+        branch_layout.POSES: branch_layout.MATRIX_NUMBERS * count,
+        branch_layout.NEAR: DOF * count if hinted else 0,
+        branch_layout.SLACK: 1,
+        branch_layout.REAL: BRANCHES * lanes // WORD,
+        branch_layout.FITS: BRANCHES * lanes // WORD,
+        branch_layout.ODD: -(-lanes // WORD),
     }
-    return CallLayout(arrays, {layout.ROWS: count, layout.BLOCKS: blocks})
+    return TablePlan(arrays, {branch_layout.ROWS: count, branch_layout.BLOCKS: blocks})
 
 
 def _blocks(count: int) -> int:

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix
-from rrtik_ompl.fast.ik import ik_layout as layout
-from rrtik_ompl.fast.tables.robot_tables import Table
-from rrtik_ompl.ik.call_memory import WORD, CallLayout, CallMemory
+from rrtik_ompl.fast.ik import ik_layout
+from rrtik_ompl.fast.tables.memory import WORD, PlannedTable, Table, TablePlan
 
 
 class KernelCall:
@@ -43,54 +42,54 @@ class KernelCall:
         following: NDArray[np.int64] | None = None,
     ) -> None:
         given = near is not None, following is not None
-        self._memory = memory = CallMemory(_layout_of(limb, len(aims), len(q), *given, steps, patience))
+        self._memory = memory = PlannedTable(_plan_of(limb, len(aims), len(q), *given, steps, patience))
         self.address = memory.address
-        self.q: Matrix = memory[layout.Q].reshape(q.shape)
+        self.q: Matrix = memory[ik_layout.Q].reshape(q.shape)
         self.q[:] = q
-        self.next: NDArray[np.int64] = memory[layout.NEXT].view(np.int64)
-        self.aims: Matrix = memory[layout.AIMS].reshape(aims.shape)
+        self.next: NDArray[np.int64] = memory[ik_layout.NEXT].view(np.int64)
+        self.aims: Matrix = memory[ik_layout.AIMS].reshape(aims.shape)
         self.aims[:] = aims
         if near is not None:
-            memory[layout.NEAR].reshape(near.shape)[:] = near
+            memory[ik_layout.NEAR].reshape(near.shape)[:] = near
         if following is not None:
             self.next[:] = following
 
     @property
     def reached(self) -> Mask:
         """Which rows are at their goals, shape (m,)."""
-        rows: Mask = self._memory[layout.REACHED].view(np.int32)[: len(self.q)] != 0
+        rows: Mask = self._memory[ik_layout.REACHED].view(np.int32)[: len(self.q)] != 0
         return rows
 
     @property
     def steps(self) -> int:
         """How many have been taken."""
-        return int(self._memory.fields[layout.DONE])
+        return int(self._memory.header[ik_layout.DONE])
 
 
 @lru_cache(maxsize=64)
-def _layout_of(limb: Table, aims: int, rows: int, near: bool, begun: bool, steps: int, patience: int) -> CallLayout:
-    dof, joints = int(limb.header[layout.DOF]), int(limb.header[layout.JOINTS])
+def _plan_of(limb: Table, aims: int, rows: int, near: bool, begun: bool, steps: int, patience: int) -> TablePlan:
+    dof, joints = int(limb.header[ik_layout.DOF]), int(limb.header[ik_layout.JOINTS])
     arrays = {
-        layout.AIMS: layout.AIM_FLOATS * aims,
-        layout.NEAR: dof * rows if near else 0,
-        layout.Q: dof * rows,
-        layout.REACHED: (rows + 1) // 2,
-        layout.NEXT: rows if begun else 0,
-        layout.FIRST: 12,
-        layout.FRAMES: 12 * (joints + 1),
-        layout.COLUMNS: 6 * dof,
-        layout.ERROR: 6,
-        layout.WEIGHTS: 6,
-        layout.SQUARE: 36,
-        layout.CHANGE: dof,
-        layout.FARNESS: int(limb.header[layout.SEED_COUNT]),
+        ik_layout.AIMS: ik_layout.AIM_FLOATS * aims,
+        ik_layout.NEAR: dof * rows if near else 0,
+        ik_layout.Q: dof * rows,
+        ik_layout.REACHED: (rows + 1) // 2,
+        ik_layout.NEXT: rows if begun else 0,
+        ik_layout.FIRST: ik_layout.POSE_NUMBERS,
+        ik_layout.FRAMES: ik_layout.POSE_NUMBERS * (joints + 1),
+        ik_layout.COLUMNS: ik_layout.TWIST_NUMBERS * dof,
+        ik_layout.ERROR: ik_layout.TWIST_NUMBERS,
+        ik_layout.WEIGHTS: ik_layout.TWIST_NUMBERS,
+        ik_layout.SQUARE: ik_layout.TWIST_NUMBERS**2,
+        ik_layout.CHANGE: dof,
+        ik_layout.FARNESS: int(limb.header[ik_layout.SEED_COUNT]),
     }
     numbers = {
-        layout.ROWS: rows,
-        layout.STEPS: steps,
-        layout.PATIENCE: patience,
-        layout.AIM_BYTES: WORD * layout.AIM_FLOATS if aims > 1 else 0,
-        layout.NEAR_BYTES: WORD * dof,
-        layout.DONE: 0,
+        ik_layout.ROWS: rows,
+        ik_layout.STEPS: steps,
+        ik_layout.PATIENCE: patience,
+        ik_layout.AIM_BYTES: WORD * ik_layout.AIM_FLOATS if aims > 1 else 0,
+        ik_layout.NEAR_BYTES: WORD * dof,
+        ik_layout.DONE: 0,
     }
-    return CallLayout(arrays, numbers)
+    return TablePlan(arrays, numbers)

@@ -1,0 +1,128 @@
+"""Kernels of the sphere phase: the lanes in which balls of the arm meet each other.
+
+As against the scene, groups come first, then bodies, their clusters, and single balls.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rrtik_ompl.fast.checks.obstacle_kernels import squared
+from rrtik_ompl.fast.checks.sphere_kernels import place_cluster, placed_centre
+from rrtik_ompl.fast.simd.compiled import inlined, kernel
+from rrtik_ompl.fast.simd.lanes import bits, int_at, set_int
+from rrtik_ompl.fast.tables.accessors import (
+    balls_of,
+    body_balls_of,
+    body_of,
+    centres_of,
+    cluster_balls_of,
+    cluster_of,
+    end_ball_of,
+    end_cluster_of_body,
+    end_pair_of,
+    first_ball_of,
+    first_cluster_of_body,
+    first_pair_of,
+    frame_at,
+    frame_of_body,
+    frame_of_cluster,
+    frames_of,
+    group_balls_of,
+    group_centres_of,
+    one_body_of,
+    one_group_of,
+    other_body_of,
+    other_group_of,
+    pair_group_count_of,
+    pair_group_of,
+    pair_of,
+    radius_at,
+    stored_centre,
+)
+from rrtik_ompl.fast.tables.layout import NO_MARKS, BallTable, Marks, ScratchTable
+
+
+@inlined
+def within(x: Any, y: Any, z: Any, centre: Any, reach: float) -> Any:
+    """Lanes in which two points are nearer to each other than ``reach``."""
+    return bits(squared(x - centre[0], y - centre[1], z - centre[2]) < reach * reach)
+
+
+@kernel
+def clusters_meet(balls: BallTable, scratch: ScratchTable, first: int, second: int, wanted: int) -> int:
+    """Lanes in which a ball of one cluster meets a ball of another."""
+    place_cluster(balls, scratch, first)
+    place_cluster(balls, scratch, second)
+    centres, all_balls = centres_of(scratch), balls_of(balls)
+    around, frames = cluster_balls_of(balls), frames_of(scratch)
+    mine, others = cluster_of(balls, first), cluster_of(balls, second)
+    hull = placed_centre(frame_at(frames, frame_of_cluster(others)), around, second)
+    meeting = 0
+    for ball in range(first_ball_of(mine), end_ball_of(mine)):
+        x, y, z = stored_centre(centres, ball)
+        radius = radius_at(all_balls, ball)
+        if within(x, y, z, hull, radius + radius_at(around, second)) & wanted & ~meeting == 0:
+            continue
+        for other in range(first_ball_of(others), end_ball_of(others)):
+            meeting |= within(x, y, z, stored_centre(centres, other), radius + radius_at(all_balls, other)) & wanted
+        if meeting == wanted:
+            break
+    return meeting
+
+
+@kernel
+def bodies_meet(balls: BallTable, scratch: ScratchTable, first: int, second: int, wanted: int) -> int:
+    """Lanes in which a ball of one body meets a ball of another."""
+    frames, one, two = frames_of(scratch), body_of(balls, first), body_of(balls, second)
+    around, hulls = cluster_balls_of(balls), body_balls_of(balls)
+    first_frame, second_frame = frame_at(frames, frame_of_body(one)), frame_at(frames, frame_of_body(two))
+    hull, radius = placed_centre(second_frame, hulls, second), radius_at(hulls, second)
+    x, y, z = placed_centre(first_frame, hulls, first)
+    close = within(x, y, z, hull, radius + radius_at(hulls, first)) & wanted
+    meeting = 0
+    if close == 0:
+        return meeting
+    for mine in range(first_cluster_of_body(one), end_cluster_of_body(one)):
+        x, y, z = placed_centre(first_frame, around, mine)
+        extent = radius_at(around, mine)
+        near = within(x, y, z, hull, radius + extent) & close & ~meeting
+        if near == 0:
+            continue
+        for other in range(first_cluster_of_body(two), end_cluster_of_body(two)):
+            centre = placed_centre(second_frame, around, other)
+            both = within(x, y, z, centre, extent + radius_at(around, other)) & near & ~meeting
+            if both != 0:
+                meeting |= clusters_meet(balls, scratch, mine, other, both)
+        if meeting == close:
+            break
+    return meeting
+
+
+@kernel
+def self_collision(balls: BallTable, scratch: ScratchTable, wanted: int, marks: Marks, one: bool) -> int:
+    """Lanes among ``wanted`` in which two bodies of the arm meet; if ``one`` is enough, not all of them.
+
+    Unless ``NO_MARKS``, ``marks`` are one number for each pair, which collects the lanes.
+    """
+    around, centres = group_balls_of(balls), group_centres_of(scratch)
+    meeting = 0
+    for number in range(pair_group_count_of(balls)):
+        group = pair_group_of(balls, number)
+        first, second = one_group_of(group), other_group_of(group)
+        x, y, z = stored_centre(centres, first)
+        reach = radius_at(around, first) + radius_at(around, second)
+        close = within(x, y, z, stored_centre(centres, second), reach) & wanted
+        if marks == NO_MARKS:
+            close &= ~meeting
+        if close == 0:
+            continue
+        for k in range(first_pair_of(group), end_pair_of(group)):
+            pair = pair_of(balls, k)
+            found = bodies_meet(balls, scratch, one_body_of(pair), other_body_of(pair), close)
+            meeting |= found
+            if marks != NO_MARKS and found != 0:
+                set_int(marks, k, int_at(marks, k) | found)
+        if marks == NO_MARKS and (meeting == wanted or (one and meeting != 0)):
+            break
+    return meeting

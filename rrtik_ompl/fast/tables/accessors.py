@@ -1,0 +1,245 @@
+"""What kernels read from the tables, by name: each function here reads one number, or finds one address.
+
+The places are those of :mod:`rrtik_ompl.fast.tables.layout`. By the types mypy knows which address is meant, so that it
+refuses a table that is passed for another; to the compiler all addresses are whole numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+from rrtik_ompl.fast.simd.access import (
+    double_reader,
+    double_vector_reader,
+    field_reader,
+    float_column,
+    float_reader,
+    int_reader,
+    member_reader,
+    part_reader,
+    record_reader,
+    vector_reader,
+)
+from rrtik_ompl.fast.simd.access import double_row as _double_row
+from rrtik_ompl.fast.simd.access import int_row as _int_row
+from rrtik_ompl.fast.simd.compiled import WIDTH, inlined
+from rrtik_ompl.fast.simd.lanes import lanes_at, set_int, set_lanes
+from rrtik_ompl.fast.tables import layout
+from rrtik_ompl.fast.tables.layout import DOUBLE_BYTES, FLOAT_BYTES, INT_BYTES
+
+Vector: TypeAlias = Any  # three numbers
+
+FRAME_BYTES = layout.POSE_NUMBERS * FLOAT_BYTES * WIDTH
+
+# World
+arm_of: Callable[[layout.WorldTable], layout.ArmTable] = field_reader(layout.ARM)
+outer_balls_of: Callable[[layout.WorldTable], layout.BallTable] = field_reader(layout.OUTER)
+inner_balls_of: Callable[[layout.WorldTable], layout.BallTable] = field_reader(layout.INNER)
+outer_primitives_of: Callable[[layout.WorldTable], layout.PrimitiveTable] = field_reader(layout.OUTER_PRIMITIVES)
+inner_primitives_of: Callable[[layout.WorldTable], layout.PrimitiveTable] = field_reader(layout.INNER_PRIMITIVES)
+scratch_of: Callable[[layout.WorldTable], layout.ScratchTable] = field_reader(layout.SCRATCH)
+moving_solids_of: Callable[[layout.WorldTable], layout.SolidTable] = field_reader(layout.MOVING_SOLIDS)
+standing_solids_of: Callable[[layout.WorldTable], layout.SolidTable] = field_reader(layout.STANDING_SOLIDS)
+
+# Arm
+joint_count_of: Callable[[layout.ArmTable], int] = field_reader(layout.JOINT_COUNT)
+parents_of: Callable[[layout.ArmTable], layout.IntArray] = field_reader(layout.PARENTS)
+sliding_of: Callable[[layout.ArmTable], layout.IntArray] = field_reader(layout.SLIDING)
+placement_of: Callable[[layout.ArmTable, int], layout.Placement] = member_reader(
+    layout.PLACEMENTS, FLOAT_BYTES * layout.POSE_NUMBERS
+)
+first_row_of: Callable[[layout.Placement], Vector] = vector_reader(layout.ROTATION)
+second_row_of: Callable[[layout.Placement], Vector] = vector_reader(layout.ROTATION + 3)
+third_row_of: Callable[[layout.Placement], Vector] = vector_reader(layout.ROTATION + 6)
+origin_of: Callable[[layout.Placement], Vector] = vector_reader(layout.ORIGIN)
+frame_at: Callable[[layout.FrameArray, int], layout.Frame] = record_reader(FRAME_BYTES)
+
+# Balls of the arm
+group_count_of: Callable[[layout.BallTable], int] = field_reader(layout.GROUP_COUNT)
+cluster_count_of: Callable[[layout.BallTable], int] = field_reader(layout.CLUSTER_COUNT)
+body_count_of: Callable[[layout.BallTable], int] = field_reader(layout.BODY_COUNT)
+pair_group_count_of: Callable[[layout.BallTable], int] = field_reader(layout.PAIR_GROUP_COUNT)
+pair_count_of: Callable[[layout.BallTable], int] = field_reader(layout.PAIR_COUNT)
+balls_of: Callable[[layout.BallTable], layout.BallArray] = field_reader(layout.BALLS)
+group_balls_of: Callable[[layout.BallTable], layout.BallArray] = field_reader(layout.GROUP_BALLS)
+cluster_balls_of: Callable[[layout.BallTable], layout.BallArray] = field_reader(layout.CLUSTER_BALLS)
+body_balls_of: Callable[[layout.BallTable], layout.BallArray] = field_reader(layout.BODY_BALLS)
+radius_at: Callable[[layout.BallArray, int], float] = float_column(layout.BALL_FLOATS, layout.RADIUS)
+ball_x: Callable[[layout.BallArray, int], float] = float_column(layout.BALL_FLOATS, layout.CENTRE)
+ball_y: Callable[[layout.BallArray, int], float] = float_column(layout.BALL_FLOATS, layout.CENTRE + 1)
+ball_z: Callable[[layout.BallArray, int], float] = float_column(layout.BALL_FLOATS, layout.CENTRE + 2)
+group_of: Callable[[layout.BallTable, int], layout.Group] = member_reader(layout.GROUPS, INT_BYTES * layout.GROUP_INTS)
+frame_of_group: Callable[[layout.Group], int] = int_reader(layout.GROUP_FRAME)
+first_cluster_of_group: Callable[[layout.Group], int] = int_reader(layout.GROUP_FIRST)
+end_cluster_of_group: Callable[[layout.Group], int] = int_reader(layout.GROUP_END)
+cluster_of: Callable[[layout.BallTable, int], layout.Cluster] = member_reader(
+    layout.CLUSTERS, INT_BYTES * layout.CLUSTER_INTS
+)
+body_of_cluster: Callable[[layout.Cluster], int] = int_reader(layout.CLUSTER_BODY)
+frame_of_cluster: Callable[[layout.Cluster], int] = int_reader(layout.CLUSTER_FRAME)
+first_ball_of: Callable[[layout.Cluster], int] = int_reader(layout.CLUSTER_FIRST)
+end_ball_of: Callable[[layout.Cluster], int] = int_reader(layout.CLUSTER_END)
+body_of: Callable[[layout.BallTable, int], layout.MovingBody] = member_reader(
+    layout.BODIES, INT_BYTES * layout.BODY_INTS
+)
+frame_of_body: Callable[[layout.MovingBody], int] = int_reader(layout.BODY_FRAME)
+first_cluster_of_body: Callable[[layout.MovingBody], int] = int_reader(layout.BODY_FIRST)
+end_cluster_of_body: Callable[[layout.MovingBody], int] = int_reader(layout.BODY_END)
+pair_group_of: Callable[[layout.BallTable, int], layout.PairGroup] = member_reader(
+    layout.PAIR_GROUPS, INT_BYTES * layout.PAIR_GROUP_INTS
+)
+one_group_of: Callable[[layout.PairGroup], int] = int_reader(layout.PAIR_GROUP_ONE)
+other_group_of: Callable[[layout.PairGroup], int] = int_reader(layout.PAIR_GROUP_OTHER)
+first_pair_of: Callable[[layout.PairGroup], int] = int_reader(layout.PAIR_GROUP_FIRST)
+end_pair_of: Callable[[layout.PairGroup], int] = int_reader(layout.PAIR_GROUP_END)
+pair_of: Callable[[layout.BallTable, int], layout.Pair] = member_reader(layout.PAIRS, INT_BYTES * layout.PAIR_INTS)
+one_body_of: Callable[[layout.Pair], int] = int_reader(layout.PAIR_ONE)
+other_body_of: Callable[[layout.Pair], int] = int_reader(layout.PAIR_OTHER)
+
+# Primitives: what stands still
+primitive_count_of: Callable[[layout.PrimitiveTable], int] = field_reader(layout.PRIMITIVE_COUNT)
+padded_count_of: Callable[[layout.PrimitiveTable], int] = field_reader(layout.PADDED_COUNT)
+standing_count_of: Callable[[layout.PrimitiveTable], int] = field_reader(layout.STANDING_COUNT)
+fault_of: Callable[[layout.PrimitiveTable], int] = field_reader(layout.FAULT)
+boxes_of: Callable[[layout.PrimitiveTable], layout.LaneArray] = field_reader(layout.BOXES)
+planes_of: Callable[[layout.PrimitiveTable], layout.PlaneArray] = field_reader(layout.PLANES)
+checked_of: Callable[[layout.PrimitiveTable], layout.IntArray] = field_reader(layout.CHECKED)
+excluding_of: Callable[[layout.PrimitiveTable], layout.IntArray] = field_reader(layout.EXCLUDING)
+own_of: Callable[[layout.PrimitiveTable], layout.IntArray] = field_reader(layout.OWN)
+head_of: Callable[[layout.PrimitiveTable, int], layout.PrimitiveHead] = member_reader(
+    layout.NUMBERS, INT_BYTES * layout.HEAD_INTS
+)
+kind_of: Callable[[layout.PrimitiveHead], int] = int_reader(layout.KIND)
+standing_body_of: Callable[[layout.PrimitiveHead], int] = int_reader(layout.STANDING_BODY)
+first_plane_of: Callable[[layout.PrimitiveHead], int] = int_reader(layout.FIRST_PLANE)
+end_plane_of: Callable[[layout.PrimitiveHead], int] = int_reader(layout.END_PLANE)
+plane_at: Callable[[layout.PlaneArray, int], layout.Plane] = record_reader(FLOAT_BYTES * layout.PLANE_FLOATS)
+normal_of: Callable[[layout.Plane], Vector] = vector_reader(layout.PLANE_NORMAL)
+offset_of: Callable[[layout.Plane], float] = float_reader(layout.PLANE_OFFSET)
+shape_of: Callable[[layout.PrimitiveTable, int], layout.PrimitiveShape] = member_reader(
+    layout.PRIMITIVES, FLOAT_BYTES * layout.SHAPE_FLOATS
+)
+centre_of: Callable[[layout.PrimitiveShape], Vector] = vector_reader(layout.SHAPE_CENTRE)
+ball_radius_of: Callable[[layout.PrimitiveShape], float] = float_reader(layout.BALL_RADIUS)
+capsule_axis_of: Callable[[layout.PrimitiveShape], Vector] = vector_reader(layout.CAPSULE_AXIS)
+inverse_square_of: Callable[[layout.PrimitiveShape], float] = float_reader(layout.CAPSULE_INVERSE_SQUARE)
+capsule_radius_of: Callable[[layout.PrimitiveShape], float] = float_reader(layout.CAPSULE_RADIUS)
+first_axis_of: Callable[[layout.PrimitiveShape], Vector] = vector_reader(layout.BOX_AXES)
+second_axis_of: Callable[[layout.PrimitiveShape], Vector] = vector_reader(layout.BOX_AXES + 3)
+third_axis_of: Callable[[layout.PrimitiveShape], Vector] = vector_reader(layout.BOX_AXES + 6)
+half_sizes_of: Callable[[layout.PrimitiveShape], Vector] = vector_reader(layout.BOX_HALF_SIZES)
+cylinder_axis_of: Callable[[layout.PrimitiveShape], Vector] = vector_reader(layout.CYLINDER_AXIS)
+half_length_of: Callable[[layout.PrimitiveShape], float] = float_reader(layout.CYLINDER_HALF_LENGTH)
+cylinder_radius_of: Callable[[layout.PrimitiveShape], float] = float_reader(layout.CYLINDER_RADIUS)
+half_space_normal_of: Callable[[layout.PrimitiveShape], Vector] = vector_reader(layout.HALF_SPACE_NORMAL)
+half_space_offset_of: Callable[[layout.PrimitiveShape], float] = float_reader(layout.HALF_SPACE_OFFSET)
+share_of: Callable[[layout.PrimitiveShape], float] = float_reader(layout.CONVEX_SHARE)
+
+# Solids
+span_of: Callable[[layout.SolidTable, int], layout.Span] = member_reader(layout.SPANS, INT_BYTES * layout.SPAN_INTS)
+frame_of_span: Callable[[layout.Span], int] = int_reader(layout.SPAN_FRAME)
+first_around_of: Callable[[layout.Span], int] = int_reader(layout.AROUND_FIRST)
+end_around_of: Callable[[layout.Span], int] = int_reader(layout.AROUND_END)
+first_inside_of: Callable[[layout.Span], int] = int_reader(layout.INSIDE_FIRST)
+end_inside_of: Callable[[layout.Span], int] = int_reader(layout.INSIDE_END)
+solid_of: Callable[[layout.SolidTable, int], layout.Solid] = member_reader(layout.SOLIDS, INT_BYTES * layout.SOLID_INTS)
+kind_of_solid: Callable[[layout.Solid], int] = int_reader(layout.SOLID_KIND)
+first_block_of: Callable[[layout.Solid], int] = int_reader(layout.FIRST_BLOCK)
+end_block_of: Callable[[layout.Solid], int] = int_reader(layout.END_BLOCK)
+is_inside: Callable[[layout.Solid], int] = int_reader(layout.IS_INSIDE)
+sizes_of: Callable[[layout.SolidTable, int], layout.SolidSizes] = member_reader(
+    layout.SIZES, DOUBLE_BYTES * layout.SIZE_COUNT
+)
+disc_of: Callable[[layout.SolidSizes], float] = double_reader(layout.DISC)
+axis_of: Callable[[layout.SolidSizes], Vector] = double_vector_reader(layout.AXIS)
+round_of: Callable[[layout.SolidSizes], float] = double_reader(layout.ROUND)
+slack_of: Callable[[layout.SolidSizes], float] = double_reader(layout.SLACK)
+bound_centre_of: Callable[[layout.SolidSizes], Vector] = double_vector_reader(layout.BOUND_CENTRE)
+bound_radius_of: Callable[[layout.SolidSizes], float] = double_reader(layout.BOUND_RADIUS)
+corners_of: Callable[[layout.SolidTable], layout.CornerArray] = field_reader(layout.CORNERS)
+
+# Scratch memory
+values_of: Callable[[layout.ScratchTable], layout.LaneArray] = field_reader(layout.VALUES)
+frames_of: Callable[[layout.ScratchTable], layout.FrameArray] = field_reader(layout.FRAMES)
+group_centres_of: Callable[[layout.ScratchTable], layout.CentreArray] = field_reader(layout.GROUP_CENTRES)
+centres_of: Callable[[layout.ScratchTable], layout.CentreArray] = field_reader(layout.CENTRES)
+placed_flags_of: Callable[[layout.ScratchTable], layout.IntArray] = field_reader(layout.PLACED)
+found_of: Callable[[layout.ScratchTable], layout.PrimitiveList] = field_reader(layout.FOUND)
+near_of: Callable[[layout.ScratchTable], layout.PrimitiveList] = field_reader(layout.NEAR)
+met_of: Callable[[layout.ScratchTable], layout.PrimitiveList] = field_reader(layout.MET)
+marks_of: Callable[[layout.ScratchTable], layout.Marks] = field_reader(layout.MARKS)
+waiting_of: Callable[[layout.ScratchTable], layout.IntArray] = field_reader(layout.WAITING)
+outer_last_of: Callable[[layout.ScratchTable], layout.LastHit] = field_reader(layout.OUTER_LAST)
+inner_last_of: Callable[[layout.ScratchTable], layout.LastHit] = field_reader(layout.INNER_LAST)
+note_of: Callable[[layout.ScratchTable], layout.LaneArray] = field_reader(layout.NOTE)
+last_ball_of: Callable[[layout.LastHit], int] = int_reader(layout.LAST_BALL)
+last_frame_of: Callable[[layout.LastHit], int] = int_reader(layout.LAST_FRAME)
+last_primitive_of: Callable[[layout.LastHit], int] = int_reader(layout.LAST_PRIMITIVE)
+last_primitive_list: Callable[[layout.LastHit], layout.PrimitiveList] = part_reader(INT_BYTES * layout.LAST_PRIMITIVE)
+
+# Probe
+best_of: Callable[[layout.ProbeTable], layout.LaneArray] = field_reader(layout.BEST)
+which_of: Callable[[layout.ProbeTable], layout.IntArray] = field_reader(layout.WHICH)
+gaps_of: Callable[[layout.ProbeTable], layout.LaneArray] = field_reader(layout.GAPS)
+
+# Rows: array, numbers in a row, number of the row
+joint_row: Callable[[layout.JointValues, int, int], layout.JointValues] = _double_row
+checked_row: Callable[[layout.IntArray, int, int], layout.IntArray] = _int_row
+marks_row: Callable[[layout.Marks, int, int], layout.Marks] = _int_row
+
+
+@inlined
+def rotation_row(frame: layout.Frame, row: int) -> Vector:
+    """A row of a frame's rotation, in lanes."""
+    place = layout.ROTATION + 3 * row
+    return lanes_at(frame, place), lanes_at(frame, place + 1), lanes_at(frame, place + 2)
+
+
+@inlined
+def origin_at(frame: layout.Frame, row: int) -> Any:
+    """A coordinate of a frame's origin, in lanes."""
+    return lanes_at(frame, layout.ORIGIN + row)
+
+
+@inlined
+def set_rotation_row(frame: layout.Frame, row: int, x: Any, y: Any, z: Any) -> None:
+    """Set a row of a frame's rotation."""
+    place = layout.ROTATION + 3 * row
+    set_lanes(frame, place, x)
+    set_lanes(frame, place + 1, y)
+    set_lanes(frame, place + 2, z)
+
+
+@inlined
+def set_origin(frame: layout.Frame, row: int, value: Any) -> None:
+    """Set a coordinate of a frame's origin."""
+    set_lanes(frame, layout.ORIGIN + row, value)
+
+
+@inlined
+def stored_centre(centres: layout.CentreArray, number: int) -> Vector:
+    """A centre that is placed, in lanes."""
+    return lanes_at(centres, 3 * number), lanes_at(centres, 3 * number + 1), lanes_at(centres, 3 * number + 2)
+
+
+@inlined
+def store_centre(centres: layout.CentreArray, number: int, x: Any, y: Any, z: Any) -> None:
+    """Set a centre."""
+    set_lanes(centres, 3 * number, x)
+    set_lanes(centres, 3 * number + 1, y)
+    set_lanes(centres, 3 * number + 2, z)
+
+
+@inlined
+def corner_block(corners: layout.CornerArray, block: int) -> Vector:
+    """Coordinates of ``WIDTH`` corners of a solid; here lanes hold corners."""
+    return lanes_at(corners, 3 * block), lanes_at(corners, 3 * block + 1), lanes_at(corners, 3 * block + 2)
+
+
+@inlined
+def remember_hit(last: layout.LastHit, ball: int, frame: int, primitive: int) -> None:
+    """Note what met last."""
+    set_int(last, layout.LAST_BALL, ball)
+    set_int(last, layout.LAST_FRAME, frame)
+    set_int(last, layout.LAST_PRIMITIVE, primitive)
