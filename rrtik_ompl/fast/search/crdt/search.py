@@ -21,7 +21,7 @@ from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.fast.tables.layout import COLLIDING, FREE, UNDECIDED
-from rrtik_ompl.fast.tables.robot_tables import Table, table
+from rrtik_ompl.fast.tables.memory import Table, table
 from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
 
 FIRST_CAPACITY = 256  # vertices
@@ -117,6 +117,10 @@ class CrdtSearch:
     def branch(self, number: int, vertex: int) -> Matrix:
         """The branch of a tree from its root to a vertex, shape (k, n)."""
         return self._trees[number].branch(vertex)
+
+    def intact(self) -> bool:
+        """Whether no kernel has written beyond the memory of the search or what it works on."""
+        return self._motions.intact() and self._table.intact() and all(tree.intact() for tree in self._trees)
 
     def _go_on(self, until: int) -> int:
         """Let the kernel work up to a number of iterations, or until it wants an answer or room, and give it that."""
