@@ -12,7 +12,7 @@ from typing import Any
 
 from rrtik_ompl.fast.checks.kinematics import forward_kinematics
 from rrtik_ompl.fast.checks.narrow_phase import narrow_phase
-from rrtik_ompl.fast.checks.obstacle_kernels import ALL_LANES
+from rrtik_ompl.fast.checks.obstacle_kernels import ALL_LANES, kinds_known
 from rrtik_ompl.fast.checks.self_kernels import self_collision
 from rrtik_ompl.fast.checks.sphere_kernels import prepare, recheck_last_hit, scene_collision
 from rrtik_ompl.fast.simd.compiled import WIDTH, entry, inlined, kernel
@@ -29,7 +29,6 @@ from rrtik_ompl.fast.simd.lanes import (
 from rrtik_ompl.fast.tables.accessors import (
     arm_of,
     body_count_of,
-    fault_of,
     inner_balls_of,
     inner_last_of,
     inner_primitives_of,
@@ -102,8 +101,7 @@ def load_row(world: WorldTable, rows: JointValues, row: int, lane: int) -> None:
 @inlined
 def sound_count(world: WorldTable, count: int) -> int:
     """``count``, or UNSOUND if a table holds a primitive of an unknown kind."""
-    fault = fault_of(outer_primitives_of(world)) | fault_of(inner_primitives_of(world))
-    return count if fault == 0 else UNSOUND
+    return count if kinds_known(outer_primitives_of(world)) and kinds_known(inner_primitives_of(world)) else UNSOUND
 
 
 @kernel

@@ -62,21 +62,24 @@ from rrtik_ompl.fast.tables.accessors import (
     frame_of_cluster,
     frames_of,
     gaps_of,
+    group_at,
     group_balls_of,
     group_centres_of,
     group_count_of,
-    group_of,
-    head_of,
+    groups_of,
+    heads_of,
     one_body_of,
     one_group_of,
     other_body_of,
     other_group_of,
+    pair_at,
+    pair_group_at,
     pair_group_count_of,
-    pair_group_of,
-    pair_of,
+    pair_groups_of,
+    pairs_of,
     radius_at,
     scratch_of,
-    standing_body_of,
+    standing_body_at,
     standing_count_of,
     stored_centre,
     which_of,
@@ -119,7 +122,7 @@ def cluster_to_primitive(
     """Measure the balls of a cluster against a primitive."""
     cluster = cluster_of(balls, place)
     frame = frame_at(frames_of(scratch), frame_of_cluster(cluster))
-    pair = body_of_cluster(cluster) * standing_count_of(primitives) + standing_body_of(head_of(primitives, number))
+    pair = body_of_cluster(cluster) * standing_count_of(primitives) + standing_body_at(heads_of(primitives), number)
     if int_at(checked_of(primitives), pair) == 0:
         return
     around = cluster_balls_of(balls)
@@ -138,7 +141,7 @@ def group_to_primitive(
     balls: BallTable, primitives: PrimitiveTable, scratch: ScratchTable, probe: ProbeTable, place: int, number: int
 ) -> None:
     """Measure the clusters of a group against a primitive."""
-    group = group_of(balls, place)
+    group = group_at(groups_of(balls), place)
     for cluster in range(first_cluster_of_group(group), end_cluster_of_group(group)):
         cluster_to_primitive(balls, primitives, scratch, probe, cluster, number)
 
@@ -231,15 +234,16 @@ def measure_bodies(
 @kernel
 def measure_self(balls: BallTable, scratch: ScratchTable, probe: ProbeTable, start: int) -> None:
     """Measure the arm against itself; the pairs are numbered from ``start``."""
+    groups, pairs = pair_groups_of(balls), pairs_of(balls)
     around, centres = group_balls_of(balls), group_centres_of(scratch)
     for k in range(pair_group_count_of(balls)):
-        group = pair_group_of(balls, k)
+        group = pair_group_at(groups, k)
         first, second = one_group_of(group), other_group_of(group)
         x, y, z = stored_centre(centres, first)
         reach = radius_at(around, first) + radius_at(around, second)
         if within_best(probe, x, y, z, stored_centre(centres, second), reach):
             for number in range(first_pair_of(group), end_pair_of(group)):
-                pair = pair_of(balls, number)
+                pair = pair_at(pairs, number)
                 measure_bodies(balls, scratch, probe, one_body_of(pair), other_body_of(pair), start + number)
 
 

@@ -56,8 +56,9 @@ from rrtik_ompl.fast.tables.accessors import (
     outer_last_of,
     outer_primitives_of,
     own_of,
+    pair_at,
     pair_count_of,
-    pair_of,
+    pairs_of,
     round_of,
     scratch_of,
     sizes_of,
@@ -232,7 +233,7 @@ def narrow_phase(world: WorldTable, wanted: int) -> Any:
     scratch, balls, mine = scratch_of(world), outer_balls_of(world), moving_solids_of(world)
     standing = standing_count_of(outer_primitives_of(world))
     crossing = body_count_of(balls) * standing
-    marks = marks_of(scratch)
+    marks, pairs = marks_of(scratch), pairs_of(balls)
     open_, colliding = 0, 0
     for k in range(total):
         marked = int_at(marks, k) & ~colliding
@@ -241,7 +242,7 @@ def narrow_phase(world: WorldTable, wanted: int) -> Any:
         if k < crossing:
             first, second, others = k // standing, k % standing, standing_solids_of(world)
         else:
-            pair = pair_of(balls, k - crossing)
+            pair = pair_at(pairs, k - crossing)
             first, second, others = one_body_of(pair), other_body_of(pair), mine
         left, hit = compare_bodies(scratch, mine, first, others, second, marked)
         if k < crossing and left != hit:

@@ -2,7 +2,7 @@
 
 The broad phase, that is which primitives are in reach of a ball, stands here too. A set of lanes is an integer, one bit
 a lane. Primitives: see :mod:`rrtik_ompl.fast.tables.layout`; a primitive of an unknown kind counts as met everywhere,
-and its table says so.
+and :func:`kinds_known` says so.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from rrtik_ompl.fast.simd.lanes import (
     lanes_at,
     larger,
     lowest,
-    set_field,
     set_int,
     smaller,
     spread,
@@ -44,7 +43,9 @@ from rrtik_ompl.fast.tables.accessors import (
     half_sizes_of,
     half_space_normal_of,
     half_space_offset_of,
+    head_at,
     head_of,
+    heads_of,
     inverse_square_of,
     kind_of,
     normal_of,
@@ -52,17 +53,22 @@ from rrtik_ompl.fast.tables.accessors import (
     padded_count_of,
     plane_at,
     planes_of,
+    primitive_count_of,
     second_axis_of,
+    shape_at,
     shape_of,
+    shapes_of,
     share_of,
     standing_body_of,
     third_axis_of,
 )
 from rrtik_ompl.fast.tables.layout import (
+    KIND_COUNT,
     NO_MARKS,
     LaneArray,
     Marks,
     PlaneArray,
+    PrimitiveHead,
     PrimitiveList,
     PrimitiveShape,
     PrimitiveTable,
@@ -71,6 +77,16 @@ from rrtik_ompl.fast.tables.layout import (
 ALL_LANES = (1 << WIDTH) - 1
 ZERO, ONE = np.float32(0.0), np.float32(1.0)
 UNBOUNDED_DISTANCE = np.float32(1e18)  # [m] where there is nothing to measure; its square is a float32 still
+
+
+@inlined
+def kinds_known(primitives: PrimitiveTable) -> bool:
+    """Whether every primitive has a formula; they are sorted by kind, so that the first and the last say it."""
+    count = primitive_count_of(primitives)
+    known = count == 0
+    if count > 0:
+        known = kind_of(head_of(primitives, 0)) >= 0 and kind_of(head_of(primitives, count - 1)) < KIND_COUNT
+    return known
 
 
 @inlined
@@ -138,15 +154,25 @@ def meets_convex(planes: PlaneArray, start: int, end: int, share: Any, x: Any, y
 
 
 @inlined
-def meets_primitive(primitives: PrimitiveTable, number: int, x: Any, y: Any, z: Any, radius: float, bound: bool) -> Any:
+def meets_primitive(
+    primitives: PrimitiveTable,
+    head: PrimitiveHead,
+    shape: PrimitiveShape,
+    x: Any,
+    y: Any,
+    z: Any,
+    radius: float,
+    bound: bool,
+) -> Any:
     """Lanes in which a ball meets a primitive; ``bound``: the ball only stands for balls inside it."""
-    shape, head = shape_of(primitives, number), head_of(primitives, number)
     kind = kind_of(head)
-    if kind == layout.HALF_SPACE:
-        return bits(half_space_gap(shape, x, y, z) < radius)
-    if kind == layout.CONVEX:
-        share = ONE if bound else share_of(shape)
-        return meets_convex(planes_of(primitives), first_plane_of(head), end_plane_of(head), share, x, y, z, radius)
+    if kind < 0 or kind >= layout.CENTRED_KINDS:
+        if kind == layout.HALF_SPACE:
+            return bits(half_space_gap(shape, x, y, z) < radius)
+        if kind == layout.CONVEX:
+            share, planes = ONE if bound else share_of(shape), planes_of(primitives)
+            return meets_convex(planes, first_plane_of(head), end_plane_of(head), share, x, y, z, radius)
+        return ALL_LANES
     centre = centre_of(shape)
     x, y, z = x - centre[0], y - centre[1], z - centre[2]
     if kind == layout.BOX:
@@ -158,12 +184,9 @@ def meets_primitive(primitives: PrimitiveTable, number: int, x: Any, y: Any, z: 
     if kind == layout.CAPSULE:
         reach = radius + capsule_radius_of(shape)
         return bits(to_capsule(shape, x, y, z) < reach * reach)
-    if kind == layout.CYLINDER:
-        height, outside = beyond_ends(shape, x, y, z)
-        beyond, outside = larger(height, ZERO), larger(outside, ZERO)
-        return bits(beyond * beyond + outside * outside < radius * radius)
-    set_field(primitives, layout.FAULT, layout.UNSOUND)
-    return ALL_LANES
+    beyond, outside = beyond_ends(shape, x, y, z)  # the last of the kinds with a centre: a cylinder
+    beyond, outside = larger(beyond, ZERO), larger(outside, ZERO)
+    return bits(beyond * beyond + outside * outside < radius * radius)
 
 
 @kernel
@@ -180,14 +203,16 @@ def primitive_gap(primitives: PrimitiveTable, number: int, x: Any, y: Any, z: An
     """Signed distance of a point from a primitive, negative inside; ``bound``: the point stands for others near it."""
     shape, head = shape_of(primitives, number), head_of(primitives, number)
     kind = kind_of(head)
-    if kind == layout.HALF_SPACE:
-        return half_space_gap(shape, x, y, z)
-    if kind == layout.CONVEX:
-        height = to_convex(planes_of(primitives), first_plane_of(head), end_plane_of(head), x, y, z)
-        if bound or share_of(shape) != ZERO:
-            return height
-        # Outside, the height is too small for an inner primitive.
-        return choose(height < ZERO, height, spread(UNBOUNDED_DISTANCE))
+    if kind < 0 or kind >= layout.CENTRED_KINDS:
+        if kind == layout.HALF_SPACE:
+            return half_space_gap(shape, x, y, z)
+        if kind == layout.CONVEX:
+            height = to_convex(planes_of(primitives), first_plane_of(head), end_plane_of(head), x, y, z)
+            if bound or share_of(shape) != ZERO:
+                return height
+            # Outside, the height is too small for an inner primitive.
+            return choose(height < ZERO, height, spread(UNBOUNDED_DISTANCE))
+        return spread(-UNBOUNDED_DISTANCE)
     centre = centre_of(shape)
     x, y, z = x - centre[0], y - centre[1], z - centre[2]
     if kind == layout.BALL:
@@ -198,12 +223,9 @@ def primitive_gap(primitives: PrimitiveTable, number: int, x: Any, y: Any, z: An
         a, b, c = beyond_faces(shape, x, y, z)
         outside = square_root(squared(larger(a, ZERO), larger(b, ZERO), larger(c, ZERO)))
         return outside + smaller(larger(larger(a, b), c), ZERO)
-    if kind == layout.CYLINDER:
-        a, b = beyond_ends(shape, x, y, z)
-        outside = square_root(larger(a, ZERO) * larger(a, ZERO) + larger(b, ZERO) * larger(b, ZERO))
-        return outside + smaller(larger(a, b), ZERO)
-    set_field(primitives, layout.FAULT, layout.UNSOUND)
-    return spread(-UNBOUNDED_DISTANCE)
+    a, b = beyond_ends(shape, x, y, z)  # the last of the kinds with a centre: a cylinder
+    outside = square_root(larger(a, ZERO) * larger(a, ZERO) + larger(b, ZERO) * larger(b, ZERO))
+    return outside + smaller(larger(a, b), ZERO)
 
 
 @kernel
@@ -224,16 +246,18 @@ def meets_primitives(
 
     Unless ``NO_MARKS``, ``marks`` are one number for each standing body, which collects the lanes that meet it.
     """
+    heads, shapes = heads_of(primitives), shapes_of(primitives)
     meeting, kept = 0, 0
     for k in range(count):
         number = int_at(source, k)
-        found = meets_primitive(primitives, number, x, y, z, radius, bound) & wanted
+        head, shape = head_at(heads, number), shape_at(shapes, number)
+        found = meets_primitive(primitives, head, shape, x, y, z, radius, bound) & wanted
         if found != 0:
             meeting |= found
             set_int(sink, kept, number)
             kept += 1
             if marks != NO_MARKS:
-                body = standing_body_of(head_of(primitives, number))
+                body = standing_body_of(head)
                 set_int(marks, body, int_at(marks, body) | found)
     return meeting, kept
 

@@ -34,9 +34,11 @@ from rrtik_ompl.fast.tables.accessors import (
     one_group_of,
     other_body_of,
     other_group_of,
+    pair_at,
+    pair_group_at,
     pair_group_count_of,
-    pair_group_of,
-    pair_of,
+    pair_groups_of,
+    pairs_of,
     radius_at,
     stored_centre,
 )
@@ -105,10 +107,11 @@ def self_collision(balls: BallTable, scratch: ScratchTable, wanted: int, marks: 
 
     Unless ``NO_MARKS``, ``marks`` are one number for each pair, which collects the lanes.
     """
+    groups, pairs = pair_groups_of(balls), pairs_of(balls)
     around, centres = group_balls_of(balls), group_centres_of(scratch)
     meeting = 0
     for number in range(pair_group_count_of(balls)):
-        group = pair_group_of(balls, number)
+        group = pair_group_at(groups, number)
         first, second = one_group_of(group), other_group_of(group)
         x, y, z = stored_centre(centres, first)
         reach = radius_at(around, first) + radius_at(around, second)
@@ -118,7 +121,7 @@ def self_collision(balls: BallTable, scratch: ScratchTable, wanted: int, marks: 
         if close == 0:
             continue
         for k in range(first_pair_of(group), end_pair_of(group)):
-            pair = pair_of(balls, k)
+            pair = pair_at(pairs, k)
             found = bodies_meet(balls, scratch, one_body_of(pair), other_body_of(pair), close)
             meeting |= found
             if marks != NO_MARKS and found != 0:

@@ -34,11 +34,12 @@ from rrtik_ompl.fast.tables.accessors import (
     frame_of_cluster,
     frame_of_group,
     frames_of,
+    group_at,
     group_balls_of,
     group_centres_of,
     group_count_of,
-    group_of,
-    head_of,
+    groups_of,
+    heads_of,
     last_ball_of,
     last_frame_of,
     last_primitive_list,
@@ -52,7 +53,7 @@ from rrtik_ompl.fast.tables.accessors import (
     radius_at,
     remember_hit,
     rotation_row,
-    standing_body_of,
+    standing_body_at,
     standing_count_of,
     store_centre,
     stored_centre,
@@ -91,10 +92,10 @@ def checked_primitives(
     """Copy a list of primitives without those that a body need not keep clear of; returns how many are left."""
     everything = int_at(excluding_of(primitives), body) == 0
     checked = checked_row(checked_of(primitives), standing_count_of(primitives), body)
-    kept = 0
+    heads, kept = heads_of(primitives), 0
     for k in range(count):
         number = int_at(source, k)
-        if everything or int_at(checked, standing_body_of(head_of(primitives, number))) != 0:
+        if everything or int_at(checked, standing_body_at(heads, number)) != 0:
             set_int(sink, kept, number)
             kept += 1
     return kept
@@ -103,9 +104,9 @@ def checked_primitives(
 @kernel
 def prepare(balls: BallTable, scratch: ScratchTable) -> None:
     """Place the groups' centres and forget the balls' centres of the last block."""
-    frames = frames_of(scratch)
+    frames, groups = frames_of(scratch), groups_of(balls)
     for group in range(group_count_of(balls)):
-        frame = frame_at(frames, frame_of_group(group_of(balls, group)))
+        frame = frame_at(frames, frame_of_group(group_at(groups, group)))
         x, y, z = placed_centre(frame, group_balls_of(balls), group)
         store_centre(group_centres_of(scratch), group, x, y, z)
     flags = placed_flags_of(scratch)
@@ -186,7 +187,7 @@ def scene_collision(
     """
     if primitive_count_of(primitives) == 0:
         return 0
-    around, found = group_balls_of(balls), found_of(scratch)
+    groups, around, found = groups_of(balls), group_balls_of(balls), found_of(scratch)
     meeting = 0
     for number in range(group_count_of(balls)):
         x, y, z = stored_centre(group_centres_of(scratch), number)
@@ -198,7 +199,7 @@ def scene_collision(
         close, count = meets_primitives(primitives, x, y, z, radius, True, still, found, count, found, NO_MARKS)
         if close == 0:
             continue
-        group = group_of(balls, number)
+        group = group_at(groups, number)
         for cluster in range(first_cluster_of_group(group), end_cluster_of_group(group)):
             left = close if marks != NO_MARKS else close & ~meeting
             meeting |= cluster_meets(balls, primitives, scratch, cluster, count, left, marks, one, last)

@@ -15,6 +15,7 @@ from rrtik_ompl.fast.simd.access import (
     field_reader,
     float_column,
     float_reader,
+    int_column,
     int_reader,
     member_reader,
     part_reader,
@@ -69,7 +70,8 @@ radius_at: Callable[[layout.BallArray, int], float] = float_column(layout.BALL_F
 ball_x: Callable[[layout.BallArray, int], float] = float_column(layout.BALL_FLOATS, layout.CENTRE)
 ball_y: Callable[[layout.BallArray, int], float] = float_column(layout.BALL_FLOATS, layout.CENTRE + 1)
 ball_z: Callable[[layout.BallArray, int], float] = float_column(layout.BALL_FLOATS, layout.CENTRE + 2)
-group_of: Callable[[layout.BallTable, int], layout.Group] = member_reader(layout.GROUPS, INT_BYTES * layout.GROUP_INTS)
+groups_of: Callable[[layout.BallTable], layout.GroupArray] = field_reader(layout.GROUPS)
+group_at: Callable[[layout.GroupArray, int], layout.Group] = record_reader(INT_BYTES * layout.GROUP_INTS)
 frame_of_group: Callable[[layout.Group], int] = int_reader(layout.GROUP_FRAME)
 first_cluster_of_group: Callable[[layout.Group], int] = int_reader(layout.GROUP_FIRST)
 end_cluster_of_group: Callable[[layout.Group], int] = int_reader(layout.GROUP_END)
@@ -86,14 +88,16 @@ body_of: Callable[[layout.BallTable, int], layout.MovingBody] = member_reader(
 frame_of_body: Callable[[layout.MovingBody], int] = int_reader(layout.BODY_FRAME)
 first_cluster_of_body: Callable[[layout.MovingBody], int] = int_reader(layout.BODY_FIRST)
 end_cluster_of_body: Callable[[layout.MovingBody], int] = int_reader(layout.BODY_END)
-pair_group_of: Callable[[layout.BallTable, int], layout.PairGroup] = member_reader(
-    layout.PAIR_GROUPS, INT_BYTES * layout.PAIR_GROUP_INTS
+pair_groups_of: Callable[[layout.BallTable], layout.PairGroupArray] = field_reader(layout.PAIR_GROUPS)
+pair_group_at: Callable[[layout.PairGroupArray, int], layout.PairGroup] = record_reader(
+    INT_BYTES * layout.PAIR_GROUP_INTS
 )
 one_group_of: Callable[[layout.PairGroup], int] = int_reader(layout.PAIR_GROUP_ONE)
 other_group_of: Callable[[layout.PairGroup], int] = int_reader(layout.PAIR_GROUP_OTHER)
 first_pair_of: Callable[[layout.PairGroup], int] = int_reader(layout.PAIR_GROUP_FIRST)
 end_pair_of: Callable[[layout.PairGroup], int] = int_reader(layout.PAIR_GROUP_END)
-pair_of: Callable[[layout.BallTable, int], layout.Pair] = member_reader(layout.PAIRS, INT_BYTES * layout.PAIR_INTS)
+pairs_of: Callable[[layout.BallTable], layout.PairArray] = field_reader(layout.PAIRS)
+pair_at: Callable[[layout.PairArray, int], layout.Pair] = record_reader(INT_BYTES * layout.PAIR_INTS)
 one_body_of: Callable[[layout.Pair], int] = int_reader(layout.PAIR_ONE)
 other_body_of: Callable[[layout.Pair], int] = int_reader(layout.PAIR_OTHER)
 
@@ -101,7 +105,6 @@ other_body_of: Callable[[layout.Pair], int] = int_reader(layout.PAIR_OTHER)
 primitive_count_of: Callable[[layout.PrimitiveTable], int] = field_reader(layout.PRIMITIVE_COUNT)
 padded_count_of: Callable[[layout.PrimitiveTable], int] = field_reader(layout.PADDED_COUNT)
 standing_count_of: Callable[[layout.PrimitiveTable], int] = field_reader(layout.STANDING_COUNT)
-fault_of: Callable[[layout.PrimitiveTable], int] = field_reader(layout.FAULT)
 boxes_of: Callable[[layout.PrimitiveTable], layout.LaneArray] = field_reader(layout.BOXES)
 planes_of: Callable[[layout.PrimitiveTable], layout.PlaneArray] = field_reader(layout.PLANES)
 checked_of: Callable[[layout.PrimitiveTable], layout.IntArray] = field_reader(layout.CHECKED)
@@ -110,8 +113,11 @@ own_of: Callable[[layout.PrimitiveTable], layout.IntArray] = field_reader(layout
 head_of: Callable[[layout.PrimitiveTable, int], layout.PrimitiveHead] = member_reader(
     layout.NUMBERS, INT_BYTES * layout.HEAD_INTS
 )
-kind_of: Callable[[layout.PrimitiveHead], int] = int_reader(layout.KIND)
+heads_of: Callable[[layout.PrimitiveTable], layout.HeadArray] = field_reader(layout.NUMBERS)
+standing_body_at: Callable[[layout.HeadArray, int], int] = int_column(layout.HEAD_INTS, layout.STANDING_BODY)
+head_at: Callable[[layout.HeadArray, int], layout.PrimitiveHead] = record_reader(INT_BYTES * layout.HEAD_INTS)
 standing_body_of: Callable[[layout.PrimitiveHead], int] = int_reader(layout.STANDING_BODY)
+kind_of: Callable[[layout.PrimitiveHead], int] = int_reader(layout.KIND)
 first_plane_of: Callable[[layout.PrimitiveHead], int] = int_reader(layout.FIRST_PLANE)
 end_plane_of: Callable[[layout.PrimitiveHead], int] = int_reader(layout.END_PLANE)
 plane_at: Callable[[layout.PlaneArray, int], layout.Plane] = record_reader(FLOAT_BYTES * layout.PLANE_FLOATS)
@@ -120,6 +126,8 @@ offset_of: Callable[[layout.Plane], float] = float_reader(layout.PLANE_OFFSET)
 shape_of: Callable[[layout.PrimitiveTable, int], layout.PrimitiveShape] = member_reader(
     layout.PRIMITIVES, FLOAT_BYTES * layout.SHAPE_FLOATS
 )
+shapes_of: Callable[[layout.PrimitiveTable], layout.ShapeArray] = field_reader(layout.PRIMITIVES)
+shape_at: Callable[[layout.ShapeArray, int], layout.PrimitiveShape] = record_reader(FLOAT_BYTES * layout.SHAPE_FLOATS)
 centre_of: Callable[[layout.PrimitiveShape], Vector] = vector_reader(layout.SHAPE_CENTRE)
 ball_radius_of: Callable[[layout.PrimitiveShape], float] = float_reader(layout.BALL_RADIUS)
 capsule_axis_of: Callable[[layout.PrimitiveShape], Vector] = vector_reader(layout.CAPSULE_AXIS)

@@ -33,7 +33,12 @@ DoubleArray = NewType("DoubleArray", int)
 LaneArray = NewType("LaneArray", int)
 JointValues = NewType("JointValues", int)  # rows of float64, one number for each joint
 BallArray = NewType("BallArray", int)
+HeadArray = NewType("HeadArray", int)
+ShapeArray = NewType("ShapeArray", int)
 PlaneArray = NewType("PlaneArray", int)
+GroupArray = NewType("GroupArray", int)
+PairGroupArray = NewType("PairGroupArray", int)
+PairArray = NewType("PairArray", int)
 FrameArray = NewType("FrameArray", int)
 CentreArray = NewType("CentreArray", int)  # of points, lanes of x, of y and of z each
 CornerArray = NewType("CornerArray", int)
@@ -93,9 +98,8 @@ PAIR_ONE, PAIR_OTHER = range(2)
 # Primitives: what stands still. BOXES: BOX_RUNS of PADDED_COUNT floats · NUMBERS: the heads · PRIMITIVES: the
 # shapes · CHECKED: one int for each moving and standing body, 0 to ignore that pair ·
 # EXCLUDING: for each moving body whether it has a pair to ignore · OWN: for each standing body the primitive that has
-# its formula, or any of its balls, -1 if it has none · FAULT: not 0 once a kernel has met a kind that it does not know
+# its formula, or any of its balls, -1 if it has none
 PRIMITIVE_COUNT, PADDED_COUNT, BOXES, PRIMITIVES, NUMBERS, PLANES, STANDING_COUNT, CHECKED, EXCLUDING, OWN = range(10)
-FAULT = 10
 LOW_X, HIGH_X, LOW_Y, HIGH_Y, LOW_Z, HIGH_Z = BOX_RUNS = range(6)
 # Head of a primitive (ints): kind, number of its standing body, planes from, to.
 HEAD_INTS = 4
@@ -106,6 +110,7 @@ PLANE_NORMAL, PLANE_OFFSET = 0, 3
 
 # Kinds of primitives. A new one needs a branch in `meets_primitive` and `primitive_gap`, in kernels and in numpy.
 BALL, CAPSULE, BOX, CYLINDER, HALF_SPACE, CONVEX = KINDS = range(6)
+KIND_COUNT, CENTRED_KINDS = len(KINDS), 4  # the latter: so many, the first ones, have a centre
 # Shape of a primitive (floats): all but half-spaces and convex ones begin with their centre, a capsule with one end.
 SHAPE_FLOATS = 16
 SHAPE_CENTRE = 0

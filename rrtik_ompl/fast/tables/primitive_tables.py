@@ -20,7 +20,6 @@ from rrtik_ompl.fast.tables.layout import (
     CHECKED,
     END_PLANE,
     EXCLUDING,
-    FAULT,
     FIRST_PLANE,
     HEAD_INTS,
     HIGH_X,
@@ -92,7 +91,6 @@ def primitive_table(primitives: Sequence[tuple[int, Primitive]], checked: NDArra
             CHECKED: checked.astype(np.int32),
             EXCLUDING: np.asarray((~checked).any(axis=1), dtype=np.int32),
             OWN: own,
-            FAULT: 0,
         }
     )
 
