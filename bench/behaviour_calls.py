@@ -12,26 +12,12 @@ import numpy as np
 
 import rrtik_ompl as rrtik
 from behaviour_paths import plan_of
-from behaviour_problems import (
-    AHEAD,
-    BUDGET,
-    EDGE,
-    LONG,
-    MADE,
-    POSES,
-    Cases,
-    Result,
-    draws,
-    goal_of,
-    problem_of,
-    robot_of,
-    surroundings,
-)  # fmt: skip
+from behaviour_problems import LONG, MADE, Cases, Result, draws, goal_of, problem_of, robot_of, surroundings
 
 SLOW_ALL = ("ccd", "pso", "pso-resampled", "pinocchio", "projection")  # seconds for all solutions of one goal
 
 
-def ik_case(name: str, method: str, kind: str, scene: bool = False, **options: Any) -> Result:
+def ik_case(name: str, method: Any, kind: str, scene: bool = False, **options: Any) -> Result:
     robot = robot_of(name)
     world = problem_of(f"made_{name}").world if scene else None
     options = {"near": draws(robot, 1, 8)[0], **options}
@@ -46,7 +32,7 @@ def batch_case(name: str, scene: bool) -> Result:
     return f"{found.found.sum()} {sorted(set(found.reasons))}", [found.q, found.found, found.residuals]
 
 
-def track_case(name: str, method: str, points: bool = False, **options: Any) -> Result:
+def track_case(name: str, method: Any, points: bool = False, **options: Any) -> Result:
     robot = robot_of(name)
     start = 0.5 * draws(robot, 1, 9)[0]
     poses = robot.fk_batch(start + np.linspace(0.0, 0.4, 20)[:, None])
@@ -56,6 +42,7 @@ def track_case(name: str, method: str, points: bool = False, **options: Any) -> 
 
 
 def inverse_kinematics() -> Cases:
+    method: Any
     calls: list[tuple[Any, ...]] = [("titan4", "closed-form", "position", {})]  # an error
     for method in rrtik.list_ik_methods():
         kinds = ("pose",) if method == "closed-form" else ("position",) if method == "fabrik" else ("pose", "position")
@@ -86,7 +73,7 @@ def run_case(run: Any) -> Result:
 
 
 def scenario_case(name: str, **options: Any) -> Result:
-    return run_case(rrtik.load_scenario(name).run(**{BUDGET: LONG}, **options))
+    return run_case(rrtik.load_scenario(name).run(repair_budget=LONG, **options))
 
 
 def feed_case(kind: str) -> Result:
@@ -94,19 +81,23 @@ def feed_case(kind: str) -> Result:
     problem, scene = problem_of("made_ur5"), surroundings(robot_of("ur5"))
     first, *others = scene.obstacles
     there = rrtik.pose(first.pose.translation + np.array([0.1, 0.1, 0.0]))
-    motion = POSES([0.0, 2.0], [first.pose, there]) if kind == "poses" else rrtik.ConstantVelocity([0.05, 0.02, 0.0])
-    moved = rrtik.Scene([rrtik.Obstacle(first.name, first.shape, first.pose, motion), *others])
+    motion = (
+        rrtik.TimedPoses([0.0, 2.0], [first.pose, there])
+        if kind == "poses"
+        else rrtik.ConstantVelocity([0.05, 0.02, 0.0])
+    )
+    moved = rrtik.Scene((rrtik.Obstacle(first.name, first.shape, first.pose, motion), *others))
     feed: Any = (lambda t: moved.at(min(t, 1.0))) if kind in ("function", "goal") else moved
     goal = (lambda t: problem.goal.q - 0.02 * min(t, 1.0)) if kind == "goal" else None
-    options = {"step": 0.05, "rate": 20, "seconds": 10, "seed": 2, EDGE: 1.0, BUDGET: LONG}
-    return run_case(rrtik.replan(problem, feed, goal_feed=goal, **options))
+    options: dict[str, Any] = {"step": 0.05, "rate": 20, "seconds": 10, "seed": 2, "max_edge": 1.0}
+    return run_case(rrtik.replan(problem, feed, goal_feed=goal, repair_budget=LONG, **options))
 
 
 def replans() -> Cases:
     for name in ("replan_planar_arm", "replan_pockets", "replan_triangles", "replan_ur5", "replan_walls"):
         for seed, planner in ((0, "drrt-con"), (1, "drrt-con"), (0, "drrt"), (2, "rrt-connect")):
             yield f"replan {name} {planner} {seed}", partial(scenario_case, name, seed=seed, planner=planner)
-        yield f"replan {name} ahead", partial(scenario_case, name, seed=3, **{AHEAD: 4})
+        yield f"replan {name} ahead", partial(scenario_case, name, seed=3, lookahead_ticks=4)
     yield "replan replan_titan4", partial(scenario_case, "replan_titan4", seed=0)
     for kind in ("poses", "velocity", "function", "goal"):
         yield f"replan feed {kind}", partial(feed_case, kind)

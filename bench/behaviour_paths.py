@@ -16,7 +16,7 @@ from ompl import geometric as og
 
 import rrtik_ompl as rrtik
 import rrtik_planners
-from behaviour_problems import LONG, MADE, TIMED, Cases, Result, problem_of
+from behaviour_problems import LONG, MADE, Cases, Result, problem_of
 
 OWN = ("bicrdt", "crdt", "fastrrtconnect", "mbrrt", "drrt-con", "ikurt")
 WHEEL = ("RRTConnect", "RRT", "KPIECE1", "BKPIECE1", "LBKPIECE1", "FMT", "BFMT")
@@ -95,12 +95,12 @@ def plain() -> Cases:
         yield f"plain OMPL {planner}", partial(plain_case, planner)
 
 
-def shorten_case(name: str, planner: str, method: str, **options: Any) -> Result:
+def shorten_case(name: str, planner: str, method: Any, **options: Any) -> Result:
     path = rrtik.shorten(plan_of(name, planner).path, problem_of(name), method=method, seed=1, **options)
     return f"{len(path.waypoints)}", [path.waypoints, np.array([path.length])]
 
 
-def rules_case(method: str) -> Result:
+def rules_case(method: Any) -> Result:
     rules = rrtik.MoveRules(problem_of("titan4_sdu").robot.joint_names, joint_costs=[2, 1, 1, 1, 1, 1], last_joints=[0])
     plan = plan_of("titan4_sdu", "bicrdt", 1, '{"last_joints": [0]}')
     path = rrtik.shorten(plan.path, problem_of("titan4_sdu"), method=method, seed=1, rules=rules)
@@ -128,7 +128,7 @@ def timed_case(name: str, planner: str, share: float, blend: float) -> Result:
     problem = problem_of(name)
     limits = rrtik.RateLimits.of(problem.robot, share=share)
     options = {"blend": blend, "world": problem.world} if blend else {}
-    motion = TIMED(plan_of(name, planner).path, limits, **options)
+    motion = rrtik.time_parameterize(plan_of(name, planner).path, limits, **options)
     sampled = [motion(t) for t in np.linspace(0.0, motion.duration, 9)]
     arrays = [motion.times, motion.positions, motion.velocities, motion.accelerations]
     return f"{len(motion.times)}", [*arrays, *(s.positions for s in sampled), *(s.velocities for s in sampled)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Iterator
 from functools import cache
 from typing import Any
@@ -16,13 +15,6 @@ Cases = Iterator[tuple[str, Callable[[], Result]]]
 
 LONG = 60.0  # [s] a limit that no case comes near
 MADE = ("panda", "panda_primitives", "ur5", "titan4", "puma560")
-
-# Names before and after their change; remove the older one once no tree has it.
-TIMED = getattr(rrtik, "time_parameterize", None) or rrtik.timed
-POSES = getattr(rrtik, "TimedPoses", None) or rrtik.Waypoints
-SET = getattr(rrtik, "GoalSet", None) or rrtik.GoalRegion
-NEW_NAMES = "repair_budget" in inspect.signature(rrtik.replan).parameters
-BUDGET, AHEAD, EDGE = ("repair_budget", "lookahead_ticks", "max_edge") if NEW_NAMES else ("slot", "predict", "eps")
 
 
 @cache
@@ -48,7 +40,7 @@ def surroundings(robot: Any) -> Any:
     shapes += [rrtik.Capsule(0.5 * size, size), rrtik.Prism(corners, size), rrtik.Box([size, size, size])]
     placed = enumerate(zip(shapes, map(rrtik.pose, places, turns), strict=True))
     made = [rrtik.Obstacle(f"o{k}", shape, pose, margin=0.01 * (k % 2)) for k, (shape, pose) in placed]
-    return rrtik.Scene([*made, rrtik.Obstacle("floor", rrtik.HalfSpace((0, 0, 1), -8 * size))])
+    return rrtik.Scene((*made, rrtik.Obstacle("floor", rrtik.HalfSpace((0, 0, 1), -8 * size))))
 
 
 @cache
@@ -66,11 +58,12 @@ def problem_of(name: str) -> Any:
 def goal_of(kind: str, robot: Any) -> Any:
     T = robot.fk_batch(draws(robot, 3, 3))
     centre = rrtik.pose(T[0][:3, 3])
-    freedom = [[-0.1, 0.1], [0, 0.05], [0, 0], [-3.2, 3.2], [-3.2, 3.2], [-3.2, 3.2]]
-    return {
+    freedom = np.array([[-0.1, 0.1], [0, 0.05], [0, 0], [-3.2, 3.2], [-3.2, 3.2], [-3.2, 3.2]])
+    goals: dict[str, Callable[[], Any]] = {
         "pose": lambda: rrtik.PoseGoal(T[0]),
         "position": lambda: rrtik.PositionGoal(T[0][:3, 3], tolerance=0.005),
         "far": lambda: rrtik.PoseGoal(rrtik.pose([9.0, 0, 0])),
         "region": lambda: rrtik.TaskRegion(centre, freedom),
-        "set": lambda: SET([rrtik.PoseGoal(T[1]), rrtik.PoseGoal(T[2])]),
-    }[kind]()
+        "set": lambda: rrtik.GoalSet([rrtik.PoseGoal(T[1]), rrtik.PoseGoal(T[2])]),
+    }
+    return goals[kind]()

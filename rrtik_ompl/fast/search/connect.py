@@ -19,7 +19,7 @@ from rrtik_ompl.fast.search.tree_memory import grow, tree_table
 from rrtik_ompl.fast.simd.halton import inverse_bases
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.simd.processor import WIDTH
-from rrtik_ompl.fast.tables.robot_tables import Table, aligned, table
+from rrtik_ompl.fast.tables.memory import Table, aligned, is_intact, table
 
 PATIENCE = 8  # rejected paths until undecided motions are asked for at once
 FIRST_CAPACITY = 64 * WIDTH  # vertices
@@ -156,6 +156,11 @@ class ConnectSearch:
             "questions": self._questions,
             "rejected": rejected,
         }
+
+    def intact(self) -> bool:
+        """Whether no kernel has written beyond the memory of the search or what it works on."""
+        tables = self._motions.intact() and all(own.intact() for own in (self._search, *self._trees))
+        return tables and all(is_intact(rows) for rows in (*self._roots, self._path_rows))
 
     def _run(self, ask: Ask | None, stop: Callable[[], object] | None) -> int:
         """Call the kernel until it is done; its last status."""

@@ -46,6 +46,8 @@ from rrtik_ompl.fast.search.connect_motions import (
     aim_at_sample,
     aim_at_vertex,
     aim_straight,
+    candidate_row_of,
+    candidate_values_of,
     check_candidate,
     dof_in,
     meeting_of,
@@ -141,7 +143,7 @@ def load_row(search: ConnectTable, source: Configuration) -> bool:
     lower, upper, row = (
         field(search, connect_layout.LOWER),
         field(search, connect_layout.UPPER),
-        field(search, connect_layout.ROW),
+        candidate_row_of(search),
     )
     for k in range(dof_in(search)):
         value = double_at(source, k)
@@ -156,7 +158,7 @@ def load_row(search: ConnectTable, source: Configuration) -> bool:
 def plant_roots(search: ConnectTable, side: int, rows: Configuration, count: int) -> int:
     """Make the rows the roots of a tree; returns the number of the first one outside the box, or -1."""
     tree = tree_of(search, side)
-    row, values = field(search, connect_layout.ROW), field(search, connect_layout.ROW_VALUES)
+    row, values = candidate_row_of(search), candidate_values_of(search)
     clear_tree(tree)
     for k in range(count):
         if not load_row(search, row_at(rows, dof_in(search), k)):
@@ -171,7 +173,7 @@ def rows_free(search: ConnectTable, rows: Configuration, count: int) -> int:
     for k in range(count):
         if not load_row(search, row_at(rows, dof_in(search), k)):
             return 0
-        if not configuration_free(motions_of(search), field(search, connect_layout.ROW)):
+        if not configuration_free(motions_of(search), candidate_row_of(search)):
             return 0
     return 1
 

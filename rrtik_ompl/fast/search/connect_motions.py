@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -16,28 +17,28 @@ from rrtik_ompl.fast.search.motions.motion_kernels import (
     step_count,
     world_of,
 )
-from rrtik_ompl.fast.search.motions.motion_layout import FastMotions
+from rrtik_ompl.fast.search.motions.motion_layout import MotionTable
 from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row, distance
 from rrtik_ompl.fast.search.tree_kernels import live_of, nearest_vertex, radius_of, row_of, values_of
 from rrtik_ompl.fast.search.tree_layout import TreeTable
+from rrtik_ompl.fast.simd.access import field_reader
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field, set_float
 from rrtik_ompl.fast.simd.random_kernels import next_point
+from rrtik_ompl.fast.tables.layout import JointValues
 
 MAX_STRAIGHT_MOTIONS = 16  # whole motions to goals that are tried first
 SAMPLE_BOX_GROWTH = 1.1  # from one sample to the next, where samples begin near a place
 RANGE_TOLERANCE = 1e-9  # of the range, by which a motion of the trees may be longer
 
 
-@inlined
-def motions_of(search: ConnectTable) -> FastMotions:
-    """The motion table of the world."""
-    motions: FastMotions = field(search, connect_layout.MOTIONS)
-    return motions
+motions_of: Callable[[ConnectTable], MotionTable] = field_reader(connect_layout.MOTIONS)
+candidate_row_of: Callable[[ConnectTable], Configuration] = field_reader(connect_layout.ROW)
+candidate_values_of: Callable[[ConnectTable], JointValues] = field_reader(connect_layout.ROW_VALUES)
 
 
 @inlined
-def dof_in(search: ConnectTable) -> Any:
+def dof_in(search: ConnectTable) -> int:
     """How many numbers a configuration has."""
     return dof_of(motions_of(search))
 
@@ -76,8 +77,8 @@ def count_up(search: ConnectTable, place: int) -> None:
 @kernel
 def set_row_values(search: ConnectTable) -> None:
     """Joint values of ROW, unless they are the configuration itself."""
-    row, values = field(search, connect_layout.ROW), field(search, connect_layout.ROW_VALUES)
-    if row != values:
+    row, values = candidate_row_of(search), candidate_values_of(search)
+    if int(row) != values:
         set_joint_values(motions_of(search), row, values)
 
 
@@ -93,7 +94,7 @@ def nearest_to(search: ConnectTable, side: int, row: Configuration) -> Any:
 @kernel
 def steer(search: ConnectTable, start: Configuration, aim: Configuration, length: float) -> Any:
     """Set ROW to ``aim``, or to the point at the range on the motion to it; returns whether it is ``aim``."""
-    row, span = field(search, connect_layout.ROW), number_of(search, connect_layout.RANGE)
+    row, span = candidate_row_of(search), number_of(search, connect_layout.RANGE)
     reached = length <= span * (1.0 + RANGE_TOLERANCE)
     for k in range(dof_in(search)):
         there = double_at(aim, k)
@@ -112,13 +113,13 @@ def check_candidate(search: ConnectTable) -> int:
     The ends that are vertices are left out: they were checked with the motion that led to them, or as roots.
     """
     motions, tree = motions_of(search), tree_of(search, field(search, connect_layout.GROWING))
-    vertex, row = field(search, connect_layout.FROM), field(search, connect_layout.ROW)
+    vertex, row = field(search, connect_layout.FROM), candidate_row_of(search)
     start, values = row_of(tree, vertex), values_of(tree, vertex)
     last = step_count(motions, start, row)
     count = last - field(search, connect_layout.BRIDGE)
     resolve = field(search, connect_layout.RESOLVE) != 0
     count_up(search, connect_layout.CHECKED)
-    there, first = field(search, connect_layout.ROW_VALUES), 1
+    there, first = candidate_values_of(search), 1
     if descends(dof_of(motions), start, row):
         values, there, first = there, values, last - count
     return check_part(world_of(motions), values, there, last, first, count, resolve)
@@ -150,7 +151,7 @@ def aim_straight(search: ConnectTable) -> bool:
         return False
     count_up(search, connect_layout.STRAIGHT_TRIED)
     target = row_of(tree_of(search, 1), goal)
-    copy_row(dof_in(search), target, field(search, connect_layout.ROW))
+    copy_row(dof_in(search), target, candidate_row_of(search))
     set_row_values(search)
     set_field(search, connect_layout.TARGET, goal)
     set_candidate(search, 0, nearest_to(search, 0, target), 1)
@@ -166,7 +167,7 @@ def place_sample(search: ConnectTable) -> None:
         low = max(double_at(field(search, connect_layout.LOWER), k), middle - spread)
         high = min(double_at(field(search, connect_layout.UPPER), k), middle + spread)
         share = double_at(field(search, connect_layout.POINT), k)
-        set_double(field(search, connect_layout.ROW), k, low + (high - low) * share)
+        set_double(candidate_row_of(search), k, low + (high - low) * share)
     larger = min(SAMPLE_BOX_GROWTH * spread, connect_layout.UNBOUNDED_SPREAD)
     set_double(field(search, connect_layout.NUMBERS), connect_layout.SPREAD, larger)
 
@@ -179,7 +180,7 @@ def aim_at_sample(search: ConnectTable) -> bool:
     if live_of(tree_of(search, side)) > live_of(tree_of(search, 1 - side)):
         side = 1 - side
     set_field(search, connect_layout.GROWER, side)
-    dof, row = dof_in(search), field(search, connect_layout.ROW)
+    dof, row = dof_in(search), candidate_row_of(search)
     point, bases = field(search, connect_layout.POINT), field(search, connect_layout.INVERSE_BASES)
     next_point(search, connect_layout.RANDOM, point, bases, dof)
     place_sample(search)

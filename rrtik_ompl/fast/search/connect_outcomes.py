@@ -5,6 +5,8 @@ from __future__ import annotations
 from rrtik_ompl.fast.search import connect_layout
 from rrtik_ompl.fast.search.connect_layout import ConnectTable
 from rrtik_ompl.fast.search.connect_motions import (
+    candidate_row_of,
+    candidate_values_of,
     count_up,
     dof_in,
     meeting_of,
@@ -52,7 +54,7 @@ def on_free(search: ConnectTable, state: int) -> int:
         set_meeting(search, 1 - side, field(search, connect_layout.TARGET))
         set_field(search, connect_layout.MEETING_STATE, state)
         return finish_or_ask(search)
-    row, values = field(search, connect_layout.ROW), field(search, connect_layout.ROW_VALUES)
+    row, values = candidate_row_of(search), candidate_values_of(search)
     vertex = add_vertex(tree_of(search, side), row, values, start, state, connect_layout.UNBOUNDED_DOMAIN)
     if field(search, connect_layout.PHASE) == connect_layout.EXTEND:
         set_field(search, connect_layout.PHASE, connect_layout.CONNECT)
@@ -80,7 +82,7 @@ def ask(search: ConnectTable, kind: int, start: Configuration, end: Configuratio
 def ask_for_candidate(search: ConnectTable) -> None:
     """Ask whether the motion to ROW is free, before it is inserted."""
     tree = tree_of(search, field(search, connect_layout.GROWING))
-    start, end = row_of(tree, field(search, connect_layout.FROM)), field(search, connect_layout.ROW)
+    start, end = row_of(tree, field(search, connect_layout.FROM)), candidate_row_of(search)
     set_field(search, connect_layout.QUESTIONS, 0)
     ask(search, connect_layout.MOTION_QUESTION, start, end, 0, connect_layout.NO_VERTEX)
 

@@ -14,7 +14,7 @@ from rrtik_ompl.fast.search.connect import FIRST_BUDGET, ConnectSearch
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.fast.search.shortcut import ShortcutSearch
 from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.fast.tables.robot_tables import aligned, table
+from rrtik_ompl.fast.tables.memory import aligned, is_intact, table
 
 FIRST_CAPACITY = 256  # rows
 # Half the side of the first sample's box over the gap; narrower, new paths pass closer to what moves and are hit more.
@@ -101,6 +101,11 @@ class PathRepair:
             self._make_room(2 * len(self._given))
             rows = self._kernels.finish(self._table.address, seed)
         return self._path[:rows].copy() if rows > 0 else None
+
+    def intact(self) -> bool:
+        """Whether no kernel has written beyond the memory of the repair, its search and its shortcuts."""
+        tables = all(each.intact() for each in (self._table, self._search, self._cuts))
+        return tables and all(is_intact(rows) for rows in (self._given, self._points, self._path))
 
     def _make_room(self, rows: int) -> None:
         """Memory for paths of so many rows; the points stay."""

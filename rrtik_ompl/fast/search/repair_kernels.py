@@ -7,6 +7,7 @@ them until it is the whole space.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from rrtik_ompl.fast.search import connect_layout, repair_layout, shortcut_layout
@@ -20,13 +21,15 @@ from rrtik_ompl.fast.search.motions.motion_kernels import (
     step_count,
     whole_steps,
 )
-from rrtik_ompl.fast.search.motions.motion_layout import FastMotions
+from rrtik_ompl.fast.search.motions.motion_layout import MotionTable
 from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row, distance, row_at
 from rrtik_ompl.fast.search.repair_layout import RepairTable
 from rrtik_ompl.fast.search.shortcut_kernels import resume as resume_shortcuts
+from rrtik_ompl.fast.search.shortcut_kernels import route_of
 from rrtik_ompl.fast.search.shortcut_layout import ShortcutTable
 from rrtik_ompl.fast.search.tree_kernels import parent_of
 from rrtik_ompl.fast.search.tree_layout import TreeTable
+from rrtik_ompl.fast.simd.access import field_reader
 from rrtik_ompl.fast.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field
 from rrtik_ompl.fast.tables.layout import FREE
@@ -34,25 +37,13 @@ from rrtik_ompl.fast.tables.layout import FREE
 DIRECTION_TOLERANCE = 1e-9  # change of a unit vector that is none
 
 
-@inlined
-def motions_of(repair: RepairTable) -> FastMotions:
-    """The motion table of the world."""
-    motions: FastMotions = field(repair, repair_layout.MOTIONS)
-    return motions
-
-
-@inlined
-def search_of(repair: RepairTable) -> ConnectTable:
-    """The table of the RRT-Connect search."""
-    search: ConnectTable = field(repair, repair_layout.SEARCH)
-    return search
-
-
-@inlined
-def cuts_of(repair: RepairTable) -> ShortcutTable:
-    """The table of the random shortcuts."""
-    cuts: ShortcutTable = field(repair, repair_layout.CUTS)
-    return cuts
+motions_of: Callable[[RepairTable], MotionTable] = field_reader(repair_layout.MOTIONS)
+search_of: Callable[[RepairTable], ConnectTable] = field_reader(repair_layout.SEARCH)
+cuts_of: Callable[[RepairTable], ShortcutTable] = field_reader(repair_layout.CUTS)
+given_of: Callable[[RepairTable], Configuration] = field_reader(repair_layout.GIVEN)
+points_of: Callable[[RepairTable], Configuration] = field_reader(repair_layout.POINTS)
+path_of: Callable[[RepairTable], Configuration] = field_reader(repair_layout.PATH)
+count_of: Callable[[RepairTable], int] = field_reader(repair_layout.COUNT)  # points
 
 
 @inlined
@@ -62,21 +53,21 @@ def number_of(repair: RepairTable, place: int) -> Any:
 
 
 @inlined
-def given(repair: RepairTable, number: int) -> Any:
+def given(repair: RepairTable, number: int) -> Configuration:
     """Address of a waypoint of the path as it was given."""
-    return row_at(field(repair, repair_layout.GIVEN), dof_of(motions_of(repair)), number)
+    return row_at(given_of(repair), dof_of(motions_of(repair)), number)
 
 
 @inlined
-def point_of(repair: RepairTable, number: int) -> Any:
+def point_of(repair: RepairTable, number: int) -> Configuration:
     """Address of a point along the path."""
-    return row_at(field(repair, repair_layout.POINTS), dof_of(motions_of(repair)), number)
+    return row_at(points_of(repair), dof_of(motions_of(repair)), number)
 
 
 @inlined
-def repaired(repair: RepairTable, number: int) -> Any:
+def repaired(repair: RepairTable, number: int) -> Configuration:
     """Address of a waypoint of the repaired path."""
-    return row_at(field(repair, repair_layout.PATH), dof_of(motions_of(repair)), number)
+    return row_at(path_of(repair), dof_of(motions_of(repair)), number)
 
 
 @kernel
@@ -111,7 +102,7 @@ def check_path(repair: RepairTable, rows: int) -> int:
     """Check the given path; the first blocked edge is searched for from either end. HIT, FREE_PATH or NO_ROOM."""
     if not divide(repair, rows):
         return repair_layout.NO_ROOM
-    edges, checked = field(repair, repair_layout.COUNT) - 1, 0
+    edges, checked = count_of(repair) - 1, 0
     for k in range(edges):
         a, b = point_of(repair, k), point_of(repair, k + 1)
         checked += step_count(motions_of(repair), a, b) + 1
@@ -150,7 +141,7 @@ def repair_path(repair: RepairTable, seed: int, forgetting: int, budget: int) ->
     Returns the number of rows of the new PATH. UNFINISHED: the search needs more than ``budget`` motions, or room; go
     on with it and call :func:`finish`. NO_PATH: an end is blocked, or the search has come to its end.
     """
-    edges = field(repair, repair_layout.COUNT) - 1
+    edges = count_of(repair) - 1
     if field(repair, repair_layout.FIRST) == 0 and not configuration_free(motions_of(repair), point_of(repair, 0)):
         return repair_layout.NO_PATH
     if field(repair, repair_layout.LAST) == edges - 1 and not configuration_free(
@@ -218,7 +209,7 @@ def shorten(repair: RepairTable, rows: int, seed: int) -> None:
 def finish(repair: RepairTable, seed: int) -> int:
     """Write the PATH that a search has found, what is new of it shortened; its rows, or TOO_LONG without room."""
     search, cuts = search_of(repair), cuts_of(repair)
-    dof, route = dof_of(motions_of(repair)), field(cuts, shortcut_layout.ROUTE)
+    dof, route = dof_of(motions_of(repair)), route_of(cuts)
     begin = root_of(tree_of(search, 0), meeting_of(search, 0))
     end = field(repair, repair_layout.LAST) + 1 + root_of(tree_of(search, 1), meeting_of(search, 1))
     new = write_path(search, route, field(repair, repair_layout.CAPACITY))
@@ -230,6 +221,6 @@ def finish(repair: RepairTable, seed: int) -> int:
         rows = append(repair, rows, point_of(repair, k))
     for k in range(field(cuts, shortcut_layout.COUNT)):
         rows = append(repair, rows, row_at(route, dof, k))
-    for k in range(end + 1, field(repair, repair_layout.COUNT)):
+    for k in range(end + 1, count_of(repair)):
         rows = append(repair, rows, point_of(repair, k))
     return rows

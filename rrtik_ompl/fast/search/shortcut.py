@@ -12,7 +12,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.search import shortcut_layout
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.fast.tables.robot_tables import table
+from rrtik_ompl.fast.tables.memory import table
 
 SPARE_WAYPOINTS = 256  # room for more than at the beginning
 NO_LIMIT = 2**62
@@ -155,6 +155,10 @@ class ShortcutSearch:
                 self.answer(ask is not None and bool(np.all(ask(*self.questions))))
             if stop is not None and stop():
                 return False
+
+    def intact(self) -> bool:
+        """Whether no kernel has written beyond the memory of the search or what it works on."""
+        return self._table.intact() and self._motions.intact()
 
     def _number(self, place: int) -> int:
         return int(self._table.header[place])

@@ -9,48 +9,50 @@ were checked when they were part of longer edges.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from rrtik_ompl.fast.search import shortcut_layout
 from rrtik_ompl.fast.search.motions.motion_kernels import check_motion, dof_of
-from rrtik_ompl.fast.search.motions.motion_layout import FastMotions
+from rrtik_ompl.fast.search.motions.motion_layout import MotionTable
 from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row, row_at
 from rrtik_ompl.fast.search.shortcut_layout import FIRST_INSIDE, SECOND_INSIDE, ShortcutTable
+from rrtik_ompl.fast.simd.access import field_reader
 from rrtik_ompl.fast.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field
 from rrtik_ompl.fast.simd.random_kernels import next_share
-from rrtik_ompl.fast.tables.layout import COLLIDING, FREE, UNDECIDED
+from rrtik_ompl.fast.tables.layout import COLLIDING, FREE, UNDECIDED, DoubleArray
 
 PULL_PROBABILITY = 0.5  # of each joint in a pull
 MIN_GAIN = 1e-6  # of the length of the route, or a shortcut is not worth its checks
 WAYPOINT_TOLERANCE = 1e-9  # of the length of an edge: nearer to a waypoint is at the waypoint
 
 
-@inlined
-def motions_of(search: ShortcutTable) -> FastMotions:
-    """The motion table of the world."""
-    motions: FastMotions = field(search, shortcut_layout.MOTIONS)
-    return motions
+motions_of: Callable[[ShortcutTable], MotionTable] = field_reader(shortcut_layout.MOTIONS)
+route_of: Callable[[ShortcutTable], Configuration] = field_reader(shortcut_layout.ROUTE)
+ends_of: Callable[[ShortcutTable], Configuration] = field_reader(shortcut_layout.ENDS)
+arc_lengths_of: Callable[[ShortcutTable], DoubleArray] = field_reader(shortcut_layout.ARC_LENGTHS)
+count_of: Callable[[ShortcutTable], int] = field_reader(shortcut_layout.COUNT)  # waypoints
 
 
 @inlined
-def dof_in(search: ShortcutTable) -> Any:
+def dof_in(search: ShortcutTable) -> int:
     """How many numbers a configuration has."""
     return dof_of(motions_of(search))
 
 
 @inlined
-def waypoint(search: ShortcutTable, number: int) -> Any:
+def waypoint(search: ShortcutTable, number: int) -> Configuration:
     """Address of a waypoint."""
-    return row_at(field(search, shortcut_layout.ROUTE), dof_in(search), number)
+    return row_at(route_of(search), dof_in(search), number)
 
 
 @inlined
-def end(search: ShortcutTable, number: int) -> Any:
+def end(search: ShortcutTable, number: int) -> Configuration:
     """Address of an end of the shortcut, 0 or 1."""
-    return row_at(field(search, shortcut_layout.ENDS), dof_in(search), number)
+    return row_at(ends_of(search), dof_in(search), number)
 
 
 @inlined
@@ -66,15 +68,14 @@ def metric_distance(search: ShortcutTable, a: Configuration, b: Configuration) -
     for k in range(dof_in(search)):
         gap = double_at(b, k) - double_at(a, k)
         total += double_at(field(search, shortcut_layout.METRIC), k) * gap * gap
-    length: float = np.sqrt(total)
-    return length
+    return np.sqrt(total)  # type: ignore[no-any-return]
 
 
 @kernel
 def measure_route(search: ShortcutTable, start: int) -> None:
     """Length of the route up to each waypoint after ``start``."""
-    places = field(search, shortcut_layout.ARC_LENGTHS)
-    for k in range(start + 1, field(search, shortcut_layout.COUNT)):
+    places = arc_lengths_of(search)
+    for k in range(start + 1, count_of(search)):
         length = metric_distance(search, waypoint(search, k - 1), waypoint(search, k))
         set_double(places, k, double_at(places, k - 1) + length)
 
@@ -82,7 +83,7 @@ def measure_route(search: ShortcutTable, start: int) -> None:
 @kernel
 def edge_of(search: ShortcutTable, place: float) -> int:
     """Number of the edge on which a place of the route lies, by bisection."""
-    places, low, high = field(search, shortcut_layout.ARC_LENGTHS), 0, field(search, shortcut_layout.COUNT) - 1
+    places, low, high = arc_lengths_of(search), 0, count_of(search) - 1
     while high - low > 1:
         middle = (low + high) // 2
         if double_at(places, middle) <= place:
@@ -95,7 +96,7 @@ def edge_of(search: ShortcutTable, place: float) -> int:
 @kernel
 def random_place(search: ShortcutTable) -> Any:
     """A random place on the route: its waypoint or edge, how much of the edge lies before it, and where that is."""
-    places, count = field(search, shortcut_layout.ARC_LENGTHS), field(search, shortcut_layout.COUNT)
+    places, count = arc_lengths_of(search), count_of(search)
     if next_share(search, shortcut_layout.RANDOM) < probability(search, shortcut_layout.WAYPOINT_END):
         chosen = int(next_share(search, shortcut_layout.RANDOM) * count)
         return chosen, 0.0, double_at(places, chosen)
@@ -127,7 +128,7 @@ def set_end(search: ShortcutTable, number: int, edge: int, share: float) -> None
 @kernel
 def propose_pull(search: ShortcutTable) -> bool:
     """Draw a pull; whether it would gain something."""
-    chosen = 1 + int(next_share(search, shortcut_layout.RANDOM) * (field(search, shortcut_layout.COUNT) - 2))
+    chosen = 1 + int(next_share(search, shortcut_layout.RANDOM) * (count_of(search) - 2))
     before, here, after = (waypoint(search, chosen - 1), waypoint(search, chosen), waypoint(search, chosen + 1))
     first, second = metric_distance(search, before, here), metric_distance(search, here, after)
     if first + second <= 0.0:
@@ -141,10 +142,9 @@ def propose_pull(search: ShortcutTable) -> bool:
         set_double(target, k, min(max((1.0 - pulled) * double_at(here, k) + pulled * straight, low), high))
     set_field(search, shortcut_layout.FIRST, chosen)
     set_field(search, shortcut_layout.CUTS, shortcut_layout.PULL)
-    total = double_at(field(search, shortcut_layout.ARC_LENGTHS), field(search, shortcut_layout.COUNT) - 1)
+    total = double_at(arc_lengths_of(search), count_of(search) - 1)
     new_length = metric_distance(search, before, target) + metric_distance(search, target, after)
-    gain: bool = first + second - new_length > MIN_GAIN * total
-    return gain
+    return bool(first + second - new_length > MIN_GAIN * total)
 
 
 @kernel
@@ -160,7 +160,7 @@ def propose_shortcut(search: ShortcutTable) -> bool:
     if (
         second == first + 1
         and cuts == FIRST_INSIDE + SECOND_INSIDE
-        and field(search, shortcut_layout.COUNT) == field(search, shortcut_layout.CAPACITY)
+        and count_of(search) == field(search, shortcut_layout.CAPACITY)
     ):
         return False
     set_field(search, shortcut_layout.FIRST, first)
@@ -168,9 +168,8 @@ def propose_shortcut(search: ShortcutTable) -> bool:
     set_field(search, shortcut_layout.CUTS, cuts)
     set_end(search, 0, first, share)
     set_end(search, 1, second, other_share)
-    total = double_at(field(search, shortcut_layout.ARC_LENGTHS), field(search, shortcut_layout.COUNT) - 1)
-    gain: bool = other_place - place - metric_distance(search, end(search, 0), end(search, 1)) > MIN_GAIN * total
-    return gain
+    total = double_at(arc_lengths_of(search), count_of(search) - 1)
+    return bool(other_place - place - metric_distance(search, end(search, 0), end(search, 1)) > MIN_GAIN * total)
 
 
 @kernel
@@ -220,7 +219,7 @@ def check_parts(search: ShortcutTable) -> int:
 @kernel
 def take_shortcut(search: ShortcutTable) -> None:
     """Put the shortcut in place of what it cuts off."""
-    dof, count = dof_in(search), field(search, shortcut_layout.COUNT)
+    dof, count = dof_in(search), count_of(search)
     first, second = field(search, shortcut_layout.FIRST), field(search, shortcut_layout.SECOND)
     cuts = field(search, shortcut_layout.CUTS)
     kept_from = second + 1 if cuts & SECOND_INSIDE else second  # the second end is that waypoint or lies before it
@@ -269,7 +268,7 @@ def is_done(search: ShortcutTable) -> Any:
     """Whether no further try is to be made."""
     spent = field(search, shortcut_layout.TRIES) >= field(search, shortcut_layout.MAX_TRIES)
     stuck = field(search, shortcut_layout.FAILURES) >= field(search, shortcut_layout.PATIENCE)
-    return spent or stuck or field(search, shortcut_layout.COUNT) < 3
+    return spent or stuck or count_of(search) < 3
 
 
 @entry

@@ -6,32 +6,20 @@ cut off stays in place and is never the nearest again.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.fast.search.motions.row_kernels import Configuration, JointValues, copy_row, row_at
-from rrtik_ompl.fast.search.tree_layout import (
-    CAPACITY,
-    CUT,
-    DOF,
-    JOINTS,
-    LIVE,
-    PARENTS,
-    POINTS,
-    RADII,
-    ROWS,
-    SIZE,
-    STATES,
-    VALUES,
-    TreeTable,
-)
+from rrtik_ompl.fast.search import tree_layout
+from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row, row_at
+from rrtik_ompl.fast.search.tree_layout import CUT, TreeTable
+from rrtik_ompl.fast.simd.access import field_reader
 from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import (
     bits,
     choose,
     double_at,
-    field,
     first_bit,
     float_at,
     int_at,
@@ -43,6 +31,8 @@ from rrtik_ompl.fast.simd.lanes import (
     set_lanes,
     spread,
 )
+from rrtik_ompl.fast.tables.accessors import joint_row
+from rrtik_ompl.fast.tables.layout import IntArray, JointValues, LaneArray
 
 ABSENT_COORDINATE = np.float32(1e15)  # [rad or m] of what is no vertex: farther than any that is one
 UNBOUNDED_SQUARE = np.float32(3e38)  # [unit of the configurations, squared] more than any squared distance
@@ -50,58 +40,65 @@ UNBOUNDED_BLOCK = np.float32(3e38)  # more than the number of any block
 ZERO = np.float32(0.0)
 
 
+size_of: Callable[[TreeTable], int] = field_reader(tree_layout.SIZE)
+capacity_of: Callable[[TreeTable], int] = field_reader(tree_layout.CAPACITY)
+live_of: Callable[[TreeTable], int] = field_reader(tree_layout.LIVE)  # vertices that are not cut off
+dof_of: Callable[[TreeTable], int] = field_reader(tree_layout.DOF)
+joints_of: Callable[[TreeTable], int] = field_reader(tree_layout.JOINTS)
+points_of: Callable[[TreeTable], LaneArray] = field_reader(tree_layout.POINTS)
+rows_of: Callable[[TreeTable], Configuration] = field_reader(tree_layout.ROWS)
+all_values_of: Callable[[TreeTable], JointValues] = field_reader(tree_layout.VALUES)
+parents_of: Callable[[TreeTable], IntArray] = field_reader(tree_layout.PARENTS)
+radii_of: Callable[[TreeTable], int] = field_reader(tree_layout.RADII)
+states_of: Callable[[TreeTable], IntArray] = field_reader(tree_layout.STATES)
+
+
 @inlined
-def row_of(tree: TreeTable, vertex: int) -> Any:
+def row_of(tree: TreeTable, vertex: int) -> Configuration:
     """Address of a vertex's configuration."""
-    return row_at(field(tree, ROWS), field(tree, DOF), vertex)
+    return row_at(rows_of(tree), dof_of(tree), vertex)
 
 
 @inlined
-def values_of(tree: TreeTable, vertex: int) -> Any:
+def values_of(tree: TreeTable, vertex: int) -> JointValues:
     """Address of a vertex's joint values."""
-    return row_at(field(tree, VALUES), field(tree, JOINTS), vertex)
+    return joint_row(all_values_of(tree), joints_of(tree), vertex)
 
 
 @inlined
 def parent_of(tree: TreeTable, vertex: int) -> Any:
     """The parent of a vertex, -1 for a root."""
-    return int_at(field(tree, PARENTS), vertex)
+    return int_at(parents_of(tree), vertex)
 
 
 @inlined
 def state_of(tree: TreeTable, vertex: int) -> Any:
     """CERTAIN, OPEN or CUT."""
-    return int_at(field(tree, STATES), vertex)
+    return int_at(states_of(tree), vertex)
 
 
 @inlined
 def set_state(tree: TreeTable, vertex: int, state: int) -> None:
     """Set whether a vertex is CERTAIN, OPEN or CUT."""
-    set_int(field(tree, STATES), vertex, state)
+    set_int(states_of(tree), vertex, state)
 
 
 @inlined
 def radius_of(tree: TreeTable, vertex: int) -> Any:
     """Radius of a vertex's domain [unit of the configurations]."""
-    return float_at(field(tree, RADII), vertex)
+    return float_at(radii_of(tree), vertex)
 
 
 @inlined
 def set_radius(tree: TreeTable, vertex: int, radius: float) -> None:
     """Set the radius of a vertex's domain."""
-    set_float(field(tree, RADII), vertex, np.float32(radius))
-
-
-@inlined
-def live_of(tree: TreeTable) -> Any:
-    """How many vertices are not cut off."""
-    return field(tree, LIVE)
+    set_float(radii_of(tree), vertex, np.float32(radius))
 
 
 @inlined
 def is_full(tree: TreeTable) -> Any:
     """Whether a tree has no room for one more vertex."""
-    return field(tree, SIZE) >= field(tree, CAPACITY)
+    return size_of(tree) >= capacity_of(tree)
 
 
 @inlined
@@ -113,9 +110,9 @@ def lane_place(dof: int, vertex: int, coordinate: int) -> Any:
 @kernel
 def nearest_vertex(tree: TreeTable, query: int) -> Any:
     """The vertex nearest to ``DOF`` floats; of several the first one."""
-    dof, points = field(tree, DOF), field(tree, POINTS)
+    dof, points = dof_of(tree), points_of(tree)
     least, place = spread(UNBOUNDED_SQUARE), spread(ZERO)
-    for block in range((field(tree, SIZE) + WIDTH - 1) // WIDTH):
+    for block in range((size_of(tree) + WIDTH - 1) // WIDTH):
         total = spread(ZERO)
         for k in range(dof):
             gap = lanes_at(points, block * dof + k) - float_at(query, k)
@@ -131,20 +128,20 @@ def nearest_vertex(tree: TreeTable, query: int) -> Any:
 @kernel
 def add_vertex(tree: TreeTable, row: Configuration, values: JointValues, parent: int, state: int, radius: float) -> Any:
     """Append a vertex; there must be room. Returns its number."""
-    dof, vertex = field(tree, DOF), field(tree, SIZE)
-    points = field(tree, POINTS)
+    dof, vertex = dof_of(tree), size_of(tree)
+    points = points_of(tree)
     if vertex % WIDTH == 0:
         set_lanes(points, vertex // WIDTH * dof, spread(ABSENT_COORDINATE))
     copy_row(dof, row, row_of(tree, vertex))
     for k in range(dof):
         set_float(points, lane_place(dof, vertex, k), np.float32(double_at(row, k)))
-    if field(tree, VALUES) != field(tree, ROWS):
-        copy_row(field(tree, JOINTS), values, values_of(tree, vertex))
-    set_int(field(tree, PARENTS), vertex, parent)
+    if int(all_values_of(tree)) != rows_of(tree):  # joint values are not the configuration itself
+        copy_row(joints_of(tree), values, values_of(tree, vertex))
+    set_int(parents_of(tree), vertex, parent)
     set_state(tree, vertex, state)
     set_radius(tree, vertex, radius)
-    set_field(tree, SIZE, vertex + 1)
-    set_field(tree, LIVE, field(tree, LIVE) + 1)
+    set_field(tree, tree_layout.SIZE, vertex + 1)
+    set_field(tree, tree_layout.LIVE, live_of(tree) + 1)
     return vertex
 
 
@@ -152,8 +149,8 @@ def add_vertex(tree: TreeTable, row: Configuration, values: JointValues, parent:
 def cut_vertex(tree: TreeTable, vertex: int) -> int:
     """Cut one vertex off, not its descendants."""
     set_state(tree, vertex, CUT)
-    set_field(tree, LIVE, field(tree, LIVE) - 1)
-    set_float(field(tree, POINTS), lane_place(field(tree, DOF), vertex, 0), ABSENT_COORDINATE)
+    set_field(tree, tree_layout.LIVE, live_of(tree) - 1)
+    set_float(points_of(tree), lane_place(dof_of(tree), vertex, 0), ABSENT_COORDINATE)
     return vertex
 
 
@@ -162,16 +159,16 @@ def cut_branch(tree: TreeTable, vertex: int) -> Any:
     """Cut a vertex and all its descendants off; returns how many vertices are left."""
     if state_of(tree, vertex) != CUT:
         cut_vertex(tree, vertex)
-    for later in range(vertex + 1, field(tree, SIZE)):
+    for later in range(vertex + 1, size_of(tree)):
         parent = parent_of(tree, later)
         if parent >= 0 and state_of(tree, later) != CUT and state_of(tree, parent) == CUT:
             cut_vertex(tree, later)
-    return field(tree, LIVE)
+    return live_of(tree)
 
 
 @kernel
 def clear_tree(tree: TreeTable) -> int:
     """Forget all vertices."""
-    set_field(tree, SIZE, 0)
-    set_field(tree, LIVE, 0)
+    set_field(tree, tree_layout.SIZE, 0)
+    set_field(tree, tree_layout.LIVE, 0)
     return 0

@@ -20,7 +20,7 @@ from rrtik_ompl.fast.search.tree_layout import (
     STATES,
     VALUES,
 )
-from rrtik_ompl.fast.tables.robot_tables import Table, aligned, table
+from rrtik_ompl.fast.tables.memory import Table, aligned, table
 
 
 def tree_table(dof: int, joints: int, capacity: int) -> Table:

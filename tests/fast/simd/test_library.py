@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rrtik_ompl import load_problem
 from rrtik_ompl.cli import terminal
 from rrtik_ompl.cli.app import run
 from rrtik_ompl.fast import warm_up
@@ -170,10 +171,10 @@ def test_a_library_is_loaded_once(cached):
 
 
 def test_functions_take_whole_numbers_only(cached):
-    kernels = library.library(KERNELS)
-    assert kernels.classify(0, 0, 0, 0, True) == 0
+    kernels, world = library.library(KERNELS), load_problem("planar3_a").world.fast
+    assert kernels.classify(world.address, 0, 0, 0, True) == 0
     with pytest.raises(Exception, match="argument 3"):
-        kernels.classify(0, 0, 0.5, 0, 0)
+        kernels.classify(world.address, 0, 0.5, 0, 0)
     with pytest.raises(TypeError):
         kernels.classify(0, 0)
 

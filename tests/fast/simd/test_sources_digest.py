@@ -1,5 +1,8 @@
 """Which edits make kernels anew: those of kernels and layouts, no others."""
 
+import ast
+import importlib
+import inspect
 import subprocess
 import sys
 
@@ -49,17 +52,16 @@ def test_an_edit_of_what_holds_no_kernel_makes_nothing_anew(edited, module):
     assert {name: code_files.machine_key(name) for name in before} == before
 
 
+def holds_nothing(module):
+    """Whether a module of ``fast/`` is a docstring alone, as packages are."""
+    statements = ast.parse(inspect.getsource(importlib.import_module(f"rrtik_ompl.fast.{module}"))).body
+    return len(statements) == 1 and isinstance(statements[0], ast.Expr)
+
+
 def test_the_sources_of_a_kernel_are_all_that_it_imports():
     for name in code_files.kernel_modules():
         code = f"import sys, rrtik_ompl.fast.{name}; print(*sys.modules)"
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
         loaded = {m.removeprefix("rrtik_ompl.fast.") for m in done.stdout.split() if m.startswith("rrtik_ompl.fast.")}
-        assert loaded - set(code_files.kernel_sources(name)) <= {
-            "simd",
-            "checks",
-            "search",
-            "ik",
-            "tables",
-            "search.crdt",
-            "simd.code_files",
-        }
+        others = loaded - set(code_files.kernel_sources(name)) - {"simd.code_files"}
+        assert [module for module in others if not holds_nothing(module)] == []

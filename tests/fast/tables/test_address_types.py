@@ -13,6 +13,15 @@ from rrtik_ompl.fast.checks.check_kernels import check_edge
 from rrtik_ompl.fast.checks.distance_kernels import measure_scene
 from rrtik_ompl.fast.checks.kinematics import forward_kinematics
 from rrtik_ompl.fast.checks.sphere_kernels import scene_collision
+from rrtik_ompl.fast.search.connect_layout import ConnectTable
+from rrtik_ompl.fast.search.connect_motions import check_candidate, nearest_to
+from rrtik_ompl.fast.search.crdt.layout import CrdtTable, CrdtTreeTable
+from rrtik_ompl.fast.search.crdt.growth import add_free_edges
+from rrtik_ompl.fast.search.motions.motion_kernels import check_motion
+from rrtik_ompl.fast.search.motions.motion_layout import MotionTable
+from rrtik_ompl.fast.search.motions.row_kernels import Configuration
+from rrtik_ompl.fast.search.tree_kernels import parent_of
+from rrtik_ompl.fast.search.tree_layout import TreeTable
 from rrtik_ompl.fast.ik.ik_kinematics import measure
 from rrtik_ompl.fast.ik.ik_layout import Aim, CallTable, Pose
 from rrtik_ompl.fast.tables.accessors import first_ball_of, radius_at
@@ -25,8 +34,14 @@ from rrtik_ompl.fast.tables.layout import (
 def right(
     world: WorldTable, arm: ArmTable, balls: BallTable, primitives: PrimitiveTable, scratch: ScratchTable,
     last: LastHit, values: JointValues, probe: ProbeTable, cluster: Cluster, array: BallArray, aim: Aim,
-    call: CallTable,
+    call: CallTable, motions: MotionTable, connect: ConnectTable, tree: TreeTable, row: Configuration,
+    crdt: CrdtTable, crdt_tree: CrdtTreeTable,
 ) -> None:
+    check_motion(motions, row, row, True)
+    check_candidate(connect)
+    nearest_to(connect, 0, row)
+    parent_of(tree, 0)
+    add_free_edges(crdt, crdt_tree)
     forward_kinematics(arm, scratch)
     scene_collision(balls, primitives, scratch, 1, NO_MARKS, True, last)
     check_edge(world, values, values, 3, False)
@@ -39,8 +54,15 @@ def right(
 def swapped(
     world: WorldTable, arm: ArmTable, balls: BallTable, primitives: PrimitiveTable, scratch: ScratchTable,
     last: LastHit, values: JointValues, probe: ProbeTable, group: Group, centres: CentreArray, pose: Pose,
-    call: CallTable,
+    call: CallTable, motions: MotionTable, connect: ConnectTable, tree: TreeTable, row: Configuration,
+    crdt: CrdtTable, crdt_tree: CrdtTreeTable,
 ) -> None:
+    check_motion(world, row, row, True)
+    check_motion(motions, values, row, True)
+    check_candidate(crdt)
+    nearest_to(connect, 0, values)
+    parent_of(crdt_tree, 0)
+    add_free_edges(crdt, tree)
     forward_kinematics(scratch, arm)
     scene_collision(primitives, balls, scratch, 1, NO_MARKS, True, last)
     check_edge(values, world, values, 3, False)
@@ -62,4 +84,4 @@ def test_swapped_addresses_are_type_errors(tmp_path):
     done = subprocess.run([*command, str(root / "pyproject.toml"), str(file)], capture_output=True, text=True, cwd=root)
     lines = SNIPPET.splitlines()
     wrong = {lines[int(line.split(":")[1]) - 1].strip() for line in done.stdout.splitlines() if "[arg-type]" in line}
-    assert wrong == {line.strip() for line in lines[lines.index("def swapped(") + 5 :]}, done.stdout + done.stderr
+    assert wrong == {line.strip() for line in lines[lines.index("def swapped(") + 6 :]}, done.stdout + done.stderr

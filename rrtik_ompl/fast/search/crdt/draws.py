@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from rrtik_ompl.fast.search.crdt import layout as crdt_layout
-from rrtik_ompl.fast.search.crdt.fields import dof_in, extension_row, rule_of
+from rrtik_ompl.fast.search.crdt.accessors import dof_in, extension_row, order_of, rule_of
 from rrtik_ompl.fast.search.crdt.layout import CrdtTable
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
 from rrtik_ompl.fast.simd.lanes import field, int_at, set_double, set_int
@@ -31,7 +31,7 @@ def sample(search: CrdtTable) -> None:
 @kernel
 def shuffle(search: CrdtTable) -> None:
     """The axes that may move, in random order."""
-    order, count = field(search, crdt_layout.ORDER), field(search, crdt_layout.AXIS_COUNT)
+    order, count = order_of(search), field(search, crdt_layout.AXIS_COUNT)
     for k in range(count):
         set_int(order, k, int_at(field(search, crdt_layout.AXES), k))
     for k in range(count - 1, 0, -1):
@@ -44,7 +44,7 @@ def shuffle(search: CrdtTable) -> None:
 @inlined
 def to_front(search: CrdtTable, axis: int) -> None:
     """Let an axis go first and the others keep their order."""
-    order, k = field(search, crdt_layout.ORDER), 0
+    order, k = order_of(search), 0
     while int_at(order, k) != axis:
         k += 1
     for place in range(k, 0, -1):

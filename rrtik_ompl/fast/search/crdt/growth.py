@@ -8,8 +8,18 @@ from __future__ import annotations
 from typing import Any
 
 from rrtik_ompl.fast.search.crdt import layout as crdt_layout
+from rrtik_ompl.fast.search.crdt.accessors import (
+    dof_in,
+    edge_count_of,
+    edge_end,
+    edge_start,
+    extension_row,
+    motions_of,
+    order_of,
+    rule_of,
+    verdicts_of,
+)
 from rrtik_ompl.fast.search.crdt.draws import draw, shuffle, to_front
-from rrtik_ompl.fast.search.crdt.fields import dof_in, edge_end, edge_start, extension_row, motions_of, rule_of
 from rrtik_ompl.fast.search.crdt.layout import BACK, BETWEEN, BEYOND, ONWARD, CrdtTable, CrdtTreeTable
 from rrtik_ompl.fast.search.crdt.tree_kernels import (
     add_crdt_vertex,
@@ -47,7 +57,7 @@ def remembered_axis(search: CrdtTable, tree: CrdtTreeTable, vertex: int, parent:
 @kernel
 def add_edge(search: CrdtTable, axis: int, start: Any, end: Any) -> None:
     """Put an edge along an axis through the current row on the list."""
-    count, dof = field(search, crdt_layout.EDGE_COUNT), dof_in(search)
+    count, dof = edge_count_of(search), dof_in(search)
     current = extension_row(search, crdt_layout.CURRENT)
     first, second = edge_start(search, count), edge_end(search, count)
     copy_row(dof, current, first)
@@ -95,7 +105,7 @@ def lay_out(search: CrdtTable, tree: CrdtTreeTable, near: int, exactly: bool) ->
     set_field(search, crdt_layout.COMPLETE, 1)
     legs = 0
     for k in range(field(search, crdt_layout.AXIS_COUNT)):
-        axis = int_at(field(search, crdt_layout.ORDER), k)
+        axis = int_at(order_of(search), k)
         here, there = double_at(current, axis), double_at(extension_row(search, crdt_layout.TARGET), axis)
         came_from = here if legs > 0 or parent == crdt_layout.ROOT else coordinate(tree, parent, axis)
         turn = turning(came_from, here, there)
@@ -112,7 +122,7 @@ def lay_out(search: CrdtTable, tree: CrdtTreeTable, near: int, exactly: bool) ->
             add_edge(search, axis, came_from, there)
         if legs == 0:
             set_field(search, crdt_layout.TURN, turn)
-            set_field(search, crdt_layout.FIRST_EDGES, field(search, crdt_layout.EDGE_COUNT))
+            set_field(search, crdt_layout.FIRST_EDGES, edge_count_of(search))
         set_double(current, axis, there)
         legs += 1
 
@@ -133,13 +143,13 @@ def check_edge(search: CrdtTable, start: Configuration, end: Configuration) -> i
 @kernel
 def check_extension(search: CrdtTable) -> int:
     """Check the edges of the extension up to the first that is not free; returns how many want an answer."""
-    count, open_, resolve = field(search, crdt_layout.EDGE_COUNT), 0, resolves(motions_of(search))
+    count, open_, resolve = edge_count_of(search), 0, resolves(motions_of(search))
     for edge in range(count):
         verdict = check_edge(search, edge_start(search, edge), edge_end(search, edge))
         if verdict == UNDECIDED:
             verdict = UNDECIDED if resolve else COLLIDING
             open_ += 1 if resolve else 0
-        set_int(field(search, crdt_layout.VERDICTS), edge, verdict)
+        set_int(verdicts_of(search), edge, verdict)
         if verdict == COLLIDING:
             set_field(search, crdt_layout.EDGE_COUNT, edge + 1)
             break
@@ -150,7 +160,7 @@ def check_extension(search: CrdtTable) -> int:
 def count_free(search: CrdtTable) -> int:
     """How many edges at the beginning of the extension are free."""
     free = 0
-    while free < field(search, crdt_layout.EDGE_COUNT) and int_at(field(search, crdt_layout.VERDICTS), free) == FREE:
+    while free < edge_count_of(search) and int_at(verdicts_of(search), free) == FREE:
         free += 1
     return free
 
@@ -158,7 +168,7 @@ def count_free(search: CrdtTable) -> int:
 @kernel
 def add_free_edges(search: CrdtTable, tree: CrdtTreeTable) -> int:
     """Add the free leading part of the extension to the tree; returns what was achieved."""
-    count, first = field(search, crdt_layout.EDGE_COUNT), field(search, crdt_layout.FIRST_EDGES)
+    count, first = edge_count_of(search), field(search, crdt_layout.FIRST_EDGES)
     near, turn = field(search, crdt_layout.NEAR), field(search, crdt_layout.TURN)
     dof, known, free = dof_in(search), size_of(tree), count_free(search)
     set_field(search, crdt_layout.CHECKED, field(search, crdt_layout.CHECKED) + min(free + 1, count))

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import Any
 
 from rrtik_ompl.fast.search.crdt import layout as crdt_layout
+from rrtik_ompl.fast.search.crdt.accessors import count_up, dof_in, extension_row, goal_row, rule_row, tree_of
 from rrtik_ompl.fast.search.crdt.draws import sample
-from rrtik_ompl.fast.search.crdt.fields import count_up, dof_in, extension_row, goal_row, rule_row, tree_of
 from rrtik_ompl.fast.search.crdt.growth import add_free_edges, check_extension, lay_out
 from rrtik_ompl.fast.search.crdt.layout import CrdtTable, CrdtTreeTable
 from rrtik_ompl.fast.search.crdt.tree_kernels import coordinate, nearest_crdt_vertex, read_vertex, size_of

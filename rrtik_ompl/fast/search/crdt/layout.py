@@ -34,7 +34,7 @@ EXTENSION, NEAR, ORDER, TURN, FIRST_EDGES, EDGE_COUNT, COMPLETE, VERDICTS, LAST 
 NEAREST, GOALS, GOAL_TOLERANCE, GOAL_COUNT, VERTEX, VERTEX_END, GOAL, FIELD_COUNT = range(22, 30)
 
 # Rows of RULES: limits of a valid configuration, then what CrdtRules says.
-LIMIT_LOWER, LIMIT_UPPER, SAMPLE_LOWER, SAMPLE_UPPER, SCALE, SMALLEST_MOVE, CHANCE = range(7)
+LIMIT_LOWER, LIMIT_UPPER, SAMPLE_LOWER, SAMPLE_UPPER, SCALE, SMALLEST_MOVE, CHANCE, RULE_COUNT = range(8)
 
 # Rows of EXTENSION: the target, the configuration that the extension has reached, the starts of as many edges as there
 # are coordinates and one more, then their ends.

@@ -6,11 +6,11 @@ The kernels decide what they can; the world is asked about the rest, all edges o
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import PlannerError
@@ -21,7 +21,7 @@ from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.fast.tables.layout import COLLIDING, FREE, UNDECIDED
-from rrtik_ompl.fast.tables.robot_tables import Table, table
+from rrtik_ompl.fast.tables.memory import PlannedTable, TablePlan
 from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
 
 FIRST_CAPACITY = 256  # vertices
@@ -59,15 +59,14 @@ class CrdtSearch:
         self._world, self._motions = world, motions  # they own the tables
         self._resume = kernels.resume_pair if goals is None else kernels.resume_single
         self._trees = [TreeMemory(rows, FIRST_CAPACITY) for rows in roots]
-        first: dict[int, int | NDArray[Any]] = {crdt_layout.NEXT: crdt_layout.BEGIN}
-        if goals is not None:
-            first = {crdt_layout.NEXT: crdt_layout.CHOOSE_GOAL, crdt_layout.VERTEX_END: len(roots[0])}
-            first |= {crdt_layout.GOALS: goals, crdt_layout.GOAL_COUNT: len(goals)}
-            first |= {crdt_layout.GOAL_TOLERANCE: np.array([tolerance * tolerance])}
-        self._table = _search_table(motions, world.robot, rules, first)
+        aims = np.zeros((0, motions.dof)) if goals is None else goals
+        self._table = _search_table(motions, world.robot, rules, aims)
         header = self._table.header
         header[crdt_layout.RANDOM] = seed
         header[crdt_layout.ITERATION_LIMIT] = NO_LIMIT if limit is None else limit
+        header[crdt_layout.NEXT] = crdt_layout.BEGIN if goals is None else crdt_layout.CHOOSE_GOAL
+        header[crdt_layout.VERTEX_END] = 0 if goals is None else len(roots[0])
+        self._table[crdt_layout.GOAL_TOLERANCE][:] = tolerance * tolerance
         for side, tree in enumerate(self._trees):
             header[crdt_layout.TREE + side] = tree.address
         self._budget = FIRST_BUDGET
@@ -118,6 +117,10 @@ class CrdtSearch:
         """The branch of a tree from its root to a vertex, shape (k, n)."""
         return self._trees[number].branch(vertex)
 
+    def intact(self) -> bool:
+        """Whether no kernel has written beyond the memory of the search or what it works on."""
+        return self._motions.intact() and self._table.intact() and all(tree.intact() for tree in self._trees)
+
     def _go_on(self, until: int) -> int:
         """Let the kernel work up to a number of iterations, or until it wants an answer or room, and give it that."""
         status = self._resume(self._table.address, until - self.iterations)
@@ -129,7 +132,7 @@ class CrdtSearch:
 
     def _answer(self) -> None:
         """Ask the world about the edges that the kernels left undecided."""
-        verdicts = self._table[crdt_layout.VERDICTS][: self._field(crdt_layout.EDGE_COUNT)]
+        verdicts = self._table[crdt_layout.VERDICTS].view(np.int32)[: self._field(crdt_layout.EDGE_COUNT)]
         asked = np.flatnonzero(verdicts == UNDECIDED)
         rows = self._table[crdt_layout.EXTENSION].reshape(-1, self._motions.dof)[crdt_layout.EDGES :]
         starts, ends = np.split(rows, 2)
@@ -152,18 +155,35 @@ class CrdtSearch:
         return int(self._table.header[place])
 
 
-def _search_table(motions: FastMotions, robot: Robot, rules: CrdtRules, first: dict[int, int | NDArray[Any]]) -> Table:
-    """The table of a search from what it begins with; fields that nobody names are numbers that the kernels set."""
-    dof, fields = motions.dof, dict.fromkeys(range(crdt_layout.FIELD_COUNT), 0)
+def _search_table(motions: FastMotions, robot: Robot, rules: CrdtRules, goals: Matrix) -> PlannedTable:
+    """The table of a search; fields that are not set here are set later, by the search or its kernels."""
+    table = PlannedTable(_plan(motions.dof, len(rules.axes), len(goals)))
+    table.header[crdt_layout.MOTIONS] = motions.address
     limits = robot.lower - LIMIT_TOLERANCE, robot.upper + LIMIT_TOLERANCE
     rows = (*limits, rules.lower, rules.upper, rules.scale, rules.smallest_move, rules.chance)
-    arrays: dict[int, NDArray[Any]] = {
-        crdt_layout.RULES: np.array(rows),
-        crdt_layout.AXES: rules.axes,
-        crdt_layout.EXTENSION: np.zeros((crdt_layout.EDGES + 2 * (dof + 1)) * dof),
-        crdt_layout.ORDER: np.zeros(dof, dtype=np.int32),
-        crdt_layout.VERDICTS: np.zeros(dof + 1, dtype=np.int32),
-        crdt_layout.NEAREST: np.zeros(2 * WIDTH),
+    table[crdt_layout.RULES][:] = np.concatenate(rows)
+    table[crdt_layout.AXES].view(np.int32)[: len(rules.axes)] = rules.axes
+    table[crdt_layout.GOALS][:] = goals.ravel()
+    return table
+
+
+@lru_cache(maxsize=64)
+def _plan(dof: int, axes: int, goals: int) -> TablePlan:
+    """Where the arrays of a search lie; the first one is read in whole lanes."""
+    arrays = {
+        crdt_layout.NEAREST: 2 * WIDTH,
+        crdt_layout.RULES: crdt_layout.RULE_COUNT * dof,
+        crdt_layout.EXTENSION: (crdt_layout.EDGES + 2 * (dof + 1)) * dof,
+        crdt_layout.AXES: _words(axes),
+        crdt_layout.ORDER: _words(dof),
+        crdt_layout.VERDICTS: _words(dof + 1),
+        crdt_layout.GOALS: goals * dof,
+        crdt_layout.GOAL_TOLERANCE: 1,
     }
-    numbers = {crdt_layout.MOTIONS: motions.address, crdt_layout.AXIS_COUNT: len(rules.axes)}
-    return table({**fields, **numbers, **arrays, **first})
+    numbers = {place: 0 for place in range(crdt_layout.FIELD_COUNT) if place not in arrays}
+    return TablePlan(arrays, numbers | {crdt_layout.AXIS_COUNT: axes, crdt_layout.GOAL_COUNT: goals})
+
+
+def _words(integers: int) -> int:
+    """Words of 8 bytes that so many int32 take."""
+    return -(-integers // 2)

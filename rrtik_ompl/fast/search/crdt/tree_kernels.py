@@ -5,16 +5,17 @@ A tree of RRT-Connect is another one: it is searched in float32, and keeps joint
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from rrtik_ompl.fast.search.crdt import layout as crdt_layout
 from rrtik_ompl.fast.search.crdt.layout import CrdtTreeTable
 from rrtik_ompl.fast.search.motions.row_kernels import Configuration
+from rrtik_ompl.fast.simd.access import field_reader
 from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import (
     choose,
     double_at,
-    field,
     int_at,
     lane_numbers,
     rounded_sum,
@@ -25,32 +26,33 @@ from rrtik_ompl.fast.simd.lanes import (
     spread_wide,
     wide_lanes_at,
 )
+from rrtik_ompl.fast.tables.layout import DoubleArray, IntArray
 
 UNBOUNDED_SQUARE = 1e300  # [squared unit of the scaled metric] more than any squared distance
 
 
-@inlined
-def size_of(tree: CrdtTreeTable) -> Any:
-    """Number of vertices."""
-    return field(tree, crdt_layout.SIZE)
+size_of: Callable[[CrdtTreeTable], int] = field_reader(crdt_layout.SIZE)
+capacity_of: Callable[[CrdtTreeTable], int] = field_reader(crdt_layout.CAPACITY)
+coordinates_of: Callable[[CrdtTreeTable], DoubleArray] = field_reader(crdt_layout.COORDINATES)
+parents_of: Callable[[CrdtTreeTable], IntArray] = field_reader(crdt_layout.PARENTS)
 
 
 @inlined
 def coordinate(tree: CrdtTreeTable, vertex: int, axis: int) -> Any:
     """A coordinate of a vertex."""
-    return double_at(field(tree, crdt_layout.COORDINATES), axis * field(tree, crdt_layout.CAPACITY) + vertex)
+    return double_at(coordinates_of(tree), axis * capacity_of(tree) + vertex)
 
 
 @inlined
 def crdt_parent_of(tree: CrdtTreeTable, vertex: int) -> Any:
     """The parent of a vertex, ROOT for a root."""
-    return int_at(field(tree, crdt_layout.PARENTS), vertex)
+    return int_at(parents_of(tree), vertex)
 
 
 @inlined
 def set_crdt_parent(tree: CrdtTreeTable, vertex: int, parent: int) -> None:
     """Hang a vertex on another one."""
-    set_int(field(tree, crdt_layout.PARENTS), vertex, parent)
+    set_int(parents_of(tree), vertex, parent)
 
 
 @inlined
@@ -63,9 +65,9 @@ def read_vertex(tree: CrdtTreeTable, dof: int, vertex: int, sink: Configuration)
 @inlined
 def add_crdt_vertex(tree: CrdtTreeTable, dof: int, row: Configuration, parent: int) -> Any:
     """Add the coordinates at an address to a tree that has room; returns the number of the vertex."""
-    vertex, coordinates = size_of(tree), field(tree, crdt_layout.COORDINATES)
+    vertex, coordinates = size_of(tree), coordinates_of(tree)
     for axis in range(dof):
-        set_double(coordinates, axis * field(tree, crdt_layout.CAPACITY) + vertex, double_at(row, axis))
+        set_double(coordinates, axis * capacity_of(tree) + vertex, double_at(row, axis))
     set_crdt_parent(tree, vertex, parent)
     set_field(tree, crdt_layout.SIZE, vertex + 1)
     return vertex
@@ -76,8 +78,8 @@ def nearest_crdt_vertex(
     tree: CrdtTreeTable, dof: int, target: Configuration, scale: Configuration, nearest: int
 ) -> int:
     """The vertex nearest to a target in the scaled metric; among equals the oldest. ``nearest``: two wide lanes."""
-    coordinates = field(tree, crdt_layout.COORDINATES)
-    count, run = size_of(tree), field(tree, crdt_layout.CAPACITY) // WIDTH
+    coordinates = coordinates_of(tree)
+    count, run = size_of(tree), capacity_of(tree) // WIDTH
     lowest, holder = spread_wide(UNBOUNDED_SQUARE), spread_wide(0.0)
     for block in range((count + WIDTH - 1) // WIDTH):
         total = spread_wide(0.0)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.fast.search.crdt import layout as crdt_layout
-from rrtik_ompl.fast.tables.robot_tables import aligned, table
+from rrtik_ompl.fast.tables.memory import aligned, table
 
 
 class TreeMemory:
@@ -48,6 +48,10 @@ class TreeMemory:
         while (parent := self._parents.item(chain[-1])) != crdt_layout.ROOT:
             chain.append(parent)
         return np.ascontiguousarray(self._runs[:, chain[::-1]].T)
+
+    def intact(self) -> bool:
+        """Whether no kernel has written beyond this memory."""
+        return self._table.intact()
 
     def grow(self) -> None:
         """Give the tree twice the room."""

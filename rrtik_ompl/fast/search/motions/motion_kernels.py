@@ -6,56 +6,43 @@ are checked at the same ones.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from rrtik_ompl.fast.checks.check_kernels import check_edge, check_part
-from rrtik_ompl.fast.search.motions.motion_layout import (
-    DOF,
-    ENDS,
-    GAIN,
-    JOINTS,
-    NUMBERS,
-    OFFSET,
-    RESOLUTION,
-    RESOLVE,
-    STEP_TOLERANCE,
-    STEPS_PER_UNIT,
-    WEIGHTS,
-    WORLD,
-    FastMotions,
-)
-from rrtik_ompl.fast.search.motions.row_kernels import Configuration, JointValues, distance, row_at
+from rrtik_ompl.fast.search.motions import motion_layout
+from rrtik_ompl.fast.search.motions.motion_layout import STEP_TOLERANCE, MotionTable
+from rrtik_ompl.fast.search.motions.row_kernels import Configuration, distance
+from rrtik_ompl.fast.simd.access import field_reader
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
-from rrtik_ompl.fast.simd.lanes import double_at, field, set_double
-from rrtik_ompl.fast.tables.layout import FREE
+from rrtik_ompl.fast.simd.lanes import double_at, set_double
+from rrtik_ompl.fast.tables.accessors import joint_row
+from rrtik_ompl.fast.tables.layout import FREE, DoubleArray, JointValues, WorldTable
+
+world_of: Callable[[MotionTable], WorldTable] = field_reader(motion_layout.WORLD)
+dof_of: Callable[[MotionTable], int] = field_reader(motion_layout.DOF)
+joints_of: Callable[[MotionTable], int] = field_reader(motion_layout.JOINTS)
+gain_of: Callable[[MotionTable], DoubleArray] = field_reader(motion_layout.GAIN)
+offset_of: Callable[[MotionTable], DoubleArray] = field_reader(motion_layout.OFFSET)
+weights_of: Callable[[MotionTable], DoubleArray] = field_reader(motion_layout.WEIGHTS)
+numbers_of: Callable[[MotionTable], DoubleArray] = field_reader(motion_layout.NUMBERS)
+ends_of: Callable[[MotionTable], JointValues] = field_reader(motion_layout.ENDS)
+resolve_of: Callable[[MotionTable], int] = field_reader(motion_layout.RESOLVE)
 
 
 @inlined
-def dof_of(motions: FastMotions) -> Any:
-    """How many numbers a configuration has."""
-    return field(motions, DOF)
-
-
-@inlined
-def world_of(motions: FastMotions) -> Any:
-    """The tables of the checks."""
-    return field(motions, WORLD)
-
-
-@inlined
-def resolves(motions: FastMotions) -> bool:
+def resolves(motions: MotionTable) -> bool:
     """Whether doubtful motions are resolved in this world."""
-    resolve: bool = field(motions, RESOLVE) != 0
-    return resolve
+    return resolve_of(motions) != 0
 
 
 @kernel
-def set_joint_values(motions: FastMotions, row: Configuration, values: JointValues) -> None:
+def set_joint_values(motions: MotionTable, row: Configuration, values: JointValues) -> None:
     """Write the joint values of a configuration."""
-    dof, gain, offset = field(motions, DOF), field(motions, GAIN), field(motions, OFFSET)
-    for joint in range(field(motions, JOINTS)):
+    dof, gain, offset = dof_of(motions), gain_of(motions), offset_of(motions)
+    for joint in range(joints_of(motions)):
         total = 0.0
         for k in range(dof):
             total += double_at(gain, joint * dof + k) * double_at(row, k)
@@ -69,13 +56,14 @@ def whole_steps(steps: float) -> Any:
 
 
 @kernel
-def step_count(motions: FastMotions, start: Configuration, end: Configuration) -> Any:
+def step_count(motions: MotionTable, start: Configuration, end: Configuration) -> Any:
     """Number of steps in which a motion is checked; :func:`rrtik_ompl.fast.search.motions.motion_table.step_counts`."""
-    dof, weights, numbers = field(motions, DOF), field(motions, WEIGHTS), field(motions, NUMBERS)
+    dof, weights, numbers = dof_of(motions), weights_of(motions), numbers_of(motions)
     travel = 0.0
     for k in range(dof):
         travel += double_at(weights, k) * abs(double_at(end, k) - double_at(start, k))
-    steps, per_unit = travel / double_at(numbers, RESOLUTION), double_at(numbers, STEPS_PER_UNIT)
+    steps = travel / double_at(numbers, motion_layout.RESOLUTION)
+    per_unit = double_at(numbers, motion_layout.STEPS_PER_UNIT)
     if per_unit > 0.0:
         steps = max(steps, per_unit * distance(dof, start, end))
     return whole_steps(steps)
@@ -91,22 +79,22 @@ def descends(dof: int, start: Configuration, end: Configuration) -> Any:
 
 
 @kernel
-def check_motion(motions: FastMotions, start: Configuration, end: Configuration, resolve: bool) -> Any:
+def check_motion(motions: MotionTable, start: Configuration, end: Configuration, resolve: bool) -> Any:
     """Check the motion between two configurations: FREE, UNDECIDED or COLLIDING.
 
     Without ``resolve`` the outer balls alone decide, and what they do not prove free is UNDECIDED.
     """
-    first, second = (end, start) if descends(field(motions, DOF), start, end) else (start, end)
-    values = field(motions, ENDS)
-    others = row_at(values, field(motions, JOINTS), 1)
+    first, second = (end, start) if descends(dof_of(motions), start, end) else (start, end)
+    values = ends_of(motions)
+    others = joint_row(values, joints_of(motions), 1)
     set_joint_values(motions, first, values)
     set_joint_values(motions, second, others)
     return check_edge(world_of(motions), values, others, step_count(motions, start, end), resolve)
 
 
 @kernel
-def configuration_free(motions: FastMotions, row: Configuration) -> bool:
+def configuration_free(motions: MotionTable, row: Configuration) -> bool:
     """Whether the outer balls prove a configuration free."""
-    values = field(motions, ENDS)
+    values = ends_of(motions)
     set_joint_values(motions, row, values)
     return check_part(world_of(motions), values, values, 1, 1, 1, False) == FREE

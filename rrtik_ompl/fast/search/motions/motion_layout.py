@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NewType
 
-FastMotions = NewType("FastMotions", int)  # of a motion table
+MotionTable = NewType("MotionTable", int)  # of a motion table
 
 # WORLD: the tables of the checks · joint values are GAIN @ q + OFFSET, shapes (JOINTS, DOF) and (JOINTS,)
 # WEIGHTS: no point of the arm moves farther than WEIGHTS @ |b - a| [m] from a to b · NUMBERS: float64, see below

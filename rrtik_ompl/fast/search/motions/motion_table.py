@@ -12,7 +12,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast.search.motions import motion_layout
 from rrtik_ompl.fast.search.motions.motion_layout import STEP_TOLERANCE
-from rrtik_ompl.fast.tables.robot_tables import table
+from rrtik_ompl.fast.tables.memory import table
 
 
 def step_counts(starts: Matrix, ends: Matrix, weights: Vector, resolution: float) -> NDArray[np.int64]:
@@ -103,6 +103,10 @@ class FastMotions:
     def joint_values(self, Q: Matrix) -> Matrix:
         """Joint values of configurations, shapes (m, dof) and (m, joints)."""
         return Q @ self._gain.T + self._offset
+
+    def intact(self) -> bool:
+        """Whether no kernel has written beyond this table or those of the checks."""
+        return self._table.intact() and self.fast.intact()
 
     def require_covered(self, lower: Vector, upper: Vector) -> None:
         """Refuse a box of configurations that the checks' margin against rounding does not cover; shapes (dof,).

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any, NewType
+from collections.abc import Callable
+from typing import NewType
 
 import numpy as np
 
+from rrtik_ompl.fast.simd.access import double_row
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, set_double
 
-Configuration = NewType("Configuration", int)  # address of a configuration, float64
-JointValues = NewType("JointValues", int)  # address of the joint values of a configuration, float64
-NUMBER_BYTES = 8  # of a float64
+Configuration = NewType("Configuration", int)  # rows of float64, one number for each coordinate
 
-
-@inlined
-def row_at(rows: int, length: int, number: int) -> Any:
-    """Address of one of several rows of ``length`` numbers that follow each other in memory."""
-    return rows + NUMBER_BYTES * length * number
+row_at: Callable[[Configuration, int, int], Configuration] = double_row  # array, numbers in a row, number of the row
 
 
 @inlined

@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from rrtik_ompl.fast.search.crdt import layout as crdt_layout
 from rrtik_ompl.fast.search.crdt.layout import CrdtTable, CrdtTreeTable
 from rrtik_ompl.fast.search.motions.motion_kernels import dof_of
-from rrtik_ompl.fast.search.motions.motion_layout import FastMotions
-from rrtik_ompl.fast.search.motions.row_kernels import row_at
+from rrtik_ompl.fast.search.motions.motion_layout import MotionTable
+from rrtik_ompl.fast.search.motions.row_kernels import Configuration, row_at
+from rrtik_ompl.fast.simd.access import field_reader
 from rrtik_ompl.fast.simd.compiled import inlined
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_field
+from rrtik_ompl.fast.tables.layout import IntArray
+
+motions_of: Callable[[CrdtTable], MotionTable] = field_reader(crdt_layout.MOTIONS)
+rules_of: Callable[[CrdtTable], Configuration] = field_reader(crdt_layout.RULES)
+extension_of: Callable[[CrdtTable], Configuration] = field_reader(crdt_layout.EXTENSION)
+goals_of: Callable[[CrdtTable], Configuration] = field_reader(crdt_layout.GOALS)
+order_of: Callable[[CrdtTable], IntArray] = field_reader(crdt_layout.ORDER)
+verdicts_of: Callable[[CrdtTable], IntArray] = field_reader(crdt_layout.VERDICTS)
+edge_count_of: Callable[[CrdtTable], int] = field_reader(crdt_layout.EDGE_COUNT)
 
 
 @inlined
-def motions_of(search: CrdtTable) -> FastMotions:
-    """The motion table of the world."""
-    motions: FastMotions = field(search, crdt_layout.MOTIONS)
-    return motions
-
-
-@inlined
-def dof_in(search: CrdtTable) -> Any:
+def dof_in(search: CrdtTable) -> int:
     """How many numbers a configuration has."""
     return dof_of(motions_of(search))
 
@@ -34,9 +38,9 @@ def tree_of(search: CrdtTable, side: int) -> CrdtTreeTable:
 
 
 @inlined
-def rule_row(search: CrdtTable, rule: int) -> Any:
+def rule_row(search: CrdtTable, rule: int) -> Configuration:
     """Address of a rule's numbers, one for each axis."""
-    return row_at(field(search, crdt_layout.RULES), dof_in(search), rule)
+    return row_at(rules_of(search), dof_in(search), rule)
 
 
 @inlined
@@ -46,27 +50,27 @@ def rule_of(search: CrdtTable, rule: int, axis: int) -> Any:
 
 
 @inlined
-def extension_row(search: CrdtTable, row: int) -> Any:
+def extension_row(search: CrdtTable, row: int) -> Configuration:
     """Address of a row of the extension, such as TARGET or CURRENT."""
-    return row_at(field(search, crdt_layout.EXTENSION), dof_in(search), row)
+    return row_at(extension_of(search), dof_in(search), row)
 
 
 @inlined
-def edge_start(search: CrdtTable, edge: int) -> Any:
+def edge_start(search: CrdtTable, edge: int) -> Configuration:
     """Address of the start of an edge of the extension."""
     return extension_row(search, crdt_layout.EDGES + edge)
 
 
 @inlined
-def edge_end(search: CrdtTable, edge: int) -> Any:
+def edge_end(search: CrdtTable, edge: int) -> Configuration:
     """Address of the end of an edge of the extension."""
     return extension_row(search, crdt_layout.EDGES + dof_in(search) + 1 + edge)
 
 
 @inlined
-def goal_row(search: CrdtTable, goal: int) -> Any:
+def goal_row(search: CrdtTable, goal: int) -> Configuration:
     """Address of a goal of a single tree."""
-    return row_at(field(search, crdt_layout.GOALS), dof_in(search), goal)
+    return row_at(goals_of(search), dof_in(search), goal)
 
 
 @inlined
