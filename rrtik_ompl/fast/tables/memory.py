@@ -31,8 +31,9 @@ COPIED_WORDS = 4096  # up to so many it is quicker to copy a whole piece than to
 
 def aligned(array: NDArray[Any]) -> NDArray[Any]:
     """A flat copy that starts on a multiple of ``ALIGNMENT`` bytes, between guard words; even an empty one does."""
-    memory = np.full(array.nbytes + 3 * ALIGNMENT, GUARD, dtype=np.uint8)
+    memory = np.empty(array.nbytes + 3 * ALIGNMENT, dtype=np.uint8)
     start = ALIGNMENT + -memory.ctypes.data % ALIGNMENT
+    memory[:start] = memory[start + array.nbytes :] = GUARD
     copy: NDArray[Any] = np.ndarray(array.size, array.dtype, memory, start)
     copy[:] = array.ravel()
     return copy

@@ -60,10 +60,7 @@ from rrtik_ompl.fast.tables.layout import (
     ROTATION,
     SLIDING,
 )
-from rrtik_ompl.fast.tables.memory import Table as Table
-from rrtik_ompl.fast.tables.memory import aligned as aligned
-from rrtik_ompl.fast.tables.memory import table as table
-from rrtik_ompl.fast.tables.memory import whole_records
+from rrtik_ompl.fast.tables.memory import Table, table, whole_records
 from rrtik_ompl.robot import Chain
 
 Spheres: TypeAlias = NDArray[np.float64]  # shape (n, 4): centre and radius [m]

@@ -170,8 +170,14 @@ def test_a_library_is_loaded_once(cached):
     assert library.library(KERNELS) is library.library(KERNELS)
 
 
-def test_functions_take_whole_numbers_only(cached):
-    kernels, world = library.library(KERNELS), load_problem("planar3_a").world.fast
+@pytest.fixture(scope="module")
+def world():
+    """The tables of a world, made with libraries of their own."""
+    return load_problem("planar3_a").world.fast
+
+
+def test_functions_take_whole_numbers_only(world, cached):
+    kernels = library.library(KERNELS)
     assert kernels.classify(world.address, 0, 0, 0, True) == 0
     with pytest.raises(Exception, match="argument 3"):
         kernels.classify(world.address, 0, 0.5, 0, 0)
@@ -261,8 +267,8 @@ def packaged(cached, tmp_path, monkeypatch):
     return folder / code_files.bitcode_name(KERNELS)
 
 
-def test_bitcode_of_the_package_saves_compiling(packaged, cached):
-    assert library.library(KERNELS).classify(0, 0, 0, 0, 0) == 0
+def test_bitcode_of_the_package_saves_compiling(world, packaged, cached):
+    assert library.library(KERNELS).classify(world.address, 0, 0, 0, 0) == 0
     assert cached.is_file()
 
 
