@@ -2,24 +2,7 @@
 
 What stands here is loaded when it is first used, so that ``import rrtik_ompl`` costs next to nothing.
 
-Where what is, from below; each module imports only from those below it:
-
-- robot, description, catalog: robots, from URDF and SRDF, DH tables, or by name.
-- scene, goal, task_region, problem and their ``*_file``: what is asked, and its YAML.
-- collision, fast: collision checks; batched kernels on sphere covers, which ``World`` asks first; searches in kernels.
-- checks, world, moving_world: margins, the second opinion, the rule for steps; a world that follows what moves.
-- ik, goal_configurations, tip_distance, reach: inverse kinematics, with MB-RRT, IKURT and the genetic algorithm in
-  folders of their own; configurations for a goal of the tip; maps of reach.
-- path, transitions, one_joint, moves_text: what counts as a move; from any path to single-joint moves, in words.
-- ompl_bridge: the only room where arrays become OMPL states.
-- planning, random_stream, shortening: from a problem to a path, and a shorter one; seeds.
-- scenarios: generated problems for any arm, in families.
-- trajectory: from a path to a timed motion. replanning, scenario: replanning among moving obstacles.
-- viewer, ``plot*``, report: the 3-D page; plots; tables.
-- sensing, overlay: markers, cameras, poses of marked objects; the arm drawn over pictures.
-- benchmark: suites, guarded runs, records, OMPL's logs, reports.
-- pilot: the pilot's tool: session, engine, server, page; an arm over TCP.
-- cli, ``*_command``, ``*_commands``: the command line.
+ARCHITECTURE.md in the repository says where what is; docs/api.md lists what stands here.
 """
 
 from importlib import import_module
@@ -131,9 +114,10 @@ else:
     RENAMED = {"GoalRegion": "GoalSet", "Run": "ReplanRun", "Waypoints": "TimedPoses", "timed": "time_parameterize"}
 
     def __getattr__(name: str) -> Any:
+        if name in RENAMED:  # Python would hide an AttributeError from ``from rrtik_ompl import``
+            raise ImportError(f"rrtik_ompl.{name} is now rrtik_ompl.{RENAMED[name]}")
         if name not in _HOME_OF:
-            hint = f": {name} is now {RENAMED[name]}" if name in RENAMED else ""
-            raise AttributeError(f"module 'rrtik_ompl' has no attribute '{name}'{hint}")
+            raise AttributeError(f"module 'rrtik_ompl' has no attribute '{name}'")
         value = getattr(import_module(f"rrtik_ompl.{_HOME_OF[name]}"), name)
         globals()[name] = value
         return value

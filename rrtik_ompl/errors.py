@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 from types import UnionType
-from typing import get_args
+from typing import NoReturn, get_args
 
 
 class RrtikError(Exception):
@@ -74,3 +74,24 @@ def require(value: object, kind: type | UnionType, what: str, remedy: str = "") 
 
 class MeshWarning(UserWarning):
     """A mesh is missing or cannot be the solid that its author probably meant, but work can go on."""
+
+
+class Renamed:
+    """An attribute that has another name now; whoever asks for it is told so.
+
+    Example:
+        >>> class Arm:
+        ...     joints = Renamed("joint_names")
+        >>> Arm().joints
+        Traceback (most recent call last):
+        AttributeError: 'Arm' has no attribute 'joints': it is now 'joint_names'
+    """
+
+    def __init__(self, new: str) -> None:
+        self._new, self._old = new, ""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._old = name
+
+    def __get__(self, instance: object, owner: type) -> NoReturn:
+        raise AttributeError(f"'{owner.__name__}' has no attribute '{self._old}': it is now '{self._new}'")

@@ -19,7 +19,7 @@ from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ompl_bridge.attempt import Attempt, attempt
-from rrtik_ompl.ompl_bridge.ompl_planners import PlannerFactory, ompl_planners, traits_of
+from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, ompl_planners, traits_of
 from rrtik_ompl.path import JointPath, Violation
 from rrtik_ompl.problem import Problem, densely_checked
 

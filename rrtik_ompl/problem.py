@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import TAU, Vector, frozen
 from rrtik_ompl.choices import Accuracy
-from rrtik_ompl.errors import ProblemError, require
+from rrtik_ompl.errors import ProblemError, Renamed, require
 from rrtik_ompl.goal import Goal, JointGoal
 from rrtik_ompl.path import verification_resolution
 from rrtik_ompl.robot import Robot
@@ -64,6 +64,8 @@ class Problem:
         other = copy.copy(self)
         other.world = self.world.with_resolution(motion_resolution)
         return other
+
+    refined = Renamed("with_resolution")
 
     def with_accuracy(self, accuracy: Accuracy) -> Problem:
         """The same problem, its world "exact" or "conservative" (see :meth:`rrtik_ompl.World.with_accuracy`)."""

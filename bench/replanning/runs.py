@@ -160,7 +160,7 @@ def with_pairs(loop: Loop, quick: Moments, slow: Moments, slow_every: int) -> No
         found = {what: _repaired(other, path, motions) for what, other in (scratch if often else plain).items()}
         if not often:
             found |= {f"from scratch: new World, {title}, shortcut": _by_plan(loop, kind) for kind, title in PLANS}
-        planner.look(motions)  # once more: what a repair reads is as fresh in memory as for the others
+        planner.check_path(motions)  # once more: what a repair reads is as fresh in memory as for the others
         begin = time.process_time()
         ours = repair(motions, stop)
         found[OURS] = (time.process_time() - begin, _length(planner.path) / _length(path)) if ours else None
@@ -174,7 +174,7 @@ def with_pairs(loop: Loop, quick: Moments, slow: Moments, slow_every: int) -> No
 def _repaired(other: DrrtCon, path: np.ndarray, motions: MotionQueries) -> tuple[float, float] | None:
     """Seconds of another's repair and the share of the path's length that the new one has."""
     other.path = path
-    other.look(motions)
+    other.check_path(motions)
     begin = time.process_time()
     found = other.repair(motions, _after(begin + 2.0))
     return (time.process_time() - begin, _length(other.path) / _length(path)) if found else None

@@ -78,7 +78,7 @@ class DRRTCon(SafePlanner):
         core.rejoin(start, passed)
         if not (goals == core.path[-1]).all(axis=1).any() and not core.retarget(goals, checker, ptc):
             return False
-        return core.look(checker) or core.repair(checker, ptc)
+        return core.check_path(checker) or core.repair(checker, ptc)
 
     def _new(self) -> DrrtCon:
         lower, upper = self.bounds()

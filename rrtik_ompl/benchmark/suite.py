@@ -31,8 +31,8 @@ from rrtik_ompl.files.sections import parse
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.generated_problems import FAMILIES
-from rrtik_ompl.ompl_bridge.ompl_planners import ompl_planners
 from rrtik_ompl.ompl_bridge.planner_options import planner_options
+from rrtik_ompl.ompl_bridge.planner_traits import ompl_planners
 from rrtik_ompl.planning import find_planner
 from rrtik_ompl.shortening import METHODS
 

@@ -16,8 +16,8 @@ from ompl import util as ou
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import PlannerError
-from rrtik_ompl.ompl_bridge.ompl_planners import OMPL_TRAITS, PlannerFactory, traits_of
 from rrtik_ompl.ompl_bridge.planner_options import is_safe, other_planner, safe_planner
+from rrtik_ompl.ompl_bridge.planner_traits import OMPL_TRAITS, PlannerFactory, traits_of
 from rrtik_ompl.ompl_bridge.setup import (
     ValidityCallback,
     exact_path,

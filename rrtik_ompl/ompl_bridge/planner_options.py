@@ -11,7 +11,7 @@ from ompl import base as ob
 
 from rrtik_ompl.arrays import finite_array
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.ompl_bridge.ompl_planners import PlannerFactory
+from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
 from rrtik_ompl.problem import Problem
 

@@ -40,7 +40,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     :meth:`search`. The options are the keyword parameters of the constructor; ``world``, ``seed`` and, for planners
     that want the goal of the tip, ``goal`` are filled in by `plan()`.
 
-    Traits of the class, for `plan()`; see :class:`~rrtik_ompl.ompl_bridge.ompl_planners.PlannerTraits`:
+    Traits of the class, for `plan()`; see :class:`~rrtik_ompl.ompl_bridge.planner_traits.PlannerTraits`:
     ``anytime``, ``one_goal``, ``finds_goals``, ``straight_first``, ``supports_iteration_limit`` (such a planner has the
     option ``max_iterations``), ``path_statistics`` and ``kernels``.
 

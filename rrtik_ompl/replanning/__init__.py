@@ -11,7 +11,7 @@ from rrtik_ompl.files.text import check_target, file_name
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning.feed import Source, SpeedWarning, feed_of
 from rrtik_ompl.replanning.loop import Clock, GoalFeed, Loop
-from rrtik_ompl.replanning.run import ReplanRun, Tick, load_run
+from rrtik_ompl.replanning.record import ReplanRun, Tick, load_run
 from rrtik_ompl.replanning.settings import PLANNERS, ReplanSettings, refuse_renamed
 from rrtik_ompl.trajectory.limits import RateLimits
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.bodies import Body, link_bodies, scene_bodies
 from rrtik_ompl.replanning.feed import Feed
-from rrtik_ompl.replanning.run import ReplanRun
+from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle, Scene
 

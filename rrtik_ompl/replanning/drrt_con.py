@@ -3,6 +3,8 @@
 Source: [1, ch. 5.2, algorithms 6 to 8], with these corrections: where the scene has changed but the path is free the
 robot goes on; where no connection is found the path is kept, and what is left of it is tried again at the next call,
 with new samples (a path that becomes free by itself needs none).
+
+``replan()`` and ``rrtik replan`` use it; ``rrtik_planners.DRRTCon`` makes an OMPL planner of it.
 """
 
 from __future__ import annotations
@@ -56,7 +58,7 @@ class DrrtCon:
         found = self.connect(start[None], goals[usable[1:]], motions, stop, chain=False)
         return self._take(found, motions)
 
-    def look(self, motions: MotionQueries) -> bool:
+    def check_path(self, motions: MotionQueries) -> bool:
         """Check the path again, all of it in one call; whether it is free."""
         if self.path is None:
             return False
@@ -66,7 +68,7 @@ class DrrtCon:
         return self.free
 
     def repair(self, motions: MotionQueries, stop: Stop = no_stop) -> bool:
-        """After a :meth:`look` that found the path hit: find another one; whether there is one."""
+        """After a :meth:`check_path` that found the path blocked: find another one; whether there is one."""
         self.repairs += 1
         ends_free = self.path is not None and bool(motions.valid_batch(self.path[[0, -1]]).all())
         found = self._reconnected(motions, stop) if ends_free else None

@@ -43,8 +43,8 @@ class KernelDrrtCon(DrrtCon):
             world.motions, lower, upper, eps=max_edge, iterations=ITERATIONS, tries=tries, patience=patience
         )  # fmt: skip
 
-    def look(self, motions: MotionQueries) -> bool:
-        """See :meth:`DrrtCon.look`."""
+    def check_path(self, motions: MotionQueries) -> bool:
+        """See :meth:`DrrtCon.check_path`."""
         if self.path is None:
             return False
         self.free = self._kernels.check(self.path)

@@ -16,7 +16,7 @@ from rrtik_ompl.poses import quaternion_xyzw
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning.evading import evasion
 from rrtik_ompl.replanning.feed import Feed, MotionTracker, required_distances
-from rrtik_ompl.replanning.run import ReplanRun, Tick
+from rrtik_ompl.replanning.record import ReplanRun, Tick
 from rrtik_ompl.replanning.settings import PREDICTED_PLACES, ReplanSettings, make_planner
 from rrtik_ompl.replanning.walking import one_step, to_first_corner
 from rrtik_ompl.robot import Robot
@@ -126,7 +126,7 @@ class Loop:
         return self._planner.retarget(self._goals, self._world, self._budget_ends())
 
     def _check(self) -> bool:
-        return self._planner.look(self._world)
+        return self._planner.check_path(self._world)
 
     def _repair(self) -> bool:
         """Find a free path; without the predicted places of obstacles if there is none with them."""
@@ -135,7 +135,7 @@ class Loop:
         if not self._settings.lookahead_ticks:
             return False
         self._world.move(self._world.scene, inflation=self._distances)
-        return self._planner.look(self._world) or self._new_path()
+        return self._planner.check_path(self._world) or self._new_path()
 
     def _new_path(self) -> bool:
         stop, planner = self._budget_ends(), self._planner

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.files.text import write_text
 
 if TYPE_CHECKING:
-    from rrtik_ompl.replanning.run import ReplanRun
+    from rrtik_ompl.replanning.record import ReplanRun
     from rrtik_ompl.viewer.drawing.marks import Mark
     from rrtik_ompl.viewer.subject import Showable, ShownPath
 

@@ -12,7 +12,7 @@ from string import Template
 
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.replanning.run import ReplanRun
+from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.story import story_of

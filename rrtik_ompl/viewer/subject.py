@@ -12,7 +12,7 @@ from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import Goal, JointGoal
 from rrtik_ompl.path import JointPath
-from rrtik_ompl.replanning.run import ReplanRun
+from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.viewer.drawing.marks import Mark

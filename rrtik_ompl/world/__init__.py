@@ -16,7 +16,7 @@ from rrtik_ompl.collision.certificate import Certificate, fixed_contact
 from rrtik_ompl.collision.contacts import Contact as Contact
 from rrtik_ompl.collision.contacts import inside, measured
 from rrtik_ompl.collision.motion_bound import displacement_weights
-from rrtik_ompl.errors import InputError, MeshWarning, require
+from rrtik_ompl.errors import InputError, MeshWarning, Renamed, require
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions, motions_of, step_counts
 from rrtik_ompl.robot import Robot
@@ -142,6 +142,8 @@ class World:
         other = copy.copy(self)
         other.motion_resolution = positive(motion_resolution, "motion_resolution")
         return other
+
+    refined = Renamed("with_resolution")
 
     def valid(self, q: ArrayLike) -> bool:
         """Whether q, shape (dof,), is inside the limits and free of collision.

@@ -62,7 +62,7 @@ class ExactChecker:
 
     def free(self, rows: Matrix) -> Mask:
         """Which rows, shape (m, dof), are free of collision. Shape (m,)."""
-        answers = self.fast.classify(self._robot.joint_values(rows), narrow_phase=not self.conservative)
+        answers = self.fast.classify(self._robot.joint_values(rows), resolve=not self.conservative)
         free: Mask = answers == FREE
         if not self.conservative:
             undecided = rows[answers == UNDECIDED]
@@ -75,7 +75,7 @@ class ExactChecker:
     def motions_free(self, starts: Matrix, ends: Matrix, steps: NDArray[np.int64]) -> Mask:
         """Which straight motions, shape (m, dof), are free at all k / steps, k = 0..steps. Shape (m,)."""
         sides = self._robot.joint_values(starts), self._robot.joint_values(ends)
-        answers = self.fast.classify_edges(*sides, steps, narrow_phase=not self.conservative)
+        answers = self.fast.classify_edges(*sides, steps, resolve=not self.conservative)
         free: Mask = answers == FREE
         if not self.conservative:
             for k in np.flatnonzero(answers == UNDECIDED):

@@ -130,7 +130,7 @@ class MovingWorld:
         """Which rows of Q, shape (m, dof), are free. Shape (m,)."""
         rows = finite_array(Q, (None, self.robot.dof), "configurations")
         self.checked += len(rows)
-        free: Mask = self._fast.classify(self.robot.joint_values(rows), narrow_phase=False) == FREE
+        free: Mask = self._fast.classify(self.robot.joint_values(rows), resolve=False) == FREE
         return free & self.robot.within_limits(rows) & (not self.blocked)
 
     def motion_valid(self, a: ArrayLike, b: ArrayLike) -> bool:
@@ -144,7 +144,7 @@ class MovingWorld:
         steps = step_counts(starts, ends, self.weights, self.motion_resolution)
         self.checked += int(steps.sum()) + len(steps)
         sides = self.robot.joint_values(starts), self.robot.joint_values(ends)
-        free: Mask = self._fast.classify_edges(*sides, steps, narrow_phase=False) == FREE
+        free: Mask = self._fast.classify_edges(*sides, steps, resolve=False) == FREE
         return free & self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self.blocked)
 
     def _contact_of_base(self) -> str:

@@ -15,7 +15,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal, joint_difference
 from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.ompl_bridge import GoalSampler, StateIO
-from rrtik_ompl.ompl_bridge.ompl_planners import ompl_planners, traits_of
+from rrtik_ompl.ompl_bridge.planner_traits import ompl_planners, traits_of
 from rrtik_ompl.planning import list_planners, plan
 from rrtik_ompl.poses import pose
 from rrtik_ompl.problem import Problem

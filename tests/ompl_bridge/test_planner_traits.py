@@ -15,8 +15,8 @@ from rrtik_ompl.errors import PlannerError
 from rrtik_ompl.ik.genetic.options import PRESETS
 from rrtik_ompl.ik.trajectory import list_ik_trajectory_methods
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult
-from rrtik_ompl.ompl_bridge.ompl_planners import OMPL_TRAITS, PlannerTraits, ompl_planners, traits_of
 from rrtik_ompl.ompl_bridge.planner_options import planner_options
+from rrtik_ompl.ompl_bridge.planner_traits import OMPL_TRAITS, PlannerTraits, ompl_planners, traits_of
 from rrtik_ompl.planning import find_planner
 from rrtik_ompl.shortening import METHODS
 from rrtik_ompl.world import ACCURACIES
@@ -25,7 +25,7 @@ LIBRARY = Path(rrtik_ompl.__file__).parent
 # These ask for a planner by its name, as a user does: generated problems and the pilot's tool are made with certain
 # ones. Replanners and methods of shortening have names of their own, some of them the same.
 BY_NAME: tuple[str, ...] = (
-    "ompl_bridge/ompl_planners.py",
+    "ompl_bridge/planner_traits.py",
     "generated_problems/",
     "pilot/",
     "reproduce/",
@@ -128,6 +128,9 @@ def test_the_short_name_is_the_same_package():
 
 def test_an_old_name_says_the_new_one():
     for old, new in rrtik_ompl.RENAMED.items():
-        if old not in dir(rrtik_ompl):
-            with pytest.raises(AttributeError, match=f"{old} is now {new}"):
-                getattr(rrtik_ompl, old)
+        with pytest.raises(ImportError, match=f"^rrtik_ompl.{old} is now rrtik_ompl.{new}$"):
+            exec(f"from rrtik_ompl import {old}")  # an AttributeError would be hidden here
+    problem = rrtik_ompl.load_problem("planar3_a")
+    for kept in (problem, problem.world):
+        with pytest.raises(AttributeError, match="'refined': it is now 'with_resolution'"):
+            kept.refined(0.5)

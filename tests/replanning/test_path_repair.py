@@ -45,9 +45,9 @@ def on_straight_path(length=20.0):
 
 def test_a_blocked_path_keeps_its_beginning_and_its_end():
     planner, judge_ = on_straight_path(), Scripted((10.0, 10.0), 2.0)
-    assert not planner.look(judge_)
+    assert not planner.check_path(judge_)
     assert planner.repair(judge_)
-    assert planner.look(judge_)
+    assert planner.check_path(judge_)
     kept = planner.path[np.abs(planner.path[:, 1] - 10.0) < 1e-12]
     assert kept[:, 0].min() == 0.0
     assert kept[:, 0].max() == 20.0
@@ -57,17 +57,17 @@ def test_a_blocked_path_keeps_its_beginning_and_its_end():
 
 def test_a_look_asks_once_for_all_motions():
     planner, judge_ = on_straight_path(), Scripted((10.0, 17.0), 1.0)
-    assert planner.look(judge_)
+    assert planner.check_path(judge_)
     assert judge_.calls == 1
 
 
 def test_where_no_way_is_found_the_path_is_kept_and_serves_again_without_a_search():
     planner, lid = on_straight_path(), Scripted((20.0, 10.0), 2.0)
-    assert not planner.look(lid)
+    assert not planner.check_path(lid)
     assert not planner.repair(lid)
     drawn = planner.connect.samples
     assert planner.path is not None
-    assert planner.look(Scripted((20.0, 17.0), 2.0))
+    assert planner.check_path(Scripted((20.0, 17.0), 2.0))
     assert planner.connect.samples == drawn
 
 
@@ -75,7 +75,7 @@ def test_from_scratch_forgets_the_pieces():
     planner = FromScratch(PlainConnect(LOW, HIGH, 1.0, seed=3), 1.0)
     planner.begin(np.array([0.0, 10.0]), np.array([[20.0, 10.0]]), Scripted((0, 0), 0.1))
     judge_ = Scripted((10.0, 10.0), 2.0)
-    planner.look(judge_)
+    planner.check_path(judge_)
     assert planner.repair(judge_)
     assert judge_.motion_valid_batch(planner.path[:-1], planner.path[1:]).all()
 

@@ -17,7 +17,7 @@ from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.checks import reference_distances
 from rrtik_ompl.fast.checks.clearance import Clearance, rounded
-from rrtik_ompl.fast.checks.inputs import LARGEST_ANGLE, STROKE, joint_limits, step_counts
+from rrtik_ompl.fast.checks.inputs import LARGEST_ANGLE, STROKE, checked_step_counts, joint_limits
 from rrtik_ompl.fast.checks.reference import ReferenceChecks
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.tables.layout import INNER_LAST, MARKS, OUTER_PRIMITIVES, STANDING_SOLIDS, UNDECIDED
@@ -152,28 +152,28 @@ class FastWorld:
         """Largest absolute value of each joint that kernels can be given directly [rad or m], shape (joints,)."""
         return self._limits
 
-    def classify(self, V: ArrayLike, *, narrow_phase: bool = True) -> NDArray[np.int8]:
+    def classify(self, V: ArrayLike, *, resolve: bool = True) -> NDArray[np.int8]:
         """Check rows of joint values V, shape (m, joints): FREE, UNDECIDED or COLLIDING each. Shape (m,).
 
         Args:
             V: Joint values [rad or m].
-            narrow_phase: False to be content with FREE and UNDECIDED.
+            resolve: False to be content with FREE and UNDECIDED.
 
         Raises:
             InputError: If V has the wrong shape or a value that is not finite.
         """
         rows, beyond = self._values(V, "joint values")
         if self._kernels is None:
-            answers = self._reference.classify(rows, narrow_phase=narrow_phase)
+            answers = self._reference.classify(rows, resolve=resolve)
         else:
             found = np.empty(len(rows), dtype=np.int32)
             places = (rows.ctypes.data, len(rows), found.ctypes.data)
-            _require_sound(self._kernels.classify(self.address, *places, narrow_phase))
+            _require_sound(self._kernels.classify(self.address, *places, resolve))
             answers = found.astype(np.int8)
         return answers if beyond is None else np.where(beyond, np.int8(UNDECIDED), answers)
 
     def classify_edges(
-        self, A: ArrayLike, B: ArrayLike, counts: ArrayLike, *, narrow_phase: bool = True
+        self, A: ArrayLike, B: ArrayLike, counts: ArrayLike, *, resolve: bool = True
     ) -> NDArray[np.int8]:
         """Check straight motions A[k] -> B[k] by their configurations (1 - s) A + s B, s = 0, 1 / count, ..., 1.
 
@@ -183,22 +183,22 @@ class FastWorld:
             A: Starts, shape (m, joints).
             B: Ends, shape (m, joints).
             counts: Numbers of steps, whole and at least 1, shape (m,).
-            narrow_phase: False to be content with FREE and UNDECIDED.
+            resolve: False to be content with FREE and UNDECIDED.
 
         Raises:
             InputError: If shapes do not fit, a value is not finite or a number of steps is not a positive integer.
         """
         (starts, first), (ends, second) = self._values(A, "starts"), self._values(B, "ends")
-        steps = step_counts(counts, len(starts))
+        steps = checked_step_counts(counts, len(starts))
         if len(starts) != len(ends):
             raise InputError(f"motions need as many starts as ends, got {len(starts)} and {len(ends)}")
         if self._kernels is None:
-            answers = self._reference.classify_edges(starts, ends, steps, narrow_phase=narrow_phase)
+            answers = self._reference.classify_edges(starts, ends, steps, resolve=resolve)
         else:
             found = np.empty(len(starts), dtype=np.int32)
             places = (starts.ctypes.data, ends.ctypes.data, steps.ctypes.data)
             sink = found.ctypes.data
-            _require_sound(self._kernels.classify_edges(self.address, *places, len(starts), sink, narrow_phase))
+            _require_sound(self._kernels.classify_edges(self.address, *places, len(starts), sink, resolve))
             answers = found.astype(np.int8)
         for beyond in (first, second):
             answers = answers if beyond is None else np.where(beyond, np.int8(UNDECIDED), answers)

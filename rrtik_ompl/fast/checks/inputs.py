@@ -30,7 +30,7 @@ def joint_limits(chain: Chain, strokes: ArrayLike) -> Vector:
     return np.where(chain.prismatic, given, LARGEST_ANGLE)
 
 
-def step_counts(counts: ArrayLike, count: int) -> NDArray[np.int32]:
+def checked_step_counts(counts: ArrayLike, count: int) -> NDArray[np.int32]:
     """Numbers of steps of ``count`` motions as kernels read them, shape (count,).
 
     Raises:

@@ -165,7 +165,7 @@ class ReferenceChecks:
     def __init__(self, arm: Table, balls: tuple[Table, Table], primitives: tuple[Table, Table]) -> None:
         self._arm, self._balls, self._primitives = arm, balls, primitives
 
-    def classify(self, values: Matrix, *, narrow_phase: bool) -> NDArray[np.int8]:
+    def classify(self, values: Matrix, *, resolve: bool) -> NDArray[np.int8]:
         """See :meth:`rrtik_ompl.fast.FastWorld.classify`."""
         answers = np.zeros(len(values), dtype=np.int8)
         for start in range(0, len(values), CHUNK):
@@ -173,24 +173,22 @@ class ReferenceChecks:
             poses = frames(self._arm, values[part])
             answers[part] = self._in_collision(poses, 0).any(axis=1)
             open_ = np.flatnonzero(answers[part])
-            if narrow_phase and len(open_):
+            if resolve and len(open_):
                 answers[start + open_] += self._in_collision(poses[open_], 1).any(axis=1)
         return answers
 
     def classify_edges(
-        self, starts: Matrix, ends: Matrix, steps: NDArray[np.int32], *, narrow_phase: bool
+        self, starts: Matrix, ends: Matrix, steps: NDArray[np.int32], *, resolve: bool
     ) -> NDArray[np.int8]:
         """See :meth:`rrtik_ompl.fast.FastWorld.classify_edges`."""
         answers = np.zeros(len(starts), dtype=np.int8)
         for edge, count in enumerate(steps):
             share = (np.arange(count + 1) / count)[:, None]
-            answers[edge] = self.classify(
-                (1.0 - share) * starts[edge] + share * ends[edge], narrow_phase=narrow_phase
-            ).max()
+            answers[edge] = self.classify((1.0 - share) * starts[edge] + share * ends[edge], resolve=resolve).max()
         return answers
 
     def marks(self, values: Matrix) -> Mask:
-        """Flags of the pairs that the outer balls cannot narrow_phase free, shape (m, flags)."""
+        """Flags of the pairs that the outer balls cannot prove free, shape (m, flags)."""
         return np.asarray(self._in_collision(frames(self._arm, values), 0))
 
     def _in_collision(self, poses: NDArray[np.float64], level: int) -> NDArray[np.bool_]:

@@ -54,7 +54,7 @@ _lock = RLock()
 
 
 def library(name: str) -> Library | None:
-    """The kernels of a module of this package (``"kernels"``), or None, and one warning, if there cannot be any."""
+    """The kernels of a module of ``fast`` (``"checks.check_kernels"``); None, and one warning, if there can be none."""
     with _lock:
         if name not in _libraries:
             _libraries[name] = _tried(name)

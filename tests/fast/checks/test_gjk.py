@@ -120,7 +120,7 @@ def test_motions_are_judged_as_their_configurations_are():
     expected = [COLLIDING if (e == COLLIDING).any() else int(e.max()) for e in each]
     assert len(set(expected)) > 1
     np.testing.assert_array_equal(world.classify_edges(starts, ends, steps), expected)
-    assert (world.classify_edges(starts, ends, steps, narrow_phase=False) >= np.minimum(expected, UNDECIDED)).all()
+    assert (world.classify_edges(starts, ends, steps, resolve=False) >= np.minimum(expected, UNDECIDED)).all()
 
 
 def test_pairs_that_are_proven_apart_are_not_handed_on():

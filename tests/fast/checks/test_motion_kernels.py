@@ -24,7 +24,7 @@ def test_a_motion_is_judged_by_its_configurations(name):
         for answer, a, b, count in zip(answers, VA, VB, counts, strict=True):
             share = (np.arange(count + 1) / count)[:, None]
             assert answer == case.world.classify((1.0 - share) * a + share * b).max()
-        cautious = case.world.classify_edges(VA, VB, counts, narrow_phase=False)
+        cautious = case.world.classify_edges(VA, VB, counts, resolve=False)
         np.testing.assert_array_equal(cautious, np.minimum(answers, UNDECIDED))
         seen |= set(answers.tolist())
     assert seen == {FREE, UNDECIDED, COLLIDING}

@@ -108,7 +108,7 @@ def test_a_motion_is_checked_in_kernels_as_by_the_world(accuracy: str) -> None:
         steps = step_counts(a, b, world.weights, world.motion_resolution)
         forward = np.array([tuple(p) <= tuple(q) for p, q in zip(a, b, strict=True)])
         first, second = (np.where(forward[:, None], *pair) for pair in (sides, sides[::-1]))
-        answers = world.fast.classify_edges(first, second, steps, narrow_phase=accuracy == "exact")
+        answers = world.fast.classify_edges(first, second, steps, resolve=accuracy == "exact")
         np.testing.assert_array_equal(found, answers)
     assert 0 < (found == FREE).sum() < len(found)
     assert world.motions.resolve == (accuracy == "exact")
@@ -119,7 +119,7 @@ def test_a_configuration_is_proven_free_in_kernels_as_by_the_world() -> None:
     rows, _ = motions_within(world, 500, 0.0)
     found = np.zeros(len(rows), dtype=np.int32)
     write_free(world.motions.address, 6, rows.ctypes.data, len(rows), found.ctypes.data)
-    answers = world.fast.classify(world.robot.joint_values(rows), narrow_phase=False)
+    answers = world.fast.classify(world.robot.joint_values(rows), resolve=False)
     np.testing.assert_array_equal(found != 0, answers == FREE)
 
 

@@ -113,9 +113,9 @@ def test_checks_write_nothing_beyond_their_memory(name, reach, dented_cube, made
     others = np.roll(Q, 1, axis=0)
     for checks in (world.fast, moving._fast):
         V, ends = robot.joint_values(Q), robot.joint_values(others)
-        for narrow_phase in (True, False):
-            checks.classify(V, narrow_phase=narrow_phase)
-            checks.classify_edges(V, ends, np.full(len(V), 20), narrow_phase=narrow_phase)
+        for resolve in (True, False):
+            checks.classify(V, resolve=resolve)
+            checks.classify_edges(V, ends, np.full(len(V), 20), resolve=resolve)
             assert checks.intact()
         checks.clearance(V, upper=True)
         assert checks.intact()

@@ -30,7 +30,7 @@ def spoiled_world():
 NEAR = np.array([[5.0, 6.2]])
 CALLS = {
     "configurations": lambda fast: fast.classify(NEAR),
-    "without narrow phase": lambda fast: fast.classify(NEAR, narrow_phase=False),
+    "without narrow phase": lambda fast: fast.classify(NEAR, resolve=False),
     "motions": lambda fast: fast.classify_edges(NEAR, NEAR + 0.1, [3]),
     "distances": lambda fast: fast.clearance(NEAR),
     "pairs": lambda fast: fast.undecided_pairs(NEAR),

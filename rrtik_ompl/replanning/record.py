@@ -34,7 +34,8 @@ class Tick:
         q: The robot's configuration then, shape (n,).
         event: "plan" or "repair": move along a path found just now, the first one or another one; "walk": along the old
             one; "wait"; "evade"; "arrive": the last configuration.
-        path: The path after the tick's work, shape (k, n), or None if there is none.
+        path: The path after the tick's work, shape (k, n), free or blocked; None before the first one was found and in
+            the last tick.
         poses: Of the obstacles that have moved since the first tick: x, y, z and quaternion x, y, z, w.
         seconds: Wall time of its parts [s]: "sense", "retarget", "look" (check of the path), "plan" or
             "repair" (search and shortening), "all".
