@@ -2,7 +2,7 @@
 
 What stands here is loaded when it is first used, so that ``import rrtik_ompl`` costs next to nothing.
 
-ARCHITECTURE.md in the repository says where what is; docs/api.md lists what stands here.
+ARCHITECTURE.md in the repository says where what is, docs/README.md how it is used.
 """
 
 from importlib import import_module

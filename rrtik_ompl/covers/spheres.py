@@ -1,7 +1,7 @@
 """Balls around a solid (outer cover, contains it) and balls inside it (inner spheres), for any coal geometry.
 
-An outer cover is proven, not sampled: the solid is cut into convex elements without gaps (``cover_cells``) and every
-element lies wholly inside one ball (``cover_search`` finds the balls).
+An outer cover is proven, not sampled: the solid is cut into convex elements without gaps (``covers/cells.py``), and
+every element lies wholly inside one ball (``covers/search.py`` finds the balls).
 
 Spheres are float64 arrays of shape (n, 4): centre x, y, z and radius [m], in the frame of the geometry. Containment
 holds within 1e-9 of the size of the solid [m per m].

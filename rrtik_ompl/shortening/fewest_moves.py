@@ -66,7 +66,7 @@ def fewest_moves(
 
     Returns:
         A route with the same ends, bit for bit, that is no worse. Its bound is the number of joints that differ, and
-        more where that has been refuted (see :meth:`MoveSearch.settle_corners` and :mod:`move_proof`).
+        more where that has been refuted (:mod:`rrtik_ompl.moves.lower_bounds`).
 
     Raises:
         InputError: If an edge moves several joints or ``rounds`` is negative.

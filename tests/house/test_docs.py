@@ -23,10 +23,6 @@ LIBRARY = ROOT / "rrtik_ompl"
 PAGES = {file.stem: file.read_text() for file in (*ROOT.glob("*.md"), *sorted((ROOT / "docs").glob("[a-z]*.md")))}
 PLACES = {file.stem: file.parent for file in (*ROOT.glob("*.md"), *(ROOT / "docs").glob("[a-z]*.md"))}
 MOST_WORDS = 1500
-GONE = (
-    *("C-RDT paper", "GA-REB paper", "IKURT paper", "DRRT-Con paper", "MB-RRT paper", "post-processing paper"),
-    *("shared-control tool", "the specification", "kinematics specification", "Post-processing page"),
-)
 
 
 def blocks(page, language):
@@ -181,17 +177,6 @@ def test_every_number_of_a_release_is_the_same():
 
 def test_nothing_is_left_to_verify():
     assert [page for page, text in PAGES.items() if "VERIFY" in text] == []
-
-
-LISTS = (Path(__file__), ROOT / "bench" / "house.py")  # they name the words to find them
-
-
-@pytest.mark.parametrize("folder", ["rrtik_ompl", "planners", "robots", "bench", "tests", "docs"])
-def test_citations_name_works_that_a_reader_can_get(folder):
-    kinds = (".py", ".md", ".yaml", ".js", ".html")
-    files = [file for file in (ROOT / folder).rglob("*") if file.suffix in kinds and file not in LISTS]
-    found = [(str(file.relative_to(ROOT)), words) for file in files for words in GONE if words in file.read_text()]
-    assert found == []
 
 
 # --- the ladder --------------------------------------------------------------------------------------------------

@@ -5,6 +5,15 @@ from rrtik_tests.places import ROOT
 TESTS = ROOT / "tests"
 
 
+ROOMS = {file.parent.name for file in (ROOT / "rrtik_ompl").glob("*/__init__.py")}
+OTHERS = {"bench", "helpers", "house", "planners", "planning", "robots", "spine"}  # modules of the root: the last two
+
+
+def test_every_room_has_its_folder():
+    folders = {folder.parent.name for folder in TESTS.glob("*/test_*.py")} | {"fast", "helpers"}
+    assert folders == ROOMS - {"shapes"} | OTHERS  # shapes are tested by what they become, in collision
+
+
 def test_every_test_file_lies_in_a_folder():
     assert [file.name for file in TESTS.glob("*.py")] == ["conftest.py"]
     assert [str(file) for file in (TESTS / "helpers").rglob("test_*.py")] == []

@@ -5,7 +5,7 @@ be replaced by a larger one that :func:`aligned` makes. :class:`TablePlan` is fo
 all its arrays lie in a single piece, for numpy takes as long to give the address of an array as a small kernel runs.
 
 Kernels check no bounds. Therefore every array lies between guard words, at least ``ALIGNMENT`` bytes of a pattern
-before and behind it (behind it alone in a single piece), and ``intact()`` says whether they are as they were.
+before and behind it (behind it alone in a single piece, also behind the fields), and ``intact()`` says whether they are as they were.
 Tests check it after each kernel.
 """
 
@@ -102,8 +102,8 @@ class TablePlan:
 
     Attributes:
         spans: The words of each array.
-        words: Of all, the fields at their end.
-        start: The first word of the fields.
+        words: Of all, the fields and their guard words at the end.
+        start, stop: The first word of the fields, and the one after the last.
         fields: Numbers, and how far arrays are from the first one in bytes.
         pointing: 1 for each field that is the address of an array, else 0.
         guards: Numbers of the guard words.
@@ -122,13 +122,14 @@ class TablePlan:
                 guards.append(np.arange(end - GUARD_WORDS, end))
         for place, number in numbers.items():
             self.fields[place] = number
-        self.start, self.words = end, end + len(self.fields)
-        self.guards = np.concatenate([np.zeros(0, dtype=np.intp), *guards])
+        self.start, self.stop = end, end + len(self.fields)
+        self.words = self.stop + GUARD_WORDS
+        self.guards = np.concatenate([*guards, np.arange(self.stop, self.words)])
         self.blank: NDArray[np.float64] | None = None
         if self.words <= COPIED_WORDS:
             self.blank = np.zeros(self.words)
             self.blank[self.guards] = GUARD_WORD
-            self.blank[self.start :].view(np.int64)[:] = self.fields
+            self.blank[self.start : self.stop].view(np.int64)[:] = self.fields
 
 
 class PlannedTable:
@@ -145,7 +146,7 @@ class PlannedTable:
         unaligned = -begin % ALIGNMENT
         first = unaligned // WORD
         self._plan, self._words = plan, whole[first : first + plan.words]
-        self.header: Header = self._words[plan.start :].view(np.int64)
+        self.header: Header = self._words[plan.start : plan.stop].view(np.int64)
         if plan.blank is not None:
             self._words[:] = plan.blank
         else:
@@ -159,5 +160,5 @@ class PlannedTable:
         return self._words[self._plan.spans[place]]
 
     def intact(self) -> bool:
-        """Whether nothing has been written beyond an array."""
+        """Whether nothing has been written beyond an array or the fields."""
         return bool((self._words[self._plan.guards] == GUARD_WORD).all())

@@ -19,6 +19,8 @@ from rrtik_ompl.shapes import Box, Sphere
 from rrtik_ompl.world import World
 from rrtik_ompl.world.moving_world import MovingWorld
 
+pytestmark = pytest.mark.kernels
+
 MOTIONS = 1_000_000
 
 

@@ -27,6 +27,8 @@ from rrtik_ompl.shapes import Box
 from rrtik_ompl.world import World
 from rrtik_ompl.world.moving_world import MovingWorld
 
+pytestmark = pytest.mark.kernels
+
 NONE = np.empty((0, 4))
 NAMES = ("planar3_c", "titan4_prisms", "env_e")
 

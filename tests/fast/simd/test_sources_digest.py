@@ -3,6 +3,7 @@
 import ast
 import importlib
 import inspect
+import shutil
 import subprocess
 import sys
 
@@ -44,6 +45,21 @@ def test_an_edit_of_a_kernel_or_a_layout_makes_anew_what_depends_on_it_and_nothi
     }
 
 
+def test_an_edit_of_covers_makes_nothing_anew(tmp_path):
+    copy = tmp_path / "rrtik_ompl"
+    shutil.copytree(code_files.FOLDER.parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    code = "from rrtik_ompl.fast.simd.code_files import *; print(*map(machine_key, kernel_modules()))"
+
+    def keys():
+        return subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
+
+    before = keys().stdout
+    (copy / "covers" / "spheres.py").write_text("# changed\n" + (copy / "covers" / "spheres.py").read_text())
+    assert keys().stdout == before
+    (copy / "fast" / "checks" / "gjk.py").write_text("# changed\n" + (copy / "fast" / "checks" / "gjk.py").read_text())
+    assert keys().stdout != before
+
+
 @pytest.mark.parametrize("module", ["tables.robot_tables", "tables.packing", "simd.library", "checks.fast_world"])
 def test_an_edit_of_what_holds_no_kernel_makes_nothing_anew(edited, module):
     before = {name: code_files.machine_key(name) for name in code_files.kernel_modules()}
@@ -62,6 +78,8 @@ def test_the_sources_of_a_kernel_are_all_that_it_imports():
     for name in code_files.kernel_modules():
         code = f"import sys, rrtik_ompl.fast.{name}; print(*sys.modules)"
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        outside = {m for m in done.stdout.split() if m.startswith("rrtik_ompl.") and m.split(".")[1] != "fast"}
+        assert outside <= {"rrtik_ompl.files", "rrtik_ompl.files.cache"}, "the digest sees fast/ alone"
         loaded = {m.removeprefix("rrtik_ompl.fast.") for m in done.stdout.split() if m.startswith("rrtik_ompl.fast.")}
         others = loaded - set(code_files.kernel_sources(name)) - {"simd.code_files"}
         assert [module for module in others if not holds_nothing(module)] == []

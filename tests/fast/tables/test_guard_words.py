@@ -14,6 +14,8 @@ from rrtik_ompl.fast.tables.memory import PlannedTable, Table, TablePlan, aligne
 from rrtik_ompl.fast.tables.scratch import probe_table
 from rrtik_ompl.world.moving_world import MovingWorld
 
+pytestmark = pytest.mark.kernels
+
 ARMS = {"titan4": 1.8, "panda": 0.8, "puma560": 0.9, "point2d": 5.0}
 
 
@@ -94,6 +96,11 @@ def test_a_write_behind_an_array_of_a_planned_table_is_seen(words):
         assert own.intact()
         write(int(own.header[place]), len(own[place]), 8.0)
         assert not own.intact()
+    own = PlannedTable(TablePlan({0: words}, {1: 9}))
+    write(own.address, 1, 8.0)
+    assert own.intact()
+    write(own.address, 2, 8.0)
+    assert not own.intact()
 
 
 def test_arrays_of_a_planned_table_are_where_its_fields_say():

@@ -14,6 +14,8 @@ from rrtik_ompl.fast.tables import layout
 from rrtik_ompl.fast.tables.primitive_tables import primitive_table
 from rrtik_ompl.fast.tables.scene_tables import outer_primitives
 
+pytestmark = pytest.mark.kernels
+
 UNKNOWN = layout.KINDS.stop
 
 
