@@ -75,7 +75,7 @@ def entry_of(frame: Frame, lane: int, place: int) -> float:
 @inlined
 def frame_row(frame: Frame, lane: int, row: int) -> Any:
     """A row of a frame's rotation in one lane."""
-    place = layout.ROTATION + 3 * row
+    place = layout.ROTATION + layout.AXES * row
     return entry_of(frame, lane, place), entry_of(frame, lane, place + 1), entry_of(frame, lane, place + 2)
 
 
@@ -97,7 +97,7 @@ def carried(frame: Frame, lane: int, p: Any) -> Any:
 @inlined
 def corner_at(corners: CornerArray, block: int, lane: int) -> Any:
     """One corner of a solid."""
-    place = 3 * WIDTH * block + lane
+    place = layout.AXES * WIDTH * block + lane
     return (
         np.float64(float_at(corners, place)),
         np.float64(float_at(corners, place + WIDTH)),

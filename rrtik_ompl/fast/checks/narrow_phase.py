@@ -163,7 +163,7 @@ def compare_bodies(
 @kernel
 def carried_axis(frame: Frame, lane: int, axis: int, a: Any, b: Any, c: Any) -> Any:
     """A coordinate in the world of points of a frame. Here lanes hold points; ``lane`` is that of the frame."""
-    place = (layout.ROTATION + 3 * axis) * WIDTH + lane
+    place = (layout.ROTATION + layout.AXES * axis) * WIDTH + lane
     turned = a * float_at(frame, place) + b * float_at(frame, place + WIDTH) + c * float_at(frame, place + 2 * WIDTH)
     return turned + float_at(frame, (layout.ORIGIN + axis) * WIDTH + lane)
 

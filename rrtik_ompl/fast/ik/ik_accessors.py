@@ -63,6 +63,7 @@ pose_at: Callable[[ik_layout.Pose, int], ik_layout.Pose] = record_reader(DOUBLE_
 next_pose: Callable[[ik_layout.Pose], ik_layout.Pose] = part_reader(DOUBLE_BYTES * ik_layout.POSE_NUMBERS)
 column_at: Callable[[ik_layout.Columns, int], ik_layout.Twist] = record_reader(DOUBLE_BYTES * ik_layout.TWIST_NUMBERS)
 next_start_at: Callable[[ik_layout.NextStart, int], ik_layout.NextStart] = record_reader(WORD_BYTES)
+number_of_next: Callable[[ik_layout.NextStart], int] = field_reader(0)
 configuration_at: Callable[[ik_layout.Configuration, int, int], ik_layout.Configuration] = double_row
 
 
@@ -106,7 +107,7 @@ def set_steps_done(call: ik_layout.CallTable, steps: int) -> None:
 @inlined
 def pose_entry(pose: ik_layout.Pose, row: int, column: int) -> Any:
     """An entry of a pose's rotation."""
-    return double_at(pose, ik_layout.ROTATION + 3 * row + column)
+    return double_at(pose, ik_layout.ROTATION + ik_layout.AXES * row + column)
 
 
 @inlined
@@ -130,7 +131,7 @@ def pose_origin(pose: ik_layout.Pose, axis: int) -> Any:
 @inlined
 def set_pose_entry(pose: ik_layout.Pose, row: int, column: int, value: float) -> None:
     """Set an entry of a pose's rotation."""
-    set_double(pose, ik_layout.ROTATION + 3 * row + column, value)
+    set_double(pose, ik_layout.ROTATION + ik_layout.AXES * row + column, value)
 
 
 @inlined
@@ -149,3 +150,9 @@ def square_at(square: ik_layout.Square, row: int, column: int) -> Any:
 def set_square(square: ik_layout.Square, row: int, column: int, value: float) -> None:
     """Set an entry of the square matrix."""
     set_double(square, ik_layout.TWIST_NUMBERS * row + column, value)
+
+
+@inlined
+def set_next(follower: ik_layout.NextStart, start: int) -> None:
+    """Set the number of a row's next start."""
+    set_field(follower, 0, start)

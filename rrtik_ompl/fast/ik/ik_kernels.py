@@ -28,6 +28,7 @@ from rrtik_ompl.fast.ik.ik_accessors import (
     next_of,
     next_start_at,
     number,
+    number_of_next,
     patience_of,
     pose_at,
     pose_entry,
@@ -38,6 +39,7 @@ from rrtik_ompl.fast.ik.ik_accessors import (
     seed_count_of,
     seed_tips_of,
     seeds_of,
+    set_next,
     set_square,
     set_steps_done,
     square_at,
@@ -49,7 +51,7 @@ from rrtik_ompl.fast.ik.ik_accessors import (
 from rrtik_ompl.fast.ik.ik_kinematics import differentiate, measure, move_tip, see_from, weigh
 from rrtik_ompl.fast.ik.ik_layout import TWIST_NUMBERS, Aim, CallTable, Configuration, LimbTable, Twist
 from rrtik_ompl.fast.simd.compiled import entry, inlined, kernel
-from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field, set_int
+from rrtik_ompl.fast.simd.lanes import double_at, set_double, set_int
 
 UNBOUNDED_RESIDUAL = 1e300  # without unit
 
@@ -210,7 +212,7 @@ def search(limb: LimbTable, call: CallTable, row: int) -> bool:
     dof, aim = dof_of(limb), aim_at(call, row)
     q, follower = configuration_at(q_of(call), dof, row), next_start_at(next_of(call), row)
     see_from(limb, call, aim)
-    begin, source = field(follower, 0), near_at(call, row)
+    begin, source = number_of_next(follower), near_at(call, row)
     for start in range(seed_count_of(limb) + 1):
         if start == 1:
             measure_seeds(limb, call, aim)
@@ -220,7 +222,7 @@ def search(limb: LimbTable, call: CallTable, row: int) -> bool:
             continue
         for k in range(dof):
             set_double(q, k, double_at(source, k))
-        set_field(follower, 0, start + 1)
+        set_next(follower, start + 1)
         if descend(limb, call, aim, q):
             return True
     return False

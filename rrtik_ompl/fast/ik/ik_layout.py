@@ -29,6 +29,7 @@ JOINTS, DOF, FIXED, SLIDING, COLUMN, GAIN, OFFSET, LOWER, UPPER, SEED_COUNT, SEE
 PER_METRE, PER_CHORD, DAMPING, SHARE, SHARE_GROWTH, LARGEST_STEP, STALLED = range(7)  # the numbers
 
 # Pose (float64): the rotation row by row, then the origin. Twist, a residual or a column of the Jacobian: along, about.
+AXES = 3  # rows of a rotation
 POSE_NUMBERS = 12
 ROTATION, ORIGIN = 0, 9
 TWIST_NUMBERS = 6

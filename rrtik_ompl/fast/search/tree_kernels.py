@@ -49,7 +49,7 @@ points_of: Callable[[TreeTable], LaneArray] = field_reader(tree_layout.POINTS)
 rows_of: Callable[[TreeTable], Configuration] = field_reader(tree_layout.ROWS)
 all_values_of: Callable[[TreeTable], JointValues] = field_reader(tree_layout.VALUES)
 parents_of: Callable[[TreeTable], IntArray] = field_reader(tree_layout.PARENTS)
-radii_of: Callable[[TreeTable], int] = field_reader(tree_layout.RADII)
+radii_of: Callable[[TreeTable], LaneArray] = field_reader(tree_layout.RADII)
 states_of: Callable[[TreeTable], IntArray] = field_reader(tree_layout.STATES)
 
 

@@ -185,7 +185,7 @@ marks_row: Callable[[layout.Marks, int, int], layout.Marks] = _int_row
 @inlined
 def rotation_row(frame: layout.Frame, row: int) -> Vector:
     """A row of a frame's rotation, in lanes."""
-    place = layout.ROTATION + 3 * row
+    place = layout.ROTATION + layout.AXES * row
     return lanes_at(frame, place), lanes_at(frame, place + 1), lanes_at(frame, place + 2)
 
 
@@ -198,7 +198,7 @@ def origin_at(frame: layout.Frame, row: int) -> Any:
 @inlined
 def set_rotation_row(frame: layout.Frame, row: int, x: Any, y: Any, z: Any) -> None:
     """Set a row of a frame's rotation."""
-    place = layout.ROTATION + 3 * row
+    place = layout.ROTATION + layout.AXES * row
     set_lanes(frame, place, x)
     set_lanes(frame, place + 1, y)
     set_lanes(frame, place + 2, z)
@@ -213,21 +213,24 @@ def set_origin(frame: layout.Frame, row: int, value: Any) -> None:
 @inlined
 def stored_centre(centres: layout.CentreArray, number: int) -> Vector:
     """A centre that is placed, in lanes."""
-    return lanes_at(centres, 3 * number), lanes_at(centres, 3 * number + 1), lanes_at(centres, 3 * number + 2)
+    place = layout.AXES * number
+    return lanes_at(centres, place), lanes_at(centres, place + 1), lanes_at(centres, place + 2)
 
 
 @inlined
 def store_centre(centres: layout.CentreArray, number: int, x: Any, y: Any, z: Any) -> None:
     """Set a centre."""
-    set_lanes(centres, 3 * number, x)
-    set_lanes(centres, 3 * number + 1, y)
-    set_lanes(centres, 3 * number + 2, z)
+    place = layout.AXES * number
+    set_lanes(centres, place, x)
+    set_lanes(centres, place + 1, y)
+    set_lanes(centres, place + 2, z)
 
 
 @inlined
 def corner_block(corners: layout.CornerArray, block: int) -> Vector:
     """Coordinates of ``WIDTH`` corners of a solid; here lanes hold corners."""
-    return lanes_at(corners, 3 * block), lanes_at(corners, 3 * block + 1), lanes_at(corners, 3 * block + 2)
+    place = layout.AXES * block
+    return lanes_at(corners, place), lanes_at(corners, place + 1), lanes_at(corners, place + 2)
 
 
 @inlined

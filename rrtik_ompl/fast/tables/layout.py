@@ -69,6 +69,7 @@ ARM, OUTER, INNER, OUTER_PRIMITIVES, INNER_PRIMITIVES, SCRATCH, MOVING_SOLIDS, S
 # parent's frame
 JOINT_COUNT, PARENTS, SLIDING, PLACEMENTS = range(4)
 # Placement (of floats) and frame (of lanes): the rotation row by row, then the origin.
+AXES = 3  # numbers of a point, rows of a rotation
 POSE_NUMBERS = 12
 ROTATION, ORIGIN = 0, 9
 

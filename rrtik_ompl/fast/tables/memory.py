@@ -5,8 +5,8 @@ be replaced by a larger one that :func:`aligned` makes. :class:`TablePlan` is fo
 all its arrays lie in a single piece, for numpy takes as long to give the address of an array as a small kernel runs.
 
 Kernels check no bounds. Therefore every array lies between guard words, at least ``ALIGNMENT`` bytes of a pattern
-before and behind it (behind it alone in a single piece, also behind the fields), and ``intact()`` says whether they are as they were.
-Tests check it after each kernel.
+before and behind it (in a single piece behind it and behind the fields), and ``intact()`` says whether they are as they
+were. Tests check it after each kernel.
 """
 
 from __future__ import annotations

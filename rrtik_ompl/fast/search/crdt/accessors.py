@@ -13,7 +13,7 @@ from rrtik_ompl.fast.search.motions.row_kernels import Configuration, row_at
 from rrtik_ompl.fast.simd.access import field_reader
 from rrtik_ompl.fast.simd.compiled import inlined
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_field
-from rrtik_ompl.fast.tables.layout import IntArray
+from rrtik_ompl.fast.tables.layout import DoubleArray, IntArray
 
 motions_of: Callable[[CrdtTable], MotionTable] = field_reader(crdt_layout.MOTIONS)
 rules_of: Callable[[CrdtTable], Configuration] = field_reader(crdt_layout.RULES)
@@ -21,6 +21,7 @@ extension_of: Callable[[CrdtTable], Configuration] = field_reader(crdt_layout.EX
 goals_of: Callable[[CrdtTable], Configuration] = field_reader(crdt_layout.GOALS)
 order_of: Callable[[CrdtTable], IntArray] = field_reader(crdt_layout.ORDER)
 verdicts_of: Callable[[CrdtTable], IntArray] = field_reader(crdt_layout.VERDICTS)
+nearest_of: Callable[[CrdtTable], DoubleArray] = field_reader(crdt_layout.NEAREST)
 edge_count_of: Callable[[CrdtTable], int] = field_reader(crdt_layout.EDGE_COUNT)
 
 

@@ -9,7 +9,15 @@ from __future__ import annotations
 from typing import Any
 
 from rrtik_ompl.fast.search.crdt import layout as crdt_layout
-from rrtik_ompl.fast.search.crdt.accessors import count_up, dof_in, extension_row, goal_row, rule_row, tree_of
+from rrtik_ompl.fast.search.crdt.accessors import (
+    count_up,
+    dof_in,
+    extension_row,
+    goal_row,
+    nearest_of,
+    rule_row,
+    tree_of,
+)
 from rrtik_ompl.fast.search.crdt.draws import sample
 from rrtik_ompl.fast.search.crdt.growth import add_free_edges, check_extension, lay_out
 from rrtik_ompl.fast.search.crdt.layout import CrdtTable, CrdtTreeTable
@@ -23,7 +31,7 @@ from rrtik_ompl.fast.simd.lanes import double_at, field, set_field
 def nearest_to_target(search: CrdtTable, tree: CrdtTreeTable) -> Any:
     """The vertex of a tree that is nearest to TARGET."""
     target, scale = extension_row(search, crdt_layout.TARGET), rule_row(search, crdt_layout.SCALE)
-    return nearest_crdt_vertex(tree, dof_in(search), target, scale, field(search, crdt_layout.NEAREST))
+    return nearest_crdt_vertex(tree, dof_in(search), target, scale, nearest_of(search))
 
 
 @inlined

@@ -75,7 +75,7 @@ def add_crdt_vertex(tree: CrdtTreeTable, dof: int, row: Configuration, parent: i
 
 @kernel
 def nearest_crdt_vertex(
-    tree: CrdtTreeTable, dof: int, target: Configuration, scale: Configuration, nearest: int
+    tree: CrdtTreeTable, dof: int, target: Configuration, scale: Configuration, nearest: DoubleArray
 ) -> int:
     """The vertex nearest to a target in the scaled metric; among equals the oldest. ``nearest``: two wide lanes."""
     coordinates = coordinates_of(tree)
