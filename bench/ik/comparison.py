@@ -166,7 +166,7 @@ def _batch_share(robot: Robot, poses: np.ndarray, method: IkMethod) -> float:
     return float(rrtik.solve_ik_batch(robot, poses, method=method).found.mean())
 
 
-def judge(report: Report, name: str, runs: dict[str, Runs], batch: dict[str, tuple[float, float]]) -> None:
+def compare(report: Report, name: str, runs: dict[str, Runs], batch: dict[str, tuple[float, float]]) -> None:
     """The acceptance rows of one arm."""
     auto, kernel = runs["auto"], runs[KERNEL]
     share = batch["solve_ik_batch, auto"][0]
@@ -214,7 +214,7 @@ def main() -> None:
         runs, absent = single(robot, poses, options.budget, (KERNEL, "auto", *list_ik_methods()))
         batch = batches(robot, poses)
         missing += absent
-        judge(report, name, runs, batch)
+        compare(report, name, runs, batch)
         report.table(f"{name}, pose by pose", HEAD, [run.row(each) for each, run in runs.items()])
         rows = [[each, _percent(share), f"{us:.1f}"] for each, (share, us) in batch.items()]
         report.table(f"{name}, {len(poses)} poses in one call", ["method", "solved", "a pose [us]"], rows)

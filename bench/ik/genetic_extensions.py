@@ -9,7 +9,7 @@ import pinocchio as pin
 
 import rrtik_ompl as rrtik
 from rrtik_bench.genetic.published import INCH, TOLERANCE, curve
-from rrtik_bench.genetic.runs import TRAJECTORIES, Run, arm, mean, median, run, runs
+from rrtik_bench.genetic.runs import TRAJECTORIES, TrajectoryRun, arm, mean, median, run, runs
 from rrtik_bench.report.page import Report
 from rrtik_ompl.ik.genetic.objective import manipulability
 from rrtik_ompl.ik.genetic.options import REFINED, STANDARD
@@ -38,7 +38,7 @@ def extensions(report: Report, seeds: int) -> None:
     obstacles(report, seeds)
 
 
-def _complete(each: list[Run]) -> str:
+def _complete(each: list[TrajectoryRun]) -> str:
     return f"{sum(one.completed == 100.0 for one in each)} of {len(each)}"
 
 

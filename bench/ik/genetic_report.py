@@ -14,7 +14,7 @@ import numpy as np
 from bench.ik.genetic_extensions import extensions
 from bench.shared.pages import add_out
 from rrtik_bench.genetic.published import FIRST_POINT, INCH, REFERENCE, TABLE_4, TABLE_5, curve, expanded_tip
-from rrtik_bench.genetic.runs import JUMP, TRAJECTORIES, Run, arm, mean, median, run, runs
+from rrtik_bench.genetic.runs import JUMP, TRAJECTORIES, TrajectoryRun, arm, mean, median, run, runs
 from rrtik_bench.report.page import Report
 from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.ik.genetic.options import HISTORICAL, STANDARD
@@ -46,7 +46,7 @@ def kinematics(report: Report) -> None:
     )
 
 
-def standard(report: Report, seeds: int) -> dict[int, list[Run]]:
+def standard(report: Report, seeds: int) -> dict[int, list[TrajectoryRun]]:
     """Three joints, gain 1."""
     done = runs(arm(3), replace(STANDARD, gain=1.0), seeds)
     every = [each for rows in done.values() for each in rows]
@@ -95,7 +95,9 @@ def standard(report: Report, seeds: int) -> dict[int, list[Run]]:
     return done
 
 
-def without_reduction(report: Report, with_it: dict[int, list[Run]], seeds: int) -> dict[int, list[Run]]:
+def without_reduction(
+    report: Report, with_it: dict[int, list[TrajectoryRun]], seeds: int
+) -> dict[int, list[TrajectoryRun]]:
     """How much the reduction saves."""
     bare = runs(arm(3), replace(STANDARD, window=None), seeds)
     shares = [mean(bare[n], "generations") / mean(with_it[n], "generations") for n in TRAJECTORIES]
@@ -104,7 +106,7 @@ def without_reduction(report: Report, with_it: dict[int, list[Run]], seeds: int)
     return bare
 
 
-def historical(report: Report, bare: dict[int, list[Run]], seeds: int) -> None:
+def historical(report: Report, bare: dict[int, list[TrajectoryRun]], seeds: int) -> None:
     """Table 4 of the paper beside both presets."""
     old = runs(arm(3), replace(HISTORICAL, gain=0.0), seeds)
     old_bare = runs(arm(3), replace(HISTORICAL, window=None), seeds)
@@ -145,7 +147,7 @@ def historical(report: Report, bare: dict[int, list[Run]], seeds: int) -> None:
     )
 
 
-def _cells(each: list[Run]) -> list[str]:
+def _cells(each: list[TrajectoryRun]) -> list[str]:
     """Mean generations, the share of points if it is not 100 %, and generations per point."""
     share = mean(each, "completed")
     text = f"{mean(each, 'generations'):.0f}" + (f", {share:.0f} %" if share < 100.0 else "")

@@ -20,7 +20,7 @@ from bench.ik.ikurt_runs import (
     PLAIN,
     POSE_SECONDS,
     VARIANTS,
-    Run,
+    IkurtRun,
     blocked_runs,
     example_runs,
     generated,
@@ -38,23 +38,23 @@ SOON = 5.0  # [s] for the hundred seeds
 AT_ONCE = 5  # runs of a process
 
 
-def solved(runs: list[Run]) -> float:
+def solved(runs: list[IkurtRun]) -> float:
     return 100.0 * float(np.mean([each.solved for each in runs]))
 
 
-def middle(runs: list[Run], name: str) -> float:
+def middle(runs: list[IkurtRun], name: str) -> float:
     """Median of a count over all runs; of one that failed what it had used up by then."""
     return float(np.median([each.count(name) for each in runs]))
 
 
-def worst(runs: list[Run]) -> float:
+def worst(runs: list[IkurtRun]) -> float:
     return max((each.away for each in runs if each.solved), default=np.inf)
 
 
 def acceptance(report: Report, measure: Parts, literal: int, improved: int, stretch: float) -> None:
     wanted = [(name, which, improved if which == IMPROVED else literal)
               for name in EXAMPLES for which in (LITERAL, IMPROVED, PLAIN)]  # fmt: skip
-    done: dict[str, dict[str, list[Run]]] = {name: {} for name in EXAMPLES}
+    done: dict[str, dict[str, list[IkurtRun]]] = {name: {} for name in EXAMPLES}
     for (name, which, _), runs in zip(wanted, seeds_of(measure, wanted, SECONDS, stretch), strict=True):
         done[name][which] = runs
     for which in VARIANTS:
@@ -63,7 +63,7 @@ def acceptance(report: Report, measure: Parts, literal: int, improved: int, stre
     table(report, done)
 
 
-def seeds_of(measure: Parts, wanted: list[tuple[str, str, int]], limit: float, stretch: float) -> list[list[Run]]:
+def seeds_of(measure: Parts, wanted: list[tuple[str, str, int]], limit: float, stretch: float) -> list[list[IkurtRun]]:
     """Runs of examples by variants, so many seeds each, a few in a process."""
     pieces = [(name, which, first, min(first + AT_ONCE, count), limit, stretch)
               for name, which, count in wanted for first in range(0, count, AT_ONCE)]  # fmt: skip
@@ -74,7 +74,7 @@ def seeds_of(measure: Parts, wanted: list[tuple[str, str, int]], limit: float, s
     ]
 
 
-def rows(report: Report, which: str, done: dict[str, list[Run]], stretch: float) -> None:
+def rows(report: Report, which: str, done: dict[str, list[IkurtRun]], stretch: float) -> None:
     """The rows that runs decide, for one variant."""
     what = f"{which} ({len(done['planar6_c'])} runs each): "
     for name in ("planar6_c", "planar6_c_pose"):
@@ -108,7 +108,7 @@ def rows(report: Report, which: str, done: dict[str, list[Run]], stretch: float)
     report.bar(what + "CONNECT adds vertices of falling metric", "strictly", f"{adds} vertices", falls and adds > 0)
 
 
-def beat(report: Report, done: dict[str, dict[str, list[Run]]]) -> None:
+def beat(report: Report, done: dict[str, dict[str, list[IkurtRun]]]) -> None:
     for name in (n for n in done if n not in ("planar3_boxes", "planar6_c")):
         before, after = (middle(done[name][which], "metric_evaluations") for which in VARIANTS)
         shown = f"{after:.0f} of {before:.0f}: 1/{before / max(after, 1):.0f}"
@@ -119,7 +119,7 @@ def beat(report: Report, done: dict[str, dict[str, list[Run]]]) -> None:
     report.bar("Beat: TITAN-4 online, largest median", "< 0.1 s", f"{slowest:.4f} s", slowest < 0.1)
 
 
-def table(report: Report, done: dict[str, dict[str, list[Run]]]) -> None:
+def table(report: Report, done: dict[str, dict[str, list[IkurtRun]]]) -> None:
     lines = []
     for name, each in done.items():
         for which, runs in each.items():

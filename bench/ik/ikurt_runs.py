@@ -26,7 +26,7 @@ VARIANTS = {LITERAL: IKURTPublished, IMPROVED: IKURT}
 
 
 @dataclass
-class Run:
+class IkurtRun:
     """One plan: its processor and wall time, how far its end is from the goal in the published metric, if sound."""
 
     found: bool
@@ -52,18 +52,18 @@ class Run:
         return self.seconds if name == "seconds" else float(self.statistics.get(name, 0))
 
 
-def run(problem: Any, planner: Any, seed: int, limit: float, stretch: float, **parameters: Any) -> Run:
+def run(problem: Any, planner: Any, seed: int, limit: float, stretch: float, **parameters: Any) -> IkurtRun:
     begin = time.process_time()
     plan = rrtik.plan(problem, planner, seconds=limit * stretch, seed=seed, parameters=parameters)
     taken = limit, time.process_time() - begin, plan.seconds
     if plan.path is None:
-        return Run(False, dict(plan.statistics), *taken)
+        return IkurtRun(False, dict(plan.statistics), *taken)
     sound = not plan.path.violations(problem.world) and bool((plan.path.start == problem.start).all())
     away = float(metric_of(problem).distance(plan.path.end[None])[0])
-    return Run(True, dict(plan.statistics), *taken, away, sound)
+    return IkurtRun(True, dict(plan.statistics), *taken, away, sound)
 
 
-def example_runs(name: str, which: str, first: int, end: int, limit: float, stretch: float) -> list[Run]:
+def example_runs(name: str, which: str, first: int, end: int, limit: float, stretch: float) -> list[IkurtRun]:
     """An example by one variant, for the seeds from ``first`` to before ``end``."""
     problem = rrtik.load_problem(name)
     run(problem, IKURT, 0, limit, stretch)  # whatever is loaded at the first question is no part of planning
@@ -72,7 +72,7 @@ def example_runs(name: str, which: str, first: int, end: int, limit: float, stre
     return [run(asked, VARIANTS.get(which, IKURT), k, limit, stretch, **parameters) for k in range(first, end)]
 
 
-def blocked_runs(which: str, stretch: float) -> list[Run]:
+def blocked_runs(which: str, stretch: float) -> list[IkurtRun]:
     """A goal that no free configuration reaches."""
     return [run(cases.blocked(), VARIANTS[which], seed, BLOCKED_SECONDS, stretch) for seed in range(5)]
 

@@ -46,7 +46,7 @@ BOUND = (
 
 
 @dataclass(frozen=True)
-class Run:
+class FewestMovesRun:
     """One plan, and the double axis cut of a BiCRDT path of the same seed."""
 
     route: np.ndarray | None
@@ -68,7 +68,7 @@ class Run:
         return np.inf if self.route is None else float(np.abs(np.diff(self.route, axis=0)).sum())
 
 
-def one_run(problem: Problem, seed: int) -> Run:
+def one_run(problem: Problem, seed: int) -> FewestMovesRun:
     """Plan twice."""
     plan = rrtik.plan(problem, FewestMoves, seconds=LIMITS.get(problem.name, LIMIT), seed=seed)
     begin = perf_counter()
@@ -80,7 +80,7 @@ def one_run(problem: Problem, seed: int) -> Run:
     route = None if plan.path is None else plan.path.waypoints
     whole = route is not None and sound(problem, route)
     gap = int(plan.statistics.get("gap", 99))
-    return Run(route, plan.seconds, gap, whole, cut.transitions, cut.length, cut_seconds)
+    return FewestMovesRun(route, plan.seconds, gap, whole, cut.transitions, cut.length, cut_seconds)
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class Measured:
 
     name: str
     problem: Problem
-    runs: list[Run]
+    runs: list[FewestMovesRun]
     bound: int
     proof_seconds: float
     grid: str
@@ -116,7 +116,7 @@ class Measured:
 
 
 def measured(name: str, count: int) -> Measured:
-    """Run one problem; the bound is found apart from the planner."""
+    """FewestMovesRun one problem; the bound is found apart from the planner."""
     problem = case_a_with_room(rrtik.load_problem("planar3_a")) if name == WITH_ROOM else rrtik.load_problem(name)
     begin = perf_counter()
     bound = least_moves(problem)

@@ -77,7 +77,7 @@ class Runs:
     failed: dict[str, int] = field(default_factory=dict)
 
     def add(self, group: str, problem: Problem, answer: Answer) -> None:
-        """Judge one run."""
+        """Classify one run."""
         self.group.append(group)
         self.seconds.append(answer.cpu)
         if answer.failed:

@@ -85,7 +85,7 @@ def _kept_free(scenario: Scenario, run: ReplanRun) -> bool:
 
 
 def _untouched(scenario: Scenario, runs: list[ReplanRun]) -> int:
-    """How many runs had no contact at any time, by an independent judge."""
+    """How many runs had no contact at any time, by an independent check."""
     problem = scenario.problem
     return sum(not check_contacts(problem.robot, run, problem.world.scene).contacts for run in runs)
 

@@ -141,19 +141,19 @@ def without_itself(world: World) -> World:
     return World(replace(world.robot, self_collision=False), world.scene)
 
 
-def near_contact(world: World, judge: World, count: int, rng: np.random.Generator) -> Matrix:
-    """Configurations within ``NEAR``, in every joint, of what is contact to ``judge``, shape (count, dof).
+def near_contact(world: World, exact: World, count: int, rng: np.random.Generator) -> Matrix:
+    """Configurations within ``NEAR``, in every joint, of what is contact to ``exact``, shape (count, dof).
 
     Between a free and a colliding random configuration the contact is found by bisection; a contact at which the world
     itself is not free otherwise is not used if there are others.
     """
-    Q = uniform(judge, 4 * count, rng)
-    free = judge.valid_batch(Q)
+    Q = uniform(exact, 4 * count, rng)
+    free = exact.valid_batch(Q)
     pairs = min(int(free.sum()), int((~free).sum()))
     clear, touching = Q[free][:pairs], Q[~free][:pairs]
     for _ in range(BISECTIONS if pairs else 0):
         middle = 0.5 * (clear + touching)
-        valid = judge.valid_batch(middle)[:, None]
+        valid = exact.valid_batch(middle)[:, None]
         clear, touching = np.where(valid, middle, clear), np.where(valid, touching, middle)
     usable = world.valid_batch(clear)
     clear = clear[usable] if usable.any() else Q

@@ -267,7 +267,7 @@ def test_a_road_map_comes_to_an_end_also_where_there_are_several_goals(name):
         assert plan(problem, name, seconds=0.5, seed=seed).seconds > 0.0
 
 
-def test_after_its_deadline_a_judge_says_no(wall):
+def test_after_its_deadline_a_checker_says_no(wall):
     assert ValidityCallback(wall.world).valid(wall.start)
     assert not ValidityCallback(wall.world, deadline=0.0).valid(wall.start)
     assert not ValidityCallback(wall.world, deadline=0.0).motion_valid(wall.start, wall.start)

@@ -20,7 +20,7 @@ from rrtik_tests.moving_plane import HIGH, LOW
 
 
 class Scripted:
-    """A judge in the plane: a disc that is not free, and counts of the calls."""
+    """A checker in the plane: a disc that is not free, and counts of the calls."""
 
     def __init__(self, centre, radius):
         self.centre, self.radius, self.calls = np.array(centre, dtype=float), radius, 0
@@ -44,10 +44,10 @@ def on_straight_path(length=20.0):
 
 
 def test_a_blocked_path_keeps_its_beginning_and_its_end():
-    planner, judge_ = on_straight_path(), Scripted((10.0, 10.0), 2.0)
-    assert not planner.check_path(judge_)
-    assert planner.repair(judge_)
-    assert planner.check_path(judge_)
+    planner, checker = on_straight_path(), Scripted((10.0, 10.0), 2.0)
+    assert not planner.check_path(checker)
+    assert planner.repair(checker)
+    assert planner.check_path(checker)
     kept = planner.path[np.abs(planner.path[:, 1] - 10.0) < 1e-12]
     assert kept[:, 0].min() == 0.0
     assert kept[:, 0].max() == 20.0
@@ -56,9 +56,9 @@ def test_a_blocked_path_keeps_its_beginning_and_its_end():
 
 
 def test_a_look_asks_once_for_all_motions():
-    planner, judge_ = on_straight_path(), Scripted((10.0, 17.0), 1.0)
-    assert planner.check_path(judge_)
-    assert judge_.calls == 1
+    planner, checker = on_straight_path(), Scripted((10.0, 17.0), 1.0)
+    assert planner.check_path(checker)
+    assert checker.calls == 1
 
 
 def test_where_no_way_is_found_the_path_is_kept_and_serves_again_without_a_search():
@@ -74,18 +74,18 @@ def test_where_no_way_is_found_the_path_is_kept_and_serves_again_without_a_searc
 def test_from_scratch_forgets_the_pieces():
     planner = FromScratch(PlainConnect(LOW, HIGH, 1.0, seed=3), 1.0)
     planner.begin(np.array([0.0, 10.0]), np.array([[20.0, 10.0]]), Scripted((0, 0), 0.1))
-    judge_ = Scripted((10.0, 10.0), 2.0)
-    planner.check_path(judge_)
-    assert planner.repair(judge_)
-    assert judge_.motion_valid_batch(planner.path[:-1], planner.path[1:]).all()
+    checker = Scripted((10.0, 10.0), 2.0)
+    planner.check_path(checker)
+    assert planner.repair(checker)
+    assert checker.motion_valid_batch(planner.path[:-1], planner.path[1:]).all()
 
 
 def test_the_sequential_cut_shortens_and_keeps_both_ends():
-    judge_ = Scripted((10.0, 10.0), 2.0)
+    checker = Scripted((10.0, 10.0), 2.0)
     zigzag = np.array([[0.0, 10.0], [3.0, 14.0], [6.0, 12.0], [9.0, 16.0], [12.0, 13.0], [16.0, 15.0], [20.0, 10.0]])
-    cut = dense_sequential_cut(zigzag, 0.5, judge_)
+    cut = dense_sequential_cut(zigzag, 0.5, checker)
     assert (cut[[0, -1]] == zigzag[[0, -1]]).all()
-    assert judge_.motion_valid_batch(cut[:-1], cut[1:]).all()
+    assert checker.motion_valid_batch(cut[:-1], cut[1:]).all()
     assert np.linalg.norm(np.diff(cut, axis=0), axis=1).sum() < 23.0
 
 

@@ -21,7 +21,7 @@ JUMP = 10.0  # [deg]
 
 
 @dataclass(frozen=True)
-class Run:
+class TrajectoryRun:
     """One run along one trajectory; ``seconds`` are of the processor."""
 
     robot: Robot
@@ -91,25 +91,25 @@ def arm(joints: int, d7: float = 2.2) -> Robot:
     )
 
 
-def run(robot: Robot, trajectory: int, options: GeneticOptions, seed: int) -> Run:
+def run(robot: Robot, trajectory: int, options: GeneticOptions, seed: int) -> TrajectoryRun:
     """Once along a published trajectory, to the published limit of generations."""
     goals = [rrtik.PositionGoal(point, TOLERANCE * INCH) for point in curve(trajectory) * INCH]
     limit = 10_000 if robot.dof == 3 else 20_000
     begin = time.process_time()
     result = follow_targets(robot, goals, replace(options, generations=limit), np.random.default_rng(seed))
-    return Run(robot, trajectory, result, time.process_time() - begin)
+    return TrajectoryRun(robot, trajectory, result, time.process_time() - begin)
 
 
-def runs(robot: Robot, options: GeneticOptions, seeds: int) -> dict[int, list[Run]]:
+def runs(robot: Robot, options: GeneticOptions, seeds: int) -> dict[int, list[TrajectoryRun]]:
     """By trajectory, one run per seed."""
     return {number: [run(robot, number, options, seed) for seed in range(seeds)] for number in TRAJECTORIES}
 
 
-def mean(values: list[Run], what: str) -> float:
-    """Of a property of `Run`."""
+def mean(values: list[TrajectoryRun], what: str) -> float:
+    """Of a property of `TrajectoryRun`."""
     return float(np.mean([getattr(each, what) for each in values]))
 
 
-def median(values: list[Run], what: str) -> float:
-    """Of a property of `Run`."""
+def median(values: list[TrajectoryRun], what: str) -> float:
+    """Of a property of `TrajectoryRun`."""
     return float(np.median([getattr(each, what) for each in values]))

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from rrtik_bench.genetic.published import FIRST_POINT, TABLE_4, TABLE_5
-from rrtik_bench.genetic.runs import TRAJECTORIES, Run, arm, mean, median, runs
+from rrtik_bench.genetic.runs import TRAJECTORIES, TrajectoryRun, arm, mean, median, runs
 from rrtik_bench.report.rows import Row, verdict, within
 from rrtik_bench.tables import Table
 from rrtik_ompl.ik.genetic.options import HISTORICAL, STANDARD, GeneticOptions
@@ -21,12 +21,12 @@ GENERATION = "a generation is one evaluation of the population; the historical p
 
 
 @cache
-def _three(options: GeneticOptions, count: int) -> dict[int, list[Run]]:
+def _three(options: GeneticOptions, count: int) -> dict[int, list[TrajectoryRun]]:
     return runs(arm(3), options, count)
 
 
 @cache
-def _five(options: GeneticOptions, count: int) -> dict[int, list[Run]]:
+def _five(options: GeneticOptions, count: int) -> dict[int, list[TrajectoryRun]]:
     return runs(arm(5), options, count)
 
 

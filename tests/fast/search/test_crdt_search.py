@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.description.urdf import robot_from_urdf_text
-from rrtik_ompl.fast.search.crdt import search as axis_search
+from rrtik_ompl.fast.search.crdt import search as crdt_search
 from rrtik_ompl.fast.search.crdt.rules import KERNELS, CrdtRules
 from rrtik_ompl.fast.search.crdt.search import CrdtSearch
 from rrtik_ompl.ompl_bridge import WorldChecker
@@ -156,10 +156,10 @@ def grown(problem: Problem, seed: int, limit: int = 300) -> list[np.ndarray]:
 def test_neither_the_budget_nor_the_room_changes_a_search(monkeypatch: Any) -> None:
     problem = shipped("planar3_c")
     usual = [grown(problem, seed) for seed in range(3)]
-    assert max(len(tree) for trees in usual for tree in trees) > axis_search.FIRST_CAPACITY
-    monkeypatch.setattr(axis_search, "FIRST_BUDGET", 1)
-    monkeypatch.setattr(axis_search, "MIN_PAUSE", 0.0)
-    monkeypatch.setattr(axis_search, "FIRST_CAPACITY", 16)
+    assert max(len(tree) for trees in usual for tree in trees) > crdt_search.FIRST_CAPACITY
+    monkeypatch.setattr(crdt_search, "FIRST_BUDGET", 1)
+    monkeypatch.setattr(crdt_search, "MIN_PAUSE", 0.0)
+    monkeypatch.setattr(crdt_search, "FIRST_CAPACITY", 16)
     for seed, trees in enumerate(usual):
         for mine, theirs in zip(grown(problem, seed), trees, strict=True):
             np.testing.assert_array_equal(mine, theirs)

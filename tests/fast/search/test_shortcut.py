@@ -20,7 +20,7 @@ pytestmark = pytest.mark.kernels
 RESOLUTION = 0.02
 
 
-def judge(world, chain, a, b, weights):
+def checked(world, chain, a, b, weights):
     """The kernels' answer for an edge, checked as a World would check it."""
     if tuple(a) > tuple(b):
         a, b = b, a
@@ -48,12 +48,12 @@ class Wandering:
         for _ in range(100 * count):
             step = route[-1] + rng.normal(size=len(self.weights)) * 0.3
             step = np.clip(step, self.case.robot.lower, self.case.robot.upper)
-            if len(route) < count and self.judge(route[-1], step) == FREE:
+            if len(route) < count and self.checked(route[-1], step) == FREE:
                 route.append(step)
         self.route = np.array(route)
 
-    def judge(self, a, b):
-        return judge(self.world, self.chain, a, b, self.weights)
+    def checked(self, a, b):
+        return checked(self.world, self.chain, a, b, self.weights)
 
     def search(self, seed=0, **options):
         given = {"weights": self.weights, "resolution": RESOLUTION, "seed": seed, **options}
@@ -78,7 +78,7 @@ def test_every_edge_stays_free_and_the_ends_stay_to_the_bit(wandering):
             search.run(tries)
             route = search.waypoints
             assert search.tries == tries or len(route) == 2
-            assert all(wandering.judge(a, b) == FREE for a, b in pairwise(route))
+            assert all(wandering.checked(a, b) == FREE for a, b in pairwise(route))
             assert (route[0] == wandering.route[0]).all()
             assert (route[-1] == wandering.route[-1]).all()
             assert (route >= wandering.route.min(axis=0)).all()
@@ -111,7 +111,7 @@ def test_what_the_kernels_cannot_decide_is_asked_and_used_only_if_it_is_free(wan
 
     def odd_ones_are_free(A, B):
         for a, b in zip(A, B, strict=True):
-            asked.append(wandering.judge(a, b))
+            asked.append(wandering.checked(a, b))
             if len(asked) % 2:
                 allowed.add((a.tobytes(), b.tobytes()))
         return np.array([(a.tobytes(), b.tobytes()) in allowed for a, b in zip(A, B, strict=True)])
@@ -121,7 +121,7 @@ def test_what_the_kernels_cannot_decide_is_asked_and_used_only_if_it_is_free(wan
         search.run(300, ask=odd_ones_are_free)
         for a, b in pairwise(search.waypoints):
             pair = {(a.tobytes(), b.tobytes()), (b.tobytes(), a.tobytes())}
-            assert wandering.judge(a, b) == FREE or pair & allowed
+            assert wandering.checked(a, b) == FREE or pair & allowed
     assert set(asked) <= {UNDECIDED}
 
 
