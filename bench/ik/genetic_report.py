@@ -98,8 +98,6 @@ def standard(report: Report, seeds: int) -> dict[int, list[TrajectoryRun]]:
 def without_reduction(
     report: Report, with_it: dict[int, list[TrajectoryRun]], seeds: int
 ) -> dict[int, list[TrajectoryRun]]:
-    report: Report, with_it: dict[int, list[TrajectoryRun]], seeds: int
-) -> dict[int, list[TrajectoryRun]]:
     """How much the reduction saves."""
     bare = runs(arm(3), replace(STANDARD, window=None), seeds)
     shares = [mean(bare[n], "generations") / mean(with_it[n], "generations") for n in TRAJECTORIES]
