@@ -1,4 +1,4 @@
-"""The arm: a Pinocchio model with its geometry, limits, named postures and tip frame. A robot never changes."""
+"""The arm: a Pinocchio [56] model with its geometry, limits, named postures and tip frame. A robot never changes."""
 
 from __future__ import annotations
 

@@ -1,9 +1,8 @@
 """A task-space region: poses of the tip with ranges for position and for roll, pitch and yaw.
 
-Source: D. Berenson, S. Srinivasa, J. Kuffner, "Task Space Regions: A framework for pose-constrained manipulation
-planning", International Journal of Robotics Research 30 (2011), 1435-1460: a frame w in the world, bounds of the
-displacement of a frame s in it, and the tip's place in s. Their distance is that of the displacement; here it is that
-of the tip from the nearest pose of the region, in metres and radians.
+Source: [17]: a frame w in the world, bounds of the displacement of a frame s in it, and the tip's place in s. Their
+distance is that of the displacement; here it is that of the tip from the nearest pose of the region, in metres and
+radians.
 """
 
 from __future__ import annotations

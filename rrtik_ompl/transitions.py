@@ -25,7 +25,7 @@ def moved(a: ArrayLike, b: ArrayLike, tolerance: float = SAME) -> NDArray[np.boo
 
 
 def lower_bound(start: ArrayLike, goal: ArrayLike, tolerance: float = SAME) -> int:
-    """The paper's c: the fewest single-joint moves that lead from start to goal, each of shape (n,).
+    """The number c of [1, ch. 6.3]: the fewest single-joint moves that lead from start to goal, each of shape (n,).
 
     It is reached when nothing obstructs. If one joint alone is obstructed, c + 2 is the natural optimum.
     """
@@ -83,7 +83,7 @@ def route_length(waypoints: ArrayLike) -> float:
     return float(np.linalg.norm(np.diff(_rows(waypoints), axis=0), axis=1).sum())
 
 
-def routes(n: int, l: int, m: int = 1) -> int:  # noqa: E741 - the paper's letter
+def routes(n: int, l: int, m: int = 1) -> int:  # noqa: E741 - the letter of [1]
     """Ways to walk m edges one joint at a time on a grid: ``[(n l)! / (l!)^n]^m``, the order of the edges being fixed.
 
     Args:
@@ -94,7 +94,7 @@ def routes(n: int, l: int, m: int = 1) -> int:  # noqa: E741 - the paper's lette
     return int(_edge_routes(n, l, m) ** m)
 
 
-def routes_published(n: int, l: int, m: int = 1) -> int:  # noqa: E741 - the paper's letter
+def routes_published(n: int, l: int, m: int = 1) -> int:  # noqa: E741 - the letter of [1]
     """The count as printed, ``m! (n l)! / (l!)^n``. It agrees with :func:`routes` for m = 1 only.
 
     The factor m! would permute the edges of the route, whose order is given.

@@ -1,4 +1,4 @@
-"""The genetic algorithm with range reduction: published tables beside both presets, acceptance rows, extensions.
+"""The genetic algorithm with range reduction: tables of [2] beside both presets, acceptance rows, extensions.
 
 Usage: ``python bench/ik/genetic_report.py [--quick] [--out bench/reports/genetic.md]``; a few minutes.
 """
@@ -107,7 +107,7 @@ def without_reduction(
 
 
 def historical(report: Report, bare: dict[int, list[TrajectoryRun]], seeds: int) -> None:
-    """Table 4 of the paper beside both presets."""
+    """Table 4 of [2] beside both presets."""
     old = runs(arm(3), replace(HISTORICAL, gain=0.0), seeds)
     old_bare = runs(arm(3), replace(HISTORICAL, window=None), seeds)
     unfaithful = runs(arm(3), replace(STANDARD, gain=0.0), seeds)

@@ -1,4 +1,4 @@
-"""The problems of the IKURT report: the published examples as acceptance wants them, and generated ones."""
+"""The problems of the IKURT report: the examples of [1, ch. 5.1] as acceptance wants them, and generated ones."""
 
 from __future__ import annotations
 

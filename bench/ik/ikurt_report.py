@@ -1,4 +1,4 @@
-"""IKURT: every acceptance row for the published algorithm and the improved one, and both beside IK and RRT-Connect.
+"""IKURT: every acceptance row for the algorithm of [1, ch. 5.1] and the improved one, both beside IK and RRT-Connect.
 
 Usage: ``python bench/ik/ikurt_report.py [--mbm mbm_panda] [--jobs 2] [--quick]``; half an hour of one core. An
 interrupted run goes on where it was.
@@ -112,11 +112,11 @@ def beat(report: Report, done: dict[str, dict[str, list[IkurtRun]]]) -> None:
     for name in (n for n in done if n not in ("planar3_boxes", "planar6_c")):
         before, after = (middle(done[name][which], "metric_evaluations") for which in VARIANTS)
         shown = f"{after:.0f} of {before:.0f}: 1/{before / max(after, 1):.0f}"
-        report.bar(f"Beat: evaluations, {name}", "<= 1/3 of the literal", shown, after <= before / 3)
+        report.bar(f"metric evaluations, {name}", "<= 1/3 of the literal", shown, after <= before / 3)
     accuracy = max(worst(done[name]["improved"]) for name in done)
-    report.bar("Beat: accuracy of the improved one, all examples", "1e-6", f"{accuracy:.1e}", accuracy <= 1e-6)
+    report.bar("accuracy of the improved one, all examples", "1e-6", f"{accuracy:.1e}", accuracy <= 1e-6)
     slowest = max(middle(done[name]["improved"], "seconds") for name in cases.TITAN)
-    report.bar("Beat: TITAN-4 online, largest median", "< 0.1 s", f"{slowest:.4f} s", slowest < 0.1)
+    report.bar("TITAN-4 online, largest median time", "< 0.1 s", f"{slowest:.4f} s", slowest < 0.1)
 
 
 def table(report: Report, done: dict[str, dict[str, list[IkurtRun]]]) -> None:

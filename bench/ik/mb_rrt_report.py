@@ -1,4 +1,4 @@
-"""The MB-RRT report: the published tables beside ours, every acceptance row, and what lies beyond the paper.
+"""The MB-RRT report: the published tables of [3] beside ours, every acceptance row, and what lies beyond [3].
 
     nice python bench/ik/mb_rrt_report.py [--quick] [--out bench/reports/mb_rrt.md]
 
@@ -84,7 +84,7 @@ def acceptance_of_tables(report: Report, found: dict[int, dict[str, Measured]]) 
 def page(quick: bool, folder: Path) -> Report:
     rng = np.random.default_rng(0)
     about = (
-        f"{versions('numpy')}; seed 0. Goals of the published tables: a sunflower of points, since the paper does not "
+        f"{versions('numpy')}; seed 0. Goals of the published tables: a sunflower of points, since [3] does not "
         "say which they were. Lengths in cm."
     )
     report, small = Report("MB-RRT", "python bench/ik/mb_rrt_report.py", intro=about), Report("", "")
@@ -94,7 +94,7 @@ def page(quick: bool, folder: Path) -> Report:
     if not quick:
         acceptance_of_tables(report, published.tables(report))
     report.add(small)
-    further = beyond_the_paper(rng)
+    further = left_open(rng)
     laws(report, rng, exact)
     report.add(further)
     _pictures(folder)
@@ -126,8 +126,8 @@ def laws(report: Report, rng: np.random.Generator, exact: published.Exact) -> No
     report.bar(bar, "< 0.01; 1/3 +- 0.01; 2 to 5", measured, kept)
 
 
-def beyond_the_paper(rng: np.random.Generator) -> Report:
-    """The sections on what the authors left open, and the acceptance rows that they decide."""
+def left_open(rng: np.random.Generator) -> Report:
+    """The sections on what [3] leaves open, and the acceptance rows that they decide."""
     report = Report("", "")
     worst, outside = beyond.arcs(report, rng)
     limited = beyond.limits(report, rng)
@@ -167,7 +167,7 @@ def _slashed(values: list[float]) -> str:
 
 
 def _pictures(folder: Path) -> None:
-    """The tree of MB-RRT and that of the arcs for the arm of the paper's illustration: 4 links, goal (20, 30)."""
+    """The tree of MB-RRT and that of the arcs for the arm that [3] draws: 4 links, goal (20, 30)."""
     links, goal = Links([10.0] * 4), np.array([20.0, 30.0])
     run = grow(links, goal, tolerance=0.05, rng=np.random.default_rng(1))
     plot_tree(run, folder / "mb_rrt_tree.png")

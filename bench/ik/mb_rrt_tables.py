@@ -54,23 +54,23 @@ def _table(report: Report, count: int, results: dict[str, dict[float, Measured]]
 
 
 READINGS = [
-    "How the figures that differ are read (rows of the tables of [3]):",
+    "How the figures of [3] that differ are read:",
     "",
     "- Tables 6 and 7 are rows of 8 and 9 (C-space, Uniforme A, Superficie A) but for two entries: Uniforme A mu",
     "  2681.2731 (8: 2681.2577, a misprint) and Superficie A rho 0.22309, 0.21782 in table 6, which repeats the",
-    "  10-joint values of table 7 (rows 10, 11).",
-    "- Uniforme A*, 3 joints: \"57142\" is read as 5.7142 % (2 goals of 35), as the trap of rule A predicts (row 9).",
-    "- C-space, 3 joints, is nearer to the print at 0.2 cm, the tolerance of the 2-joint demonstration (row 3);",
+    "  10-joint values of table 7.",
+    "- Uniforme A*, 3 joints: \"57142\" is read as 5.7142 % (2 goals of 35), as the trap of rule A predicts.",
+    "- C-space, 3 joints, is nearer to the print at 0.2 cm, the tolerance of the 2-joint demonstration;",
     "  T_C of Uniforme B and mu of Superficie B are printed between what 0.2 and 0.3 cm give. Success is",
-    "  strict `<`, once a pass (row 13); mu is over converged goals (row 2).",
-    "- Superficie A, 3 joints: other goal clouds gave 17 to 43 %; the paper's is not known (row 6).",
+    "  strict `<`, once a pass; mu is over converged goals.",
+    "- Superficie A, 3 joints: other goal clouds gave 17 to 43 %; that of [3] is not known.",
     "- Uniforme A*, 10 joints: the rate is as printed, mu is a tenth of it. In the trap success comes early or never;",
     "  no reading of the rules gives 1672.",
     "- Uniforme B*, 10 joints: printed 71 % with mean 1333; a ring of radius d_n around the goal gives 100 % and",
     "  a mean near L^2 / (pi d_n tol) = 318, which is what is measured. No reading of the rules gives 71 %.",
     "- rho is up to 0.12 above the print in the uniform rows and up to twice in Superficie B: the published goals were",
-    "  probably denser near the base (they lower every rho), and the margin is not stated (rows 6, 7).",
-    "- The other rates and means differ by what single goal clouds differ by (row 12).",
+    "  probably denser near the base (they lower every rho), and the margin is not stated.",
+    "- The other rates and means differ by what single goal clouds differ by.",
 ]  # fmt: skip
 
 

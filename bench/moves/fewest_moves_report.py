@@ -129,7 +129,7 @@ def measured(name: str, count: int) -> Measured:
 
 
 def bars(report: Report, results: dict[str, Measured]) -> None:
-    """The bars of the issue."""
+    """What is wanted: sound routes, and how often they have the fewest moves."""
     runs = [run for m in results.values() for run in m.runs]
     whole = share(runs, lambda run: run.sound)
     text = f"{100 * whole:.1f} % of {len(runs)} paths"

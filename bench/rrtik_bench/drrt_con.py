@@ -130,8 +130,8 @@ def _order(run: ReplanRun) -> list[tuple[str, int]]:
 
 
 TABLES = (
-    Table("drrt-con-static", "Static scene: what is walked", f"{SOURCE}, figure of scene 2", static, 2, 1),
-    Table("drrt-con-pockets", "Two obstacles, one sliding", f"{SOURCE}, figure of scene 1", pockets, 2, 1),
-    Table("drrt-con-triangles", "Six triangles", f"{SOURCE}, figure of scene 3", triangles, 5, 1),
-    Table("drrt-con-arm", "Planar arm, goal covered for a while", f"{SOURCE}, figure of scene 4", planar_arm, 3, 1),
+    Table("drrt-con-static", "Static scene: what is walked", f"{SOURCE}, figure of the static scene", static, 2, 1),
+    Table("drrt-con-pockets", "Two obstacles, one sliding", f"{SOURCE}, figure of two obstacles", pockets, 2, 1),
+    Table("drrt-con-triangles", "Six triangles", f"{SOURCE}, figure of six triangles", triangles, 5, 1),
+    Table("drrt-con-arm", "Planar arm, goal covered for a while", f"{SOURCE}, figure of the arm", planar_arm, 3, 1),
 )

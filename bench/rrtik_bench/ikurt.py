@@ -101,6 +101,6 @@ def solutions(quick: bool) -> list[Row]:
 
 
 TABLES = (
-    Table("ikurt-examples", "Six examples, to the letter and repaired", f"{SOURCE}, section 5", examples, 180, 8),
-    Table("ikurt-solutions", "Solutions of a pose", f"{SOURCE}, section 4", solutions, 1, 1),
+    Table("ikurt-examples", "Six examples, to the letter and repaired", SOURCE, examples, 180, 8),
+    Table("ikurt-solutions", "Solutions of a pose", SOURCE, solutions, 1, 1),
 )

@@ -14,5 +14,5 @@ from rrtik_bench.tables import Collection
 PAGES = (titan4, mb_rrt, genetic, crdt, ikurt, drrt_con, shortening, sensing, camera_tables)
 COLLECTION = Collection(
     tables=tuple(table for page in PAGES for table in page.TABLES),
-    not_here=("Marker sensing, section 6: the sequences with 125, 400 and 500 mm, of which only a plot was published",),
+    not_here=("[1, ch. 4]: the sequences with 125, 400 and 500 mm, of which only a plot was published",),
 )

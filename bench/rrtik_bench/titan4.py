@@ -1,4 +1,4 @@
-"""The TITAN-4 pages: sizes, the eight branches, singular families, the determinant and the ranks."""
+"""What [1, ch. 3] says of TITAN-4: sizes, the eight branches, singular families, the determinant and the ranks."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rrtik_ompl.ik.analytic.analytic_solver import wrapped
 from rrtik_ompl.ik.analytic.closed_form import form_of, solutions
 from rrtik_ompl.robot import Robot
 
-SOURCE = "TITAN-4 kinematics"
+SOURCE = "[1, ch. 3, app. A to C]"
 A1, A2, A3, A4, D6 = 0.122, 0.851, 0.483, 0.127, 0.339  # [m]; no lengths are printed: drawings and the headline reach
 MOUNT = 0.194  # [m] of the shoulder axis above the mounting face
 RIGHT = np.pi / 2
@@ -156,8 +156,8 @@ def _least_singular_value(robot: Robot, q: Matrix) -> float:
 
 
 TABLES = (
-    Table("titan4-size", "Reach and envelope", f"{SOURCE}, sections 1 to 5", sizes, 2, 1),
-    Table("titan4-branches", "Closed form: eight branches", f"{SOURCE}, section 7", branches, 1, 1),
-    Table("titan4-singular-poses", "Closed form: singular families", f"{SOURCE}, section 8", singular_families, 1, 1),
-    Table("titan4-singularities", "Determinant and ranks", f"{SOURCE}, section 9", singularities, 1, 1),
+    Table("titan4-size", "Reach and envelope", "[1, ch. 3]", sizes, 2, 1),
+    Table("titan4-branches", "Closed form: eight branches", SOURCE, branches, 1, 1),
+    Table("titan4-singular-poses", "Closed form: singular families", SOURCE, singular_families, 1, 1),
+    Table("titan4-singularities", "Determinant and ranks", SOURCE, singularities, 1, 1),
 )

@@ -37,7 +37,7 @@ BOARD = [pose([x * 0.0535, y * 0.0535, 0.0]) for x in (-1, 1) for y in (-1, 1)]
 
 
 def algebra(report: Report, count: int) -> None:
-    """Section 1: both ways to the gripper, and the inverse by its formula."""
+    """Both ways to the gripper, and the inverse by its formula."""
     worst = 0.0
     for _ in range(count):
         T_0h, T_hb, T_be, T_0m = (pin.SE3.Random() for _ in range(4))
@@ -64,7 +64,7 @@ def exactness(report: Report, count: int) -> None:
 
 
 def simulated_sensor(report: Report, count: int) -> None:
-    """Section 7: corners with noise of 0.03 pixels, the marker parallel to the picture."""
+    """Corners with noise of 0.03 pixels, the marker parallel to the picture."""
     rows, held, largest = [], True, True
     for number, (x, y, z, printed) in enumerate(SERIES, start=1):
         seen = 1e3 * positions(noisy_poses(facing(0.0, 0.0, 0.0, 1e-3 * np.array([x, y, z])), count, number))
@@ -97,7 +97,7 @@ def statistics(report: Report, _: int) -> None:
 
 
 def simulated_accuracy(report: Report, _: int) -> None:
-    """Section 6 without pictures: corners pulled inwards by blur, a lens whose distortion is not corrected."""
+    """The accuracy test of [1, ch. 4] without pictures: corners pulled inwards by blur, the lens not corrected."""
     errors: list[float] = []
     published = [error for _, _, _, error in ACCURACY]
     bent, straight = published_camera((0.3, 0.0, 0.0, 0.0, 0.0)), published_camera()

@@ -1,4 +1,4 @@
-"""The published series of marker sensing taken again by the synthetic camera: precision, gripper, accuracy, range."""
+"""The series of [1, ch. 4] taken again by the synthetic camera: precision, gripper, accuracy, range."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ TRUSTED = 2e-3  # [m]
 
 
 def precision(report: Report, count: int) -> None:
-    """Section 4: a marker that stands still, eight poses at each published distance."""
+    """A marker that stands still, eight poses at each published distance."""
     rows, steadier, biases = [], [], {}
     for number, (_, _, z, printed) in enumerate(SERIES, start=1):
         row = [f"{z:.0f}", f"{printed:.3f}"]
@@ -63,7 +63,7 @@ def precision(report: Report, count: int) -> None:
 
 
 def gripper(report: Report, count: int) -> None:
-    """Section 5: the tip of a virtual arm at the end of a lever of 1.92 m."""
+    """The tip of a virtual arm at the end of a lever of 1.92 m."""
     rows, model = [], []
     for distance, _, _, _, first, third in GRIPPER:
         row = [str(distance), f"{(third - first) / NORMAL_QUARTILES:.2f}"]
@@ -86,7 +86,7 @@ def gripper(report: Report, count: int) -> None:
 
 
 def accuracy(report: Report, count: int) -> None:
-    """Section 6: the known distance between two markers, lens calibrated or taken to have no distortion."""
+    """The known distance between two markers, lens calibrated or taken to have no distortion."""
     rows, errors, published = [], {}, {distance: error for distance, _, _, error in ACCURACY}
     ways = ((False, published_camera()), (False, CAMERA), (True, CAMERA))
     for apart in (125, 300, 400, 500):

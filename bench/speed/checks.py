@@ -46,7 +46,7 @@ PEER_SHARE = 5  # the peer is asked about every fifth configuration
 
 
 def free_motions(options: Options, report: Report) -> None:
-    """Row 5: one configuration along free motions of 1 rad, forward kinematics and all collisions."""
+    """One configuration along free motions of 1 rad, forward kinematics and all collisions."""
     rows = []
     for name, world in _free_worlds(options):
         found = _along_free(world, options)
@@ -103,7 +103,7 @@ def _along_free(world: World, options: Options) -> tuple[float, int] | None:
 
 
 def near_obstacles(options: Options, report: Report) -> None:
-    """Rows 6 and 7: exact batches near obstacles against Pinocchio and coal, and what the kernels leave undecided."""
+    """Exact batches near obstacles against Pinocchio and coal, and what the kernels leave undecided."""
     rows: list[list[str]] = []
     found: dict[str, list[Any]] = {kind: [] for kind in KINDS}
     for name, kind, world, Q in _near(options):

@@ -40,7 +40,7 @@ Times = dict[str, list[float]]
 
 
 def spheres(options: Options, report: Report) -> None:
-    """Row 1: 59 spheres, VAMP's obstacle shapes, checks as dense as VAMP's; the best of a few calls."""
+    """59 spheres, VAMP's [13] obstacle shapes, checks as dense as VAMP's; the best of a few calls."""
     title = "1. Panda of 59 spheres"
     files = panda_files(options, options.problems)
     if not files:
@@ -87,7 +87,7 @@ def spheres(options: Options, report: Report) -> None:
 
 
 def exact(options: Options, report: Report) -> None:
-    """Rows 2 and 3: exact solids, ours under both rules for steps and whole `plan` calls, roboplan in turn with it."""
+    """Exact solids, ours under both rules for steps and whole `plan` calls, roboplan in turn with it."""
     title = "2, 3. Panda with exact solids"
     files = panda_files(options, options.problems)
     if not files:
@@ -157,7 +157,7 @@ def _whole_plan(problem: Problem, options: Options) -> Callable[[int], Matrix | 
 
 
 def callbacks(options: Options, report: Report) -> None:
-    """Row 4: OMPL with a Python validity callback on the meshes; medians over one subset."""
+    """OMPL with a Python validity callback on the meshes; medians over one subset."""
     title = "4. OMPL's RRT-Connect with a validity callback in Python"
     files = panda_files(options, options.peer_problems)
     if not files:
@@ -187,7 +187,7 @@ def callbacks(options: Options, report: Report) -> None:
 
 
 def ompl_layer(options: Options, report: Report) -> None:
-    """Row 8: what OMPL around the kernel planner costs, call by call."""
+    """What OMPL around the kernel planner costs, call by call."""
     title = "8. SimpleSetup.solve() against the bare search"
     files = panda_files(options, options.peer_problems)
     problems = [exact_problem(options, file) for file in files] or shipped_problems()
@@ -212,7 +212,7 @@ def ompl_layer(options: Options, report: Report) -> None:
 
 
 def titan(options: Options, report: Report) -> None:
-    """Row 9: TITAN-4, all shipped problems, exact."""
+    """TITAN-4, all shipped problems, exact."""
     rows, medians = [], []
     seeds = range(options.seed, options.seed + (3 if options.quick else 20))
     for problem in shipped_problems():

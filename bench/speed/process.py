@@ -29,7 +29,7 @@ IMPORT = "import time; t = time.perf_counter(); import {}; print(time.perf_count
 
 
 def starts(options: Options, report: Report) -> None:
-    """Row 10: from nothing to a printed plan in a new process, with empty and with filled caches; wall time."""
+    """From nothing to a printed plan in a new process, with empty and with filled caches; wall time."""
     with TemporaryDirectory() as folder:
         places = {name: str(Path(folder) / place) for name, place in CACHES.items()}
         same_source(places)
@@ -69,7 +69,7 @@ def same_source(places: dict[str, str]) -> None:
 
 
 def memory(options: Options, report: Report) -> None:
-    """Row 11: resident memory of a process of its own over many plans."""
+    """Resident memory of a process of its own over many plans."""
     plans = 50 if options.quick else options.plans
     same_source({})
     lines = _output([str(Path(__file__).resolve()), str(plans), str(options.seed)], {}).split()

@@ -29,7 +29,7 @@ class CRDT(OneJointPlanner):
     first, the path to the vertex nearest to a goal is reported as an approximate solution.
 
     A small goal tolerance needs very many iterations for an arm of six joints, since nothing draws the tree towards the
-    goal; the default is meant to be met soon. The comparison with RRT in [1] used the step length of the RRT.
+    goal; the default is meant to be met soon. The comparison with RRT in [1, ch. 6.3] used the step length of the RRT.
 
     In a world with kernels the whole search runs there; it finds the same path as the search in Python.
     """

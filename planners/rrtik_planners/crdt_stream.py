@@ -10,7 +10,7 @@ import numpy as np
 from rrtik_ompl.arrays import Vector
 
 WORD = 2**64 - 1
-# Source: Steele, Lea, Flood, Fast splittable pseudorandom number generators, 2014 (splitmix64).
+# Source: splitmix64 [46].
 GOLDEN, FIRST_FACTOR, SECOND_FACTOR = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
 
 

@@ -46,7 +46,7 @@ class OneJointPlanner(SafePlanner):
             world: Checks configurations and motions instead of ``si``, if given.
             seed: At least 0; drawn from OMPL's if None.
             scale_by_range: Divide each coordinate by its range in the metric of the nearest neighbour.
-            max_iterations: K of [1, algorithms 9 to 11]; without limit if None.
+            max_iterations: K of [1, ch. 6.3, algorithms 9 to 11]; without limit if None.
             joint_costs: Cost of a joint's motion, greater than 0, shape (n,): a slow or risky joint costs more. The
                 metric multiplies its coordinate by it, and of the samples it takes part only in the share lowest cost /
                 its cost, so that it moves less often; where it has to, it still does. All equal if None.

@@ -153,8 +153,8 @@ def measured(geometry: Any) -> Any:
 def inside_mesh(vertices: Matrix, triangles: NDArray[np.int64], point: Vector) -> bool:
     """Whether a point lies inside a mesh: generalised winding number above one half (also for slightly open meshes).
 
-    The solid angle of each triangle is van Oosterom and Strackee's formula (1983); their sum over 4 pi is the winding
-    number (Jacobson, Kavan and Sorkine-Hornung 2013).
+    The solid angle of each triangle is van Oosterom and Strackee's formula [37]; their sum over 4 pi is the winding
+    number [38].
     """
     a, b, c = (vertices[triangles[:, k]] - point for k in range(3))
     la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))

@@ -58,7 +58,7 @@ class ToolEntry(Section):
 class TableEntry(Section):
     """The table."""
 
-    convention: Literal["standard", "modified"] = Field(description="standard (Paul) or modified (Craig)")
+    convention: Literal["standard", "modified"] = Field(description="standard (Paul [32]) or modified (Craig [33])")
     rows: Annotated[list[RowEntry], Field(min_length=1)]
     radius: NotNegative | list[NotNegative] = Field(0.05, description="of the links [m], one number or one per row")
     tool: ToolEntry | None = None

@@ -48,9 +48,9 @@ ANYTIME = PlannerTraits(anytime=True, supports_iteration_limit=False)
 # What is not listed has the default traits.
 # - PRM and PRMstar take up further goals in a second thread. It has motions checked by Python under a lock of the
 #   roadmap, for which the first thread waits while it holds Python's lock: with more than one goal they hang.
-# - AORRTC gives up when it is led from one goal to another: with 16 goals of a UR5 its paths were thrice as long as
-#   with one. If a straight motion from the start to the goal is free it returns a path from the goal to the goal. Its
-#   graph is empty.
+# - AORRTC [15] gives up when it is led from one goal to another: with 16 goals of a UR5 its paths were thrice as long
+#   as with one. If a straight motion from the start to the goal is free it returns a path from the goal to the goal.
+#   Its graph is empty.
 # - SORRTstar finds a free straight motion, then draws from what could be shorter, which is nothing, and does not check
 #   its time meanwhile.
 # - BITstar's graph is never freed again (60 kB a run).

@@ -1,4 +1,4 @@
-"""Statistics of repeated measurements, as the published precision and accuracy tests print them."""
+"""Statistics of repeated measurements, as the precision and accuracy tests of [1, ch. 4] print them."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Series:
 
     @property
     def possible(self) -> bool:
-        """No sample in [smallest, largest] deviates by more than half the range times sqrt(N / (N - 1))."""
+        """No sample in [smallest, largest] deviates by more than half the range times sqrt(N / (N - 1)) (like [54])."""
         return self.deviation <= self.largest_possible_deviation
 
     @property

@@ -65,7 +65,7 @@ def _is_convex(polygon: Matrix, ring: list[int]) -> bool:
 
 
 def _ears(polygon: Matrix, ring: list[int]) -> list[list[int]]:
-    """Triangulate by cutting ears (Meisters 1975); ``ring`` runs counter-clockwise."""
+    """Triangulate by cutting ears [39]; ``ring`` runs counter-clockwise."""
     rest, triangles = list(ring), []
     while len(rest) > 3:
         for k in range(len(rest)):
@@ -89,7 +89,7 @@ def _in_triangle(point: Vector, p: Vector, q: Vector, r: Vector) -> bool:
 
 
 def _merged(polygon: Matrix, parts: list[list[int]]) -> list[list[int]]:
-    """Join neighbouring parts while the union stays convex (Hertel and Mehlhorn 1983)."""
+    """Join neighbouring parts while the union stays convex [40]."""
     parts = [list(part) for part in parts]
     joined = True
     while joined:

@@ -1,4 +1,7 @@
-"""Splits a path into stops and blended segments for time parameterisation."""
+"""Splits a path into stops and blended segments for time parameterisation.
+
+The idea of rounding corners is that of [20]; the curves here are quintics.
+"""
 
 from __future__ import annotations
 

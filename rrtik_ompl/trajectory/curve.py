@@ -1,7 +1,6 @@
 """Along a curve from rest to rest in the shortest time under velocity and acceleration limits, by toppra.
 
-Source: H. Pham and Q.-C. Pham, "A new approach to time-optimal path parameterization based on reachability analysis",
-IEEE Transactions on Robotics 34(3), 2018.
+Source: [19].
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 All joints follow the same profile, so the motion stays on the line; for one joint it is the joint's fastest motion.
 Without a jerk limit the profile is the trapezoid of velocity, which is the shortest one on a line.
-Source: L. Berscheid and T. Kroeger, "Jerk-limited real-time trajectory generation with arbitrary target states", 2021.
+Source: [21].
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ REGULAR = {"titan4_regular": (20, 30, -70, 20, 30, 40)}
 PUMA_GOAL = np.radians([40, 60, -120, 30, 40, 20])
 
 
-def test_every_scenario_of_the_specification_is_shipped():
+def test_every_problem_is_shipped():
     assert set(NAMES) <= set(list_problems())
 
 
@@ -95,7 +95,7 @@ def test_the_published_panel_route_is_free_in_the_reconstructed_panel(sdu_route)
 
 
 @pytest.mark.parametrize(("name", "optimum"), [("planar3_a", 3), ("planar3_b", 4), ("planar3_c", 3)])
-def test_the_fewest_moves_of_the_planar_arms_are_those_of_the_specification(name, optimum):
+def test_the_fewest_moves_of_the_planar_arms_are_as_stated(name, optimum):
     problem = load_problem(name)
     lower, upper = np.degrees(problem.robot.lower), np.degrees(problem.robot.upper)
     axes = [np.radians(np.arange(a, b + 1e-9, 5.0)) for a, b in zip(lower, upper, strict=True)]

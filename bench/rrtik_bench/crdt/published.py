@@ -13,7 +13,7 @@ CRDT_TABLE = (
     (1897, 3238, 9561, 98.85),
     (233.76, 395.06, 1461.48, 22.76),
 )
-# The final list of moves of the paper's SDU test, degrees as printed.
+# The final list of moves of the SDU test in [1, ch. 6.3], degrees as printed.
 SDU_LIST: list[list[float]] = [
     [25, 19, -82, 60, 90, 0],
     [48.19, 19, -82, 60, 90, 0],

@@ -122,14 +122,14 @@ def counts(quick: bool) -> list[Row]:
     """How many single-joint routes there are."""
     del quick
     found = routes(3, 1), routes(3, 2)
-    reading = "one edge (m = 1); for more the paper's factor m! would count the orders of edges, which are fixed"
+    reading = "one edge (m = 1); for more the printed factor m! would count the orders of edges, which are fixed"
     return [Row("Routes(3, 1), Routes(3, 2)", "6, 90", f"{found[0]}, {found[1]}", verdict(found == (6, 90)), reading)]
 
 
 TABLES = (
-    Table("crdt-routes", "Number of single-joint routes", f"{SOURCE}, section 1", counts, 1, 1),
-    Table("crdt-e", "Environment E: RRT and C-RDT", f"{SOURCE}, table of section 6.1", environment_e, 65, 8),
-    Table("crdt-planar", "Planar arm, two squares", f"{SOURCE}, section 6.2", planar, 7, 1),
-    Table("crdt-sdu", "TITAN-4 at the subsea unit", f"{SOURCE}, section 6.3", subsea, 11, 3),
-    Table("crdt-prisms", "TITAN-4 and two prisms", f"{SOURCE}, section 6.4", prisms, 6, 2),
+    Table("crdt-routes", "Number of single-joint routes", f"{SOURCE}, count of routes", counts, 1, 1),
+    Table("crdt-e", "Environment E: RRT and C-RDT", f"{SOURCE}, two tables of test E", environment_e, 65, 8),
+    Table("crdt-planar", "Planar arm, two squares", f"{SOURCE}, planar test", planar, 7, 1),
+    Table("crdt-sdu", "TITAN-4 at the subsea unit", f"{SOURCE}, SDU test", subsea, 11, 3),
+    Table("crdt-prisms", "TITAN-4 and two prisms", f"{SOURCE}, prism test", prisms, 6, 2),
 )

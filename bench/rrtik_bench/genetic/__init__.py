@@ -1,1 +1,1 @@
-"""The genetic algorithm for trajectories: what was published, and the runs that are compared with it."""
+"""The genetic algorithm for trajectories [2]: what was published, and the runs that are compared with it."""

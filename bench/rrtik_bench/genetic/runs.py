@@ -1,4 +1,4 @@
-"""Runs of the genetic algorithm along the published trajectories, and what is read off them."""
+"""Runs of the genetic algorithm along the trajectories of [2], and what is read off them."""
 
 from __future__ import annotations
 

@@ -125,8 +125,8 @@ def statements(quick: bool) -> list[Row]:
 
 
 TABLES = (
-    Table("ga-reb-4", "Three joints, with and without range reduction", f"{SOURCE}, table 4", three_joints, 60, 15),
-    Table("ga-reb-5", "Five joints", f"{SOURCE}, table 5", five_joints, 50, 12),
-    Table("ga-reb-first", "Generations to the first point", f"{SOURCE}, section 8.3", first_points, 60, 12),
-    Table("ga-reb-statements", "Errors, jumps, single generations", f"{SOURCE}, section 8.4", statements, 15, 4),
+    Table("ga-reb-4", "Three joints, with and without range reduction", "[2, table 4]", three_joints, 60, 15),
+    Table("ga-reb-5", "Five joints", "[2, table 5]", five_joints, 50, 12),
+    Table("ga-reb-first", "Generations to the first point", SOURCE, first_points, 60, 12),
+    Table("ga-reb-statements", "Errors, jumps, single generations", SOURCE, statements, 15, 4),
 )

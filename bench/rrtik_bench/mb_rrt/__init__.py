@@ -1,1 +1,1 @@
-"""MB-RRT: what was published, and the runs that are compared with it."""
+"""MB-RRT [3]: what was published, and the runs that are compared with it."""

@@ -40,10 +40,10 @@ EXPECTED = {
     },
 }  # fmt: skip
 PASS = "an iteration is one pass over the joints; the mean is over goals solved"
-CLOUD = "goals spread evenly over the area (the paper's are not known); shares vary from cloud to cloud"
+CLOUD = "goals spread evenly over the area (those of [3] are not known); shares vary from cloud to cloud"
 READINGS = {
     (3, "c-space"): "nearer to the print at 0.2 cm, the tolerance of the 2-joint demonstration; " + CLOUD,
-    (10, "c-space"): "step 3 degrees, root at zero, not stated in the paper; " + CLOUD,
+    (10, "c-space"): "step 3 degrees, root at zero, not stated in [3]; " + CLOUD,
     (3, "uniform-a-star"): 'printed "57142", read as 5.7142 %, as the trap of rule A predicts',
     (10, "uniform-a-star"): "in the trap success comes early or never: no reading gives a mean of 1672",
     (3, "uniform-b-star"): "a ring about the goal predicts 95 passes; 100 % as printed",
@@ -132,9 +132,9 @@ def example(quick: bool) -> list[Row]:
 
 
 TABLES = (
-    Table("mb-rrt-example", "Surface sampling, worked example", f"{SOURCE}, figures of section 4", example, 1, 1),
-    Table("mb-rrt-8", "All variants, 3 joints (tables 6, 8)", SOURCE, partial(variants, 3), 25, 5),
-    Table("mb-rrt-9", "All variants, 10 joints (tables 7, 9)", SOURCE, partial(variants, 10), 100, 20),
-    Table("mb-rrt-10", "MB-RRT's precision, 3 joints", SOURCE, partial(precision, 3), 1, 1),
-    Table("mb-rrt-11", "MB-RRT's precision, 10 joints", SOURCE, partial(precision, 10), 2, 1),
+    Table("mb-rrt-example", "Surface sampling, worked example", f"{SOURCE}, worked example", example, 1, 1),
+    Table("mb-rrt-8", "All variants, 3 joints (tables 6, 8)", "[3, tables 6 and 8]", partial(variants, 3), 25, 5),
+    Table("mb-rrt-9", "All variants, 10 joints (tables 7, 9)", "[3, tables 7 and 9]", partial(variants, 10), 100, 20),
+    Table("mb-rrt-10", "MB-RRT's precision, 3 joints", "[3, table 10]", partial(precision, 3), 1, 1),
+    Table("mb-rrt-11", "MB-RRT's precision, 10 joints", "[3, table 11]", partial(precision, 10), 2, 1),
 )

@@ -1,4 +1,4 @@
-"""The measured series of sensing with square markers, taken again by the synthetic camera: as published, and as here.
+"""The measured series of [1, ch. 4], taken again by the synthetic camera: as published, and as here.
 
 "As published" are corners refined one by one, as the toolkits do it; noise of 1 % is what makes their depth as unsteady
 as the published one, and the same noise is given to the whole marker laid over the picture, which is how poses are
@@ -21,7 +21,7 @@ ROUGH, FINE = "corners one by one", "whole marker laid over"
 
 
 def precision(quick: bool) -> list[Row]:
-    """Section 4: standard deviation of the depth of one marker, the worst of several random poses."""
+    """Standard deviation of the depth of one marker, the worst of several random poses."""
     from rrtik_bench.sensing.runs import PLAIN, positions, random_poses, seen_poses
 
     poses, count, rows = (2, 20, []) if quick else (8, 100, [])
@@ -35,7 +35,7 @@ def precision(quick: bool) -> list[Row]:
 
 
 def gripper(quick: bool) -> list[Row]:
-    """Section 5: how unsteady a gripper 1.92 m away from the marker is, by the quartiles; the median of poses."""
+    """How unsteady a gripper 1.92 m away from the marker is, by the quartiles; the median of poses."""
     from rrtik_bench.sensing.runs import PLAIN, gripper_distances, gripper_poses, seen_poses
 
     poses, count, rows = (3, 20, []) if quick else (5, 100, [])
@@ -53,7 +53,7 @@ def gripper(quick: bool) -> list[Row]:
 
 
 def accuracy(quick: bool) -> list[Row]:
-    """Section 6: two markers 300 mm apart, the lens known or taken to be without distortion."""
+    """Two markers 300 mm apart, the lens known or taken to be without distortion."""
     from rrtik_bench.sensing.runs import CAMERA, PLAIN, pair_at, pair_distances, seen_poses
     from rrtik_ompl.sensing.cameras.synthetic_camera import published_camera
 
@@ -84,7 +84,7 @@ def _rows(name: str, printed: float, found: dict[bool, float], times: float) -> 
 
 
 TABLES = (
-    Table("sensing-precision", "Precision against distance, photographed", f"{SOURCE}, section 4", precision, 180, 15),
-    Table("sensing-gripper", "Precision of a gripper far from the marker", f"{SOURCE}, section 5", gripper, 60, 10),
-    Table("sensing-accuracy", "Two markers at a known distance", f"{SOURCE}, section 6", accuracy, 30, 8),
+    Table("sensing-precision", "Precision against distance, photographed", SOURCE, precision, 180, 15),
+    Table("sensing-gripper", "Precision of a gripper far from the marker", SOURCE, gripper, 60, 10),
+    Table("sensing-accuracy", "Two markers at a known distance", SOURCE, accuracy, 30, 8),
 )

@@ -1,4 +1,4 @@
-"""Series of photographs by the synthetic camera, as in the published tests: the same marker, distances and lens matrix.
+"""Series of photographs by the synthetic camera, as in [1, ch. 4]: the same marker, distances and lens matrix.
 
 Noise of 1 % of full scale is what makes OpenCV's own corners as unsteady as the published ones.
 """

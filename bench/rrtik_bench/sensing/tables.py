@@ -1,4 +1,4 @@
-"""The precision tables of sensing with square markers: their arithmetic, and what a simulated camera predicts."""
+"""The precision tables of [1, ch. 4]: their arithmetic, and what a simulated camera predicts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rrtik_bench.tables import Table
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.sensing.precision import NORMAL_QUARTILES
 
-SOURCE = "Marker sensing"
+SOURCE = "[1, ch. 4]"
 COUNT = 100  # observations of a series
 CAMERA = np.array([[877.6915, 0.2272, 320.6451], [0.0, 869.8953, 242.8119], [0.0, 0.0, 1.0]])  # [px]
 MARKER = 80.0  # [mm]
@@ -99,6 +99,6 @@ def _corners(pose: Vector) -> Matrix:
 
 
 TABLES = (
-    Table("sensing-arithmetic", "Precision and accuracy: what follows", f"{SOURCE}, sections 4 to 6", arithmetic, 1, 1),
-    Table("sensing-noise", "Precision against distance, simulated", f"{SOURCE}, section 4", simulated, 1, 1),
+    Table("sensing-arithmetic", "Precision and accuracy: what follows", SOURCE, arithmetic, 1, 1),
+    Table("sensing-noise", "Precision against distance, simulated", SOURCE, simulated, 1, 1),
 )

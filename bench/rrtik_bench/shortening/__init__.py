@@ -1,1 +1,1 @@
-"""Shortening of paths among planar obstacles: what was published, and the runs that are compared with it."""
+"""Shortening among planar obstacles [1, ch. 5.3]: what was published, and the runs that are compared with it."""

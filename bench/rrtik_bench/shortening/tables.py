@@ -1,4 +1,4 @@
-"""The comparison of sequential cut, random cut and retraction, and the route of the pilot's tool."""
+"""Sequential cut, random cut and retraction [1, ch. 5.3], and the route of the pilot's tool [1, ch. 6]."""
 
 from __future__ import annotations
 

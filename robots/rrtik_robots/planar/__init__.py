@@ -45,7 +45,7 @@ def planar(
 
 
 def planar3(*, radius: float = 0.0, tip: str = "tip", base_pose: BasePose = None) -> Robot:
-    """Three links of 1 m with the limits of the published planar tests."""
+    """Three links of 1 m with the limits of the planar test of [1, ch. 6.3]."""
     return _arm("planar3", (1.0,) * 3, LIMITS_PLANAR3_DEG, radius, tip, base_pose)
 
 

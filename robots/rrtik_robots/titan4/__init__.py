@@ -41,7 +41,7 @@ def titan4(
     All angles are physical ones: 0 is the arm stretched along x, wrist yaw 0 the straight wrist.
 
     Args:
-        limits: ``"planning"`` (of the published planning tests) or ``"envelope"`` (measured from the
+        limits: ``"planning"`` (of the tests in [1, ch. 6.3]) or ``"envelope"`` (measured from the
             shoulder-elbow line: for everything about reach); they differ in the shoulder's stroke by 7.81 degrees.
         lengths: Lengths [m] that differ from `TitanGeometry`'s, by name.
         tip: Link that goals refer to.

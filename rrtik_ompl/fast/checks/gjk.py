@@ -1,8 +1,8 @@
 """GJK in kernels: whether two convex solids are apart, overlap, or neither is proven.
 
 Each verdict is a proof with a margin. Two solids are apart if a plane is found between them; they overlap if points of
-their difference surround the origin or a point of both is found. How plane and points are found (Gilbert, Johnson and
-Keerthi 1988) can then do no harm: a poor search only leaves a pair undecided. Solids: see ``solid_tables``.
+their difference surround the origin or a point of both is found. How plane and points are found [35] can then do no
+harm: a poor search only leaves a pair undecided. Solids: see ``solid_tables``.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ def farthest(solids: SolidTable, number: int, frame: Frame, note: LaneArray, lan
 
 @kernel
 def nearest_on_triangle(a: Any, b: Any, c: Any) -> Any:
-    """The point of a triangle that is nearest to the origin (Ericson 2005, 5.1.5); the corners may coincide.
+    """The point of a triangle that is nearest to the origin [36, section 5.1.5]; the corners may coincide.
 
     Whatever rounding does, it is a mean of the corners with weights that are not negative.
     """

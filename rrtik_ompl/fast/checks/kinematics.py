@@ -49,7 +49,7 @@ QUARTERS_PER_RADIAN = 2.0 / np.pi
 QUARTER_HIGH = 1.5707963267948966  # pi / 2 in two parts: the second is what float64 cannot hold of it
 QUARTER_LOW = 6.123233995736766e-17
 
-# Polynomials in z = x^2 for |x| <= pi / 4, fitted to the smallest greatest error (Lawson 1961):
+# Polynomials in z = x^2 for |x| <= pi / 4, fitted to the smallest greatest error [45]:
 # sin x = x + x z S(z), error 1.8e-9; cos x = 1 - z / 2 + z^2 C(z), error 1e-10.
 SINE = (np.float32(-0.16666651), np.float32(0.00833198), np.float32(-0.00019496))
 COSINE = (np.float32(4.16666469e-02), np.float32(-1.38873672e-03), np.float32(2.44384155e-05))

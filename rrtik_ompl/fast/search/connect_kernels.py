@@ -1,7 +1,7 @@
 """RRT-Connect whole in a kernel: two trees grow towards each other until a path between a start and a goal is certain.
 
-Sources: Kuffner and LaValle 2000 (RRT-Connect), Kuffner and LaValle 2005 (the smaller tree grows), Yershova, Jaillet,
-Simeon and LaValle 2005 (dynamic domain: a vertex that was blocked is only extended towards samples near it).
+Sources: RRT-Connect [4]; the smaller tree grows [5]; dynamic domain: a vertex that was blocked is only extended towards
+samples near it [6].
 
 The search, as worlds without kernels run it in Python, and the kernels of each line::
 

@@ -1,6 +1,6 @@
 """A path's check, and its repair, each in one call: cut from both sides, RRT-Connect between the pieces, shortcuts.
 
-Source: [8; 1, ch. 5.2, algorithms 6 to 8]. The pieces are the trees from the beginning. Added to the paper: whole
+Source: [8; 1, ch. 5.2, algorithms 6 to 8]. The pieces are the trees from the beginning. Added to them: whole
 motions between the pieces are tried first, and the first samples lie near the gap, in a box that grows with each of
 them until it is the whole space.
 """

@@ -2,9 +2,9 @@
 
 A try is one of two. A shortcut takes two random places on the route, on its edges or at its waypoints, and goes
 straight from one to the other. A pull moves some joints of one waypoint towards the straight line between its
-neighbours, so that a corner can slide along what it touches (after the partial shortcuts of Geraerts and Overmars
-2007). Pieces of edges that remain beside a shortcut are checked again, for their configurations are not the ones that
-were checked when they were part of longer edges.
+neighbours, so that a corner can slide along what it touches (after the partial shortcuts of [9]). Pieces of edges that
+remain beside a shortcut are checked again, for their configurations are not the ones that were checked when they were
+part of longer edges.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The bases of the Halton sequence that searches in kernels draw their samples from."""
+"""The bases of the Halton sequence [49] that searches in kernels draw their samples from."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ import numpy as np
 from rrtik_ompl.fast.simd.compiled import kernel
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field
 
-# Constants of splitmix64, without signs: LLVM may assume that a signed number never overflows.
+# Constants of splitmix64 [46], without signs: LLVM may assume that a signed number never overflows.
 GOLDEN, FIRST_FACTOR, SECOND_FACTOR = (
     np.uint64(x) for x in (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB)
 )
@@ -20,7 +20,7 @@ LEAST_REST = 1e-12
 
 @kernel
 def next_share(table: int, place: int) -> float:
-    """The next number in [0, 1); the state is a field of a table. Source: splitmix64 (Steele, Lea, Flood 2014)."""
+    """The next number in [0, 1); the state is a field of a table. Source: splitmix64 [46]."""
     state: Any = np.uint64(field(table, place)) + GOLDEN
     set_field(table, place, np.int64(state))
     mixed = (state ^ (state >> SHIFT_30)) * FIRST_FACTOR
@@ -32,8 +32,8 @@ def next_share(table: int, place: int) -> float:
 def next_in_base(x: float, inverse: float) -> float:
     """The successor of x in the van der Corput sequence of base 1 / inverse: 1 is added to its first digit.
 
-    The carry runs towards the later digits. From a random first point it is a randomised Halton sequence (Struckmeier
-    1995; Wang and Hickernell 2000).
+    The carry runs towards the later digits. The successor is that of [47]; from a random first point it is a randomised
+    Halton sequence [48].
     """
     rest = max(1.0 - x - LEAST_REST, LEAST_REST)  # less, as x is rounded
     if inverse < rest:

@@ -244,7 +244,7 @@ def neighbourhoods(spheres: Spheres) -> list[Spheres]:
 
 
 def enclosing_ball(spheres: Spheres) -> Vector:
-    """A small ball around balls, shape (4,): steps towards the farthest one (Badoiu and Clarkson 2003), best kept."""
+    """A small ball around balls, shape (4,): steps towards the farthest one [43], best kept."""
     if len(spheres) == 1:
         return np.array(spheres[0])
     centres, radii = spheres[:, :3], spheres[:, 3]

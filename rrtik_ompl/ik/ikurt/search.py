@@ -1,4 +1,4 @@
-"""IKURT made fast and robust: the published idea on batches, with the Jacobian where the way is clear.
+"""IKURT made fast and robust: the idea of [1, ch. 5.1] on batches, with the Jacobian where the way is clear.
 
 What differs from :mod:`rrtik_ompl.ik.ikurt.published`: CONNECT tries many directions at once, the cheap metric before
 the collision check, takes the best free one, and lives through misses; directions are isotropic, so that joints reach

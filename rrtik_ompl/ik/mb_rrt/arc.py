@@ -1,6 +1,6 @@
 """Sampling on the arc of intersection: every node inside its solution region, every pass exactly at the goal.
 
-The authors of MB-RRT proposed it and left it open. A node is useful if and only if the rest of the chain can span its
+[3] proposes it and leaves it open. A node is useful if and only if the rest of the chain can span its
 distance from the goal, ``folded[i] <= |x - g| <= remaining[i]``. By the law of cosines that is an interval of the
 cosine of the angle between the edge and the direction to the goal, in the plane and in space alike.
 """

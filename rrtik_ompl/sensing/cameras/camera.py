@@ -21,7 +21,7 @@ class Camera:
 
     Attributes:
         matrix: Shape (3, 3): fx, fy, cx, cy in pixels; skew is not modelled and must be 0.
-        distortion: Brown's k1, k2, p1, p2, k3. Shape (5,).
+        distortion: Brown's k1, k2, p1, p2, k3 [59]. Shape (5,).
         width: Of the picture, in pixels.
         height: Of the picture, in pixels.
     """

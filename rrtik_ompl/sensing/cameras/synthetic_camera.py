@@ -46,7 +46,7 @@ def marker_print(cells: NDArray[np.uint8], side: float) -> Print:
 
 
 def published_camera(distortion: Sequence[float] = (0.0,) * 5) -> Camera:
-    """The camera of the published experiments: 640 x 480."""
+    """The camera of the experiments in [1, ch. 4]: 640 x 480."""
     return Camera(PUBLISHED_MATRIX, 640, 480, distortion)
 
 

@@ -208,7 +208,7 @@ def test_rank_4_needs_the_listed_coincidences(titan):
         (0.5, 0.3): 5,
         (0.5, RIGHT): 5,  # all three families together
         (0.0, 0.0): 4,
-        (0.0, 0.3): 4,  # elbow and shoulder with A, B, C and P in line: not listed in the publication
+        (0.0, 0.3): 4,  # elbow and shoulder with A, B, C and P in line: not listed in [1, ch. 3]
         (0.0, RIGHT): 4,
     }
 
