@@ -32,16 +32,9 @@ from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.generated_problems import FAMILIES
 from rrtik_ompl.ompl_bridge.planner_options import planner_options
-from rrtik_ompl.ompl_bridge.planner_traits import ompl_planners
+from rrtik_ompl.ompl_bridge.planner_traits import unbound_planners
 from rrtik_ompl.planning import find_planner
 from rrtik_ompl.shortening import METHODS
-
-# Geometric planners that OMPL 2.0.1 has and its wheel does not offer; those that a later wheel offers are left out.
-UNBOUND = (
-    "ABITstar AITstar AOXRRTConnect ATRRT AnytimePathShortening BLITstar BiEST BiRLRT BiTRRT CForest EIRMstar EITstar "
-    "EST LBTRRT LazyLBTRRT LazyPRM LazyPRMstar LazyRRT PDST ProjEST QMP QMPStar QRRT QRRTStar RLRT RRTXstatic RRTsharp "
-    "SBL SPARS SPARStwo SST STRIDE STRRTstar TRRT TRRTstar TSRRT VFRRT XXL pRRT pSBL"
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,8 +159,7 @@ def _planner(name: str) -> Any:
     try:
         return find_planner(name)
     except UnknownNameError as error:
-        lacking = ", ".join(each for each in UNBOUND.split() if each not in ompl_planners())
-        error.args = (f"{error}; OMPL's wheel lacks {lacking}",)
+        error.args = (f"{error}; OMPL's wheel lacks {', '.join(unbound_planners())}",)
         raise
 
 
