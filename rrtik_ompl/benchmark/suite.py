@@ -16,8 +16,7 @@ from rrtik_ompl.benchmark.sources import (
     scaling_sources,
 )
 from rrtik_ompl.benchmark.suite_file import (
-    BY_KIND,
-    NONE,
+    SHORTENINGS,
     Generated,
     Joints,
     Obstacles,
@@ -26,6 +25,7 @@ from rrtik_ompl.benchmark.suite_file import (
     SuiteFile,
 )
 from rrtik_ompl.catalog import find_suite, load_robot
+from rrtik_ompl.choices import SuiteShortening, one_of
 from rrtik_ompl.errors import UnknownNameError
 from rrtik_ompl.files.sections import parse
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml
@@ -34,7 +34,6 @@ from rrtik_ompl.generated_problems import FAMILIES
 from rrtik_ompl.ompl_bridge.planner_options import planner_options
 from rrtik_ompl.ompl_bridge.planner_traits import unbound_planners
 from rrtik_ompl.planning import find_planner
-from rrtik_ompl.shortening import METHODS
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +43,7 @@ class Entrant:
     label: str
     name: str
     parameters: dict[str, Any]
-    shorten: str
+    shorten: SuiteShortening
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,12 +145,8 @@ def _entrant(document: YamlDocument, place: Location, item: str | PlannerGroup, 
         with document.at((*place, "parameters", key)):
             if key not in options:
                 raise UnknownNameError(f"parameter of planner {group.name}", key, options)
-    method = group.shorten or shorten
-    if method not in (*METHODS, BY_KIND, NONE):
-        raise document.error(
-            (*place, "shorten") if group.shorten else ("shorten",),
-            str(UnknownNameError("shortening method", method, (*METHODS, BY_KIND, NONE))),
-        )
+    with document.at((*place, "shorten") if group.shorten else ("shorten",)):
+        method = one_of(SHORTENINGS, group.shorten or shorten, "shortening method")
     return Entrant(group.label or group.name, group.name, dict(group.parameters), method)
 
 

@@ -25,6 +25,7 @@ from rrtik_ompl.ompl_bridge.planner_traits import (
     unbound_planners,
 )
 from rrtik_ompl.planning import find_planner
+from rrtik_ompl.replanning import PLANNERS
 from rrtik_ompl.shortening import METHODS
 from rrtik_ompl.world import ACCURACIES
 
@@ -142,6 +143,7 @@ def test_the_names_to_choose_from_stand_once():
     assert set(get_args(choices.TrajectoryIkMethod)) == {"auto", *list_ik_trajectory_methods()}
     assert set(get_args(choices.GeneticPreset)) == set(PRESETS)
     assert get_args(choices.Accuracy) == ACCURACIES
+    assert get_args(choices.Replanner) == PLANNERS
 
 
 def test_the_short_name_is_the_same_package():
