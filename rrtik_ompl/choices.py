@@ -20,6 +20,8 @@ ShorteningMethod: TypeAlias = Literal[
     "ompl",
     "fewest-moves",
 ]
+CommandShortening: TypeAlias = Literal[ShorteningMethod, "none"]
+SuiteShortening: TypeAlias = Literal[ShorteningMethod, "by-kind", "none"]
 IkMethod: TypeAlias = Literal[
     "auto",
     "closed-form",
@@ -37,6 +39,10 @@ IkMethod: TypeAlias = Literal[
 TrajectoryIkMethod: TypeAlias = Literal["auto", "closed-form", "numeric", "genetic"]
 GeneticPreset: TypeAlias = Literal["standard", "historical", "refined"]
 FrameAxis: TypeAlias = Literal["x", "y", "z"]
+DhConvention: TypeAlias = Literal["standard", "modified"]
+Replanner: TypeAlias = Literal["drrt-con", "rrt-connect", "drrt"]
+TickEvent: TypeAlias = Literal["plan", "walk", "repair", "wait", "evade", "arrive"]
+RunOutcome: TypeAlias = Literal["arrived", "out of time", "interrupted"]
 
 Name = TypeVar("Name", bound=str)
 

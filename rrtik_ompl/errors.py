@@ -49,11 +49,17 @@ class ProblemError(RrtikError):
 
     Attributes:
         contacts: Pairs of names in collision, empty if the reason is another one.
+        part: What is wrong with it: "start" or "goal".
     """
 
-    def __init__(self, message: str, contacts: Iterable[tuple[str, str]] = ()) -> None:
-        self.contacts = tuple(contacts)
+    def __init__(self, message: str, contacts: Iterable[tuple[str, str]] = (), *, part: str = "start") -> None:
+        self.contacts, self.part = tuple(contacts), part
         super().__init__(message)
+
+
+def in_file(path: object, error: InputError) -> InputError:
+    """The same error, naming the file before all else, as errors of its lines do by themselves."""
+    return error if str(error).startswith(str(path)) else InputError(f"{path}: {error}")
 
 
 class PlannerError(RrtikError):

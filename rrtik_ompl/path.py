@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
-from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.errors import InputError, in_file, require
 from rrtik_ompl.files.tables import dumps, loads, path_format
 from rrtik_ompl.files.text import read_text, write_text
 from rrtik_ompl.robot import Robot
@@ -284,7 +284,7 @@ def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> Joint
         found = JointPath(document["waypoints"], names, sliding, name, turning)
         return found if robot is None else _fitted(found, robot)
     except InputError as error:
-        raise error if str(error).startswith(str(path)) else InputError(f"{path}: {error}") from None
+        raise in_file(path, error) from None
 
 
 def _fitted(path: JointPath, robot: Robot) -> JointPath:

@@ -89,15 +89,15 @@ def _usable(world: World, values: ArrayLike, what: str) -> Vector:
     q = robot.configuration(values, what)
     fault = robot.limit_fault(q)
     if fault:
-        raise ProblemError(f"{what}: {fault}")
+        raise ProblemError(f"{what}: {fault}", part=what)
     q = robot.clamp(q)
     # both opinions must agree, for the path through q will be certified by the second one
     if not world.valid(q) or not world.certify(q[None])[0]:
         touching = world.contacts(q)
         pairs = [(c.first, c.second) for c in touching]
         if touching and all(c.distance > 0.0 for c in touching):
-            raise ProblemError(f"{what} is too near: {world.explain(q)}; move it or lower the margin", pairs)
-        raise ProblemError(f"{what} is in collision: {world.explain(q)}; move it or allow the pair", pairs)
+            raise ProblemError(f"{what} is too near: {world.explain(q)}; move it or lower the margin", pairs, part=what)
+        raise ProblemError(f"{what} is in collision: {world.explain(q)}; move it or allow the pair", pairs, part=what)
     return q
 
 

@@ -29,6 +29,7 @@ class FastRRTConnect(SafePlanner):
 
     kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
     supports_iteration_limit: ClassVar[bool] = True
+    proof_iterations: ClassVar[int] = 20_000
 
     def __init__(
         self,

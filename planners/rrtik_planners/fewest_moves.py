@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from typing import ClassVar
+from types import MappingProxyType
+from typing import Any, ClassVar
 
 import numpy as np
 from ompl import base as ob
@@ -43,6 +45,7 @@ class FewestMoves(OneJointPlanner):
     kernels: ClassVar[tuple[str, ...]] = ()
     anytime: ClassVar[bool] = True
     path_statistics: ClassVar[tuple[str, ...]] = ("lower_bound", "gap")
+    brief_options: ClassVar[Mapping[str, Any]] = MappingProxyType({"searches": 1, "rounds": 0})
 
     def __init__(
         self,

@@ -25,6 +25,7 @@ class OneJointPlanner(SafePlanner):
 
     ompl_name: ClassVar[str]
     kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
+    one_joint: ClassVar[bool] = True
 
     def __init__(
         self,

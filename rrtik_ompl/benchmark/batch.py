@@ -13,12 +13,12 @@ from rrtik_ompl.benchmark import spread
 from rrtik_ompl.benchmark.campaign import all_jobs
 from rrtik_ompl.benchmark.sources import file_source
 from rrtik_ompl.benchmark.suite import Entrant, Suite
-from rrtik_ompl.benchmark.suite_file import BY_KIND, NONE
+from rrtik_ompl.benchmark.suite_file import NONE, SHORTENINGS
 from rrtik_ompl.catalog import default_planner
+from rrtik_ompl.choices import SuiteShortening, one_of
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.ompl_bridge.planner_options import planner_options
 from rrtik_ompl.planning import find_planner
-from rrtik_ompl.shortening import METHODS
 
 
 def plan_batch(
@@ -28,7 +28,7 @@ def plan_batch(
     seconds: float = 5.0,
     seed: int = 0,
     parameters: Mapping[str, Any] | None = None,
-    shorten: str = NONE,
+    shorten: SuiteShortening = NONE,
     memory_mb: float = 4096.0,
     jobs: int = 1,
     scheduler: str | None = None,
@@ -77,11 +77,9 @@ def plan_batch(
     return [{**records[k], "problem": source.name} for k, source in enumerate(named)]
 
 
-def _entrant(planner: str, parameters: dict[str, Any], shorten: str) -> Entrant:
+def _entrant(planner: str, parameters: dict[str, Any], shorten: SuiteShortening) -> Entrant:
     options = planner_options(find_planner(planner))
     for key in parameters:
         if key not in options:
             raise UnknownNameError(f"parameter of planner {planner}", key, options)
-    if shorten not in (*METHODS, BY_KIND, NONE):
-        raise UnknownNameError("shortening method", shorten, (*METHODS, BY_KIND, NONE))
-    return Entrant(planner, planner, parameters, shorten)
+    return Entrant(planner, planner, parameters, one_of(SHORTENINGS, shorten, "shortening method"))

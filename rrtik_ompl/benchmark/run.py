@@ -10,12 +10,12 @@ import numpy as np
 
 from rrtik_ompl.benchmark.sources import build, from_plain
 from rrtik_ompl.benchmark.suite_file import BY_KIND, NONE
-from rrtik_ompl.choices import ShorteningMethod, one_of
+from rrtik_ompl.choices import ShorteningMethod, SuiteShortening
 from rrtik_ompl.errors import RrtikError
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning import plan
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.shortening import METHODS, shorten
+from rrtik_ompl.shortening import shorten
 from rrtik_ompl.world import World
 
 SOLVED, NOT_FOUND, INVALID, ERROR = "solved", "not found", "invalid", "error"
@@ -76,11 +76,11 @@ def _measured(job: Mapping[str, Any], problem: Problem) -> dict[str, Any]:
     return record | final | {"waypoints": path.waypoints.tolist()}
 
 
-def _shortened(path: JointPath, problem: Problem, method: str, seed: int) -> JointPath:
+def _shortened(path: JointPath, problem: Problem, method: SuiteShortening, seed: int) -> JointPath:
     if method == NONE or len(path.waypoints) < 2:
         return path
     by_kind: ShorteningMethod = "axis" if path.one_joint_at_a_time else "auto"
-    chosen = by_kind if method == BY_KIND else one_of(METHODS, method, "shortening method")
+    chosen = by_kind if method == BY_KIND else method
     return shorten(path, problem, method=chosen, seed=seed)
 
 

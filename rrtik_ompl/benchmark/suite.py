@@ -16,8 +16,7 @@ from rrtik_ompl.benchmark.sources import (
     scaling_sources,
 )
 from rrtik_ompl.benchmark.suite_file import (
-    BY_KIND,
-    NONE,
+    SHORTENINGS,
     Generated,
     Joints,
     Obstacles,
@@ -26,22 +25,15 @@ from rrtik_ompl.benchmark.suite_file import (
     SuiteFile,
 )
 from rrtik_ompl.catalog import find_suite, load_robot
+from rrtik_ompl.choices import SuiteShortening, one_of
 from rrtik_ompl.errors import UnknownNameError
 from rrtik_ompl.files.sections import parse
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.generated_problems import FAMILIES
 from rrtik_ompl.ompl_bridge.planner_options import planner_options
-from rrtik_ompl.ompl_bridge.planner_traits import ompl_planners
+from rrtik_ompl.ompl_bridge.planner_traits import unbound_planners
 from rrtik_ompl.planning import find_planner
-from rrtik_ompl.shortening import METHODS
-
-# Geometric planners that OMPL 2.0.1 has and its wheel does not offer; those that a later wheel offers are left out.
-UNBOUND = (
-    "ABITstar AITstar AOXRRTConnect ATRRT AnytimePathShortening BLITstar BiEST BiRLRT BiTRRT CForest EIRMstar EITstar "
-    "EST LBTRRT LazyLBTRRT LazyPRM LazyPRMstar LazyRRT PDST ProjEST QMP QMPStar QRRT QRRTStar RLRT RRTXstatic RRTsharp "
-    "SBL SPARS SPARStwo SST STRIDE STRRTstar TRRT TRRTstar TSRRT VFRRT XXL pRRT pSBL"
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +43,7 @@ class Entrant:
     label: str
     name: str
     parameters: dict[str, Any]
-    shorten: str
+    shorten: SuiteShortening
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,12 +145,8 @@ def _entrant(document: YamlDocument, place: Location, item: str | PlannerGroup, 
         with document.at((*place, "parameters", key)):
             if key not in options:
                 raise UnknownNameError(f"parameter of planner {group.name}", key, options)
-    method = group.shorten or shorten
-    if method not in (*METHODS, BY_KIND, NONE):
-        raise document.error(
-            (*place, "shorten") if group.shorten else ("shorten",),
-            str(UnknownNameError("shortening method", method, (*METHODS, BY_KIND, NONE))),
-        )
+    with document.at((*place, "shorten") if group.shorten else ("shorten",)):
+        method = one_of(SHORTENINGS, group.shorten or shorten, "shortening method")
     return Entrant(group.label or group.name, group.name, dict(group.parameters), method)
 
 
@@ -166,8 +154,7 @@ def _planner(name: str) -> Any:
     try:
         return find_planner(name)
     except UnknownNameError as error:
-        lacking = ", ".join(each for each in UNBOUND.split() if each not in ompl_planners())
-        error.args = (f"{error}; OMPL's wheel lacks {lacking}",)
+        error.args = (f"{error}; OMPL's wheel lacks {', '.join(unbound_planners())}",)
         raise
 
 

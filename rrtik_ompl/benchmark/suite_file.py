@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Final, get_args
 
 from pydantic import Field, Tag
 
+from rrtik_ompl.choices import SuiteShortening
 from rrtik_ompl.files.sections import Name, Positive, Section, Version, tag, told_apart_by
 
-BY_KIND, NONE = "by-kind", "none"  # of shortening, beside the methods
+BY_KIND: Final = "by-kind"  # of shortening, beside the methods
+NONE: Final = "none"
+SHORTENINGS: tuple[SuiteShortening, ...] = get_args(SuiteShortening)
 Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
 Seed = Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)]
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, get_args
 
 import typer
 
-from rrtik_ompl.choices import ShorteningMethod, one_of
+from rrtik_ompl.choices import CommandShortening, ShorteningMethod
 from rrtik_ompl.cli.terminal import progress, say
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
@@ -18,14 +18,15 @@ from rrtik_ompl.files.text import check_target
 RULES = ("joint_costs", "frozen_joints", "last_joints", "smallest_move")  # of single-joint moves, see MoveRules
 
 
-SHORTEN: tuple[str, ...] = (*get_args(ShorteningMethod), "none")
+SHORTEN: tuple[CommandShortening, ...] = get_args(CommandShortening)
 
 
-def _method(name: str) -> str:
+def _method(name: str) -> CommandShortening:
     """What to do to the raw path: the name of a method of shortening, or "none"."""
-    if name not in SHORTEN:
-        raise typer.BadParameter(f"'{name}' is not one of {', '.join(map(repr, SHORTEN))}.")
-    return name
+    for each in SHORTEN:
+        if each == name:
+            return each
+    raise typer.BadParameter(f"'{name}' is not one of {', '.join(map(repr, SHORTEN))}.")
 
 
 def plan(
@@ -41,7 +42,7 @@ def plan(
         typer.Option("--set", metavar="NAME=VALUE", help="An option of the planner, in JSON; repeatable."),
     ] = None,
     shorten: Annotated[
-        str,
+        CommandShortening,
         typer.Option(
             parser=_method,
             metavar=f"[{'|'.join(SHORTEN)}]",
@@ -90,16 +91,18 @@ def plan(
     return 0 if found.found else 1
 
 
-def _shortened(path: Any, problem: Any, method: str, seed: int, rules: dict[str, Any]) -> tuple[Any, float]:
+def _shortened(
+    path: Any, problem: Any, method: CommandShortening, seed: int, rules: dict[str, Any]
+) -> tuple[Any, float]:
     """The path made shorter, by the rules of single-joint moves that the planner had; and the time [s]."""
-    from rrtik_ompl.shortening import METHODS, MoveRules, shorten
+    from rrtik_ompl.shortening import MoveRules, shorten
 
     if path is None or method == "none" or len(path.waypoints) < 2:
         return path, 0.0
     begin = time.perf_counter()
-    wanted = "fewest-moves" if method == "auto" and path.one_joint_at_a_time else method
+    wanted: ShorteningMethod = "fewest-moves" if method == "auto" and path.one_joint_at_a_time else method
     kept = MoveRules(problem.robot.joint_names, **rules) if rules and path.one_joint_at_a_time else None
-    shorter = shorten(path, problem, method=one_of(METHODS, wanted, "shortening method"), seed=seed, rules=kept)
+    shorter = shorten(path, problem, method=wanted, seed=seed, rules=kept)
     return shorter, time.perf_counter() - begin
 
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import finite_array
+from rrtik_ompl.choices import DhConvention
 from rrtik_ompl.description.robot_build import JointLimits, build_robot
 from rrtik_ompl.description.tree import Joint, Link, Solid, Tree
 from rrtik_ompl.errors import InputError, UnknownNameError
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.description.robot_source import BasePose
 
 
-CONVENTIONS = ("standard", "modified")
+CONVENTIONS: tuple[DhConvention, ...] = get_args(DhConvention)
 ROW_KINDS = ("revolute", "continuous", "prismatic")
 SMALLEST_RADIUS = 1e-4  # [m], stands for a radius of 0
 
@@ -62,7 +63,7 @@ def robot_from_dh(
     name: str,
     rows: Iterable[DhRow],
     *,
-    convention: str,
+    convention: DhConvention,
     radius: float | Sequence[float] = 0.05,
     floor_gap: float = 0.0,
     tool: Any | None = None,
@@ -173,7 +174,7 @@ def _x_part(row: DhRow) -> pin.SE3:
     return pin.SE3(pin.rpy.rpyToMatrix(row.alpha, 0.0, 0.0), np.array([row.a, 0.0, 0.0]))
 
 
-def _fixed_parts(table: Sequence[DhRow], convention: str, tool: Any) -> tuple[list[Any], Any]:
+def _fixed_parts(table: Sequence[DhRow], convention: DhConvention, tool: Any) -> tuple[list[Any], Any]:
     """What lies before each joint's own motion (a turn about z or a slide along it), and what lies after the last."""
     before, after = [], pin.SE3.Identity()
     for row in table:
@@ -182,7 +183,7 @@ def _fixed_parts(table: Sequence[DhRow], convention: str, tool: Any) -> tuple[li
     return before, after * tool
 
 
-def _corners(table: Sequence[DhRow], convention: str, tool: Any) -> list[list[Any]]:
+def _corners(table: Sequence[DhRow], convention: DhConvention, tool: Any) -> list[list[Any]]:
     """Corner points of each link, base first, in the frame of its joint: along d, then along the a that follows."""
     shift = 0 if convention == "standard" else 1
     corners = [[np.zeros(3)] + ([_x_part(table[0]).translation] if shift else [])]

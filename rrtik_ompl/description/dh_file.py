@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from rrtik_ompl.choices import DhConvention
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.files.sections import (
     Name,
@@ -58,7 +59,7 @@ class ToolEntry(Section):
 class TableEntry(Section):
     """The table."""
 
-    convention: Literal["standard", "modified"] = Field(description="standard (Paul [32]) or modified (Craig [33])")
+    convention: DhConvention = Field(description="standard (Paul [32]) or modified (Craig [33])")
     rows: Annotated[list[RowEntry], Field(min_length=1)]
     radius: NotNegative | list[NotNegative] = Field(0.05, description="of the links [m], one number or one per row")
     tool: ToolEntry | None = None

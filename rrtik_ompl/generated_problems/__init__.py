@@ -1,13 +1,14 @@
 """Generated problems for any arm: a posture to be reached, obstacles of a family around it, and a start far from it.
 
 A problem is kept if it is worth planning: the straight motion collides, no order of moving every joint once is free,
-and a path is known to exist, because RRT-Connect or BiCRDT found one within a number of iterations (a limit of time
-would make the problem depend on the machine).
+and a path is known to exist, because a planner found one within a number of iterations (a limit of time would make the
+problem depend on the machine). These planners are those whose class has the trait ``proof_iterations``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from rrtik_ompl.arrays import Matrix, Vector, whole_number
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.generated_problems.families import FAMILIES, obstacles
 from rrtik_ompl.moves.staircase import staircase_orders
+from rrtik_ompl.ompl_bridge.planner_traits import planners_with
 from rrtik_ompl.planning import plan
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
@@ -36,7 +38,6 @@ MIN_DISTANCE, MAX_DISTANCE, MIN_HEIGHT = (
 )  # where a goal's tip lies: distance from the base and height, in reaches
 AWAY = 0.3  # the tip's least distance between start and goal, in reaches
 OUTWARD = 0.3  # cosine of the forearm's angle to the way out, at least
-PROOFS = {"fastrrtconnect": 20_000, "bicrdt": 200}  # planners and their iterations
 PATIENCE = 60.0  # [s], never used up
 
 
@@ -141,8 +142,22 @@ def _starts(world: World, goal: Vector, reach: float, rng: np.random.Generator) 
 
 
 def _solvable(problem: Problem) -> bool:
-    """Whether one of two planners of different kinds finds a path."""
+    """Whether one of the planners that prove it finds a path."""
     return any(
         plan(problem, name, seconds=PATIENCE, seed=0, restarts=0, parameters={"max_iterations": most}).found
-        for name, most in PROOFS.items()
+        for name, most in _proofs()
     )
+
+
+@cache
+def _proofs() -> tuple[tuple[str, int], ...]:
+    """The planners that prove that a problem has a solution, and their iterations; the most first.
+
+    Raises:
+        InputError: If no package offers one.
+    """
+    found = planners_with(lambda traits: traits.proof_iterations)
+    if not found:
+        raise InputError("generated problems: no installed planner has proof_iterations; install rrtik-ompl whole")
+    stated = ((name, traits.proof_iterations) for name, traits in found.items())
+    return tuple(sorted(stated, key=lambda each: each[1], reverse=True))

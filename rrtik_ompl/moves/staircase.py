@@ -166,7 +166,7 @@ def _halves(piece: _Piece, world: World, finest: float) -> list[_Piece]:
     if world.weights @ np.abs(piece.b - piece.a) <= finest:
         raise InputError(
             f"path to convert: edge {piece.edge + 1} passes too close to something to be walked one joint at a time in "
-            f"steps of {1e3 * finest:.3g} mm; plan with 'bicrdt' instead"
+            f"steps of {1e3 * finest:.3g} mm; use a planner of single-joint moves instead, such as the default one"
         )
     middle = 0.5 * (piece.a + piece.b)
     ends = ((piece.a, middle), (middle, piece.b))

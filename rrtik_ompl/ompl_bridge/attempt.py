@@ -119,12 +119,12 @@ def _raise_failure(planner: ob.Planner, name: str, status: ob.PlannerStatus, err
     if failure is not None:
         raise PlannerError(f"planner {name}{'' if failure.refused else ' broke'}: {failure.summary}")
     if status == ob.PlannerStatus.CRASH and getattr(planner, "error", None):  # a planner of somebody else, in Python
-        raise PlannerError(f"planner {name} broke: {str(planner.error).splitlines()[-1]}")
+        raise PlannerError(f"planner {name} broke: {planner.error}")
 
 
 def in_short(error: Exception) -> str:
-    """The last line of an exception's text, its type if it has none."""
-    return (str(error).splitlines() or [type(error).__name__])[-1]
+    """What an exception says, its type if it says nothing."""
+    return str(error) or type(error).__name__
 
 
 def _graph(planner: ob.Planner, si: ob.SpaceInformation) -> dict[str, int]:

@@ -6,12 +6,14 @@ them with their defaults). Nothing else in the library knows a planner by its na
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, fields
-from typing import TypeAlias
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, TypeAlias
 
 from ompl import base as ob
 from ompl import geometric as og
+
+from rrtik_ompl import catalog
 
 PlannerFactory: TypeAlias = Callable[..., ob.Planner]  # a planner's class, or what makes one from a SpaceInformation
 
@@ -24,13 +26,19 @@ class PlannerTraits:
         anytime: It goes on improving its path until the time is up. An optimal path touches what it goes round, so its
             motions are checked as densely as by the second check.
         one_goal: It gets the first goal configuration alone.
-        finds_goals: A goal of the tip, given as the option ``goal``, is enough for it.
+        finds_goals: A goal of the tip, given as the option ``goal``, is enough for it: `plan()` computes no goal
+            configurations. ``needs_goals()`` of a SafePlanner says it of one that was made, to ``solve``.
         straight_first: The straight motion to the nearest goal is tried before it.
         has_graph: Its trees can be counted afterwards.
         supports_iteration_limit: A short attempt, ended by a number of iterations (the option ``max_iterations`` of a
             SafePlanner) or of checked motions (any other), can be of use.
         path_statistics: Names of its statistics that describe the path, not the work: they are not added up.
         kernels: Names of the kernel libraries that it may use.
+        one_joint: Its paths move one joint at a time.
+        brief_options: Options with which it stops at the first path that is good, without improving it; none if it has
+            no such options. The pilot's routes are planned by the first ``one_joint`` planner that has some.
+        proof_iterations: Its ``max_iterations`` where it is to prove that a generated problem has a solution; 0 if it
+            is not used for that. So what it finds decides which problems a seed gives.
     """
 
     anytime: bool = False
@@ -41,6 +49,9 @@ class PlannerTraits:
     supports_iteration_limit: bool = True
     path_statistics: tuple[str, ...] = ()
     kernels: tuple[str, ...] = ()
+    one_joint: bool = False
+    brief_options: Mapping[str, Any] = field(default_factory=dict)
+    proof_iterations: int = 0
 
 
 ANYTIME = PlannerTraits(anytime=True, supports_iteration_limit=False)
@@ -66,11 +77,24 @@ _LISTED = {
     "SORRTstar": PlannerTraits(anytime=True, straight_first=True, supports_iteration_limit=False),
 }
 
+# Geometric planners that OMPL 2.0.1 has and its wheel does not offer; those that a later wheel offers are left out.
+_UNBOUND = (
+    "ABITstar AITstar AOXRRTConnect ATRRT AnytimePathShortening BLITstar BiEST BiRLRT BiTRRT CForest EIRMstar EITstar "
+    "EST LBTRRT LazyLBTRRT LazyPRM LazyPRMstar LazyRRT PDST ProjEST QMP QMPStar QRRT QRRTStar RLRT RRTXstatic RRTsharp "
+    "SBL SPARS SPARStwo SST STRIDE STRRTstar TRRT TRRTstar TSRRT VFRRT XXL pRRT pSBL"
+)
+
 
 def ompl_planners() -> dict[str, type[ob.Planner]]:
     """OMPL's geometric planners of the installed wheel by their names."""
     found = {key: value for key, value in vars(og).items() if isinstance(value, type) and issubclass(value, ob.Planner)}
     return {key: value for key, value in found.items() if value is not ob.Planner}
+
+
+def unbound_planners() -> tuple[str, ...]:
+    """Names of OMPL's geometric planners that the installed wheel lacks."""
+    offered = ompl_planners()
+    return tuple(name for name in _UNBOUND.split() if name not in offered)
 
 
 OMPL_TRAITS = {planner: _LISTED.get(name, PlannerTraits()) for name, planner in ompl_planners().items()}
@@ -82,3 +106,9 @@ def traits_of(factory: PlannerFactory) -> PlannerTraits:
         return OMPL_TRAITS[factory]
     stated = {each.name: getattr(factory, each.name) for each in fields(PlannerTraits) if hasattr(factory, each.name)}
     return PlannerTraits(**stated)
+
+
+def planners_with(condition: Callable[[PlannerTraits], object]) -> dict[str, PlannerTraits]:
+    """The planners that packages offer whose traits meet a condition, by their names, sorted; OMPL's are left out."""
+    stated = {name: traits_of(catalog.find_planner(name)) for name in catalog.list_planners()}
+    return {name: traits for name, traits in stated.items() if condition(traits)}

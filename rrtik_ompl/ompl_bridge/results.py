@@ -54,7 +54,7 @@ def failure_of(error: BaseException) -> Failure:
     """What an exception that left a search means."""
     if isinstance(error, InputError):
         return Failure(True, str(error))
-    return Failure(False, traceback.format_exception_only(error)[-1].strip().splitlines()[-1] + _hint(error))
+    return Failure(False, f"{type(error).__name__}: {error}".removesuffix(": ") + _hint(error))
 
 
 def _hint(error: BaseException) -> str:

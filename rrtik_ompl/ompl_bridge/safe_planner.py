@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import inspect
 import time
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -42,7 +44,8 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
 
     Traits of the class, for `plan()`; see :class:`~rrtik_ompl.ompl_bridge.planner_traits.PlannerTraits`:
     ``anytime``, ``one_goal``, ``finds_goals``, ``straight_first``, ``supports_iteration_limit`` (such a planner has the
-    option ``max_iterations``), ``path_statistics`` and ``kernels``.
+    option ``max_iterations``), ``path_statistics``, ``kernels``, ``one_joint``, ``brief_options`` and
+    ``proof_iterations``.
 
     Attributes:
         seed: The seed in use; given, or drawn from OMPL's, so that ``ompl.util.RNG.setSeed`` fixes it too.
@@ -60,6 +63,9 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     supports_iteration_limit: ClassVar[bool] = False
     path_statistics: ClassVar[tuple[str, ...]] = ()
     kernels: ClassVar[tuple[str, ...]] = ()
+    one_joint: ClassVar[bool] = False
+    brief_options: ClassVar[Mapping[str, Any]] = MappingProxyType({})
+    proof_iterations: ClassVar[int] = 0
 
     def __init__(
         self, si: ob.SpaceInformation, name: str, *, world: MotionQueries | None = None, seed: int | None = None
@@ -106,7 +112,11 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         raise NotImplementedError(f"{type(self).__name__} has no search()")
 
     def needs_goals(self) -> bool:
-        """Whether the search needs goal configurations. For subclasses that can do without."""
+        """Whether this planner's search needs goal configurations. For subclasses that can do without.
+
+        ``solve`` asks it of a planner that was made, which may depend on its options. The trait ``finds_goals`` is of
+        the class: `plan()` reads it before there is a planner.
+        """
         return True
 
     def solve(self, ptc: ob.PlannerTerminationCondition | float) -> ob.PlannerStatus:

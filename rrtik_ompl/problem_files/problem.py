@@ -72,7 +72,7 @@ def load_problem(name_or_file: FilePath, *, robot: Robot | FilePath | None = Non
     try:
         return Problem(world, start, goal, name=path.stem)
     except ProblemError as error:
-        line = document.lines[("goal",) if str(error).startswith("goal") else ("start",)]
+        line = document.lines[(error.part,)]
         error.args = (f"{path}:{line}: {error}",)
         raise
 

@@ -56,6 +56,7 @@ class RunSection(Section):
     lookahead_ticks: Annotated[int, Field(strict=True, ge=0)] = Field(
         0, description="predict obstacle motion this many ticks ahead"
     )
+    repair_budget: Positive | None = Field(None, description="time that a repair may take, one tick if absent [s]")
     seconds: Positive = Field(60.0, description="simulated time at most [s]")
     velocity: Numbers | None = Field(None, description="joint speeds, one or one a joint [rad/s or m/s]")
     goal: Annotated[list[GoalWaypoint], Field(min_length=1)] | None = Field(None, description="a goal that moves")

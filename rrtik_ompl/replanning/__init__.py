@@ -6,9 +6,11 @@ import os
 import time
 from typing import NoReturn
 
+from rrtik_ompl.choices import Replanner
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.files.text import check_target, file_name
 from rrtik_ompl.problem import Problem
+from rrtik_ompl.replanning.drrt_con import DrrtCon
 from rrtik_ompl.replanning.feed import Source, SpeedWarning, feed_of
 from rrtik_ompl.replanning.loop import Clock, GoalFeed, Loop
 from rrtik_ompl.replanning.record import ReplanRun, Tick, load_run
@@ -24,7 +26,7 @@ def replan(  # noqa: D417 - the settings are described in one place
     *,
     step: float,
     rate: float,
-    planner: str = "drrt-con",
+    planner: Replanner = DrrtCon.name,
     max_edge: float | None = None,
     margin: float = 0.0,
     speed_bound: float | None = None,

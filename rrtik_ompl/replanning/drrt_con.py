@@ -15,7 +15,8 @@ from typing import ClassVar
 import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.replanning.connecting import Connect, Joined
+from rrtik_ompl.choices import Replanner
+from rrtik_ompl.replanning.connecting import Connect, Joined, PlainConnect
 from rrtik_ompl.transitions import subdivided, without_repeats
 from rrtik_ompl.world.motion_queries import MotionQueries, Stop, no_stop
 
@@ -34,6 +35,9 @@ class DrrtCon:
             it is blocked.
         free: Whether every motion of the path was free when it was checked last.
         repairs: Number of searches for a new path so far.
+        name: Of the class, as a setting.
+        forgetting: Of the class: whether each repair plans from scratch.
+        repairs_in_kernels: Of the class: whether :class:`KernelDrrtCon` does its work in a world that has kernels.
 
     Args:
         connect: The search between pieces of a path.
@@ -41,7 +45,9 @@ class DrrtCon:
         post: Shortens what is new of a path; the sequential cut if None, as published.
     """
 
-    name: ClassVar[str] = "drrt-con"
+    name: ClassVar[Replanner] = "drrt-con"
+    forgetting: ClassVar[bool] = False
+    repairs_in_kernels: ClassVar[bool] = True
 
     def __init__(self, connect: Connect, max_edge: float, *, post: Post | None = None) -> None:
         self.connect, self.max_edge, self.post = connect, max_edge, post
@@ -49,6 +55,11 @@ class DrrtCon:
         self.free, self.repairs = False, 0
         self._dense = np.zeros((0, 0))
         self._hits: Mask = np.zeros(0, dtype=bool)
+
+    @classmethod
+    def in_box(cls, lower: Vector, upper: Vector, max_edge: float, seed: int, post: Post | None) -> DrrtCon:
+        """One that samples in the box from lower to upper, shape (n,)."""
+        return cls(PlainConnect(lower, upper, max_edge, seed), max_edge, post=post)
 
     def begin(self, start: Vector, goals: Matrix, motions: MotionQueries, stop: Stop = no_stop) -> bool:
         """Look for a first path from ``start`` to one of ``goals``, shape (g, n); whether there is one."""
@@ -127,7 +138,8 @@ class DrrtCon:
 class FromScratch(DrrtCon):
     """The baseline without memory: RRT-Connect from the robot to the goal whenever the path is blocked."""
 
-    name: ClassVar[str] = "rrt-connect"
+    name: ClassVar[Replanner] = "rrt-connect"
+    forgetting: ClassVar[bool] = True
 
     def _reconnected(self, motions: MotionQueries, stop: Stop) -> Joined | None:
         return self.connect(self._dense[:1], self._dense[-1:], motions, stop)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import TAU, Matrix, Vector
+from rrtik_ompl.choices import TickEvent
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import JOINT_TOLERANCE, JointGoal
 from rrtik_ompl.ik.goal_configurations import goal_configurations
@@ -84,7 +85,8 @@ class Loop:
         self._measured(spent, "retarget", self._follow_goal)
         checked = self._world.checked
         free = self._measured(spent, "look", self._check) if changed or not self._planner.free else True
-        checked, event, reason = self._world.checked - checked, "walk", ""
+        event: TickEvent = "walk"
+        checked, reason = self._world.checked - checked, ""
         if not free and not self._world.blocked:
             event, before = "repair" if self._planner.path is not None else "plan", self._planner.path
             free = self._measured(spent, event, self._repair)
@@ -157,7 +159,7 @@ class Loop:
         self._planner.advance(place, passed, self._world)
         return place
 
-    def _wait_or_evade(self) -> tuple[str, str, Vector]:
+    def _wait_or_evade(self) -> tuple[TickEvent, str, Vector]:
         """Without a free path: wait, or evade an obstacle that is too near. Event, reason, configuration."""
         if self._world.blocked:
             return "wait", self._world.blocked, self.q
@@ -194,7 +196,7 @@ class Loop:
         return result
 
     def _record(
-        self, now: float, q: Vector, event: str, spent: Mapping[str, float], checked: int, reason: str,
+        self, now: float, q: Vector, event: TickEvent, spent: Mapping[str, float], checked: int, reason: str,
         path: Matrix | None = None,
     ) -> None:  # fmt: skip
         poses = {

@@ -7,13 +7,14 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, finite_number, not_negative, positive, whole_number
-from rrtik_ompl.errors import InputError, UnknownNameError, require
+from rrtik_ompl.choices import RunOutcome, TickEvent, one_of
+from rrtik_ompl.errors import InputError, in_file, require
 from rrtik_ompl.files.tables import json_object
 from rrtik_ompl.files.text import read_text, write_text
 from rrtik_ompl.poses import pose
@@ -21,8 +22,8 @@ from rrtik_ompl.transitions import route_length
 
 KIND = "replan_run"
 MAX_RECORD_BYTES = 512 * 1024 * 1024  # bytes of a record, half an hour of 20 obstacles at 50 Hz
-EVENTS = ("plan", "walk", "repair", "wait", "evade", "arrive")
-OUTCOMES = ("arrived", "out of time", "interrupted")
+EVENTS: tuple[TickEvent, ...] = get_args(TickEvent)
+OUTCOMES: tuple[RunOutcome, ...] = get_args(RunOutcome)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +46,7 @@ class Tick:
 
     time: float
     q: Vector
-    event: str
+    event: TickEvent
     path: Matrix | None
     poses: Mapping[str, Vector]
     seconds: Mapping[str, float]
@@ -75,7 +76,7 @@ class ReplanRun:
     margin: float
     speed_bound: float | None
     ticks: list[Tick] = field(default_factory=list)
-    outcome: str = "interrupted"
+    outcome: RunOutcome = "interrupted"
     reason: str = ""
 
     @property
@@ -98,11 +99,11 @@ class ReplanRun:
         """Length of the motion [rad, metres counted alike]."""
         return route_length(self.configurations) if self.ticks else 0.0
 
-    def count(self, event: str) -> int:
+    def count(self, event: TickEvent) -> int:
         """Number of ticks of a kind."""
         return sum(tick.event == event for tick in self.ticks)
 
-    def seconds(self, part: str, *events: str) -> NDArray[np.float64]:
+    def seconds(self, part: str, *events: TickEvent) -> NDArray[np.float64]:
         """Wall times of a part of the ticks (of some kinds alone) that have it [s], shape (m,)."""
         chosen = [tick for tick in self.ticks if not events or tick.event in events]
         return np.array([tick.seconds[part] for tick in chosen if part in tick.seconds])
@@ -111,9 +112,9 @@ class ReplanRun:
         """One line for a person."""
         repairs = self.seconds("repair", "repair")
         worst = f", the longest {1e3 * repairs.max():.1f} ms" if len(repairs) else ""
+        counted: tuple[tuple[TickEvent, str], ...] = (("repair", "repair"), ("wait", "wait"), ("evade", "evasion"))
         made, waits, evasions = (
-            f"{self.count(event)} {noun}{'s' * (self.count(event) != 1)}"
-            for event, noun in (("repair", "repair"), ("wait", "wait"), ("evade", "evasion"))
+            f"{self.count(event)} {noun}{'s' * (self.count(event) != 1)}" for event, noun in counted
         )
         why = f" ({self.reason})" if self.reason else ""
         end = f"{self.problem}: {self.outcome}{why} after {self.ticks[-1].time:.2f} s"
@@ -161,7 +162,7 @@ def load_run(path: str | os.PathLike[str]) -> ReplanRun:
     except (KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{path}: not a whole record: {error!r}; write it again with rrtik replan --record") from None
     except InputError as error:
-        raise error if str(error).startswith(str(path)) else InputError(f"{path}: {error}") from None
+        raise in_file(path, error) from None
 
 
 def _heads(document: Mapping[str, Any]) -> dict[str, Any]:
@@ -176,9 +177,8 @@ def _heads(document: Mapping[str, Any]) -> dict[str, Any]:
     not_negative(given["margin"], "margin")
     if given["speed_bound"] is not None:
         positive(given["speed_bound"], "speed_bound")
-    if given["outcome"] not in OUTCOMES:
-        raise UnknownNameError("outcome", given["outcome"], OUTCOMES)
-    return {**given, "joint_names": tuple(given["joint_names"])}
+    outcome = one_of(OUTCOMES, given["outcome"], "outcome")
+    return {**given, "outcome": outcome, "joint_names": tuple(given["joint_names"])}
 
 
 def _check_times(ticks: list[Tick]) -> None:
@@ -198,9 +198,7 @@ def _tick_data(tick: Tick) -> dict[str, Any]:
 
 
 def _tick(entry: Mapping[str, Any], joints: int) -> Tick:
-    event = str(entry["event"])
-    if event not in EVENTS:
-        raise UnknownNameError("event of a tick", event, EVENTS)
+    event = one_of(EVENTS, str(entry["event"]), "event of a tick")
     return Tick(
         finite_number(entry["time"], "time of a tick"),
         finite_array(entry["q"], (joints,), "q of a tick"),

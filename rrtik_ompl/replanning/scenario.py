@@ -88,6 +88,7 @@ def _settings(entry: RunSection, robot: Robot) -> ReplanSettings:
         speed_bound=entry.speed_bound,
         max_edge=entry.max_edge,
         lookahead_ticks=entry.lookahead_ticks,
+        repair_budget=entry.repair_budget,
         seconds=entry.seconds,
         limits=None if entry.velocity is None else RateLimits.of(robot, velocity=entry.velocity),
     )

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from rrtik_ompl.arrays import TAU, Vector, finite_array, positive, whole_number
+from rrtik_ompl.choices import Replanner
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
 from rrtik_ompl.problem_files.run import RENAMED
-from rrtik_ompl.replanning.connecting import KERNELS, KernelCuts, PlainConnect
+from rrtik_ompl.replanning.connecting import KERNELS, KernelCuts
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
 from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
 from rrtik_ompl.replanning.single_tree import SingleTree
@@ -20,7 +21,8 @@ from rrtik_ompl.trajectory.limits import RateLimits
 from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_ompl.world.moving_world import MovingWorld
 
-PLANNERS = ("drrt-con", "rrt-connect", "drrt")
+REPLANNERS: dict[Replanner, type[DrrtCon]] = {each.name: each for each in (DrrtCon, FromScratch, SingleTree)}
+PLANNERS: tuple[Replanner, ...] = tuple(REPLANNERS)
 MAX_RATE = 1e5  # [Hz]
 MIN_EDGE_SHARE = 1e-3  # of the usual max_edge: a path is checked in pieces of half of it, which must fit into memory
 PREDICTED_PLACES = 3  # places of an obstacle that are avoided at once where its motion is predicted
@@ -52,7 +54,7 @@ class ReplanSettings:
 
     step: float
     rate: float
-    planner: str = "drrt-con"
+    planner: Replanner = DrrtCon.name
     max_edge: float | None = None
     margin: float = 0.0
     speed_bound: float | None = None
@@ -143,11 +145,8 @@ def refuse_renamed(options: Mapping[str, object]) -> None:
 def make_planner(settings: ReplanSettings, world: MovingWorld, lower: Vector, upper: Vector) -> DrrtCon:
     """The replanner of the name, for a world and a box of configurations to sample in."""
     edge, seed = settings.edge_length(world.robot), settings.seed
+    kind = REPLANNERS[settings.planner]
     cuts = KernelCuts(world, seed) if has_kernels(world, *KERNELS) else None
-    if settings.planner == SingleTree.name:
-        return SingleTree(lower, upper, edge, seed, post=cuts)
-    forgetting = settings.planner == FromScratch.name
-    if cuts is not None:
-        return KernelDrrtCon(world, lower, upper, edge, seed, forgetting=forgetting)
-    kind = FromScratch if forgetting else DrrtCon
-    return kind(PlainConnect(lower, upper, edge, seed), edge)
+    if cuts is not None and kind.repairs_in_kernels:
+        return KernelDrrtCon(world, lower, upper, edge, seed, forgetting=kind.forgetting)
+    return kind.in_box(lower, upper, edge, seed, cuts)

@@ -11,6 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.choices import Replanner
 from rrtik_ompl.replanning.connecting import ITERATIONS, Joined, joined, one_by_one
 from rrtik_ompl.replanning.drrt_con import DrrtCon, Post
 from rrtik_ompl.search.rrt_connect import ConnectRules, extend
@@ -30,7 +31,8 @@ class SingleTree(DrrtCon):
         post: See :class:`DrrtCon`.
     """
 
-    name: ClassVar[str] = "drrt"
+    name: ClassVar[Replanner] = "drrt"
+    repairs_in_kernels: ClassVar[bool] = False
 
     def __init__(self, lower: Vector, upper: Vector, max_edge: float, seed: int, *, post: Post | None = None) -> None:
         super().__init__(self, max_edge, post=post)
@@ -38,6 +40,11 @@ class SingleTree(DrrtCon):
         self._rng = np.random.default_rng(seed)
         self._tree: ConfigurationTree | None = None
         self.samples = 0
+
+    @classmethod
+    def in_box(cls, lower: Vector, upper: Vector, max_edge: float, seed: int, post: Post | None) -> SingleTree:
+        """See :meth:`DrrtCon.in_box`."""
+        return cls(lower, upper, max_edge, seed, post=post)
 
     def begin(self, start: Vector, goals: Matrix, motions: MotionQueries, stop: Stop = no_stop) -> bool:
         """See :meth:`DrrtCon.begin`; the tree's only root is the first goal that is free."""

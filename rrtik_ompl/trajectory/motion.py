@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
-from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.errors import InputError, in_file, require
 from rrtik_ompl.files.text import read_text, write_text
 from rrtik_ompl.path import VERIFICATION_DENSITY, JointPath
 from rrtik_ompl.robot import Robot
@@ -245,7 +245,7 @@ def load_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) ->
             raise InputError(f"the trajectory moves {own}, but robot '{robot.name}' has the joints {wanted}")
         return found
     except InputError as error:
-        raise error if str(error).startswith(str(file)) else InputError(f"{file}: {error}") from None
+        raise in_file(file, error) from None
 
 
 def _from_document(document: dict[str, Any], robot: Robot | None) -> Trajectory:

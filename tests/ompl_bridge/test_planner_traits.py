@@ -16,19 +16,23 @@ from rrtik_ompl.ik.genetic.options import PRESETS
 from rrtik_ompl.ik.trajectory import list_ik_trajectory_methods
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult
 from rrtik_ompl.ompl_bridge.planner_options import planner_options
-from rrtik_ompl.ompl_bridge.planner_traits import OMPL_TRAITS, PlannerTraits, ompl_planners, traits_of
+from rrtik_ompl.ompl_bridge.planner_traits import (
+    OMPL_TRAITS,
+    PlannerTraits,
+    ompl_planners,
+    planners_with,
+    traits_of,
+    unbound_planners,
+)
 from rrtik_ompl.planning import find_planner
+from rrtik_ompl.replanning import PLANNERS
 from rrtik_ompl.shortening import METHODS
 from rrtik_ompl.world import ACCURACIES
 
 LIBRARY = Path(rrtik_ompl.__file__).parent
-# These ask for a planner by its name, as a user does: generated problems and the pilot's tool are made with certain
-# ones. Replanners and methods of shortening have names of their own, some of them the same.
+# Replanners and methods of shortening have names of their own, some of them those of planners.
 BY_NAME: tuple[str, ...] = (
     "ompl_bridge/planner_traits.py",
-    "generated_problems/",
-    "pilot/",
-    "reproduce/",
     "replanning/",
     "shortening/",
     "cli/replan.py",
@@ -64,6 +68,27 @@ def test_the_classes_of_the_planners_state_their_traits():
     assert set(traits_of(rrtik_planners.FewestMoves).path_statistics) == {"lower_bound", "gap"}
     anytime = {name for name, planner in ompl_planners().items() if traits_of(planner).anytime}
     assert anytime == {"AORRTC", "BITstar", "InformedRRTstar", "PRMstar", "RRTstar", "SORRTstar"}
+
+
+def test_the_planners_that_prove_problems_and_plan_the_routes_of_a_pilot_are_found_by_their_traits():
+    proofs = planners_with(lambda traits: traits.proof_iterations)
+    assert {name: traits.proof_iterations for name, traits in proofs.items()} == {
+        "fastrrtconnect": 20_000,
+        "bicrdt": 200,
+    }
+    brief = planners_with(lambda traits: traits.one_joint and traits.brief_options)
+    assert {name: dict(traits.brief_options) for name, traits in brief.items()} == {
+        "fewest-moves": {"searches": 1, "rounds": 0}
+    }
+    for name, traits in (proofs | brief).items():
+        assert {*traits.brief_options, *(["max_iterations"] if traits.proof_iterations else [])} <= set(
+            planner_options(find_planner(name))
+        )
+
+
+def test_the_planners_that_the_wheel_lacks_are_none_that_it_has():
+    assert not set(unbound_planners()) & set(ompl_planners())
+    assert "BiTRRT" in unbound_planners()
 
 
 @pytest.mark.parametrize("name", catalog.list_planners())
@@ -118,6 +143,7 @@ def test_the_names_to_choose_from_stand_once():
     assert set(get_args(choices.TrajectoryIkMethod)) == {"auto", *list_ik_trajectory_methods()}
     assert set(get_args(choices.GeneticPreset)) == set(PRESETS)
     assert get_args(choices.Accuracy) == ACCURACIES
+    assert get_args(choices.Replanner) == PLANNERS
 
 
 def test_the_short_name_is_the_same_package():

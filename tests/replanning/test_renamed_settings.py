@@ -47,6 +47,13 @@ def test_an_old_key_of_a_file_is_answered_with_file_line_and_the_new_one(old, ne
         assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("new", NAMES.values())
+def test_a_key_by_its_new_name_is_taken(new, tmp_path):
+    file = tmp_path / "new.yaml"
+    file.write_text(TEXT % f"{new}: 1")
+    assert getattr(load_scenario(file).settings, new) == 1
+
+
 def test_an_old_option_is_answered_with_the_new_one(capsys):
     assert rrtik(["replan", "replan_walls", "--predict", "2"]) == 2
     assert "--predict is now called --lookahead-ticks" in capsys.readouterr().err
@@ -63,9 +70,9 @@ def test_a_name_that_never_was_is_no_setting():
 
 def test_a_file_and_the_arguments_make_the_same_settings(tmp_path):
     file = tmp_path / "new.yaml"
-    file.write_text(TEXT % "max_edge: 1.5, lookahead_ticks: 2, margin: 0.1, seconds: 3, speed_bound: 0.5")
+    file.write_text(TEXT % "max_edge: 1.5, lookahead_ticks: 2, margin: 0.1, seconds: 3, repair_budget: 20")
     scenario = load_scenario(file)
-    made = ReplanSettings(step=0.5, rate=10, max_edge=1.5, lookahead_ticks=2, margin=0.1, seconds=3, speed_bound=0.5)
+    made = ReplanSettings(step=0.5, rate=10, max_edge=1.5, lookahead_ticks=2, margin=0.1, seconds=3, repair_budget=20)
     for name in ReplanSettings.__dataclass_fields__:
         assert getattr(scenario.settings, name) == getattr(made, name)
     one, other = scenario.run(seed=1), replan_with(made, scenario.problem)

@@ -8,12 +8,16 @@ Source: [1, ch. 6 and 6.3] (lists of single-joint moves).
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cache
+from typing import Any
 
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.errors import InputError
 from rrtik_ompl.moves.lattice import MoveLattice
 from rrtik_ompl.moves.values import Values, lattice_size, spread_values, values_of
+from rrtik_ompl.ompl_bridge.planner_traits import planners_with
 from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.planning import plan
 from rrtik_ompl.problem import Problem
@@ -21,7 +25,6 @@ from rrtik_ompl.shortening.fewest_moves import turning_limits
 from rrtik_ompl.world import World
 
 PLANNER_SECONDS = 5.0
-PLANNER_PARAMETERS = {"searches": 1, "rounds": 0}  # of the planner
 MAX_CORNERS = 256  # of a lattice of moves
 FURTHER_VALUES = 24  # of a joint
 DETOUR_STEPS = (-16.0, -8.0, -4.0, 4.0, 8.0, 16.0)  # small errors by which a detour is made larger or smaller
@@ -60,10 +63,10 @@ def planned(world: World, start: Vector, goal: Vector, seed: int) -> Matrix | No
 
     Raises:
         ProblemError: If the start or the goal is not free.
+        InputError: If no package offers a planner that suits.
     """
-    found = plan(
-        Problem(world, start, goal), "fewest-moves", seconds=PLANNER_SECONDS, seed=seed, parameters=PLANNER_PARAMETERS
-    )
+    planner, options = _planner()
+    found = plan(Problem(world, start, goal), planner, seconds=PLANNER_SECONDS, seed=seed, parameters=options)
     return NoRoute(found.reason) if found.path is None else found.path.waypoints
 
 
@@ -82,6 +85,18 @@ def moved_aside(world: World, route: Matrix, slack: Vector) -> Iterator[Matrix]:
                 other[column == value, joint] = value + step * slack[joint]
                 if world.motion_valid_batch(other[:-1], other[1:]).all():
                     yield other
+
+
+@cache
+def _planner() -> tuple[str, dict[str, Any]]:
+    """The planner of single-joint moves that can be told to be brief, and the options that tell it.
+
+    Raises:
+        InputError: If no package offers one.
+    """
+    for name, traits in planners_with(lambda traits: traits.one_joint and traits.brief_options).items():
+        return name, dict(traits.brief_options)
+    raise InputError("no installed planner moves one joint at a time and has brief_options; install rrtik-ompl whole")
 
 
 def _routes(world: World, start: Vector, goal: Vector, values: Values, orders: Sequence[Sequence[int]]) -> list[Matrix]:
