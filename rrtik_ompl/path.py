@@ -209,9 +209,7 @@ class JointPath:
                 f"path of {rows.shape[1]} joints: robot '{robot.name}' has {robot.dof}; it is another robot's"
             )
         half = verification_resolution(world)
-        fine = half if resolution is None else float(finite_array(resolution, (), "resolution"))
-        if fine <= 0.0:
-            raise InputError(f"resolution must be greater than 0 metres, got {fine:g}")
+        fine = half if resolution is None else positive(resolution, "resolution", "give metres")
         rows = np.vstack([rows, rows]) if len(rows) == 1 else rows
         counts = np.array([world.steps(a, b, fine) for a, b in pairwise(rows)], dtype=np.float64)
         if counts.sum() > MAX_CHECKS:

@@ -6,10 +6,9 @@ from dataclasses import replace
 from functools import partial
 from typing import ClassVar
 
-import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.arrays import Matrix, whole_number
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.moves.lower_bounds import sharper_bound
 from rrtik_ompl.moves.rules import Joints, PerJoint
@@ -83,8 +82,8 @@ class FewestMoves(OneJointPlanner):
             smallest_move=smallest_move,
             last_joints=last_joints,
         )
-        self.searches = _count(searches, 1, "searches")
-        self.rounds = _count(rounds, 0, "rounds")
+        self.searches = whole_number(searches, "searches:", least=1)
+        self.rounds = whole_number(rounds, "rounds:")
 
     def completed(self, found: SearchResult, path: Matrix) -> SearchResult:
         """See :meth:`OneJointPlanner.completed`."""
@@ -163,9 +162,3 @@ class FewestMoves(OneJointPlanner):
             return one_joint_moves(JointPath.of(world.robot, short), world).waypoints
         except InputError:  # it comes so close to something that no single-joint moves follow it
             return None
-
-
-def _count(value: int, least: int, option: str) -> int:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise InputError(f"{option}: expected a whole number of at least {least}, got {value!r}")
-    return int(value)

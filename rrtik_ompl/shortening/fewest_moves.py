@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from rrtik_ompl.arrays import TAU, Matrix, Vector, finite_array
+from rrtik_ompl.arrays import TAU, Matrix, Vector, finite_array, positive
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.moves.lattice import MoveLattice
@@ -127,8 +127,7 @@ def grid_route(problem: Problem, step: float) -> Matrix | None:
     world, ends = problem.world, _ends(problem, "grid_route")
     if world.robot.dof > 3:
         raise InputError(f"grid_route: expected at most 3 joints, got {world.robot.dof}")
-    if not step > 0.0:
-        raise InputError(f"grid_route: step must be greater than 0, got {step:g}")
+    positive(step, "grid_route: step")
     lower, upper = turning_limits(world.robot, ends)
     size = float(np.prod((upper - lower) / step + 2.0))
     if size > MAX_CELLS:
