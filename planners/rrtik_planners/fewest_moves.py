@@ -24,7 +24,7 @@ from rrtik_planners.bicrdt import BiCRDT
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
 from rrtik_planners.one_joint_planner import OneJointPlanner
 
-SEARCHES, ROUNDS = 5, 10
+SEARCHES, MAX_IMPROVEMENT_ROUNDS = 5, 10
 BRIEF_ITERATIONS = 1000  # of BiCRDT, before it is started anew
 SAMPLED_ITERATIONS = 20_000  # of RRT-Connect
 FEW_NODES = 256  # of a lattice, where each motion is checked by itself
@@ -50,7 +50,7 @@ class FewestMoves(OneJointPlanner):
         world: MotionQueries | None = None,
         seed: int | None = None,
         searches: int = SEARCHES,
-        rounds: int = ROUNDS,
+        rounds: int = MAX_IMPROVEMENT_ROUNDS,
         joint_costs: PerJoint | None = None,
         frozen_joints: Joints = (),
         smallest_move: PerJoint = 0.0,
@@ -107,7 +107,7 @@ class FewestMoves(OneJointPlanner):
             most_nodes=FEW_NODES if world is None else MOST_NODES,
             prove=partial(sharper_bound, world, movable) if isinstance(world, World) else None,
         )
-        moves.settle_corners(ptc)
+        moves.try_corner_routes(ptc)
         iterations = self._quick_routes(moves, starts, goals, checker, ptc)
         if moves.route is None:
             return SearchResult(None, {"iterations": iterations})

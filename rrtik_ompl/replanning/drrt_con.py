@@ -16,7 +16,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.replanning.connecting import Connect, Joined
-from rrtik_ompl.transitions import subdivided, without_repeats
+from rrtik_ompl.transitions import part_counts, subdivided, without_repeats
 from rrtik_ompl.world.motion_queries import MotionQueries, Stop, no_stop
 
 MAX_CUTS = 24  # shortcut ends that are tried from one point of a path
@@ -182,5 +182,5 @@ def cut_from_start(path: Matrix, step: float, motions: MotionQueries) -> Matrix:
 def _points_and_edges(path: Matrix, step: float) -> tuple[Matrix, Vector]:
     """See :func:`points_along`; also the number of the edge on which, or at whose end, each point lies."""
     path = path if len(path) > 1 else np.vstack([path, path])
-    counts = np.ceil(np.linalg.norm(np.diff(path, axis=0), axis=1) / step - 1e-9)
+    counts = part_counts(path, step)
     return subdivided(path, counts)

@@ -11,7 +11,7 @@ from rrtik_ompl.arrays import TAU, Vector, not_negative, positive, whole_number
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
 from rrtik_ompl.problem_files.run import RENAMED
-from rrtik_ompl.replanning.connecting import KERNELS, KernelCuts, PlainConnect
+from rrtik_ompl.replanning.connecting import KERNELS, KernelCuts, PythonConnect
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
 from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
 from rrtik_ompl.replanning.single_tree import SingleTree
@@ -147,4 +147,4 @@ def make_planner(settings: ReplanSettings, world: MovingWorld, lower: Vector, up
     if cuts is not None:
         return KernelDrrtCon(world, lower, upper, edge, seed, forgetting=forgetting)
     kind = FromScratch if forgetting else DrrtCon
-    return kind(PlainConnect(lower, upper, edge, seed), edge)
+    return kind(PythonConnect(lower, upper, edge, seed), edge)

@@ -20,7 +20,7 @@ from rrtik_ompl.transitions import lower_bound, single_joint
 from rrtik_ompl.world import World
 from rrtik_ompl.world.motion_queries import Stop, no_stop
 
-ROUNDS = 10
+MAX_IMPROVEMENT_ROUNDS = 10
 MAX_CELLS = 2_000_000  # of a grid
 
 
@@ -48,7 +48,7 @@ def fewest_moves(
     waypoints: Matrix,
     world: World,
     *,
-    rounds: int = ROUNDS,
+    rounds: int = MAX_IMPROVEMENT_ROUNDS,
     seed: int = 0,
     stop: Stop = no_stop,
     rules: MoveRules | None = None,
@@ -66,7 +66,7 @@ def fewest_moves(
 
     Returns:
         A route with the same ends, bit for bit, that is no worse. Its bound is the number of joints that differ, and
-        more where that has been refuted (see :meth:`MoveSearch.settle_corners` and :mod:`move_proof`).
+        more where that has been refuted (see :meth:`MoveSearch.try_corner_routes` and :mod:`move_proof`).
 
     Raises:
         InputError: If an edge moves several joints or ``rounds`` is negative.
@@ -92,7 +92,7 @@ def fewest_moves(
         prove=partial(sharper_bound, world, [j for j in range(world.robot.dof) if j not in frozen]),
     )
     search.offer(rows)
-    search.settle_corners(stop)
+    search.try_corner_routes(stop)
     search.improve(rounds, stop)
     return MovesFound(rows[:1] if search.route is None else search.route, search.moves, search.bound)
 
@@ -105,7 +105,7 @@ def least_moves(problem: Problem) -> int:
     """
     world, ends = problem.world, _ends(problem, "least_moves")
     search = MoveSearch(ends[:1], ends[1:], *turning_limits(world.robot, ends), world.motion_valid_batch)
-    search.settle_corners()
+    search.try_corner_routes()
     if search.proven or search.bound == lower_bound(ends[0], ends[1]):  # met, or too many corners
         return search.bound
     return sharper_bound(world, range(world.robot.dof), ends[0], ends[1], no_stop)
