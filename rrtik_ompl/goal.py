@@ -17,6 +17,7 @@ from rrtik_ompl.poses import rigid, rotation_angles
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.task_region import TaskRegion, WithinTolerances
 from rrtik_ompl.tip_distance import metres_per_radian
+from rrtik_ompl.units import wrapped
 
 JOINT_TOLERANCE = 1e-6  # [rad] or [m]
 NO_BOX = frozen([0.0, 0.0, 0.0])
@@ -27,7 +28,7 @@ def joint_difference(robot: Robot, Q: ArrayLike, q: ArrayLike) -> NDArray[np.flo
     difference: NDArray[np.float64] = np.asarray(Q, dtype=np.float64) - np.asarray(q, dtype=np.float64)
     if not robot.continuous.any():
         return difference
-    turned = (difference + np.pi) % (2.0 * np.pi) - np.pi
+    turned = wrapped(difference)
     shortest: NDArray[np.float64] = np.where(robot.continuous, turned, difference)
     return shortest
 

@@ -13,10 +13,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
 from rrtik_ompl.errors import InputError, in_file, require
-from rrtik_ompl.files.tables import dumps, loads, path_format
-from rrtik_ompl.files.text import read_text, write_text
+from rrtik_ompl.files.tables import FORMATS, dumps, loads
+from rrtik_ompl.files.text import known_ending, read_text, write_text
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.transitions import SAME, merge_moves, moved, route_length, single_joint, subdivided, transitions
+from rrtik_ompl.transitions import (
+    SAME,
+    merge_moves,
+    moved,
+    part_counts,
+    route_length,
+    single_joint,
+    subdivided,
+    transitions,
+)
 from rrtik_ompl.units import joint_units
 from rrtik_ompl.world import World
 
@@ -186,7 +195,7 @@ class JointPath:
     def resample(self, step: float) -> JointPath:
         """The same path with further waypoints, none farther than ``step`` [rad] from the next; all old ones stay."""
         size = positive(step, "resample step")
-        counts = np.ceil(np.linalg.norm(np.diff(self.waypoints, axis=0), axis=1) / size - 1e-9)
+        counts = part_counts(self.waypoints, size)
         return self.with_waypoints(subdivided(self.waypoints, counts)[0])
 
     def violations(self, world: World, *, resolution: float | None = None) -> tuple[Violation, ...]:
@@ -209,9 +218,7 @@ class JointPath:
                 f"path of {rows.shape[1]} joints: robot '{robot.name}' has {robot.dof}; it is another robot's"
             )
         half = verification_resolution(world)
-        fine = half if resolution is None else float(finite_array(resolution, (), "resolution"))
-        if fine <= 0.0:
-            raise InputError(f"resolution must be greater than 0 metres, got {fine:g}")
+        fine = half if resolution is None else positive(resolution, "resolution", "give metres")
         rows = np.vstack([rows, rows]) if len(rows) == 1 else rows
         counts = np.array([world.steps(a, b, fine) for a, b in pairwise(rows)], dtype=np.float64)
         if counts.sum() > MAX_CHECKS:
@@ -236,7 +243,7 @@ class JointPath:
         Raises:
             InputError: If the ending is another one or the file cannot be written.
         """
-        write_text(path, dumps(self._document(), path_format(path)))
+        write_text(path, dumps(self._document(), known_ending(path, FORMATS, "path")))
 
     def _document(self) -> dict[str, Any]:
         return {
@@ -274,7 +281,7 @@ def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> Joint
         InputError: If the file is missing, malformed, or does not fit the robot; the message names file and line.
     """
     require(robot, Robot | None, "robot of a path", "use load_robot(name)")
-    ending = path_format(path)
+    ending = known_ending(path, FORMATS, "path")
     try:
         document = loads(read_text(path), ending)
         names, name = document.get("joint_names"), str(document.get("robot", ""))

@@ -126,6 +126,15 @@ def edge_keys(route: Matrix) -> list[tuple[bytes, bytes]]:
     return list(pairwise(row.tobytes() for row in route))
 
 
+def part_counts(rows: Matrix, step: float) -> Vector:
+    """Into how many parts to cut each edge of a polyline, shape (k, n), so that none is longer than ``step``.
+
+    A part may be longer by rounding. An edge without length has none (-0.0). Shape (k - 1,).
+    """
+    counts: Vector = np.ceil(np.linalg.norm(np.diff(rows, axis=0), axis=1) / step - 1e-9)
+    return counts
+
+
 def subdivided(rows: Matrix, counts: Vector) -> tuple[Matrix, Vector]:
     """Cut edge i of a polyline, shape (k, n), into ``counts[i]`` equal parts; also the edge number of every point."""
     points, edges = [rows[:1]], [np.zeros(1, dtype=np.int64)]

@@ -3,10 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import TAU
 
 DEGREES = 180.0 / np.pi  # in a radian
+DEGREE = np.pi / 180.0  # [rad]
+
+
+Angle = TypeVar("Angle", float, NDArray[np.float64])
+
+
+def wrapped(angle: Angle) -> Angle:
+    """Angles [rad] moved by full turns into [-pi, pi): a number, or an array of any shape, whose shape it keeps."""
+    return (angle + np.pi) % TAU - np.pi
 
 
 def joint_unit(slides: bool) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 import rrtik_ompl as rrtik
 from rrtik_ompl.planning import plan
 from rrtik_ompl.replanning import ReplanRun, replan
-from rrtik_ompl.replanning.connecting import PlainConnect
+from rrtik_ompl.replanning.connecting import PythonConnect
 from rrtik_ompl.replanning.contact_check import ContactReport, check_contacts
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
 from rrtik_ompl.replanning.generate import moving_problem
@@ -148,8 +148,8 @@ def with_pairs(loop: Loop, quick: Moments, slow: Moments, slow_every: int) -> No
     eps, count = planner.max_edge, 0
     scratch = {SCRATCH: KernelDrrtCon(world, lower, upper, eps, 1, forgetting=True)}
     plain = {
-        "DRRT-Con as published, in Python": DrrtCon(PlainConnect(lower, upper, eps, 1), eps),
-        "from scratch as published, in Python": FromScratch(PlainConnect(lower, upper, eps, 1), eps),
+        "DRRT-Con as published, in Python": DrrtCon(PythonConnect(lower, upper, eps, 1), eps),
+        "from scratch as published, in Python": FromScratch(PythonConnect(lower, upper, eps, 1), eps),
     }
 
     def timed(motions: MotionQueries, stop: Callable[[], Any]) -> bool:

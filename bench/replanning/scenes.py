@@ -18,7 +18,7 @@ WALLS = [[(6, -5), (8, -5), (8, 12), (6, 12)], [(12, 8), (14, 8), (14, 25), (12,
 POCKET = [(4, 2), (12, 2), (12, 3), (5, 3), (5, 8), (4, 8)]
 UPPER = [(9, 10), (17, 10), (17, 17), (16, 17), (16, 11), (9, 11)]
 CENTRES = [(5, 5), (5, 14), (10, 9), (10, 16), (14, 5), (15, 12)]
-CIRCUMRADIUS, TURN = 1.8, 0.03
+CIRCUMRADIUS, TURN_CHANCE = 1.8, 0.03
 OPTIONS = {"step": STEP, "rate": RATE, "max_edge": EPS, "repair_budget": 0.5}
 
 
@@ -74,7 +74,7 @@ def _wander(rng: np.random.Generator, at: np.ndarray, length: float, ticks: int)
     heading, places = rng.uniform(0.0, 2.0 * np.pi), [at]
     way = length * np.array([np.cos(heading), np.sin(heading)])
     for _ in range(ticks):
-        if rng.random() < TURN:
+        if rng.random() < TURN_CHANCE:
             heading = rng.uniform(0.0, 2.0 * np.pi)
             way = length * np.array([np.cos(heading), np.sin(heading)])
         ahead = at + way

@@ -10,7 +10,7 @@ from rrtik_bench.report.rows import Row, verdict
 from rrtik_bench.tables import Table
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.replanning import ReplanRun
-from rrtik_ompl.replanning.connecting import PlainConnect
+from rrtik_ompl.replanning.connecting import PythonConnect
 from rrtik_ompl.replanning.contact_check import check_contacts
 from rrtik_ompl.replanning.drrt_con import DrrtCon
 from rrtik_ompl.replanning.scenario import Scenario, load_scenario
@@ -36,7 +36,7 @@ def static(quick: bool) -> list[Row]:
     walked = [run.length for run in _runs(scenario, count)]
     once = []
     for seed in range(count):
-        planner = DrrtCon(PlainConnect(problem.robot.lower, problem.robot.upper, edge, seed), edge)
+        planner = DrrtCon(PythonConnect(problem.robot.lower, problem.robot.upper, edge, seed), edge)
         planner.begin(problem.start, problem.goal.q[None], MovingWorld(problem.world))
         assert planner.path is not None
         once.append(route_length(planner.path))

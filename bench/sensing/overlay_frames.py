@@ -14,7 +14,7 @@ from bench.shared.problems import goal_joints
 from rrtik_bench.report.page import Report
 from rrtik_ompl import load_problem, load_robot
 from rrtik_ompl.overlay.augment import Augmenter, Ghost
-from rrtik_ompl.overlay.canvas import FAR, Canvas
+from rrtik_ompl.overlay.canvas import FARTHEST_DRAWN, Canvas
 from rrtik_ompl.overlay.figure import figure_of, placed
 from rrtik_ompl.overlay.reference_z_buffer import ROUNDING, reference_z_buffer
 from rrtik_ompl.overlay.surfaces import robot_surfaces
@@ -41,9 +41,9 @@ def silhouettes(report: Report, count: int) -> None:
             canvas = Canvas(camera)
             canvas.draw(shown)
             truth, doubt = reference_z_buffer(camera, shown)
-            both = canvas.drawn & (truth < FAR)
+            both = canvas.drawn & (truth < FARTHEST_DRAWN)
             drawn += int(both.sum())
-            differ += int((canvas.drawn != (truth < FAR)).sum())
+            differ += int((canvas.drawn != (truth < FARTHEST_DRAWN)).sum())
             doubtful += int((both & doubt).sum())
             deep = max(deep, float(np.abs(canvas.depths - truth)[both].max()))
         different += differ

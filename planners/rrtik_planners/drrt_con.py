@@ -10,13 +10,12 @@ from ompl import base as ob
 from rrtik_ompl.arrays import Matrix, Vector, positive
 from rrtik_ompl.fast.search.connect_layout import KERNELS
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
+from rrtik_ompl.fast.search.motions.motion_table import NO_LIMIT
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_ompl.replanning.connecting import KERNELS as LIBRARIES
-from rrtik_ompl.replanning.connecting import KernelConnect, PlainConnect
+from rrtik_ompl.replanning.connecting import KernelConnect, PythonConnect
 from rrtik_ompl.replanning.drrt_con import DrrtCon, points_along
 from rrtik_ompl.world.motion_queries import has_kernels, is_conservative
-
-UNLIMITED = 2**62  # samples; the time is the limit
 
 
 class DRRTCon(SafePlanner):
@@ -82,11 +81,11 @@ class DRRTCon(SafePlanner):
 
     def _new(self) -> DrrtCon:
         lower, upper = self.bounds()
-        eps, _ = connect_lengths(lower, upper, self.range, None)
+        max_edge, _ = connect_lengths(lower, upper, self.range, None)
         seed, world = int(self.rng.integers(2**63)), self._world
         if is_conservative(world) and has_kernels(world, *LIBRARIES):
-            return DrrtCon(KernelConnect(world, lower, upper, eps, seed, UNLIMITED), eps)
-        return DrrtCon(PlainConnect(lower, upper, eps, seed, UNLIMITED), eps)
+            return DrrtCon(KernelConnect(world, lower, upper, max_edge, seed, NO_LIMIT), max_edge)
+        return DrrtCon(PythonConnect(lower, upper, max_edge, seed, NO_LIMIT), max_edge)
 
 
 def _nearest_place(path: Matrix, starts: Matrix, step: float) -> tuple[Vector, int]:

@@ -8,10 +8,9 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any, ClassVar
 
-import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.arrays import Matrix, whole_number
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.moves.lower_bounds import sharper_bound
 from rrtik_ompl.moves.rules import Joints, PerJoint
@@ -27,7 +26,7 @@ from rrtik_planners.bicrdt import BiCRDT
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
 from rrtik_planners.one_joint_planner import OneJointPlanner
 
-SEARCHES, ROUNDS = 5, 10
+SEARCHES, MAX_IMPROVEMENT_ROUNDS = 5, 10
 BRIEF_ITERATIONS = 1000  # of BiCRDT, before it is started anew
 SAMPLED_ITERATIONS = 20_000  # of RRT-Connect
 FEW_NODES = 256  # of a lattice, where each motion is checked by itself
@@ -54,7 +53,7 @@ class FewestMoves(OneJointPlanner):
         world: MotionQueries | None = None,
         seed: int | None = None,
         searches: int = SEARCHES,
-        rounds: int = ROUNDS,
+        rounds: int = MAX_IMPROVEMENT_ROUNDS,
         joint_costs: PerJoint | None = None,
         frozen_joints: Joints = (),
         smallest_move: PerJoint = 0.0,
@@ -86,8 +85,8 @@ class FewestMoves(OneJointPlanner):
             smallest_move=smallest_move,
             last_joints=last_joints,
         )
-        self.searches = _count(searches, 1, "searches")
-        self.rounds = _count(rounds, 0, "rounds")
+        self.searches = whole_number(searches, "searches:", least=1)
+        self.rounds = whole_number(rounds, "rounds:")
 
     def completed(self, found: SearchResult, path: Matrix) -> SearchResult:
         """See :meth:`OneJointPlanner.completed`."""
@@ -111,7 +110,7 @@ class FewestMoves(OneJointPlanner):
             most_nodes=FEW_NODES if world is None else MOST_NODES,
             prove=partial(sharper_bound, world, movable) if isinstance(world, World) else None,
         )
-        moves.settle_corners(ptc)
+        moves.try_corner_routes(ptc)
         iterations = self._quick_routes(moves, starts, goals, checker, ptc)
         if moves.route is None:
             return SearchResult(None, {"iterations": iterations})
@@ -166,9 +165,3 @@ class FewestMoves(OneJointPlanner):
             return one_joint_moves(JointPath.of(world.robot, short), world).waypoints
         except InputError:  # it comes so close to something that no single-joint moves follow it
             return None
-
-
-def _count(value: int, least: int, option: str) -> int:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise InputError(f"{option}: expected a whole number of at least {least}, got {value!r}")
-    return int(value)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix, positive
+from rrtik_ompl.arrays import Matrix, positive, whole_number
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import Goal
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
@@ -58,8 +58,7 @@ class IKURT(TipSeeker):
             InputError: If an option is out of range or the space is of another kind.
         """
         super().__init__(si, "IKURT", world=world, seed=seed, goal=goal)
-        if isinstance(most_vertices, bool) or not isinstance(most_vertices, int) or most_vertices < 1:
-            raise InputError(f"most_vertices: expected a whole number of at least 1, got {most_vertices!r}")
+        most_vertices = whole_number(most_vertices, "most_vertices:", least=1)
         if not isinstance(jacobian, bool):
             raise InputError(f"jacobian: expected true or false, got {jacobian!r}")
         self.options = Options(positive(step, "step"), positive(stride, "stride"), jacobian, most_vertices)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import TAU, Matrix, Vector
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.problem import Problem
@@ -43,7 +43,7 @@ def planar_chain(joints: int, seed: int = 0) -> Problem:
     start = _bent(joints, BEND)
     rng = np.random.default_rng([joints, seed])
     for _ in range(DRAWS):
-        angles = rng.uniform(-0.6, 0.6, 3) + np.array([np.pi, 2.0 * np.pi / 3.0, -2.0 * np.pi / 3.0])
+        angles = rng.uniform(-0.6, 0.6, 3) + np.array([np.pi, TAU / 3.0, -TAU / 3.0])
         places = np.column_stack([np.cos(angles), np.sin(angles)]) * rng.uniform(1.0, 2.5, (3, 1))
         discs = [(place, SMALL_DISC) for place in places] + [(WAY[0], DISC)]
         world = World(robot, Scene(tuple(_ball(k, (*place, 0.0), size) for k, (place, size) in enumerate(discs))))

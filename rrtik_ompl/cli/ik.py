@@ -119,9 +119,11 @@ def _setting(
 
 def _tolerances(millimetres: float | None, degrees: float | None) -> dict[str, float]:
     """Those that are given, by the names of `PoseGoal`, in metres and radians."""
+    from rrtik_ompl.arrays import positive
+
     for option, value in (("--tolerance-mm", millimetres), ("--tolerance-deg", degrees)):
-        if value is not None and not value > 0.0:
-            raise InputError(f"{option} must be greater than 0, got {value:g}")
+        if value is not None:
+            positive(value, option)
     found = {} if millimetres is None else {"position_tolerance": 1e-3 * millimetres}
     return found if degrees is None else {**found, "orientation_tolerance": math.radians(degrees)}
 

@@ -19,7 +19,7 @@ from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form, solutio
 from rrtik_ompl.ik.analytic.reference_branches import tip_fault
 from rrtik_ompl.ik.solve import IkResult, different_rows, mid_range_configuration
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.units import DEGREES
+from rrtik_ompl.units import DEGREES, shown_unit
 
 if TYPE_CHECKING:
     from rrtik_ompl.goal import TipGoal
@@ -89,7 +89,7 @@ def _targets(robot: Robot, goal: TipGoal) -> NDArray[np.float64] | None:
 def joint_heads(robot: Robot) -> list[str]:
     """Names of the joints with the unit in which a person reads them."""
     return [
-        f"{name} [{'m' if slides else 'deg'}]" for name, slides in zip(robot.joint_names, robot.prismatic, strict=True)
+        f"{name} [{shown_unit(slides)[1]}]" for name, slides in zip(robot.joint_names, robot.prismatic, strict=True)
     ]
 
 

@@ -92,11 +92,12 @@ def time_path(
 
     from rrtik_ompl import RateLimits, load_problem, plot_joints, time_parameterize
     from rrtik_ompl.cli import plan_report as report
+    from rrtik_ompl.units import DEGREE
 
     task = load_problem(problem)
     robot = task.robot
     route = _valid_path(path, task)
-    factors = np.where(robot.prismatic, 1.0, np.pi / 180.0)
+    factors = np.where(robot.prismatic, 1.0, DEGREE)
     limits = RateLimits.of(
         robot, share=share, **{name: None if row is None else _scaled(row, factors) for name, row in given.items()}
     )

@@ -17,13 +17,12 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.boxes import Boxes, PlacedBoxes
 from rrtik_ompl.collision.containment import Containment
-from rrtik_ompl.collision.margins import kept_apart, request
+from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, kept_apart, request
 from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.robot import Robot
 
 MAX_PAIR_CHECKS = 1 << 16  # runs of rows times pairs checked together, to bound memory
 RUNS = (64, 16, 4, 1)  # rows that are checked together
-DISTANCE_TOLERANCE = 1e-5  # [m] for rounding, in our arithmetic and in coal's distances
 
 Numbers: TypeAlias = NDArray[np.int64]
 

@@ -6,6 +6,8 @@ import coal
 
 from rrtik_ompl.collision.bodies import Body
 
+DISTANCE_TOLERANCE = 1e-5  # [m] for rounding, in our arithmetic and in coal's distances and depths
+
 
 def kept_apart(first: Body, second: Body) -> float:
     """How far two bodies must stay apart [m]: the margin of an obstacle, 0 between links.

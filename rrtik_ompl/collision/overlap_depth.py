@@ -9,11 +9,9 @@ import pinocchio as pin
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.collision.margins import kept_apart, request
+from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, kept_apart, request
 from rrtik_ompl.collision.solids import is_mesh
 from rrtik_ompl.robot import Robot
-
-DISTANCE_TOLERANCE = 1e-5  # [m] taken off coal's depths
 
 
 class OverlapDepth:

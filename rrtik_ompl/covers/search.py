@@ -163,7 +163,7 @@ def _refined(
             places, needs = _moved_elsewhere(places, needs, spare, spare_needs, limit)
         owner = needs.argmin(axis=0)
         kept, owner = np.unique(owner, return_inverse=True)
-        places = _settled(parts, surface, places[kept], owner.ravel()[element])
+        places = _descended(parts, surface, places[kept], owner.ravel()[element])
     return best
 
 
@@ -196,7 +196,7 @@ def _moved_elsewhere(
     return Places(centres, depth), needs
 
 
-def _settled(parts: Elements, surface: cKDTree, places: Places, owner: NDArray[np.int64]) -> Places:
+def _descended(parts: Elements, surface: cKDTree, places: Places, owner: NDArray[np.int64]) -> Places:
     """Each ball moved to where it sticks out least while it holds its points.
 
     It goes away from the surface that is nearest and towards the point that is farthest, in ever shorter steps (after

@@ -15,7 +15,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import TAU, Matrix, Vector
 from rrtik_ompl.collision.solids import inside_mesh
 
 ROUNDING = 1e-12  # relative to the extent of the solid; far above float64's rounding, far below any length that matters
@@ -182,7 +182,7 @@ def cylinder_solid(radius: float, half_length: float) -> tuple[CylinderSolid, Fr
     """A cylinder about z, inside a regular prism."""
     frame = Frame(np.zeros(3), np.eye(3), 2.0 * float(np.hypot(radius, half_length)))
     small, high = radius / frame.scale, half_length / frame.scale
-    turn = (np.arange(CYLINDER_SIDES) + 0.5) * (2.0 * np.pi / CYLINDER_SIDES)
+    turn = (np.arange(CYLINDER_SIDES) + 0.5) * (TAU / CYLINDER_SIDES)
     ring = np.column_stack([np.cos(turn), np.sin(turn)]) * (small / np.cos(np.pi / CYLINDER_SIDES))
     return CylinderSolid(small, high, _prism(ring, high), ROUNDING), frame
 

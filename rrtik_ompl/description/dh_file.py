@@ -25,6 +25,7 @@ from rrtik_ompl.files.sections import (
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
 from rrtik_ompl.poses import IDENTITY_QUATERNION, pose
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.units import DEGREE
 
 if TYPE_CHECKING:
     from rrtik_ompl.description.robot_source import BasePose
@@ -120,7 +121,7 @@ def _row(document: YamlDocument, number: int, row: RowEntry) -> DhRow:
     lower, upper = (-180.0, 180.0) if limits is None else limits
     if lower >= upper:
         raise document.error((*place, given), f"lower limit {lower:g} is not below upper limit {upper:g}; swap them")
-    scale = 1.0 if row.type == "prismatic" else np.pi / 180.0
+    scale = 1.0 if row.type == "prismatic" else DEGREE
     return DhRow(
         a=row.a,
         alpha=np.radians(row.alpha_deg),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Vector, finite_array, frozen
+from rrtik_ompl.arrays import TAU, Vector, finite_array, frozen
 from rrtik_ompl.description.tree import Joint, Tree
 from rrtik_ompl.description.tree_model import build_models
 from rrtik_ompl.errors import InputError, UnknownNameError
@@ -216,7 +216,7 @@ def _limits(name: str, joints: Iterable[Joint], given: Mapping[str, JointLimits]
 
 def _turned_inside(q: Vector, bounds: Mapping[str, Any]) -> Vector:
     """The same posture with joints that lie outside their limits turned by a full turn, if that brings them inside."""
-    for turn in (2.0 * np.pi, -2.0 * np.pi):
+    for turn in (TAU, -TAU):
         other = q + turn
         outside = (q < bounds["lower"]) | (q > bounds["upper"])
         fits = (other >= bounds["lower"]) & (other <= bounds["upper"]) & ~bounds["prismatic"]

@@ -5,25 +5,12 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
 from typing import Any
 
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.files.text import file_name, is_number
+from rrtik_ompl.files.text import is_number
 
 FORMATS = (".json", ".csv", ".txt")
-
-
-def path_format(path: str | os.PathLike[str]) -> str:
-    """Ending of a path file, one of ``FORMATS``.
-
-    Raises:
-        InputError: If it is another one.
-    """
-    ending = file_name(path).suffix.lower()
-    if ending not in FORMATS:
-        raise InputError(f"{path}: unknown ending '{ending}' for a path; use {', '.join(FORMATS)}")
-    return ending
 
 
 def dumps(document: dict[str, Any], ending: str) -> str:

@@ -99,6 +99,18 @@ def make_folder(path: str | os.PathLike[str]) -> None:
         raise InputError(f"{path}: no folder can be made: {getattr(error, 'strerror', None) or error}") from error
 
 
+def known_ending(path: str | os.PathLike[str], endings: tuple[str, ...], what: str) -> str:
+    """Ending of a file in small letters, one of ``endings``; ``what`` says in the error message what the file holds.
+
+    Raises:
+        InputError: If it is another one.
+    """
+    ending = file_name(path).suffix.lower()
+    if ending not in endings:
+        raise InputError(f"{path}: unknown ending '{ending}' for a {what}; use {', '.join(endings)}")
+    return ending
+
+
 def check_target(path: Path | None, endings: tuple[str, ...]) -> None:
     """Refuse a file that cannot be written before the work is done, not after; None is no file.
 

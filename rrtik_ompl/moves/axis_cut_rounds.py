@@ -13,11 +13,16 @@ from rrtik_ompl.moves.axis_cut import axis_cut, check_once, double_axis_cut
 from rrtik_ompl.transitions import lower_bound, route_length, transitions
 from rrtik_ompl.world.motion_queries import MotionsFree, Stop, no_stop
 
-ROUNDS = 20
+MAX_CUT_ROUNDS = 20
 
 
 def axis_cut_rounds(
-    waypoints: ArrayLike, motions_free: MotionsFree, *, rounds: int = ROUNDS, seed: int = 0, stop: Stop = no_stop
+    waypoints: ArrayLike,
+    motions_free: MotionsFree,
+    *,
+    rounds: int = MAX_CUT_ROUNDS,
+    seed: int = 0,
+    stop: Stop = no_stop,
 ) -> Matrix:
     """The double pass, then ``rounds`` passes with random joint orders in alternating direction; keeps the best.
 

@@ -94,7 +94,7 @@ class MoveSearch:
 
     @property
     def bound(self) -> int:
-        """No route has fewer moves. Sharpened by :meth:`settle_corners` and :meth:`raise_bound`."""
+        """No route has fewer moves. Sharpened by :meth:`try_corner_routes` and :meth:`raise_bound`."""
         return min(*self._bounds, self.moves)
 
     @property
@@ -122,7 +122,7 @@ class MoveSearch:
         self._offers.append(merged)
         self._best.take(merged)
 
-    def settle_corners(self, stop: Stop = no_stop) -> None:
+    def try_corner_routes(self, stop: Stop = no_stop) -> None:
         """Find out for each start and goal whether they are joined without a detour of any joint; sharpens the bound.
 
         Such routes have no free values: they pass the corners of the box between start and goal, all of which are

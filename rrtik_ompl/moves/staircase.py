@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import Matrix, Vector, positive
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.path import VERIFICATION_DENSITY, JointPath
 from rrtik_ompl.problem import Problem
@@ -56,9 +56,7 @@ def one_joint_moves(path: JointPath, problem: Problem | World, *, finest: float 
     faults = path.violations(world)
     if faults:
         raise InputError(f"path to convert: edge {faults[0].edge + 1} is not valid: {faults[0].reason}")
-    least = FINEST * world.motion_resolution if finest is None else float(finest)
-    if not least > 0.0:
-        raise InputError(f"finest must be greater than 0 metres, got {least:g}")
+    least = FINEST * world.motion_resolution if finest is None else positive(finest, "finest", "give metres")
     for density in DENSITIES:
         finer = world.with_resolution(world.motion_resolution / density)
         converted = path.with_waypoints(_converted(path.waypoints, finer, least))

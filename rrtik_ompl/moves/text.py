@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.path import JointPath, Move
-from rrtik_ompl.units import reading
+from rrtik_ompl.units import reading, wrapped
 
 COLUMNS = ("move", "joint", "from", "to", "change", "unit")
 
@@ -58,7 +58,7 @@ def _sentence(move: Move) -> str:
     else:
         words, unit, factor = ("up", "down"), "degrees", float(np.rad2deg(1.0))
     if move.continuous:
-        words, end = ("forward", "back"), float(np.remainder(end + np.pi, 2.0 * np.pi) - np.pi)
+        words, end = ("forward", "back"), float(wrapped(end))
     word = words[0] if move.change > 0.0 else words[1]
     far, target = _rounded(factor * abs(move.change)), _rounded(factor * end)
     return f"{_said(move.joint)} {word} {far} {unit} to {target.replace('-', 'minus ')}"

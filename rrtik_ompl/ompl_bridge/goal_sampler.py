@@ -12,7 +12,7 @@ from rrtik_ompl.ompl_bridge.setup import ValidityCallback, space_information
 from rrtik_ompl.ompl_bridge.states import StateIO, space_bounds
 from rrtik_ompl.problem import Problem
 
-MOST = 32
+MAX_CONFIGURATIONS = 32
 
 
 class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no types
@@ -28,7 +28,7 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
     """
 
     def __init__(
-        self, problem: Problem, si: ob.SpaceInformation | None = None, *, seed: int = 0, most: int = MOST
+        self, problem: Problem, si: ob.SpaceInformation | None = None, *, seed: int = 0, most: int = MAX_CONFIGURATIONS
     ) -> None:
         """Make a goal.
 

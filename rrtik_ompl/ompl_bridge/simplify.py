@@ -15,7 +15,7 @@ from rrtik_ompl.ompl_bridge.setup import ValidityCallback, space_information
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.problem import Problem
 
-ENDLESS = 1e9  # [s]
+MAX_SECONDS = 1e9  # [s]
 
 
 def simplified(problem: Problem, route: Matrix, *, seconds: float, seed: int) -> tuple[Matrix, int]:
@@ -32,8 +32,8 @@ def simplified(problem: Problem, route: Matrix, *, seconds: float, seed: int) ->
         ou.RNG.setSeed(1 + seed % (2**31 - 2))  # before any object that draws from it; OMPL does not take 0
         validity = ValidityCallback(problem.world)
         si = space_information(problem, route, validity)
-        validity.deadline = time.monotonic() + min(seconds, ENDLESS)
-        condition = ob.timedPlannerTerminationCondition(min(seconds, ENDLESS))
+        validity.deadline = time.monotonic() + min(seconds, MAX_SECONDS)
+        condition = ob.timedPlannerTerminationCondition(min(seconds, MAX_SECONDS))
         validity.stop = condition.terminate
         states = StateIO(si)
         path = states.path(si, route)

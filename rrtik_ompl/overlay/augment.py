@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.overlay.canvas import NEAR, Canvas
+from rrtik_ompl.overlay.canvas import NEAREST_DRAWN, Canvas
 from rrtik_ompl.overlay.figure import Figure, figure_of, placed, tinted
 from rrtik_ompl.overlay.surfaces import ROBOT_TRIANGLES, obstacle_surfaces, robot_surfaces
 from rrtik_ompl.robot import Robot
@@ -151,7 +151,9 @@ class Augmenter:
         return np.asarray(drawn, dtype=np.uint8)
 
     def depths(self) -> NDArray[np.float32]:
-        """Depths of the arm and obstacles drawn last, `canvas.FAR` where there was nothing. Shape (height, width).
+        """Depths of the arm and obstacles drawn last. Shape (height, width).
+
+        They are `canvas.FARTHEST_DRAWN` where there was nothing.
 
         Raises:
             InputError: If nothing was drawn yet.
@@ -237,7 +239,7 @@ class Augmenter:
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Sixteenths of pixels of points in the base's frame, and which of them are before the camera."""
         seen = np.asarray(points, dtype=np.float64) @ T_camera_base[:3, :3].T + T_camera_base[:3, 3]
-        before = seen[:, 2] > NEAR
+        before = seen[:, 2] > NEAREST_DRAWN
         pixels = np.zeros((len(seen), 2))
         if before.any():
             pixels[before] = self.camera.project(seen[before])

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.overlay.figure import Placed
 from rrtik_ompl.sensing.cameras.camera import Camera
 
-NEAR, FAR = 0.05, 50.0  # [m]
+NEAREST_DRAWN, FARTHEST_DRAWN = 0.05, 50.0  # [m]
 
 
 class Canvas:
@@ -22,7 +22,7 @@ class Canvas:
 
     Attributes:
         colors: Red, green, blue from 0 to 1, of something else where nothing was drawn. Shape (height, width, 3).
-        depths: Along the optical axis [m]; `FAR` where nothing was drawn. Shape (height, width).
+        depths: Along the optical axis [m]; `FARTHEST_DRAWN` where nothing was drawn. Shape (height, width).
     """
 
     def __init__(self, camera: Camera) -> None:
@@ -30,16 +30,16 @@ class Canvas:
         self.camera = camera
         self._view, self._angle = _matrix(camera)
         self.colors: NDArray[np.float32] = np.zeros((camera.height, camera.width, 3), dtype=np.float32)
-        self.depths: NDArray[np.float32] = np.full((camera.height, camera.width), FAR, dtype=np.float32)
+        self.depths: NDArray[np.float32] = np.full((camera.height, camera.width), FARTHEST_DRAWN, dtype=np.float32)
 
     def clear(self) -> None:
         """Empty it again."""
-        self.depths.fill(FAR)
+        self.depths.fill(FARTHEST_DRAWN)
 
     @property
     def drawn(self) -> NDArray[np.bool_]:
         """Where something was drawn. Shape (height, width)."""
-        return np.asarray(self.depths < 0.999 * FAR)
+        return np.asarray(self.depths < 0.999 * FARTHEST_DRAWN)
 
     def draw(self, figure: Placed, both_sides: bool = False) -> None:
         """Draw a figure; what lies behind what is there already stays hidden.
@@ -56,7 +56,16 @@ class Canvas:
         points = np.ascontiguousarray(_bent(figure.points, self.camera), dtype=np.float32)
         rasterize: Any = cv2.triangleRasterize
         self.colors, self.depths = rasterize(
-            points, figure.faces, figure.colors, self.colors, self.depths, self._view, self._angle, NEAR, FAR, settings
+            points,
+            figure.faces,
+            figure.colors,
+            self.colors,
+            self.depths,
+            self._view,
+            self._angle,
+            NEAREST_DRAWN,
+            FARTHEST_DRAWN,
+            settings,
         )
 
 
@@ -75,7 +84,7 @@ def _bent(points: NDArray[np.float32], camera: Camera) -> NDArray[np.float32]:
     if not camera.distortion.any():
         return points
     k1, k2, p1, p2, k3 = camera.distortion.astype(np.float32)
-    depth = np.maximum(points[:, 2], NEAR)
+    depth = np.maximum(points[:, 2], NEAREST_DRAWN)
     x, y = points[:, 0] / depth, points[:, 1] / depth
     square = np.minimum(x * x + y * y, 4.0)  # far outside the picture the polynomial turns back
     radial = 1.0 + square * (k1 + square * (k2 + square * k3))

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.overlay.canvas import FAR
+from rrtik_ompl.overlay.canvas import FARTHEST_DRAWN
 from rrtik_ompl.overlay.figure import Placed
 from rrtik_ompl.sensing.cameras.camera import Camera
 
@@ -19,10 +19,10 @@ def reference_z_buffer(camera: Camera, figure: Placed) -> tuple[Matrix, NDArray[
     A pixel belongs to a triangle if its centre does; triangles that are seen from inside are left out.
 
     Returns:
-        Depth of the nearest triangle at every pixel's centre, `canvas.FAR` if there is none, and whether that centre is
+        Depth of the nearest triangle at every pixel's centre, `FARTHEST_DRAWN` if none, and whether that centre is
         within `ROUNDING` of an edge. Shapes (height, width).
     """
-    depths = np.full((camera.height, camera.width), FAR)
+    depths = np.full((camera.height, camera.width), FARTHEST_DRAWN)
     doubtful = np.zeros((camera.height, camera.width), dtype=bool)
     points = figure.points.astype(np.float64)
     pixels = points[:, :2] / points[:, 2:] * np.diag(camera.matrix)[:2] + camera.matrix[:2, 2]

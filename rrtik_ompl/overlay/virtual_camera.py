@@ -6,8 +6,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import finite_array
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.arrays import finite_array, finite_number, positive
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.viewer.drawing import palette
 
@@ -32,10 +31,8 @@ def orbit_pose(centre: ArrayLike, distance: float, azimuth: float, elevation: fl
         InputError: If a number is not finite or the distance not positive.
     """
     at = finite_array(centre, (3,), "centre")
-    away, turn, rise = (float(finite_array(v, (), n)) for v, n in (
-        (distance, "distance"), (azimuth, "azimuth"), (elevation, "elevation")))  # fmt: skip
-    if away <= 0.0:
-        raise InputError(f"distance must be positive, got {away:g}")
+    away = positive(distance, "distance")
+    turn, rise = finite_number(azimuth, "azimuth"), finite_number(elevation, "elevation")
     back = np.array([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)])
     right = np.array([-np.sin(turn), np.cos(turn), 0.0])
     down = np.cross(-back, right)

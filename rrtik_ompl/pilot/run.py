@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import queue
 import time as clock
-from collections.abc import Callable
 from typing import Any
 
 import cv2
 
 from rrtik_ompl.pilot.engine import VIEW_COMMANDS, Engine
 from rrtik_ompl.pilot.web.server import PilotServer
+from rrtik_ompl.world.motion_queries import Stop, no_stop
 
 PERIOD_SECONDS = 1.0 / 32.0  # a little less than a camera's, so that none of its pictures is left out
 CAMERA, OUTSIDE = "C", "O"
@@ -38,7 +38,7 @@ class Loop:
         """Of the session [s]; stands still in a pause."""
         return clock.monotonic() - self._begin if self._paused_at is None else self._paused_at
 
-    def run(self, until: Callable[[], bool] = lambda: False) -> None:
+    def run(self, until: Stop = no_stop) -> None:
         """Go on until Ctrl-C, or until ``until`` is true."""
         cv2.setNumThreads(1)  # more of them only spin: no picture of this size is ready sooner
         while not until():

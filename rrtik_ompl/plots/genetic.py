@@ -8,8 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.files.text import known_ending
 from rrtik_ompl.ik.genetic.search import GeneticRun
-from rrtik_ompl.plots.joints import COLORS, plot_format, save_figure, tidy
+from rrtik_ompl.plots.joints import COLORS, FORMATS, save_figure, tidy
 
 LEAST = 1e-12  # [m] drawn where the distance is 0, which has no logarithm
 MILLIMETRES = 1e3
@@ -30,7 +31,7 @@ def plot_distances(
     Raises:
         InputError: If there is no run, the ending is another one, or the file cannot be written.
     """
-    plot_format(file)
+    known_ending(file, FORMATS, "plot")
     if not runs:
         raise InputError("runs to plot: there is none")
     for name, run in runs.items():

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.files.text import file_name, write_bytes
+from rrtik_ompl.errors import require
+from rrtik_ompl.files.text import known_ending, write_bytes
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.trajectory import Trajectory
 
@@ -39,7 +39,7 @@ def plot_joints(motion: Trajectory | JointPath, file: str | os.PathLike[str]) ->
     Raises:
         InputError: If the ending is another one, the file cannot be written, or ``motion`` is something else.
     """
-    plot_format(file)
+    known_ending(file, FORMATS, "plot")
     require(motion, Trajectory | JointPath, "motion to plot")
     over, label, rows = _rows(motion)
     from matplotlib.figure import Figure
@@ -58,18 +58,6 @@ def plot_joints(motion: Trajectory | JointPath, file: str | os.PathLike[str]) ->
     save_figure(figure, file)
 
 
-def plot_format(file: str | os.PathLike[str]) -> str:
-    """Ending of a picture, one of ``FORMATS``.
-
-    Raises:
-        InputError: If it is another one.
-    """
-    ending = file_name(file).suffix.lower()
-    if ending not in FORMATS:
-        raise InputError(f"{file}: unknown ending '{ending}' for a plot; use {', '.join(FORMATS)}")
-    return ending
-
-
 def save_figure(figure: Figure, file: str | os.PathLike[str], *, dpi: int = 150) -> None:
     """Write a matplotlib figure so that the same figure gives the same file, whole or not at all.
 
@@ -78,7 +66,7 @@ def save_figure(figure: Figure, file: str | os.PathLike[str], *, dpi: int = 150)
     """
     import matplotlib
 
-    ending, picture = plot_format(file), BytesIO()
+    ending, picture = known_ending(file, FORMATS, "plot"), BytesIO()
     metadata = {"Date": None} if ending == ".svg" else {}
     with matplotlib.rc_context({"svg.hashsalt": "rrtik", "svg.fonttype": "none"}):
         figure.savefig(picture, format=ending[1:], dpi=dpi, metadata=metadata)

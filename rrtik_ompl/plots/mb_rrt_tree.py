@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.files.text import known_ending
 from rrtik_ompl.ik.mb_rrt.run import TreeSearch
-from rrtik_ompl.plots.joints import COLORS, plot_format, save_figure, tidy
+from rrtik_ompl.plots.joints import COLORS, FORMATS, save_figure, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,7 +32,7 @@ def plot_tree(run: TreeSearch, file: str | os.PathLike[str]) -> None:
     Raises:
         InputError: If the run is not planar, the ending is another one, or the file cannot be written.
     """
-    plot_format(file)
+    known_ending(file, FORMATS, "plot")
     require(run, TreeSearch, "tree to plot")
     if run.links.dimension != 2:
         raise InputError(

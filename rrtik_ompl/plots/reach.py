@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.plots.joints import plot_format, save_figure, tidy
+from rrtik_ompl.files.text import known_ending
+from rrtik_ompl.plots.joints import FORMATS, save_figure, tidy
 from rrtik_ompl.reach.grid_map import Slice
 
 INK, CAMERA = "#1d2733", "#d55e00"
@@ -30,7 +31,7 @@ def plot_slices(
     Raises:
         InputError: If there is no slice, the ending is another one, or the file cannot be written.
     """
-    plot_format(file)
+    known_ending(file, FORMATS, "plot")
     if not slices:
         raise InputError("slices to plot: there is none")
     from matplotlib.figure import Figure

@@ -8,7 +8,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import TAU, Matrix, Vector
 from rrtik_ompl.robot import Robot
 
 DIRECTIONS = 64  # one bit each of a 64-bit number
@@ -88,7 +88,7 @@ MEASURES: Mapping[str, Callable[[int, bool], Counter]] = MappingProxyType(
 def _directions(planar: bool) -> Matrix:
     """Evenly spread unit vectors, shape (DIRECTIONS, 3): a circle, or a sunflower on the sphere."""
     if planar:
-        around = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+        around = TAU * np.arange(DIRECTIONS) / DIRECTIONS
         return np.stack([np.cos(around), np.sin(around), np.zeros(DIRECTIONS)], axis=1)
     height = 1.0 - (2.0 * np.arange(DIRECTIONS) + 1.0) / DIRECTIONS
     turn, radius = GOLDEN * np.arange(DIRECTIONS), np.sqrt(1.0 - height**2)

@@ -66,9 +66,9 @@ class KernelConnect:
     """The search in a kernel, for worlds that have them (:mod:`rrtik_ompl.fast.search.connect_kernels`)."""
 
     def __init__(
-        self, world: KernelWorld, lower: Vector, upper: Vector, eps: float, seed: int, iterations: int = ITERATIONS
+        self, world: KernelWorld, lower: Vector, upper: Vector, max_edge: float, seed: int, iterations: int = ITERATIONS
     ) -> None:
-        self._search = ConnectSearch(world.motions, lower, upper, range_=eps)
+        self._search = ConnectSearch(world.motions, lower, upper, range_=max_edge)
         self._rng, self._iterations, self.samples = np.random.default_rng(seed), iterations, 0
 
     def __call__(
@@ -81,18 +81,18 @@ class KernelConnect:
         return None if bridge is None else joined(first, bridge, second, chain=chain)
 
 
-class PlainConnect:
+class PythonConnect:
     """The published search in Python, for any motion check."""
 
-    def __init__(self, lower: Vector, upper: Vector, eps: float, seed: int, iterations: int = ITERATIONS) -> None:
-        self._lower, self._upper, self._eps = lower, upper, eps
+    def __init__(self, lower: Vector, upper: Vector, max_edge: float, seed: int, iterations: int = ITERATIONS) -> None:
+        self._lower, self._upper, self._max_edge = lower, upper, max_edge
         self._rng, self._iterations, self.samples = np.random.default_rng(seed), iterations, 0
 
     def __call__(
         self, first: Matrix, second: Matrix, motions: MotionQueries, stop: Stop, *, chain: bool = True
     ) -> Joined | None:
         """See :class:`Connect`."""
-        rules = ConnectRules(self._lower, self._upper, self._eps, max_iterations=self._iterations)
+        rules = ConnectRules(self._lower, self._upper, self._max_edge, max_iterations=self._iterations)
         search = RrtConnect(first, second, rules, one_by_one(motions), self._rng)
         bridge = search.run(stop)
         self.samples += search.iterations

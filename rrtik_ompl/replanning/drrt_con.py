@@ -16,8 +16,8 @@ import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.choices import Replanner
-from rrtik_ompl.replanning.connecting import Connect, Joined, PlainConnect
-from rrtik_ompl.transitions import subdivided, without_repeats
+from rrtik_ompl.replanning.connecting import Connect, Joined, PythonConnect
+from rrtik_ompl.transitions import part_counts, subdivided, without_repeats
 from rrtik_ompl.world.motion_queries import MotionQueries, Stop, no_stop
 
 MAX_CUTS = 24  # shortcut ends that are tried from one point of a path
@@ -59,7 +59,7 @@ class DrrtCon:
     @classmethod
     def in_box(cls, lower: Vector, upper: Vector, max_edge: float, seed: int, post: Post | None) -> DrrtCon:
         """One that samples in the box from lower to upper, shape (n,)."""
-        return cls(PlainConnect(lower, upper, max_edge, seed), max_edge, post=post)
+        return cls(PythonConnect(lower, upper, max_edge, seed), max_edge, post=post)
 
     def begin(self, start: Vector, goals: Matrix, motions: MotionQueries, stop: Stop = no_stop) -> bool:
         """Look for a first path from ``start`` to one of ``goals``, shape (g, n); whether there is one."""
@@ -194,5 +194,5 @@ def cut_from_start(path: Matrix, step: float, motions: MotionQueries) -> Matrix:
 def _points_and_edges(path: Matrix, step: float) -> tuple[Matrix, Vector]:
     """See :func:`points_along`; also the number of the edge on which, or at whose end, each point lies."""
     path = path if len(path) > 1 else np.vstack([path, path])
-    counts = np.ceil(np.linalg.norm(np.diff(path, axis=0), axis=1) / step - 1e-9)
+    counts = part_counts(path, step)
     return subdivided(path, counts)

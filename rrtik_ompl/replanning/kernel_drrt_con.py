@@ -40,7 +40,7 @@ class KernelDrrtCon(DrrtCon):
         super().__init__(KernelConnect(world, lower, upper, max_edge, seed), max_edge, post=KernelCuts(world, seed))
         tries, patience = (CUTS, PATIENCE) if forgetting else (REPAIR_CUTS, REPAIR_PATIENCE)
         self._kernels = PathRepair(
-            world.motions, lower, upper, eps=max_edge, iterations=ITERATIONS, tries=tries, patience=patience
+            world.motions, lower, upper, max_edge=max_edge, iterations=ITERATIONS, tries=tries, patience=patience
         )  # fmt: skip
 
     def check_path(self, motions: MotionQueries) -> bool:

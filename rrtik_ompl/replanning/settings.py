@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.arrays import TAU, Vector, finite_array, positive, whole_number
+from rrtik_ompl.arrays import TAU, Vector, not_negative, positive, whole_number
 from rrtik_ompl.choices import Replanner
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
@@ -74,10 +74,7 @@ class ReplanSettings:
             raise InputError(f"rate must be {MAX_RATE:g} Hz or less, got {rate:g}")
         checked: dict[str, float | None] = {"rate": rate}
         checked |= {name: whole_number(getattr(self, name), name) for name in ("lookahead_ticks", "seed")}
-        margin = float(finite_array(self.margin, (), "margin"))
-        if margin < 0.0:
-            raise InputError(f"margin must not be negative, got {margin:g} m")
-        checked["margin"] = margin
+        checked["margin"] = not_negative(self.margin, "margin")
         for name, meaning in _POSITIVE.items():
             value = getattr(self, name)
             checked[name] = None if value is None and name in _OPTIONAL else positive(value, name, f"give {meaning}")

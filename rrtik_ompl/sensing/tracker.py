@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.arrays import TAU, Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.sensing.markers.corner_pose import ALIGNED_SIGMA, CornerPose, turn_between
 from rrtik_ompl.sensing.sight import Sighting
@@ -181,4 +181,4 @@ class PoseTracker:
 
 def _share(cutoff: float, seconds: float) -> float:
     """Of a new value, in a first-order low-pass filter."""
-    return 1.0 / (1.0 + 1.0 / (2.0 * np.pi * cutoff * seconds))
+    return 1.0 / (1.0 + 1.0 / (TAU * cutoff * seconds))

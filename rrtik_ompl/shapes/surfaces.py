@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import TAU, Matrix, Vector
 from rrtik_ompl.shapes.polygons import convex_parts
 
 Faces: TypeAlias = NDArray[np.int64]  # vertex numbers, shape (m, 3)
@@ -35,7 +35,7 @@ def extruded(polygon: Matrix, height: float) -> Triangles:
 
 def revolved(radii: Vector, heights: Vector, segments: int) -> Triangles:
     """Circles about z with these radii and heights, shape (k,) each, from below, and the surface between them."""
-    turn = np.linspace(0.0, 2.0 * np.pi, segments, endpoint=False)
+    turn = np.linspace(0.0, TAU, segments, endpoint=False)
     x, y = np.outer(radii, np.cos(turn)), np.outer(radii, np.sin(turn))
     circles = np.stack([x, y, np.broadcast_to(heights[:, None], x.shape)], 2)
     return Triangles(circles.reshape(-1, 3), wrap(len(radii), segments))

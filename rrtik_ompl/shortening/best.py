@@ -13,7 +13,7 @@ from rrtik_ompl.transitions import route_length
 STARTS = 8  # searches from the input: random shortcuts end in different classes of routes
 QUICK_TRIES = 1000  # of a search that leaves out what the kernels cannot decide
 TRIES = 300  # of one that has those checked by the world
-ROUNDS = 3  # of improvement where there is no end to the time, at most
+MAX_ROUNDS_WITHOUT_DEADLINE = 3  # of improvement where there is no end to the time, at most
 LEAST_GAIN = 1e-4  # of the length, or a round gained nothing
 MOST_HALVINGS = 4  # of the steps of retraction
 IDLE_ROUNDS = 3  # without gain end the work
@@ -27,7 +27,7 @@ def best_in_time(route: Matrix, task: Task) -> Matrix:
         return _without_kernels(route, task)
     best = _several_starts(route, task)
     rounds = idle = 0
-    while not task.expired() and idle < IDLE_ROUNDS and (task.bounded or rounds < ROUNDS):
+    while not task.expired() and idle < IDLE_ROUNDS and (task.bounded or rounds < MAX_ROUNDS_WITHOUT_DEADLINE):
         before = route_length(best)
         best = _improved(best, task, rounds)
         rounds += 1

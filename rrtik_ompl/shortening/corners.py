@@ -21,7 +21,7 @@ FIRST_GAIN = 2e-3  # of the length: what the first round does not bother to gain
 LEAST_GAIN = 1.2e-4  # likewise for the second round; the rounds after it are finer still
 FINER = 0.4  # from one round to the next
 ROUND = 2e-4  # of the length: where chords still gain as much, something round is left to be gone round
-ROUNDS = 8
+MAX_CORNER_ROUNDS = 8
 CHORD = 1.3  # a chord is found to this factor
 
 
@@ -65,7 +65,7 @@ class _Corners:
         """Rounds of pulling and cutting, until the chords gain nothing more."""
         rows, share = self._few(list(route)), FIRST_GAIN
         self.task.report(np.array(rows))
-        for number in range(ROUNDS):
+        for number in range(MAX_CORNER_ROUNDS):
             if self.task.expired():
                 break
             whole = _length(rows)

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from rrtik_ompl.arrays import TAU, Matrix, Vector, finite_array
+from rrtik_ompl.arrays import TAU, Matrix, Vector, finite_array, positive
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.moves.lattice import MoveLattice
@@ -20,7 +20,7 @@ from rrtik_ompl.transitions import lower_bound, single_joint
 from rrtik_ompl.world import World
 from rrtik_ompl.world.motion_queries import Stop, no_stop
 
-ROUNDS = 10
+MAX_IMPROVEMENT_ROUNDS = 10
 MAX_CELLS = 2_000_000  # of a grid
 
 
@@ -48,7 +48,7 @@ def fewest_moves(
     waypoints: Matrix,
     world: World,
     *,
-    rounds: int = ROUNDS,
+    rounds: int = MAX_IMPROVEMENT_ROUNDS,
     seed: int = 0,
     stop: Stop = no_stop,
     rules: MoveRules | None = None,
@@ -92,7 +92,7 @@ def fewest_moves(
         prove=partial(sharper_bound, world, [j for j in range(world.robot.dof) if j not in frozen]),
     )
     search.offer(rows)
-    search.settle_corners(stop)
+    search.try_corner_routes(stop)
     search.improve(rounds, stop)
     return MovesFound(rows[:1] if search.route is None else search.route, search.moves, search.bound)
 
@@ -105,7 +105,7 @@ def least_moves(problem: Problem) -> int:
     """
     world, ends = problem.world, _ends(problem, "least_moves")
     search = MoveSearch(ends[:1], ends[1:], *turning_limits(world.robot, ends), world.motion_valid_batch)
-    search.settle_corners()
+    search.try_corner_routes()
     if search.proven or search.bound == lower_bound(ends[0], ends[1]):  # met, or too many corners
         return search.bound
     return sharper_bound(world, range(world.robot.dof), ends[0], ends[1], no_stop)
@@ -127,8 +127,7 @@ def grid_route(problem: Problem, step: float) -> Matrix | None:
     world, ends = problem.world, _ends(problem, "grid_route")
     if world.robot.dof > 3:
         raise InputError(f"grid_route: expected at most 3 joints, got {world.robot.dof}")
-    if not step > 0.0:
-        raise InputError(f"grid_route: step must be greater than 0, got {step:g}")
+    positive(step, "grid_route: step")
     lower, upper = turning_limits(world.robot, ends)
     size = float(np.prod((upper - lower) / step + 2.0))
     if size > MAX_CELLS:

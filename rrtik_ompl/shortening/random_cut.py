@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.fast.search.motions.motion_table import NO_LIMIT
 from rrtik_ompl.fast.search.shortcut import ShortcutSearch
 from rrtik_ompl.shortening.task import Task
 from rrtik_ompl.transitions import without_repeats
@@ -30,7 +31,7 @@ def shortcut(route: Matrix, task: Task, *, tries: int = TRIES) -> Matrix:
 
 
 def _cut(route: Matrix, task: Task, tries: int, *, share: float, pull: float) -> Matrix:
-    limit = 2**62 if task.bounded else tries
+    limit = NO_LIMIT if task.bounded else tries
     if task.kernel_world is None or len(route) < 3:
         return _plain(route, task, limit, share)
     for asking in (False, True):

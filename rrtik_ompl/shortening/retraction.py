@@ -12,7 +12,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.shortening.task import Task
-from rrtik_ompl.transitions import merge_moves, route_length, subdivided, without_repeats
+from rrtik_ompl.transitions import merge_moves, part_counts, route_length, subdivided, without_repeats
 
 STEPS = 40  # of the planner along a route, where nobody says how large they are
 FINENESS = 5.0  # the third phase's steps are this many times as small
@@ -93,7 +93,7 @@ def _last_visible(count: int, visible: Callable[[int], bool], *, last_is_hidden:
 
 def _divided(corners: Matrix, step: float) -> Matrix:
     """A polyline with further points, none farther than ``step`` from the next; its corners stay as they are."""
-    counts = np.ceil(np.linalg.norm(np.diff(corners, axis=0), axis=1) / step - 1e-9)
+    counts = part_counts(corners, step)
     points, edges = subdivided(corners, counts)
     a, b = corners[edges], corners[edges + 1]
     divided: Matrix = np.clip(points, np.minimum(a, b), np.maximum(a, b))  # a joint that does not move stays to the bit

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
 from rrtik_ompl.errors import InputError, in_file, require
-from rrtik_ompl.files.text import read_text, write_text
+from rrtik_ompl.files.text import known_ending, read_text, write_text
 from rrtik_ompl.path import VERIFICATION_DENSITY, JointPath
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.trajectory.text import dumps, loads, trajectory_format
+from rrtik_ompl.trajectory.text import FORMATS, dumps, loads
 from rrtik_ompl.units import joint_units
 from rrtik_ompl.world import World
 
@@ -216,7 +216,9 @@ class Trajectory:
         units = joint_units(self.prismatic)
         columns = (self.times, self.positions, self.velocities, self.accelerations)
         points = [column.tolist() for column in columns]
-        write_text(file, dumps(self.robot_name, self.joint_names, units, points, trajectory_format(file)))
+        write_text(
+            file, dumps(self.robot_name, self.joint_names, units, points, known_ending(file, FORMATS, "trajectory"))
+        )
 
     def _names(self) -> dict[str, Any]:
         return {"joint_names": self.joint_names, "prismatic": self.prismatic, "robot_name": self.robot_name}
@@ -236,7 +238,7 @@ def load_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) ->
         InputError: If the file is missing, malformed, or does not fit the robot; the message names file and line.
     """
     require(robot, Robot | None, "robot of a trajectory", "use load_robot(name)")
-    ending = trajectory_format(file)
+    ending = known_ending(file, FORMATS, "trajectory")
     try:
         document = loads(read_text(file), ending)
         found = _from_document(document, robot)

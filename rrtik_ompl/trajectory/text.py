@@ -5,30 +5,16 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.tables import json_object, table_rows
-from rrtik_ompl.files.text import file_name
 
 FORMATS = (".json", ".csv")
 KIND = "joint_trajectory"
 FIELDS = ("positions", "velocities", "accelerations")
 _DURATION = (("sec", "secs"), ("nanosec", "nsecs"))
-
-
-def trajectory_format(path: str | os.PathLike[str]) -> str:
-    """Ending of a trajectory file, one of ``FORMATS``.
-
-    Raises:
-        InputError: If it is another one.
-    """
-    ending = file_name(path).suffix.lower()
-    if ending not in FORMATS:
-        raise InputError(f"{path}: unknown ending '{ending}' for a trajectory; use {', '.join(FORMATS)}")
-    return ending
 
 
 def dumps(robot: str, names: Sequence[str], units: Sequence[str], columns: Sequence[list[Any]], ending: str) -> str:

@@ -19,14 +19,12 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.containment import Containment
-from rrtik_ompl.collision.margins import kept_apart, request
+from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, kept_apart, request
 from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.collision.solids import around
 from rrtik_ompl.fast import FREE, UNDECIDED
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world.arm_cache import Pairs, arm_cache
-
-DISTANCE_TOLERANCE = 1e-5  # [m] taken off coal's distances
 
 
 class ExactChecker:

@@ -19,11 +19,11 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.choices import Accuracy
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions
+from rrtik_ompl.fast.search.motions.motion_table import MotionsFree as MotionsFree
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.robot import Chain, Robot
 
 MotionFree: TypeAlias = Callable[[Vector, Vector], bool]  # as MotionQueries.motion_valid
-MotionsFree: TypeAlias = Callable[[Matrix, Matrix], Mask]  # as MotionQueries.motion_valid_batch
 Stop: TypeAlias = Callable[[], object]  # true when it is time to stop
 
 LARGEST_BATCH = 1024  # motions

@@ -192,7 +192,7 @@ def test_a_page_shows_every_solution_as_a_ghost(capsys, tmp_path):
         (["ur5", "--position", 0.4, 0, 0.4, "--method", "closed-form"], "brings no closed form; what fits: numeric"),
         (["puma560", "--position", 1, 0, 0, "--seed", -1], "seed must be a whole number"),
         (["puma560", "--position", 1, 0, 0, "--seconds", -1], "seconds must not be negative"),
-        (["puma560", "--position", 1, 0, 0, "--tolerance-mm", -1], "--tolerance-mm must be greater than 0, got -1"),
+        (["puma560", "--position", 1, 0, 0, "--tolerance-mm", -1], "--tolerance-mm: must be greater than 0, got -1"),
         (["puma560", "--position", 1, 0, 0, "--tolerance-deg", 1], "--tolerance-deg is of an orientation"),
         (["puma560", "--poses", "points.csv", "--tolerance-deg", 1], "a point has none: leave it out"),
         (["--problem", "puma_pose", "--tolerance-mm", 1], "has tolerances of its own"),

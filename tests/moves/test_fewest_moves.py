@@ -87,7 +87,7 @@ def test_without_obstacles_the_bound_is_the_number_of_joints_that_differ_and_is_
 def test_a_direct_route_needs_no_further_question() -> None:
     ends = np.array([[0.0, 0, 0], [1, 0.5, -0.5]])
     search = MoveSearch(ends[:1], ends[1:], -np.ones(3), np.ones(3), lambda tails, _: np.ones(len(tails), dtype=bool))
-    search.settle_corners()
+    search.try_corner_routes()
     asked = search.motions
     search.improve(100)
     assert search.direct
@@ -107,7 +107,7 @@ def test_without_a_look_at_all_corners_the_bound_stays_and_nothing_is_proven_on_
     corners = [np.where(np.arange(8) < k, 1.0, 0.0) for k in range(1, 9)]
     aside = np.where(np.arange(8) == 7, -1.0, start)  # nine moves: the last joint moves twice
     search.offer(np.vstack([start, aside, *[np.where(np.arange(8) == 7, -1.0, c) for c in corners[:7]], goal]))
-    search.settle_corners()
+    search.try_corner_routes()
     assert search.bound == 8
     search.improve(1)
     assert search.bound == 8

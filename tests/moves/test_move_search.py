@@ -78,7 +78,7 @@ def test_a_search_is_never_worse_than_what_it_was_offered_and_repeats_with_its_s
         search = MoveSearch(start[None], goal[None], *limits, world.motion_valid_batch, seed=seed, most_nodes=64)
         if offered is not None:
             search.offer(offered)
-        search.settle_corners()
+        search.try_corner_routes()
         search.improve(2)
         found.append(search.route)
         if offered is not None and search.route is not None:
@@ -112,6 +112,6 @@ def test_limits_and_frozen_joints_are_kept() -> None:
 
     for frozen, moves in (((), 3), ((2,), None)):
         search = MoveSearch(start[None], goal[None], -np.ones(3), np.full(3, 3.0), ask, frozen=frozen)
-        search.settle_corners()
+        search.try_corner_routes()
         search.improve(3)
         assert (None if search.route is None else search.moves) == moves

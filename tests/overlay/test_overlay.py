@@ -7,7 +7,7 @@ import pytest
 from rrtik_ompl import load_robot
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.overlay.augment import MAX_LAYERS, Augmenter, Ghost
-from rrtik_ompl.overlay.canvas import FAR, Canvas
+from rrtik_ompl.overlay.canvas import FARTHEST_DRAWN, Canvas
 from rrtik_ompl.overlay.figure import figure_of, placed
 from rrtik_ompl.overlay.reference_z_buffer import reference_z_buffer
 from rrtik_ompl.overlay.surfaces import obstacle_surfaces, robot_surfaces, surface_of_shape
@@ -32,7 +32,7 @@ def test_silhouette_and_depth_are_those_of_a_z_buffer(name):
     canvas.draw(shown)
     truth, _ = reference_z_buffer(CAMERA, shown)
     assert canvas.drawn.sum() > 3000
-    assert np.array_equal(canvas.drawn, truth < FAR)
+    assert np.array_equal(canvas.drawn, truth < FARTHEST_DRAWN)
     assert np.abs(canvas.depths - truth)[canvas.drawn].max() < 1e-4
 
 

@@ -18,6 +18,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.reach.grid_map import Slice
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.units import wrapped
 
 PITCHES_DEG = tuple(range(-90, 91, 15))  # of the gripper in the arm plane, with a straight wrist
 CELL = 0.025  # [m]
@@ -62,7 +63,7 @@ class Camera:
         middle, to_points = self.target - self.position, np.asarray(points, dtype=np.float64) - self.position
         distance = np.linalg.norm(to_points, axis=1)
         heading = np.arctan2(to_points[:, 1], to_points[:, 0]) - np.arctan2(middle[1], middle[0])
-        pan = np.abs((heading + np.pi) % (2.0 * np.pi) - np.pi)
+        pan = np.abs(wrapped(heading))
         tilt = np.abs(_elevation(to_points) - _elevation(middle[None]))
         wide, high = np.arctan(half * self.aspect), np.arctan(half)
         aimed = (pan <= wide + np.radians(self.pan_deg)) & (tilt <= high + np.radians(self.tilt_deg))

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
+from rrtik_ompl.arrays import Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.search import connect_layout
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
-from rrtik_ompl.fast.search.motions.motion_table import FastMotions
+from rrtik_ompl.fast.search.motions.motion_table import NO_LIMIT, FastMotions, MotionsFree
 from rrtik_ompl.fast.search.tree_layout import CAPACITY, SIZE
 from rrtik_ompl.fast.search.tree_memory import grow, tree_table
 from rrtik_ompl.fast.simd.halton import inverse_bases
@@ -27,9 +27,6 @@ FIRST_ROOTS = 16
 FIRST_PATH = 64  # rows
 FIRST_BUDGET, MIN_BUDGET, MAX_BUDGET = 256, 16, 1 << 20  # motions in one call of the kernel
 CALL_SECONDS = 1e-3  # what a call should take
-NO_LIMIT = 2**62
-
-Ask = Callable[[Matrix, Matrix], Mask]
 
 
 class ConnectSearch:
@@ -91,7 +88,7 @@ class ConnectSearch:
         goals: Matrix,
         seed: int,
         *,
-        ask: Ask | None = None,
+        ask: MotionsFree | None = None,
         stop: Callable[[], object] | None = None,
         max_iterations: int | None = None,
     ) -> Matrix | None:
@@ -162,7 +159,7 @@ class ConnectSearch:
         tables = self._motions.intact() and all(own.intact() for own in (self._search, *self._trees))
         return tables and all(is_intact(rows) for rows in (*self._roots, self._path_rows))
 
-    def _run(self, ask: Ask | None, stop: Callable[[], object] | None) -> int:
+    def _run(self, ask: MotionsFree | None, stop: Callable[[], object] | None) -> int:
         """Call the kernel until it is done; its last status."""
         budget = FIRST_BUDGET
         while True:
@@ -181,7 +178,7 @@ class ConnectSearch:
             if stop is not None and stop():
                 return connect_layout.RUNNING
 
-    def _answer(self, ask: Ask) -> None:
+    def _answer(self, ask: MotionsFree) -> None:
         count, shape = int(self._search.header[connect_layout.QUESTIONS]), (-1, self._dof)
         ends = (self._search[place].reshape(shape)[:count].copy() for place in _QUESTIONS)
         self._search[connect_layout.ANSWERS][:count] = ask(*ends)

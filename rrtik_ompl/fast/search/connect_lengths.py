@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.arrays import Vector, positive
+from rrtik_ompl.arrays import TAU, Vector, positive
 
 RANGE_SHARE = 0.08  # of the diagonal of the box, no joint counted for more than a turn
 DOMAIN_SHARE = 6.0**-0.5  # of the diagonal of the box: the root mean square distance of two random configurations
@@ -24,7 +24,7 @@ def connect_lengths(lower: Vector, upper: Vector, range_: float | None, domain: 
         InputError: If one of them is not a number above 0.
     """
     if range_ is None:
-        range_ = max(RANGE_SHARE * float(np.linalg.norm(np.minimum(upper - lower, 2.0 * np.pi))), MIN_RANGE)
+        range_ = max(RANGE_SHARE * float(np.linalg.norm(np.minimum(upper - lower, TAU))), MIN_RANGE)
     used = positive(range_, "range")
     if domain is None:
         domain = max(DOMAIN_SHARE * float(np.linalg.norm(upper - lower)), used)

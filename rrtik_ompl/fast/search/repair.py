@@ -33,7 +33,7 @@ class PathRepair:
     Args:
         motions: How motions are checked in a world, whose obstacles may be moved between two calls.
         lower, upper: The box to sample in, shape (n,), finite.
-        eps: Longest motion of the trees [unit of the box]; a path is cut at points half as far apart.
+        max_edge: Longest motion of the trees [unit of the box]; a path is cut at points half as far apart.
         iterations: Samples of a repair at most.
         tries, patience: Random shortcuts of a repair at most, and how many without gain end them.
 
@@ -47,7 +47,7 @@ class PathRepair:
         lower: Vector,
         upper: Vector,
         *,
-        eps: float,
+        max_edge: float,
         iterations: int,
         tries: int,
         patience: int,
@@ -56,13 +56,13 @@ class PathRepair:
         if kernels is None:
             raise InputError("repair in kernels: there are none; install numba")
         self._kernels, self._motions, self._dof = kernels, motions, motions.dof
-        self._search = ConnectSearch(motions, lower, upper, range_=eps)
+        self._search = ConnectSearch(motions, lower, upper, range_=max_edge)
         self._iterations = iterations
         fields: dict[int, Any] = dict.fromkeys(range(repair_layout.FIELD_COUNT), 0)
         fields |= {
             repair_layout.TRIES: tries,
             repair_layout.PATIENCE: patience,
-            repair_layout.NUMBERS: np.array([0.5 * eps, GAP_BOX_RATIO]),
+            repair_layout.NUMBERS: np.array([0.5 * max_edge, GAP_BOX_RATIO]),
         }
         fields[repair_layout.MOTIONS] = motions.address
         self._table = table(fields)

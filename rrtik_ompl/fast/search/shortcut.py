@@ -10,12 +10,11 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.search import shortcut_layout
-from rrtik_ompl.fast.search.motions.motion_table import FastMotions
+from rrtik_ompl.fast.search.motions.motion_table import NO_LIMIT, FastMotions
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.tables.memory import table
 
 SPARE_WAYPOINTS = 256  # room for more than at the beginning
-NO_LIMIT = 2**62
 TRIES_PER_CALL = 256  # of the kernel, until the caller may stop it
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector
 from rrtik_ompl.fast.ik.branch_layout import DOUBLE_ROOT, REACH_TOLERANCE
 
 
@@ -69,7 +69,7 @@ class AnalyticSolver:
 
 def wrapped(angle: NDArray[np.float64]) -> NDArray[np.float64]:
     """Angles moved by full turns into (-pi, pi]."""
-    turned: NDArray[np.float64] = angle - 2.0 * np.pi * np.ceil(angle / (2.0 * np.pi) - 0.5)
+    turned: NDArray[np.float64] = angle - TAU * np.ceil(angle / TAU - 0.5)
     return turned
 
 

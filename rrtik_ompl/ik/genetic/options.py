@@ -11,8 +11,7 @@ import numpy as np
 from rrtik_ompl.arrays import whole_number
 from rrtik_ompl.choices import GeneticPreset
 from rrtik_ompl.errors import InputError
-
-DEGREE = float(np.pi / 180.0)
+from rrtik_ompl.units import DEGREE
 
 
 @dataclass(frozen=True, slots=True)

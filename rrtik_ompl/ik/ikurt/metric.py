@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import TAU, Matrix, Vector
 from rrtik_ompl.goal import PoseGoal, PositionGoal, pose_errors
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.residual import twist
@@ -56,7 +56,7 @@ class TipMetric:
         self, robot: Robot, targets: list[Target], *, metres_per_radian: float | None = None, unit: float = 1.0
     ) -> None:
         self.robot, self.targets, self.unit = robot, targets, unit
-        self.metres_per_radian = reach(robot) / (2.0 * np.pi) * REACH_PER_TURN
+        self.metres_per_radian = reach(robot) / TAU * REACH_PER_TURN
         if metres_per_radian is not None:
             self.metres_per_radian = metres_per_radian
         self.scale = unit * np.array([1.0] * 3 + [self.metres_per_radian] * 3)

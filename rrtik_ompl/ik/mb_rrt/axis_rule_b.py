@@ -15,6 +15,7 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.ik.mb_rrt.axes import Axes
 from rrtik_ompl.ik.mb_rrt.links import directions
 from rrtik_ompl.ik.mb_rrt.run import first_hit
+from rrtik_ompl.units import wrapped
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +60,7 @@ def _closest_circle(frames: NDArray[np.float64], point: Vector, sample: Vector) 
     off = (np.hypot(local[:, 0], local[:, 1]) - np.hypot(point[0], point[1])) ** 2 + (local[:, 2] - point[2]) ** 2
     best = int(np.argmin(off))
     turn = np.arctan2(local[best, 1], local[best, 0]) - np.arctan2(point[1], point[0])
-    return best, float((turn + np.pi) % (2.0 * np.pi) - np.pi)
+    return best, float(wrapped(turn))
 
 
 def _about_z(angle: float) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.units import wrapped
 
 ROUNDING = 1e-12  # of the reach: a goal this far outside counts as reachable
 
@@ -121,8 +122,8 @@ def headings_to_joints(chains: Matrix) -> Matrix:
     edges = np.diff(chains, axis=-2)
     heading = np.arctan2(edges[..., 1], edges[..., 0])
     turns = np.diff(heading, axis=-1, prepend=0.0)
-    wrapped: Matrix = (turns + np.pi) % (2.0 * np.pi) - np.pi
-    return wrapped
+    relative: Matrix = wrapped(turns)
+    return relative
 
 
 def joints_to_chain(lengths: Vector, joints: Matrix) -> Matrix:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector
 from rrtik_ompl.goal import PoseGoal, PositionGoal
 from rrtik_ompl.ik.mb_rrt.axes import Axes, axes_of, misfit
 from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
@@ -139,7 +139,7 @@ def _last_turned(robot: Robot, axes: Axes, target: PoseGoal, ends: Matrix) -> Ma
     wanted = target.T_world_tip.rotation @ axes.fixed[-1][:3, :3].T
     off = np.swapaxes(frames, 1, 2) @ wanted  # the turn about z nearest to it
     turn = np.arctan2(off[:, 1, 0] - off[:, 0, 1], off[:, 0, 0] + off[:, 1, 1])
-    full = 2.0 * np.pi
+    full = TAU
     turn += full * np.ceil((axes.lower[-1] - turn) / full - 1e-9)  # the first full turn inside the limits
     angles[:, joint] = np.clip(turn, axes.lower[-1], axes.upper[-1]) - axes.offset[-1]
     return angles

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import TAU, Mask, Vector
 from rrtik_ompl.ik.mb_rrt.axes import Axes
+from rrtik_ompl.units import wrapped
 
 SLACK = 1e-12  # in cosines and angles: what rounding may add where an interval is a single value
 FLAT = 1e-24  # [m^2] a circle this small is a point
@@ -57,7 +58,7 @@ def _draw(
 ) -> tuple[Vector, Mask]:
     """Uniform angles on centre +- inner..outer inside the limits, shape (m,); where there are none the nearest."""
     turns = TAU * np.arange(np.floor((lower - np.pi) / TAU) - 1.0, np.ceil((upper + np.pi) / TAU) + 2.0)
-    centre = (centre + np.pi) % TAU - np.pi
+    centre = wrapped(centre)
     begins = np.stack([centre + inner, centre - outer], axis=1)[:, :, None] + turns
     widths = (outer - inner)[:, None, None]
     starts = np.clip(begins, lower, upper).reshape(len(centre), -1)

@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import TAU, Matrix, Vector
 from rrtik_ompl.goal import has_task_regions, tip_errors
 from rrtik_ompl.ik.goal_rows import goal_rows
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target
@@ -86,6 +86,6 @@ def _turning_freely(robot: Robot) -> Robot:
     turning = ~robot.prismatic
     return replace(
         robot,
-        lower=np.where(turning, -2.0 * np.pi, robot.lower),
-        upper=np.where(turning, 2.0 * np.pi, robot.upper),
+        lower=np.where(turning, -TAU, robot.lower),
+        upper=np.where(turning, TAU, robot.upper),
     )

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form
 from rrtik_ompl.path import JointPath
@@ -128,8 +128,8 @@ def joint_range(world: World, q: Vector, joint: int) -> JointRange:
     if not world.valid(q):
         why = world.explain(q)
         return JointRange(here, here, why, why, ())
-    low, below = _reach(world, q, joint, float(robot.lower[joint]), here - 2.0 * np.pi)
-    high, above = _reach(world, q, joint, float(robot.upper[joint]), here + 2.0 * np.pi)
+    low, below = _reach(world, q, joint, float(robot.lower[joint]), here - TAU)
+    high, above = _reach(world, q, joint, float(robot.upper[joint]), here + TAU)
     return JointRange(low, high, below, above, _singular_stretches(robot, q, joint, low, high))
 
 

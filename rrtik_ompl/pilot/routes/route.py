@@ -63,7 +63,7 @@ class Route:
 
 def route_to(world: World, q: Vector, goal: Vector, rates: Vector, seed: int) -> Route | NoRoute:
     """A route to a configuration."""
-    return _route(world, world, q, [[_settled(world, goal, q)[None]]], rates, seed)
+    return _route(world, world, q, [[_with_near_joints_kept(world, goal, q)[None]]], rates, seed)
 
 
 def route_to_grasp(
@@ -100,7 +100,7 @@ def _tails(
     at = solve_ik_batch(world.robot, [stages[1].homogeneous], near=near, world=holding, seed=seed)
     if not at.found[0]:
         return NoRoute(at.details[0] or at.reasons[0] or "not to be reached", "the grasp")
-    grasp = _settled(holding, at.q[0], q)
+    grasp = _with_near_joints_kept(holding, at.q[0], q)
     short = approaches(world, holding, grasp, stages, MAX_BEGINNINGS)
     if short:
         return short
@@ -111,7 +111,7 @@ def _tails(
     return NoRoute(str(last), "from before the object to it") if isinstance(last, NoRoute) else [[last]]
 
 
-def _settled(world: World, goal: Vector, q: Vector) -> Vector:
+def _with_near_joints_kept(world: World, goal: Vector, q: Vector) -> Vector:
     """A goal whose joints that are near enough already need not move, if that is free; else nearly so.
 
     Near enough is the tolerance of following; inverse kinematics leaves rounding errors.

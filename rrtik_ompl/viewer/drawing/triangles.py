@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.arrays import TAU, Matrix
 from rrtik_ompl.shapes.surfaces import Faces, wrap
 
 CREASE = np.deg2rad(35.0)  # faces that meet at a larger angle are drawn with an edge between them
@@ -63,7 +63,7 @@ def tube(points: Matrix, radius: float, sides: int = 8) -> tuple[Matrix, Faces]:
         normal /= max(float(np.linalg.norm(normal)), 1e-12)
         across[k] = normal
     beside = np.cross(along, across)
-    turn = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)[:, None]
+    turn = np.linspace(0.0, TAU, sides, endpoint=False)[:, None]
     circles = points[:, None] + radius * (np.cos(turn) * across[:, None] + np.sin(turn) * beside[:, None])
     return circles.reshape(-1, 3), wrap(len(points), sides)
 

@@ -9,7 +9,7 @@ import pytest
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.search.repair import PathRepair
-from rrtik_ompl.replanning.connecting import PlainConnect
+from rrtik_ompl.replanning.connecting import PythonConnect
 from rrtik_ompl.replanning.drrt_con import DrrtCon
 from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
 from rrtik_ompl.scene import Obstacle, Scene
@@ -23,10 +23,10 @@ pytestmark = pytest.mark.kernels
 LOW, HIGH = np.zeros(2), np.full(2, 20.0)
 
 
-def repairing(world, eps=1.0, iterations=4000, tries=24):
+def repairing(world, max_edge=1.0, iterations=4000, tries=24):
     low, high = world.robot.finite_range()
     return PathRepair(
-        world.motions, low, high, eps=eps, iterations=iterations, tries=tries, patience=tries
+        world.motions, low, high, max_edge=max_edge, iterations=iterations, tries=tries, patience=tries
     )  # fmt: skip
 
 
@@ -58,7 +58,7 @@ def test_a_look_finds_what_python_finds_and_asks_for_as_many_configurations(name
     answers = []
     for _ in range(20):
         path = 0.4 * rng.uniform(low, high, (3, robot.dof))
-        plain = DrrtCon(PlainConnect(low, high, 1.0, 0), 1.0)
+        plain = DrrtCon(PythonConnect(low, high, 1.0, 0), 1.0)
         kernel = KernelDrrtCon(world, low, high, 1.0, 0)
         plain.path = kernel.path = path
         before = world.checked
@@ -120,7 +120,7 @@ def test_a_search_gives_up_when_told_to_and_when_its_samples_are_spent():
 
 def test_memory_grows_with_what_a_path_needs():
     world, path = walled()
-    repair = repairing(world, eps=0.02, iterations=10**6, tries=0)
+    repair = repairing(world, max_edge=0.02, iterations=10**6, tries=0)
     assert not repair.check(path)
     found = repair.repair(2, no_stop)
     assert len(found) > 256

@@ -17,7 +17,7 @@ from rrtik_ompl.errors import PlannerError
 from rrtik_ompl.fast.search.crdt import layout as crdt_layout
 from rrtik_ompl.fast.search.crdt.rules import KERNELS, CrdtRules
 from rrtik_ompl.fast.search.crdt.tree_memory import TreeMemory
-from rrtik_ompl.fast.search.motions.motion_table import FastMotions
+from rrtik_ompl.fast.search.motions.motion_table import NO_LIMIT, FastMotions
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.fast.tables.layout import COLLIDING, FREE, UNDECIDED
@@ -27,7 +27,6 @@ from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
 FIRST_CAPACITY = 256  # vertices
 FIRST_BUDGET = 16  # iterations
 MIN_PAUSE, MAX_PAUSE = 0.5e-3, 2e-3  # [s] between two readings of the clock, if iterations are not longer
-NO_LIMIT = 2**62
 
 
 class CrdtSearch:

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from collections.abc import Callable
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector, finite_array, positive
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, positive
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast.search.motions import motion_layout
 from rrtik_ompl.fast.search.motions.motion_layout import STEP_TOLERANCE
 from rrtik_ompl.fast.tables.memory import table
+
+MotionsFree: TypeAlias = Callable[[Matrix, Matrix], Mask]  # as MotionQueries.motion_valid_batch
+
+NO_LIMIT = 2**62  # a count that no search reaches; fits into the kernels' integers
 
 
 def step_counts(starts: Matrix, ends: Matrix, weights: Vector, resolution: float) -> NDArray[np.int64]:
@@ -123,7 +128,7 @@ class FastMotions:
             raise InputError(f"bounds: joint {beyond[0]} can go farther than the checks cover ({limits[beyond[0]]:g})")
 
 
-class KernelWorld(Protocol):
+class MotionSource(Protocol):
     """A world whose motion table is wanted."""
 
     robot: Any
@@ -139,7 +144,7 @@ class KernelWorld(Protocol):
         """The tables of the checks, None where nothing can be checked in kernels."""
 
 
-def motions_of(world: KernelWorld, kept: FastMotions | None) -> FastMotions | None:
+def motions_of(world: MotionSource, kept: FastMotions | None) -> FastMotions | None:
     """The motion table of a world: the one that was kept while it still fits, None where kernels cannot be used."""
     fast, resolve = world.fast, world.accuracy == "exact"
     if fast is None:
