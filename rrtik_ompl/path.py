@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
 from rrtik_ompl.errors import InputError, in_file, require
@@ -18,6 +18,7 @@ from rrtik_ompl.files.text import known_ending, read_text, write_text
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.transitions import (
     SAME,
+    in_parts,
     merge_moves,
     moved,
     part_counts,
@@ -227,7 +228,7 @@ class JointPath:
                 f"raise motion_resolution, or check whether the joint values are rad and m"
             )
         found: list[Violation] = []
-        for part in _in_parts(counts):
+        for part in in_parts(counts, AT_ONCE):
             dense, edges = subdivided(rows[part[0] : part[-1] + 2], counts[part])
             bad = np.flatnonzero(~world.certify(dense))
             bad = bad[(bad > 0) | (part[0] == 0)]  # the point at which a part begins is the last one of the part before
@@ -257,12 +258,6 @@ class JointPath:
             "transitions": self.transitions,
             "waypoints": self.waypoints.tolist(),
         }
-
-
-def _in_parts(counts: Vector) -> list[NDArray[np.int64]]:
-    """Numbers of the edges with so many checks each, shape (k,), in parts of about AT_ONCE checks."""
-    edges = np.arange(len(counts), dtype=np.int64)
-    return np.split(edges, np.flatnonzero(np.diff(counts.cumsum() // AT_ONCE)) + 1)
 
 
 def verification_resolution(world: World) -> float:

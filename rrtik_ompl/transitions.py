@@ -135,6 +135,12 @@ def part_counts(rows: Matrix, step: float) -> Vector:
     return counts
 
 
+def in_parts(counts: Vector, at_once: int) -> list[NDArray[np.int64]]:
+    """Numbers of the edges with so many checks each, shape (k,), in parts of about ``at_once`` checks."""
+    edges = np.arange(len(counts), dtype=np.int64)
+    return np.split(edges, np.flatnonzero(np.diff(counts.cumsum() // at_once)) + 1)
+
+
 def subdivided(rows: Matrix, counts: Vector) -> tuple[Matrix, Vector]:
     """Cut edge i of a polyline, shape (k, n), into ``counts[i]`` equal parts; also the edge number of every point."""
     points, edges = [rows[:1]], [np.zeros(1, dtype=np.int64)]

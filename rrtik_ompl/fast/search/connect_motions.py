@@ -21,7 +21,7 @@ from rrtik_ompl.fast.search.motions.motion_layout import MotionTable
 from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row, distance
 from rrtik_ompl.fast.search.tree_kernels import live_of, nearest_vertex, radius_of, row_of, values_of
 from rrtik_ompl.fast.search.tree_layout import TreeTable
-from rrtik_ompl.fast.simd.access import field_reader
+from rrtik_ompl.fast.simd.access import count_up, field_reader
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field, set_float
 from rrtik_ompl.fast.simd.random_kernels import next_point
@@ -66,12 +66,6 @@ def set_meeting(search: ConnectTable, side: int, vertex: int) -> None:
 def number_of(search: ConnectTable, place: int) -> Any:
     """RANGE, DOMAIN or SPREAD."""
     return double_at(field(search, connect_layout.NUMBERS), place)
-
-
-@inlined
-def count_up(search: ConnectTable, place: int) -> None:
-    """Add 1 to a field."""
-    set_field(search, place, field(search, place) + 1)
 
 
 @kernel

@@ -7,7 +7,6 @@ from rrtik_ompl.fast.search.connect_layout import ConnectTable
 from rrtik_ompl.fast.search.connect_motions import (
     candidate_row_of,
     candidate_values_of,
-    count_up,
     dof_in,
     meeting_of,
     nearest_to,
@@ -26,6 +25,7 @@ from rrtik_ompl.fast.search.tree_kernels import (
     state_of,
 )
 from rrtik_ompl.fast.search.tree_layout import CERTAIN, CUT, OPEN
+from rrtik_ompl.fast.simd.access import count_up
 from rrtik_ompl.fast.simd.compiled import kernel
 from rrtik_ompl.fast.simd.lanes import field, int_at, set_field, set_int
 

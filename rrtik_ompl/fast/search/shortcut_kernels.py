@@ -19,7 +19,7 @@ from rrtik_ompl.fast.search.motions.motion_kernels import check_motion, dof_of
 from rrtik_ompl.fast.search.motions.motion_layout import MotionTable
 from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row, row_at
 from rrtik_ompl.fast.search.shortcut_layout import FIRST_INSIDE, SECOND_INSIDE, ShortcutTable
-from rrtik_ompl.fast.simd.access import field_reader
+from rrtik_ompl.fast.simd.access import count_up, field_reader
 from rrtik_ompl.fast.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field
 from rrtik_ompl.fast.simd.random_kernels import next_share
@@ -239,12 +239,6 @@ def take_shortcut(search: ShortcutTable) -> None:
         copy_row(dof, end(search, 1), waypoint(search, put))
     set_field(search, shortcut_layout.COUNT, tail + moved)
     measure_route(search, first)
-
-
-@inlined
-def count_up(search: ShortcutTable, place: int) -> None:
-    """Add 1 to a field."""
-    set_field(search, place, field(search, place) + 1)
 
 
 @kernel

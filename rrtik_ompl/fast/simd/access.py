@@ -14,7 +14,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from rrtik_ompl.fast.simd.compiled import inlined
-from rrtik_ompl.fast.simd.lanes import DOUBLE, INDEX, SINGLE, WHOLE, pointer
+from rrtik_ompl.fast.simd.lanes import DOUBLE, INDEX, SINGLE, WHOLE, field, pointer, set_field
 from rrtik_ompl.fast.tables.layout import DOUBLE_BYTES, INT_BYTES
 
 _FIELD_BYTES = 8
@@ -135,3 +135,9 @@ def _row_reader(size: int) -> Any:
 
 int_row = _row_reader(INT_BYTES)  # function (array, width, number): finds a row of ``width`` int32
 double_row = _row_reader(DOUBLE_BYTES)  # the same of float64
+
+
+@inlined
+def count_up(table: int, place: int) -> None:
+    """Add 1 to a field."""
+    set_field(table, place, field(table, place) + 1)

@@ -12,7 +12,7 @@ from rrtik_ompl.fast.search.motions.motion_layout import MotionTable
 from rrtik_ompl.fast.search.motions.row_kernels import Configuration, row_at
 from rrtik_ompl.fast.simd.access import field_reader
 from rrtik_ompl.fast.simd.compiled import inlined
-from rrtik_ompl.fast.simd.lanes import double_at, field, set_field
+from rrtik_ompl.fast.simd.lanes import double_at, field
 from rrtik_ompl.fast.tables.layout import DoubleArray, IntArray
 
 motions_of: Callable[[CrdtTable], MotionTable] = field_reader(crdt_layout.MOTIONS)
@@ -72,9 +72,3 @@ def edge_end(search: CrdtTable, edge: int) -> Configuration:
 def goal_row(search: CrdtTable, goal: int) -> Configuration:
     """Address of a goal of a single tree."""
     return row_at(goals_of(search), dof_in(search), goal)
-
-
-@inlined
-def count_up(search: CrdtTable, place: int) -> None:
-    """Add 1 to a field."""
-    set_field(search, place, field(search, place) + 1)

@@ -10,7 +10,6 @@ from typing import Any
 
 from rrtik_ompl.fast.search.crdt import layout as crdt_layout
 from rrtik_ompl.fast.search.crdt.accessors import (
-    count_up,
     dof_in,
     extension_row,
     goal_row,
@@ -23,6 +22,7 @@ from rrtik_ompl.fast.search.crdt.growth import add_free_edges, check_extension, 
 from rrtik_ompl.fast.search.crdt.layout import CrdtTable, CrdtTreeTable
 from rrtik_ompl.fast.search.crdt.tree_kernels import coordinate, nearest_crdt_vertex, read_vertex, size_of
 from rrtik_ompl.fast.search.motions.row_kernels import copy_row
+from rrtik_ompl.fast.simd.access import count_up
 from rrtik_ompl.fast.simd.compiled import entry, inlined
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_field
 
