@@ -9,9 +9,9 @@ from typing import Annotated, Any, get_args
 
 import typer
 
-from rrtik_ompl.choices import CommandShortening, ShorteningMethod
+from rrtik_ompl.choices import CommandShortening, ShorteningMethod, one_of
 from rrtik_ompl.cli.terminal import progress, say
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
 
@@ -23,10 +23,10 @@ SHORTEN: tuple[CommandShortening, ...] = get_args(CommandShortening)
 
 def _method(name: str) -> CommandShortening:
     """What to do to the raw path: the name of a method of shortening, or "none"."""
-    for each in SHORTEN:
-        if each == name:
-            return each
-    raise typer.BadParameter(f"'{name}' is not one of {', '.join(map(repr, SHORTEN))}.")
+    try:
+        return one_of(SHORTEN, name, "shortening method")
+    except UnknownNameError:
+        raise typer.BadParameter(f"'{name}' is not one of {', '.join(map(repr, SHORTEN))}.") from None
 
 
 def plan(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.files.text import file_name, read_bytes, write_bytes, write_text
+from rrtik_ompl.files.text import known_ending, read_bytes, write_bytes, write_text
 
 FORMATS = (".npz", ".csv")
 LARGEST_FILE = 2**30  # bytes
@@ -105,7 +105,7 @@ class ReachMap:
         Raises:
             InputError: If the ending is another one or the file cannot be written.
         """
-        ending = _ending(path)
+        ending = known_ending(path, FORMATS, "map of reach")
         if ending == ".csv":
             places = np.argwhere(self.reached)
             rows = np.column_stack([self.corner + self.size * (places + 0.5), self.values[self.reached]])
@@ -148,7 +148,7 @@ def load_reach_map(path: str | os.PathLike[str]) -> ReachMap:
     Raises:
         InputError: If the file cannot be used.
     """
-    if _ending(path) != ".npz":
+    if known_ending(path, FORMATS, "map of reach") != ".npz":
         raise InputError(f"{path}: only .npz holds a whole map; a .csv cannot be read back")
     try:
         with np.load(BytesIO(read_bytes(path, LARGEST_FILE)), allow_pickle=False) as data:
@@ -163,10 +163,3 @@ def load_reach_map(path: str | os.PathLike[str]) -> ReachMap:
             )
     except (KeyError, ValueError, OSError, EOFError) as error:
         raise InputError(f"{path}: is no map of reach: {error}; make one with `rrtik reach ... --out`") from error
-
-
-def _ending(path: str | os.PathLike[str]) -> str:
-    ending = file_name(path).suffix.lower()
-    if ending not in FORMATS:
-        raise InputError(f"{path}: unknown ending '{ending}' for a map of reach; use {', '.join(FORMATS)}")
-    return ending
