@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +18,6 @@ from rrtik_ompl.files.text import known_ending, read_text, write_text
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.transitions import (
     SAME,
-    in_parts,
     merge_moves,
     moved,
     part_counts,
@@ -28,12 +27,11 @@ from rrtik_ompl.transitions import (
     transitions,
 )
 from rrtik_ompl.units import joint_units
-from rrtik_ompl.world import World
+from rrtik_ompl.world import Proof, World
+from rrtik_ompl.world.route_check import VERIFICATION_DENSITY as VERIFICATION_DENSITY
+from rrtik_ompl.world.route_check import Violation, route_violations, verification_resolution
 
-VERIFICATION_DENSITY = 2.0  # how many times finer than the motion resolution a path is checked again
 MAX_VALUE = 1e6  # of a joint [rad or m], as everywhere in our files
-MAX_CHECKS = 30_000_000  # of a path; more than that take minutes
-AT_ONCE = 200_000  # of them, so that a long path needs no more memory than a short one
 
 
 class Move(NamedTuple):
@@ -59,21 +57,6 @@ class Move(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Violation:
-    """Why a path is not valid.
-
-    Attributes:
-        edge: Number of the edge, from 0; waypoint ``edge`` is its beginning.
-        q: The offending configuration, shape (n,).
-        reason: A line for a person: the pair in collision, or the joint and its limit.
-    """
-
-    edge: int
-    q: Vector
-    reason: str
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class JointPath:
     """Waypoints joined by straight lines in configuration space.
 
@@ -83,6 +66,7 @@ class JointPath:
         prismatic: Which joints slide, shape (n,).
         robot_name: Name of the robot it is for, or "".
         continuous: Which joints turn without limits, shape (n,).
+        proof: What is proven of it, see :meth:`proved`; None if that was not asked, as in a path with other waypoints.
     """
 
     waypoints: Matrix
@@ -90,6 +74,7 @@ class JointPath:
     prismatic: Mask
     robot_name: str
     continuous: Mask
+    proof: Proof | None
 
     def __init__(
         self,
@@ -117,6 +102,7 @@ class JointPath:
         object.__setattr__(self, "prismatic", frozen(sliding, bool))
         object.__setattr__(self, "robot_name", robot_name)
         object.__setattr__(self, "continuous", frozen(endless, bool))
+        object.__setattr__(self, "proof", None)
 
     def __repr__(self) -> str:
         k, n = self.waypoints.shape
@@ -200,10 +186,11 @@ class JointPath:
         return self.with_waypoints(subdivided(self.waypoints, counts)[0])
 
     def violations(self, world: World, *, resolution: float | None = None) -> tuple[Violation, ...]:
-        """Check the path again, densely and independently of the planner that made it.
+        """Check the path again, independently of the planner that made it.
 
-        Every edge is checked in steps in which no point of the arm moves more than half of the world's motion
-        resolution (or ``resolution`` [m], if given), by :meth:`World.certify`.
+        An edge that is proven free for its whole length (:meth:`World.prove`) needs no more. Every other one is checked
+        in steps in which no point of the arm moves more than half of the world's motion resolution (or ``resolution``
+        [m], if given), by :meth:`World.certify`.
 
         Returns:
             The first violation of every edge that has one; empty for a valid path.
@@ -218,23 +205,19 @@ class JointPath:
             raise InputError(
                 f"path of {rows.shape[1]} joints: robot '{robot.name}' has {robot.dof}; it is another robot's"
             )
-        half = verification_resolution(world)
-        fine = half if resolution is None else positive(resolution, "resolution", "give metres")
+        fine = verification_resolution(world) if resolution is None else resolution
         rows = np.vstack([rows, rows]) if len(rows) == 1 else rows
-        counts = np.array([world.steps(a, b, fine) for a, b in pairwise(rows)], dtype=np.float64)
-        if counts.sum() > MAX_CHECKS:
-            raise InputError(
-                f"path: {counts.sum():.1e} checks are too many (at most {MAX_CHECKS:.0e}); "
-                f"raise motion_resolution, or check whether the joint values are rad and m"
-            )
-        found: list[Violation] = []
-        for part in in_parts(counts, AT_ONCE):
-            dense, edges = subdivided(rows[part[0] : part[-1] + 2], counts[part])
-            bad = np.flatnonzero(~world.certify(dense))
-            bad = bad[(bad > 0) | (part[0] == 0)]  # the point at which a part begins is the last one of the part before
-            _, first = np.unique(edges[bad], return_index=True)
-            found += [Violation(int(part[edges[k]]), frozen(dense[k]), world.explain(dense[k])) for k in bad[first]]
-        return tuple(found)
+        return route_violations(world, rows, positive(fine, "resolution", "give metres"))
+
+    def proved(self, world: World, *, clearance: float = 0.0, seconds: float | None = None) -> JointPath:
+        """The same path with what is proven of its motions, see :meth:`World.prove`.
+
+        Raises:
+            InputError: If the path is another robot's, or the clearance is negative or infinite.
+        """
+        other = copy.copy(self)
+        object.__setattr__(other, "proof", world.prove(self.waypoints, clearance=clearance, seconds=seconds))
+        return other
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the path to a file: .json (complete), .csv (a header of joint names), .txt (OMPL's matrix text).
@@ -258,11 +241,6 @@ class JointPath:
             "transitions": self.transitions,
             "waypoints": self.waypoints.tolist(),
         }
-
-
-def verification_resolution(world: World) -> float:
-    """Largest step of any point of the arm between two configurations of the second check [m]."""
-    return world.motion_resolution / VERIFICATION_DENSITY
 
 
 def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> JointPath:

@@ -20,8 +20,9 @@ from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ompl_bridge.attempt import Attempt, attempt
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, ompl_planners, traits_of
-from rrtik_ompl.path import JointPath, Violation
+from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem, densely_checked
+from rrtik_ompl.world.proof import PROOF_KERNELS
 
 RESTARTS = 20
 MAX_RESTARTS = 1_000_000
@@ -54,6 +55,11 @@ class Plan:
     seed: int
     statistics: Mapping[str, int | float]
 
+    @property
+    def proven(self) -> bool | None:
+        """Whether every motion of the path is proven free for its whole length; None without a path."""
+        return None if self.path is None or self.path.proof is None else self.path.proof.proven
+
 
 def plan(
     problem: Problem,
@@ -72,13 +78,8 @@ def plan(
     (see :class:`GoalSearch`).
 
     The planner first relies on what the kernels can prove without coal, for a short while; where that finds no path its
-    motions are checked exactly. Either way a path is returned only if a second check agrees, which is twice as dense
-    (:meth:`JointPath.violations`). The second check has forward kinematics of its own (numpy; the first one has
-    Pinocchio's and the kernels'), bounding boxes of its own and fresh collision requests. It shares with the first: the
-    bodies (``Body``), the pairs of them that must not touch, the test for one inside another (``Containment``), the
-    margins and what is requested of coal (``margins.request``), the bounds on how fast two bodies approach each other
-    (``approach_weights``), and the bound on the arm's displacement that the number of checked configurations is
-    computed from.
+    motions are checked exactly. Either way a path is returned only if a second check agrees
+    (:meth:`JointPath.violations`): motions are proven free for their whole length, or else checked twice as densely.
 
     If a planner gives up before its time it is started anew with another random stream; if the second check rejects its
     path, it is started anew and its motions are checked as densely as by the second check.
@@ -117,7 +118,7 @@ def plan(
     begin = time.perf_counter()
     search = _Search(problem, factory, name, begin + limit, seeds, parameters or {})
     if _nothing_to_do(problem):  # some planners return a detour, others crash
-        path: JointPath | None = JointPath.of(problem.robot, problem.start[None])
+        path: JointPath | None = JointPath.of(problem.robot, problem.start[None]).proved(problem.world)
     else:
         path = search.run()
     elapsed, reason = time.perf_counter() - begin - search.counting, search.reason
@@ -133,7 +134,7 @@ def _load_kernels(problem: Problem, factory: PlannerFactory) -> None:
     if not isinstance(problem.goal, JointGoal):
         load_kernels(problem.robot)
     if problem.world.fast is not None:
-        for name in traits_of(factory).kernels:
+        for name in (*traits_of(factory).kernels, PROOF_KERNELS):
             library(name)
 
 
@@ -290,8 +291,8 @@ def _verified(problem: Problem, outcome: Attempt, name: str) -> _Verified:
         return _Verified(
             None, f"{name} ended with '{outcome.status}'" + (f": {outcome.reason}" if outcome.reason else "")
         )
-    path = JointPath.of(problem.world.robot, outcome.rows)
-    faults: tuple[Violation, ...] = path.violations(problem.world)
+    path = JointPath.of(problem.world.robot, outcome.rows).proved(problem.world)
+    faults = () if path.proof is not None and path.proof.proven else path.violations(problem.world)
     if faults:
         return _Verified(None, f"the path of {name} was rejected by the second check: {faults[0].reason}")
     if not (path.start == problem.start).all() or not problem.reached(path.end):

@@ -11,9 +11,9 @@ from rrtik_ompl.arrays import TAU, Vector, frozen
 from rrtik_ompl.choices import Accuracy
 from rrtik_ompl.errors import ProblemError, Renamed, require
 from rrtik_ompl.goal import Goal, JointGoal
-from rrtik_ompl.path import verification_resolution
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
+from rrtik_ompl.world.route_check import verification_resolution
 
 
 class Problem:

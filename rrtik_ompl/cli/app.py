@@ -76,7 +76,7 @@ def check(problem: ProblemName, path: PathFile = None) -> int:
     The check is denser than a planner's and independent of it. Exit code 1 if the path is not valid.
     """
     from rrtik_ompl import JointGoal, load_path, load_problem
-    from rrtik_ompl.path import verification_resolution
+    from rrtik_ompl.world.route_check import verification_resolution
 
     question = load_problem(problem)
     world = question.world

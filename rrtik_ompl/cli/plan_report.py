@@ -10,12 +10,13 @@ from rich.table import Table
 
 from rrtik_ompl.goal import JointGoal, PositionGoal
 from rrtik_ompl.moves.text import COLUMNS, moves_document
-from rrtik_ompl.path import JointPath, verification_resolution
+from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning import Plan
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.trajectory import RateLimits, Trajectory
 from rrtik_ompl.transitions import lower_bound
 from rrtik_ompl.units import reading, shown_unit
+from rrtik_ompl.world.route_check import verification_resolution
 
 
 def moves_table(path: JointPath) -> Table:

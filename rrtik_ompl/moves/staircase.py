@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, positive
 from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.path import VERIFICATION_DENSITY, JointPath
+from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.transitions import SAME, merge_moves
 from rrtik_ompl.world import World
 from rrtik_ompl.world.motion_queries import MotionsFree
+from rrtik_ompl.world.route_check import VERIFICATION_DENSITY
 
 Order: TypeAlias = tuple[int, ...]  # the joints of a piece, the first to move first
 

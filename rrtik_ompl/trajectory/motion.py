@@ -13,11 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
 from rrtik_ompl.errors import InputError, in_file, require
 from rrtik_ompl.files.text import known_ending, read_text, write_text
-from rrtik_ompl.path import VERIFICATION_DENSITY, JointPath
+from rrtik_ompl.path import JointPath
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.trajectory.text import FORMATS, dumps, loads
 from rrtik_ompl.units import joint_units
 from rrtik_ompl.world import World
+from rrtik_ompl.world.route_check import VERIFICATION_DENSITY
 
 FIT_TOLERANCE = 1e-8  # [rad] or [m]; between a knot and the end of the cubic that leads to it
 JUMP_SHARE = 1e-6  # of the largest acceleration; a larger difference between two pieces is a jump, its jerk infinite

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import copy
 import warnings
+from dataclasses import replace
 from typing import get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Matrix, finite_array, positive
+from rrtik_ompl.arrays import Mask, Matrix, finite_array, not_negative, positive
 from rrtik_ompl.choices import Accuracy, one_of
 from rrtik_ompl.collision.bodies import colliding_pairs, link_bodies, scene_bodies
 from rrtik_ompl.collision.certificate import Certificate, fixed_contact
@@ -22,6 +23,9 @@ from rrtik_ompl.fast.search.motions.motion_table import FastMotions, motions_of,
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.world.exact_checks import ExactChecker
+from rrtik_ompl.world.proof import Gap as Gap
+from rrtik_ompl.world.proof import Proof as Proof
+from rrtik_ompl.world.proof import Prover
 
 MOTION_RESOLUTION = 0.01  # [m]
 ACCURACIES: tuple[Accuracy, ...] = get_args(Accuracy)
@@ -104,6 +108,7 @@ class World:
         self._certificate = Certificate(robot, self.bodies, pairs)
         self._motions: FastMotions | None = None
         self._checks = ExactChecker(robot, self.bodies, moving, conservative=accuracy == "conservative")
+        self._prover = Prover(robot, self.bodies, moving)
         standing = tuple(p for p in pairs if all(self.bodies[i].joint == 0 for i in p))
         self._always_colliding = fixed_contact(robot, self.bodies, standing) is not None
 
@@ -167,10 +172,43 @@ class World:
 
     def motion_valid_batch(self, A: ArrayLike, B: ArrayLike) -> Mask:
         """Which straight motions A[k] -> B[k], shape (m, dof) each, are valid. Shape (m,)."""
-        starts, ends = self._rows(A, 2), self._rows(B, 2)
-        if len(starts) != len(ends):
-            raise InputError(f"motions need as many starts as ends, got {len(starts)} and {len(ends)}")
-        return self._motions_free(starts, ends)
+        return self._motions_free(*self._both_ends(A, B))
+
+    def motion_proven(self, a: ArrayLike, b: ArrayLike) -> bool:
+        """Whether every configuration of the straight motion from a to b, shape (dof,) each, is proven free."""
+        return bool(self._motions_proven(self._rows(a, 1), self._rows(b, 1))[0])
+
+    def motions_proven(self, A: ArrayLike, B: ArrayLike, *, clearance: float = 0.0) -> Mask:
+        """Which straight motions A[k] -> B[k], shape (m, dof) each, are proven free for their whole length. Shape (m,).
+
+        ``clearance`` [m] is kept from every obstacle on top of its margin. What grazes an obstacle cannot be proven.
+        """
+        return self._motions_proven(*self._both_ends(A, B), not_negative(clearance, "clearance"))
+
+    def prove(self, waypoints: ArrayLike, *, clearance: float = 0.0, seconds: float | None = None) -> Proof:
+        """Prove the straight motions between waypoints, shape (k, dof), free for their whole length.
+
+        After [16], with a bound of second order in place of first.
+
+        Args:
+            waypoints: Of a path.
+            clearance: To be kept from every obstacle on top of its margin [m].
+            seconds: When to stop; what was not looked at by then is not proven.
+
+        Raises:
+            InputError: If waypoints are not finite rows of ``dof`` numbers, or the clearance is negative or infinite.
+
+        Example:
+            ``world.prove(path.waypoints).proven``
+        """
+        rows, kept = self._rows(waypoints, 2), not_negative(clearance, "clearance")
+        starts, ends = rows[:-1], rows[1:]
+        mask = self._may_be_proven(starts, ends)
+        places = np.flatnonzero(mask).tolist()
+        found = self._prover.gaps(starts[mask], ends[mask], clearance=kept, seconds=seconds)
+        gaps = {places[k]: replace(gap, motion=places[k]) for k, gap in found.items()}
+        gaps |= {k: Gap(k, float("nan"), "", "") for k in np.flatnonzero(~mask).tolist()}
+        return Proof(len(starts), kept, tuple(gaps[k] for k in sorted(gaps)))
 
     def steps(self, a: ArrayLike, b: ArrayLike, resolution: float | None = None) -> int:
         """Number of steps in which a motion is checked: the bound on the arm's displacement over the resolution."""
@@ -221,6 +259,21 @@ class World:
         mask[mask] = self._certificate.free(rows[mask])
         return mask
 
+    def _may_be_proven(self, starts: Matrix, ends: Matrix) -> Mask:
+        """Which motions have both ends inside the limits, in a world where something is free."""
+        return self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self._always_colliding)
+
+    def _motions_proven(self, starts: Matrix, ends: Matrix, clearance: float = 0.0) -> Mask:
+        mask = self._may_be_proven(starts, ends)
+        mask[mask] = self._prover.proven(starts[mask], ends[mask], clearance=clearance)
+        return mask
+
+    def _both_ends(self, A: ArrayLike, B: ArrayLike) -> tuple[Matrix, Matrix]:
+        starts, ends = self._rows(A, 2), self._rows(B, 2)
+        if len(starts) != len(ends):
+            raise InputError(f"motions need as many starts as ends, got {len(starts)} and {len(ends)}")
+        return starts, ends
+
     def _rows(self, Q: ArrayLike, dimensions: int) -> Matrix:
         """Checked configurations as rows, shape (m, dof)."""
         rows = np.asarray(Q, dtype=np.float64) if isinstance(Q, np.ndarray) and Q.dtype.kind in "fiub" else None
@@ -238,7 +291,7 @@ class World:
         return mask
 
     def _motions_free(self, starts: Matrix, ends: Matrix) -> Mask:
-        mask = self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self._always_colliding)
+        mask = self._may_be_proven(starts, ends)
         starts, ends = _one_way(starts[mask], ends[mask])
         steps = step_counts(starts, ends, self.weights, self.motion_resolution)
         mask[mask] = self._checks.motions_free(starts, ends, steps)

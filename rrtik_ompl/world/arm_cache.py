@@ -63,7 +63,7 @@ class ArmCache:
             outer=outer,
             inner=inner,
             solids=[convex_solids(body.geometry) for body in bodies],
-            strokes=_strokes(self._robot),
+            strokes=strokes(self._robot),
             like=self._latest if share else None,
         )
         if share:
@@ -85,7 +85,7 @@ def _spheres(body: Body) -> Spheres:
     )
 
 
-def _strokes(robot: Robot) -> Vector:
+def strokes(robot: Robot) -> Vector:
     """How far the limits let each joint of the chain go from its zero, shape (joints,); 0 for continuous joints."""
     ends = np.maximum(np.abs(robot.lower), np.abs(robot.upper))
     ends = np.where(np.isfinite(ends), ends, 0.0)

@@ -1,0 +1,1 @@
+"""Proofs in kernels that whole motions are free, not only points of them."""

@@ -1,0 +1,230 @@
+"""What the kernels of proofs read, made from bodies and the pairs of them that must not touch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.margins import kept_apart
+from rrtik_ompl.fast.proof import layout
+from rrtik_ompl.fast.proof.layout import CONVEX_SOLID, HALF_SPACE, NODES, UNKNOWN, WHOLE_BODY
+from rrtik_ompl.fast.tables.layout import CONVEX_SOLID as IS_CONVEX
+from rrtik_ompl.fast.tables.layout import HALF_SPACE_SOLID
+from rrtik_ompl.fast.tables.memory import Table, record, table
+from rrtik_ompl.fast.tables.solid_tables import ConvexSolid, Solids
+from rrtik_ompl.robot import Chain
+
+ROOM = 1e-8  # [m] for rounding: float64 misplaces points of an arm of 30 joints and 100 m by less than a tenth of it
+KINDS = {IS_CONVEX: CONVEX_SOLID, HALF_SPACE_SOLID: HALF_SPACE}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ProofPairs:
+    """The table of a proof, and what its pairs are.
+
+    Attributes:
+        table: For the kernels.
+        bodies: Numbers of the two bodies of each of the table's pairs, shape (n, 2).
+        margins: How far each must stay apart [m], shape (n,).
+        beside_obstacle: Which pairs are of what moves and an obstacle, shape (n,).
+    """
+
+    table: Table
+    bodies: NDArray[np.int64]
+    margins: Vector
+    beside_obstacle: NDArray[np.bool_]
+
+    def keep(self, clearance: float) -> None:
+        """Let the kernels keep a clearance [m] from obstacles beside the margins."""
+        self.table[layout.MARGINS][:] = self.margins + ROOM + clearance * self.beside_obstacle
+
+
+def proof_pairs(
+    chain: Chain,
+    bodies: Sequence[Body],
+    pairs: Sequence[tuple[int, int]],
+    solids: Sequence[Solids],
+    strokes: ArrayLike,
+) -> ProofPairs:
+    """Pack a proof.
+
+    Args:
+        chain: The tree of joints.
+        bodies: All bodies.
+        pairs: Numbers of those that must not touch; pairs that both stand still are left out.
+        solids: For each body convex solids around it, in its own frame.
+        strokes: Largest value of sliding joints [m], a number or shape (joints,).
+    """
+    joints = len(chain.parent)
+    parts = [_parts(body, around) for body, around in zip(bodies, solids, strict=True)]
+    reached = [
+        _reaches(chain, body.joint, own, np.broadcast_to(strokes, joints))
+        for body, own in zip(bodies, parts, strict=True)
+    ]
+    sweeps: dict[tuple[int, int], int] = {}
+    whole, of_parts = [], []
+    ends = np.cumsum([0, *(len(part) + (len(part) > 1) for part in parts)])
+    for i, j in pairs:
+        if bodies[i].joint == bodies[j].joint == 0:
+            continue
+        one, other = (i, j) if _beyond(chain, bodies[i].joint, bodies[j].joint) else (j, i)
+        base = _common(chain, bodies[one].joint, bodies[other].joint)
+        own = [sweeps.setdefault((k, base), len(sweeps)) if bodies[k].joint != base else -1 for k in (one, other)]
+        first = len(of_parts)
+        split = len(parts[one]) > 1 or len(parts[other]) > 1
+        if split:
+            firsts = [ends[k] + (len(parts[k]) > 1) for k in (one, other)]
+            of_parts += [
+                (firsts[0] + a, firsts[1] + b, base, *own, 0, 0, i, j)
+                for a in range(len(parts[one]))
+                for b in range(len(parts[other]))
+            ]
+        whole.append((ends[one], ends[other], base, *own, first, len(of_parts), i, j))
+    rows = np.array([*whole, *of_parts], dtype=np.int64).reshape(-1, layout.PAIR_SIZE + 2)
+    rows[: len(whole), layout.PARTS_FIRST : layout.PARTS_END + 1] += len(whole)
+    named = rows[:, layout.PAIR_SIZE :]
+    packed = _solid_arrays(bodies, parts)
+    made = table(
+        {
+            layout.JOINT_COUNT: joints,
+            layout.PARENTS: (chain.parent + 1).astype(np.int32),
+            layout.SLIDING: chain.prismatic.astype(np.int32),
+            layout.JOINTS: _joint_records(chain),
+            **packed,
+            layout.SWEEP_COUNT: len(sweeps),
+            layout.SWEEPS: np.array([(bodies[k].joint, base) for k, base in sweeps], dtype=np.int32),
+            layout.REACHES: np.array([reached[k] for k, _ in sweeps], dtype=np.float64),
+            layout.BODY_PAIR_COUNT: len(whole),
+            layout.PAIR_COUNT: len(rows),
+            layout.PAIRS: rows[:, : layout.PAIR_SIZE].astype(np.int32),
+            layout.MARGINS: np.zeros(len(rows)),
+            layout.FRAMES: np.zeros(NODES * (joints + 1) * layout.FRAME_SIZE),
+            layout.STAMPS: np.zeros(NODES, dtype=np.int32),
+            layout.BENDS: np.zeros(len(sweeps)),
+            layout.WAYS: np.zeros(3 * len(rows)),
+            layout.LISTS: np.zeros((layout.DEEPEST + 2) * len(rows), dtype=np.int32),
+            layout.COUNTS: np.zeros(layout.DEEPEST + 2, dtype=np.int32),
+            layout.STACK: np.zeros(2 * (layout.DEEPEST + 3), dtype=np.int32),
+            layout.SEEN: np.zeros(4 * layout.FRAME_SIZE),
+            layout.LAST_STAMP: np.zeros(1, dtype=np.int32),
+        }
+    )
+    margins = np.array([kept_apart(bodies[i], bodies[j]) for i, j in named], dtype=np.float64)
+    obstacles = np.array([body.kind == "obstacle" for body in bodies], dtype=bool)
+    return ProofPairs(made, named, margins, obstacles[named].any(axis=1))
+
+
+def _parts(body: Body, solids: Solids) -> tuple[ConvexSolid, ...]:
+    """Convex solids around a body in its joint's frame; one of an unknown kind where there are none."""
+    rotation, origin = np.array(body.placement.rotation), np.array(body.placement.translation)
+    return tuple(solid.placed(rotation, origin, 0.0) for solid in solids.around) or (_NOTHING,)
+
+
+_NOTHING = ConvexSolid(np.zeros((1, 3)), inside=False, kind=-1)
+
+
+def _kind(body: Body, solid: ConvexSolid) -> int:
+    """What the kernels take a solid for; a half-space that moves is not known to them."""
+    kind = KINDS.get(solid.kind, UNKNOWN)
+    return UNKNOWN if kind == HALF_SPACE and body.joint > 0 else kind
+
+
+def _common(chain: Chain, first: int, second: int) -> int:
+    """The last frame that carries both of two frames."""
+    while first != second:  # parents have smaller numbers
+        first, second = min(first, second), int(chain.parent[max(first, second) - 1]) + 1
+    return first
+
+
+def _beyond(chain: Chain, first: int, second: int) -> bool:
+    """Whether a frame is carried by another one."""
+    return _common(chain, first, second) == second
+
+
+def _joint_records(chain: Chain) -> Matrix:
+    """The joints as the kernels read them, shape (joints, JOINT_SIZE)."""
+    turns = chain.placement[:, :3, :3].reshape(-1, 9)
+    return np.concatenate([turns, chain.placement[:, :3, 3], chain.axis], axis=1)
+
+
+def _points(solid: ConvexSolid, axis: Vector) -> tuple[float, float]:
+    """Largest distance of a solid's points from the frame's origin, and from an axis through it."""
+    around = solid.disc + solid.radius
+    far = float(np.linalg.norm(solid.corners, axis=1).max()) + around
+    return far, float(np.linalg.norm(np.cross(solid.corners, axis), axis=1).max()) + around
+
+
+def _reaches(chain: Chain, joint: int, parts: Sequence[ConvexSolid], strokes: Vector) -> Vector:
+    """How far a body's points come from the axis of each joint that carries it, in any posture, shape (joints,)."""
+    reaches = np.zeros(len(chain.parent))
+    if joint == 0:
+        return reaches
+    if any(solid.kind != IS_CONVEX for solid in parts):
+        return np.full(len(chain.parent), np.inf)
+    measured = np.array([_points(solid, chain.axis[joint - 1]) for solid in parts]).max(axis=0)
+    far, reaches[joint - 1] = measured
+    while (parent := int(chain.parent[joint - 1])) >= 0:
+        origin = chain.placement[joint - 1][:3, 3]
+        slide = float(strokes[joint - 1]) if chain.prismatic[joint - 1] else 0.0
+        reaches[parent] = float(np.linalg.norm(np.cross(origin, chain.axis[parent]))) + slide + far
+        far += float(np.linalg.norm(origin)) + slide
+        joint = parent + 1
+    return reaches
+
+
+def _sizes(solids: Sequence[ConvexSolid], turn: Matrix) -> Vector:
+    """Ball and box around solids, the box along the columns of ``turn``, and the measures of the first solid."""
+    if any(solid.kind != IS_CONVEX for solid in solids):
+        own = solids[0]
+        return record(layout.SIZE_COUNT, {layout.DISC: own.disc, layout.DISC_AXIS: own.axis})
+    lows, highs = [], []
+    for solid in solids:
+        across = solid.disc * np.sqrt(np.maximum(0.0, 1.0 - (turn.T @ solid.axis) ** 2)) + solid.radius
+        along = solid.corners @ turn
+        lows.append(along.min(axis=0) - across)
+        highs.append(along.max(axis=0) + across)
+    low, high = np.min(lows, axis=0), np.max(highs, axis=0)
+    centre = turn @ (0.5 * (low + high))
+    radius = max(float(np.linalg.norm(s.corners - centre, axis=1).max()) + s.disc + s.radius for s in solids)
+    own = solids[0]
+    return record(
+        layout.SIZE_COUNT,
+        {
+            layout.BALL_CENTRE: centre,
+            layout.BALL_RADIUS: radius,
+            layout.BOX_AXES: turn.T.ravel(),
+            layout.BOX_MIDDLE: 0.5 * (low + high),
+            layout.BOX_HALF: 0.5 * (high - low),
+            layout.DISC: own.disc,
+            layout.DISC_AXIS: own.axis,
+            layout.ROUND: own.radius,
+        },
+    )
+
+
+def _solid_arrays(
+    bodies: Sequence[Body], parts: Sequence[Sequence[ConvexSolid]]
+) -> dict[int, int | NDArray[np.int32] | NDArray[np.float64]]:
+    """The arrays of all solids: a body of several parts comes before these, as a whole."""
+    numbers, sizes, corners, count = [], [], [np.zeros((0, 3))], 0
+    for body, own in zip(bodies, parts, strict=True):
+        turn = np.array(body.placement.rotation)
+        if len(own) > 1:
+            known = all(solid.kind == IS_CONVEX for solid in own)
+            numbers.append((body.joint, 0, 0, WHOLE_BODY if known else UNKNOWN))
+            sizes.append(_sizes(own, turn))
+        for solid in own:
+            numbers.append((body.joint, count, count + len(solid.corners), _kind(body, solid)))
+            sizes.append(_sizes([solid], turn))
+            corners.append(solid.corners)
+            count += len(solid.corners)
+    return {
+        layout.SOLIDS: np.array(numbers, dtype=np.int32),
+        layout.SIZES: np.array(sizes, dtype=np.float64),
+        layout.CORNERS: np.concatenate(corners),
+    }

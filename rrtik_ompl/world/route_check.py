@@ -1,0 +1,75 @@
+"""The second check of a path: its motions proven, and those that cannot be proven checked densely."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix, Vector, frozen
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.transitions import in_parts, subdivided
+from rrtik_ompl.world import World
+
+VERIFICATION_DENSITY = 2.0  # how many times finer than the motion resolution a motion is checked again
+MAX_CHECKS = 30_000_000  # of a path; more than that take minutes
+AT_ONCE = 200_000  # of them, so that a long path needs no more memory than a short one
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Violation:
+    """Why a path is not valid.
+
+    Attributes:
+        edge: Number of the edge, from 0; waypoint ``edge`` is its beginning.
+        q: The offending configuration, shape (n,).
+        reason: A line for a person: the pair in collision, or the joint and its limit.
+    """
+
+    edge: int
+    q: Vector
+    reason: str
+
+
+def verification_resolution(world: World) -> float:
+    """Largest step of any point of the arm between two configurations of the second check [m]."""
+    return world.motion_resolution / VERIFICATION_DENSITY
+
+
+def route_violations(world: World, rows: Matrix, resolution: float) -> tuple[Violation, ...]:
+    """The first violation of every motion between waypoints that has one.
+
+    Args:
+        world: The world.
+        rows: Waypoints, two at least, shape (k, dof).
+        resolution: Largest step of any point of the arm between two checks of a motion that is not proven [m].
+
+    Raises:
+        InputError: If the path is too long for its checks.
+    """
+    counts = np.array([world.steps(a, b, resolution) for a, b in pairwise(rows)], dtype=np.float64)
+    if counts.sum() > MAX_CHECKS:
+        raise InputError(
+            f"path: {counts.sum():.1e} checks are too many (at most {MAX_CHECKS:.0e}); "
+            f"raise motion_resolution, or check whether the joint values are rad and m"
+        )
+    open_ = np.flatnonzero(~world.motions_proven(rows[:-1], rows[1:]))
+    found: list[Violation] = []
+    for run in np.split(open_, np.flatnonzero(np.diff(open_) > 1) + 1) if len(open_) else ():
+        found += _sampled(world, rows, counts, run)
+    return tuple(found)
+
+
+def _sampled(world: World, rows: Matrix, counts: Vector, run: NDArray[np.int64]) -> Iterator[Violation]:
+    """The violations of consecutive motions, whose numbers are given, checked in steps."""
+    for part in in_parts(counts[run], AT_ONCE):
+        edges = run[part]
+        dense, owners = subdivided(rows[edges[0] : edges[-1] + 2], counts[edges])
+        bad = np.flatnonzero(~world.certify(dense))
+        bad = bad[(bad > 0) | (part[0] == 0)]  # the point at which a part begins is the last one of the part before
+        _, first = np.unique(owners[bad], return_index=True)
+        for k in bad[first]:
+            yield Violation(int(edges[owners[k]]), frozen(dense[k]), world.explain(dense[k]))
