@@ -175,20 +175,18 @@ class World:
         return self._motions_free(*self._both_ends(A, B))
 
     def motion_proven(self, a: ArrayLike, b: ArrayLike) -> bool:
-        """Whether every configuration of the straight motion from a to b, shape (dof,) each, is proven free."""
+        """Whether each configuration of the straight motion from a to b, shape (dof,) each, is proven free."""
         return bool(self._motions_proven(self._rows(a, 1), self._rows(b, 1))[0])
 
     def motions_proven(self, A: ArrayLike, B: ArrayLike, *, clearance: float = 0.0) -> Mask:
-        """Which straight motions A[k] -> B[k], shape (m, dof) each, are proven free for their whole length. Shape (m,).
+        """Which straight motions A[k] -> B[k], shape (m, dof) each, are proven free as a whole. Shape (m,).
 
         ``clearance`` [m] is kept from every obstacle on top of its margin. What grazes an obstacle cannot be proven.
         """
         return self._motions_proven(*self._both_ends(A, B), not_negative(clearance, "clearance"))
 
     def prove(self, waypoints: ArrayLike, *, clearance: float = 0.0, seconds: float | None = None) -> Proof:
-        """Prove the straight motions between waypoints, shape (k, dof), free for their whole length.
-
-        After [16], with a bound of second order in place of first.
+        """Prove the straight motions between waypoints, shape (k, dof), free for their whole length; after [16].
 
         Args:
             waypoints: Of a path.
@@ -197,9 +195,6 @@ class World:
 
         Raises:
             InputError: If waypoints are not finite rows of ``dof`` numbers, or the clearance is negative or infinite.
-
-        Example:
-            ``world.prove(path.waypoints).proven``
         """
         rows, kept = self._rows(waypoints, 2), not_negative(clearance, "clearance")
         starts, ends = rows[:-1], rows[1:]

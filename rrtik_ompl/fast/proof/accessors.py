@@ -9,7 +9,7 @@ from rrtik_ompl.fast.proof import layout
 from rrtik_ompl.fast.proof.layout import ProofTable
 from rrtik_ompl.fast.simd.access import field_reader, int_column
 from rrtik_ompl.fast.simd.compiled import inlined
-from rrtik_ompl.fast.simd.lanes import double_at, field
+from rrtik_ompl.fast.simd.lanes import double_at
 
 joint_count_of: Callable[[ProofTable], int] = field_reader(layout.JOINT_COUNT)
 parents_of: Callable[[ProofTable], int] = field_reader(layout.PARENTS)
@@ -73,4 +73,5 @@ def sizes_at(table: ProofTable, solid: int, place: int) -> Any:
 @inlined
 def node_frames(table: ProofTable, node: int) -> int:
     """Where the frames of a node begin, counted in float64; the first one is the world."""
-    return layout.FRAME_SIZE * (field(table, layout.JOINT_COUNT) + 1) * node
+    place: int = layout.FRAME_SIZE * (joint_count_of(table) + 1) * node
+    return place

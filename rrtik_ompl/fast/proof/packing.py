@@ -67,7 +67,8 @@ def proof_pairs(
         for body, own in zip(bodies, parts, strict=True)
     ]
     sweeps: dict[tuple[int, int], int] = {}
-    whole, of_parts = [], []
+    whole: list[tuple[int, ...]] = []
+    of_parts: list[tuple[int, ...]] = []
     ends = np.cumsum([0, *(len(part) + (len(part) > 1) for part in parts)])
     for i, j in pairs:
         if bodies[i].joint == bodies[j].joint == 0:
@@ -116,7 +117,7 @@ def proof_pairs(
     )
     margins = np.array([kept_apart(bodies[i], bodies[j]) for i, j in named], dtype=np.float64)
     obstacles = np.array([body.kind == "obstacle" for body in bodies], dtype=bool)
-    return ProofPairs(made, named, margins, obstacles[named].any(axis=1))
+    return ProofPairs(made, named, margins, obstacles[named[:, 0]] | obstacles[named[:, 1]])
 
 
 def _parts(body: Body, solids: Solids) -> tuple[ConvexSolid, ...]:

@@ -1,0 +1,180 @@
+"""Motions that are proven free for their whole length."""
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.collision.bodies import link_bodies
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.fast.proof import layout
+from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.shapes import Box, Cylinder, HalfSpace, Sphere
+from rrtik_ompl.world import World
+
+ARMS = ("panda", "ur5", "titan4", "planar10", "ur5_gripper", "puma560")
+SLIDER = """<robot name="slider">
+  <link name="base"/><link name="rail"/><link name="arm"/><link name="tool"/>
+  <joint name="turn" type="revolute"><parent link="base"/><child link="rail"/><axis xyz="0 0 1"/>
+    <limit lower="-3" upper="3" velocity="1" effort="1"/></joint>
+  <joint name="slide" type="prismatic"><parent link="rail"/><child link="arm"/><origin xyz="0.2 0 0.1"/>
+    <axis xyz="1 0 0"/><limit lower="0" upper="0.8" velocity="1" effort="1"/></joint>
+  <joint name="wrist" type="revolute"><parent link="arm"/><child link="tool"/><origin xyz="0.3 0 0"/><axis xyz="0 1 0"/>
+    <limit lower="-3" upper="3" velocity="1" effort="1"/></joint>
+  {0}
+</robot>"""
+LINK = """<link name="{0}">
+  <collision><origin xyz="{1} 0 0"/><geometry><box size="{2} 0.05 0.05"/></geometry></collision>
+</link>"""
+
+
+def slider(folder):
+    """An arm that turns, slides and turns."""
+    text = SLIDER.replace("{0}", "").replace('<link name="arm"/>', LINK.format("arm", 0.15, 0.3))
+    text = text.replace('<link name="tool"/>', LINK.format("tool", 0.1, 0.2))
+    (folder / "slider.urdf").write_text(text)
+    return rrtik.load_robot(folder / "slider.urdf", tip="tool")
+
+
+def arm(name, folder):
+    return slider(folder) if name == "slider" else rrtik.load_robot(name)
+
+
+def random_motions(robot, rng, count, length=1.0):
+    """Motions of random free configurations, shapes (count, dof)."""
+    low, high = np.maximum(robot.lower, -3.0), np.minimum(robot.upper, 3.0)
+    starts = rng.uniform(low, high, (count, robot.dof))
+    ends = np.clip(starts + rng.normal(0.0, length / np.sqrt(robot.dof), starts.shape), low, high)
+    return starts, ends
+
+
+def surface_point(robot, q, rng):
+    """A point on a moving link at a configuration, by coal's own bounding information of its geometry."""
+    bodies = [b for b in link_bodies(robot) if b.joint > 0]
+    body = bodies[rng.integers(len(bodies))]
+    geometry = body.geometry
+    if isinstance(geometry, coal.BVHModelBase):
+        points = np.array([geometry.vertex(int(k)) for k in rng.integers(geometry.num_vertices, size=3)])
+        local = points[0]
+    elif isinstance(geometry, coal.ConvexBase):
+        local = np.array(geometry.point(int(rng.integers(geometry.num_points))))
+    else:
+        local = np.array(geometry.aabb_center)
+    frame = pin.SE3(robot.joint_frames(q[None])[0][body.joint])
+    return frame.act(body.placement.act(local))
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("name", [*ARMS, "slider"])
+def test_a_needle_or_plate_in_the_way_is_always_found(name, tmp_path):
+    robot, rng = arm(name, tmp_path), np.random.default_rng(5)
+    starts, ends = random_motions(robot, rng, 25)
+    for a, b in zip(starts, ends, strict=True):
+        point = surface_point(robot, a + rng.uniform() * (b - a), rng)
+        solid = Box([0.3, 0.3, 1e-4]) if rng.uniform() < 0.5 else Cylinder(2e-4, 0.4)
+        place = pin.SE3(pin.exp3(rng.normal(size=3)), point)
+        world = World(robot, Scene([Obstacle("thin", solid, place)]))
+        assert not world.motion_proven(a, b)
+        assert not world.motion_proven(b, a)
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("name", [*ARMS, "slider"])
+def test_what_is_proven_is_free_wherever_coal_looks(name, tmp_path):
+    robot, rng = arm(name, tmp_path), np.random.default_rng(6)
+    plate, floor = Box([0.4, 0.4, 1e-4]), HalfSpace([0.1, 0, 1], -1.1)
+    solids = (Box([0.2, 0.1, 0.3]), Sphere(0.1), Cylinder(0.05, 0.4), plate, floor)
+    reach = 3.0 if name.startswith("planar") else 0.9
+    places = [pin.SE3(pin.exp3(rng.normal(size=3)), rng.uniform(-reach, reach, 3)) for _ in solids]
+    places[-1] = pin.SE3.Identity()
+    scene = Scene([Obstacle(f"o{k}", s, p) for k, (s, p) in enumerate(zip(solids, places, strict=True))])
+    world = World(robot, scene)
+    starts, ends = random_motions(robot, rng, 300, length=0.6)
+    proven = world.motions_proven(starts, ends)
+    for a, b in zip(starts[proven][:40], ends[proven][:40], strict=True):
+        rows = a + np.linspace(0.0, 1.0, 400)[:, None] * (b - a)
+        assert world.valid_batch(rows).all()
+    free = world.motion_valid_batch(starts, ends)
+    assert proven.sum() >= 0.97 * free.sum()
+    assert not (proven & ~free).any()
+    if name != "planar10":  # whose links hardly keep clear of all that stands on its plane
+        assert proven.any()
+    assert world._prover._packed.table.intact()
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("name", ["panda", "ur5", "slider", "titan4"])
+def test_no_point_leaves_its_chord_by_more_than_the_bound(name, tmp_path):
+    robot, rng = arm(name, tmp_path), np.random.default_rng(7)
+    world = World(robot, Scene([Obstacle("far", Sphere(0.1), pin.SE3(np.eye(3), np.array([50.0, 0, 0])))]))
+    starts, ends = random_motions(robot, rng, 20, length=1.5)
+    for a, b in zip(starts, ends, strict=True):
+        world.motion_proven(a, b)
+        table = world._prover._packed.table
+        bends = table[layout.BENDS]
+        frames = robot.joint_frames(a + np.linspace(0.0, 1.0, 101)[:, None] * (b - a))
+        sweeps = table[layout.SWEEPS].reshape(-1, layout.SWEEP_SIZE)
+        for body in [k for k in world.bodies if k.joint > 0]:
+            for (frame, base), bend in zip(sweeps, bends, strict=True):
+                if frame != body.joint:
+                    continue
+                poses = np.linalg.inv(frames[:, base]) @ frames[:, frame] @ body.placement.homogeneous
+                point = poses[:, :3, :3] @ np.array(body.geometry.aabb_center) + poses[:, :3, 3]
+                share = np.linspace(0.0, 1.0, 101)[:, None]
+                left = np.linalg.norm(point - (1.0 - share) * point[0] - share * point[-1], axis=1).max()
+                # bodies that one joint carries have a sweep each; the largest of them bounds all their points
+                same = max(x for (f, s), x in zip(sweeps, bends, strict=True) if (f, s) == (frame, base))
+                assert left <= same / 8.0 + 1e-12, bend
+
+
+@pytest.mark.kernels
+def test_a_clearance_is_kept_to_the_micrometre():
+    robot = rrtik.load_robot("point2d", radius=0.5, bounds=[[0.0, 26.0], [0.0, 20.0]])
+    wall = Obstacle("wall", Box([30.0, 1.0, 4.0]), rrtik.pose([13.0, 10.0, 0.0]), margin=0.1)
+    world = World(robot, Scene([wall]))
+    a, b = np.array([[2.0, 8.895]]), np.array([[20.0, 8.895]])  # 5 mm beyond wall, margin and radius
+    assert world.motions_proven(a, b, clearance=0.005 - 1e-6).all()
+    assert not world.motions_proven(a, b, clearance=0.005 + 1e-6).any()
+    gap = world.prove(np.concatenate([a, b]), clearance=0.006).unproven[0]
+    assert {gap.first, gap.second} == {"wall", world.bodies[0].name}
+
+
+@pytest.mark.kernels
+def test_a_still_motion_and_the_limits():
+    robot = rrtik.load_robot("panda")
+    world, q = World(robot), robot.posture("default")
+    assert world.motion_proven(q, q)
+    assert not world.motion_proven(q, robot.upper + 0.1)
+    assert world.prove([q]).proven  # no motion at all
+    assert not world.prove([q, robot.upper + 0.1]).proven
+
+
+@pytest.mark.kernels
+def test_what_a_plan_returns_says_what_is_proven():
+    problem = rrtik.load_problem("titan4_prisms")
+    plan = rrtik.plan(problem, seed=1)
+    assert plan.found
+    assert plan.proven
+    assert plan.path.proof.motions == len(plan.path.waypoints) - 1
+    assert plan.path.with_waypoints(plan.path.waypoints).proof is None
+
+
+@pytest.mark.kernels
+def test_without_kernels_nothing_is_proven_and_plans_are_checked_densely(monkeypatch):
+    monkeypatch.setattr("rrtik_ompl.world.proof.library", lambda name: None)
+    problem = rrtik.load_problem("titan4_prisms")
+    plan = rrtik.plan(problem, seed=1)
+    assert plan.found
+    assert plan.proven is False
+    assert plan.path.violations(problem.world) == ()
+
+
+def test_a_proof_of_bad_numbers_is_refused_by_name():
+    world = World(rrtik.load_robot("panda"))
+    q = world.robot.posture("default")
+    for clearance in (-0.1, np.inf, np.nan):
+        with pytest.raises(InputError, match="clearance"):
+            world.prove([q, q], clearance=clearance)
+    with pytest.raises(InputError):
+        world.prove([q, q * np.nan])
