@@ -141,6 +141,21 @@ def test_a_clearance_is_kept_to_the_micrometre():
 
 
 @pytest.mark.kernels
+@pytest.mark.parametrize("gap", [1e-4, 2e-6, -2e-6, -1e-4])
+@pytest.mark.parametrize("share", [0.5, 0.31])
+def test_the_outermost_point_of_an_arc_is_seen_to_the_micrometre(gap, share):
+    robot, a, b = rrtik.load_robot("planar3", radius=0.02), np.array([-0.5, 0.0, 0.0]), np.array([0.5, 0.0, 0.0])
+    q = a + share * (b - a)
+    way = np.array([np.cos(q[0]), np.sin(q[0]), 0.0])
+
+    def world(distance):
+        return World(robot, Scene([Obstacle("ball", Sphere(0.01), rrtik.pose(distance * way))]))
+
+    beyond = world(3.2).clearance(q)
+    assert world(3.2 - beyond + gap).motion_proven(a, b) == (gap > 0.0)
+
+
+@pytest.mark.kernels
 def test_a_still_motion_and_the_limits():
     robot = rrtik.load_robot("panda")
     world, q = World(robot), robot.posture("default")
