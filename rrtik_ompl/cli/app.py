@@ -73,10 +73,11 @@ def _options(
 def check(problem: ProblemName, path: PathFile = None) -> int:
     """Check a problem, and a path for it.
 
-    The check is denser than a planner's and independent of it. Exit code 1 if the path is not valid.
+    Motions are proven free for their whole length; where that cannot be done they are checked densely. Exit code 1 if
+    the path is not valid.
     """
     from rrtik_ompl import JointGoal, load_path, load_problem
-    from rrtik_ompl.world.route_check import verification_resolution
+    from rrtik_ompl.world.route_check import how_checked
 
     question = load_problem(problem)
     world = question.world
@@ -96,9 +97,8 @@ def check(problem: ProblemName, path: PathFile = None) -> int:
         say(f"{path}: {fault}")
     if faults:
         return NOT_FOUND
-    step = verification_resolution(world)
     size = f"{len(route.waypoints)} waypoints, {route.transitions} moves, length {route.length:.2f} {route.unit}"
-    say(f"{path}: valid, checked every {step:g} m; {size}")
+    say(f"{path}: valid, {how_checked(world, route.waypoints)}; {size}")
     return FOUND
 
 

@@ -16,7 +16,7 @@ from rrtik_ompl.problem import Problem
 from rrtik_ompl.trajectory import RateLimits, Trajectory
 from rrtik_ompl.transitions import lower_bound
 from rrtik_ompl.units import reading, shown_unit
-from rrtik_ompl.world.route_check import verification_resolution
+from rrtik_ompl.world.route_check import how_checked
 
 
 def moves_table(path: JointPath) -> Table:
@@ -95,10 +95,8 @@ def summary(problem: Problem, plan: Plan, path: JointPath | None, shorten_second
         angle = np.degrees(plan.statistics["orientation_error"])
         turned = "" if isinstance(problem.goal, PositionGoal) else f" and {angle:.2g} deg"
         lines.append(f"the tip ends {plan.statistics['position_error']:.2g} m{turned} from the goal")
-    step = verification_resolution(problem.world)
-    lines.append(
-        f"planning {plan.seconds:.3f} s, shortening {shorten_seconds:.3f} s; checked again every {step:g} m: valid"
-    )
+    checked = how_checked(problem.world, path.waypoints)
+    lines.append(f"planning {plan.seconds:.3f} s, shortening {shorten_seconds:.3f} s; valid: {checked}")
     return lines
 
 
@@ -118,6 +116,7 @@ def document(problem: Problem, plan: Plan, path: JointPath | None, shorten_secon
         return found
     found |= {
         "length": path.length,
+        "proven": problem.world.prove(path.waypoints).proven,
         "transitions": path.transitions,
         "lower_bound": fewest_moves(problem, plan),
         "joint_names": list(path.joint_names),

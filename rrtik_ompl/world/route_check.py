@@ -39,6 +39,17 @@ def verification_resolution(world: World) -> float:
     return world.motion_resolution / VERIFICATION_DENSITY
 
 
+def how_checked(world: World, rows: Matrix) -> str:
+    """How the second check sees that the motions between waypoints, shape (k, dof), are free, in a few words."""
+    proof = world.prove(rows)
+    if proof.proven:
+        return "proven free at every configuration"
+    sampled, first = len(proof.unproven), proof.unproven[0]
+    where = f", first motion {first.motion + 1}" + (f" ('{first.first}' and '{first.second}')" if first.first else "")
+    step = f"checked every {1e3 * verification_resolution(world):g} mm"
+    return f"{proof.motions - sampled} of {proof.motions} motions proven free, the others {step}{where}"
+
+
 def route_violations(world: World, rows: Matrix, resolution: float) -> tuple[Violation, ...]:
     """The first violation of every motion between waypoints that has one.
 

@@ -24,7 +24,23 @@ def test_plan_prints_the_moves_and_saves_a_path_that_check_accepts(capsys, tmp_p
     assert len(rows) == path.transitions
     code, out, _ = rrtik(capsys, "check", "titan4_sdu", str(file))
     assert code == 0
-    assert "valid" in out
+    assert "valid, proven free at every configuration" in out
+
+
+def test_check_names_a_motion_that_is_not_proven(capsys, tmp_path):
+    scene = "{obstacles: [{name: wall, box: [30, 1, 4], pose: {xyz: [13, 10, 0]}}]}"
+    robot = "{point2d: {radius: 0.5, bounds: [[0, 26], [0, 20]]}}"
+    ends = "start: {joints: [2, 5]}\ngoal: {joints: [20, 5]}"
+    (tmp_path / "wall.yaml").write_text(f"version: 1\nrobot: {robot}\nscene: {scene}\n{ends}\n")
+    (tmp_path / "graze.csv").write_text("x,y\n2,5\n2,8.999999995\n20,5\n")  # nearer than rounding allows
+    code, out, _ = rrtik(capsys, "check", str(tmp_path / "wall.yaml"), str(tmp_path / "graze.csv"))
+    assert code == 0
+    assert "0 of 2 motions proven free, the others checked every 5 mm, first motion 1" in out
+    assert "'wall'" in out
+
+
+def test_json_says_whether_a_path_is_proven(capsys):
+    assert json.loads(rrtik(capsys, "plan", "titan4_prisms", "--seed", "1", "--json")[1])["proven"] is True
 
 
 def test_the_same_seed_prints_the_same_moves(capsys):
