@@ -143,7 +143,7 @@ def test_a_long_path_is_checked_in_parts_with_the_same_violations(monkeypatch, a
     rows = np.random.default_rng(0).integers(0, 12, (40, 2)).astype(float)
     rows[[7, 20]] = 5.0  # waypoints inside the box, where parts may end
     whole = JointPath(rows).violations(world)
-    monkeypatch.setattr("rrtik_ompl.path.AT_ONCE", at_once)
+    monkeypatch.setattr("rrtik_ompl.world.route_check.AT_ONCE", at_once)
     parts = JointPath(rows).violations(world)
     assert len(whole) > 5
     assert [(v.edge, v.reason) for v in parts] == [(v.edge, v.reason) for v in whole]
