@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias, TypeVar
 from rrtik_ompl.errors import UnknownNameError
 
 Accuracy: TypeAlias = Literal["exact", "conservative"]
+ProofMode: TypeAlias = Literal["preferred", "required", "off"]
 ShorteningMethod: TypeAlias = Literal[
     "auto",
     "axis",

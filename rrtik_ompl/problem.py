@@ -61,16 +61,18 @@ class Problem:
 
     def with_resolution(self, motion_resolution: float) -> Problem:
         """The same problem, its motions checked in steps of another size [m] (:meth:`World.with_resolution`)."""
-        other = copy.copy(self)
-        other.world = self.world.with_resolution(motion_resolution)
-        return other
+        return self.with_world(self.world.with_resolution(motion_resolution))
 
     refined = Renamed("with_resolution")
 
     def with_accuracy(self, accuracy: Accuracy) -> Problem:
         """The same problem, its world "exact" or "conservative" (see :meth:`rrtik_ompl.World.with_accuracy`)."""
+        return self.with_world(self.world.with_accuracy(accuracy))
+
+    def with_world(self, world: World) -> Problem:
+        """The same start and goal in another form of the same world; neither is checked again."""
         other = copy.copy(self)
-        other.world = self.world.with_accuracy(accuracy)
+        other.world = world
         return other
 
     def reached(self, q: ArrayLike) -> bool:

@@ -19,7 +19,8 @@ from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ik.numeric.descent import Search
 from rrtik_ompl.ik.solve import SECONDS, chosen_method, free_of_collision, mid_range_configuration, solve_ik
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World, check_world
+from rrtik_ompl.world import World
+from rrtik_ompl.world.check_world import check_world
 
 
 @dataclass(frozen=True, slots=True, eq=False)

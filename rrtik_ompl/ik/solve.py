@@ -20,7 +20,8 @@ from rrtik_ompl.ik.methods import METHODS, load_kernels
 from rrtik_ompl.ik.random_stream import RandomStream
 from rrtik_ompl.ik.targets import leaves_freedom, targets
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World, check_world
+from rrtik_ompl.world import World
+from rrtik_ompl.world.check_world import check_world
 
 SECONDS = 1.0
 DRAWS = 32  # targets drawn from a goal that leaves freedom; one for each part if it has more parts

@@ -25,7 +25,8 @@ from rrtik_ompl.ik.numeric.track import Tracker
 from rrtik_ompl.ik.random_stream import RandomStream
 from rrtik_ompl.ik.solve import free_of_collision, solve_ik
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World, check_world
+from rrtik_ompl.world import World
+from rrtik_ompl.world.check_world import check_world
 
 SECONDS = 60.0
 SECONDS_A_POINT = 5.0  # to say why a point has no configuration

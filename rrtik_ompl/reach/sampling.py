@@ -14,7 +14,8 @@ from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.reach.grid_map import ReachMap
 from rrtik_ompl.reach.measures import MEASURES
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World, check_world
+from rrtik_ompl.world import World
+from rrtik_ompl.world.check_world import check_world
 
 SAMPLES = 200_000
 BLOCK = 20_000  # postures at a time

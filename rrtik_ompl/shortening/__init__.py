@@ -18,7 +18,8 @@ from rrtik_ompl.moves.axis_cut_rounds import axis_cut_rounds
 from rrtik_ompl.moves.rules import MoveRules
 from rrtik_ompl.ompl_bridge.simplify import simplified
 from rrtik_ompl.path import JointPath
-from rrtik_ompl.problem import Problem, densely_checked
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.shortening.acceptance import Acceptance
 from rrtik_ompl.shortening.best import best_in_time
 from rrtik_ompl.shortening.corners import snap_corners
 from rrtik_ompl.shortening.fewest_moves import fewest_moves
@@ -26,6 +27,7 @@ from rrtik_ompl.shortening.random_cut import random_cut, shortcut
 from rrtik_ompl.shortening.retraction import retract
 from rrtik_ompl.shortening.sequential import sequential_cut
 from rrtik_ompl.shortening.task import Task
+from rrtik_ompl.world.kept_clearance import check_clearance
 
 __all__ = ["METHODS", "Method", "MoveRules", "Task", "shorten"]
 
@@ -63,9 +65,7 @@ def _axis_rounds(route: Matrix, task: Task, _: Problem) -> Matrix:
 
 
 def _fewest_moves(route: Matrix, task: Task, problem: Problem) -> Matrix:
-    """A route of little travel touches what it goes round, so it is checked as densely as by the second check."""
-    world = densely_checked(problem).world
-    return fewest_moves(route, world, seed=task.seed, stop=task.expired, rules=task.rules).route
+    return fewest_moves(route, problem.world, seed=task.seed, stop=task.expired, rules=task.rules).route
 
 
 METHODS: Mapping[ShorteningMethod, Method] = MappingProxyType(
@@ -95,6 +95,7 @@ def shorten(
     rules: MoveRules | None = None,
     on_better: Callable[[JointPath], object] | None = None,
     stop: Callable[[], bool] | None = None,
+    clearance: float | None = None,
 ) -> JointPath:
     """Shorten a path of a problem.
 
@@ -117,38 +118,42 @@ def shorten(
             last, the smallest move, costs. Its last moves, of the joints that move last, stay as they are.
         on_better: Called with every better path in between; these have not yet passed the second check.
         stop: Called from time to time; True ends the work, and the best so far is returned.
+        clearance: What the new motions keep from every obstacle on top of its margin [m]. None: 1 mm, or what the ends
+            of the path have.
 
     Returns:
-        A path with the same ends. It passes the same second check as a plan: if a shortened path does not, its
-        motions are checked as densely as that; if that does not help, the input is returned. It is not longer than
-        the input, and where one joint moves at a time it has no more moves.
+        A path with the same ends, and with its proof. If the input is proven free so is the result, with the clearance
+        if the input has it: what is not gets a detour, or else only proven motions are used; if that does not help,
+        the input is returned. It is not longer than the input, and where one joint moves at a time it has no more
+        moves.
 
     Raises:
         UnknownNameError: If there is no such method.
         InputError: If the path is not valid for the problem, does not keep to the rules or has one waypoint, the time
-            is not positive, the seed is negative, or the method cannot do it.
+            is not positive, the seed is negative, the method cannot do it, or an end of the path cannot keep the
+            clearance.
     """
     one_joint = one_joint or rules is not None
-    chosen = _checked(path, problem, method, seconds, seed, one_joint)
+    chosen = _checked(path, problem, method, seconds, seed, one_joint, clearance)
     head, tail = _parts(path.waypoints, rules)
     if len(head) < 2:
         return path
     end = time.monotonic() + (np.inf if seconds is None else float(seconds))
     listener = None if on_better is None else lambda rows: on_better(path.with_waypoints(np.vstack([rows, tail])))
-    # What is as short as can be touches what it goes round, so most methods check as densely as the second check.
-    dense = densely_checked(problem)
-    for checked in (problem, dense) if chosen.keeps_moves else (dense,):
-        left = end - time.monotonic()
+    single = one_joint or chosen.keeps_moves
+    acceptance = Acceptance(path, problem, clearance, one_joint=single, seed=seed)
+    for form, share in acceptance.forms():
+        left = share * (end - time.monotonic())
         limits: dict[str, Any] = {"seconds": left, "on_better": listener, "stop": stop}
-        task = Task(checked.world, seed=seed, one_joint=one_joint, rules=rules, **limits)
-        rows = np.vstack([chosen.run(head, task, checked), tail])
-        worse = not chosen.keeps_moves and task.rank(rows) > task.rank(path.waypoints)
-        same_ends = (rows[[0, -1]] == path.waypoints[[0, -1]]).all()
-        shorter = path.with_waypoints(rows)
-        kept = rules is None or rules.kept_by(rows)
-        if same_ends and kept and not worse and not shorter.violations(problem.world):
-            return shorter
-    return path
+        task = Task(form.world, seed=seed, one_joint=one_joint, rules=rules, **limits)
+        rows = np.vstack([chosen.run(head, task, form), tail])
+        if not (rows[[0, -1]] == path.waypoints[[0, -1]]).all() or not (rules is None or rules.kept_by(rows)):
+            continue
+        shorter = acceptance.accepted(path.with_waypoints(rows))
+        if shorter is None or (not chosen.keeps_moves and task.rank(shorter.waypoints) > task.rank(path.waypoints)):
+            continue
+        return shorter
+    return acceptance.input
 
 
 def _parts(route: Matrix, rules: MoveRules | None) -> tuple[Matrix, Matrix]:
@@ -161,7 +166,13 @@ def _parts(route: Matrix, rules: MoveRules | None) -> tuple[Matrix, Matrix]:
 
 
 def _checked(
-    path: JointPath, problem: Problem, method: ShorteningMethod, seconds: float | None, seed: int, one_joint: bool
+    path: JointPath,
+    problem: Problem,
+    method: ShorteningMethod,
+    seconds: float | None,
+    seed: int,
+    one_joint: bool,
+    clearance: float | None,
 ) -> Method:
     """The method, if the request makes sense."""
     require(path, JointPath, "path to shorten", "a plan has one if plan.found")
@@ -175,6 +186,7 @@ def _checked(
     faults = path.violations(problem.world)
     if faults:
         raise InputError(f"path to shorten: edge {faults[0].edge + 1} is not valid: {faults[0].reason}")
+    check_clearance(problem.world, clearance, {"the start": path.start, "the end of the path": path.end})
     if one_joint and not path.one_joint_at_a_time:
         raise InputError("path to shorten: it moves several joints at once, so one_joint cannot be kept")
     if one_joint and not chosen.can_keep_moves:

@@ -32,20 +32,6 @@ ACCURACIES: tuple[Accuracy, ...] = get_args(Accuracy)
 FINEST_RESOLUTION = 1e-5  # [m]; a motion across an arm's reach is then some hundred thousand checks
 
 
-def check_world(world: World | None, robot: Robot) -> None:
-    """Refuse what is no robot, no world, or the world of another robot.
-
-    Raises:
-        InputError: It says how to make what is needed.
-    """
-    require(robot, Robot, "robot", "use load_robot(name or file)")
-    if world is None:
-        return
-    require(world, World, "world", "make it with World(robot, scene)")
-    if world.robot is not robot:
-        raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")
-
-
 class World:
     """Exact collision checks of a robot in a scene.
 
@@ -107,19 +93,20 @@ class World:
         self.accuracy = one_of(ACCURACIES, accuracy, "accuracy")
         self._certificate = Certificate(robot, self.bodies, pairs)
         self._motions: FastMotions | None = None
+        self._proven_clearance: float | None = None
         self._checks = ExactChecker(robot, self.bodies, moving, conservative=accuracy == "conservative")
-        self._prover = Prover(robot, self.bodies, moving)
         standing = tuple(p for p in pairs if all(self.bodies[i].joint == 0 for i in p))
         self._always_colliding = fixed_contact(robot, self.bodies, standing) is not None
+        self._prover = Prover(robot, self.bodies, moving, always_colliding=self._always_colliding)
 
     def __repr__(self) -> str:
         return f"World({self.robot.name}, {self.scene}, motion_resolution={self.motion_resolution:g} m)"
 
     @property
     def fast(self) -> FastWorld | None:
-        """The world's tables, for planners that run in kernels; None without kernels or where nothing is ever free."""
-        tables = self._checks.fast
-        return tables if tables.address and not self._always_colliding else None
+        """The world's tables, for planners that run in kernels; None without kernels or where these do not suffice."""
+        tables, enough = self._checks.fast, not self._always_colliding and self._proven_clearance is None
+        return tables if tables.address and enough else None
 
     @property
     def motions(self) -> FastMotions | None:
@@ -150,6 +137,31 @@ class World:
 
     refined = Renamed("with_resolution")
 
+    def with_clearance(self, clearance: float) -> World:
+        """The same world, whose checks keep a distance [m] from every obstacle on top of its margin.
+
+        For searches that are to leave room: :meth:`contacts`, :meth:`certify` and proofs stay as they are.
+
+        Raises:
+            InputError: If the clearance is negative or infinite.
+        """
+        wider = not_negative(clearance, "clearance")
+        other = copy.copy(self)
+        other._checks = self._checks.with_bodies(
+            tuple(replace(b, margin=b.margin + wider) if b.kind == "obstacle" else b for b in self.bodies)
+        )
+        return other
+
+    def proving(self, clearance: float = 0.0) -> World:
+        """The same world, where motions have to be proven too, with a clearance [m]; searches in kernels cannot.
+
+        Raises:
+            InputError: If the clearance is negative or infinite.
+        """
+        other = copy.copy(self)
+        other._proven_clearance = not_negative(clearance, "clearance")
+        return other
+
     def valid(self, q: ArrayLike) -> bool:
         """Whether q, shape (dof,), is inside the limits and free of collision.
 
@@ -176,14 +188,14 @@ class World:
 
     def motion_proven(self, a: ArrayLike, b: ArrayLike) -> bool:
         """Whether each configuration of the straight motion from a to b, shape (dof,) each, is proven free."""
-        return bool(self._motions_proven(self._rows(a, 1), self._rows(b, 1))[0])
+        return bool(self._prover.proven(self._rows(a, 1), self._rows(b, 1))[0])
 
     def motions_proven(self, A: ArrayLike, B: ArrayLike, *, clearance: float = 0.0) -> Mask:
         """Which straight motions A[k] -> B[k], shape (m, dof) each, are proven free as a whole. Shape (m,).
 
         ``clearance`` [m] is kept from every obstacle on top of its margin. What grazes an obstacle cannot be proven.
         """
-        return self._motions_proven(*self._both_ends(A, B), not_negative(clearance, "clearance"))
+        return self._prover.proven(*self._both_ends(A, B), clearance=not_negative(clearance, "clearance"))
 
     def prove(self, waypoints: ArrayLike, *, clearance: float = 0.0, seconds: float | None = None) -> Proof:
         """Prove the straight motions between waypoints, shape (k, dof), free for their whole length; after [16].
@@ -196,14 +208,8 @@ class World:
         Raises:
             InputError: If waypoints are not finite rows of ``dof`` numbers, or the clearance is negative or infinite.
         """
-        rows, kept = self._rows(waypoints, 2), not_negative(clearance, "clearance")
-        starts, ends = rows[:-1], rows[1:]
-        mask = self._may_be_proven(starts, ends)
-        places = np.flatnonzero(mask).tolist()
-        found = self._prover.gaps(starts[mask], ends[mask], clearance=kept, seconds=seconds)
-        gaps = {places[k]: replace(gap, motion=places[k]) for k, gap in found.items()}
-        gaps |= {k: Gap(k, float("nan"), "", "") for k in np.flatnonzero(~mask).tolist()}
-        return Proof(len(starts), kept, tuple(gaps[k] for k in sorted(gaps)))
+        kept = not_negative(clearance, "clearance")
+        return self._prover.route(self._rows(waypoints, 2), clearance=kept, seconds=seconds)
 
     def steps(self, a: ArrayLike, b: ArrayLike, resolution: float | None = None) -> int:
         """Number of steps in which a motion is checked: the bound on the arm's displacement over the resolution."""
@@ -254,15 +260,6 @@ class World:
         mask[mask] = self._certificate.free(rows[mask])
         return mask
 
-    def _may_be_proven(self, starts: Matrix, ends: Matrix) -> Mask:
-        """Which motions have both ends inside the limits, in a world where something is free."""
-        return self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self._always_colliding)
-
-    def _motions_proven(self, starts: Matrix, ends: Matrix, clearance: float = 0.0) -> Mask:
-        mask = self._may_be_proven(starts, ends)
-        mask[mask] = self._prover.proven(starts[mask], ends[mask], clearance=clearance)
-        return mask
-
     def _both_ends(self, A: ArrayLike, B: ArrayLike) -> tuple[Matrix, Matrix]:
         starts, ends = self._rows(A, 2), self._rows(B, 2)
         if len(starts) != len(ends):
@@ -286,10 +283,12 @@ class World:
         return mask
 
     def _motions_free(self, starts: Matrix, ends: Matrix) -> Mask:
-        mask = self._may_be_proven(starts, ends)
+        mask = self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self._always_colliding)
         starts, ends = _one_way(starts[mask], ends[mask])
         steps = step_counts(starts, ends, self.weights, self.motion_resolution)
-        mask[mask] = self._checks.motions_free(starts, ends, steps)
+        mask[mask] = free = self._checks.motions_free(starts, ends, steps)
+        if self._proven_clearance is not None:
+            mask[mask] = self._prover.proven(starts[free], ends[free], clearance=self._proven_clearance)
         return mask
 
 

@@ -47,6 +47,7 @@ class ExactChecker:
         covers = arm.covers_of(bodies)
         self.fast = arm.pack(bodies, pairs, covers)
         self._robot, self._bodies = robot, bodies
+        self._pairs, self._covers = pairs, covers
         self._data = robot.model.createData()
         self._standing = {k: self._transform(k) for k, body in enumerate(bodies) if body.joint == 0}
         self._approaches = dict(zip(pairs, approach_weights(robot, bodies, pairs), strict=True))
@@ -56,6 +57,13 @@ class ExactChecker:
         """The same checker, conservative or not; shares the tables."""
         other = copy.copy(self)
         other.conservative = conservative
+        return other
+
+    def with_bodies(self, bodies: tuple[Body, ...]) -> ExactChecker:
+        """The same checker of the same bodies with other margins."""
+        other = copy.copy(self)
+        other._bodies = bodies
+        other.fast = arm_cache(self._robot).pack(bodies, self._pairs, self._covers)
         return other
 
     def free(self, rows: Matrix) -> Mask:

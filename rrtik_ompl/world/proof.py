@@ -10,13 +10,12 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.fast.proof.layout import ProofTable
 from rrtik_ompl.fast.proof.packing import ProofPairs, proof_pairs
-from rrtik_ompl.fast.simd.library import Library, library
+from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.tables.solid_tables import convex_solids
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world.arm_cache import Pairs, strokes
@@ -24,6 +23,8 @@ from rrtik_ompl.world.arm_cache import Pairs, strokes
 LARGEST_VALUE = 1e3  # [rad] or [m] of a joint, up to which rounding is bounded
 PROOF_KERNELS = "proof.proof_kernels"
 MOTIONS_AT_ONCE = 64  # between two looks at the clock
+PROVEN, NOT_LOOKED_AT = -1, -2  # in the place of a pair's number
+DOUBLE, INT = 8, 4  # bytes of a number
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,63 +69,82 @@ class Proof:
 
 
 class Prover:
-    """Proofs of motions of an arm among bodies; without kernels it proves nothing."""
+    """Proofs of motions of an arm among bodies; without kernels, or where bodies always touch, it proves nothing."""
 
-    def __init__(self, robot: Robot, bodies: tuple[Body, ...], pairs: Pairs) -> None:
+    def __init__(self, robot: Robot, bodies: tuple[Body, ...], pairs: Pairs, *, always_colliding: bool = False) -> None:
         self._robot, self._bodies, self._pairs = robot, bodies, pairs
+        self._always_colliding = always_colliding
         self._packed: ProofPairs | None = None
 
-    def gaps(
-        self, starts: Matrix, ends: Matrix, *, clearance: float = 0.0, seconds: float | None = None
-    ) -> dict[int, Gap]:
-        """The motions starts[k] -> ends[k], shapes (m, dof), that are not proven, by their numbers.
+    def route(self, rows: Matrix, *, clearance: float = 0.0, seconds: float | None = None) -> Proof:
+        """Prove the motions between waypoints, shape (k, dof).
 
         Args:
-            starts: Inside the limits.
-            ends: As many.
+            rows: The waypoints.
             clearance: To be kept from obstacles beside their margins [m].
             seconds: When to stop; None for never. What was not looked at by then is not proven.
         """
-        begin = time.monotonic()
-        kernels = library(PROOF_KERNELS)
-        if kernels is None:
-            return {k: Gap(k, float("nan"), "", "") for k in range(len(starts))}
+        values, count = np.ascontiguousarray(self._robot.joint_values(rows)), len(rows) - 1
+        sound = self._sound(rows, values)
+        between = None if sound is None else sound[:-1] & sound[1:]
+        gaps = self._gaps(values, values[1:], between, clearance, seconds) if count else []
+        return Proof(count, clearance, tuple(gaps))
+
+    def proven(self, starts: Matrix, ends: Matrix, *, clearance: float = 0.0) -> Mask:
+        """Which of the motions starts[k] -> ends[k], shapes (m, dof), are proven free. Shape (m,)."""
+        mask = np.ones(len(starts), dtype=bool)
+        if len(starts) == 0:
+            return mask
+        rows = np.concatenate([starts, ends])
+        values = np.ascontiguousarray(self._robot.joint_values(rows))
+        sound = self._sound(rows, values)
+        both = None if sound is None else sound[: len(starts)] & sound[len(starts) :]
+        mask[[gap.motion for gap in self._gaps(values, values[len(starts) :], both, clearance, None)]] = False
+        return mask
+
+    def _sound(self, rows: Matrix, values: Matrix) -> Mask | None:
+        """Which configurations are inside the limits and not too large for the bound on rounding; None for all."""
+        inside = self._robot.within_limits(rows)
+        if inside.all() and np.abs(values).max(initial=0.0) <= LARGEST_VALUE:
+            return None
+        sound: Mask = inside & (np.abs(values) <= LARGEST_VALUE).all(axis=1)
+        return sound
+
+    def _gaps(
+        self, tails: Matrix, heads: Matrix, sound: Mask | None, clearance: float, seconds: float | None
+    ) -> list[Gap]:
+        """The motions from the first rows of joint values to as many others that are not proven."""
+        count, joints = heads.shape
+        begin, kernels = time.monotonic(), library(PROOF_KERNELS)
+        if kernels is None or self._always_colliding:
+            return [Gap(k, float("nan"), "", "") for k in range(count)]
+        packed = self._packed_for(clearance)
+        pairs, places = np.full(count, NOT_LOOKED_AT, dtype=np.int32), np.full(count, np.nan)
+        table = ProofTable(packed.table.address)
+        at, found, where = (tails.ctypes.data, heads.ctypes.data), pairs.ctypes.data, places.ctypes.data
+        some = count if seconds is None else MOTIONS_AT_ONCE
+        for first in range(0, count, some):
+            if first > 0 and seconds is not None and time.monotonic() - begin > seconds:
+                break
+            skipped = DOUBLE * joints * first
+            number = min(some, count - first)
+            kernels.prove(table, at[0] + skipped, at[1] + skipped, number, found + INT * first, where + DOUBLE * first)
+        if sound is not None:
+            pairs[~sound], places[~sound] = NOT_LOOKED_AT, np.nan
+        elif (pairs == PROVEN).all():
+            return []
+        return [self._gap(packed, k, int(pairs[k]), float(places[k])) for k in np.flatnonzero(pairs != PROVEN).tolist()]
+
+    def _packed_for(self, clearance: float) -> ProofPairs:
+        """The table, with a clearance to keep."""
         if self._packed is None:
             solids = [convex_solids(body.geometry) for body in self._bodies]
             self._packed = proof_pairs(self._robot.chain, self._bodies, self._pairs, solids, strokes(self._robot))
         self._packed.keep(clearance)
-        tails, heads = (np.ascontiguousarray(self._robot.joint_values(rows)) for rows in (starts, ends))
-        bounded = (np.abs(tails) <= LARGEST_VALUE).all(axis=1) & (np.abs(heads) <= LARGEST_VALUE).all(axis=1)
-        pairs, places = np.full(len(tails), -2, dtype=np.int32), np.full(len(tails), np.nan)
-        for first in range(0, len(tails), MOTIONS_AT_ONCE):
-            if seconds is not None and first > 0 and time.monotonic() - begin > seconds:
-                break
-            part = slice(first, first + MOTIONS_AT_ONCE)
-            self._prove(kernels, self._packed, tails[part], heads[part], pairs[part], places[part])
-        open_ = np.flatnonzero((pairs != -1) | ~bounded)
-        return {k: self._gap(k, int(pairs[k]), float(places[k])) for k in open_.tolist()}
+        return self._packed
 
-    def _prove(
-        self,
-        kernels: Library,
-        packed: ProofPairs,
-        tails: Matrix,
-        heads: Matrix,
-        pairs: NDArray[np.int32],
-        places: NDArray[np.float64],
-    ) -> None:
-        table = ProofTable(packed.table.address)
-        starts, ends = tails.ctypes.data, heads.ctypes.data
-        kernels.prove(table, starts, ends, len(tails), pairs.ctypes.data, places.ctypes.data)
-
-    def _gap(self, motion: int, pair: int, place: float) -> Gap:
-        if pair < 0 or self._packed is None:
+    def _gap(self, packed: ProofPairs, motion: int, pair: int, place: float) -> Gap:
+        if pair < 0:
             return Gap(motion, float("nan"), "", "")
-        i, j = self._packed.bodies[pair].tolist()
+        i, j = packed.bodies[pair].tolist()
         return Gap(motion, place, self._bodies[i].name, self._bodies[j].name)
-
-    def proven(self, starts: Matrix, ends: Matrix, *, clearance: float = 0.0) -> Mask:
-        """Which motions are proven free. Shape (m,)."""
-        mask = np.ones(len(starts), dtype=bool)
-        mask[list(self.gaps(starts, ends, clearance=clearance))] = False
-        return mask

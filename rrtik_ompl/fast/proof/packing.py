@@ -23,7 +23,7 @@ ROOM = 1e-8  # [m] for rounding: float64 misplaces points of an arm of 30 joints
 KINDS = {IS_CONVEX: CONVEX_SOLID, HALF_SPACE_SOLID: HALF_SPACE}
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class ProofPairs:
     """The table of a proof, and what its pairs are.
 
@@ -32,16 +32,20 @@ class ProofPairs:
         bodies: Numbers of the two bodies of each of the table's pairs, shape (n, 2).
         margins: How far each must stay apart [m], shape (n,).
         beside_obstacle: Which pairs are of what moves and an obstacle, shape (n,).
+        clearance: What the kernels keep now from obstacles beside the margins [m]; nan before the first :meth:`keep`.
     """
 
     table: Table
     bodies: NDArray[np.int64]
     margins: Vector
     beside_obstacle: NDArray[np.bool_]
+    clearance: float = float("nan")
 
     def keep(self, clearance: float) -> None:
         """Let the kernels keep a clearance [m] from obstacles beside the margins."""
-        self.table[layout.MARGINS][:] = self.margins + ROOM + clearance * self.beside_obstacle
+        if clearance != self.clearance:
+            self.table[layout.MARGINS][:] = self.margins + ROOM + clearance * self.beside_obstacle
+            self.clearance = clearance
 
 
 def proof_pairs(

@@ -162,13 +162,14 @@ def prove_motion(table: ProofTable, start: int, end: int) -> Any:
     """Prove one motion. Returns a pair that is not proven, -1 if there is none, and where on the motion that is."""
     begin_motion(table, start, end)
     lists, stack, full = lists_of(table), stack_of(table), layout.NODES - 1
-    for k in range(body_pair_count_of(table)):
-        set_int(lists, k, k)
-    set_int(counts_of(table), 0, body_pair_count_of(table))
-    moves = False
+    first = layout.DEEPEST  # what stands still need not be split
     for k in range(joint_count_of(table)):
-        moves |= double_at(start, k) != double_at(end, k)
-    set_int(stack, 0, 0)
+        if double_at(start, k) != double_at(end, k):
+            first = 0
+    for k in range(body_pair_count_of(table)):
+        set_int(lists, pair_count_of(table) * first + k, k)
+    set_int(counts_of(table), first, body_pair_count_of(table))
+    set_int(stack, 0, first)
     set_int(stack, 1, 0)
     top = 1
     while top > 0:
@@ -179,7 +180,7 @@ def prove_motion(table: ProofTable, start: int, end: int) -> Any:
         visit(table, start, end, number * step + step)
         if settle(table, level, number) == 0:
             continue
-        if level == layout.DEEPEST or not moves:
+        if level == layout.DEEPEST:
             return int_at(lists, pair_count_of(table) * (level + 1)), (number + 0.5) / (1 << level)
         for half in range(2):
             set_int(stack, 2 * top, level + 1)

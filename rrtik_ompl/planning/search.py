@@ -1,0 +1,175 @@
+"""Attempt after attempt of one planner at one problem, until the second check accepts a path."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.choices import ProofMode
+from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.ik.goal_configurations import GoalSearch
+from rrtik_ompl.ompl_bridge.attempt import Attempt, attempt
+from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.planning.second_check import SecondCheck
+from rrtik_ompl.problem import Problem, densely_checked
+
+SHORTEST = 1e-3  # [s] that an attempt gets at least
+ROUNDS = 6  # attempts to find a proven path, once there is one that is checked in steps
+IN_KERNELS = 3  # of them, without proofs while searching, for planners that run in kernels
+ANYTIME_SHARE = 0.8  # of the time, in which an anytime planner keeps a clearance; the rest if it then has no path
+
+
+class Search:
+    """Attempt after attempt, one per seed, until the second check accepts a path.
+
+    Attributes:
+        totals: The counts of all attempts.
+        reason: Why there is no path, in a line; "" if there is one.
+        counting: Time that was no planning [s]; the deadline was put off by it.
+
+    Args:
+        problem: What to solve.
+        factory: Makes the planner.
+        name: Of the planner, for messages.
+        deadline: When to end [s, of ``time.perf_counter``].
+        seeds: One for each attempt.
+        parameters: Options of the planner.
+        proof: See :func:`rrtik_ompl.planning.plan`.
+        clearance: Likewise.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        factory: PlannerFactory,
+        name: str,
+        deadline: float,
+        seeds: list[int],
+        parameters: Mapping[str, Any],
+        proof: ProofMode,
+        clearance: float | None,
+    ) -> None:
+        self.totals: dict[str, int | float] = {"attempts": 0, "rejected": 0}
+        self.reason, self.counting = "", 0.0
+        self._problem, self._factory, self._parameters = problem, factory, parameters
+        self._deadline, self._seeds = deadline, seeds
+        self._goals = GoalSearch(problem, np.random.default_rng(seeds[0]))
+        self._traits, joints = traits_of(factory), isinstance(problem.goal, JointGoal)
+        self._aimless = self._traits.finds_goals and not joints
+        self._long_ways = joints and bool(problem.robot.continuous.any()) and len(seeds) > 1
+        self._check = SecondCheck(problem, name, proof, clearance, one_joint=self._traits.one_joint)
+        self._strict = cache(self._check.strict)
+
+    def run(self) -> JointPath | None:
+        """The path, or None and a reason."""
+        self.reason = self._check.impossible()
+        if self.reason:
+            return None
+        for number in range(len(self._seeds)):
+            if self._done():
+                break
+            self.totals["attempts"] += 1
+            aims = self._aims(number)
+            if len(aims) == 0 and not self._aimless:
+                if self._goals.exhausted:
+                    break
+                continue
+            path = self._quick_path(aims) if number == 0 else None
+            if path is None and not self._done():
+                path = self._path(number, aims)
+            if path is not None:
+                return path
+        self.reason = self._check.reason or self._goals.reason
+        return self._check.best
+
+    def _done(self) -> bool:
+        """Whether there is no time left, or nothing better to be expected."""
+        return self._left() <= 0.0 or self._check.settled or self._check.open > ROUNDS
+
+    def _left(self) -> float:
+        return self._deadline - time.perf_counter()
+
+    def _short_way(self, number: int) -> bool:
+        """Whether an attempt goes the short way round alone."""
+        return self._long_ways and number == 0
+
+    def _aims(self, number: int) -> Matrix:
+        """What an attempt aims at: all that is known, the newest first, for some planners take the first alone."""
+        if self._aimless:
+            return np.zeros((0, self._problem.robot.dof))
+        known = len(self._goals.rows)
+        newer = number > 0 and self._goals.more()
+        rows = self._goals.first()
+        return rows[:1] if self._short_way(number) else np.roll(rows, -known if newer else -number, axis=0)
+
+    def _quick_path(self, aims: Matrix) -> JointPath | None:
+        """Of a brief attempt on what the kernels can prove; None where it finds nothing or cannot prove an end."""
+        if not self._traits.supports_iteration_limit or self._problem.world.accuracy != "exact":
+            return None
+        proven = self._problem.with_accuracy("conservative")
+        aims = aims[proven.world.valid_batch(aims)]
+        if len(aims) == 0 or not proven.world.valid(proven.start):
+            return None
+        return self._accepted(self._attempt(proven, 0, aims, self._left(), effort=1))
+
+    def _path(self, number: int, aims: Matrix) -> JointPath | None:
+        """Of an attempt with exact checks, with room to spare as soon as a path was not proven.
+
+        An optimal path touches what it goes round, and an anytime planner has no time left for a second attempt.
+        """
+        anytime = self._traits.anytime
+        if self._check.proves and (anytime or self._check.best is not None):
+            strict = self._strict(proving=not self._traits.kernels or self._check.open > IN_KERNELS)
+            roomy = aims[strict.world.valid_batch(aims)]
+            if len(roomy) or self._aimless:
+                path = self._strict_path(strict, number, roomy)
+                if path is not None or not anytime or self._done():
+                    return path
+        effort = 2**number if self._traits.supports_iteration_limit and self._others(number) else None
+        asked = densely_checked(self._problem) if anytime or self._check.rejected else self._problem
+        return self._accepted(self._attempt(asked, number, aims, self._share(number) * self._left(), effort))
+
+    def _strict_path(self, strict: Problem, number: int, aims: Matrix) -> JointPath | None:
+        """Of an attempt with room to spare."""
+        effort = 2**self._check.open if self._traits.supports_iteration_limit else None
+        share = ANYTIME_SHARE if self._traits.anytime else self._share(number)
+        return self._accepted(self._attempt(strict, number, aims, share * self._left(), effort))
+
+    def _share(self, number: int) -> float:
+        """Of the time left, what an attempt gets: half for the short way round, before the long way is tried."""
+        return 0.5 if self._short_way(number) else 1.0
+
+    def _accepted(self, outcome: Attempt) -> JointPath | None:
+        """The path of an attempt, if the second check accepts it."""
+        path = self._check.accepted(outcome, self._seeds[0])
+        self.totals["rejected"] = self._check.rejected
+        return path
+
+    def _others(self, number: int) -> bool:
+        """Whether later attempts would aim at other configurations than this one."""
+        if self._aimless or number == len(self._seeds) - 1:
+            return False
+        return not self._goals.exhausted or (self._traits.one_goal and number + 1 < len(self._goals.rows))
+
+    def _attempt(self, problem: Problem, number: int, aims: Matrix, seconds: float, effort: int | None) -> Attempt:
+        """One attempt, counted."""
+        outcome = attempt(
+            problem,
+            self._factory,
+            aims,
+            seconds=max(seconds, SHORTEST),
+            seed=self._seeds[number],
+            parameters=self._parameters,
+            effort=effort,
+        )
+        self.counting += outcome.counting
+        self._deadline += outcome.counting
+        for key, value in outcome.statistics.items():
+            self.totals[key] = value if key in self._traits.path_statistics else self.totals.get(key, 0) + value
+        return outcome

@@ -1,0 +1,141 @@
+"""The second check of what planners find: proven, or made provable by detours, or checked in steps and kept in mind."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.choices import ProofMode
+from rrtik_ompl.ompl_bridge.attempt import Attempt
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.problem import Problem, densely_checked
+from rrtik_ompl.world.detours import with_detours
+from rrtik_ompl.world.kept_clearance import Room, room_between
+
+
+class SecondCheck:
+    """Accepts paths of planners.
+
+    A proven path is accepted at once. One that is not proven gets detours; where these do not help it is checked in
+    steps, and the best such path is kept in mind.
+
+    Attributes:
+        best: The best path that is not proven with the clearance wanted, or None.
+        reason: Why the last path was not accepted, in a line; "" if it was.
+        rejected: How many paths are not valid.
+        open: How many are valid, but not proven.
+
+    Args:
+        problem: What is solved.
+        name: Of the planner, for messages.
+        proof: See :func:`rrtik_ompl.planning.plan`.
+        clearance: Likewise.
+        one_joint: Whether paths move one joint at a time, so that they get no detours.
+    """
+
+    def __init__(
+        self, problem: Problem, name: str, proof: ProofMode, clearance: float | None, *, one_joint: bool
+    ) -> None:
+        self.best: JointPath | None = None
+        self._ends_proven = True
+        self.reason, self.rejected, self.open = "", 0, 0
+        self._problem, self._name, self._proof, self._clearance = problem, name, proof, clearance
+        self._one_joint = one_joint
+
+    @property
+    def proves(self) -> bool:
+        """Whether paths are to be proven at all."""
+        return self._proof != "off"
+
+    @property
+    def settled(self) -> bool:
+        """Whether there is a path that cannot be made better: its ends themselves are not proven free."""
+        return self.best is not None and not self._ends_proven
+
+    def impossible(self) -> str:
+        """Why there can be no proven path if that is required, in a line; "" if there may be one."""
+        start = self._problem.start
+        if self._proof != "required" or self._problem.world.motion_proven(start, start):
+            return ""
+        return f"the start is not proven free: {self._first_gap(np.stack([start, start]))}"
+
+    def strict(self, *, proving: bool) -> Problem:
+        """The problem for searches that leave room: motions keep more than the clearance in steps, and may be proven.
+
+        Args:
+            proving: Whether motions have to be proven, which searches in kernels cannot.
+        """
+        room = self._room(self._problem.start[None]) or Room(0.0, 0.0)
+        strict = densely_checked(self._problem)
+        world = strict.world.with_clearance(room.searched) if room.searched > 0.0 else strict.world
+        return strict.with_world(world.proving(room.kept) if proving else world)
+
+    def accepted(self, outcome: Attempt, seed: int) -> JointPath | None:
+        """The path of an attempt if it is accepted.
+
+        Args:
+            outcome: Of the attempt.
+            seed: Of the detours.
+        """
+        if outcome.rows is None:
+            self.reason = f"{self._name} ended with '{outcome.status}'"
+            self.reason += f": {outcome.reason}" if outcome.reason else ""
+            return None
+        problem, path = self._problem, JointPath.of(self._problem.robot, outcome.rows)
+        if not (path.start == problem.start).all() or not problem.reached(path.end):
+            self.reason = f"the path of {self._name} does not lead from the start to the goal"
+            self.rejected += 1
+            return None
+        proven = self._proven(path, seed) if self.proves else None
+        return proven if proven is not None else self._checked(path)
+
+    def _proven(self, path: JointPath, seed: int) -> JointPath | None:
+        """The path, with detours where it needs them, if it is proven to keep the clearance."""
+        room = self._room(path.waypoints[[0, -1]])
+        if room is None:
+            self._ends_proven = False
+            return None
+        world, rows = self._problem.world, path.waypoints
+        first = path.proved(world, clearance=room.kept)
+        if first.proof is not None and first.proof.proven:
+            self.reason = ""
+            return first
+        if self._one_joint:
+            return None
+        repaired = with_detours(world, rows, clearance=room.kept, rng=np.random.default_rng(seed))
+        if repaired is None:
+            return None
+        self.reason = ""
+        return path.with_waypoints(repaired).proved(world, clearance=room.kept)
+
+    def _checked(self, path: JointPath) -> JointPath | None:
+        """The path if no proof is wanted and the check in steps agrees; else it may become the best one."""
+        world = self._problem.world
+        if self.proves:
+            path = path.proved(world)
+        proven = path.proof is not None and path.proof.proven
+        faults = () if proven else path.violations(world)
+        if faults:
+            self.rejected += 1
+            self.reason = f"the path of {self._name} was rejected by the second check: {faults[0].reason}"
+            return None
+        self.reason = ""
+        if not self.proves:
+            return path
+        self.open += 1
+        if proven or self._proof == "preferred":
+            self.best = path if self.best is None or _rank(path) < _rank(self.best) else self.best
+        else:
+            self.reason = f"no path that is proven free: {self._first_gap(path.waypoints)}"
+        return self.best if self.settled else None
+
+    def _room(self, ends: Matrix) -> Room | None:
+        return room_between(self._problem.world, ends, self._clearance)
+
+    def _first_gap(self, rows: Matrix) -> str:
+        return str(next(iter(self._problem.world.prove(rows).unproven), ""))
+
+
+def _rank(path: JointPath) -> tuple[int, float]:
+    """Motions that are not proven, then length: what is to be small."""
+    return 0 if path.proof is None else len(path.proof.unproven), path.length

@@ -1,0 +1,75 @@
+"""Which shortened paths may be returned: proven ones with the clearance, or what is no worse than the input in that."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.problem import Problem, densely_checked
+from rrtik_ompl.world.detours import with_detours
+from rrtik_ompl.world.kept_clearance import room_between
+
+
+class Acceptance:
+    """The second check of shortened paths.
+
+    Attributes:
+        input: The given path, with what is proven of it.
+
+    Args:
+        path: Given, valid.
+        problem: What it solves.
+        clearance: To be kept [m]; None for a millimetre, or what the ends of the path have.
+        one_joint: Whether its moves of one joint have to stay such, so that there are no detours.
+        seed: Of the detours.
+    """
+
+    def __init__(
+        self, path: JointPath, problem: Problem, clearance: float | None, *, one_joint: bool, seed: int
+    ) -> None:
+        self._problem, self._one_joint, self._seed = problem, one_joint, seed
+        self._room = room_between(problem.world, path.waypoints[[0, -1]], clearance)
+        self.input = self._proved(path)
+        self._input_keeps = self._keeps(self.input)
+
+    def forms(self) -> list[tuple[Problem, float]]:
+        """The problem in the forms in which to shorten, one after the other, and their shares of the time left.
+
+        What is as short as can be touches what it goes round, so motions are checked as densely as by the second check,
+        with room to spare; then with proofs too. Where the input does not keep the clearance, neither may help.
+        """
+        dense, found = densely_checked(self._problem), []
+        if self._room is not None:
+            roomy = dense.world.with_clearance(self._room.searched) if self._room.searched > 0.0 else dense.world
+            found = [(roomy, 0.7), (roomy.proving(self._room.kept), 1.0 if self._input_keeps else 0.5)]
+        if not self._input_keeps:
+            found.append((dense.world, 1.0))
+        return [(dense.with_world(world), share) for world, share in found]
+
+    def accepted(self, shorter: JointPath) -> JointPath | None:
+        """The path, with what is proven of it and with detours where it needs them, or None."""
+        proved = self._proved(shorter)
+        if self._keeps(proved):
+            return proved
+        if self._room is not None and not self._one_joint:
+            rng = np.random.default_rng(self._seed)
+            rows = with_detours(self._problem.world, shorter.waypoints, clearance=self._room.kept, rng=rng)
+            if rows is not None:
+                return self._proved(shorter.with_waypoints(rows))
+        if self._input_keeps or (_proven(self.input) and not _proven(proved)):
+            return None
+        return None if shorter.violations(self._problem.world) else proved
+
+    def _proved(self, path: JointPath) -> JointPath:
+        """The path with a proof that it keeps the clearance, or else that it is free, as far as that goes."""
+        kept = 0.0 if self._room is None else self._room.kept
+        proved = path.proved(self._problem.world, clearance=kept)
+        return proved if _proven(proved) or kept == 0.0 else path.proved(self._problem.world)
+
+    def _keeps(self, proved: JointPath) -> bool:
+        """Whether a path is proven to keep the clearance."""
+        return self._room is not None and _proven(proved) and proved.proof.clearance == self._room.kept  # type: ignore[union-attr]
+
+
+def _proven(path: JointPath) -> bool:
+    return path.proof is not None and path.proof.proven

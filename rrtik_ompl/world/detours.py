@@ -1,0 +1,76 @@
+"""Detours around what is not proven: two motions in the place of one, or of a few, through a point near by."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.transitions import route_length
+from rrtik_ompl.world import World
+
+SIZES = (0.01, 0.03, 0.1, 0.3)  # of a detour, shares of the stretch's length
+POINTS = 12  # of each size
+WIDER = 3  # stretches that are tried, each with a motion more at both ends
+MOST_REPAIRS = 24  # of a route
+
+
+def with_detours(world: World, rows: Matrix, *, clearance: float, rng: np.random.Generator) -> Matrix | None:
+    """A route, shape (k, dof), with detours in the place of what is not proven; None if one of them is not found.
+
+    Args:
+        world: The world.
+        rows: The route.
+        clearance: To be kept from obstacles beside their margins [m].
+        rng: Of the points that are tried.
+
+    Returns:
+        A proven route with the same ends, shape (m, dof); the given one if it is proven.
+    """
+    for _ in range(MOST_REPAIRS):
+        open_ = world.prove(rows, clearance=clearance).unproven
+        if not open_:
+            return rows
+        repaired = _repaired(world, rows, open_[0].motion, clearance, rng)
+        if repaired is None:
+            return None
+        rows = repaired
+    return None
+
+
+def _repaired(world: World, rows: Matrix, motion: int, clearance: float, rng: np.random.Generator) -> Matrix | None:
+    """The route with a detour around one of its motions, or around a stretch with that in the middle."""
+    for more in range(WIDER):
+        first, last = max(motion - more, 0), min(motion + 1 + more, len(rows) - 1)
+        via = _via(world, rows[first : last + 1], clearance, rng)
+        if via is not None:
+            return np.vstack([rows[: first + 1], via, rows[last:]])
+    return None
+
+
+def _via(world: World, stretch: Matrix, clearance: float, rng: np.random.Generator) -> Matrix | None:
+    """What to pass between the ends of a stretch, shape (0 or 1, dof), on proven motions; None if nothing is found."""
+    a, b = stretch[0], stretch[-1]
+    if len(stretch) > 2 and world.motions_proven(a[None], b[None], clearance=clearance)[0]:
+        return stretch[:0]
+    length = route_length(stretch)
+    for size in SIZES:
+        points = _near(world, stretch, size * length, rng)
+        points = points[world.motions_proven(points, points, clearance=clearance)]
+        points = points[world.motions_proven(np.tile(a, (len(points), 1)), points, clearance=clearance)]
+        points = points[world.motions_proven(points, np.tile(b, (len(points), 1)), clearance=clearance)]
+        if len(points):
+            lengths = np.linalg.norm(points - a, axis=1) + np.linalg.norm(points - b, axis=1)
+            best: Matrix = points[[lengths.argmin()]]
+            return best
+    return None
+
+
+def _near(world: World, stretch: Matrix, size: float, rng: np.random.Generator) -> Matrix:
+    """Random points within the limits, about ``size`` from places spread over a stretch, shape (POINTS, dof)."""
+    places = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(stretch, axis=0), axis=1)))
+    wanted = places[-1] * rng.uniform(0.0, 1.0, POINTS)
+    on = np.stack([np.interp(wanted, places, column) for column in stretch.T], axis=1)
+    ways = rng.normal(size=on.shape)
+    ways *= size / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-300)
+    near: Matrix = np.clip(on + ways, world.robot.lower, world.robot.upper)
+    return near

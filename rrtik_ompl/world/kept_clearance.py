@@ -1,0 +1,75 @@
+"""The clearance that a path keeps: what was asked for, or as much of a preference as its own ends have."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix, not_negative
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.world import World
+
+CLEARANCE = 1e-3  # [m] that is kept where nobody says
+SPARE = 2.0  # searches look at points of a motion alone, so they keep this many times as much
+HALVINGS = 10  # of what is kept, until it is given up
+BISECTIONS = 30
+
+
+class Room(NamedTuple):
+    """What can be kept between given ends.
+
+    Attributes:
+        kept: To be proven of every motion, beside the margins [m].
+        searched: To be kept by searches, which look at points of a motion alone [m].
+    """
+
+    kept: float
+    searched: float
+
+
+def room_between(world: World, ends: Matrix, clearance: float | None) -> Room | None:
+    """What can be kept on the way between configurations, shape (k, dof); None if not even these are proven free.
+
+    Args:
+        world: The world.
+        ends: Where a path begins and ends.
+        clearance: Wanted [m]; None for a millimetre, or less if the ends have less.
+    """
+    wanted = CLEARANCE if clearance is None else clearance
+    for searched in (*(SPARE * wanted * 0.5**k for k in range(HALVINGS)), 0.0):
+        if world.motions_proven(ends, ends, clearance=searched).all():
+            return Room(min(wanted, searched), searched)
+    return None
+
+
+def check_clearance(world: World, clearance: float | None, ends: dict[str, Matrix]) -> None:
+    """Refuse a clearance that a start or a goal cannot keep.
+
+    Args:
+        world: The world.
+        clearance: Wanted [m]; None is never refused.
+        ends: Configurations, shape (dof,) each, by what they are.
+
+    Raises:
+        InputError: It names the pair of bodies and what is possible.
+    """
+    if clearance is None:
+        return
+    wanted = not_negative(clearance, "clearance")
+    for what, q in ends.items():
+        gap = next(iter(world.prove(np.stack([q, q]), clearance=wanted).unproven), None)
+        if gap is not None and world.motion_proven(q, q):
+            most = 1e3 * _most(world, q, wanted)
+            pair = f"'{gap.first}' and '{gap.second}'"
+            raise InputError(f"clearance: {what} cannot keep {1e3 * wanted:g} mm: {pair}; at most {most:.3f} mm here")
+
+
+def _most(world: World, q: Matrix, refused: float) -> float:
+    """The largest clearance that a configuration keeps [m], below one that it does not."""
+    low, high = 0.0, refused
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        kept = world.motions_proven(q[None], q[None], clearance=middle).all()
+        low, high = (middle, high) if kept else (low, middle)
+    return low
