@@ -22,7 +22,7 @@ from rrtik_ompl.problem import Problem, densely_checked
 SHORTEST = 1e-3  # [s] that an attempt gets at least
 ROUNDS = 6  # attempts to find a proven path, once there is one that is checked in steps
 IN_KERNELS = 3  # of them, without proofs while searching, for planners that run in kernels
-ANYTIME_SHARE = 0.8  # of the time, in which an anytime planner keeps a clearance; the rest if it then has no path
+ANYTIME_SHARE = 0.8  # of the time, for the first attempt of an anytime planner, which keeps a clearance
 
 
 class Search:
@@ -119,21 +119,24 @@ class Search:
         return self._accepted(self._attempt(proven, 0, aims, self._left(), effort=1))
 
     def _path(self, number: int, aims: Matrix) -> JointPath | None:
-        """Of an attempt with exact checks, with room to spare as soon as a path was not proven.
-
-        An optimal path touches what it goes round, and an anytime planner has no time left for a second attempt.
-        """
-        anytime = self._traits.anytime
-        if self._check.proves and (anytime or self._check.best is not None):
+        """Of an attempt with exact checks, with room to spare as soon as a path was not proven."""
+        if self._leaves_room(number):
             strict = self._strict(proving=not self._traits.kernels or self._check.open > IN_KERNELS)
             roomy = aims[strict.world.valid_batch(aims)]
             if len(roomy) or self._aimless:
-                path = self._strict_path(strict, number, roomy)
-                if path is not None or not anytime or self._done():
-                    return path
+                return self._strict_path(strict, number, roomy)
         effort = 2**number if self._traits.supports_iteration_limit and self._others(number) else None
-        asked = densely_checked(self._problem) if anytime or self._check.rejected else self._problem
+        dense = self._traits.anytime or self._check.rejected
+        asked = densely_checked(self._problem) if dense else self._problem
         return self._accepted(self._attempt(asked, number, aims, self._share(number) * self._left(), effort))
+
+    def _leaves_room(self, number: int) -> bool:
+        """Whether an attempt keeps more than the clearance.
+
+        The first one of an anytime planner does: an optimal path touches what it goes round.
+        """
+        first = self._traits.anytime and number == 0 and len(self._seeds) > 1
+        return self._check.proves and (first or self._check.best is not None)
 
     def _strict_path(self, strict: Problem, number: int, aims: Matrix) -> JointPath | None:
         """Of an attempt with room to spare."""
