@@ -6,17 +6,19 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix, whole_number
+from rrtik_ompl.arrays import Matrix, not_negative, whole_number
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.moves.clearance_levels import Level, clearance_levels
 from rrtik_ompl.moves.lower_bounds import sharper_bound
 from rrtik_ompl.moves.rules import Joints, PerJoint
 from rrtik_ompl.moves.search import MOST_NODES, MoveSearch
 from rrtik_ompl.moves.staircase import one_joint_moves
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
+from rrtik_ompl.ompl_bridge.motion_checker import WorldChecker
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.shortening import Task
 from rrtik_ompl.shortening.random_cut import shortcut
@@ -32,17 +34,35 @@ SAMPLED_ITERATIONS = 20_000  # of RRT-Connect
 FEW_NODES = 256  # of a lattice, where each motion is checked by itself
 
 
+class _Question(NamedTuple):
+    """Between which configurations to search, shapes (s, n) and (g, n), in which form of the world, until when."""
+
+    starts: Matrix
+    goals: Matrix
+    checker: MotionChecker
+    stop: Stop
+    level: Level | None = None
+
+    @property
+    def ends(self) -> tuple[Matrix, Matrix, MotionChecker, Stop]:
+        """What a search is given."""
+        return self.starts, self.goals, self.checker, self.stop
+
+
 class FewestMoves(OneJointPlanner):
     """Fewest moves first, least joint travel second; goes on until the bound is met, its rounds are over or time is up.
 
     It starts from the best of several quick runs of BiCRDT and looks for better routes on lattices of joint values.
     Where BiCRDT hardly gets anywhere it starts from RRT-Connect's route, turned into single-joint moves.
     ``statistics`` has the lower bound of the moves and the gap: how many moves more than that the path has.
+
+    It keeps a clearance from obstacles where that costs no move.
     """
 
     ompl_name: ClassVar[str] = "FewestMoves"
     kernels: ClassVar[tuple[str, ...]] = ()
     anytime: ClassVar[bool] = True
+    leaves_room: ClassVar[bool] = True
     path_statistics: ClassVar[tuple[str, ...]] = ("lower_bound", "gap")
     brief_options: ClassVar[Mapping[str, Any]] = MappingProxyType({"searches": 1, "rounds": 0})
 
@@ -58,6 +78,7 @@ class FewestMoves(OneJointPlanner):
         frozen_joints: Joints = (),
         smallest_move: PerJoint = 0.0,
         last_joints: Joints = (),
+        clearance: float | None = None,
     ) -> None:
         """Make a planner.
 
@@ -72,6 +93,8 @@ class FewestMoves(OneJointPlanner):
             frozen_joints: As there.
             smallest_move: As there.
             last_joints: As there. The bound counts their moves too.
+            clearance: Wanted from obstacles, on top of their margins [m]; None for a centimetre. Needs a
+                ``rrtik_ompl.World``.
 
         Raises:
             InputError: If an option is out of range or the space is of another kind.
@@ -87,6 +110,7 @@ class FewestMoves(OneJointPlanner):
         )
         self.searches = whole_number(searches, "searches:", least=1)
         self.rounds = whole_number(rounds, "rounds:")
+        self.clearance = None if clearance is None else not_negative(clearance, "clearance")
 
     def completed(self, found: SearchResult, path: Matrix) -> SearchResult:
         """See :meth:`OneJointPlanner.completed`."""
@@ -96,53 +120,77 @@ class FewestMoves(OneJointPlanner):
 
     def between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`OneJointPlanner.between`."""
+        world = self._world
+        if not isinstance(world, World):
+            return self._found(_Question(starts, goals, checker, ptc))
+        best: SearchResult | None = None
+        levels = clearance_levels(world, starts[:1], self.clearance)
+        for number, level in enumerate(levels):
+            last = number == len(levels) - 1
+            aims = goals[level.proving.motion_valid_batch(goals, goals)]
+            settled = best is not None and best.path is not None and (best.statistics["gap"] == 0 or ptc())
+            if settled or (len(aims) == 0 and not last):
+                continue
+            aims = goals if last else aims
+            asked = _Question(starts, aims, WorldChecker(level.proving), ptc, level)
+            found = self._found(asked, patient=last)
+            checker.checked_motions += asked.checker.checked_motions
+            best = found if best is None else _fewer(best, found)
+        assert best is not None
+        return best
+
+    def _found(self, asked: _Question, *, patient: bool = True) -> SearchResult:
+        """What is found; without patience it is given up if quick routes are not found."""
         frozen, world = self.options.staying, self._world
-        movable = [joint for joint in range(starts.shape[1]) if joint not in frozen]
+        movable = [joint for joint in range(asked.starts.shape[1]) if joint not in frozen]
         moves = MoveSearch(
-            starts,
-            goals,
+            asked.starts,
+            asked.goals,
             *self.bounds(),
-            checker.motion_valid_batch,
+            asked.checker.motion_valid_batch,
             seed=int(self.rng.integers(2**63)),
             costs=self.options.joint_costs,
             frozen=frozen,
             smallest_move=self.options.smallest_move,
             most_nodes=FEW_NODES if world is None else MOST_NODES,
             prove=partial(sharper_bound, world, movable) if isinstance(world, World) else None,
+            all_free=None if asked.level is None or world is None else world.motion_valid_batch,
         )
-        moves.try_corner_routes(ptc)
-        iterations = self._quick_routes(moves, starts, goals, checker, ptc)
+        moves.try_corner_routes(asked.stop)
+        iterations = self._quick_routes(moves, asked, patient=patient)
         if moves.route is None:
             return SearchResult(None, {"iterations": iterations})
-        moves.improve(self.rounds, ptc)
+        moves.improve(self.rounds, asked.stop)
         counts = {"iterations": iterations, "rounds": moves.rounds, "lower_bound": moves.bound}
         return SearchResult(moves.route, {**counts, "gap": moves.moves - moves.bound})
 
-    def _quick_routes(self, moves: MoveSearch, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> int:
+    def _quick_routes(self, moves: MoveSearch, asked: _Question, *, patient: bool) -> int:
         """Offer the routes of several runs of BiCRDT, or others if it finds none; returns its iterations."""
+        level = asked.level
+        world = self._world if level is None else level.searched
         iterations, seeds = 0, self.rng.integers(2**31, size=self.searches).tolist()
         for seed in seeds:
-            if moves.proven or ptc():
+            if moves.proven or asked.stop():
                 return iterations
-            found = self._bicrdt(seed, BRIEF_ITERATIONS).search(starts, goals, checker, ptc)
+            found = self._bicrdt(world, seed, BRIEF_ITERATIONS).search(*asked.ends)
             iterations += int(found.statistics.get("iterations", 0))
             if found.path is not None:
-                moves.offer(found.path)
+                _offer(moves, found.path, level)
             elif moves.route is None:
-                route = self._converted(seed, starts, goals, checker, ptc)
+                route = self._converted(world, seed, asked)
                 if route is not None:
-                    moves.offer(route)
-        if moves.route is None:
-            found = self._bicrdt(seeds[0], None).search(starts, goals, checker, ptc)
+                    _offer(moves, route, level)
+        if moves.route is None and patient:
+            found = self._bicrdt(world, seeds[0], None).search(*asked.ends)
             iterations += int(found.statistics.get("iterations", 0))
             if found.path is not None:
                 moves.offer(found.path)
         return iterations
 
-    def _bicrdt(self, seed: int, iterations: int | None) -> BiCRDT:
+    def _bicrdt(self, world: MotionQueries | None, seed: int, iterations: int | None) -> BiCRDT:
         return BiCRDT(
             self.getSpaceInformation(),
-            world=self._world,
+            world=world,
             seed=seed,
             joint_costs=self.options.joint_costs.tolist(),
             frozen_joints=self.options.staying,
@@ -150,18 +198,34 @@ class FewestMoves(OneJointPlanner):
             max_iterations=iterations,
         )
 
-    def _converted(self, seed: int, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> Matrix | None:
+    def _converted(self, world: MotionQueries | None, seed: int, asked: _Question) -> Matrix | None:
         """RRT-Connect's route, made shorter and turned into single-joint moves; None if there is none."""
-        world = self._world
         if not isinstance(world, World) or self.options.staying:
             return None
         sampled = FastRRTConnect(
             self.getSpaceInformation(), world=world, seed=seed, max_iterations=SAMPLED_ITERATIONS
-        ).search(starts, goals, checker, ptc)
+        ).search(*asked.ends)
         if sampled.path is None:
             return None
-        short = shortcut(sampled.path, Task(world, seed=seed, stop=ptc))
+        short = shortcut(sampled.path, Task(world, seed=seed, stop=asked.stop))
         try:
             return one_joint_moves(JointPath.of(world.robot, short), world).waypoints
         except InputError:  # it comes so close to something that no single-joint moves follow it
             return None
+
+
+def _offer(moves: MoveSearch, route: Matrix, level: Level | None) -> None:
+    """Offer a route that has been checked in steps; on a level of clearance only if it keeps that."""
+    if level is None or level.proving.motion_valid_batch(route[:-1], route[1:]).all():
+        moves.offer(route)
+
+
+def _fewer(one: SearchResult, other: SearchResult) -> SearchResult:
+    """The result with fewer moves, the first of equal ones; with the work and the bound of both."""
+    if one.path is None or other.path is None:
+        return other if one.path is None else one
+    best = other if transitions(other.path) < transitions(one.path) else one
+    assert best.path is not None
+    counts = {key: one.statistics[key] + other.statistics[key] for key in ("iterations", "rounds")}
+    bound = max(one.statistics["lower_bound"], other.statistics["lower_bound"])
+    return SearchResult(best.path, {**counts, "lower_bound": bound, "gap": transitions(best.path) - bound})

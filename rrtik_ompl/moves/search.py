@@ -49,6 +49,8 @@ class MoveSearch:
         smallest_move: No move is shorter, shape (n,); any may be if None.
         most_nodes: Size of the lattices.
         prove: Sharpens the bound between a start and a goal; called once, when one move more than it remains.
+        all_free: Which motions are free where no clearance is kept and nothing has to be proven: only what these say
+            is not free raises the bound. As ``motions_free`` if None.
     """
 
     def __init__(
@@ -65,6 +67,7 @@ class MoveSearch:
         smallest_move: Vector | None = None,
         most_nodes: int = MOST_NODES,
         prove: Proof | None = None,
+        all_free: MotionsFree | None = None,
     ) -> None:
         self.pairs = [(s, g) for s, g in product(starts, goals)]
         self._bounds = [lower_bound(s, g) for s, g in self.pairs]
@@ -75,7 +78,10 @@ class MoveSearch:
         count = starts.shape[1]
         order = self._rng.permutation(count).tolist()
         shortest = np.zeros(count) if smallest_move is None else smallest_move
-        self._best = BestRoute(self._queries, np.ones(count) if costs is None else costs, order, shortest)
+        travel = np.ones(count) if costs is None else costs
+        self._best = BestRoute(self._queries, travel, order, shortest)
+        self._unkept = None if all_free is None else BatchedMotionQueries(all_free)
+        self._any = self._best if self._unkept is None else BestRoute(self._unkept, travel, order, shortest)
         self._movable = [j for j in range(count) if j not in frozen and lower[j] < upper[j]]
         self._most_nodes = most_nodes
         self._prove = prove
@@ -110,7 +116,7 @@ class MoveSearch:
     @property
     def motions(self) -> int:
         """How many straight motions have been checked."""
-        return self._queries.asked
+        return self._queries.asked + (0 if self._unkept is None else self._unkept.asked)
 
     def raise_bound(self, pair: int, bound: int) -> None:
         """Take note that no route between a start and a goal, counted as in ``pairs``, has fewer moves."""
@@ -128,7 +134,9 @@ class MoveSearch:
         Such routes have no free values: they pass the corners of the box between start and goal, all of which are
         tried. If there is none, a joint has to move twice. A joint alone cannot: another has to leave and return.
         """
-        self._queries.stop = stop
+        for queries in (self._queries, self._unkept):
+            if queries is not None:
+                queries.stop = stop
         with suppress(OutOfTime):
             for number, (start, goal) in enumerate(self.pairs):
                 values = values_of(np.array([start, goal]))
@@ -136,6 +144,8 @@ class MoveSearch:
                 if not 0 < least <= self.moves or lattice_size(values) > self._most_nodes:
                     continue
                 found = self._best.search(values, start, goal)
+                if (found is None or transitions(found) > least) and self._any is not self._best:
+                    found = self._any.search(values, start, goal)
                 if found is None or transitions(found) > least:
                     self.raise_bound(number, 3 if least == 1 else least + 1)
 

@@ -25,6 +25,8 @@ class PlannerTraits:
     Attributes:
         anytime: It goes on improving its path until the time is up. An optimal path touches what it goes round, so its
             motions are checked as densely as by the second check.
+        leaves_room: It keeps a clearance itself, where it costs nothing that it values more; its option ``clearance``
+            says how much [m].
         one_goal: It gets the first goal configuration alone.
         finds_goals: A goal of the tip, given as the option ``goal``, is enough for it: `plan()` computes no goal
             configurations. ``needs_goals()`` of a SafePlanner says it of one that was made, to ``solve``.
@@ -42,6 +44,7 @@ class PlannerTraits:
     """
 
     anytime: bool = False
+    leaves_room: bool = False
     one_goal: bool = False
     finds_goals: bool = False
     straight_first: bool = False

@@ -57,13 +57,15 @@ class Search:
     ) -> None:
         self.totals: dict[str, int | float] = {"attempts": 0, "rejected": 0}
         self.reason, self.counting = "", 0.0
-        self._problem, self._factory, self._parameters = problem, factory, parameters
+        self._problem, self._factory = problem, factory
         self._deadline, self._seeds = deadline, seeds
         self._goals = GoalSearch(problem, np.random.default_rng(seeds[0]))
         self._traits, joints = traits_of(factory), isinstance(problem.goal, JointGoal)
+        wanted = {"clearance": clearance} if self._traits.leaves_room and clearance is not None else {}
+        self._parameters = {**wanted, **parameters}
         self._aimless = self._traits.finds_goals and not joints
         self._long_ways = joints and bool(problem.robot.continuous.any()) and len(seeds) > 1
-        self._check = SecondCheck(problem, name, proof, clearance, one_joint=self._traits.one_joint)
+        self._check = SecondCheck(problem, name, proof, clearance, self._traits)
         self._strict = cache(self._check.strict)
 
     def run(self) -> JointPath | None:
@@ -136,7 +138,7 @@ class Search:
         The first one of an anytime planner does: an optimal path touches what it goes round.
         """
         first = self._traits.anytime and number == 0 and len(self._seeds) > 1
-        return self._check.proves and (first or self._check.best is not None)
+        return self._check.proves and not self._traits.leaves_room and (first or self._check.best is not None)
 
     def _strict_path(self, strict: Problem, number: int, aims: Matrix) -> JointPath | None:
         """Of an attempt with room to spare."""

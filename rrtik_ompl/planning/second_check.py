@@ -7,6 +7,7 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.choices import ProofMode
 from rrtik_ompl.ompl_bridge.attempt import Attempt
+from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem, densely_checked
 from rrtik_ompl.world.detours import with_detours
@@ -30,17 +31,17 @@ class SecondCheck:
         name: Of the planner, for messages.
         proof: See :func:`rrtik_ompl.planning.plan`.
         clearance: Likewise.
-        one_joint: Whether paths move one joint at a time, so that they get no detours.
+        traits: Of the planner. Paths that move one joint at a time get no detours.
     """
 
     def __init__(
-        self, problem: Problem, name: str, proof: ProofMode, clearance: float | None, *, one_joint: bool
+        self, problem: Problem, name: str, proof: ProofMode, clearance: float | None, traits: PlannerTraits
     ) -> None:
         self.best: JointPath | None = None
         self._ends_proven = True
         self.reason, self.rejected, self.open = "", 0, 0
         self._problem, self._name, self._proof, self._clearance = problem, name, proof, clearance
-        self._one_joint = one_joint
+        self._traits = traits
 
     @property
     def proves(self) -> bool:
@@ -100,7 +101,10 @@ class SecondCheck:
         if first.proof is not None and first.proof.proven:
             self.reason = ""
             return first
-        if self._one_joint:
+        if self._traits.leaves_room and (plain := path.proved(world)).proof is not None and plain.proof.proven:
+            self.reason = ""
+            return plain
+        if self._traits.one_joint:
             return None
         repaired = with_detours(world, rows, clearance=room.kept, rng=np.random.default_rng(seed))
         if repaired is None:

@@ -42,12 +42,14 @@ class Method:
             its length may grow then.
         can_keep_moves: Whether it stays one if that is wanted.
         moves_only: Whether it takes nothing but such a path.
+        leaves_room: Whether it keeps a clearance itself, where that costs no move.
     """
 
     run: Callable[[Matrix, Task, Problem], Matrix]
     keeps_moves: bool = False
     can_keep_moves: bool = True
     moves_only: bool = False
+    leaves_room: bool = False
 
 
 def _ompl(route: Matrix, task: Task, problem: Problem) -> Matrix:
@@ -65,14 +67,16 @@ def _axis_rounds(route: Matrix, task: Task, _: Problem) -> Matrix:
 
 
 def _fewest_moves(route: Matrix, task: Task, problem: Problem) -> Matrix:
-    return fewest_moves(route, problem.world, seed=task.seed, stop=task.expired, rules=task.rules).route
+    return fewest_moves(
+        route, problem.world, seed=task.seed, stop=task.expired, rules=task.rules, clearance=task.clearance
+    ).route
 
 
 METHODS: Mapping[ShorteningMethod, Method] = MappingProxyType(
     {
         "axis": Method(_axis, keeps_moves=True),
         "axis-rounds": Method(_axis_rounds, keeps_moves=True),
-        "fewest-moves": Method(_fewest_moves, keeps_moves=True, moves_only=True),
+        "fewest-moves": Method(_fewest_moves, keeps_moves=True, moves_only=True, leaves_room=True),
         "sequential": Method(lambda route, task, _: sequential_cut(route, task)),
         "random": Method(lambda route, task, _: random_cut(route, task)),
         "shortcut": Method(lambda route, task, _: shortcut(route, task)),
@@ -119,7 +123,7 @@ def shorten(
         on_better: Called with every better path in between; these have not yet passed the second check.
         stop: Called from time to time; True ends the work, and the best so far is returned.
         clearance: What the new motions keep from every obstacle on top of its margin [m]. None: 1 mm, or what the ends
-            of the path have.
+            of the path have; with "fewest-moves" 1 cm where that costs no move.
 
     Returns:
         A path with the same ends, and with its proof. If the input is proven free so is the result, with the clearance
@@ -141,11 +145,11 @@ def shorten(
     end = time.monotonic() + (np.inf if seconds is None else float(seconds))
     listener = None if on_better is None else lambda rows: on_better(path.with_waypoints(np.vstack([rows, tail])))
     single = one_joint or chosen.keeps_moves
-    acceptance = Acceptance(path, problem, clearance, one_joint=single, seed=seed)
+    acceptance = Acceptance(path, problem, clearance, one_joint=single, seed=seed, leaves_room=chosen.leaves_room)
     for form, share in acceptance.forms():
         left = share * (end - time.monotonic())
         limits: dict[str, Any] = {"seconds": left, "on_better": listener, "stop": stop}
-        task = Task(form.world, seed=seed, one_joint=one_joint, rules=rules, **limits)
+        task = Task(form.world, seed=seed, one_joint=one_joint, rules=rules, clearance=clearance, **limits)
         rows = np.vstack([chosen.run(head, task, form), tail])
         if not (rows[[0, -1]] == path.waypoints[[0, -1]]).all() or not (rules is None or rules.kept_by(rows)):
             continue

@@ -22,11 +22,20 @@ class Acceptance:
         clearance: To be kept [m]; None for a millimetre, or what the ends of the path have.
         one_joint: Whether its moves of one joint have to stay such, so that there are no detours.
         seed: Of the detours.
+        leaves_room: Whether the method keeps a clearance itself, where that costs no move.
     """
 
     def __init__(
-        self, path: JointPath, problem: Problem, clearance: float | None, *, one_joint: bool, seed: int
+        self,
+        path: JointPath,
+        problem: Problem,
+        clearance: float | None,
+        *,
+        one_joint: bool,
+        seed: int,
+        leaves_room: bool = False,
     ) -> None:
+        self._leaves_room = leaves_room
         self._problem, self._one_joint, self._seed = problem, one_joint, seed
         self._room = room_between(problem.world, path.waypoints[[0, -1]], clearance)
         self.input = self._proved(path)
@@ -39,6 +48,8 @@ class Acceptance:
         with room to spare; then with proofs too. Where the input does not keep the clearance, neither may help.
         """
         dense, found = densely_checked(self._problem), []
+        if self._leaves_room:
+            return [(dense, 1.0)]
         if self._room is not None:
             roomy = dense.world.with_clearance(self._room.searched) if self._room.searched > 0.0 else dense.world
             found = [(roomy, 0.7), (roomy.proving(self._room.kept), 1.0 if self._input_keeps else 0.5)]
@@ -56,6 +67,8 @@ class Acceptance:
             rows = with_detours(self._problem.world, shorter.waypoints, clearance=self._room.kept, rng=rng)
             if rows is not None:
                 return self._proved(shorter.with_waypoints(rows))
+        if self._leaves_room and _proven(proved):
+            return proved
         if self._input_keeps or (_proven(self.input) and not _proven(proved)):
             return None
         return None if shorter.violations(self._problem.world) else proved

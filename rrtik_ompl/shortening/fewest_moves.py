@@ -10,13 +10,14 @@ import numpy as np
 from rrtik_ompl.arrays import TAU, Matrix, Vector, finite_array, positive
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.moves.clearance_levels import Level, clearance_levels
 from rrtik_ompl.moves.lattice import MoveLattice
 from rrtik_ompl.moves.lower_bounds import sharper_bound
 from rrtik_ompl.moves.rules import MoveRules
 from rrtik_ompl.moves.search import MoveSearch
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.transitions import lower_bound, single_joint
+from rrtik_ompl.transitions import lower_bound, single_joint, transitions
 from rrtik_ompl.world import World
 from rrtik_ompl.world.motion_queries import Stop, no_stop
 
@@ -52,8 +53,11 @@ def fewest_moves(
     seed: int = 0,
     stop: Stop = no_stop,
     rules: MoveRules | None = None,
+    clearance: float | None = None,
 ) -> MovesFound:
     """Look for a route with fewer moves, or with as many and less travel.
+
+    It keeps a clearance where that costs no move, and its motions are proven free.
 
     Args:
         waypoints: A free route, shape (k, n), every edge of which moves one joint.
@@ -63,6 +67,8 @@ def fewest_moves(
         seed: Of all random choices.
         stop: Called often; True ends the work, and the best so far is returned.
         rules: Kept by the route and by what comes out. Joints that move last stay where they are.
+        clearance: Wanted from obstacles, on top of their margins [m]; None for a centimetre. Less is kept where more
+            moves would be needed, or where the ends have less.
 
     Returns:
         A route with the same ends, bit for bit, that is no worse. Its bound is the number of joints that differ, and
@@ -80,21 +86,35 @@ def fewest_moves(
         raise InputError(f"rounds: expected at least 0, got {rounds}")
     kept = MoveRules(world.robot.joint_names) if rules is None else rules
     frozen = [*kept.frozen_joints, *kept.last_joints]
-    search = MoveSearch(
-        rows[:1],
-        rows[-1:],
-        *turning_limits(world.robot, rows),
-        world.motion_valid_batch,
-        seed=seed,
-        costs=kept.joint_costs,
-        frozen=frozen,
-        smallest_move=kept.smallest_move,
-        prove=partial(sharper_bound, world, [j for j in range(world.robot.dof) if j not in frozen]),
-    )
-    search.offer(rows)
-    search.try_corner_routes(stop)
-    search.improve(rounds, stop)
-    return MovesFound(rows[:1] if search.route is None else search.route, search.moves, search.bound)
+    best, bound, taken = rows, lower_bound(rows[0], rows[-1]), False
+    for level in clearance_levels(world, rows[[0, -1]], clearance):
+        if taken and (transitions(best) == bound or stop()):
+            break
+        search = MoveSearch(
+            rows[:1],
+            rows[-1:],
+            *turning_limits(world.robot, rows),
+            level.proving.motion_valid_batch,
+            seed=seed,
+            costs=kept.joint_costs,
+            frozen=frozen,
+            smallest_move=kept.smallest_move,
+            prove=partial(sharper_bound, world, [j for j in range(world.robot.dof) if j not in frozen]),
+            all_free=world.motion_valid_batch,
+        )
+        if _free(level, best):
+            search.offer(best)
+        search.try_corner_routes(stop)
+        search.improve(rounds, stop)
+        bound = max(bound, search.bound)
+        if search.route is not None and transitions(search.route) <= transitions(best) - taken:
+            best, taken = search.route, True
+    return MovesFound(best, transitions(best), bound)
+
+
+def _free(level: Level, route: Matrix) -> bool:
+    """Whether a route keeps a level."""
+    return bool(level.proving.motion_valid_batch(route[:-1], route[1:]).all())
 
 
 def least_moves(problem: Problem) -> int:

@@ -26,6 +26,7 @@ class Task:
         seed: Of all random choices.
         one_joint: Whether every edge of the result must move one joint, as the edges of the given route do.
         rules: What single-joint moves have to keep to, or None.
+        clearance: What was asked for [m], for methods that leave room themselves; or None.
         bounded: Whether there is an end to the time.
         asked: How many straight motions have been checked.
         confirmed_again: How many motions of a result have been checked on top of that, as parts of free ones.
@@ -36,6 +37,7 @@ class Task:
         seed: See above.
         one_joint: See above.
         rules: See above.
+        clearance: See above.
         on_better: Called with every better route, shape (k, n).
         stop: Called between two checks; True ends the time.
     """
@@ -48,11 +50,12 @@ class Task:
         seed: int = 0,
         one_joint: bool = False,
         rules: MoveRules | None = None,
+        clearance: float | None = None,
         on_better: Callable[[Matrix], object] | None = None,
         stop: Stop | None = None,
     ) -> None:
         self.motions = motions
-        self.seed, self.one_joint, self.rules = seed, one_joint, rules
+        self.seed, self.one_joint, self.rules, self.clearance = seed, one_joint, rules, clearance
         self.asked = self.confirmed_again = 0
         self.bounded = bool(np.isfinite(seconds))
         self._deadline = time.monotonic() + seconds

@@ -11,7 +11,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.world import World
 
 CLEARANCE = 1e-3  # [m] that is kept where nobody says
-SPARE = 2.0  # searches look at points of a motion alone, so they keep this many times as much
+SPARE = 1e-3  # [m] that searches keep on top, but not more than twice: they look at points of a motion alone
 HALVINGS = 10  # of what is kept, until it is given up
 BISECTIONS = 30
 
@@ -37,7 +37,8 @@ def room_between(world: World, ends: Matrix, clearance: float | None) -> Room | 
         clearance: Wanted [m]; None for a millimetre, or less if the ends have less.
     """
     wanted = CLEARANCE if clearance is None else clearance
-    for searched in (*(SPARE * wanted * 0.5**k for k in range(HALVINGS)), 0.0):
+    most = wanted + min(wanted, SPARE)
+    for searched in (*(most * 0.5**k for k in range(HALVINGS)), 0.0):
         if world.motions_proven(ends, ends, clearance=searched).all():
             return Room(min(wanted, searched), searched)
     return None
