@@ -28,6 +28,7 @@ from rrtik_ompl.transitions import (
 )
 from rrtik_ompl.units import joint_units
 from rrtik_ompl.world import Proof, World
+from rrtik_ompl.world.kept_clearance import CLEARANCE
 from rrtik_ompl.world.route_check import VERIFICATION_DENSITY as VERIFICATION_DENSITY
 from rrtik_ompl.world.route_check import Violation, route_violations, verification_resolution
 
@@ -241,6 +242,16 @@ class JointPath:
             "transitions": self.transitions,
             "waypoints": self.waypoints.tolist(),
         }
+
+
+def proved_as_clear(path: JointPath, world: World, clearance: float) -> JointPath:
+    """A path with a proof that it keeps a clearance [m], or as much as a millimetre of it, or that it is free."""
+    proved = path.proved(world, clearance=clearance)
+    for kept in sorted({min(clearance, CLEARANCE), 0.0} - {clearance}, reverse=True):
+        if proved.proof is not None and proved.proof.proven:
+            break
+        proved = path.proved(world, clearance=kept)
+    return proved
 
 
 def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> JointPath:

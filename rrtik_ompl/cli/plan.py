@@ -9,7 +9,7 @@ from typing import Annotated, Any, get_args
 
 import typer
 
-from rrtik_ompl.choices import CommandShortening, ShorteningMethod, one_of
+from rrtik_ompl.choices import CommandShortening, ProofMode, ShorteningMethod, one_of
 from rrtik_ompl.cli.terminal import progress, say
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
@@ -19,6 +19,7 @@ RULES = ("joint_costs", "frozen_joints", "last_joints", "smallest_move")  # of s
 
 
 SHORTEN: tuple[CommandShortening, ...] = get_args(CommandShortening)
+PROOF_MODES: tuple[ProofMode, ...] = get_args(ProofMode)
 
 
 def _method(name: str) -> CommandShortening:
@@ -27,6 +28,14 @@ def _method(name: str) -> CommandShortening:
         return one_of(SHORTEN, name, "shortening method")
     except UnknownNameError:
         raise typer.BadParameter(f"'{name}' is not one of {', '.join(map(repr, SHORTEN))}.") from None
+
+
+def _proof_mode(name: str) -> ProofMode:
+    """Whether proofs are preferred, required, or not wanted."""
+    try:
+        return one_of(PROOF_MODES, name, "proof")
+    except UnknownNameError:
+        raise typer.BadParameter(f"'{name}' is not one of {', '.join(map(repr, PROOF_MODES))}.") from None
 
 
 def plan(
@@ -49,6 +58,18 @@ def plan(
             help="How the path is made shorter; auto: fewest-moves for single-joint moves.",
         ),
     ] = "auto",
+    proof: Annotated[
+        ProofMode,
+        typer.Option(
+            parser=_proof_mode,
+            metavar=f"[{'|'.join(PROOF_MODES)}]",
+            help="Whether every motion has to be proven free for its whole length.",
+        ),
+    ] = "preferred",
+    clearance: Annotated[
+        float | None,
+        typer.Option(help="What the path keeps from obstacles [m]; 0.001, or what start and goal have, if left out."),
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Save the path: .json, .csv or .txt (OMPL matrix).")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
@@ -70,10 +91,11 @@ def plan(
     options = _parameters(parameter or [])
     question = load_problem(problem)
     with progress(f"planning {question.name} with {planner}"):
-        found = find_path(question, planner, seconds=seconds, seed=seed, restarts=restarts, parameters=options)
+        limits: dict[str, Any] = {"seconds": seconds, "restarts": restarts, "proof": proof, "clearance": clearance}
+        found = find_path(question, planner, seed=seed, parameters=options, **limits)
     with progress("shortening"):
         rules = {name: value for name, value in options.items() if name in RULES}
-        path, shorten_seconds = _shortened(found.path, question, shorten, found.seed, rules)
+        path, shorten_seconds = _shortened(found.path, question, shorten, found.seed, rules, clearance)
     if path is not None and out is not None:
         path.save(out)
     if path is not None and html is not None:
@@ -92,7 +114,7 @@ def plan(
 
 
 def _shortened(
-    path: Any, problem: Any, method: CommandShortening, seed: int, rules: dict[str, Any]
+    path: Any, problem: Any, method: CommandShortening, seed: int, rules: dict[str, Any], clearance: float | None
 ) -> tuple[Any, float]:
     """The path made shorter, by the rules of single-joint moves that the planner had; and the time [s]."""
     from rrtik_ompl.shortening import MoveRules, shorten
@@ -102,7 +124,7 @@ def _shortened(
     begin = time.perf_counter()
     wanted: ShorteningMethod = "fewest-moves" if method == "auto" and path.one_joint_at_a_time else method
     kept = MoveRules(problem.robot.joint_names, **rules) if rules and path.one_joint_at_a_time else None
-    shorter = shorten(path, problem, method=wanted, seed=seed, rules=kept)
+    shorter = shorten(path, problem, method=wanted, seed=seed, rules=kept, clearance=clearance)
     return shorter, time.perf_counter() - begin
 
 

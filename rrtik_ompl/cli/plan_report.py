@@ -95,7 +95,7 @@ def summary(problem: Problem, plan: Plan, path: JointPath | None, shorten_second
         angle = np.degrees(plan.statistics["orientation_error"])
         turned = "" if isinstance(problem.goal, PositionGoal) else f" and {angle:.2g} deg"
         lines.append(f"the tip ends {plan.statistics['position_error']:.2g} m{turned} from the goal")
-    checked = how_checked(problem.world, path.waypoints)
+    checked = how_checked(problem.world, path.waypoints, path.proof)
     lines.append(f"planning {plan.seconds:.3f} s, shortening {shorten_seconds:.3f} s; valid: {checked}")
     return lines
 
@@ -114,9 +114,11 @@ def document(problem: Problem, plan: Plan, path: JointPath | None, shorten_secon
     }
     if path is None:
         return found
+    proof = path.proof if path.proof is not None else problem.world.prove(path.waypoints)
     found |= {
         "length": path.length,
-        "proven": problem.world.prove(path.waypoints).proven,
+        "proven": proof.proven,
+        "clearance": proof.clearance if proof.proven else None,
         "transitions": path.transitions,
         "lower_bound": fewest_moves(problem, plan),
         "joint_names": list(path.joint_names),

@@ -19,6 +19,7 @@ from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.transitions import SAME, merge_moves
 from rrtik_ompl.world import World
+from rrtik_ompl.world.kept_clearance import check_clearance, room_between
 from rrtik_ompl.world.motion_queries import MotionsFree
 from rrtik_ompl.world.route_check import VERIFICATION_DENSITY
 
@@ -30,7 +31,9 @@ FINEST = 1.0 / 64.0  # of the world's motion resolution: no point of the arm mov
 WIDEST = 64  # corners followed per step; a piece of up to seven joints has no more, so its search is exact
 
 
-def one_joint_moves(path: JointPath, problem: Problem | World, *, finest: float | None = None) -> JointPath:
+def one_joint_moves(
+    path: JointPath, problem: Problem | World, *, finest: float | None = None, clearance: float | None = None
+) -> JointPath:
     """Turn a path of any planner into single-joint moves.
 
     Every edge becomes a staircase, one step per joint that changes, in an order that is free. An edge for which no
@@ -41,13 +44,17 @@ def one_joint_moves(path: JointPath, problem: Problem | World, *, finest: float 
         problem: Its problem, or the world that checks the moves.
         finest: Where no point of the arm moves farther than this [m], a piece is not halved again; a 64th of the
             motion resolution if None.
+        clearance: What the moves keep from every obstacle on top of its margin [m], if the path keeps it. None: 1 mm,
+            or what the ends of the path have.
 
     Returns:
-        A path with the same ends, bit for bit, every edge of which moves exactly one joint; it has passed the same
-        second check as a plan. Its moves follow the path closely, so there are many: ``shorten`` makes fewer of them.
+        A path with the same ends, bit for bit, every edge of which moves exactly one joint, with its proof. If the
+        path is proven free, so are the moves, with the clearance if the path has it; else they have passed the same
+        second check as a plan. They follow the path closely, so there are many: ``shorten`` makes fewer of them.
 
     Raises:
-        InputError: If the path is not valid, or comes so close to something that no staircase passes there.
+        InputError: If the path is not valid, or comes so close to something that no staircase passes there; if an end
+            of the path cannot keep the clearance.
     """
     world = problem.world if isinstance(problem, Problem) else problem
     require(path, JointPath, "path to convert", "a plan has one if plan.found")
@@ -58,12 +65,27 @@ def one_joint_moves(path: JointPath, problem: Problem | World, *, finest: float 
     if faults:
         raise InputError(f"path to convert: edge {faults[0].edge + 1} is not valid: {faults[0].reason}")
     least = FINEST * world.motion_resolution if finest is None else positive(finest, "finest", "give metres")
+    check_clearance(world, clearance, {"the start": path.start, "the end of the path": path.end})
+    for kept in _provable(path, world, clearance):
+        try:
+            return path.with_waypoints(_converted(path.waypoints, world.proving(kept), least)).proved(
+                world, clearance=kept
+            )
+        except InputError:  # no staircase that keeps so much; another form may
+            continue
     for density in DENSITIES:
         finer = world.with_resolution(world.motion_resolution / density)
         converted = path.with_waypoints(_converted(path.waypoints, finer, least))
         if not converted.violations(world):
-            return converted
+            return converted.proved(world)
     raise InputError("path to convert: its single-joint moves do not pass the second check; lower motion_resolution")
+
+
+def _provable(path: JointPath, world: World, clearance: float | None) -> list[float]:
+    """The clearances that the path itself is proven to keep, of what is wanted and none [m]."""
+    room = room_between(world, path.waypoints[[0, -1]], clearance)
+    wanted = [] if room is None else sorted({room.kept, 0.0}, reverse=True)
+    return [kept for kept in wanted if world.prove(path.waypoints, clearance=kept).proven]
 
 
 def staircase_orders(a: Vector, b: Vector, motions_free: MotionsFree) -> list[Order]:

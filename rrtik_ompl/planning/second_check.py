@@ -6,9 +6,10 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.choices import ProofMode
+from rrtik_ompl.moves.clearance_levels import PREFERRED_CLEARANCE
 from rrtik_ompl.ompl_bridge.attempt import Attempt
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits
-from rrtik_ompl.path import JointPath
+from rrtik_ompl.path import JointPath, proved_as_clear
 from rrtik_ompl.problem import Problem, densely_checked
 from rrtik_ompl.world.detours import with_detours
 from rrtik_ompl.world.kept_clearance import Room, room_between
@@ -97,13 +98,11 @@ class SecondCheck:
             self._ends_proven = False
             return None
         world, rows = self._problem.world, path.waypoints
-        first = path.proved(world, clearance=room.kept)
+        leaves_room = self._traits.leaves_room
+        first = proved_as_clear(path, world, room.kept) if leaves_room else path.proved(world, clearance=room.kept)
         if first.proof is not None and first.proof.proven:
             self.reason = ""
             return first
-        if self._traits.leaves_room and (plain := path.proved(world)).proof is not None and plain.proof.proven:
-            self.reason = ""
-            return plain
         if self._traits.one_joint:
             return None
         repaired = with_detours(world, rows, clearance=room.kept, rng=np.random.default_rng(seed))
@@ -134,7 +133,8 @@ class SecondCheck:
         return self.best if self.settled else None
 
     def _room(self, ends: Matrix) -> Room | None:
-        return room_between(self._problem.world, ends, self._clearance)
+        wanted = PREFERRED_CLEARANCE if self._traits.leaves_room and self._clearance is None else self._clearance
+        return room_between(self._problem.world, ends, wanted)
 
     def _first_gap(self, rows: Matrix) -> str:
         return str(next(iter(self._problem.world.prove(rows).unproven), ""))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.path import JointPath
+from rrtik_ompl.moves.clearance_levels import PREFERRED_CLEARANCE
+from rrtik_ompl.path import JointPath, proved_as_clear
 from rrtik_ompl.problem import Problem, densely_checked
 from rrtik_ompl.world.detours import with_detours
 from rrtik_ompl.world.kept_clearance import room_between
@@ -37,7 +38,8 @@ class Acceptance:
     ) -> None:
         self._leaves_room = leaves_room
         self._problem, self._one_joint, self._seed = problem, one_joint, seed
-        self._room = room_between(problem.world, path.waypoints[[0, -1]], clearance)
+        wanted = PREFERRED_CLEARANCE if leaves_room and clearance is None else clearance
+        self._room = room_between(problem.world, path.waypoints[[0, -1]], wanted)
         self.input = self._proved(path)
         self._input_keeps = self._keeps(self.input)
 
@@ -74,10 +76,9 @@ class Acceptance:
         return None if shorter.violations(self._problem.world) else proved
 
     def _proved(self, path: JointPath) -> JointPath:
-        """The path with a proof that it keeps the clearance, or else that it is free, as far as that goes."""
+        """The path with a proof of the clearance, or of less."""
         kept = 0.0 if self._room is None else self._room.kept
-        proved = path.proved(self._problem.world, clearance=kept)
-        return proved if _proven(proved) or kept == 0.0 else path.proved(self._problem.world)
+        return proved_as_clear(path, self._problem.world, kept)
 
     def _keeps(self, proved: JointPath) -> bool:
         """Whether a path is proven to keep the clearance."""

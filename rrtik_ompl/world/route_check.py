@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.transitions import in_parts, subdivided
-from rrtik_ompl.world import World
+from rrtik_ompl.world import Proof, World
 
 VERIFICATION_DENSITY = 2.0  # how many times finer than the motion resolution a motion is checked again
 MAX_CHECKS = 30_000_000  # of a path; more than that take minutes
@@ -39,11 +39,13 @@ def verification_resolution(world: World) -> float:
     return world.motion_resolution / VERIFICATION_DENSITY
 
 
-def how_checked(world: World, rows: Matrix) -> str:
+def how_checked(world: World, rows: Matrix, known: Proof | None = None) -> str:
     """How the second check sees that the motions between waypoints, shape (k, dof), are free, in a few words."""
-    proof = world.prove(rows)
+    proof = known if known is not None and known.proven else world.prove(rows)
     if proof.proven:
-        return "proven free at every configuration"
+        margins = "its margins and " if any(obstacle.margin for obstacle in world.scene.obstacles) else ""
+        kept = f", {margins}{1e3 * proof.clearance:g} mm clear of every obstacle" if proof.clearance else ""
+        return f"proven free at every configuration{kept}"
     sampled, first = len(proof.unproven), proof.unproven[0]
     where = f", first motion {first.motion + 1}" + (f" ('{first.first}' and '{first.second}')" if first.first else "")
     step = f"checked every {1e3 * verification_resolution(world):g} mm"
