@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array
@@ -12,9 +14,11 @@ from rrtik_ompl.trajectory.corners import Curve, rounding, runs, vertices
 from rrtik_ompl.trajectory.curve import along_curve
 from rrtik_ompl.trajectory.limits import RateLimits
 from rrtik_ompl.trajectory.line import along_line
-from rrtik_ompl.trajectory.motion import Peaks, State, Trajectory, load_trajectory
+from rrtik_ompl.trajectory.load import load_trajectory
+from rrtik_ompl.trajectory.motion import Peaks, State, Trajectory
 from rrtik_ompl.trajectory.pieces import joined
 from rrtik_ompl.world import World
+from rrtik_ompl.world.kept_clearance import check_clearance, room_between
 
 __all__ = ["Peaks", "RateLimits", "State", "Trajectory", "load_trajectory", "time_parameterize"]
 
@@ -23,7 +27,12 @@ MAX_ROUNDINGS = 4  # attempts with smaller and smaller rounded corners, before n
 
 
 def time_parameterize(
-    path: JointPath, limits: RateLimits | Robot, *, blend: float = 0.0, world: World | None = None
+    path: JointPath,
+    limits: RateLimits | Robot,
+    *,
+    blend: float = 0.0,
+    world: World | None = None,
+    clearance: float | None = None,
 ) -> Trajectory:
     """Give a path its times: as fast as the limits allow, beginning and ending at rest.
 
@@ -33,14 +42,16 @@ def time_parameterize(
 
     With ``blend`` corners are rounded and passed without a stop (by toppra). The motion then leaves the path by at most
     0.22 of ``blend``, obeys velocity and acceleration limits but no jerk limit where it passes rounded corners, and is
-    itself checked against the world; a corner that cannot be rounded is a stop, and where rounding makes nothing faster
-    none is rounded.
+    itself proven free in the world, if the path is (:meth:`Trajectory.prove`), or else checked in steps; a corner that
+    cannot be rounded is a stop, and where rounding makes nothing faster none is rounded.
 
     Args:
         path: A valid path. Waypoints that coincide or lie on a line are no corners.
         limits: Or a robot, whose limits are taken (see :meth:`RateLimits.of` for those that it does not have).
         blend: Largest distance of a corner from the beginning of its rounding [rad or m]; 0 keeps to the path.
         world: For a blend: what the rounded corners must not touch.
+        clearance: What a blended motion keeps from every obstacle on top of its margin [m], if the path keeps it. None:
+            1 mm, or what the ends of the path have.
 
     Returns:
         A motion whose largest velocity, acceleration and (where it stops at the corners) jerk are within the limits
@@ -48,7 +59,7 @@ def time_parameterize(
 
     Raises:
         InputError: If the path has one waypoint, does not move, or has another number of joints than the limits; if the
-            blend is negative or comes without a world.
+            blend is negative or comes without a world, or an end of the path cannot keep the clearance.
     """
     require(path, JointPath, "path to time", "a plan has one if plan.found")
     bounds = RateLimits.of(limits) if isinstance(limits, Robot) else limits
@@ -64,15 +75,26 @@ def time_parameterize(
     if world is None:
         raise InputError("a path with rounded corners leaves the checked one: pass world=problem.world, to check it")
     require(world, World, "world of a path with rounded corners")
+    check_clearance(world, clearance, {"the start": path.start, "the end of the path": path.end})
+    free = _free_test(path, world, clearance)
     rounded = rounding(corners, reach, world)
     for _ in range(MAX_ROUNDINGS):
         found = _timed(path, corners, rounded, bounds)
         if found.duration >= stopping.duration:
             return stopping
-        if not found.faults(world):
+        if free(found):
             return found
         rounded *= 0.5
     return stopping
+
+
+def _free_test(path: JointPath, world: World, clearance: float | None) -> Callable[[Trajectory], bool]:
+    """What a motion has to pass: a proof of as much as the path itself is proven to keep, or a check in steps."""
+    room = room_between(world, path.waypoints[[0, -1]], clearance)
+    for kept in sorted({room.kept, 0.0}, reverse=True) if room is not None else ():
+        if world.prove(path.waypoints, clearance=kept).proven:
+            return lambda motion: motion.prove(world, clearance=kept).proven
+    return lambda motion: not motion.faults(world)
 
 
 def _corners(path: JointPath) -> Matrix:

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
-from rrtik_ompl.errors import InputError, in_file, require
-from rrtik_ompl.files.text import known_ending, read_text, write_text
+from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.files.text import known_ending, write_text
 from rrtik_ompl.path import JointPath
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.trajectory.text import FORMATS, dumps, loads
+from rrtik_ompl.trajectory.chords import CHORD_SLACK, chords_of
+from rrtik_ompl.trajectory.text import FORMATS, dumps
 from rrtik_ompl.units import joint_units
-from rrtik_ompl.world import World
+from rrtik_ompl.world import Proof, World
 from rrtik_ompl.world.route_check import VERIFICATION_DENSITY
 
 FIT_TOLERANCE = 1e-8  # [rad] or [m]; between a knot and the end of the cubic that leads to it
@@ -205,6 +205,30 @@ class Trajectory:
         _, first = np.unique(pieces[bad], return_index=True)
         return tuple(f"after {clock[k]:.3f} s: {world.explain(rows[k])}" for k in bad[first])
 
+    def prove(self, world: World, *, clearance: float = 0.0) -> Proof:
+        """Prove the motion itself free, at every time, not the path it was made from.
+
+        Each piece is cut into parts so short that no point of the arm leaves the straight motion between the ends of a
+        part by more than 0.1 mm, which an acceleration bounds; the straight motions are proven with that to spare.
+
+        Args:
+            world: The world.
+            clearance: To be kept from every obstacle on top of its margin [m].
+
+        Returns:
+            The proof; its motions are the pieces between two knots.
+
+        Raises:
+            InputError: If it has another number of joints than the world's robot, or the clearance is negative.
+        """
+        require(world, World, "world of a trajectory's proof")
+        finite_array(self.positions, (None, world.robot.dof), f"trajectory for robot '{world.robot.name}'")
+        h, begin = np.diff(self.times), self.accelerations[:-1]
+        pushes = np.maximum(np.abs(begin), np.abs(begin + h[:, None] * self.jerks))
+        chords = chords_of(h, pushes @ world.weights)
+        rows = self(np.append(self.times[chords.pieces] + chords.shares * h[chords.pieces], self.duration)).positions
+        return chords.joined(world.prove(rows, clearance=clearance, slack=CHORD_SLACK))
+
     def save(self, file: str | os.PathLike[str]) -> None:
         """Write the motion to a file: .json (the shape of a JointTrajectory message) or .csv (``time,<joint>...``).
 
@@ -223,48 +247,6 @@ class Trajectory:
 
     def _names(self) -> dict[str, Any]:
         return {"joint_names": self.joint_names, "prismatic": self.prismatic, "robot_name": self.robot_name}
-
-
-def load_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) -> Trajectory:
-    """Read a motion written by :meth:`Trajectory.save`, or a JointTrajectory message as JSON.
-
-    Accelerations that lead elsewhere than to the next point (other programs join their points by other curves) are
-    left out: then the motion is the cubic through positions and velocities.
-
-    Args:
-        file: A .json or .csv file.
-        robot: If given, the motion must have its joints.
-
-    Raises:
-        InputError: If the file is missing, malformed, or does not fit the robot; the message names file and line.
-    """
-    require(robot, Robot | None, "robot of a trajectory", "use load_robot(name)")
-    ending = known_ending(file, FORMATS, "trajectory")
-    try:
-        document = loads(read_text(file), ending)
-        found = _from_document(document, robot)
-        if robot is not None and found.joint_names != robot.joint_names:
-            own, wanted = ", ".join(found.joint_names), ", ".join(robot.joint_names)
-            raise InputError(f"the trajectory moves {own}, but robot '{robot.name}' has the joints {wanted}")
-        return found
-    except InputError as error:
-        raise in_file(file, error) from None
-
-
-def _from_document(document: dict[str, Any], robot: Robot | None) -> Trajectory:
-    units = document["units"]
-    sliding = None if units is None else [unit == "m" for unit in units]
-    if sliding is None and robot is not None and document["joint_names"] == list(robot.joint_names):
-        sliding = robot.prismatic.tolist()
-    names = {"joint_names": document["joint_names"], "prismatic": sliding, "robot_name": document["robot"]}
-    plain = Trajectory(document["times"], document["positions"], document["velocities"], **names)
-    if document["accelerations"] is None:
-        return plain
-    bends = finite_array(document["accelerations"], plain.positions.shape, "trajectory accelerations")
-    try:
-        return Trajectory(plain.times, plain.positions, plain.velocities, bends, **names)
-    except InputError:
-        return plain
 
 
 def _jerks(times: Vector, velocities: Matrix, accelerations: Matrix) -> Matrix:

@@ -197,19 +197,22 @@ class World:
         """
         return self._prover.proven(*self._both_ends(A, B), clearance=not_negative(clearance, "clearance"))
 
-    def prove(self, waypoints: ArrayLike, *, clearance: float = 0.0, seconds: float | None = None) -> Proof:
+    def prove(
+        self, waypoints: ArrayLike, *, clearance: float = 0.0, slack: float = 0.0, seconds: float | None = None
+    ) -> Proof:
         """Prove the straight motions between waypoints, shape (k, dof), free for their whole length; after [16].
 
         Args:
-            waypoints: Of a path.
+            waypoints: See above.
             clearance: To be kept from every obstacle on top of its margin [m].
+            slack: To be kept between all bodies on top of that [m]: how far a point may leave the straight motions.
             seconds: When to stop; what was not looked at by then is not proven.
 
         Raises:
-            InputError: If waypoints are not finite rows of ``dof`` numbers, or the clearance is negative or infinite.
+            InputError: If waypoints are not finite rows of ``dof`` numbers, or a distance is negative or infinite.
         """
-        kept = not_negative(clearance, "clearance")
-        return self._prover.route(self._rows(waypoints, 2), clearance=kept, seconds=seconds)
+        kept = {"clearance": not_negative(clearance, "clearance"), "slack": not_negative(slack, "slack")}
+        return self._prover.route(self._rows(waypoints, 2), **kept, seconds=seconds)
 
     def steps(self, a: ArrayLike, b: ArrayLike, resolution: float | None = None) -> int:
         """Number of steps in which a motion is checked: the bound on the arm's displacement over the resolution."""
@@ -232,8 +235,7 @@ class World:
         touching = () if known_free else self.contacts(q)
         if touching:
             return touching[0]
-        frames = self.robot.joint_frames(self._rows(q, 1))[0]
-        found = measured(self.bodies, self.pairs, frames, near_only=False)
+        found = measured(self.bodies, self.pairs, self.robot.joint_frames(self._rows(q, 1))[0], near_only=False)
         return min(found, key=lambda c: c.clearance, default=None)
 
     def clearance(self, q: ArrayLike) -> float:
@@ -255,8 +257,7 @@ class World:
 
     def certify(self, Q: ArrayLike) -> Mask:
         """A second opinion on the rows of Q, independent of the checks that planners use. Shape (m,)."""
-        rows = self._rows(Q, 2)
-        mask = self.robot.within_limits(rows)
+        mask = self.robot.within_limits(rows := self._rows(Q, 2))
         mask[mask] = self._certificate.free(rows[mask])
         return mask
 

@@ -76,18 +76,19 @@ class Prover:
         self._always_colliding = always_colliding
         self._packed: ProofPairs | None = None
 
-    def route(self, rows: Matrix, *, clearance: float = 0.0, seconds: float | None = None) -> Proof:
+    def route(self, rows: Matrix, *, clearance: float = 0.0, slack: float = 0.0, seconds: float | None = None) -> Proof:
         """Prove the motions between waypoints, shape (k, dof).
 
         Args:
             rows: The waypoints.
             clearance: To be kept from obstacles beside their margins [m].
+            slack: To be kept between all bodies beside that [m].
             seconds: When to stop; None for never. What was not looked at by then is not proven.
         """
         values, count = np.ascontiguousarray(self._robot.joint_values(rows)), len(rows) - 1
         sound = self._sound(rows, values)
         between = None if sound is None else sound[:-1] & sound[1:]
-        gaps = self._gaps(values, values[1:], between, clearance, seconds) if count else []
+        gaps = self._gaps(values, values[1:], between, (clearance, slack), seconds) if count else []
         return Proof(count, clearance, tuple(gaps))
 
     def proven(self, starts: Matrix, ends: Matrix, *, clearance: float = 0.0) -> Mask:
@@ -99,7 +100,7 @@ class Prover:
         values = np.ascontiguousarray(self._robot.joint_values(rows))
         sound = self._sound(rows, values)
         both = None if sound is None else sound[: len(starts)] & sound[len(starts) :]
-        mask[[gap.motion for gap in self._gaps(values, values[len(starts) :], both, clearance, None)]] = False
+        mask[[gap.motion for gap in self._gaps(values, values[len(starts) :], both, (clearance, 0.0), None)]] = False
         return mask
 
     def _sound(self, rows: Matrix, values: Matrix) -> Mask | None:
@@ -111,14 +112,17 @@ class Prover:
         return sound
 
     def _gaps(
-        self, tails: Matrix, heads: Matrix, sound: Mask | None, clearance: float, seconds: float | None
+        self, tails: Matrix, heads: Matrix, sound: Mask | None, kept: tuple[float, float], seconds: float | None
     ) -> list[Gap]:
-        """The motions from the first rows of joint values to as many others that are not proven."""
+        """The motions from the first rows of joint values to as many others that are not proven.
+
+        ``kept``: clearance and slack [m].
+        """
         count, joints = heads.shape
         begin, kernels = time.monotonic(), library(PROOF_KERNELS)
         if kernels is None or self._always_colliding:
             return [Gap(k, float("nan"), "", "") for k in range(count)]
-        packed = self._packed_for(clearance)
+        packed = self._packed_for(*kept)
         pairs, places = np.full(count, NOT_LOOKED_AT, dtype=np.int32), np.full(count, np.nan)
         table = ProofTable(packed.table.address)
         at, found, where = (tails.ctypes.data, heads.ctypes.data), pairs.ctypes.data, places.ctypes.data
@@ -135,12 +139,12 @@ class Prover:
             return []
         return [self._gap(packed, k, int(pairs[k]), float(places[k])) for k in np.flatnonzero(pairs != PROVEN).tolist()]
 
-    def _packed_for(self, clearance: float) -> ProofPairs:
-        """The table, with a clearance to keep."""
+    def _packed_for(self, clearance: float, slack: float) -> ProofPairs:
+        """The table, with a clearance and a slack to keep."""
         if self._packed is None:
             solids = [convex_solids(body.geometry) for body in self._bodies]
             self._packed = proof_pairs(self._robot.chain, self._bodies, self._pairs, solids, strokes(self._robot))
-        self._packed.keep(clearance)
+        self._packed.keep(clearance, slack)
         return self._packed
 
     def _gap(self, packed: ProofPairs, motion: int, pair: int, place: float) -> Gap:

@@ -33,6 +33,7 @@ class ProofPairs:
         margins: How far each must stay apart [m], shape (n,).
         beside_obstacle: Which pairs are of what moves and an obstacle, shape (n,).
         clearance: What the kernels keep now from obstacles beside the margins [m]; nan before the first :meth:`keep`.
+        slack: What they keep now between all bodies beside that [m].
     """
 
     table: Table
@@ -40,12 +41,13 @@ class ProofPairs:
     margins: Vector
     beside_obstacle: NDArray[np.bool_]
     clearance: float = float("nan")
+    slack: float = 0.0
 
-    def keep(self, clearance: float) -> None:
-        """Let the kernels keep a clearance [m] from obstacles beside the margins."""
-        if clearance != self.clearance:
-            self.table[layout.MARGINS][:] = self.margins + ROOM + clearance * self.beside_obstacle
-            self.clearance = clearance
+    def keep(self, clearance: float, slack: float) -> None:
+        """Let the kernels keep a clearance from obstacles beside the margins, and a slack between all bodies [m]."""
+        if (clearance, slack) != (self.clearance, self.slack):
+            self.table[layout.MARGINS][:] = self.margins + ROOM + slack + clearance * self.beside_obstacle
+            self.clearance, self.slack = clearance, slack
 
 
 def proof_pairs(

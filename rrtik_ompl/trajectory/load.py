@@ -1,0 +1,55 @@
+"""Timed motions from files."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from rrtik_ompl.arrays import finite_array
+from rrtik_ompl.errors import InputError, in_file, require
+from rrtik_ompl.files.text import known_ending, read_text
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.trajectory.motion import Trajectory
+from rrtik_ompl.trajectory.text import FORMATS, loads
+
+
+def load_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) -> Trajectory:
+    """Read a motion written by :meth:`Trajectory.save`, or a JointTrajectory message as JSON.
+
+    Accelerations that lead elsewhere than to the next point (other programs join their points by other curves) are
+    left out: then the motion is the cubic through positions and velocities.
+
+    Args:
+        file: A .json or .csv file.
+        robot: If given, the motion must have its joints.
+
+    Raises:
+        InputError: If the file is missing, malformed, or does not fit the robot; the message names file and line.
+    """
+    require(robot, Robot | None, "robot of a trajectory", "use load_robot(name)")
+    ending = known_ending(file, FORMATS, "trajectory")
+    try:
+        document = loads(read_text(file), ending)
+        found = _from_document(document, robot)
+        if robot is not None and found.joint_names != robot.joint_names:
+            own, wanted = ", ".join(found.joint_names), ", ".join(robot.joint_names)
+            raise InputError(f"the trajectory moves {own}, but robot '{robot.name}' has the joints {wanted}")
+        return found
+    except InputError as error:
+        raise in_file(file, error) from None
+
+
+def _from_document(document: dict[str, Any], robot: Robot | None) -> Trajectory:
+    units = document["units"]
+    sliding = None if units is None else [unit == "m" for unit in units]
+    if sliding is None and robot is not None and document["joint_names"] == list(robot.joint_names):
+        sliding = robot.prismatic.tolist()
+    names = {"joint_names": document["joint_names"], "prismatic": sliding, "robot_name": document["robot"]}
+    plain = Trajectory(document["times"], document["positions"], document["velocities"], **names)
+    if document["accelerations"] is None:
+        return plain
+    bends = finite_array(document["accelerations"], plain.positions.shape, "trajectory accelerations")
+    try:
+        return Trajectory(plain.times, plain.positions, plain.velocities, bends, **names)
+    except InputError:
+        return plain
