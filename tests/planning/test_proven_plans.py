@@ -1,0 +1,173 @@
+"""plan(): proven paths, detours, clearances, and what is said where nothing can be proven."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from ompl import geometric as og
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.planning import plan
+from rrtik_ompl.poses import pose
+from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.shapes import Box, Sphere
+from rrtik_ompl.world.detours import with_detours
+from rrtik_ompl.world.kept_clearance import CLEARANCE, room_between
+
+PLANNERS = ("bicrdt", "fastrrtconnect", "fewest-moves", "RRTConnect", "KPIECE1")
+
+
+def disc_world(*boxes):
+    """A disc of 0.3 m that slides in the plane among boxes (x, y, width, depth)."""
+    robot = rrtik.load_robot("point2d", radius=0.3, bounds=[[0, 10], [0, 10]])
+    walls = [Obstacle(f"box{k}", Box([w, d, 2.0]), pose([x, y, 0.0])) for k, (x, y, w, d) in enumerate(boxes)]
+    return rrtik.World(robot, Scene(tuple(walls)), motion_resolution=0.05)
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+@pytest.mark.parametrize("name", ["planar3_b", "titan4_sdu"])
+def test_paths_are_proven_to_keep_a_millimetre(planner, name):
+    problem = rrtik.load_problem(name)
+    found = plan(problem, planner, seed=3)
+    assert found.found
+    assert found.proven
+    assert found.path.proof.clearance >= CLEARANCE
+    assert problem.world.prove(found.path.waypoints, clearance=CLEARANCE).proven
+
+
+def test_without_proofs_nothing_is_said_of_them():
+    found = plan(rrtik.load_problem("planar3_b"), "bicrdt", seed=3, proof="off")
+    assert found.found
+    assert found.proven is None
+    assert found.path.proof is None
+
+
+def test_a_clearance_is_kept_if_there_is_a_path_that_keeps_it():
+    problem = rrtik.load_problem("titan4_sdu")
+    found = plan(problem, "fastrrtconnect", seed=1, clearance=0.012)
+    assert found.proven
+    assert found.path.proof.clearance == 0.012
+    least = min(problem.world.clearance(q) for q in found.path.resample(0.01).waypoints)
+    assert least > 0.0
+    narrow = [problem.world.with_clearance(0.012).valid(q) for q in found.path.resample(0.01).waypoints]
+    assert all(narrow)
+
+
+@pytest.mark.parametrize("planner", ["fastrrtconnect", "RRTConnect", "fewest-moves"])
+def test_a_preference_gives_way_where_no_path_keeps_it(planner):
+    """Two walls with a gap that the disc passes with 0.4 mm to spare on each side."""
+    world = disc_world((5.0, 5.0 + 2.5 + 0.3004, 0.2, 5.0), (5.0, 5.0 - 2.5 - 0.3004, 0.2, 5.0))
+    problem = rrtik.Problem(world, [2.0, 5.0], [8.0, 5.0])
+    assert room_between(world, np.array([problem.start, problem.goal.q]), None).kept == CLEARANCE
+    found = plan(problem, planner, seed=1)
+    assert found.proven
+    assert found.path.proof.clearance == 0.0
+    assert not world.prove(found.path.waypoints, clearance=0.0005).proven
+
+
+def test_ends_that_have_less_are_content_with_less():
+    world = disc_world((5.0, 2.0, 0.2, 4.0))
+    ends = np.array([[4.9 - 0.3 - 0.0003, 2.0], [8.0, 2.0]])  # 0.3 mm beside the wall
+    kept, searched = room_between(world, ends, None)
+    assert 0.0001 < kept <= searched < 0.0003
+    found = plan(rrtik.Problem(world, *ends), "RRTConnect", seed=1)
+    assert found.proven
+    assert found.path.proof.clearance == kept
+
+
+@pytest.mark.parametrize("clearance", [-1.0, float("inf"), float("nan")])
+def test_a_clearance_that_makes_no_sense_is_refused(clearance):
+    with pytest.raises(InputError, match="clearance"):
+        plan(rrtik.load_problem("planar3_b"), clearance=clearance)
+
+
+def test_a_clearance_that_the_start_cannot_keep_is_refused_with_what_is_possible():
+    problem = rrtik.load_problem("titan4_sdu")
+    with pytest.raises(
+        InputError, match=r"clearance: (start|goal) cannot keep 900 mm: '.*' and '.*'; at most"
+    ) as caught:
+        plan(problem, clearance=0.9)
+    most = float(str(caught.value).rsplit("at most ", 1)[1].split()[0])  # [mm]
+    what = str(caught.value).split()[1]
+    q = problem.start if what == "start" else problem.goal.q
+    assert most == pytest.approx(1e3 * problem.world.clearance(q), abs=2e-3)
+
+
+def test_an_unknown_mode_is_refused():
+    with pytest.raises(UnknownNameError, match="proof"):
+        plan(rrtik.load_problem("planar3_b"), proof="always")
+
+
+def test_without_kernels_paths_are_checked_in_steps_and_none_is_found_where_proofs_are_required(monkeypatch):
+    monkeypatch.setattr("rrtik_ompl.world.proof.library", lambda name: None)
+    problem = rrtik.load_problem("planar3_b")
+    found = plan(problem, "bicrdt", seed=3)
+    assert found.found
+    assert found.proven is False
+    assert not found.path.violations(problem.world)
+    refused = plan(problem, "bicrdt", seed=3, proof="required")
+    assert not refused.found
+    assert "not proven free" in refused.reason
+
+
+def test_detours_lead_around_what_is_not_proven():
+    """A straight motion past a ball touches it: the detour is proven, has the same ends and is hardly longer."""
+    robot = rrtik.load_robot("titan4")
+    bare = rrtik.World(robot, Scene())
+    rng = np.random.default_rng(2)
+    lower, upper = robot.finite_range()
+    mended = 0
+    for _ in range(12):
+        a, b = rng.uniform(0.5 * lower, 0.5 * upper, (2, robot.dof))
+        if not bare.motion_proven(a, b):
+            continue
+        tip = robot.fk(0.5 * (a + b)).translation
+        world = rrtik.World(robot, Scene((Obstacle("ball", Sphere(0.03), pose([tip[0], tip[1], tip[2] + 0.02])),)))
+        if not world.valid_batch([a, b]).all() or world.motion_proven(a, b):
+            continue
+        rows = with_detours(world, np.array([a, b]), clearance=0.001, rng=np.random.default_rng(0))
+        if rows is None:
+            continue
+        mended += 1
+        assert (rows[[0, -1]] == [a, b]).all()
+        assert world.prove(rows, clearance=0.001).proven
+        same = with_detours(world, np.array([a, b]), clearance=0.001, rng=np.random.default_rng(0))
+        assert (same == rows).all()
+    assert mended >= 5
+
+
+def test_the_same_seed_gives_the_same_repaired_path():
+    problem = rrtik.load_problem("planar3_boxes")
+    first, second = (plan(problem, og.RRTConnect, seed=4, clearance=0.02).path.waypoints for _ in range(2))
+    assert (first == second).all()
+
+
+def test_fewest_moves_keeps_a_centimetre_where_that_costs_no_move():
+    problem = rrtik.load_problem("titan4_sdu")
+    found = plan(problem, "fewest-moves", seed=1)
+    assert found.path.proof.clearance == 0.01
+    bare = plan(problem, "fewest-moves", seed=1, clearance=0.0)
+    assert bare.path.transitions == found.path.transitions
+    assert bare.statistics["lower_bound"] == found.statistics["lower_bound"]
+
+
+def test_bounds_of_fewest_moves_do_not_depend_on_the_clearance():
+    """A wall ends 4 mm beside the straight way of one move."""
+    world = disc_world((5.0, 2.0 - 0.3 - 0.004 - 0.5, 1.0, 1.0))
+    found = plan(rrtik.Problem(world, [2.0, 2.0], [8.0, 2.0]), "fewest-moves", seed=1)
+    assert found.statistics["lower_bound"] == 1
+    assert found.path.transitions == 1
+    assert found.proven
+    assert found.path.proof.clearance == CLEARANCE
+
+
+def test_worlds_with_a_clearance_share_everything_else():
+    problem = rrtik.load_problem("titan4_sdu")
+    wide = problem.world.with_clearance(0.2)
+    assert not wide.valid(problem.start) or not wide.valid(problem.goal.q)
+    assert problem.world.valid(problem.start)
+    assert wide.clearance(problem.start) == problem.world.clearance(problem.start)
+    assert wide.certify(problem.start[None]).all()
+    assert problem.world.proving(0.01).fast is None
+    assert dataclasses.is_dataclass(problem.world.prove([problem.start]))
