@@ -33,6 +33,8 @@ lists_of: Callable[[ProofTable], int] = field_reader(layout.LISTS)
 counts_of: Callable[[ProofTable], int] = field_reader(layout.COUNTS)
 stack_of: Callable[[ProofTable], int] = field_reader(layout.STACK)
 seen_of: Callable[[ProofTable], int] = field_reader(layout.SEEN)
+top_count_of: Callable[[ProofTable], int] = field_reader(layout.TOP_COUNT)
+top_pairs_of: Callable[[ProofTable], int] = field_reader(layout.TOP_PAIRS)
 last_stamp_of: Callable[[ProofTable], int] = field_reader(layout.LAST_STAMP)
 
 # Function (array, number) that reads one number of a record.

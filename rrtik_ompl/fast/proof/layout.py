@@ -17,6 +17,8 @@ SWEEP_COUNT, SWEEPS, REACHES, BODY_PAIR_COUNT, PAIR_COUNT, PAIRS, MARGINS = rang
 # LISTS: open pairs at each level · STACK: levels and numbers of intervals · SEEN: frames seen from another one ·
 # LAST_STAMP: one int32, counts motions
 FRAMES, STAMPS, BENDS, WAYS, LISTS, COUNTS, STACK, SEEN, LAST_STAMP = range(14, 23)
+# TOP_COUNT, TOP_PAIRS: numbers of the pairs to begin with, groups of bodies before their bodies (int32)
+TOP_COUNT, TOP_PAIRS = range(23, 25)
 
 # Joint (doubles): rotation of its placement row by row, origin, axis.
 JOINT_SIZE = 15
@@ -26,7 +28,7 @@ FRAME_SIZE = 12
 # Solid (ints): frame, corners from, to, kind.
 SOLID_SIZE = 4
 SOLID_FRAME, FIRST_CORNER, END_CORNER, SOLID_KIND = range(4)
-CONVEX_SOLID, HALF_SPACE, WHOLE_BODY, UNKNOWN = range(4)  # a whole body has a ball and a box, no corners
+CONVEX_SOLID, HALF_SPACE, WHOLE_BODY, UNKNOWN = range(4)  # a whole body, or several, has a ball and a box, no corners
 # Sizes (doubles): bounding ball; axes of the box row by row, its middle along them, its half sides; radius of the disc
 # (offset of a half-space) and its axis; radius of the ball around every point.
 SIZE_COUNT = 24

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +21,7 @@ from rrtik_ompl.fast.tables.solid_tables import ConvexSolid, Solids
 from rrtik_ompl.robot import Chain
 
 ROOM = 1e-8  # [m] for rounding: float64 misplaces points of an arm of 30 joints and 100 m by less than a tenth of it
+Members: TypeAlias = tuple[int, ...]  # numbers of bodies
 KINDS = {IS_CONVEX: CONVEX_SOLID, HALF_SPACE_SOLID: HALF_SPACE}
 
 
@@ -72,16 +74,17 @@ def proof_pairs(
         _reaches(chain, body.joint, own, np.broadcast_to(strokes, joints))
         for body, own in zip(bodies, parts, strict=True)
     ]
-    sweeps: dict[tuple[int, int], int] = {}
+    sweeps: dict[tuple[Members, int], int] = {}
     whole: list[tuple[int, ...]] = []
     of_parts: list[tuple[int, ...]] = []
     ends = np.cumsum([0, *(len(part) + (len(part) > 1) for part in parts)])
-    for i, j in pairs:
-        if bodies[i].joint == bodies[j].joint == 0:
-            continue
+    moving = [pair for pair in pairs if any(bodies[k].joint != 0 for k in pair)]
+    groups = _groups(bodies, parts, moving)
+    grouped = [(member, still) for (members, still) in groups for member in members]
+    for i, j in [*grouped, *(pair for pair in moving if not {pair, pair[::-1]} & set(grouped))]:
         one, other = (i, j) if _beyond(chain, bodies[i].joint, bodies[j].joint) else (j, i)
         base = _common(chain, bodies[one].joint, bodies[other].joint)
-        own = [sweeps.setdefault((k, base), len(sweeps)) if bodies[k].joint != base else -1 for k in (one, other)]
+        own = [sweeps.setdefault(((k,), base), len(sweeps)) if bodies[k].joint != base else -1 for k in (one, other)]
         first = len(of_parts)
         split = len(parts[one]) > 1 or len(parts[other]) > 1
         if split:
@@ -92,10 +95,18 @@ def proof_pairs(
                 for b in range(len(parts[other]))
             ]
         whole.append((ends[one], ends[other], base, *own, first, len(of_parts), i, j))
-    rows = np.array([*whole, *of_parts], dtype=np.int64).reshape(-1, layout.PAIR_SIZE + 2)
-    rows[: len(whole), layout.PARTS_FIRST : layout.PARTS_END + 1] += len(whole)
+    of_groups, first = [], -len(whole)
+    for number, (members, still) in enumerate(groups):
+        sweep = sweeps.setdefault((members, 0), len(sweeps))
+        parted = (first, first + len(members))
+        of_groups.append((ends[-1] + number, ends[still], 0, sweep, -1, *parted, members[0], still))
+        first += len(members)
+    rows = np.array([*whole, *of_parts, *of_groups], dtype=np.int64).reshape(-1, layout.PAIR_SIZE + 2)
+    split_rows = np.r_[: len(whole), len(whole) + len(of_parts) : len(rows)]
+    rows[split_rows, layout.PARTS_FIRST : layout.PARTS_END + 1] += len(whole)
+    top = [*range(len(whole) + len(of_parts), len(rows)), *range(len(grouped), len(whole))]
     named = rows[:, layout.PAIR_SIZE :]
-    packed = _solid_arrays(bodies, parts)
+    packed = _solid_arrays(bodies, parts, [members for members, _ in groups])
     made = table(
         {
             layout.JOINT_COUNT: joints,
@@ -104,8 +115,8 @@ def proof_pairs(
             layout.JOINTS: _joint_records(chain),
             **packed,
             layout.SWEEP_COUNT: len(sweeps),
-            layout.SWEEPS: np.array([(bodies[k].joint, base) for k, base in sweeps], dtype=np.int32),
-            layout.REACHES: np.array([reached[k] for k, _ in sweeps], dtype=np.float64),
+            layout.SWEEPS: np.array([(bodies[k].joint, base) for (k, *_), base in sweeps], dtype=np.int32),
+            layout.REACHES: np.array([np.max([reached[k] for k in them], axis=0) for them, _ in sweeps]),
             layout.BODY_PAIR_COUNT: len(whole),
             layout.PAIR_COUNT: len(rows),
             layout.PAIRS: rows[:, : layout.PAIR_SIZE].astype(np.int32),
@@ -119,11 +130,26 @@ def proof_pairs(
             layout.STACK: np.zeros(2 * (layout.DEEPEST + 3), dtype=np.int32),
             layout.SEEN: np.zeros(4 * layout.FRAME_SIZE),
             layout.LAST_STAMP: np.zeros(1, dtype=np.int32),
+            layout.TOP_COUNT: len(top),
+            layout.TOP_PAIRS: np.array(top, dtype=np.int32),
         }
     )
     margins = np.array([kept_apart(bodies[i], bodies[j]) for i, j in named], dtype=np.float64)
     obstacles = np.array([body.kind == "obstacle" for body in bodies], dtype=bool)
     return ProofPairs(made, named, margins, obstacles[named[:, 0]] | obstacles[named[:, 1]])
+
+
+def _groups(
+    bodies: Sequence[Body], parts: Sequence[Sequence[ConvexSolid]], pairs: Sequence[tuple[int, int]]
+) -> list[tuple[Members, int]]:
+    """Bodies that one joint carries, two or more, each time with a body that stands still and is none's to touch."""
+    found: dict[tuple[int, int], list[int]] = {}
+    for i, j in pairs:
+        mover, still = (i, j) if bodies[j].joint == 0 else (j, i)
+        convex = all(solid.kind == IS_CONVEX for solid in (*parts[mover], *parts[still]))
+        if bodies[still].joint == 0 and convex:
+            found.setdefault((bodies[mover].joint, still), []).append(mover)
+    return [(tuple(members), still) for (_, still), members in found.items() if len(members) > 1]
 
 
 def _parts(body: Body, solids: Solids) -> tuple[ConvexSolid, ...]:
@@ -215,9 +241,9 @@ def _sizes(solids: Sequence[ConvexSolid], turn: Matrix) -> Vector:
 
 
 def _solid_arrays(
-    bodies: Sequence[Body], parts: Sequence[Sequence[ConvexSolid]]
+    bodies: Sequence[Body], parts: Sequence[Sequence[ConvexSolid]], groups: Sequence[Members]
 ) -> dict[int, int | NDArray[np.int32] | NDArray[np.float64]]:
-    """The arrays of all solids: a body of several parts comes before these, as a whole."""
+    """The arrays of all solids: a body of several parts comes before these, as a whole; groups of bodies come last."""
     numbers, sizes, corners, count = [], [], [np.zeros((0, 3))], 0
     for body, own in zip(bodies, parts, strict=True):
         turn = np.array(body.placement.rotation)
@@ -230,6 +256,9 @@ def _solid_arrays(
             sizes.append(_sizes([solid], turn))
             corners.append(solid.corners)
             count += len(solid.corners)
+    for members in groups:
+        numbers.append((bodies[members[0]].joint, 0, 0, WHOLE_BODY))
+        sizes.append(_sizes([solid for k in members for solid in parts[k]], np.eye(3)))
     return {
         layout.SOLIDS: np.array(numbers, dtype=np.int32),
         layout.SIZES: np.array(sizes, dtype=np.float64),

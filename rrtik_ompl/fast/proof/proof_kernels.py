@@ -16,7 +16,6 @@ from rrtik_ompl.fast.proof import layout
 from rrtik_ompl.fast.proof.accessors import (
     base_of_pair,
     bends_of,
-    body_pair_count_of,
     counts_of,
     end_part_of,
     first_part_of,
@@ -39,6 +38,8 @@ from rrtik_ompl.fast.proof.accessors import (
     solids_of,
     stack_of,
     stamps_of,
+    top_count_of,
+    top_pairs_of,
     vector_at,
     ways_of,
 )
@@ -166,9 +167,9 @@ def prove_motion(table: ProofTable, start: int, end: int) -> Any:
     for k in range(joint_count_of(table)):
         if double_at(start, k) != double_at(end, k):
             first = 0
-    for k in range(body_pair_count_of(table)):
-        set_int(lists, pair_count_of(table) * first + k, k)
-    set_int(counts_of(table), first, body_pair_count_of(table))
+    for k in range(top_count_of(table)):
+        set_int(lists, pair_count_of(table) * first + k, int_at(top_pairs_of(table), k))
+    set_int(counts_of(table), first, top_count_of(table))
     set_int(stack, 0, first)
     set_int(stack, 1, 0)
     top = 1
