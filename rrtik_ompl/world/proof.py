@@ -74,6 +74,10 @@ class Prover:
     def __init__(self, robot: Robot, bodies: tuple[Body, ...], pairs: Pairs, *, always_colliding: bool = False) -> None:
         self._robot, self._bodies, self._pairs = robot, bodies, pairs
         self._always_colliding = always_colliding
+        self._gain, self._offset = np.ascontiguousarray(robot.chain.gain.T), robot.chain.offset
+        ends = np.stack([robot.lower, robot.upper])
+        finite = bool(np.isfinite(ends).all())
+        self._bounded = finite and bool((np.abs(robot.joint_values(ends)) < 0.5 * LARGEST_VALUE).all())
         self._packed: ProofPairs | None = None
 
     def route(self, rows: Matrix, *, clearance: float = 0.0, slack: float = 0.0, seconds: float | None = None) -> Proof:
@@ -85,7 +89,7 @@ class Prover:
             slack: To be kept between all bodies beside that [m].
             seconds: When to stop; None for never. What was not looked at by then is not proven.
         """
-        values, count = np.ascontiguousarray(self._robot.joint_values(rows)), len(rows) - 1
+        values, count = self._joint_values(rows), len(rows) - 1
         sound = self._sound(rows, values)
         between = None if sound is None else sound[:-1] & sound[1:]
         gaps = self._gaps(values, values[1:], between, (clearance, slack), seconds) if count else []
@@ -97,16 +101,21 @@ class Prover:
         if len(starts) == 0:
             return mask
         rows = np.concatenate([starts, ends])
-        values = np.ascontiguousarray(self._robot.joint_values(rows))
+        values = self._joint_values(rows)
         sound = self._sound(rows, values)
         both = None if sound is None else sound[: len(starts)] & sound[len(starts) :]
         mask[[gap.motion for gap in self._gaps(values, values[len(starts) :], both, (clearance, 0.0), None)]] = False
         return mask
 
+    def _joint_values(self, rows: Matrix) -> Matrix:
+        """Values of every joint of the chain, shape (m, joints), row after row in memory."""
+        values: Matrix = rows @ self._gain + self._offset
+        return values
+
     def _sound(self, rows: Matrix, values: Matrix) -> Mask | None:
         """Which configurations are inside the limits and not too large for the bound on rounding; None for all."""
         inside = self._robot.within_limits(rows)
-        if inside.all() and np.abs(values).max(initial=0.0) <= LARGEST_VALUE:
+        if inside.all() and (self._bounded or np.abs(values).max(initial=0.0) <= LARGEST_VALUE):
             return None
         sound: Mask = inside & (np.abs(values) <= LARGEST_VALUE).all(axis=1)
         return sound
@@ -126,16 +135,18 @@ class Prover:
         pairs, places = np.full(count, NOT_LOOKED_AT, dtype=np.int32), np.full(count, np.nan)
         table = ProofTable(packed.table.address)
         at, found, where = (tails.ctypes.data, heads.ctypes.data), pairs.ctypes.data, places.ctypes.data
-        some = count if seconds is None else MOTIONS_AT_ONCE
+        some, looked, open_ = count if seconds is None else MOTIONS_AT_ONCE, 0, 0
         for first in range(0, count, some):
             if first > 0 and seconds is not None and time.monotonic() - begin > seconds:
                 break
             skipped = DOUBLE * joints * first
             number = min(some, count - first)
-            kernels.prove(table, at[0] + skipped, at[1] + skipped, number, found + INT * first, where + DOUBLE * first)
+            sinks = (found + INT * first, where + DOUBLE * first)
+            open_ += kernels.prove(table, at[0] + skipped, at[1] + skipped, number, *sinks)
+            looked += number
         if sound is not None:
             pairs[~sound], places[~sound] = NOT_LOOKED_AT, np.nan
-        elif (pairs == PROVEN).all():
+        elif open_ == 0 and looked == count:
             return []
         return [self._gap(packed, k, int(pairs[k]), float(places[k])) for k in np.flatnonzero(pairs != PROVEN).tolist()]
 

@@ -49,8 +49,9 @@ from rrtik_ompl.fast.proof.planes import ball_gap, best_plane, beyond_half_space
 from rrtik_ompl.fast.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, int_at, set_double, set_int
 
-EAGER = 0.6  # of a ball's radius: bodies that are nearer than the sagitta less this are split at once, not compared
+EAGER = 0.9  # of a ball's radius: bodies that are nearer than the sagitta less this are split at once, not compared
 NARROW = 0.01  # width of an interval from which on they are compared nevertheless
+PATIENT = 0.1  # width of an interval down to which whole bodies are kept together, if only the sagitta is in the way
 FORGET = 1 << 30  # stamps, after which they begin anew
 
 
@@ -134,6 +135,23 @@ def apart(table: ProofTable, pair: int, begin: int, end: int, width: float) -> b
 
 
 @kernel
+def beyond(table: ProofTable, pair: int, begin: int, end: int, width: float) -> int:
+    """Compare a pair of whole bodies: 1 if it is proven apart, 0 if shorter intervals may help, -1 if they will not."""
+    pairs, solids = pairs_of(table), solids_of(table)
+    one, other = one_of_pair(pairs, pair), other_of_pair(pairs, pair)
+    if kind_of_solid(solids, one) == layout.UNKNOWN or kind_of_solid(solids, other) == layout.UNKNOWN:
+        return -1
+    kept = double_at(margins_of(table), pair)
+    wanted = kept + sagitta(table, one_sweep_of(pairs, pair), width)
+    wanted += sagitta(table, other_sweep_of(pairs, pair), width)
+    seen, places = placed(table, pair, begin, end)
+    gap, _ = ball_gap(table, one, other, seen, places)
+    if gap > wanted:
+        return 1
+    return 0 if gap > kept and width > PATIENT else -1
+
+
+@kernel
 def settle(table: ProofTable, level: int, number: int) -> int:
     """Go through the open pairs of an interval and list those that stay open for its halves; returns how many do.
 
@@ -144,12 +162,18 @@ def settle(table: ProofTable, level: int, number: int) -> int:
     width, left, row, next_row = 1.0 / (1 << level), 0, total * level, total * (level + 1)
     for k in range(int_at(counts_of(table), level)):
         pair = int_at(lists, row + k)
-        if apart(table, pair, begin, end, width):
-            continue
         first, last = first_part_of(pairs, pair), end_part_of(pairs, pair)
+        answer = 0
         if first == last:
+            answer = 1 if apart(table, pair, begin, end, width) else 0
+        else:
+            answer = beyond(table, pair, begin, end, width)
+        if answer == 1:
+            continue
+        if answer == 0:
             set_int(lists, next_row + left, pair)
             left += 1
+            continue
         for part in range(first, last):
             if not apart(table, part, begin, end, width):
                 set_int(lists, next_row + left, part)
