@@ -187,7 +187,7 @@ def prove_motion(table: ProofTable, start: int, end: int) -> Any:
     """Prove one motion. Returns a pair that is not proven, -1 if there is none, and where on the motion that is."""
     begin_motion(table, start, end)
     lists, stack, full = lists_of(table), stack_of(table), layout.NODES - 1
-    first = layout.DEEPEST  # what stands still need not be split
+    first = layout.DEEPEST - 2  # what stands still need not be split, but groups of bodies, and bodies into parts
     for k in range(joint_count_of(table)):
         if double_at(start, k) != double_at(end, k):
             first = 0
