@@ -77,6 +77,7 @@ def check(problem: ProblemName, path: PathFile = None) -> int:
     the path is not valid.
     """
     from rrtik_ompl import JointGoal, load_path, load_problem
+    from rrtik_ompl.world.clearance_curve import clearance_along
     from rrtik_ompl.world.route_check import how_checked
 
     question = load_problem(problem)
@@ -97,6 +98,8 @@ def check(problem: ProblemName, path: PathFile = None) -> int:
         say(f"{path}: {fault}")
     if faults:
         return NOT_FOUND
+    if any(body.kind == "obstacle" for body in world.bodies):
+        say(f"{path}: {clearance_along(world, route.waypoints)}{kept}")
     size = f"{len(route.waypoints)} waypoints, {route.transitions} moves, length {route.length:.2f} {route.unit}"
     say(f"{path}: valid, {how_checked(world, route.waypoints)}; {size}")
     return FOUND

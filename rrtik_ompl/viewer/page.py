@@ -20,7 +20,7 @@ from rrtik_ompl.viewer.subject import Showable, ShownPath, Subject, subject_of, 
 
 # The page may run its own script and nothing else: no request leaves the machine that shows it.
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
-SCRIPTS = ("kinematics.js", "stage.js", "panel.js", "replay.js", "player.js")
+SCRIPTS = ("kinematics.js", "stage.js", "panel.js", "replay.js", "clearance.js", "player.js")
 
 
 def page(

@@ -48,7 +48,9 @@ def draw(subject: Subject) -> tuple[RecordingWindow, Frame]:
         frame = _draw_robot(vis, robot, subject)
         draw_goal(vis, subject.goal, frame)
         if len(subject.waypoints) > 1:
-            draw_trail(vis, robot, subject.waypoints, 0.0035 * frame.arm, beads=subject.run is None)
+            doubtful = () if subject.curve is None else subject.curve.unproven
+            beads = subject.run is None
+            draw_trail(vis, robot, subject.waypoints, 0.0035 * frame.arm, beads=beads, unproven=doubtful)
         if subject.before is not None:
             draw_before(vis, robot, subject.before, 0.0035 * frame.arm)
     draw_scene(vis, scene, frame)

@@ -22,6 +22,7 @@ from rrtik_ompl.viewer.drawing.trail import pieces
 from rrtik_ompl.viewer.drawing.viewpoint import overview
 from rrtik_ompl.viewer.run_story import run_story
 from rrtik_ompl.viewer.subject import Subject
+from rrtik_ompl.world.clearance_curve import FARTHEST, ClearanceCurve
 
 PLAY_SPEED = np.deg2rad(30.0)  # [rad/s] of the joint that travels farthest in a move
 PLAY_SECONDS = (3.0, 60.0)  # shortest and longest playing time of a whole path
@@ -49,12 +50,26 @@ def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
         "before": "" if subject.before is None else _compared(subject.before, subject.waypoints),
         "moves": [] if robot is None else _moves(subject.waypoints),
         "times": [] if robot is None else _numbers(_times(subject, robot, frame)),
+        "clearance": None if robot is None or subject.curve is None else _clearance(subject.curve),
         "run": None if subject.run is None or robot is None else run_story(subject.run, robot, subject.scene, frame),
         "frame": {"low": _numbers(frame.low), "high": _numbers(frame.high)},
         "overview": _numbers(overview(_places(subject), subject.scene)),
         "planar": robot is not None and robot.planar,
         "grid": grid_cell(frame.size),
         "colors": _colors(),
+    }
+
+
+def _clearance(curve: ClearanceCurve) -> dict[str, Any]:
+    """The curve for the page: places as motion and share of it; distances that are too far to matter as null."""
+    near = curve.distances < FARTHEST
+    return {
+        "motions": curve.motions.tolist(),
+        "shares": _numbers(curve.shares),
+        "distances": [round(d, DIGITS) if ok else None for d, ok in zip(curve.distances.tolist(), near, strict=True)],
+        "pairs": [list(pair) for pair in curve.pairs],
+        "least": curve.least,
+        "unproven": list(curve.unproven),
     }
 
 
@@ -181,7 +196,18 @@ def _goal_text(goal: Goal | None) -> str:
 
 
 def _colors() -> dict[str, str]:
-    names = ("ROBOT", "START", "GOAL", "OBSTACLE", "ATTACHED", "TRAIL", "BEFORE", "BACKGROUND_TOP", "BACKGROUND_BOTTOM")
+    names = (
+        "ROBOT",
+        "START",
+        "GOAL",
+        "OBSTACLE",
+        "ATTACHED",
+        "TRAIL",
+        "UNPROVEN",
+        "BEFORE",
+        "BACKGROUND_TOP",
+        "BACKGROUND_BOTTOM",
+    )
     return {name.lower(): getattr(palette, name) for name in names}
 
 

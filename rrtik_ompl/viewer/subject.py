@@ -17,6 +17,7 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.world import World
+from rrtik_ompl.world.clearance_curve import ClearanceCurve, clearance_along
 
 
 class HasWorld(Protocol):
@@ -42,6 +43,7 @@ class Subject:
         ghosts: Configurations drawn like tinted glass, shape (m, dof), or None.
         marks: Further bodies.
         run: The run whose ticks the waypoints are, or None.
+        curve: How far the path stays from obstacles, or None if that is not known.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Subject:
     ghosts: Matrix | None = None
     marks: tuple[Mark, ...] = ()
     run: ReplanRun | None = None
+    curve: ClearanceCurve | None = None
 
     @property
     def start(self) -> Vector | None:
@@ -134,7 +137,9 @@ def subject_of(
     tinted = None if ghosts is None else _waypoints(robot, ghosts)
     if path is not None:
         earlier = None if before is None else _waypoints(robot, before)
-        return Subject(name, robot, scene, goal, _waypoints(robot, path), True, earlier, tinted, marks)
+        rows = _waypoints(robot, path)
+        curve = _curve(getattr(shown, "world", shown), rows)
+        return Subject(name, robot, scene, goal, rows, True, earlier, tinted, marks, curve=curve)
     start = getattr(shown, "start", None)
     posture = robot.clamp(np.zeros(robot.dof)) if start is None else robot.configuration(start, "start")
     return Subject(name, robot, scene, goal, frozen(posture[None]), False, None, tinted, marks)
@@ -152,12 +157,20 @@ def subject_of_run(problem: Showable, run: ReplanRun) -> Subject:
     robot = subject_of(problem).robot
     if robot is None or robot.joint_names != run.joint_names:
         raise InputError(f"run to show: one of robot '{run.robot}' with other joints; give the problem that was run")
-    shown = subject_of(problem, run.configurations)
+    shown = replace(subject_of(problem, run.configurations[:1]), waypoints=_waypoints(robot, run.configurations))
     scene = shown.scene
     still = tuple(replace(o, motion=None) for o in scene.at(0.0).obstacles)
     for name in {name for tick in run.ticks for name in tick.poses}:
         scene.obstacle(name)  # or it is a run of another problem
     return replace(shown, scene=replace(scene, obstacles=still), run=run)
+
+
+def _curve(world: object, rows: Matrix) -> ClearanceCurve | None:
+    """The clearance along a path of a world that has obstacles and in which something is proven."""
+    if not isinstance(world, World) or len(rows) < 2 or not world.scene.obstacles:
+        return None
+    found = clearance_along(world, rows)
+    return found if any(first for first, _ in found.pairs) else None
 
 
 def _waypoints(robot: Robot, path: ShownPath) -> Matrix:

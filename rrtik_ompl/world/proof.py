@@ -107,6 +107,11 @@ class Prover:
         mask[[gap.motion for gap in self._gaps(values, values[len(starts) :], both, (clearance, 0.0), None)]] = False
         return mask
 
+    def still_gaps(self, rows: Matrix, *, clearance: float) -> list[Gap]:
+        """The configurations, shape (m, dof), that are not proven free; each counts as a motion that stands still."""
+        values = self._joint_values(rows)
+        return self._gaps(values, values, self._sound(rows, values), (clearance, 0.0), None)
+
     def _joint_values(self, rows: Matrix) -> Matrix:
         """Values of every joint of the chain, shape (m, joints), row after row in memory."""
         values: Matrix = rows @ self._gain + self._offset

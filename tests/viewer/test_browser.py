@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import rrtik_ompl
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.viewer import page
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_tests.crane import WAYPOINTS
 
@@ -81,3 +83,16 @@ def test_the_page_reads_degrees_metres_and_the_tip_where_the_robot_has_it(file: 
     assert "Move 4 of 4: slew 68.8 \u2192 -57.3 deg" in shown
     x, y, z = crane.fk(WAYPOINTS[3]).translation
     assert f"tip (hand): x {x:.3f}, y {y:.3f}, z {z:.3f} m" in shown
+
+
+def test_the_page_shows_the_clearance_along_the_path_and_what_is_not_proven(tmp_path: Path) -> None:
+    problem = rrtik_ompl.load_problem("titan4_sdu")
+    path = rrtik_ompl.plan(problem, "RRTConnect", seed=1).path
+    through = np.vstack([path.waypoints, path.start])  # straight back, through the shelf
+    for rows, said in ((path.waypoints, "every move is proven free"), (through, "1 move not proven free (violet)")):
+        target = tmp_path / "view.html"
+        target.write_text(page(problem, rows), encoding="utf-8")
+        shown = chromium(target.as_uri(), "--dump-dom")
+        assert said in shown
+        assert re.search(r"now [0-9.]+ mm: \w+ and \w+; least [0-9.]+ mm: \w+ and \w+", shown)
+        assert shown.count('class="unproven"') == (rows is through)

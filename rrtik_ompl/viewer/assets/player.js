@@ -3,6 +3,7 @@ const total = story.times.length ? story.times[story.times.length - 1] : 0;
 const scrub = document.getElementById("scrub");
 let now = 0;
 let playingSince = null;
+let showClearance = () => {};
 
 function show(time) {
   now = Math.min(Math.max(time, 0), total);
@@ -14,6 +15,7 @@ function show(time) {
   showMove(arrived ? null : k);
   highlightPiece(arrived ? null : story.moves[k].piece);
   scrub.value = now;
+  showClearance(now);
   if (run) showRun(now, arrived ? k + 1 : k, arrived ? 0 : (now - story.times[k]) / (story.times[k + 1] - story.times[k]));
   document.getElementById("now").textContent = run ? nowText(k, arrived) : arrived
     ? `Goal reached after ${count(story.moves.length, "move")}`
@@ -103,6 +105,7 @@ if (robot) {
   if (story.moves.length) {
     if (run) buildEvents(goTo);
     else buildMoves(goTo);
+    if (story.clearance) showClearance = buildClearance(goTo);
     addPlayer();
   } else {
     const q = story.waypoints[0].slice();

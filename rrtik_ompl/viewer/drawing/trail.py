@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -36,7 +37,15 @@ def draw_before(vis: Visualizer, robot: Robot, waypoints: Matrix, radius: float)
         draw_tube(vis["before"], tips, 0.6 * radius, palette.BEFORE)
 
 
-def draw_trail(vis: Visualizer, robot: Robot, waypoints: Matrix, radius: float, *, beads: bool = True) -> None:
+def draw_trail(
+    vis: Visualizer,
+    robot: Robot,
+    waypoints: Matrix,
+    radius: float,
+    *,
+    beads: bool = True,
+    unproven: Sequence[int] = (),
+) -> None:
     """Draw the tip's trail under ``trail/piece N`` and a bead at every waypoint under ``beads``.
 
     Args:
@@ -45,14 +54,16 @@ def draw_trail(vis: Visualizer, robot: Robot, waypoints: Matrix, radius: float, 
         waypoints: Shape (k, dof) with k at least 2.
         radius: Of the tube [m].
         beads: Whether to draw them.
+        unproven: Numbers of the moves that are not proven free; the pieces with them have another colour.
     """
     piece = pieces(waypoints)
+    doubtful = set(piece[list(unproven)].tolist())
     for k in np.unique(piece):
         first, last = np.flatnonzero(piece == k)[[0, -1]]
         tips = robot.fk_batch(_dense(robot, waypoints[first : last + 2], len(waypoints)))[:, :3, 3]
         tips = tips[np.insert(np.linalg.norm(np.diff(tips, axis=0), axis=1) > 0.05 * radius, 0, True)]
         if len(tips) > 1:  # a turning wrist need not move the tip
-            draw_tube(vis["trail"][f"piece {k}"], tips, radius, palette.TRAIL)
+            draw_tube(vis["trail"][f"piece {k}"], tips, radius, palette.UNPROVEN if k in doubtful else palette.TRAIL)
     if beads and len(waypoints) <= MAX_PIECES:
         for k, tip in enumerate(robot.fk_batch(waypoints)):
             bead = vis["beads"][f"waypoint {k}"]
