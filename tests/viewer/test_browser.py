@@ -12,8 +12,8 @@ import pytest
 
 import rrtik_ompl
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.viewer import page
 from rrtik_ompl.viewer.drawing import palette
+from rrtik_ompl.viewer.page import page
 from rrtik_tests.crane import WAYPOINTS
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
