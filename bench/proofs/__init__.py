@@ -1,0 +1,1 @@
+"""Proofs of motions: what they cost and what they find."""
