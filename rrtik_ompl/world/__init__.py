@@ -52,6 +52,7 @@ class World:
         robot, scene, motion_resolution, accuracy: As given.
         bodies: The solids of the robot and the scene.
         pairs: Numbers of the bodies that must not touch.
+        prover: What proves its motions.
         weights: No point of the arm moves farther than ``weights @ |b - a|`` [m] from a to b, shape (dof,).
 
     Args:
@@ -97,7 +98,7 @@ class World:
         self._checks = ExactChecker(robot, self.bodies, moving, conservative=accuracy == "conservative")
         standing = tuple(p for p in pairs if all(self.bodies[i].joint == 0 for i in p))
         self._always_colliding = fixed_contact(robot, self.bodies, standing) is not None
-        self._prover = Prover(robot, self.bodies, moving, always_colliding=self._always_colliding)
+        self.prover = Prover(robot, self.bodies, moving, always_colliding=self._always_colliding)
 
     def __repr__(self) -> str:
         return f"World({self.robot.name}, {self.scene}, motion_resolution={self.motion_resolution:g} m)"
@@ -188,14 +189,14 @@ class World:
 
     def motion_proven(self, a: ArrayLike, b: ArrayLike) -> bool:
         """Whether each configuration of the straight motion from a to b, shape (dof,) each, is proven free."""
-        return bool(self._prover.proven(self._rows(a, 1), self._rows(b, 1))[0])
+        return bool(self.prover.proven(self._rows(a, 1), self._rows(b, 1))[0])
 
     def motions_proven(self, A: ArrayLike, B: ArrayLike, *, clearance: float = 0.0) -> Mask:
         """Which straight motions A[k] -> B[k], shape (m, dof) each, are proven free as a whole. Shape (m,).
 
         ``clearance`` [m] is kept from every obstacle on top of its margin. What grazes an obstacle cannot be proven.
         """
-        return self._prover.proven(*self._both_ends(A, B), clearance=not_negative(clearance, "clearance"))
+        return self.prover.proven(*self._both_ends(A, B), clearance=not_negative(clearance, "clearance"))
 
     def prove(self, waypoints: ArrayLike, *, clearance: float = 0.0, seconds: float | None = None) -> Proof:
         """Prove the straight motions between waypoints, shape (k, dof), free for their whole length; after [16].
@@ -209,7 +210,7 @@ class World:
             InputError: If waypoints are not finite rows of ``dof`` numbers, or the clearance is negative or infinite.
         """
         kept = not_negative(clearance, "clearance")
-        return self._prover.route(self._rows(waypoints, 2), clearance=kept, seconds=seconds)
+        return self.prover.route(self._rows(waypoints, 2), clearance=kept, seconds=seconds)
 
     def steps(self, a: ArrayLike, b: ArrayLike, resolution: float | None = None) -> int:
         """Number of steps in which a motion is checked: the bound on the arm's displacement over the resolution."""
@@ -288,7 +289,7 @@ class World:
         steps = step_counts(starts, ends, self.weights, self.motion_resolution)
         mask[mask] = free = self._checks.motions_free(starts, ends, steps)
         if self._proven_clearance is not None:
-            mask[mask] = self._prover.proven(starts[free], ends[free], clearance=self._proven_clearance)
+            mask[mask] = self.prover.proven(starts[free], ends[free], clearance=self._proven_clearance)
         return mask
 
 

@@ -30,22 +30,26 @@ class ProofPairs:
     Attributes:
         table: For the kernels.
         bodies: Numbers of the two bodies of each of the table's pairs, shape (n, 2).
+        sides: The same pairs as the kernels have them: body above the plane, its part, body below, its part, shape
+            (n, 4); part -1 is a body of several parts as a whole.
         margins: How far each must stay apart [m], shape (n,).
         beside_obstacle: Which pairs are of what moves and an obstacle, shape (n,).
-        clearance: What the kernels keep now from obstacles beside the margins [m]; nan before the first :meth:`keep`.
+        kept: What the kernels keep now beside the margins [m]: a clearance from obstacles, and what is for rounding; nan
+            before the first :meth:`keep`.
     """
 
     table: Table
     bodies: NDArray[np.int64]
+    sides: NDArray[np.int64]
     margins: Vector
     beside_obstacle: NDArray[np.bool_]
-    clearance: float = float("nan")
+    kept: tuple[float, float] = (float("nan"), ROOM)
 
-    def keep(self, clearance: float) -> None:
-        """Let the kernels keep a clearance [m] from obstacles beside the margins."""
-        if clearance != self.clearance:
-            self.table[layout.MARGINS][:] = self.margins + ROOM + clearance * self.beside_obstacle
-            self.clearance = clearance
+    def keep(self, clearance: float, rounding: float = ROOM) -> None:
+        """Let the kernels keep a clearance from obstacles beside the margins, and something for rounding [m]."""
+        if (clearance, rounding) != self.kept:
+            self.table[layout.MARGINS][:] = self.margins + rounding + clearance * self.beside_obstacle
+            self.kept = clearance, rounding
 
 
 def proof_pairs(
@@ -85,14 +89,17 @@ def proof_pairs(
         if split:
             firsts = [ends[k] + (len(parts[k]) > 1) for k in (one, other)]
             of_parts += [
-                (firsts[0] + a, firsts[1] + b, base, *own, 0, 0, i, j)
+                (firsts[0] + a, firsts[1] + b, base, *own, 0, 0, one, a, other, b)
                 for a in range(len(parts[one]))
                 for b in range(len(parts[other]))
             ]
-        whole.append((ends[one], ends[other], base, *own, first, len(of_parts), i, j))
-    rows = np.array([*whole, *of_parts], dtype=np.int64).reshape(-1, layout.PAIR_SIZE + 2)
+        numbers = [-1 if len(parts[k]) > 1 else 0 for k in (one, other)]
+        span = (first, len(of_parts))
+        whole.append((ends[one], ends[other], base, *own, *span, one, numbers[0], other, numbers[1]))
+    rows = np.array([*whole, *of_parts], dtype=np.int64).reshape(-1, layout.PAIR_SIZE + 4)
     rows[: len(whole), layout.PARTS_FIRST : layout.PARTS_END + 1] += len(whole)
-    named = rows[:, layout.PAIR_SIZE :]
+    sides = rows[:, layout.PAIR_SIZE :]
+    named = np.sort(sides[:, ::2], axis=1)
     packed = _solid_arrays(bodies, parts)
     made = table(
         {
@@ -117,11 +124,15 @@ def proof_pairs(
             layout.STACK: np.zeros(2 * (layout.DEEPEST + 3), dtype=np.int32),
             layout.SEEN: np.zeros(4 * layout.FRAME_SIZE),
             layout.LAST_STAMP: np.zeros(1, dtype=np.int32),
+            layout.LOG_ROOM: 0,
+            layout.LOG: np.zeros(0, dtype=np.int32),
+            layout.LOG_WAYS: np.zeros(0),
+            layout.LOG_COUNT: np.zeros(1, dtype=np.int32),
         }
     )
     margins = np.array([kept_apart(bodies[i], bodies[j]) for i, j in named], dtype=np.float64)
     obstacles = np.array([body.kind == "obstacle" for body in bodies], dtype=bool)
-    return ProofPairs(made, named, margins, obstacles[named[:, 0]] | obstacles[named[:, 1]])
+    return ProofPairs(made, named, sides, margins, obstacles[named[:, 0]] | obstacles[named[:, 1]])
 
 
 def _parts(body: Body, solids: Solids) -> tuple[ConvexSolid, ...]:
