@@ -44,7 +44,7 @@ class Certificate:
 
     Attributes:
         robot: Name of the robot.
-        robot_digest, scene_digest: Of what it is about, see :mod:`rrtik_ompl.world.digests`.
+        robot_digest, scene_digest: Of what it is about, see :mod:`rrtik_ompl.collision.digests`.
         clearance: What the path keeps from every obstacle beside its margin [m].
         waypoints: Shape (k, dof), read-only.
         motions: One for each motion; a path of one waypoint has one that stands still.

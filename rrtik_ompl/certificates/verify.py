@@ -1,14 +1,14 @@
 """Whether a certificate proves a path: computed again in numpy, from the description of the robot and the scene alone.
 
-Seen from the frame that carries both bodies of a pair, a point of one has at most the acceleration C in a motion, whose
-time runs from 0 to 1. On an interval of width h it stays within C h^2 / 8 of the chord between its places at the ends.
-So a plane that keeps two solids apart at both ends by more than both sagittas keeps them apart in between; and so does
-a gap between a ball that moves along its chord and a ball or box. Nothing is searched here: planes are given.
+Seen from the frame that carries both bodies of a pair, a point of one has at most the acceleration C in a motion, and
+stays within C h^2 / 8 of the chord between its places at the ends of an interval of width h. What is farther apart at
+both ends than both sagittas, by a plane or between balls on their chords, is so in between. Nothing is searched here.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -19,10 +19,10 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.certificates.certificate import VERSION, Certificate, MotionEntries
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.certificate import fixed_contact
+from rrtik_ompl.collision.digests import robot_digest, scene_digest
 from rrtik_ompl.fast.tables.layout import CONVEX_SOLID, HALF_SPACE_SOLID
 from rrtik_ompl.fast.tables.solid_tables import UNKNOWN, ConvexSolid, convex_solids
 from rrtik_ompl.robot import Chain
-from rrtik_ompl.world.digests import robot_digest, scene_digest
 
 if TYPE_CHECKING:
     from rrtik_ompl.world import World
@@ -34,7 +34,6 @@ AT_ONCE = 20_000  # intervals, to bound memory
 
 Numbers = NDArray[np.int64]
 Poses = tuple[NDArray[np.float64], Matrix]  # rotations, shape (n, 3, 3), and origins, shape (n, 3)
-Side = tuple[int, int, int, int, float, float]  # motion, pair, a solid of each body, begin and width of an interval
 Side = tuple[int, int, int, int, float, float]  # motion, pair, a solid of each body, begin and width of an interval
 
 
@@ -50,6 +49,7 @@ def verify(certificate: Certificate, world: World, waypoints: ArrayLike, *, clea
     rows, robot = np.ascontiguousarray(waypoints, dtype=np.float64), world.robot
     kept, moves = certificate.clearance, max(1, len(rows) - 1)
     standing = tuple(pair for pair in world.pairs if all(world.bodies[k].joint == 0 for k in pair))
+    touching = fixed_contact(robot, world.bodies, standing)  # a matter of coal, and of no motion
     same = rows.shape == certificate.waypoints.shape and rows.tobytes() == certificate.waypoints.tobytes()
     sound = rows.ndim == 2 and len(rows) > 0 and rows.shape[1] == robot.dof and bool(robot.within_limits(rows).all())
     faults = {
@@ -58,19 +58,15 @@ def verify(certificate: Certificate, world: World, waypoints: ArrayLike, *, clea
         "it is for another scene": certificate.scene_digest != scene_digest(world.bodies, world.pairs),
         f"it is for a clearance of {kept:g} m, not {clearance:g} m": not max(0.0, clearance) <= kept < np.inf,
         "it is for another path: waypoints differ": not same,
+        f"{' and '.join(map(repr, touching or ()))} touch and never move": touching is not None,
         f"waypoints are not inside the limits of robot '{robot.name}'": not sound,
         f"it has {len(certificate.motions)} motions, not {moves}": len(certificate.motions) != moves,
     }
-    fault = next((text for text, found in faults.items() if found), "")
-    if fault:
-        return fault
-    touching = fixed_contact(robot, world.bodies, standing)
-    if touching is not None:
-        return f"'{touching[0]}' and '{touching[1]}' touch and never move"
+    if any(faults.values()):
+        return next(text for text, found in faults.items() if found)
     motions = Motions(world, np.repeat(rows, 2, axis=0) if len(rows) == 1 else rows, kept)
-    if not np.abs(motions.values).max(initial=0.0) <= LARGEST_VALUE:
-        return f"a joint is beyond {LARGEST_VALUE:g} rad or m"
-    return motions.fault(certificate.motions)
+    small = bool((np.abs(motions.values) <= LARGEST_VALUE).all())
+    return motions.fault(certificate.motions) if small else f"a joint is beyond {LARGEST_VALUE:g} rad or m"
 
 
 class Solid:
@@ -80,25 +76,24 @@ class Solid:
         self.parts, self.axes, self.convex = parts, axes, all(part.kind == CONVEX_SOLID for part in parts)
         self.centre, self.middle, self.half, self.radius = np.zeros(3), np.zeros(3), np.full(3, np.inf), np.inf
         if self.convex:
-            wide = [p.disc * np.sqrt(np.maximum(0.0, 1.0 - (axes.T @ p.axis) ** 2)) + p.radius for p in parts]
-            low = np.min([(p.corners @ axes).min(axis=0) - w for p, w in zip(parts, wide, strict=True)], axis=0)
-            high = np.max([(p.corners @ axes).max(axis=0) + w for p, w in zip(parts, wide, strict=True)], axis=0)
+            low, high = -self.highest(-axes.T), self.highest(axes.T)
             self.middle, self.half, self.centre = 0.5 * (low + high), 0.5 * (high - low), axes @ (0.5 * (low + high))
             self.radius = self.far(lambda points: points - self.centre)
 
     def far(self, moved: Callable[[Matrix], Matrix]) -> float:
         """The largest length of what a function makes of the points of the parts [m]."""
-        return max(float(_length(moved(p.corners)).max()) + p.disc + p.radius for p in self.parts)
+        return max(float(np.linalg.norm(moved(p.corners), axis=1).max()) + p.disc + p.radius for p in self.parts)
 
     def highest(self, ways: Matrix) -> Vector:
-        """How far the one part reaches along unit vectors of the joint's frame, shapes (n, 3) and (n,)."""
-        part = self.parts[0]
-        if len(self.parts) == 1 and part.kind == HALF_SPACE_SOLID:
-            return np.where(np.abs(ways - part.axis).max(axis=1) <= UNIT, part.disc, np.inf)
-        if len(self.parts) > 1 or not self.convex:
-            return np.full(len(ways), np.inf)
-        across = np.sqrt(np.maximum(0.0, 1.0 - (ways @ part.axis) ** 2))
-        return np.asarray((ways @ part.corners.T).max(axis=1) + part.disc * across + part.radius)
+        """How far it reaches along unit vectors of the joint's frame, shapes (n, 3) and (n,)."""
+        heights = []
+        for part in self.parts:
+            across = np.linalg.norm(np.cross(ways, part.axis), axis=1)
+            height = (ways @ part.corners.T).max(axis=1) + part.disc * across + part.radius
+            if part.kind == HALF_SPACE_SOLID:
+                height = np.where(np.abs(ways - part.axis).max(axis=1) <= UNIT, part.disc, np.inf)
+            heights.append(height if part.kind in (CONVEX_SOLID, HALF_SPACE_SOLID) else height + np.inf)
+        return np.asarray(np.max(heights, axis=0))
 
 
 class Motions:
@@ -149,8 +144,8 @@ class Motions:
         """Frames of all joints, the world first, at shares of motions: shapes (n, joints + 1, 3, 3) and (.., 3)."""
         chain, begin = self.chain, self.values[motion]
         values = begin + share[:, None] * (self.values[motion + 1] - begin)
-        turns = np.tile(np.eye(3), (len(values), len(chain.parent) + 1, 1, 1))
-        origins = np.zeros(turns.shape[:3])
+        turns, origins = (np.zeros((len(values), len(chain.parent) + 1, *shape)) for shape in ((3, 3), (3,)))
+        turns[:, 0] = np.eye(3)
         for k, parent in enumerate(chain.parent):
             (x, y, z), place, slides = chain.axis[k], chain.placement[k], bool(chain.prismatic[k])
             cross, q = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]), values[:, k, None]
@@ -166,28 +161,27 @@ class Motions:
         first, second = ([self.solids[k] for k in numbers.tolist()] for numbers in (one, other))
         centres = [np.array([s.centre for s in solids]) for solids in (first, first, second, second)]
         p, q, begin, end = (pose[1] + _turned(pose[0], c) for pose, c in zip(seen, centres, strict=True))
-        chord, start = q - p, p - begin
-        share = np.clip(-_dot(start, chord) / np.maximum(1e-30, _dot(chord, chord)), 0.0, 1.0)
-        moving = _length(0.5 * (p + q - begin - end)) - 0.5 * (_length(chord) + _length(end - begin))
-        balls = np.where(rests, _length(start + share[:, None] * chord), moving) - [s.radius for s in second]
+        chord, start, length = q - p, p - begin, partial(np.linalg.norm, axis=1)
+        share = np.clip(-(start * chord).sum(axis=1) / np.maximum(1e-30, (chord * chord).sum(axis=1)), 0.0, 1.0)
+        moving = length(0.5 * (p + q - begin - end)) - 0.5 * (length(chord) + length(end - begin))
+        balls = np.where(rests, length(start + share[:, None] * chord), moving) - [s.radius for s in second]
         back = (seen[2][0] @ np.array([s.axes for s in second])).transpose(0, 2, 1)
         a, b = (_turned(back, x - seen[2][1]) - [s.middle for s in second] for x in (p, q))
         half = np.array([s.half for s in second])
         outside = np.maximum(0.0, np.minimum(a, b) - half) + np.minimum(0.0, np.maximum(a, b) + half)
-        boxes = np.where(rests, _length(outside), -np.inf)
+        boxes = np.where(rests, length(outside), -np.inf)
         return np.asarray(np.maximum(balls, boxes) - [s.radius for s in first])
 
     def _plane_gaps(self, one: Numbers, other: Numbers, seen: list[Poses], normals: Matrix) -> Vector:
         """Gaps of planes that are beside solids at both ends [m]; none where a normal is not of unit length."""
-        lengths, heights = _length(normals), []
+        lengths, heights = np.linalg.norm(normals, axis=1), []
         for solids, (turns, origins), sign in zip((one, one, other, other), seen, (-1.0, -1.0, 1.0, 1.0), strict=True):
             ways = sign * normals / np.maximum(lengths, 0.5)[:, None]
-            own, height = _turned(turns.transpose(0, 2, 1), ways), _dot(origins, ways)
+            own, height = _turned(turns.transpose(0, 2, 1), ways), (origins * ways).sum(axis=1)
             for number in np.unique(solids).tolist():
                 height[solids == number] += self.solids[number].highest(own[solids == number])
             heights.append(height)
-        gaps = -np.maximum(heights[0], heights[1]) - np.maximum(heights[2], heights[3])
-        return np.where(np.abs(lengths - 1.0) <= UNIT, gaps, -np.inf)
+        return np.where(np.abs(lengths - 1.0) <= UNIT, -np.maximum(*heights[:2]) - np.maximum(*heights[2:]), -np.inf)
 
     def _open(self, sides: list[Side], normals: Matrix | None = None) -> list[int]:
         """Which sides are not shown apart, by planes or, where there is none or its normal is 0, by balls and boxes."""
@@ -207,12 +201,14 @@ class Motions:
             if normals is not None:
                 ways = normals[first : first + AT_ONCE]
                 gaps = np.where(ways.any(axis=1), self._plane_gaps(one, other, seen, ways), gaps)
-            enough = gaps > self.margins[pair] + 0.125 * self.bends[pair, motion] * widths**2
-            found += (first + np.flatnonzero(~enough)).tolist()
+            enough = self.margins[pair] + 0.125 * self.bends[pair, motion] * widths**2
+            found += (first + np.flatnonzero(~(gaps > enough))).tolist()
         return found
 
+    def _all_of(self, motion: int, pair: int, a: int = -1, b: int = -1) -> Side:
+        return motion, pair, self.numbers[self.pairs[pair][0], a], self.numbers[self.pairs[pair][1], b], 0.0, 1.0
+
     def _say(self, side: Side, what: str) -> str:
-        """A line about one of the sides."""
         names = [self.bodies[k].name for k in self.pairs[side[1]]]
         return f"motion {side[0] + 1}: '{names[0]}' and '{names[1]}' {what} {side[4]:g} to {side[4] + side[5]:g} of it"
 
@@ -225,27 +221,18 @@ class Motions:
                     return f"motion {number + 1}: parts {a} and {b} of bodies {i} and {j} are no pair of the world"
                 one, other, width = self.numbers[i, a], self.numbers[j, b], 0.5**level
                 sides.append((number, places[i, j], one, other, k * width, width))
-        for k in self._open(sides, np.concatenate([motion.normals for motion in motions]))[:1]:
-            return self._say(sides[k], "are not shown apart from")
         until: dict[tuple[int, ...], float] = {}
         for side in sorted(sides):
             if until.get(side[:4], 0.0) != side[4]:
                 return self._say(side, "have a gap or an overlap of entries before")
             until[side[:4]] = side[4] + side[5]
-        for key, end in until.items():
-            if end != 1.0:
-                return self._say((*key, end, 1.0 - end), "have no entry from")
-        all_of_it = (0.0, 1.0)
-        whole = [
-            (number, k, self.numbers[i, -1], self.numbers[j, -1], *all_of_it)
-            for number in range(len(motions))
-            for k, (i, j) in enumerate(self.pairs)
-        ]
-        rest = [
-            (number, k, self.numbers[i, a], self.numbers[j, b], *all_of_it)
-            for number, k, i, j in ((*whole[n][:2], *self.pairs[whole[n][1]]) for n in self._open(whole))
-            for a, b in product(self.parts[i], self.parts[j])
-        ]
+        for side in (side for side in sides if until[side[:4]] != 1.0):
+            return self._say(side, "have no entries to the end of the motion beyond")
+        for k in self._open(sides, np.concatenate([motion.normals for motion in motions]))[:1]:
+            return self._say(sides[k], "are not shown apart from")
+        whole = [self._all_of(*both) for both in product(range(len(motions)), range(len(self.pairs)))]
+        split = [(whole[k][:2], *self.pairs[whole[k][1]]) for k in self._open(whole)]
+        rest = [self._all_of(*both, *ab) for both, i, j in split for ab in product(self.parts[i], self.parts[j])]
         rest = [side for side in rest if side[:4] not in until]
         for k in self._open(rest)[:1]:
             return self._say(rest[k], "are not shown apart from")
@@ -257,14 +244,6 @@ def _common(chain: Chain, first: int, second: int) -> int:
     while first != second:  # parents have smaller numbers
         first, second = min(first, second), int(chain.parent[max(first, second) - 1]) + 1
     return first
-
-
-def _dot(a: Matrix, b: Matrix) -> Vector:
-    return np.asarray(np.einsum("ni,ni->n", a, b))
-
-
-def _length(a: Matrix) -> Vector:
-    return np.asarray(np.linalg.norm(a, axis=1))
 
 
 def _turned(turns: NDArray[np.float64], a: Matrix) -> Matrix:

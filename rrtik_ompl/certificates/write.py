@@ -6,11 +6,11 @@ import numpy as np
 
 from rrtik_ompl.arrays import frozen, not_negative
 from rrtik_ompl.certificates.certificate import Certificate, MotionEntries
+from rrtik_ompl.collision.digests import robot_digest, scene_digest
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.fast.proof.log import ProofLog
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.world import World
-from rrtik_ompl.world.digests import robot_digest, scene_digest
 
 
 def certificate_of(world: World, path: JointPath, clearance: float = 0.0) -> Certificate | None:

@@ -16,6 +16,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.digests import world_digest
 from rrtik_ompl.fast.proof.layout import ProofTable
 from rrtik_ompl.fast.proof.log import ProofLog, logged
 from rrtik_ompl.fast.proof.packing import ROOM, ProofPairs, proof_pairs
@@ -23,7 +24,6 @@ from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.tables.solid_tables import convex_solids
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world.arm_cache import Pairs, strokes
-from rrtik_ompl.world.digests import world_digest
 
 LARGEST_VALUE = 1e3  # [rad] or [m] of a joint, up to which rounding is bounded
 PROOF_KERNELS = "proof.proof_kernels"
@@ -108,9 +108,9 @@ class Prover:
 
     def logged(self, rows: Matrix, *, clearance: float = 0.0) -> list[ProofLog] | None:
         """By what each motion between waypoints, shape (k, dof), is proven; None if one of them is not."""
-        if not self.route(rows, clearance=clearance).proven:
-            return None
         values, kernels = np.ascontiguousarray(self._robot.joint_values(rows)), library(PROOF_KERNELS)
+        if kernels is None or not self.route(rows, clearance=clearance).proven:
+            return None
         packed, told = self._packed_for(clearance), []
         packed.keep(clearance, ROOM + SPARE)
         pair, place = np.zeros(1, dtype=np.int32), np.zeros(1)

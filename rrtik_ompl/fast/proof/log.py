@@ -59,8 +59,8 @@ def logged(packed: ProofPairs, run: Callable[[], object], first_room: int = FIRS
 def _give_room(table: Table, room: int) -> None:
     """Empty the log and give it room; the table's address stays."""
     if len(table[layout.LOG_WAYS]) != 3 * room:
-        fields = {layout.LOG: np.zeros(layout.LOG_SIZE * room, dtype=np.int32), layout.LOG_WAYS: np.zeros(3 * room)}
-        for place, array in fields.items():
+        records = np.zeros(layout.LOG_SIZE * room, dtype=np.int32)
+        for place, array in ((layout.LOG, records), (layout.LOG_WAYS, np.zeros(3 * room))):
             table.arrays[place] = roomy = aligned(array)
             table.header[place] = roomy.ctypes.data
     table.header[layout.LOG_ROOM] = room

@@ -34,8 +34,8 @@ class ProofPairs:
             (n, 4); part -1 is a body of several parts as a whole.
         margins: How far each must stay apart [m], shape (n,).
         beside_obstacle: Which pairs are of what moves and an obstacle, shape (n,).
-        kept: What the kernels keep now beside the margins [m]: a clearance from obstacles, and what is for rounding; nan
-            before the first :meth:`keep`.
+        kept: What the kernels keep now beside the margins [m]: a clearance from obstacles, nan before the first
+            :meth:`keep`, and what is for rounding.
     """
 
     table: Table
