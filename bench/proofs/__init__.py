@@ -1,0 +1,1 @@
+"""Certificates made, verified and tampered with."""
