@@ -45,7 +45,7 @@ def random_scene(robot: Robot, rng: np.random.Generator, margin: float = 0.002) 
         Obstacle(f"solid {k}", solid, place, margin=margin)
         for k, (solid, place) in enumerate(zip(solids, places, strict=True))
     ]
-    return Scene([*found, Obstacle("floor", HalfSpace([0.1, 0.0, 1.0], -1.1), pin.SE3.Identity())])
+    return Scene((*found, Obstacle("floor", HalfSpace([0.1, 0.0, 1.0], -1.1), pin.SE3.Identity())))
 
 
 def random_path(world: World, rng: np.random.Generator, clearance: float) -> JointPath | None:

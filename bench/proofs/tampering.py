@@ -21,6 +21,7 @@ from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.world import World
 
 TOUCH = 1e-6  # [rad] or [m] by which a waypoint is moved
+SLIGHT = 1e-5  # [m] that is asked for beyond what there is
 
 
 class Falsified(NamedTuple):
@@ -46,7 +47,7 @@ def _forged(case: Case, world: World) -> Certificate:
 
 def _changed(case: Case, name: str, changed: Obstacle) -> World:
     """The world with another obstacle in the place of one."""
-    obstacles = [changed if item.name == name else item for item in case.world.scene.obstacles]
+    obstacles = tuple(changed if item.name == name else item for item in case.world.scene.obstacles)
     return World(case.world.robot, Scene(obstacles))
 
 
@@ -171,7 +172,7 @@ def another_margin(case: Case, rng: np.random.Generator) -> Falsified:
     q = case.path.waypoints[int(rng.integers(len(case.path.waypoints)))]
     gap = _nearest(case, q)
     nearest = next(item for item in case.world.scene.obstacles if item.name in (gap.first, gap.second))
-    more = nearest.margin + gap.clearance + 0.001
+    more = nearest.margin + gap.clearance + SLIGHT
     world = _changed(case, nearest.name, replace(nearest, margin=more))
     return Falsified(_forged(case, world) if rng.integers(2) else case.certificate, world, case.path.waypoints)
 
@@ -187,7 +188,7 @@ def _nearest(case: Case, q: Vector) -> Contact:
 def another_clearance(case: Case, rng: np.random.Generator) -> Falsified:
     """More is said to be kept than is."""
     q = case.path.waypoints[int(rng.integers(len(case.path.waypoints)))]
-    return _with(case, replace(case.certificate, clearance=_nearest(case, q).clearance + 0.001))
+    return _with(case, replace(case.certificate, clearance=_nearest(case, q).clearance + SLIGHT))
 
 
 def not_a_number(case: Case, rng: np.random.Generator) -> Falsified:

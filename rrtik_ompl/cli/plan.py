@@ -65,7 +65,6 @@ def plan(
     from rrtik_ompl import load_problem
     from rrtik_ompl.catalog import default_planner
     from rrtik_ompl.cli import plan_report as report
-    from rrtik_ompl.cli.proofs import write_certificate
     from rrtik_ompl.planning import find_planner
     from rrtik_ompl.planning import plan as find_path
 
@@ -78,14 +77,7 @@ def plan(
     with progress("shortening"):
         rules = {name: value for name, value in options.items() if name in RULES}
         path, shorten_seconds = _shortened(found.path, question, shorten, found.seed, rules)
-    if path is not None and out is not None:
-        path.save(out)
-    if path is not None and html is not None:
-        from rrtik_ompl.viewer import view
-
-        with progress("drawing"):
-            view(question, path, html=html, before=None if path is found.path else found.path)
-    lack = "" if path is None or certificate is None else write_certificate(question, path, certificate)
+    lack = "" if path is None else _write(question, path, found.path, out, html, certificate)
     if as_json:
         print(json.dumps(report.document(question, found, path, shorten_seconds)))
     else:
@@ -97,6 +89,22 @@ def plan(
     if lack:
         note(lack)
     return 0 if found.found and not lack else 1
+
+
+def _write(problem: Any, path: Any, raw: Any, out: Path | None, html: Path | None, certificate: Path | None) -> str:
+    """Write the files that were asked for; returns why there is no certificate, "" if nothing is missing."""
+    if out is not None:
+        path.save(out)
+    if html is not None:
+        from rrtik_ompl.viewer import view
+
+        with progress("drawing"):
+            view(problem, path, html=html, before=None if path is raw else raw)
+    if certificate is None:
+        return ""
+    from rrtik_ompl.cli.proofs import write_certificate
+
+    return write_certificate(problem, path, certificate)
 
 
 def _shortened(
