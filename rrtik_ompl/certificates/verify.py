@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.certificates.certificate import VERSION, Certificate, MotionEntries
+from rrtik_ompl.certificates.certificate import DEEPEST, VERSION, Certificate, MotionEntries
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.certificate import fixed_contact
 from rrtik_ompl.collision.digests import robot_digest, scene_digest
@@ -217,8 +217,8 @@ class Motions:
         places, sides = {pair: k for k, pair in enumerate(self.pairs)}, list[Side]()
         for number, motion in enumerate(motions):
             for (i, a, j, b), (level, k) in zip(motion.solids.tolist(), motion.intervals.tolist(), strict=True):
-                if (i, j) not in places or (i, a) not in self.numbers or (j, b) not in self.numbers:
-                    return f"motion {number + 1}: parts {a} and {b} of bodies {i} and {j} are no pair of the world"
+                if (i, j) not in places or not {(i, a), (j, b)} <= self.numbers.keys() or level > DEEPEST:
+                    return f"motion {number + 1}: no parts {a} and {b} of a pair {i} and {j}, or no level {level}"
                 one, other, width = self.numbers[i, a], self.numbers[j, b], 0.5**level
                 sides.append((number, places[i, j], one, other, k * width, width))
         until: dict[tuple[int, ...], float] = {}

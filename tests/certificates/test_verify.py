@@ -128,6 +128,16 @@ def scene_of(world):
     return scene_digest(world.bodies, world.pairs)
 
 
+def test_entries_of_no_pair_part_or_interval_are_refused(cases):
+    case = next(case for case in cases("panda") if len(case.certificate.motions[0].solids))
+    first, *others = case.certificate.motions
+    for solid, interval in (([0, 0, 0, 0], [0, 0]), ([0, 99, 1, 0], [0, 0]), (first.solids[0], [60, 0])):
+        changed = replace(first, solids=first.solids.copy(), intervals=first.intervals.copy())
+        changed.solids[0], changed.intervals[0] = solid, interval
+        fault = verify(replace(case.certificate, motions=(changed, *others)), case.world, case.path.waypoints)
+        assert fault.startswith("motion 1: no parts")
+
+
 def test_a_larger_clearance_than_the_certificate_has_is_not_shown_by_it(cases):
     case = cases("titan4")[0]
     assert "clearance" in verify(case.certificate, case.world, case.path.waypoints, clearance=0.002)
