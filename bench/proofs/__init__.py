@@ -1,1 +1,1 @@
-"""Proofs of motions: what they cost and what they find."""
+"""Proofs of motions: what they cost, what they find, and certificates made, verified and tampered with."""

@@ -1,245 +1,86 @@
-"""The measurements: plans on generated scenes with thin obstacles, shortened paths, planted obstacles, and times."""
+"""Worlds of several robots among random obstacles, and random paths in them that are proven free."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
-from pathlib import Path
-from time import process_time
-from typing import Any
-from unittest.mock import patch
 
-import coal
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-import rrtik_ompl as rrtik
-from bench.proofs.judge import deepest_cut
-from bench.shared.problems import goal_joints
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.choices import ShorteningMethod
-from rrtik_ompl.collision.bodies import Body, link_bodies
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.generated_problems import generated_problem
-from rrtik_ompl.ompl_bridge.attempt import Attempt, attempt
-from rrtik_ompl.problem import Problem, densely_checked
-from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
+from rrtik_ompl.certificates.certificate import Certificate
+from rrtik_ompl.certificates.write import certificate_of
+from rrtik_ompl.fast.tables.solid_tables import convex_solids
+from rrtik_ompl.path import JointPath
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Box, Cylinder
-from rrtik_ompl.shortening import METHODS, Task
+from rrtik_ompl.shapes import Box, Cylinder, HalfSpace, Mesh, Sphere
 from rrtik_ompl.world import World
 
-PLATE, NEEDLE = 1e-4, 2e-4  # [m] thickness, radius
-PLANNERS = ("fastrrtconnect", "bicrdt", "RRTConnect")
-THIN = 6  # obstacles added to a generated scene
+WAYPOINTS = 7
+STEP = 0.8  # [rad] or [m] from one waypoint to the next, about
+DENTED = [[x, y, z] for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1)] + [[0.0, 0.0, -0.03]]
+FACES = (  # of a block whose top is pushed in
+    *((0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4)),
+    *((1, 5, 8), (5, 7, 8), (7, 3, 8), (3, 1, 8)),
+)
 
 
-@dataclass(frozen=True)
-class Judged:
-    """A path: whether it is proven, what it keeps, how deep it cuts [m], and its length; before: without proofs."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Case:
+    """A path, the world that it is free in, and what proves that."""
 
-    found: bool
-    proven: bool = False
-    clearance: float = 0.0
-    cut: float = 0.0
-    length: float = 0.0
-    before: float = 0.0
-    cut_before: float = 0.0
+    world: World
+    path: JointPath
+    certificate: Certificate
 
 
-@dataclass(frozen=True)
-class Timed:
-    """Processor times of a benchmark problem [s]; ``rest``: of plan() less the planner and OMPL around it."""
-
-    proven: bool
-    whole: float
-    rest: float
-    proof: float
-    sampled: float
-
-
-def thin_problem(arm: str, family: str, seed: int) -> Problem | None:
-    """A generated problem with thin plates and needles around the straight way; None if they block an end."""
-    try:
-        problem = generated_problem(rrtik.load_robot(arm), family, seed)
-    except InputError:
-        return None
-    rng, robot = np.random.default_rng([7, seed]), problem.robot
-    ends = np.array([problem.start, goal_joints(problem)])
-    tips = robot.fk_batch(ends[0] + rng.uniform(0.1, 0.9, (THIN, 1)) * (ends[1] - ends[0]))[:, :3, 3]
-    spread = 0.1 * float(np.linalg.norm(tips.max(axis=0) - tips.min(axis=0)) + 0.1)
-    scene, added = problem.world.scene, list(problem.world.scene.obstacles)
-    for k, tip in enumerate(tips):
-        turn = pin.exp3(rng.uniform(-np.pi, np.pi, 3))
-        shape = Box([PLATE, 0.1, 0.1]) if k % 2 else Cylinder(NEEDLE, 0.2)
-        thin = Obstacle(f"thin{k}", shape, pin.SE3(turn, tip + rng.normal(0.0, spread, 3)))
-        world = World(robot, Scene((*added, thin), scene.attached, scene.allowed_collisions))
-        added += [thin] if world.valid_batch(ends).all() and world.certify(ends).all() else []
-    world = World(robot, Scene(tuple(added), scene.attached, scene.allowed_collisions))
-    return Problem(world, *ends)
+def random_scene(robot: Robot, rng: np.random.Generator, margin: float = 0.002) -> Scene:
+    """Solids of each kind around an arm, a mesh that is not convex and a half-space below it among them."""
+    reach = 3.0 if "planar" in robot.name else 0.9
+    solids = [Box([0.2, 0.1, 0.3]), Sphere(0.1), Cylinder(0.05, 0.4), Box([0.3, 0.3, 0.02]), Mesh(DENTED, FACES)]
+    places = [pin.SE3(pin.exp3(rng.normal(size=3)), rng.uniform(-reach, reach, 3)) for _ in solids]
+    found = [
+        Obstacle(f"solid {k}", solid, place, margin=margin)
+        for k, (solid, place) in enumerate(zip(solids, places, strict=True))
+    ]
+    return Scene((*found, Obstacle("floor", HalfSpace([0.1, 0.0, 1.0], -1.1), pin.SE3.Identity())))
 
 
-def planned(arm: str, family: str, seed: int) -> Judged:
-    """The path of one planner, by turns, in a generated scene with thin obstacles."""
-    problem = thin_problem(arm, family, seed)
-    if problem is None:
-        return Judged(found=False)
-    found = rrtik.plan(problem, PLANNERS[seed % len(PLANNERS)], seed=seed)
-    if found.path is None or found.path.proof is None:
-        return Judged(found=False)
-    cut = deepest_cut(problem.world, found.path)
-    return Judged(True, bool(found.proven), found.path.proof.clearance, cut, found.path.length)
-
-
-def shortened(arm: str, family: str, seed: int, method: ShorteningMethod) -> Judged:
-    """A path shortened by one method, and as it was done before there were proofs: densely checked, no clearance."""
-    problem = thin_problem(arm, family, seed)
-    single = METHODS[method].moves_only
-    raw = None if problem is None else rrtik.plan(problem, "bicrdt" if single else "fastrrtconnect", seed=seed).path
-    if problem is None or raw is None or len(raw.waypoints) < 3:
-        return Judged(found=False)
-    short = rrtik.shorten(raw, problem, method=method, seed=seed)
-    dense = densely_checked(problem)
-    old = raw.with_waypoints(METHODS[method].run(raw.waypoints, Task(dense.world, seed=seed, clearance=0.0), dense))
-    proof = short.proof
-    return Judged(
-        found=True,
-        proven=proof is not None and proof.proven,
-        clearance=0.0 if proof is None else proof.clearance,
-        cut=deepest_cut(problem.world, short),
-        length=short.length,
-        before=old.length,
-        cut_before=deepest_cut(problem.world, old),
-    )
-
-
-def planted(arm: str, seed: int) -> tuple[int, int, int]:
-    """Thin obstacles that a motion touches and discrete checks step over: planted so, found by proofs, both ways."""
-    robot, rng = rrtik.load_robot(arm), np.random.default_rng([11, seed])
-    bare, low, high = World(robot), *(np.clip(end, -3.0, 3.0) for end in (robot.lower, robot.upper))
-    bodies = [body for body in link_bodies(robot) if body.joint > 0]
-    tried = found = back = 0
-    for _ in range(200):
-        a = rng.uniform(low, high)
-        b = np.clip(a + rng.normal(0.0, 0.5, robot.dof), low, high)
-        thin = _thin_at(robot, bodies, a, b, rng)
-        if thin is None or not bare.motion_proven(a, b):
-            continue
-        world = World(robot, Scene((thin,)))
-        if not world.motion_valid(a, b) or _free_when_fine(world, a, b):
-            continue  # seen by the discrete check, or not touched at all
-        tried += 1
-        found += not world.motion_proven(a, b)
-        back += not world.motion_proven(b, a)
-        if tried == 20:
+def random_path(world: World, rng: np.random.Generator, clearance: float) -> JointPath | None:
+    """A path through random configurations, each motion proven to keep a clearance [m]; None if none is found soon."""
+    robot = world.robot
+    lower, upper = robot.finite_range()
+    drawn = rng.uniform(lower, upper, (200, robot.dof))
+    free = drawn[world.motions_proven(drawn, drawn, clearance=clearance)]
+    route = list(free[:1])
+    for _ in range(10):
+        if not route or len(route) == WAYPOINTS:
             break
-    return tried, found, back
+        size = STEP * rng.uniform(0.05, 1.0, (50, 1)) / np.sqrt(robot.dof)
+        ahead = np.clip(route[-1] + rng.normal(0.0, 1.0, (50, robot.dof)) * size, lower, upper)
+        tails = np.repeat(route[-1][None], len(ahead), axis=0)
+        route += list(ahead[world.motions_proven(tails, ahead, clearance=clearance)][:1])
+    return JointPath.of(robot, np.array(route)) if len(route) == WAYPOINTS else None
 
 
-def _free_when_fine(world: World, a: Vector, b: Vector) -> bool:
-    shares = np.linspace(0.0, 1.0, 20_001)[:, None]
-    return bool(world.valid_batch((1.0 - shares) * a + shares * b).all())
+def random_cases(robot: Robot, seed: int, clearance: float = 0.001) -> Iterator[Case]:
+    """Paths in ever new scenes, without end."""
+    rng = np.random.default_rng(seed)
+    while True:
+        world = World(robot, random_scene(robot, rng))
+        for _ in range(5):
+            path = random_path(world, rng, clearance)
+            found = None if path is None else certificate_of(world, path, clearance)
+            if path is not None and found is not None:
+                yield Case(world, path, found)
 
 
-def _thin_at(robot: Robot, bodies: list[Body], a: Vector, b: Vector, rng: np.random.Generator) -> Obstacle | None:
-    """A needle or an edge of a plate that a corner of a link touches somewhere on a motion, with its very end."""
-    body = bodies[int(rng.integers(len(bodies)))]
-    corners = _corners(body.geometry)
-    if corners is None:
-        return None
-    frame = pin.SE3(robot.joint_frames((a + rng.uniform(0.2, 0.8) * (b - a))[None])[0, body.joint]) * body.placement
-    points = corners @ frame.rotation.T + frame.translation
-    away = rng.normal(size=3)
-    away /= np.linalg.norm(away)
-    end = points[(points @ away).argmax()]
-    across = np.linalg.svd(away[None])[2][1:]
-    turn = np.column_stack([across[0], away, across[1]])
-    turn[:, 0] *= np.sign(np.linalg.det(turn))
-    depth = rng.uniform(2e-5, 3e-4)
-    if rng.random() < 0.5:
-        return Obstacle("needle", Cylinder(NEEDLE, 0.2), pin.SE3(turn, end + (NEEDLE - depth) * away))
-    return Obstacle("plate", Box([0.1, 0.02, PLATE]), pin.SE3(turn, end + (0.01 - depth) * away))
-
-
-def _corners(geometry: coal.CollisionGeometry) -> NDArray[np.float64] | None:
-    """Points of a geometry's surface, among them its farthest in every direction; None for round ones."""
-    if isinstance(geometry, coal.BVHModelBase):
-        return np.array(geometry.vertices())
-    if isinstance(geometry, coal.ConvexBase):
-        return np.array(geometry.points()).reshape(-1, 3)
-    if isinstance(geometry, coal.Box):
-        return np.array(np.meshgrid(*((-h, h) for h in geometry.halfSide))).reshape(3, -1).T
-    return None
-
-
-def benchmark_problem(file: str, urdf: str) -> Timed:
-    """One MotionBenchMaker problem: plan() with proofs, kernels warm."""
-    problem = load_motion_bench_maker(Path(file), robot=_robot(urdf))
-    problem.world.prove(np.array([problem.start, problem.start]))  # packs the table, as the first call of a user does
-    spent = 0.0
-
-    def timed(*arguments: Any, **options: Any) -> Attempt:
-        nonlocal spent
-        begin = process_time()
-        try:
-            return attempt(*arguments, **options)
-        finally:
-            spent += process_time() - begin
-
-    with patch("rrtik_ompl.planning.search.attempt", timed):
-        begin = process_time()
-        found = rrtik.plan(problem, "fastrrtconnect", seed=1)
-        whole = process_time() - begin
-    first = rrtik.plan(problem, "fastrrtconnect", seed=1, proof="off").path
-    assert first is not None
-    assert found.path is not None
-    proof = _seconds(problem.world, first.waypoints, 5)
-    begin = process_time()
-    for a, b in pairwise(first.waypoints):
-        problem.world.certify(_dense(problem.world, a, b))
-    return Timed(bool(found.proven), whole, whole - spent, proof, process_time() - begin)
-
-
-_robots: dict[str, Robot] = {}
-
-
-def _robot(urdf: str) -> Robot:
-    if urdf not in _robots:
-        _robots[urdf] = rrtik.load_robot(Path(urdf))
-    return _robots[urdf]
-
-
-def _seconds(world: World, rows: Matrix, repeats: int) -> float:
-    world.prove(rows)
-    begin = process_time()
-    for _ in range(repeats):
-        world.prove(rows)
-    return (process_time() - begin) / repeats
-
-
-def _dense(world: World, a: Vector, b: Vector) -> Matrix:
-    count = max(world.steps(a, b, 0.5 * world.motion_resolution), 1)
-    shares = np.linspace(0.0, 1.0, count + 1)[:, None]
-    rows: Matrix = (1.0 - shares) * a + shares * b
-    return rows
-
-
-def batch_ratio(file: str, urdf: str) -> tuple[float, float, float]:
-    """Free motions of 1 rad: processor time of discrete checks and of proofs [s each], and the share proven."""
-    problem = load_motion_bench_maker(Path(file), robot=_robot(urdf))
-    world, rng = problem.world, np.random.default_rng(0)
-    low, high = problem.robot.finite_range()
-    A = rng.uniform(low, high, (20_000, problem.robot.dof))
-    A = A[world.valid_batch(A)][:3000]
-    ways = rng.normal(size=A.shape)
-    B = np.clip(A + ways / np.linalg.norm(ways, axis=1, keepdims=True), low, high)
-    free = world.motion_valid_batch(A, B)
-    A, B = A[free], B[free]
-    world.motions_proven(A, B)
-    begin = process_time()
-    world.motion_valid_batch(A, B)
-    middle = process_time()
-    proven = world.motions_proven(A, B)
-    return (middle - begin) / len(A), (process_time() - middle) / len(A), float(proven.mean())
+def inner_point(world: World, q: Vector, rng: np.random.Generator) -> Vector:
+    """A point inside a moving link at a configuration, shape (3,)."""
+    moving = [body for body in world.bodies if body.joint > 0 and convex_solids(body.geometry).around]
+    body = moving[int(rng.integers(len(moving)))]
+    solid = convex_solids(body.geometry).around[0]
+    frame: Matrix = world.robot.joint_frames(q[None])[0][body.joint] @ body.placement.homogeneous
+    return np.asarray(frame[:3, :3] @ solid.corners.mean(axis=0) + frame[:3, 3])

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.proofs.cases import Judged, Timed, batch_ratio, benchmark_problem, planned, planted, shortened
+from bench.proofs.measurements import Judged, Timed, batch_ratio, benchmark_problem, planned, planted, shortened
 from bench.shared.parts import Parts, add_options
 from rrtik_bench.report.machine import processes, processor
 from rrtik_bench.report.page import Report

@@ -70,12 +70,18 @@ def _options(
     del version
 
 
-def check(problem: ProblemName, path: PathFile = None) -> int:
+def check(
+    problem: ProblemName,
+    path: PathFile = None,
+    proof: Annotated[Path | None, typer.Option(help="Verify this certificate of the path, and nothing else.")] = None,
+) -> int:
     """Check a problem, and a path for it.
 
     Motions are proven free for their whole length; where that cannot be done they are checked densely. Exit code 1 if
-    the path is not valid.
+    the path is not valid, or if the certificate does not hold.
     """
+    if proof is not None and path is None:
+        raise typer.BadParameter("'--proof' needs the path that the certificate is for.")
     from rrtik_ompl import JointGoal, load_path, load_problem
     from rrtik_ompl.world.clearance_curve import clearance_along
     from rrtik_ompl.world.route_check import how_checked
@@ -83,6 +89,12 @@ def check(problem: ProblemName, path: PathFile = None) -> int:
     question = load_problem(problem)
     world = question.world
     route = None if path is None else load_path(path, world.robot)
+    if route is not None and proof is not None:
+        from rrtik_ompl.cli.proofs import certified
+
+        line, holds = certified(question, route, proof)
+        say(line)
+        return FOUND if holds else NOT_FOUND
     kept = " beyond the margins" if any(obstacle.margin for obstacle in world.scene.obstacles) else ""
     say(f"{question.name}: start is free, clearance {_millimetres(world.clearance(question.start))}{kept}")
     if isinstance(question.goal, JointGoal):

@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args
 import typer
 
 from rrtik_ompl.choices import CommandShortening, ProofMode, ShorteningMethod, one_of
-from rrtik_ompl.cli.terminal import progress, say
+from rrtik_ompl.cli.terminal import note, progress, say
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
@@ -72,14 +72,17 @@ def plan(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Save the path: .json, .csv or .txt (OMPL matrix).")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")] = None,
+    certificate: Annotated[Path | None, typer.Option(help="Write what proves the path free: .json.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> int:
     """Find a path and print its moves.
 
-    One that moves several joints at once is printed as waypoints. Exit code 1 if no path was found.
+    One that moves several joints at once is printed as waypoints. Exit code 1 if no path was found, or if a certificate
+    was asked for and the path is not proven free.
     """
     check_target(out, PATH_FORMATS)
     check_target(html, (".html", ".htm"))
+    check_target(certificate, (".json",))
     from rrtik_ompl import load_problem
     from rrtik_ompl.catalog import default_planner
     from rrtik_ompl.cli import plan_report as report
@@ -96,21 +99,34 @@ def plan(
     with progress("shortening"):
         rules = {name: value for name, value in options.items() if name in RULES}
         path, shorten_seconds = _shortened(found.path, question, shorten, found.seed, rules, clearance)
-    if path is not None and out is not None:
-        path.save(out)
-    if path is not None and html is not None:
-        from rrtik_ompl.viewer import view
-
-        with progress("drawing"):
-            view(question, path, html=html, before=None if path is found.path else found.path)
+    lack = "" if path is None else _write(question, path, found.path, out, html, certificate)
     if as_json:
         print(json.dumps(report.document(question, found, path, shorten_seconds)))
     else:
         say(*report.summary(question, found, path, shorten_seconds))
         if path is not None:
             say(report.moves_table(path) if path.one_joint_at_a_time else report.waypoints_table(path))
-        say(*(f"wrote {file}" for file in (out, html) if path is not None and file is not None))
-    return 0 if found.found else 1
+        written = (out, html, None if lack else certificate)
+        say(*(f"wrote {file}" for file in written if path is not None and file is not None))
+    if lack:
+        note(lack)
+    return 0 if found.found and not lack else 1
+
+
+def _write(problem: Any, path: Any, raw: Any, out: Path | None, html: Path | None, certificate: Path | None) -> str:
+    """Write the files that were asked for; returns why there is no certificate, "" if nothing is missing."""
+    if out is not None:
+        path.save(out)
+    if html is not None:
+        from rrtik_ompl.viewer import view
+
+        with progress("drawing"):
+            view(problem, path, html=html, before=None if path is raw else raw)
+    if certificate is None:
+        return ""
+    from rrtik_ompl.cli.proofs import write_certificate
+
+    return write_certificate(problem, path, certificate)
 
 
 def _shortened(

@@ -7,13 +7,18 @@ planners use, and nothing else: their forward kinematics are their own, in float
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.digests import world_digest
 from rrtik_ompl.fast.proof.layout import ProofTable
+from rrtik_ompl.fast.proof.log import ProofLog, logged
 from rrtik_ompl.fast.proof.packing import ProofPairs, proof_pairs
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.tables.solid_tables import convex_solids
@@ -22,6 +27,7 @@ from rrtik_ompl.world.arm_cache import Pairs, strokes
 
 LARGEST_VALUE = 1e3  # [rad] or [m] of a joint, up to which rounding is bounded
 PROOF_KERNELS = "proof.proof_kernels"
+SPARE = 1e-10  # [m] that a proof which is written down keeps beyond ROOM: who verifies it rounds in other places
 MOTIONS_AT_ONCE = 64  # between two looks at the clock
 PROVEN, NOT_LOOKED_AT = -1, -2  # in the place of a pair's number
 DOUBLE, INT = 8, 4  # bytes of a number
@@ -61,6 +67,15 @@ class Proof:
     motions: int
     clearance: float
     unproven: tuple[Gap, ...]
+    _digest: Callable[[], str] = field(default=str, repr=False, compare=False)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Proof, (self.motions, self.clearance, self.unproven, partial(str, self.digest))
+
+    @property
+    def digest(self) -> str:
+        """Of the robot's and the scene's geometry that the motions are proven for: 32 digits in hexadecimal."""
+        return self._digest()
 
     @property
     def proven(self) -> bool:
@@ -79,6 +94,7 @@ class Prover:
         finite = bool(np.isfinite(ends).all())
         self._bounded = finite and bool((np.abs(robot.joint_values(ends)) < 0.5 * LARGEST_VALUE).all())
         self._packed: ProofPairs | None = None
+        self._digest = partial(world_digest, robot, bodies, pairs)
 
     def route(self, rows: Matrix, *, clearance: float = 0.0, slack: float = 0.0, seconds: float | None = None) -> Proof:
         """Prove the motions between waypoints, shape (k, dof).
@@ -93,7 +109,21 @@ class Prover:
         sound = self._sound(rows, values)
         between = None if sound is None else sound[:-1] & sound[1:]
         gaps = self._gaps(values, values[1:], between, (clearance, slack), seconds) if count else []
-        return Proof(count, clearance, tuple(gaps))
+        return Proof(count, clearance, tuple(gaps), self._digest)
+
+    def logged(self, rows: Matrix, *, clearance: float = 0.0) -> list[ProofLog] | None:
+        """By what each motion between waypoints, shape (k, dof), is proven; None if one of them is not."""
+        values, kernels = self._joint_values(rows), library(PROOF_KERNELS)
+        if kernels is None or not self.route(rows, clearance=clearance).proven:
+            return None
+        packed, told = self._packed_for(clearance, SPARE), []
+        pair, place = np.zeros(1, dtype=np.int32), np.zeros(1)
+        for k in range(len(rows) - 1):
+            at = (values[k].ctypes.data, values[k + 1].ctypes.data, 1, pair.ctypes.data, place.ctypes.data)
+            told.append(logged(packed, partial(kernels.prove, ProofTable(packed.table.address), *at)))
+            if pair[0] != PROVEN:
+                return None
+        return told
 
     def proven(self, starts: Matrix, ends: Matrix, *, clearance: float = 0.0) -> Mask:
         """Which of the motions starts[k] -> ends[k], shapes (m, dof), are proven free. Shape (m,)."""

@@ -36,6 +36,10 @@ seen_of: Callable[[ProofTable], int] = field_reader(layout.SEEN)
 top_count_of: Callable[[ProofTable], int] = field_reader(layout.TOP_COUNT)
 top_pairs_of: Callable[[ProofTable], int] = field_reader(layout.TOP_PAIRS)
 last_stamp_of: Callable[[ProofTable], int] = field_reader(layout.LAST_STAMP)
+log_room_of: Callable[[ProofTable], int] = field_reader(layout.LOG_ROOM)
+log_of: Callable[[ProofTable], int] = field_reader(layout.LOG)
+log_ways_of: Callable[[ProofTable], int] = field_reader(layout.LOG_WAYS)
+log_count_of: Callable[[ProofTable], int] = field_reader(layout.LOG_COUNT)
 
 # Function (array, number) that reads one number of a record.
 frame_of_solid: Callable[[int, int], int] = int_column(layout.SOLID_SIZE, layout.SOLID_FRAME)

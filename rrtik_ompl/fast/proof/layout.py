@@ -19,6 +19,10 @@ SWEEP_COUNT, SWEEPS, REACHES, BODY_PAIR_COUNT, PAIR_COUNT, PAIRS, MARGINS = rang
 FRAMES, STAMPS, BENDS, WAYS, LISTS, COUNTS, STACK, SEEN, LAST_STAMP = range(14, 23)
 # TOP_COUNT, TOP_PAIRS: numbers of the pairs to begin with, groups of bodies before their bodies (int32)
 TOP_COUNT, TOP_PAIRS = range(23, 25)
+# What a proof tells of itself. LOG_ROOM: records that there is room for, 0 for a proof that tells nothing · LOG:
+# records of int32 · LOG_WAYS: of each the unit normal of its plane, seen from the base of its pair, or zeros ·
+# LOG_COUNT: one int32, counts records, also those for which there was no room
+LOG_ROOM, LOG, LOG_WAYS, LOG_COUNT = range(25, 29)
 
 # Joint (doubles): rotation of its placement row by row, origin, axis.
 JOINT_SIZE = 15
@@ -40,6 +44,10 @@ SWEEP_FRAME, SWEEP_BASE = range(2)
 # parts from, to.
 PAIR_SIZE = 7
 PAIR_ONE, PAIR_OTHER, PAIR_BASE, ONE_SWEEP, OTHER_SWEEP, PARTS_FIRST, PARTS_END = range(7)
+# Record of the log (ints): pair, level and number of an interval on which it is proven apart, by what.
+LOG_SIZE = 4
+LOG_PAIR, LOG_LEVEL, LOG_NUMBER, LOG_MEANS = range(4)
+OPEN, BY_BALL, BY_PLANE = range(3)  # not proven; by a ball and a ball or box; by a plane
 
 DEEPEST = 9  # an interval of a motion is 1 / 2**DEEPEST of it at least
 NODES = (1 << DEEPEST) + 1

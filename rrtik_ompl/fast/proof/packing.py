@@ -32,24 +32,26 @@ class ProofPairs:
     Attributes:
         table: For the kernels.
         bodies: Numbers of the two bodies of each of the table's pairs, shape (n, 2).
+        sides: The same pairs as the kernels have them: body above the plane, its part, body below, its part, shape
+            (n, 4); part -1 is a body of several parts as a whole.
         margins: How far each must stay apart [m], shape (n,).
         beside_obstacle: Which pairs are of what moves and an obstacle, shape (n,).
-        clearance: What the kernels keep now from obstacles beside the margins [m]; nan before the first :meth:`keep`.
-        slack: What they keep now between all bodies beside that [m].
+        kept: What the kernels keep now beside the margins [m]: a clearance from obstacles, nan before the first
+            :meth:`keep`, and what they keep between all bodies for rounding and slack.
     """
 
     table: Table
     bodies: NDArray[np.int64]
+    sides: NDArray[np.int64]
     margins: Vector
     beside_obstacle: NDArray[np.bool_]
-    clearance: float = float("nan")
-    slack: float = 0.0
+    kept: tuple[float, float] = (float("nan"), ROOM)
 
-    def keep(self, clearance: float, slack: float) -> None:
+    def keep(self, clearance: float, slack: float = 0.0) -> None:
         """Let the kernels keep a clearance from obstacles beside the margins, and a slack between all bodies [m]."""
-        if (clearance, slack) != (self.clearance, self.slack):
-            self.table[layout.MARGINS][:] = self.margins + ROOM + slack + clearance * self.beside_obstacle
-            self.clearance, self.slack = clearance, slack
+        if (clearance, ROOM + slack) != self.kept:
+            self.kept = clearance, ROOM + slack
+            self.table[layout.MARGINS][:] = self.margins + self.kept[1] + clearance * self.beside_obstacle
 
 
 def proof_pairs(
@@ -90,22 +92,25 @@ def proof_pairs(
         if split:
             firsts = [ends[k] + (len(parts[k]) > 1) for k in (one, other)]
             of_parts += [
-                (firsts[0] + a, firsts[1] + b, base, *own, 0, 0, i, j)
+                (firsts[0] + a, firsts[1] + b, base, *own, 0, 0, one, a, other, b)
                 for a in range(len(parts[one]))
                 for b in range(len(parts[other]))
             ]
-        whole.append((ends[one], ends[other], base, *own, first, len(of_parts), i, j))
+        numbers = [-1 if len(parts[k]) > 1 else 0 for k in (one, other)]
+        span = (first, len(of_parts))
+        whole.append((ends[one], ends[other], base, *own, *span, one, numbers[0], other, numbers[1]))
     of_groups, first = [], -len(whole)
     for number, (members, still) in enumerate(groups):
         sweep = sweeps.setdefault((members, 0), len(sweeps))
         parted = (first, first + len(members))
-        of_groups.append((ends[-1] + number, ends[still], 0, sweep, -1, *parted, members[0], still))
+        of_groups.append((ends[-1] + number, ends[still], 0, sweep, -1, *parted, members[0], -1, still, -1))
         first += len(members)
-    rows = np.array([*whole, *of_parts, *of_groups], dtype=np.int64).reshape(-1, layout.PAIR_SIZE + 2)
+    rows = np.array([*whole, *of_parts, *of_groups], dtype=np.int64).reshape(-1, layout.PAIR_SIZE + 4)
     split_rows = np.r_[: len(whole), len(whole) + len(of_parts) : len(rows)]
     rows[split_rows, layout.PARTS_FIRST : layout.PARTS_END + 1] += len(whole)
     top = [*range(len(whole) + len(of_parts), len(rows)), *range(len(grouped), len(whole))]
-    named = rows[:, layout.PAIR_SIZE :]
+    sides = rows[:, layout.PAIR_SIZE :]
+    named = np.sort(sides[:, ::2], axis=1)
     packed = _solid_arrays(bodies, parts, [members for members, _ in groups])
     made = table(
         {
@@ -132,11 +137,15 @@ def proof_pairs(
             layout.LAST_STAMP: np.zeros(1, dtype=np.int32),
             layout.TOP_COUNT: len(top),
             layout.TOP_PAIRS: np.array(top, dtype=np.int32),
+            layout.LOG_ROOM: 0,
+            layout.LOG: np.zeros(0, dtype=np.int32),
+            layout.LOG_WAYS: np.zeros(0),
+            layout.LOG_COUNT: np.zeros(1, dtype=np.int32),
         }
     )
     margins = np.array([kept_apart(bodies[i], bodies[j]) for i, j in named], dtype=np.float64)
     obstacles = np.array([body.kind == "obstacle" for body in bodies], dtype=bool)
-    return ProofPairs(made, named, margins, obstacles[named[:, 0]] | obstacles[named[:, 1]])
+    return ProofPairs(made, named, sides, margins, obstacles[named[:, 0]] | obstacles[named[:, 1]])
 
 
 def _groups(

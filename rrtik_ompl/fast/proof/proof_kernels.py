@@ -16,6 +16,7 @@ from rrtik_ompl.fast.proof import layout
 from rrtik_ompl.fast.proof.accessors import (
     base_of_pair,
     bends_of,
+    body_pair_count_of,
     counts_of,
     end_part_of,
     first_part_of,
@@ -25,6 +26,10 @@ from rrtik_ompl.fast.proof.accessors import (
     kind_of_solid,
     last_stamp_of,
     lists_of,
+    log_count_of,
+    log_of,
+    log_room_of,
+    log_ways_of,
     margins_of,
     node_frames,
     one_of_pair,
@@ -35,6 +40,7 @@ from rrtik_ompl.fast.proof.accessors import (
     pairs_of,
     seen_of,
     size_at,
+    sizes_at,
     solids_of,
     stack_of,
     stamps_of,
@@ -51,6 +57,7 @@ from rrtik_ompl.fast.simd.lanes import double_at, int_at, set_double, set_int
 
 EAGER = 0.9  # of a ball's radius: bodies that are nearer than the sagitta less this are split at once, not compared
 NARROW = 0.01  # width of an interval from which on they are compared nevertheless
+STILL = 2  # level at which what does not move is given up: by then groups of bodies have been taken apart
 PATIENT = 0.1  # width of an interval down to which whole bodies are kept together, if only the sagitta is in the way
 FORGET = 1 << 30  # stamps, after which they begin anew
 
@@ -106,32 +113,62 @@ def placed(table: ProofTable, pair: int, begin: int, end: int) -> Any:
 
 
 @kernel
-def apart(table: ProofTable, pair: int, begin: int, end: int, width: float) -> bool:
-    """Whether a pair is proven apart on an interval, whose ends' frames are given."""
+def apart(table: ProofTable, pair: int, begin: int, end: int, width: float) -> int:
+    """By what a pair is proven apart on an interval, whose ends' frames are given; ``OPEN`` (0) if it is not."""
     pairs, solids, ways = pairs_of(table), solids_of(table), ways_of(table)
     one, other = one_of_pair(pairs, pair), other_of_pair(pairs, pair)
     mine, others = kind_of_solid(solids, one), kind_of_solid(solids, other)
     if mine == layout.UNKNOWN or others == layout.UNKNOWN:
-        return False
-    wanted = double_at(margins_of(table), pair) + sagitta(table, one_sweep_of(pairs, pair), width)
+        return layout.OPEN
+    kept = double_at(margins_of(table), pair)
+    wanted = kept + sagitta(table, one_sweep_of(pairs, pair), width)
     wanted += sagitta(table, other_sweep_of(pairs, pair), width)
     seen, places = placed(table, pair, begin, end)
     if others == layout.HALF_SPACE:
-        return mine == layout.CONVEX_SOLID and beyond_half_space(table, one, other, seen, places) > wanted
+        above = mine == layout.CONVEX_SOLID and beyond_half_space(table, one, other, seen, places) > wanted
+        return layout.BY_PLANE if above else layout.OPEN
     gap, way = ball_gap(table, one, other, seen, places)
     if gap > wanted:
-        return True
+        return layout.BY_BALL
     if mine != layout.CONVEX_SOLID or others != layout.CONVEX_SOLID:
-        return False
-    if width > NARROW and gap + EAGER * size_at(table, one, layout.BALL_RADIUS) <= wanted:
-        return False
+        return layout.OPEN
+    if width > NARROW and wanted > kept and gap + EAGER * size_at(table, one, layout.BALL_RADIUS) <= wanted:
+        return layout.OPEN
     last = vector_at(ways, 3 * pair)
     found, normal = best_plane(table, one, other, seen, places, wanted, last if dot(last, last) > 0.0 else way)
     set_double(ways, 3 * pair, normal[0])
     set_double(ways, 3 * pair + 1, normal[1])
     set_double(ways, 3 * pair + 2, normal[2])
-    proven: bool = found > wanted
-    return proven
+    return layout.BY_PLANE if found > wanted else layout.OPEN
+
+
+@kernel
+def log(table: ProofTable, pair: int, level: int, number: int, means: int) -> None:
+    """Tell by what a pair is proven apart on an interval, as far as there is room."""
+    count, solids = int_at(log_count_of(table), 0), solids_of(table)
+    set_int(log_count_of(table), 0, count + 1)
+    if count >= log_room_of(table):
+        return
+    record, to = log_of(table), layout.LOG_SIZE * count
+    set_int(record, to + layout.LOG_PAIR, pair)
+    set_int(record, to + layout.LOG_LEVEL, level)
+    set_int(record, to + layout.LOG_NUMBER, number)
+    set_int(record, to + layout.LOG_MEANS, means)
+    other = other_of_pair(pairs_of(table), pair)
+    way = vector_at(ways_of(table), 3 * pair)
+    if kind_of_solid(solids, other) == layout.HALF_SPACE:
+        way = sizes_at(table, other, layout.DISC_AXIS)
+    for k in range(3):
+        set_double(log_ways_of(table), 3 * count + k, way[k] if means == layout.BY_PLANE else 0.0)
+
+
+@inlined
+def settled(table: ProofTable, pair: int, begin: int, end: int, level: int, number: int) -> bool:
+    """Whether a pair is proven apart on an interval; the log tells by what."""
+    means = apart(table, pair, begin, end, 1.0 / (1 << level))
+    if means != layout.OPEN and log_room_of(table) > 0:
+        log(table, pair, level, number, means)
+    return means != layout.OPEN
 
 
 @kernel
@@ -159,23 +196,25 @@ def settle(table: ProofTable, level: int, number: int) -> int:
     """
     pairs, lists, total, step = pairs_of(table), lists_of(table), pair_count_of(table), (layout.NODES - 1) >> level
     begin, end = node_frames(table, number * step), node_frames(table, number * step + step)
-    width, left, row, next_row = 1.0 / (1 << level), 0, total * level, total * (level + 1)
+    left, row, next_row = 0, total * level, total * (level + 1)
+    telling = log_room_of(table) > 0
     for k in range(int_at(counts_of(table), level)):
         pair = int_at(lists, row + k)
         first, last = first_part_of(pairs, pair), end_part_of(pairs, pair)
-        answer = 0
-        if first == last:
-            answer = 1 if apart(table, pair, begin, end, width) else 0
+        if first == last or telling:
+            if settled(table, pair, begin, end, level, number):
+                continue
+            answer = 0 if first == last else -1
         else:
-            answer = beyond(table, pair, begin, end, width)
-        if answer == 1:
-            continue
+            answer = beyond(table, pair, begin, end, 1.0 / (1 << level))
+            if answer == 1:
+                continue
         if answer == 0:
             set_int(lists, next_row + left, pair)
             left += 1
             continue
         for part in range(first, last):
-            if not apart(table, part, begin, end, width):
+            if not settled(table, part, begin, end, level, number):
                 set_int(lists, next_row + left, part)
                 left += 1
     set_int(counts_of(table), level + 1, left)
@@ -187,14 +226,15 @@ def prove_motion(table: ProofTable, start: int, end: int) -> Any:
     """Prove one motion. Returns a pair that is not proven, -1 if there is none, and where on the motion that is."""
     begin_motion(table, start, end)
     lists, stack, full = lists_of(table), stack_of(table), layout.NODES - 1
-    first = layout.DEEPEST - 2  # what stands still need not be split, but groups of bodies, and bodies into parts
+    moves = False
     for k in range(joint_count_of(table)):
-        if double_at(start, k) != double_at(end, k):
-            first = 0
-    for k in range(top_count_of(table)):
-        set_int(lists, pair_count_of(table) * first + k, int_at(top_pairs_of(table), k))
-    set_int(counts_of(table), first, top_count_of(table))
-    set_int(stack, 0, first)
+        moves |= double_at(start, k) != double_at(end, k)
+    telling = log_room_of(table) > 0  # body by body: who verifies it knows no groups
+    count = body_pair_count_of(table) if telling else top_count_of(table)
+    for k in range(count):
+        set_int(lists, k, k if telling else int_at(top_pairs_of(table), k))
+    set_int(counts_of(table), 0, count)
+    set_int(stack, 0, 0)
     set_int(stack, 1, 0)
     top = 1
     while top > 0:
@@ -205,7 +245,7 @@ def prove_motion(table: ProofTable, start: int, end: int) -> Any:
         visit(table, start, end, number * step + step)
         if settle(table, level, number) == 0:
             continue
-        if level == layout.DEEPEST:
+        if level == layout.DEEPEST or (level == STILL and not moves):
             return int_at(lists, pair_count_of(table) * (level + 1)), (number + 0.5) / (1 << level)
         for half in range(2):
             set_int(stack, 2 * top, level + 1)

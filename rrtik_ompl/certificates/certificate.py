@@ -1,0 +1,172 @@
+"""A certificate: waypoints, what they are proven to keep, and the planes that prove it; written to JSON and read."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix, finite_array, finite_number, frozen, not_negative
+from rrtik_ompl.errors import InputError, in_file
+from rrtik_ompl.files.tables import json_object
+from rrtik_ompl.files.text import known_ending, read_text, write_text
+
+VERSION = 1
+KIND = "path_certificate"
+FIELDS = ("version", "kind", "robot", "robot_digest", "scene_digest", "clearance", "waypoints", "motions")
+DEEPEST = 30  # level of an interval that is read
+WHOLE = 6  # whole numbers of an entry: body, part, body, part, level, number; three numbers of a plane may follow
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionEntries:
+    """By what the pairs of solids are apart in one motion. What has no entry is apart by a ball in all of it.
+
+    Attributes:
+        solids: Body above the plane, its part, body below, its part, shape (n, 4).
+        intervals: Level and number of the interval from number / 2**level to (number + 1) / 2**level, shape (n, 2).
+        normals: Unit normal of the plane seen from the frame that carries both bodies, or zeros if a ball and a ball or
+            box settle it, shape (n, 3).
+    """
+
+    solids: NDArray[np.int64]
+    intervals: NDArray[np.int64]
+    normals: Matrix
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Certificate:
+    """What proves that a path is free, for whoever wants to compute it again.
+
+    Attributes:
+        robot: Name of the robot.
+        robot_digest, scene_digest: Of what it is about, see :mod:`rrtik_ompl.collision.digests`.
+        clearance: What the path keeps from every obstacle beside its margin [m].
+        waypoints: Shape (k, dof), read-only.
+        motions: One for each motion; a path of one waypoint has one that stands still.
+        version: Of the format.
+    """
+
+    robot: str
+    robot_digest: str
+    scene_digest: str
+    clearance: float
+    waypoints: Matrix
+    motions: tuple[MotionEntries, ...]
+    version: int = VERSION
+
+    @property
+    def entries(self) -> int:
+        """How many entries there are in all."""
+        return sum(len(motion.solids) for motion in self.motions)
+
+    def document(self) -> dict[str, Any]:
+        """Plain data for JSON; an entry is a list of six numbers, or of nine with a plane."""
+        motions = []
+        for motion in self.motions:
+            rows = np.column_stack([motion.solids, motion.intervals]).tolist()
+            ways = [way if any(way) else [] for way in motion.normals.tolist()]
+            motions.append([row + way for row, way in zip(rows, ways, strict=True)])
+        heads = {"version": self.version, "kind": KIND, "robot": self.robot}
+        digests = {"robot_digest": self.robot_digest, "scene_digest": self.scene_digest}
+        return (
+            heads
+            | digests
+            | {
+                "clearance": self.clearance,
+                "waypoints": self.waypoints.tolist(),
+                "motions": motions,
+            }
+        )
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the certificate to a JSON file, whole or not at all.
+
+        Raises:
+            InputError: If the ending is another one or the file cannot be written.
+        """
+        known_ending(path, (".json",), "certificate")
+        write_text(path, json.dumps(self.document(), separators=(",", ":")) + "\n")
+
+
+def load_certificate(path: str | os.PathLike[str]) -> Certificate:
+    """Read a certificate.
+
+    Raises:
+        InputError: If the file is missing, too large, or no certificate; the message names the file and the field.
+    """
+    known_ending(path, (".json",), "certificate")
+    text = read_text(path)
+    try:
+        return from_document(json_object(text, KIND, "motions"))
+    except InputError as error:
+        raise in_file(path, error) from None
+
+
+def from_document(document: dict[str, Any]) -> Certificate:
+    """The certificate of plain data, see :meth:`Certificate.document`.
+
+    Raises:
+        InputError: If a field is missing, unknown or of the wrong type or shape; the message names it.
+    """
+    for name in (*FIELDS, *document):
+        if name not in document or name not in FIELDS:
+            raise InputError(f"{name}: " + ("unknown field" if name in document else "missing; every field is needed"))
+    if type(document["version"]) is not int or document["version"] != VERSION:
+        raise InputError(f"version: expected {VERSION}, got {document['version']!r}")
+    for name in ("robot", "robot_digest", "scene_digest"):
+        if not isinstance(document[name], str):
+            raise InputError(f"{name}: expected text")
+    if not _is_number(document["clearance"]):
+        raise InputError("clearance: expected a number")
+    clearance = not_negative(finite_number(document["clearance"], "clearance"), "clearance")
+    waypoints = _waypoints(document["waypoints"])
+    motions, count = document["motions"], max(1, len(waypoints) - 1)
+    if not isinstance(motions, list) or len(motions) != count:
+        raise InputError(f"motions: expected a list of {count}, one for each motion between waypoints")
+    entries = tuple(_entries(motion, f"motions[{k}]") for k, motion in enumerate(motions))
+    names = (document["robot"], document["robot_digest"], document["scene_digest"])
+    return Certificate(*names, clearance, waypoints, entries)
+
+
+def _waypoints(rows: object) -> Matrix:
+    plain = isinstance(rows, list) and all(isinstance(row, list) and all(map(_is_number, row)) for row in rows)
+    if not plain or not rows:
+        raise InputError("waypoints: expected a list of lists of numbers")
+    return frozen(finite_array(rows, (None, None), "waypoints"))  # type: ignore[arg-type]
+
+
+def _entries(rows: object, where: str) -> MotionEntries:
+    if not isinstance(rows, list):
+        raise InputError(f"{where}: expected a list of entries")
+    whole, normals = np.zeros((len(rows), WHOLE), dtype=np.int64), np.zeros((len(rows), 3))
+    for k, row in enumerate(rows):
+        fault = _entry_fault(row)
+        if fault:
+            raise InputError(f"{where}[{k}]: {fault}")
+        whole[k] = row[:WHOLE]
+        if len(row) > WHOLE:
+            normals[k] = finite_array(row[WHOLE:], (3,), f"{where}[{k}]")
+    return MotionEntries(frozen(whole[:, :4], np.int64), frozen(whole[:, 4:], np.int64), frozen(normals))
+
+
+def _entry_fault(row: object) -> str:
+    """What is wrong with an entry; "" if nothing is."""
+    if not isinstance(row, list) or len(row) not in (WHOLE, WHOLE + 3):
+        return "expected a list of 6 whole numbers, or of 6 and the 3 numbers of a plane"
+    if not all(type(number) is int and 0 <= number < 1 << DEEPEST for number in row[:WHOLE]):
+        return "body, part, body, part, level and number must be whole numbers"
+    level, number = row[4:WHOLE]
+    if level > DEEPEST or number >= 1 << level:
+        return f"no interval {number} of level {level}"
+    if not all(map(_is_number, row[WHOLE:])) or (len(row) > WHOLE and not any(row[WHOLE:])):
+        return "the normal of a plane must be three numbers, not all of them 0"
+    return ""
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
