@@ -33,7 +33,7 @@ def test_a_certificate_that_plan_writes_is_verified_in_one_line(files, capsys):
     assert (code, err) == (0, "")
     (line,) = out.splitlines()
     assert line.startswith(f"{files[1]}: holds: ")
-    assert "1 mm kept from obstacles" in line
+    assert "10 mm kept from obstacles" in line
 
 
 def test_a_certificate_that_does_not_hold_is_refused_with_the_fault(files, capsys):
