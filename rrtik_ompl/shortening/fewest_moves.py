@@ -11,6 +11,7 @@ from rrtik_ompl.arrays import TAU, Matrix, Vector, finite_array, positive
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.moves.clearance_levels import Level, clearance_levels
+from rrtik_ompl.moves.fine_grids import FineGrids, rounds_before
 from rrtik_ompl.moves.lattice import MoveLattice
 from rrtik_ompl.moves.lower_bounds import sharper_bound
 from rrtik_ompl.moves.rules import MoveRules
@@ -87,28 +88,44 @@ def fewest_moves(
     kept = MoveRules(world.robot.joint_names) if rules is None else rules
     frozen = [*kept.frozen_joints, *kept.last_joints]
     best, bound, taken = rows, lower_bound(rows[0], rows[-1]), False
-    for level in clearance_levels(world, rows[[0, -1]], clearance):
-        if taken and (transitions(best) == bound or stop()):
-            break
+    levels = clearance_levels(world, rows[[0, -1]], clearance)
+    lower, upper = turning_limits(world.robot, rows)
+    joints = [j for j in range(world.robot.dof) if j not in frozen]
+
+    def improved(level: Level, offered: Matrix) -> MoveSearch:
         search = MoveSearch(
             rows[:1],
             rows[-1:],
-            *turning_limits(world.robot, rows),
+            lower,
+            upper,
             level.proving.motion_valid_batch,
             seed=seed,
             costs=kept.joint_costs,
             frozen=frozen,
             smallest_move=kept.smallest_move,
-            prove=partial(sharper_bound, world, [j for j in range(world.robot.dof) if j not in frozen]),
+            prove=partial(sharper_bound, world, joints),
             all_free=world.motion_valid_batch,
         )
-        if _free(level, best):
-            search.offer(best)
+        if _free(level, offered):
+            search.offer(offered)
         search.try_corner_routes(stop)
-        search.improve(rounds, stop)
+        search.improve(rounds_before(rounds, joints), stop)
+        return search
+
+    for level in levels:
+        if taken and (transitions(best) == bound or stop()):
+            break
+        search = improved(level, best)
         bound = max(bound, search.bound)
         if search.route is not None and transitions(search.route) <= transitions(best) - taken:
             best, taken = search.route, True
+    if transitions(best) > bound and rounds > 0 and not stop():
+        proving = [level.proving.motion_valid_batch for level in levels]
+        grids = FineGrids(joints, lower, upper, kept.joint_costs, kept.smallest_move, world.motion_valid_batch, proving)
+        found = grids.route([(rows[0], rows[-1])], transitions(best), seed, stop)
+        if found is not None:
+            search = improved(levels[found[1]], found[0])
+            best, bound = search.route if search.route is not None else best, max(bound, search.bound)
     return MovesFound(best, transitions(best), bound)
 
 
