@@ -139,7 +139,7 @@ class FewestMoves(OneJointPlanner):
         assert best is not None
         if best.path is None or best.statistics["gap"] == 0 or self.rounds == 0 or ptc():
             return best
-        return self._finer(best, world, levels, starts, goals, checker, ptc)
+        return self._finer(best, levels, starts, goals, checker, ptc)
 
     def _asked(self, starts: Matrix, goals: Matrix, levels: list[Level], number: int, ptc: Stop) -> _Question:
         """The question at a level: with the goals that keep it, at the last level with all of them."""
@@ -150,7 +150,6 @@ class FewestMoves(OneJointPlanner):
     def _finer(
         self,
         best: SearchResult,
-        world: World,
         levels: list[Level],
         starts: Matrix,
         goals: Matrix,
@@ -164,8 +163,7 @@ class FewestMoves(OneJointPlanner):
             *self.bounds(),
             self.options.joint_costs,
             self.options.smallest_move,
-            world.motion_valid_batch,
-            [level.proving.motion_valid_batch for level in levels],
+            levels,
         )
         pairs = [(start, goal) for start in starts for goal in goals]
         found = grids.route(pairs, transitions(best.path), int(self.rng.integers(2**63)), ptc)

@@ -1,8 +1,9 @@
 """Routes with fewer moves on fine grids of all joint values, for arms of which few joints move.
 
 A route that turns back several times has more free values than the lattices of a search hold. Where three joints or
-fewer may move, a grid of all of them is small enough. It is searched without a clearance first, in steps; only where
-that finds fewer moves, each level of clearance is tried.
+fewer may move, a grid of all of them is small enough. Its motions are checked in steps, which is quick; only those of a
+route are proven, and where that fails the grid loses them and is searched again. The search begins without a clearance;
+where that finds fewer moves, the largest clearance is looked for that needs no more.
 """
 
 from __future__ import annotations
@@ -14,13 +15,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.moves.best_route import BestRoute
+from rrtik_ompl.moves.clearance_levels import Level
+from rrtik_ompl.moves.lattice import MoveLattice
+from rrtik_ompl.moves.rules import long_enough
 from rrtik_ompl.moves.values import Values, spread_values, values_of
-from rrtik_ompl.world.motion_queries import BatchedMotionQueries, MotionsFree, OutOfTime, Stop
+from rrtik_ompl.world.motion_queries import BatchedMotionQueries, OutOfTime, Stop
 
 FINE_NODES = (2**15, 2**18)  # of a grid: a twentieth and half of a second in the kernels
 MOST_JOINTS = 3  # that may move
 MOST_PAIRS = 2  # of a start and a goal
+MOST_PROOFS = 16  # of routes of one grid
 FEW_ROUNDS = 2  # of improvement before the grids, which do more in less time
 
 
@@ -39,8 +43,7 @@ class FineGrids:
         upper: Finite limits, shape (n,).
         costs: Cost of each joint's travel, shape (n,).
         smallest_move: No move is shorter, shape (n,).
-        in_steps: Which straight motions are free without a clearance; quick.
-        levels: Which are proven free at each level of clearance, the largest first.
+        levels: Of clearance, the largest first.
     """
 
     joints: Sequence[int]
@@ -48,8 +51,7 @@ class FineGrids:
     upper: Vector
     costs: Vector
     smallest_move: Vector
-    in_steps: MotionsFree
-    levels: Sequence[MotionsFree]
+    levels: Sequence[Level]
 
     def route(
         self, pairs: Sequence[tuple[Vector, Vector]], moves: int, seed: int, stop: Stop
@@ -69,8 +71,7 @@ class FineGrids:
         with suppress(OutOfTime):
             for nodes in FINE_NODES:
                 for start, goal in pairs[:MOST_PAIRS]:
-                    values = self._values(start, goal, nodes, rng)
-                    found = self._kept(values, start, goal, moves, stop)
+                    found = self._kept(self._values(start, goal, nodes, rng), start, goal, moves - 1, stop)
                     if found is not None:
                         best, moves = found, len(found[0]) - 1
         return best
@@ -82,21 +83,32 @@ class FineGrids:
             values[joint] = np.union1d(values[joint], more)
         return values
 
-    def _kept(self, values: Values, start: Vector, goal: Vector, moves: int, stop: Stop) -> tuple[Matrix, int] | None:
-        """The first level of clearance at which a grid has a route with fewer moves, and that route."""
-        if self._on_grid(self.in_steps, values, start, goal, moves, stop) is None:
+    def _kept(self, values: Values, start: Vector, goal: Vector, most: int, stop: Stop) -> tuple[Matrix, int] | None:
+        """The route of a grid with the fewest moves, at most so many, and the largest clearance that it can keep."""
+        last = len(self.levels) - 1
+        route = self._proven(self.levels[last], values, start, goal, most, stop)
+        if route is None:
             return None
-        for number, motions_free in enumerate(self.levels):
-            route = self._on_grid(motions_free, values, start, goal, moves, stop)
-            if route is not None:
-                return route, number
-        return None
+        for number, level in enumerate(self.levels[:last]):
+            roomy = self._proven(level, values, start, goal, len(route) - 1, stop)
+            if roomy is not None:
+                return roomy, number
+        return route, last
 
-    def _on_grid(
-        self, motions_free: MotionsFree, values: Values, start: Vector, goal: Vector, moves: int, stop: Stop
+    def _proven(
+        self, level: Level, values: Values, start: Vector, goal: Vector, most: int, stop: Stop
     ) -> Matrix | None:
-        queries = BatchedMotionQueries(motions_free)
-        queries.stop = stop
-        best = BestRoute(queries, self.costs, range(len(start)), self.smallest_move)
-        best.search(values, start, goal)
-        return best.route if best.moves < moves else None
+        """The route of a grid with the fewest moves, at most so many, that is proven to keep a level."""
+        in_steps = BatchedMotionQueries(level.searched.motion_valid_batch)
+        proving = BatchedMotionQueries(level.proving.motion_valid_batch)
+        in_steps.stop = proving.stop = stop
+        lattice = MoveLattice(values, in_steps, self.costs)
+        for _ in range(MOST_PROOFS):
+            route = lattice.best_route(start, goal, range(len(start)), most)
+            if route is None or not long_enough(route, self.smallest_move):
+                return None
+            if proving(route[:-1], route[1:]).all():
+                return route
+            if lattice.closed_on(route, proving) == 0:
+                return None
+        return None

@@ -6,6 +6,7 @@ Source: the level sets of free runs of [1, ch. 6.3], on values at any distance f
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -47,25 +48,47 @@ class MoveLattice:
         self._places = [self.values[joint] * costs[joint] for joint in self._joints]
         self._open = self._open_segments(motions_free)
 
-    def best_route(self, start: Vector, goal: Vector, order: Sequence[int]) -> Matrix | None:
+    def best_route(self, start: Vector, goal: Vector, order: Sequence[int], most: int | None = None) -> Matrix | None:
         """The route with the fewest moves between two configurations of the lattice, the least travel among those.
 
         Args:
             start: Shape (n,).
             goal: Shape (n,).
             order: All joints; among equal routes the one whose last moves come first here.
+            most: Moves that a route may have; any number if None.
 
         Returns:
-            Shape (moves + 1, n), or None if there is no route.
+            Shape (moves + 1, n), or None if there is no such route.
         """
         end = self._index(goal)
         levels = [np.full(self._shape, np.inf)]
         levels[0][self._index(start)] = 0.0
         while not np.isfinite(levels[-1][end]):
+            if len(levels) - 1 == most:
+                return None
             levels.append(self._after_a_move(levels[-1]))
             if (np.isfinite(levels[-1]) == np.isfinite(levels[-2])).all():
                 return None
         return self._traced(levels, end, [self._joints.index(joint) for joint in order if joint in self._joints])
+
+    def closed_on(self, route: Matrix, motions_free: MotionsFree) -> int:
+        """Check the segments of a route of the lattice anew, and close those that are not free; returns their number.
+
+        Args:
+            route: Shape (k, n).
+            motions_free: Which straight motions are free, for batches of shape (m, n).
+        """
+        places, closed = [np.array(self._index(q)) for q in route], 0
+        for one, other in pairwise(places):
+            axis = int(np.flatnonzero(one != other)[0])
+            low, high = sorted((int(one[axis]), int(other[axis])))
+            line = np.repeat(one[:, None], high - low + 1, axis=1)
+            line[axis] = np.arange(low, high + 1)
+            rows = self._rows(line)
+            hit = np.flatnonzero(~motions_free(rows[:-1], rows[1:]))
+            _line(self._open[axis], tuple(one.tolist()), axis)[low + hit] = False
+            closed += len(hit)
+        return closed
 
     def _open_segments(self, motions_free: MotionsFree) -> list[Mask]:
         """For each axis which motions from one value to the next are free, in the shape of the lattice less one."""

@@ -120,8 +120,7 @@ def fewest_moves(
         if search.route is not None and transitions(search.route) <= transitions(best) - taken:
             best, taken = search.route, True
     if transitions(best) > bound and rounds > 0 and not stop():
-        proving = [level.proving.motion_valid_batch for level in levels]
-        grids = FineGrids(joints, lower, upper, kept.joint_costs, kept.smallest_move, world.motion_valid_batch, proving)
+        grids = FineGrids(joints, lower, upper, kept.joint_costs, kept.smallest_move, levels)
         found = grids.route([(rows[0], rows[-1])], transitions(best), seed, stop)
         if found is not None:
             search = improved(levels[found[1]], found[0])
