@@ -15,6 +15,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.moves.clearance_levels import Level, clearance_levels
 from rrtik_ompl.moves.fine_grids import FineGrids, rounds_before
 from rrtik_ompl.moves.lower_bounds import sharper_bound
+from rrtik_ompl.moves.reach_bound import reach_bound
 from rrtik_ompl.moves.rules import Joints, PerJoint
 from rrtik_ompl.moves.search import MOST_NODES, MoveSearch
 from rrtik_ompl.moves.staircase import one_joint_moves
@@ -23,7 +24,7 @@ from rrtik_ompl.ompl_bridge.motion_checker import WorldChecker
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.shortening import Task
 from rrtik_ompl.shortening.random_cut import shortcut
-from rrtik_ompl.transitions import transitions
+from rrtik_ompl.transitions import merge_moves, transitions
 from rrtik_ompl.world import World
 from rrtik_planners.bicrdt import BiCRDT
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
@@ -156,8 +157,9 @@ class FewestMoves(OneJointPlanner):
         checker: MotionChecker,
         ptc: Stop,
     ) -> SearchResult:
-        """What fine grids add to the best so far."""
+        """A better bound of the best so far, and what fine grids add to it."""
         assert best.path is not None
+        assert isinstance(self._world, World)
         grids = FineGrids(
             self._movable(starts),
             *self.bounds(),
@@ -166,7 +168,12 @@ class FewestMoves(OneJointPlanner):
             levels,
         )
         pairs = [(start, goal) for start in starts for goal in goals]
-        found = grids.route(pairs, transitions(best.path), int(self.rng.integers(2**63)), ptc)
+        bound, seed = int(best.statistics["lower_bound"]), int(self.rng.integers(2**63))
+        if len(starts) == len(goals) == 1:
+            moves = transitions(best.path)
+            bound = max(bound, reach_bound(self._world, self._movable(starts), starts[0], goals[0], moves, ptc))
+            best = replace(best, statistics={**best.statistics, "lower_bound": bound, "gap": moves - bound})
+        found = grids.route(pairs, merge_moves(best.path, tolerance=0.0), bound, seed, ptc)
         if found is None:
             return best
         route, number = found

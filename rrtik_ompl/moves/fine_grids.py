@@ -21,7 +21,11 @@ from rrtik_ompl.moves.rules import long_enough
 from rrtik_ompl.moves.values import Values, spread_values, values_of
 from rrtik_ompl.world.motion_queries import BatchedMotionQueries, OutOfTime, Stop
 
-FINE_NODES = (2**15, 2**18)  # of a grid: a twentieth and half of a second in the kernels
+# Configurations of one grid after the other, and whether their values are near those of the best route. The largest
+# take half a second in the kernels.
+GRIDS = ((2**15, False), (2**18, False), (2**16, True), (2**18, False), (2**16, True))
+MOST_IDLE = 3  # grids in a row without gain
+NEAR = 0.02  # of a joint's range
 MOST_JOINTS = 3  # that may move
 MOST_PAIRS = 2  # of a start and a goal
 MOST_PROOFS = 16  # of routes of one grid
@@ -54,13 +58,14 @@ class FineGrids:
     levels: Sequence[Level]
 
     def route(
-        self, pairs: Sequence[tuple[Vector, Vector]], moves: int, seed: int, stop: Stop
+        self, pairs: Sequence[tuple[Vector, Vector]], known: Matrix, least: int, seed: int, stop: Stop
     ) -> tuple[Matrix, int] | None:
         """A route with fewer moves than known, and the number of the level that it keeps, or None.
 
         Args:
             pairs: Of a start and a goal, shapes (n,), that agree in the joints that must not move.
-            moves: The fewest that are known.
+            known: The best route so far, shape (k, n), every edge of which is a move.
+            least: No route has fewer moves.
             seed: Of the places of the grids.
             stop: True ends the search; the best so far is returned.
         """
@@ -69,19 +74,38 @@ class FineGrids:
             return best
         rng = np.random.default_rng(seed)
         with suppress(OutOfTime):
-            for nodes in FINE_NODES:
+            idle = 0
+            for nodes, near in GRIDS:
+                idle += 1
                 for start, goal in pairs[:MOST_PAIRS]:
-                    found = self._kept(self._values(start, goal, nodes, rng), start, goal, moves - 1, stop)
+                    if len(known) - 1 <= least or idle > MOST_IDLE:
+                        return best
+                    values = self._values_near(known, nodes, rng) if near else self._values(start, goal, nodes, rng)
+                    ends = (known[0], known[-1]) if near else (start, goal)
+                    found = self._kept(values, *ends, len(known) - 2, stop)
                     if found is not None:
-                        best, moves = found, len(found[0]) - 1
+                        best, known, idle = found, found[0], 0
         return best
 
     def _values(self, start: Vector, goal: Vector, nodes: int, rng: np.random.Generator) -> Values:
-        values, each = values_of(np.array([start, goal])), int(nodes ** (1.0 / len(self.joints)))
+        """As many values of each joint as a grid of so many configurations has, at equal distances."""
+        values, each = values_of(np.array([start, goal])), self._each(nodes)
         for joint in self.joints:
             more = spread_values(float(self.lower[joint]), float(self.upper[joint]), each, rng)
             values[joint] = np.union1d(values[joint], more)
         return values
+
+    def _values_near(self, route: Matrix, nodes: int, rng: np.random.Generator) -> Values:
+        """The values of a route, and as many close to each as a grid of so many configurations has."""
+        values, each = values_of(route), self._each(nodes)
+        for joint in self.joints:
+            own, (low, high) = values[joint], (float(self.lower[joint]), float(self.upper[joint]))
+            aside = NEAR * (high - low) * spread_values(-1.0, 1.0, max(each // len(own), 1), rng)
+            values[joint] = np.union1d(own, np.clip(np.add.outer(own, aside).ravel(), low, high))
+        return values
+
+    def _each(self, nodes: int) -> int:
+        return int(nodes ** (1.0 / len(self.joints)))
 
     def _kept(self, values: Values, start: Vector, goal: Vector, most: int, stop: Stop) -> tuple[Matrix, int] | None:
         """The route of a grid with the fewest moves, at most so many, and the largest clearance that it can keep."""

@@ -14,11 +14,12 @@ from rrtik_ompl.moves.clearance_levels import Level, clearance_levels
 from rrtik_ompl.moves.fine_grids import FineGrids, rounds_before
 from rrtik_ompl.moves.lattice import MoveLattice
 from rrtik_ompl.moves.lower_bounds import sharper_bound
+from rrtik_ompl.moves.reach_bound import reach_bound
 from rrtik_ompl.moves.rules import MoveRules
 from rrtik_ompl.moves.search import MoveSearch
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.transitions import lower_bound, single_joint, transitions
+from rrtik_ompl.transitions import lower_bound, merge_moves, single_joint, transitions
 from rrtik_ompl.world import World
 from rrtik_ompl.world.motion_queries import Stop, no_stop
 
@@ -121,7 +122,9 @@ def fewest_moves(
             best, taken = search.route, True
     if transitions(best) > bound and rounds > 0 and not stop():
         grids = FineGrids(joints, lower, upper, kept.joint_costs, kept.smallest_move, levels)
-        found = grids.route([(rows[0], rows[-1])], transitions(best), seed, stop)
+        bound = max(bound, reach_bound(world, joints, rows[0], rows[-1], transitions(best), stop))
+        known = merge_moves(best, tolerance=0.0)
+        found = grids.route([(rows[0], rows[-1])], known, bound, seed, stop)
         if found is not None:
             search = improved(levels[found[1]], found[0])
             best, bound = search.route if search.route is not None else best, max(bound, search.bound)
