@@ -13,7 +13,9 @@ from ompl import base as ob
 from rrtik_ompl.arrays import Matrix, not_negative, whole_number
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.moves.clearance_levels import Level, clearance_levels
+from rrtik_ompl.moves.fine_grids import FineGrids, rounds_before
 from rrtik_ompl.moves.lower_bounds import sharper_bound
+from rrtik_ompl.moves.reach_bound import reach_bound
 from rrtik_ompl.moves.rules import Joints, PerJoint
 from rrtik_ompl.moves.search import MOST_NODES, MoveSearch
 from rrtik_ompl.moves.staircase import one_joint_moves
@@ -22,7 +24,7 @@ from rrtik_ompl.ompl_bridge.motion_checker import WorldChecker
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.shortening import Task
 from rrtik_ompl.shortening.random_cut import shortcut
-from rrtik_ompl.transitions import transitions
+from rrtik_ompl.transitions import merge_moves, transitions
 from rrtik_ompl.world import World
 from rrtik_planners.bicrdt import BiCRDT
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
@@ -42,6 +44,7 @@ class _Question(NamedTuple):
     checker: MotionChecker
     stop: Stop
     level: Level | None = None
+    known: Matrix | None = None  # a route that keeps the level, to start from instead of quick ones
 
     @property
     def ends(self) -> tuple[Matrix, Matrix, MotionChecker, Stop]:
@@ -54,7 +57,8 @@ class FewestMoves(OneJointPlanner):
 
     It starts from the best of several quick runs of BiCRDT and looks for better routes on lattices of joint values.
     Where BiCRDT hardly gets anywhere it starts from RRT-Connect's route, turned into single-joint moves.
-    ``statistics`` has the lower bound of the moves and the gap: how many moves more than that the path has.
+    ``statistics`` has the lower bound of the moves and the gap: how many moves more than that the path has. Where more
+    than 12 joints differ, the bound is their number.
 
     It keeps a clearance from obstacles where that costs no move.
     """
@@ -125,24 +129,65 @@ class FewestMoves(OneJointPlanner):
             return self._found(_Question(starts, goals, checker, ptc))
         best: SearchResult | None = None
         levels = clearance_levels(world, starts[:1], self.clearance)
-        for number, level in enumerate(levels):
-            last = number == len(levels) - 1
-            aims = goals[level.proving.motion_valid_batch(goals, goals)]
+        for number in range(len(levels)):
+            asked = self._asked(starts, goals, levels, number, ptc)
             settled = best is not None and best.path is not None and (best.statistics["gap"] == 0 or ptc())
-            if settled or (len(aims) == 0 and not last):
+            if settled or len(asked.goals) == 0:
                 continue
-            aims = goals if last else aims
-            asked = _Question(starts, aims, WorldChecker(level.proving), ptc, level)
-            found = self._found(asked, patient=last)
+            found = self._found(asked, patient=number == len(levels) - 1)
             checker.checked_motions += asked.checker.checked_motions
             best = found if best is None else _fewer(best, found)
         assert best is not None
-        return best
+        if best.path is None or best.statistics["gap"] == 0 or self.rounds == 0 or ptc():
+            return best
+        return self._finer(best, levels, starts, goals, checker, ptc)
+
+    def _asked(self, starts: Matrix, goals: Matrix, levels: list[Level], number: int, ptc: Stop) -> _Question:
+        """The question at a level: with the goals that keep it, at the last level with all of them."""
+        proving = levels[number].proving
+        aims = goals if number == len(levels) - 1 else goals[proving.motion_valid_batch(goals, goals)]
+        return _Question(starts, aims, WorldChecker(proving), ptc, levels[number])
+
+    def _finer(
+        self,
+        best: SearchResult,
+        levels: list[Level],
+        starts: Matrix,
+        goals: Matrix,
+        checker: MotionChecker,
+        ptc: Stop,
+    ) -> SearchResult:
+        """A better bound of the best so far, and what fine grids add to it."""
+        assert best.path is not None
+        assert isinstance(self._world, World)
+        grids = FineGrids(
+            self._movable(starts),
+            *self.bounds(),
+            self.options.joint_costs,
+            self.options.smallest_move,
+            levels,
+        )
+        pairs = [(start, goal) for start in starts for goal in goals]
+        bound, seed = int(best.statistics["lower_bound"]), int(self.rng.integers(2**63))
+        if len(starts) == len(goals) == 1:
+            moves = transitions(best.path)
+            bound = max(bound, reach_bound(self._world, self._movable(starts), starts[0], goals[0], moves, ptc))
+            best = replace(best, statistics={**best.statistics, "lower_bound": bound, "gap": moves - bound})
+        found = grids.route(pairs, merge_moves(best.path, tolerance=0.0), bound, seed, ptc)
+        if found is None:
+            return best
+        route, number = found
+        asked = self._asked(starts, goals, levels, number, ptc)._replace(known=route)
+        better = self._found(asked)
+        checker.checked_motions += asked.checker.checked_motions
+        return _fewer(best, better)
+
+    def _movable(self, starts: Matrix) -> list[int]:
+        return [joint for joint in range(starts.shape[1]) if joint not in self.options.staying]
 
     def _found(self, asked: _Question, *, patient: bool = True) -> SearchResult:
         """What is found; without patience it is given up if quick routes are not found."""
         frozen, world = self.options.staying, self._world
-        movable = [joint for joint in range(asked.starts.shape[1]) if joint not in frozen]
         moves = MoveSearch(
             asked.starts,
             asked.goals,
@@ -153,14 +198,20 @@ class FewestMoves(OneJointPlanner):
             frozen=frozen,
             smallest_move=self.options.smallest_move,
             most_nodes=FEW_NODES if world is None else MOST_NODES,
-            prove=partial(sharper_bound, world, movable) if isinstance(world, World) else None,
+            prove=partial(sharper_bound, world, self._movable(asked.starts)) if isinstance(world, World) else None,
             all_free=None if asked.level is None or world is None else world.motion_valid_batch,
         )
         moves.try_corner_routes(asked.stop)
-        iterations = self._quick_routes(moves, asked, patient=patient)
+        iterations = 0
+        if asked.known is None:
+            iterations = self._quick_routes(moves, asked, patient=patient)
+        else:
+            moves.offer(asked.known)
         if moves.route is None:
             return SearchResult(None, {"iterations": iterations})
-        moves.improve(self.rounds, asked.stop)
+        grids_follow = asked.level is not None
+        rounds = rounds_before(self.rounds, self._movable(asked.starts)) if grids_follow else self.rounds
+        moves.improve(rounds, asked.stop)
         counts = {"iterations": iterations, "rounds": moves.rounds, "lower_bound": moves.bound}
         return SearchResult(moves.route, {**counts, "gap": moves.moves - moves.bound})
 

@@ -6,6 +6,7 @@ Source: the level sets of free runs of [1, ch. 6.3], on values at any distance f
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -39,35 +40,59 @@ class MoveLattice:
 
     def __init__(self, values: Sequence[Vector], motions_free: MotionsFree, costs: Vector) -> None:
         self.values = [np.unique(v) for v in values]
-        self._shape = tuple(len(v) for v in self.values)
+        # Joints that rest have no axis: an array has 64 at most.
+        self._joints = [joint for joint, v in enumerate(self.values) if len(v) > 1] or [0]
+        self._varied = [self.values[joint] for joint in self._joints]
+        self._shape = tuple(len(v) for v in self._varied)
         self.size = int(np.prod(self._shape))
-        self._places = [v * cost for v, cost in zip(self.values, costs, strict=True)]
+        self._places = [self.values[joint] * costs[joint] for joint in self._joints]
         self._open = self._open_segments(motions_free)
 
-    def best_route(self, start: Vector, goal: Vector, order: Sequence[int]) -> Matrix | None:
+    def best_route(self, start: Vector, goal: Vector, order: Sequence[int], most: int | None = None) -> Matrix | None:
         """The route with the fewest moves between two configurations of the lattice, the least travel among those.
 
         Args:
             start: Shape (n,).
             goal: Shape (n,).
             order: All joints; among equal routes the one whose last moves come first here.
+            most: Moves that a route may have; any number if None.
 
         Returns:
-            Shape (moves + 1, n), or None if there is no route.
+            Shape (moves + 1, n), or None if there is no such route.
         """
         end = self._index(goal)
         levels = [np.full(self._shape, np.inf)]
         levels[0][self._index(start)] = 0.0
         while not np.isfinite(levels[-1][end]):
+            if len(levels) - 1 == most:
+                return None
             levels.append(self._after_a_move(levels[-1]))
             if (np.isfinite(levels[-1]) == np.isfinite(levels[-2])).all():
                 return None
-        return self._traced(levels, end, order)
+        return self._traced(levels, end, [self._joints.index(joint) for joint in order if joint in self._joints])
+
+    def closed_on(self, route: Matrix, motions_free: MotionsFree) -> int:
+        """Check the segments of a route of the lattice anew, and close those that are not free; returns their number.
+
+        Args:
+            route: Shape (k, n).
+            motions_free: Which straight motions are free, for batches of shape (m, n).
+        """
+        places, closed = [np.array(self._index(q)) for q in route], 0
+        for one, other in pairwise(places):
+            axis = int(np.flatnonzero(one != other)[0])
+            low, high = sorted((int(one[axis]), int(other[axis])))
+            line = np.repeat(one[:, None], high - low + 1, axis=1)
+            line[axis] = np.arange(low, high + 1)
+            rows = self._rows(line)
+            hit = np.flatnonzero(~motions_free(rows[:-1], rows[1:]))
+            _line(self._open[axis], tuple(one.tolist()), axis)[low + hit] = False
+            closed += len(hit)
+        return closed
 
     def _open_segments(self, motions_free: MotionsFree) -> list[Mask]:
-        """For each joint which motions from one value to the next are free, in the shape of the lattice less one."""
-        corners = np.indices(self._shape).reshape(len(self._shape), -1)
-        rows = np.stack([v[places] for v, places in zip(self.values, corners, strict=True)], axis=1)
+        """For each axis which motions from one value to the next are free, in the shape of the lattice less one."""
+        rows = self._rows(np.indices(self._shape).reshape(len(self._shape), -1))
         inside = motions_free(rows, rows).reshape(self._shape)
         numbers = np.arange(self.size).reshape(self._shape)
         found = [_both_ends(inside, joint) for joint in range(len(self._shape))]
@@ -79,8 +104,14 @@ class MoveLattice:
             open_[open_] = part
         return found
 
+    def _rows(self, places: NDArray[np.int64]) -> Matrix:
+        """The configurations at places given for each axis, shape (axes, m), as rows, shape (m, n)."""
+        rows = np.repeat(np.array([[v[0] for v in self.values]]), places.shape[1], axis=0)
+        rows[:, self._joints] = np.stack([v[k] for v, k in zip(self._varied, places, strict=True)], axis=1)
+        return rows
+
     def _index(self, q: Vector) -> Index:
-        return tuple(int(np.searchsorted(v, x)) for v, x in zip(self.values, q, strict=True))
+        return tuple(int(np.searchsorted(v, q[joint])) for v, joint in zip(self._varied, self._joints, strict=True))
 
     def _after_a_move(self, costs: Costs) -> Costs:
         """The least costs after one more move, or as before where no move helps."""
@@ -100,7 +131,7 @@ class MoveLattice:
             for k in range(count - 1) if forward else range(count - 1, 0, -1):
                 segment, head = (k, k + 1) if forward else (k - 1, k - 1)
                 carried = np.where(open_[segment], np.minimum(carried, source[k]) + gaps[segment], np.inf)
-                np.minimum(sink[head], carried, out=sink[head])
+                sink[head] = np.minimum(sink[head], carried)
 
     def _traced(self, levels: list[Costs], end: Index, order: Sequence[int]) -> Matrix:
         """The route to a configuration, from the last move to the first."""
@@ -108,7 +139,7 @@ class MoveLattice:
         for level in range(len(levels) - 1, 0, -1):
             here, wanted = indices[-1], float(levels[level][indices[-1]])
             indices.append(next(self._origins(levels[level - 1], here, wanted, order)))
-        return np.array([[v[k] for v, k in zip(self.values, index, strict=True)] for index in reversed(indices)])
+        return self._rows(np.array(indices[::-1]).T)
 
     def _origins(self, before: Costs, here: Index, wanted: float, order: Sequence[int]) -> Iterator[Index]:
         """Where a move to a configuration may come from."""

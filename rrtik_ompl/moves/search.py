@@ -15,7 +15,9 @@ from typing import TypeAlias
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.moves.axis_cut import axis_moves
 from rrtik_ompl.moves.best_route import BestRoute
+from rrtik_ompl.moves.staircase import staircase_orders
 from rrtik_ompl.moves.values import Values, lattice_size, near_values, values_of, with_spread
 from rrtik_ompl.transitions import lower_bound, merge_moves, transitions
 from rrtik_ompl.world.motion_queries import BatchedMotionQueries, MotionsFree, OutOfTime, Stop, no_stop
@@ -141,13 +143,22 @@ class MoveSearch:
             for number, (start, goal) in enumerate(self.pairs):
                 values = values_of(np.array([start, goal]))
                 least = self._bounds[number]
-                if not 0 < least <= self.moves or lattice_size(values) > self._most_nodes:
+                if not 0 < least <= self.moves:
+                    continue
+                if lattice_size(values) > self._most_nodes:
+                    self._try_some_corners(start, goal)
                     continue
                 found = self._best.search(values, start, goal)
                 if (found is None or transitions(found) > least) and self._any is not self._best:
                     found = self._any.search(values, start, goal)
                 if found is None or transitions(found) > least:
                     self.raise_bound(number, 3 if least == 1 else least + 1)
+
+    def _try_some_corners(self, start: Vector, goal: Vector) -> None:
+        """Take in a route without a detour if one is found among the many corners, not all of which are tried."""
+        orders = staircase_orders(start, goal, self._queries)
+        if orders:
+            self._best.take(np.vstack([start, axis_moves(start, goal, orders[0])]))
 
     def improve(self, rounds: int, stop: Stop = no_stop) -> None:
         """Look for better routes, for at most ``rounds`` rounds or until ``stop()``.
@@ -217,11 +228,13 @@ class MoveSearch:
                 self.raise_bound(number, prove(start, goal, self._queries.stop))
 
     def _free_values(self, joints: Sequence[int]) -> None:
-        """Routes from corner to corner, some joints free."""
+        """Routes from corner to corner, some joints free; none if a lattice cannot hold the corners."""
         promising = [k for k, bound in enumerate(self._bounds) if bound <= self.moves]
         if promising:
             start, goal = self.pairs[int(self._rng.choice(promising))]
-            self._best.search(self._with_spread(np.array([start, goal]), joints), start, goal)
+            values = self._with_spread(np.array([start, goal]), joints)
+            if lattice_size(values) <= self._most_nodes:
+                self._best.search(values, start, goal)
 
     def _around(self, route: Matrix) -> None:
         """The values of a part of a route and further ones of some joints."""

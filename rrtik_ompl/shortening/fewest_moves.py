@@ -11,13 +11,15 @@ from rrtik_ompl.arrays import TAU, Matrix, Vector, finite_array, positive
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.moves.clearance_levels import Level, clearance_levels
+from rrtik_ompl.moves.fine_grids import FineGrids, rounds_before
 from rrtik_ompl.moves.lattice import MoveLattice
 from rrtik_ompl.moves.lower_bounds import sharper_bound
+from rrtik_ompl.moves.reach_bound import reach_bound
 from rrtik_ompl.moves.rules import MoveRules
 from rrtik_ompl.moves.search import MoveSearch
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.transitions import lower_bound, single_joint, transitions
+from rrtik_ompl.transitions import lower_bound, merge_moves, single_joint, transitions
 from rrtik_ompl.world import World
 from rrtik_ompl.world.motion_queries import Stop, no_stop
 
@@ -72,7 +74,7 @@ def fewest_moves(
 
     Returns:
         A route with the same ends, bit for bit, that is no worse. Its bound is the number of joints that differ, and
-        more where that has been refuted (:mod:`rrtik_ompl.moves.lower_bounds`).
+        more where that has been refuted (:mod:`rrtik_ompl.moves.lower_bounds`), never with more than 12 such joints.
 
     Raises:
         InputError: If an edge moves several joints or ``rounds`` is negative.
@@ -87,28 +89,45 @@ def fewest_moves(
     kept = MoveRules(world.robot.joint_names) if rules is None else rules
     frozen = [*kept.frozen_joints, *kept.last_joints]
     best, bound, taken = rows, lower_bound(rows[0], rows[-1]), False
-    for level in clearance_levels(world, rows[[0, -1]], clearance):
-        if taken and (transitions(best) == bound or stop()):
-            break
+    levels = clearance_levels(world, rows[[0, -1]], clearance)
+    lower, upper = turning_limits(world.robot, rows)
+    joints = [j for j in range(world.robot.dof) if j not in frozen]
+
+    def improved(level: Level, offered: Matrix) -> MoveSearch:
         search = MoveSearch(
             rows[:1],
             rows[-1:],
-            *turning_limits(world.robot, rows),
+            lower,
+            upper,
             level.proving.motion_valid_batch,
             seed=seed,
             costs=kept.joint_costs,
             frozen=frozen,
             smallest_move=kept.smallest_move,
-            prove=partial(sharper_bound, world, [j for j in range(world.robot.dof) if j not in frozen]),
+            prove=partial(sharper_bound, world, joints),
             all_free=world.motion_valid_batch,
         )
-        if _free(level, best):
-            search.offer(best)
+        if _free(level, offered):
+            search.offer(offered)
         search.try_corner_routes(stop)
-        search.improve(rounds, stop)
+        search.improve(rounds_before(rounds, joints), stop)
+        return search
+
+    for level in levels:
+        if taken and (transitions(best) == bound or stop()):
+            break
+        search = improved(level, best)
         bound = max(bound, search.bound)
         if search.route is not None and transitions(search.route) <= transitions(best) - taken:
             best, taken = search.route, True
+    if transitions(best) > bound and rounds > 0 and not stop():
+        grids = FineGrids(joints, lower, upper, kept.joint_costs, kept.smallest_move, levels)
+        bound = max(bound, reach_bound(world, joints, rows[0], rows[-1], transitions(best), stop))
+        known = merge_moves(best, tolerance=0.0)
+        found = grids.route([(rows[0], rows[-1])], known, bound, seed, stop)
+        if found is not None:
+            search = improved(levels[found[1]], found[0])
+            best, bound = search.route if search.route is not None else best, max(bound, search.bound)
     return MovesFound(best, transitions(best), bound)
 
 

@@ -1,0 +1,208 @@
+"""Compare fewest-moves with an exact oracle in the plane: arms of 2 and 3 links among discs and rectangles.
+
+Usage: ``python bench/moves/fewest_moves_oracle.py [--cases 200] [--first 0] [--out bench/reports/...md]``
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+import pinocchio as pin
+
+import rrtik_ompl as rrtik
+from bench.shared.pages import add_out
+from rrtik_bench.report.page import Report
+from rrtik_bench.shortening.plane_arms import Array, PlaneArm, PlaneGrid
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.shapes import Box, Sphere
+from rrtik_ompl.transitions import lower_bound, transitions
+from rrtik_ompl.world import World
+from rrtik_planners import FewestMoves
+from rrtik_robots.planar import planar
+
+VALUES = {2: 521, 3: 65}  # of a joint on the oracle's grid
+RADIUS = 1e-4  # of the links [m]
+ROOM = 0.01  # of start and goal [m]
+LIMIT = 10.0  # [s] for a plan
+STARTS = 8  # tried among the same obstacles
+ONE_JOINT = 0.25  # share of the cases whose goal differs in one joint from the start
+NONE = 99  # moves, where there is no path
+HOW = (
+    "Each case is an arm of 2 or 3 links among 3 to 6 discs and rectangles, drawn at random. The oracle is a grid of "
+    f"{VALUES[2]} values a joint for 2 joints and {VALUES[3]} for 3, the values of start and goal among them. Along "
+    "each line of the grid the angles at which something begins or ceases to collide are the roots of quadratic "
+    "equations, so its motions are exact, without steps. The goal is drawn from what the grid reaches, each number of "
+    "moves as likely as any other; a quarter of the goals differ from the start in one joint. Start and goal keep "
+    "10 mm. The paths of the planner are judged by the same geometry. A path with fewer moves than the oracle's uses "
+    "values between those of the grid."
+)
+
+
+@dataclass(frozen=True)
+class Case:
+    """An arm among obstacles, the problem of it, and how many moves the oracle needs."""
+
+    number: int
+    arm: PlaneArm
+    problem: Problem
+    moves: int
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A plan of a case, and what the exact geometry says of it."""
+
+    case: Case
+    moves: int
+    bound: int
+    free: bool
+    seconds: float
+
+    @property
+    def ends(self) -> tuple[Array, Array]:
+        """Start and goal, shapes (n,)."""
+        return self.case.problem.start, self.case.problem.goal.q  # type: ignore[union-attr]
+
+
+def drawn_arm(rng: np.random.Generator, links: int) -> PlaneArm:
+    """An arm of about 2 m among obstacles that leave its base free."""
+    lengths = rng.uniform(0.5, 1.0, links) * 2.0 / links
+    solids = rng.integers(3, 7)
+    boxes = int(rng.integers(0, solids + 1))
+    discs, polygons = [], []
+    for k in range(solids):
+        away, turn = rng.uniform(0.45, 1.1) * lengths.sum(), rng.uniform(-np.pi, np.pi)
+        centre = away * np.array([np.cos(turn), np.sin(turn)])
+        size = rng.uniform(0.05, 0.3, 2)
+        if k >= boxes:
+            discs.append([*centre, size[0]])
+        else:
+            corners = 0.5 * size * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
+            angle = rng.uniform(-np.pi, np.pi)
+            spin = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+            polygons.append(centre + corners @ spin.T)
+    return PlaneArm(lengths, RADIUS, np.array(discs).reshape(-1, 3), np.array(polygons).reshape(-1, 4, 2))
+
+
+def world_of(arm: PlaneArm) -> World:
+    """The same arm and obstacles as a world of solids."""
+    solids = [
+        Obstacle(f"disc{k}", Sphere(float(r)), pin.SE3(np.eye(3), np.array([x, y, 0.0])))
+        for k, (x, y, r) in enumerate(arm.discs)
+    ]
+    for k, corners in enumerate(arm.polygons):
+        along, up = corners[0] - corners[1], corners[0] - corners[3]
+        size = np.array([np.linalg.norm(along), np.linalg.norm(up), 1.0])
+        turned = pin.utils.rotate("z", float(np.arctan2(along[1], along[0])))
+        solids.append(Obstacle(f"box{k}", Box(size), pin.SE3(turned, np.array([*corners.mean(axis=0), 0.0]))))
+    return World(planar(lengths=arm.lengths.tolist()), Scene(solids))
+
+
+def drawn_case(number: int) -> Case:
+    """Case of a number; the same number gives the same case."""
+    rng = np.random.default_rng([7, number])
+    links = 2 + number % 2
+    values = [np.linspace(-np.pi, np.pi, VALUES[links] + 2)[1:-1]] * links
+    while True:
+        arm = drawn_arm(rng, links)
+        grid = PlaneGrid(arm, values)
+        roomy = grid.room >= ROOM
+        for place in rng.permutation(np.argwhere(roomy))[:STARTS]:
+            start = np.array([v[k] for v, k in zip(values, place, strict=True)])
+            moves = grid.moves_from(start)
+            wanted = (moves > 0) & roomy
+            if rng.random() < ONE_JOINT:
+                wanted &= sum(np.indices(moves.shape)[j] != k for j, k in enumerate(place)) == 1
+            levels = np.unique(moves[wanted])
+            if len(levels) > 0 and levels[-1] > links:
+                most = int(rng.choice(levels))
+                spots = np.argwhere(wanted & (moves == most))
+                goal = np.array([v[k] for v, k in zip(values, spots[rng.integers(len(spots))], strict=True)])
+                return Case(number, arm, Problem(world_of(arm), start, goal), most)
+
+
+def outcome(case: Case) -> Outcome:
+    """Plan one case."""
+    begin = perf_counter()
+    plan = rrtik.plan(case.problem, FewestMoves, seconds=LIMIT, seed=case.number)
+    seconds = perf_counter() - begin
+    if plan.path is None:
+        return Outcome(case, NONE, 0, True, seconds)
+    route = plan.path.waypoints
+    bound = int(plan.statistics["lower_bound"])
+    return Outcome(case, transitions(route), bound, case.arm.free(route), seconds)
+
+
+def line(found: Outcome) -> list[str]:
+    """A row of the table."""
+    path = "none" if found.moves == NONE else str(found.moves)
+    c = lower_bound(*found.ends)
+    parts = [found.case.number, len(found.ends[0]), c, found.case.moves, path, found.bound, f"{found.seconds:.2f}"]
+    return [str(part) for part in parts]
+
+
+def page(found: list[Outcome]) -> Report:
+    """What was found."""
+    report = Report("Fewest moves beside an exact oracle", "python bench/moves/fewest_moves_oracle.py")
+    worse = [one for one in found if one.moves > one.case.moves]
+    equal = 1.0 - len(worse) / len(found)
+    text = f"{100 * equal:.1f} % of {len(found)}"
+    report.bar("no more moves than the oracle", ">= 99 %", text, equal >= 0.99)
+    high = [one for one in found if one.bound > one.case.moves]
+    report.bar("lower bounds above the oracle's moves", "0", str(len(high)), not high)
+    hit = [one for one in found if not one.free]
+    report.bar("paths that collide by exact geometry", "0", str(len(hit)), not hit)
+    rows = []
+    for links in (2, 3):
+        own = [one for one in found if len(one.ends[0]) == links]
+        more = Counter(one.moves - one.case.moves for one in own)
+        gaps = Counter(one.moves - one.bound for one in own if one.moves != NONE)
+        seconds = np.array([one.seconds for one in own])
+        rows.append(
+            [
+                str(links),
+                str(len(own)),
+                str(more[0]),
+                str(sum(count for extra, count in more.items() if extra < 0)),
+                str(sum(count for extra, count in more.items() if extra > 0)),
+                ", ".join(f"{gap}: {count}" for gap, count in sorted(gaps.items())),
+                f"{np.median(seconds):.2f} / {seconds.max():.2f}",
+            ]
+        )
+    head = [
+        "links",
+        "cases",
+        "as many moves",
+        "fewer",
+        "more or none",
+        "gap to the bound: cases",
+        "time, median / most [s]",
+    ]
+    report.table("Moves of the planner beside those of the oracle", head, rows)
+    head = ["case", "links", "joints that differ", "oracle", "planner", "bound", "time [s]"]
+    report.table("Cases in which the planner has more moves", head, [line(one) for one in worse])
+    report.note("How", HOW)
+    return report
+
+
+def main() -> None:
+    """Run all cases and print the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cases", type=int, default=200)
+    parser.add_argument("--first", type=int, default=0)
+    add_out(parser, "fewest_moves_oracle.md")
+    options = parser.parse_args()
+    found = []
+    for number in range(options.first, options.first + options.cases):
+        found.append(outcome(drawn_case(number)))
+        print("  ".join(line(found[-1])), "" if found[-1].free else "COLLIDES", flush=True)
+    page(found).finish(options.out)
+
+
+if __name__ == "__main__":
+    main()
