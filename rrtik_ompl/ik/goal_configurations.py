@@ -19,7 +19,7 @@ from rrtik_ompl.goal import (
     tip_errors,
 )
 from rrtik_ompl.ik.method_interface import Target
-from rrtik_ompl.ik.methods import METHODS
+from rrtik_ompl.ik.methods import METHODS, leaves_a_curve
 from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric_ik
 from rrtik_ompl.ik.numeric.projection import project, projected
 from rrtik_ompl.ik.solve import DRAWS, solve_ik
@@ -64,7 +64,7 @@ class GoalSearch:
 
     The first round takes all branches of the analytic solver, or numeric inverse kinematics from many starts; the
     second the tree of MB-RRT; further ones draw further targets from a goal that leaves freedom, and start anew from
-    random postures.
+    random postures. Of a singular pose the branches are but members of a curve, so that further rounds follow too.
 
     Attributes:
         rows: Those found so far, each round's nearest to the start first, shape (k, dof).
@@ -125,7 +125,7 @@ class GoalSearch:
         seed = int(rng.integers(2**31))
         free = any(leaves_freedom(part) for part in parts)
         if _fits("closed-form", robot, drawn) and (number == 0 or (free and number % 2 == 0)):
-            self.exhausted = not free and len(parts) <= DRAWS
+            self.exhausted = not free and len(parts) <= DRAWS and not leaves_a_curve(robot, drawn)
             return solve_ik(robot, goal, method="closed-form", near=problem.start, all=True, seed=seed).solutions
         if number == 1 and _fits("mb-rrt", robot, drawn):
             return solve_ik(
