@@ -102,6 +102,17 @@ def test_of_a_pose_the_closed_form_knows_all_there_is():
     assert not search.more()
 
 
+def test_of_a_singular_pose_further_rounds_give_other_members_of_its_curve():
+    robot = load_robot("titan4")
+    q = np.radians([20, 30, -70, 40, 90, 10])
+    search = GoalSearch(Problem(World(robot), robot.posture("ready"), PoseGoal(robot.fk(q))), np.random.default_rng(0))
+    known = len(search.first())
+    assert not search.exhausted
+    assert search.more()
+    assert search.more()
+    assert len(search.rows) > known > 0
+
+
 def test_a_search_ends(turning):
     search = GoalSearch(turning, np.random.default_rng(0))
     while not search.exhausted:
