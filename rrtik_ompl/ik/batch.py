@@ -86,9 +86,7 @@ def solve_ik_batch(
         _by_search(robot, targets, posture, world, begin + limit * len(targets), q, residuals)
     for k in np.flatnonzero(np.isnan(q[:, 0])):
         goal = PoseGoal(targets[k])
-        result = solve_ik(
-            robot, goal, method=asked, near=posture, world=world, seconds=limit, seed=first_seed + int(k)
-        )
+        result = solve_ik(robot, goal, method=asked, near=posture, world=world, seconds=limit, seed=first_seed + int(k))
         reasons[k], details[k] = result.reason, result.detail
         if result.found:
             q[k], residuals[k] = result.solutions[0], result.residuals[0]

@@ -69,7 +69,7 @@ def _closed_form(request: IkRequest) -> IkResponse:
 
 
 def leaves_a_curve(robot: Robot, targets: Sequence[Target]) -> bool:
-    """Whether any target that a closed form takes is singular within its tolerances, and so has a curve of solutions."""
+    """Whether any target of a closed form is singular within its tolerances, and so has a curve of solutions."""
     poses = np.array([_matrix(target) for target in targets])
     found = branches_of(robot, poses, slack=min(map(_slack, targets)), check=False)
     return bool(((found.singular > 0) & found.real.any(axis=1)).any())

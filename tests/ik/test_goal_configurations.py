@@ -227,6 +227,14 @@ def test_a_goal_out_of_reach_says_how_near_the_arm_came_and_ends_at_once(quiet_o
     assert 900.0 < miss < 1200.0  # the arm reaches 0.95 m
 
 
+def test_a_goal_that_only_other_walks_reach_is_not_said_to_be_missed_by_nothing(monkeypatch):
+    problem = load_problem("puma_pose")
+    monkeypatch.setattr(GoalSearch, "_round", lambda self, goal: np.zeros((0, 6)))
+    search = GoalSearch(problem, np.random.default_rng(0))
+    assert len(search.first()) == 0
+    assert "in 4 rounds; walks from other starts do reach it" in search.reason
+
+
 def test_bad_arguments_are_refused(turning):
     with pytest.raises(InputError, match="most: expected a whole number"):
         GoalSampler(turning, most=0)

@@ -85,7 +85,8 @@ def _directions(point: NDArray[np.complex128], near: float, far: float) -> Numbe
     away = np.abs(point)
     cosine = (away * away + near * near - far * far) / np.maximum(2.0 * near * away, 1e-300)
     turn = np.arccos(np.clip(cosine, -1.0, 1.0))
-    return np.angle(point) + np.stack([turn, -turn])
+    both: Numbers = np.angle(point) + np.stack([turn, -turn])
+    return both
 
 
 def psi_within_rounding(

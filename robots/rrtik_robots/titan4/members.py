@@ -83,7 +83,7 @@ def _turns(limits: Limits) -> Limits:
 def _inside(q: Numbers, limits: Limits) -> Mask:
     """Which configurations, shape (6, ...), are inside the limits up to full turns."""
     low, width = (each.reshape(6, *[1] * (q.ndim - 1)) for each in (limits[0] - AT_LIMIT, limits[1] - limits[0]))
-    inside: Mask = (np.mod(q - low, TAU) <= width + 2.0 * AT_LIMIT).all(axis=0)
+    inside: Mask = np.asarray((np.mod(q - low, TAU) <= width + 2.0 * AT_LIMIT).all(axis=0))
     return inside
 
 
@@ -170,7 +170,7 @@ def _pair(limits: Limits, joint: int) -> Matrix:
 
 
 def _yaw_axes(target: Target, limits: Limits) -> Numbers:
-    """Axis 5 where theta6 is at a limit: it is normal to the gripper axis, and theta6 turns u to it; shape (3, 2, m)."""
+    """Axis 5 where theta6 is at a limit, for theta6 is its angle from u about the gripper axis; shape (3, 2, m)."""
     theta6, across = _pair(limits, 5), np.cross(target.w, target.u, axis=0)
     axis: Numbers = np.cos(theta6) * target.u[:, None] - np.sin(theta6) * across[:, None]
     return axis

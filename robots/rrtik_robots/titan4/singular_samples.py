@@ -57,7 +57,7 @@ def configurations_inside(
     found = np.zeros((0, 6))
     for _ in range(ROUNDS):
         Q = singular_configurations(case, max(count, FEWEST), rng, g)
-        found = np.vstack([found, Q[((Q >= low) & (Q <= high)).all(axis=1)]])
+        found = np.vstack([found, Q[((low <= Q) & (high >= Q)).all(axis=1)]])
         if len(found) >= count:
             return found[:count]
     raise InputError(f"titan4: {len(found)} of {count} postures of case '{case}' found inside the limits; widen them")

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector
 from rrtik_ompl.fast.ik.branch_layout import DOUBLE_ROOT, REACH_TOLERANCE
 
-
 Limits = tuple[Vector, Vector]  # lowest and highest joint values, shape (dof,) each
 
 
@@ -47,11 +46,11 @@ class AnalyticSolver:
         families: Names of the kinds of singular poses.
         free: The joints that determine where on a family's curve a configuration lies (see ``solve``).
         solve: From T_base_frame, shape (m, 4, 4), ``near``, shape (m, dof) or None, a slack and the joint limits or
-            None, to `Branches`. The representatives of a singular pose are the members of its curve nearest to the values that the free joints
-            have in ``near`` (0 if None), and to these values turned by half a turn. With limits, one that is outside
-            gives way to the nearest member inside, if the curve has any: then the branch has a solution inside the
-            limits whenever there is one. The number is the slack [m, sine]: a pose that near to a singular one is
-            answered as if it were singular, off by at most about that.
+            None, to `Branches`. The representatives of a singular pose are the members of its curve nearest to the
+            values that the free joints have in ``near`` (0 if None), and to these values turned by half a turn. With
+            limits, one that is outside gives way to the nearest member inside that its branch has: a pose has a branch
+            inside the limits whenever it has a solution there. The number is the slack [m, sine]: a pose that near to
+            a singular one is answered as if it were singular, off by at most about that.
         nearness: From Q, shape (m, dof), to the named singular cases: 0 at the singularity, in [0, 1] or metres.
         kernel: The function of `rrtik_ompl.fast.ik.branch_kernels` that gives the same for poses that are not singular,
             "" if there is none; and the ``numbers`` that it takes.
