@@ -77,6 +77,7 @@ def solve_ik_batch(
     q, residuals = np.full((len(targets), robot.dof), np.nan), np.full((len(targets), 2), np.nan)
     reasons, details = [""] * len(targets), [""] * len(targets)
     check_poses(targets, "poses")
+    asked = method
     if len(targets):
         method = chosen_method(robot, (PoseGoal(targets[0]),), method)
     if method == "closed-form" and form_of(robot).kind == "pose":
@@ -85,9 +86,7 @@ def solve_ik_batch(
         _by_search(robot, targets, posture, world, begin + limit * len(targets), q, residuals)
     for k in np.flatnonzero(np.isnan(q[:, 0])):
         goal = PoseGoal(targets[k])
-        result = solve_ik(
-            robot, goal, method=method, near=posture, world=world, seconds=limit, seed=first_seed + int(k)
-        )
+        result = solve_ik(robot, goal, method=asked, near=posture, world=world, seconds=limit, seed=first_seed + int(k))
         reasons[k], details[k] = result.reason, result.detail
         if result.found:
             q[k], residuals[k] = result.solutions[0], result.residuals[0]

@@ -19,7 +19,7 @@ from rrtik_ompl.goal import (
     tip_errors,
 )
 from rrtik_ompl.ik.method_interface import Target
-from rrtik_ompl.ik.methods import METHODS
+from rrtik_ompl.ik.methods import METHODS, leaves_a_curve
 from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric_ik
 from rrtik_ompl.ik.numeric.projection import project, projected
 from rrtik_ompl.ik.solve import DRAWS, solve_ik
@@ -64,7 +64,7 @@ class GoalSearch:
 
     The first round takes all branches of the analytic solver, or numeric inverse kinematics from many starts; the
     second the tree of MB-RRT; further ones draw further targets from a goal that leaves freedom, and start anew from
-    random postures.
+    random postures. Of a singular pose the branches are but members of a curve, so that further rounds follow too.
 
     Attributes:
         rows: Those found so far, each round's nearest to the start first, shape (k, dof).
@@ -110,12 +110,8 @@ class GoalSearch:
         if len(self._found):
             why = self._problem.world.explain(self._found[0])
             return f"{len(self._found)} configurations reach the goal, all in collision: for instance {why}"
-        distance, angle = nearest_miss(self._problem.world.robot, goal)
         rounds = f"{self._rounds} round{'s' * (self._rounds != 1)}"
-        return (
-            f"inverse kinematics found no configuration at the goal in {rounds}; "
-            f"the nearest one misses it by {1e3 * distance:.1f} mm and {np.degrees(angle):.1f} degrees; is it in reach?"
-        )
+        return f"inverse kinematics found no configuration at the goal in {rounds}; {_miss(self._problem, goal)}"
 
     def _round(self, goal: TipGoal) -> Matrix:
         """Configurations at the goal, in collision or not, by the method whose turn it is, shape (m, dof)."""
@@ -125,7 +121,7 @@ class GoalSearch:
         seed = int(rng.integers(2**31))
         free = any(leaves_freedom(part) for part in parts)
         if _fits("closed-form", robot, drawn) and (number == 0 or (free and number % 2 == 0)):
-            self.exhausted = not free and len(parts) <= DRAWS
+            self.exhausted = not free and len(parts) <= DRAWS and not leaves_a_curve(robot, drawn)
             return solve_ik(robot, goal, method="closed-form", near=problem.start, all=True, seed=seed).solutions
         if number == 1 and _fits("mb-rrt", robot, drawn):
             return solve_ik(
@@ -136,15 +132,18 @@ class GoalSearch:
         return _walked(robot, goal, starts, number, rng)
 
 
-def nearest_miss(robot: Robot, goal: TipGoal) -> tuple[float, float]:
-    """How near the arm came to a goal within its limits: distance [m] and angle [rad]."""
-    parts = parts_of(goal)
+def _miss(problem: Problem, goal: TipGoal) -> str:
+    """How near the arm came to a goal within its limits, in a line."""
+    robot, parts = problem.world.robot, parts_of(goal)
     count = max(STARTS // len(parts), FEWEST)
     starts = np.random.default_rng(0).uniform(*robot.finite_range(), (count, robot.dof))
     ends = np.vstack([project(robot, as_task_region(part), starts) for part in parts])
     distance, angle = tip_errors(goal, robot, ends)
     best = np.argmin(goal.distance(robot, ends))
-    return float(distance[best]), float(angle[best])
+    if goal.satisfied(robot, ends[best : best + 1])[0]:
+        return "walks from other starts do reach it, so that another seed may find one"
+    away = f"{1e3 * distance[best]:.1f} mm and {np.degrees(angle[best]):.1f} degrees"
+    return f"the nearest one misses it by {away}; is it in reach?"
 
 
 def _fits(method: IkMethod, robot: Robot, drawn: list[Target]) -> bool:

@@ -58,12 +58,14 @@ class IkResponse:
         nearest: If there is none: the posture that came nearest to the goal with no regard to limits, shape (dof,).
         iterations: Steps, 0 for a closed form.
         timed_out: Whether the time was up before the method was through.
+        singular: Whether a target is in reach of a whole curve of solutions, of which ``q`` can only hold members.
     """
 
     q: Matrix
     nearest: Vector
     iterations: int = 0
     timed_out: bool = False
+    singular: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
 
@@ -65,7 +65,14 @@ def _closed_form(request: IkRequest) -> IkResponse:
         q = np.vstack([q, *(family(robot, _matrix(target), slack=_slack(target)) for target in targets)])
     outside = np.maximum(robot.lower - rows, rows - robot.upper).max(axis=1)
     best = np.argmin(np.where(reaching, outside, np.inf) if reaching.any() else residuals.sum(axis=1))
-    return IkResponse(q, rows[int(best)])
+    return IkResponse(q, rows[int(best)], singular=leaves_a_curve(robot, targets))
+
+
+def leaves_a_curve(robot: Robot, targets: Sequence[Target]) -> bool:
+    """Whether any target of a closed form is singular within its tolerances, and so has a curve of solutions."""
+    poses = np.array([_matrix(target) for target in targets])
+    found = branches_of(robot, poses, slack=min(map(_slack, targets)), check=False)
+    return bool(((found.singular > 0) & found.real.any(axis=1)).any())
 
 
 def _slack(target: Target) -> float:

@@ -81,10 +81,11 @@ def solve_ik(
         robot: The arm.
         goal: A pose, a position, or a region with some freedom (of which targets are drawn).
         method: A name from `list_ik_methods`; "auto" is the closed form where it fits, else (and where the targets
-            drawn from a region bring none) numeric, or projection onto task-space regions; the others are there to
-            be compared.
+            drawn from a region, or the curve of a singular pose, bring none) numeric, or projection onto task-space
+            regions; the others are there to be compared.
         near: Posture near which a solution is wanted, shape (dof,); the middle of the limits if None. A closed form
-            gives the nearest one there is, a numeric method the first that it finds on its way from there.
+            gives the nearest one there is (of a singular pose its nearest representative), a numeric method the
+            first that it finds on its way from there.
         all: Every solution that the method finds, not just one: a closed form gives all there are (of a singular
             pose representatives), a numeric one those it comes across, full turns of a joint counted apart.
         world: If given, solutions in collision are left out. Its robot must be this one.
@@ -111,9 +112,11 @@ def solve_ik(
 
     request = IkRequest(robot, goal, drawn, posture, accept, all, begin + limit, random, world)
     answer, q, residuals, free = _tried(request, name)
-    if method == "auto" and not free.any() and _draws(name, goal):
-        name = _walker(goal)
-        answer, q, residuals, free = _tried(request, name)
+    walked = _draws(name, goal) or (name == "closed-form" and answer.singular and len(q) == 0)
+    if method == "auto" and not free.any() and walked:
+        other = _tried(request, _walker(goal))
+        if other[3].any() or _draws(name, goal):  # else the closed form knows better why there is nothing
+            name, (answer, q, residuals, free) = _walker(goal), other
     turned = joint_difference(robot, q, posture)
     (rows,) = free.nonzero()
     order = rows[np.vecdot(turned, turned)[rows].argsort(kind="stable")]
@@ -216,6 +219,8 @@ def _why(request: IkRequest, answer: IkResponse, name: str, q: Matrix) -> tuple[
         return "time", f"the goal is in reach, but the method gave up after {answer.iterations} steps"
     if _draws(name, goal):
         return "time", f"none of {len(request.targets)} targets drawn from the goal is reached inside the limits"
+    if reached and answer.singular:
+        return "limits", f"the arm could reach this singular pose in many postures, all outside the limits: {fault}"
     if reached:
         return "limits", f"the arm could reach the goal, but {fault}"
     away = f"the nearest posture is {_away(robot, goal, answer.nearest)}"

@@ -102,6 +102,17 @@ def test_of_a_pose_the_closed_form_knows_all_there_is():
     assert not search.more()
 
 
+def test_of_a_singular_pose_further_rounds_give_other_members_of_its_curve():
+    robot = load_robot("titan4")
+    q = np.radians([20, 30, -70, 40, 90, 10])
+    search = GoalSearch(Problem(World(robot), robot.posture("ready"), PoseGoal(robot.fk(q))), np.random.default_rng(0))
+    known = len(search.first())
+    assert not search.exhausted
+    assert search.more()
+    assert search.more()
+    assert len(search.rows) > known > 0
+
+
 def test_a_search_ends(turning):
     search = GoalSearch(turning, np.random.default_rng(0))
     while not search.exhausted:
@@ -214,6 +225,14 @@ def test_a_goal_out_of_reach_says_how_near_the_arm_came_and_ends_at_once(quiet_o
         assert "degrees; is it in reach?" in text
     miss = float(sampler.reason.split("misses it by ")[1].split(" mm")[0])
     assert 900.0 < miss < 1200.0  # the arm reaches 0.95 m
+
+
+def test_a_goal_that_only_other_walks_reach_is_not_said_to_be_missed_by_nothing(monkeypatch):
+    problem = load_problem("puma_pose")
+    monkeypatch.setattr(GoalSearch, "_round", lambda self, goal: np.zeros((0, 6)))
+    search = GoalSearch(problem, np.random.default_rng(0))
+    assert len(search.first()) == 0
+    assert "in 4 rounds; walks from other starts do reach it" in search.reason
 
 
 def test_bad_arguments_are_refused(turning):

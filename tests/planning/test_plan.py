@@ -11,7 +11,7 @@ from ompl import base as ob
 
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
-from rrtik_ompl.goal import PositionGoal
+from rrtik_ompl.goal import PoseGoal, PositionGoal
 from rrtik_ompl.ompl_bridge.setup import ValidityCallback
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning import find_planner, list_planners, plan
@@ -22,6 +22,7 @@ from rrtik_ompl.shapes import Box
 from rrtik_ompl.shortening import shorten
 from rrtik_ompl.world import World
 from rrtik_ompl.world.exact_checks import ExactChecker
+from rrtik_robots.titan4.singular_samples import configurations_inside
 
 
 def at(x, y):
@@ -149,6 +150,19 @@ def test_singular_pose_goals_are_reached(name):
     found = plan(problem, "bicrdt", seconds=20.0, seed=1)
     assert found.found, found.reason
     assert problem.reached(found.path.end)
+
+
+def test_poses_that_are_singular_twice_are_reached():
+    """The wrist point on axis 1 and the wrist yaw at 90 degrees: all that is free has to stay inside the limits."""
+    robot = load_robot("titan4")
+    world = World(robot)
+    Q = configurations_inside("shoulder wrist", 40, np.random.default_rng(0), (robot.lower, robot.upper))
+    for q in Q[world.certify(Q)][:15]:
+        problem = Problem(world, robot.posture("ready"), PoseGoal(robot.fk(q)))
+        found = plan(problem, seconds=20.0, seed=1)
+        assert found.found, (np.degrees(q), found.reason)
+        assert problem.reached(found.path.end)
+        assert found.path.violations(world) == ()
 
 
 def test_a_goal_out_of_reach_and_a_goal_inside_an_obstacle_say_so():

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.fast.ik.branch_layout import REACH_TOLERANCE, SINGULAR
-from rrtik_ompl.ik.analytic.analytic_solver import wrapped
+from rrtik_ompl.ik.analytic.analytic_solver import Limits, wrapped
 from rrtik_robots.titan4.geometry import TitanGeometry
 
 Numbers = NDArray[np.float64]
@@ -48,6 +48,45 @@ def nearest_psi(
     centre, low, high, exists = psi_interval(g, radius, height)
     away = wrapped(wanted - centre)
     return centre + np.copysign(np.clip(np.abs(away), low, high), away), exists
+
+
+def psi_at(g: TitanGeometry, radius: Numbers, height: Numbers, limits: Limits) -> Numbers:
+    """Values of psi at which theta2, theta3 or theta4 is at a limit, or the elbow stretched or folded.
+
+    Where a joint is nowhere at its limit, the psi that brings it nearest to it.
+
+    Args:
+        g: Lengths of the arm.
+        radius: Of the wrist point in the arm plane, from the azimuth axis [m].
+        height: Above the shoulder axis [m], same shape.
+        limits: Lowest and highest joint values [rad], shape (6,) each.
+
+    Returns:
+        Angles [rad], shape (16, ...).
+    """
+    wrist = radius - g.a1 + 1j * height
+    low, high = limits
+    values = []
+    for theta2 in (low[1], high[1]):
+        values.append(_directions(wrist - g.a2 * np.exp(1j * theta2), g.a4, g.a3))
+    for theta3 in (low[2], high[2], 0.0, np.pi):
+        values.append(_directions(wrist, g.a4, abs(g.a2 + g.a3 * np.exp(1j * theta3))))
+    for theta4 in (low[3], high[3]):
+        bent = g.a3 * np.exp(-1j * theta4) + g.a4  # links 3 and 4 as one, seen from link 4
+        values.append(_directions(wrist, abs(bent), g.a2) - np.angle(bent))
+    return np.concatenate(values)
+
+
+def _directions(point: NDArray[np.complex128], near: float, far: float) -> Numbers:
+    """Both directions of a link of length ``near`` that ends at a point, ``far`` from the origin where it begins.
+
+    Out of reach, the one that comes nearest. Shape (2, ...).
+    """
+    away = np.abs(point)
+    cosine = (away * away + near * near - far * far) / np.maximum(2.0 * near * away, 1e-300)
+    turn = np.arccos(np.clip(cosine, -1.0, 1.0))
+    both: Numbers = np.angle(point) + np.stack([turn, -turn])
+    return both
 
 
 def psi_within_rounding(

@@ -1,20 +1,22 @@
-"""Random singular postures of the TITAN 4, for tests and benchmarks; joint limits aside."""
+"""Random singular postures of the TITAN 4, for tests and benchmarks: joint limits aside, or inside them."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.errors import UnknownNameError
-from rrtik_ompl.ik.analytic.analytic_solver import wrapped
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.ik.analytic.analytic_solver import Limits, wrapped
 from rrtik_robots.titan4.geometry import TitanGeometry
 
 RIGHT = np.pi / 2
+AT_LIMIT = 1e-12  # [rad], rounding
+FEWEST, ROUNDS = 1_000, 10_000  # postures drawn at a time, and how often before giving up
 CASES = ("generic", "elbow", "wrist", "shoulder", "elbow wrist", "shoulder wrist", "case 1", "case 2", "all psi")
 
 
 def singular_configurations(case: str, count: int, rng: np.random.Generator, g: TitanGeometry | None = None) -> Matrix:
-    """Random postures, shape (count, 6) [rad], of one of ``CASES``.
+    """Random postures, shape (count, 6) [rad], of one of ``CASES``, joint limits aside.
 
     The names are those of the families; ``case 1`` and ``case 2`` have axis 5 or axis 6 on axis 1; ``all psi`` has the
     wrist point on axis 1 and the gripper axis normal to the arm plane while link 4 is upright.
@@ -38,6 +40,27 @@ def singular_configurations(case: str, count: int, rng: np.random.Generator, g: 
     if case == "case 2":
         Q[:, 4] = rng.choice([0.0, np.pi], count)
     return Q
+
+
+def configurations_inside(
+    case: str, count: int, rng: np.random.Generator, limits: Limits, g: TitanGeometry | None = None
+) -> Matrix:
+    """The same, only those inside the limits: lowest and highest joint values [rad], shape (6,) each.
+
+    A wrist yaw of 90 degrees counts as inside limits of 90 degrees.
+
+    Raises:
+        UnknownNameError: If there is no such case.
+        InputError: If hardly any posture of the case is inside the limits.
+    """
+    low, high = limits[0] - AT_LIMIT, limits[1] + AT_LIMIT
+    found = np.zeros((0, 6))
+    for _ in range(ROUNDS):
+        Q = singular_configurations(case, max(count, FEWEST), rng, g)
+        found = np.vstack([found, Q[((low <= Q) & (high >= Q)).all(axis=1)]])
+        if len(found) >= count:
+            return found[:count]
+    raise InputError(f"titan4: {len(found)} of {count} postures of case '{case}' found inside the limits; widen them")
 
 
 def _on_axis(g: TitanGeometry, Q: Matrix, psi: np.ndarray | None, rng: np.random.Generator) -> Matrix:

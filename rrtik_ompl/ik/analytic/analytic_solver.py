@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector
 from rrtik_ompl.fast.ik.branch_layout import DOUBLE_ROOT, REACH_TOLERANCE
 
+Limits = tuple[Vector, Vector]  # lowest and highest joint values, shape (dof,) each
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Branches:
@@ -43,10 +45,12 @@ class AnalyticSolver:
         branches: A label for each branch.
         families: Names of the kinds of singular poses.
         free: The joints that determine where on a family's curve a configuration lies (see ``solve``).
-        solve: From T_base_frame, shape (m, 4, 4), ``near``, shape (m, dof) or None, and a slack, to `Branches`. The
-            representatives of a singular pose are the members of its curve nearest to the values that the free joints
-            have in ``near`` (0 if None), and to these values turned by half a turn. The number is the slack [m, sine]:
-            a pose that near to a singular one is answered as if it were singular, off by at most about that.
+        solve: From T_base_frame, shape (m, 4, 4), ``near``, shape (m, dof) or None, a slack and the joint limits or
+            None, to `Branches`. The representatives of a singular pose are the members of its curve nearest to the
+            values that the free joints have in ``near`` (0 if None), and to these values turned by half a turn. With
+            limits, one that is outside gives way to the nearest member inside that its branch has: a pose has a branch
+            inside the limits whenever it has a solution there. The number is the slack [m, sine]: a pose that near to
+            a singular one is answered as if it were singular, off by at most about that.
         nearness: From Q, shape (m, dof), to the named singular cases: 0 at the singularity, in [0, 1] or metres.
         kernel: The function of `rrtik_ompl.fast.ik.branch_kernels` that gives the same for poses that are not singular,
             "" if there is none; and the ``numbers`` that it takes.
@@ -57,14 +61,20 @@ class AnalyticSolver:
     branches: tuple[str, ...]
     families: tuple[str, ...]
     free: tuple[int, ...]
-    solve: Callable[[NDArray[np.float64], Matrix | None, float], Branches]
+    solve: Callable[[NDArray[np.float64], Matrix | None, float, Limits | None], Branches]
     nearness: Callable[[Matrix], Mapping[str, Vector]]
     kernel: str = ""
     numbers: tuple[float, ...] = ()
 
-    def __call__(self, poses: NDArray[np.float64], near: Matrix | None = None, slack: float = 0.0) -> Branches:
+    def __call__(
+        self,
+        poses: NDArray[np.float64],
+        near: Matrix | None = None,
+        slack: float = 0.0,
+        limits: Limits | None = None,
+    ) -> Branches:
         """All branches for T_base_frame, shape (m, 4, 4); see ``solve``."""
-        return self.solve(poses, near, slack)
+        return self.solve(poses, near, slack, limits)
 
 
 def wrapped(angle: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -49,7 +49,7 @@ def _block(
     robot: Robot, form: AnalyticSolver, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool
 ) -> list[NDArray[Any]]:
     """The same for as many targets as the cache has room for."""
-    found = form(_placed(robot, form, poses), hints, slack)
+    found = form(_placed(robot, form, poses), hints, slack, (robot.lower, robot.upper))
     q, real = np.array(found.q.T, order="C"), np.array(found.real.T)
     valid = real & _turn_inside(robot, q, hints)
     residuals = tip_residuals(robot, q, poses, form.kind == "pose") if check else np.zeros((0, *real.shape))
