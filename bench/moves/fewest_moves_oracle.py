@@ -1,12 +1,13 @@
 """Compare fewest-moves with an exact oracle in the plane: arms of 2 and 3 links among discs and rectangles.
 
-Usage: ``python bench/moves/fewest_moves_oracle.py [--cases 200] [--first 0] [--out bench/reports/...md]``
+Usage: ``python bench/moves/fewest_moves_oracle.py [--cases 200] [--first 0] [--jobs 2] [--out PAGE]``
 """
 
 from __future__ import annotations
 
 import argparse
 from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -15,8 +16,9 @@ import pinocchio as pin
 
 import rrtik_ompl as rrtik
 from bench.shared.pages import add_out
+from bench.shared.problems import goal_joints
 from rrtik_bench.report.page import Report
-from rrtik_bench.shortening.plane_arms import Array, PlaneArm, PlaneGrid
+from rrtik_bench.shortening.plane_arms import PlaneArm, PlaneGrid
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box, Sphere
@@ -47,7 +49,6 @@ HOW = (
 class Case:
     """An arm among obstacles, the problem of it, and how many moves the oracle needs."""
 
-    number: int
     arm: PlaneArm
     problem: Problem
     moves: int
@@ -57,16 +58,21 @@ class Case:
 class Outcome:
     """A plan of a case, and what the exact geometry says of it."""
 
-    case: Case
+    case: int
+    links: int
+    differing: int
+    oracle: int
     moves: int
     bound: int
     free: bool
     seconds: float
 
     @property
-    def ends(self) -> tuple[Array, Array]:
-        """Start and goal, shapes (n,)."""
-        return self.case.problem.start, self.case.problem.goal.q  # type: ignore[union-attr]
+    def line(self) -> list[str]:
+        """A row of a table."""
+        path = "none" if self.moves == NONE else str(self.moves)
+        seconds = f"{self.seconds:.2f}"
+        return [str(x) for x in (self.case, self.links, self.differing, self.oracle, path, self.bound, seconds)]
 
 
 def drawn_arm(rng: np.random.Generator, links: int) -> PlaneArm:
@@ -100,7 +106,7 @@ def world_of(arm: PlaneArm) -> World:
         size = np.array([np.linalg.norm(along), np.linalg.norm(up), 1.0])
         turned = pin.utils.rotate("z", float(np.arctan2(along[1], along[0])))
         solids.append(Obstacle(f"box{k}", Box(size), pin.SE3(turned, np.array([*corners.mean(axis=0), 0.0]))))
-    return World(planar(lengths=arm.lengths.tolist()), Scene(solids))
+    return World(planar(lengths=arm.lengths.tolist()), Scene(tuple(solids)))
 
 
 def drawn_case(number: int) -> Case:
@@ -123,44 +129,44 @@ def drawn_case(number: int) -> Case:
                 most = int(rng.choice(levels))
                 spots = np.argwhere(wanted & (moves == most))
                 goal = np.array([v[k] for v, k in zip(values, spots[rng.integers(len(spots))], strict=True)])
-                return Case(number, arm, Problem(world_of(arm), start, goal), most)
+                return Case(arm, Problem(world_of(arm), start, goal), most)
 
 
-def outcome(case: Case) -> Outcome:
+def outcome(number: int) -> Outcome:
     """Plan one case."""
+    case = drawn_case(number)
+    goal = goal_joints(case.problem)
     begin = perf_counter()
-    plan = rrtik.plan(case.problem, FewestMoves, seconds=LIMIT, seed=case.number)
+    plan = rrtik.plan(case.problem, FewestMoves, seconds=LIMIT, seed=number)
     seconds = perf_counter() - begin
-    if plan.path is None:
-        return Outcome(case, NONE, 0, True, seconds)
-    route = plan.path.waypoints
-    bound = int(plan.statistics["lower_bound"])
-    return Outcome(case, transitions(route), bound, case.arm.free(route), seconds)
-
-
-def line(found: Outcome) -> list[str]:
-    """A row of the table."""
-    path = "none" if found.moves == NONE else str(found.moves)
-    c = lower_bound(*found.ends)
-    parts = [found.case.number, len(found.ends[0]), c, found.case.moves, path, found.bound, f"{found.seconds:.2f}"]
-    return [str(part) for part in parts]
+    route = None if plan.path is None else plan.path.waypoints
+    return Outcome(
+        case=number,
+        links=len(goal),
+        differing=lower_bound(case.problem.start, goal),
+        oracle=case.moves,
+        moves=NONE if route is None else transitions(route),
+        bound=int(plan.statistics.get("lower_bound", 0)),
+        free=route is None or case.arm.free(route),
+        seconds=seconds,
+    )
 
 
 def page(found: list[Outcome]) -> Report:
     """What was found."""
     report = Report("Fewest moves beside an exact oracle", "python bench/moves/fewest_moves_oracle.py")
-    worse = [one for one in found if one.moves > one.case.moves]
+    worse = [one for one in found if one.moves > one.oracle]
     equal = 1.0 - len(worse) / len(found)
     text = f"{100 * equal:.1f} % of {len(found)}"
     report.bar("no more moves than the oracle", ">= 99 %", text, equal >= 0.99)
-    high = [one for one in found if one.bound > one.case.moves]
+    high = [one for one in found if one.bound > one.oracle]
     report.bar("lower bounds above the oracle's moves", "0", str(len(high)), not high)
     hit = [one for one in found if not one.free]
     report.bar("paths that collide by exact geometry", "0", str(len(hit)), not hit)
     rows = []
     for links in (2, 3):
-        own = [one for one in found if len(one.ends[0]) == links]
-        more = Counter(one.moves - one.case.moves for one in own)
+        own = [one for one in found if one.links == links]
+        more = Counter(one.moves - one.oracle for one in own)
         gaps = Counter(one.moves - one.bound for one in own if one.moves != NONE)
         seconds = np.array([one.seconds for one in own])
         rows.append(
@@ -185,7 +191,7 @@ def page(found: list[Outcome]) -> Report:
     ]
     report.table("Moves of the planner beside those of the oracle", head, rows)
     head = ["case", "links", "joints that differ", "oracle", "planner", "bound", "time [s]"]
-    report.table("Cases in which the planner has more moves", head, [line(one) for one in worse])
+    report.table("Cases in which the planner has more moves", head, [one.line for one in worse])
     report.note("How", HOW)
     return report
 
@@ -195,12 +201,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=2, help="cases at a time")
     add_out(parser, "fewest_moves_oracle.md")
     options = parser.parse_args()
     found = []
-    for number in range(options.first, options.first + options.cases):
-        found.append(outcome(drawn_case(number)))
-        print("  ".join(line(found[-1])), "" if found[-1].free else "COLLIDES", flush=True)
+    with ProcessPoolExecutor(options.jobs) as pool:
+        for one in pool.map(outcome, range(options.first, options.first + options.cases)):
+            found.append(one)
+            print("  ".join(one.line), "" if one.free else "COLLIDES", flush=True)
     page(found).finish(options.out)
 
 

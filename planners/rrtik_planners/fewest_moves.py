@@ -158,7 +158,8 @@ class FewestMoves(OneJointPlanner):
         ptc: Stop,
     ) -> SearchResult:
         """A better bound of the best so far, and what fine grids add to it."""
-        assert best.path is not None
+        path = best.path
+        assert path is not None
         assert isinstance(self._world, World)
         grids = FineGrids(
             self._movable(starts),
@@ -170,10 +171,10 @@ class FewestMoves(OneJointPlanner):
         pairs = [(start, goal) for start in starts for goal in goals]
         bound, seed = int(best.statistics["lower_bound"]), int(self.rng.integers(2**63))
         if len(starts) == len(goals) == 1:
-            moves = transitions(best.path)
+            moves = transitions(path)
             bound = max(bound, reach_bound(self._world, self._movable(starts), starts[0], goals[0], moves, ptc))
             best = replace(best, statistics={**best.statistics, "lower_bound": bound, "gap": moves - bound})
-        found = grids.route(pairs, merge_moves(best.path, tolerance=0.0), bound, seed, ptc)
+        found = grids.route(pairs, merge_moves(path, tolerance=0.0), bound, seed, ptc)
         if found is None:
             return best
         route, number = found

@@ -81,8 +81,8 @@ class FineGrids:
                     if len(known) - 1 <= least or idle > MOST_IDLE:
                         return best
                     values = self._values_near(known, nodes, rng) if near else self._values(start, goal, nodes, rng)
-                    ends = (known[0], known[-1]) if near else (start, goal)
-                    found = self._kept(values, *ends, len(known) - 2, stop)
+                    first, last = (known[0], known[-1]) if near else (start, goal)
+                    found = self._kept(values, first, last, len(known) - 2, stop)
                     if found is not None:
                         best, known, idle = found, found[0], 0
         return best

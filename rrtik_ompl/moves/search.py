@@ -146,7 +146,7 @@ class MoveSearch:
                 if not 0 < least <= self.moves:
                     continue
                 if lattice_size(values) > self._most_nodes:
-                    self._try_some_corners(start, goal)
+                    self._try_plain_orders(start, goal)
                     continue
                 found = self._best.search(values, start, goal)
                 if (found is None or transitions(found) > least) and self._any is not self._best:
@@ -154,11 +154,20 @@ class MoveSearch:
                 if found is None or transitions(found) > least:
                     self.raise_bound(number, 3 if least == 1 else least + 1)
 
-    def _try_some_corners(self, start: Vector, goal: Vector) -> None:
-        """Take in a route without a detour if one is found among the many corners, not all of which are tried."""
-        orders = staircase_orders(start, goal, self._queries)
-        if orders:
-            self._best.take(np.vstack([start, axis_moves(start, goal, orders[0])]))
+    def _try_plain_orders(self, start: Vector, goal: Vector) -> None:
+        """Take in the moves of the joints from the last to the first, or from the first to the last, if free."""
+        for order in (range(len(start))[::-1], range(len(start))):
+            route = np.vstack([start, axis_moves(start, goal, order)])
+            if self._queries(route[:-1], route[1:]).all():
+                self._best.take(route)
+
+    def _try_some_corners(self) -> None:
+        """Take in a route without a detour if one is found where the corners are too many for all to be tried."""
+        for start, goal in self.pairs:
+            many = lattice_size(values_of(np.array([start, goal]))) > self._most_nodes
+            orders = staircase_orders(start, goal, self._queries) if many and not self.direct else []
+            if orders:
+                self._best.take(np.vstack([start, axis_moves(start, goal, orders[0])]))
 
     def improve(self, rounds: int, stop: Stop = no_stop) -> None:
         """Look for better routes, for at most ``rounds`` rounds or until ``stop()``.
@@ -169,6 +178,7 @@ class MoveSearch:
             return
         self._queries.stop = stop
         with suppress(OutOfTime):
+            self._try_some_corners()
             if not self.proven:
                 self._offers = [self._cut(offered) for offered in self._offers]
                 self._cut_again()

@@ -87,48 +87,68 @@ def fewest_moves(
     if rounds < 0:
         raise InputError(f"rounds: expected at least 0, got {rounds}")
     kept = MoveRules(world.robot.joint_names) if rules is None else rules
-    frozen = [*kept.frozen_joints, *kept.last_joints]
+    work = _Work(rows, world, kept, rounds, seed, stop)
     best, bound, taken = rows, lower_bound(rows[0], rows[-1]), False
     levels = clearance_levels(world, rows[[0, -1]], clearance)
-    lower, upper = turning_limits(world.robot, rows)
-    joints = [j for j in range(world.robot.dof) if j not in frozen]
-
-    def improved(level: Level, offered: Matrix) -> MoveSearch:
-        search = MoveSearch(
-            rows[:1],
-            rows[-1:],
-            lower,
-            upper,
-            level.proving.motion_valid_batch,
-            seed=seed,
-            costs=kept.joint_costs,
-            frozen=frozen,
-            smallest_move=kept.smallest_move,
-            prove=partial(sharper_bound, world, joints),
-            all_free=world.motion_valid_batch,
-        )
-        if _free(level, offered):
-            search.offer(offered)
-        search.try_corner_routes(stop)
-        search.improve(rounds_before(rounds, joints), stop)
-        return search
-
     for level in levels:
         if taken and (transitions(best) == bound or stop()):
             break
-        search = improved(level, best)
+        search = work.improved(level, best)
         bound = max(bound, search.bound)
         if search.route is not None and transitions(search.route) <= transitions(best) - taken:
             best, taken = search.route, True
     if transitions(best) > bound and rounds > 0 and not stop():
-        grids = FineGrids(joints, lower, upper, kept.joint_costs, kept.smallest_move, levels)
-        bound = max(bound, reach_bound(world, joints, rows[0], rows[-1], transitions(best), stop))
-        known = merge_moves(best, tolerance=0.0)
-        found = grids.route([(rows[0], rows[-1])], known, bound, seed, stop)
-        if found is not None:
-            search = improved(levels[found[1]], found[0])
-            best, bound = search.route if search.route is not None else best, max(bound, search.bound)
+        best, bound = work.finer(levels, best, bound)
     return MovesFound(best, transitions(best), bound)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Work:
+    """What is asked of :func:`fewest_moves`."""
+
+    rows: Matrix
+    world: World
+    rules: MoveRules
+    rounds: int
+    seed: int
+    stop: Stop
+
+    @property
+    def joints(self) -> list[int]:
+        """Those that may move."""
+        resting = [*self.rules.frozen_joints, *self.rules.last_joints]
+        return [joint for joint in range(self.world.robot.dof) if joint not in resting]
+
+    def improved(self, level: Level, offered: Matrix) -> MoveSearch:
+        """A search on a level of clearance that starts from a route, if that keeps it."""
+        search = MoveSearch(
+            self.rows[:1],
+            self.rows[-1:],
+            *turning_limits(self.world.robot, self.rows),
+            level.proving.motion_valid_batch,
+            seed=self.seed,
+            costs=self.rules.joint_costs,
+            frozen=[*self.rules.frozen_joints, *self.rules.last_joints],
+            smallest_move=self.rules.smallest_move,
+            prove=partial(sharper_bound, self.world, self.joints),
+            all_free=self.world.motion_valid_batch,
+        )
+        if _free(level, offered):
+            search.offer(offered)
+        search.try_corner_routes(self.stop)
+        search.improve(rounds_before(self.rounds, self.joints), self.stop)
+        return search
+
+    def finer(self, levels: list[Level], best: Matrix, bound: int) -> tuple[Matrix, int]:
+        """A better bound of the best route, and what fine grids add to it."""
+        ends, limits = (self.rows[0], self.rows[-1]), turning_limits(self.world.robot, self.rows)
+        bound = max(bound, reach_bound(self.world, self.joints, *ends, transitions(best), self.stop))
+        grids = FineGrids(self.joints, *limits, self.rules.joint_costs, self.rules.smallest_move, levels)
+        found = grids.route([ends], merge_moves(best, tolerance=0.0), bound, self.seed, self.stop)
+        if found is None:
+            return best, bound
+        search = self.improved(levels[found[1]], found[0])
+        return (best if search.route is None else search.route), max(bound, search.bound)
 
 
 def _free(level: Level, route: Matrix) -> bool:
