@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
 
@@ -14,10 +13,10 @@ from rrtik_ompl.arrays import Matrix, not_negative, whole_number
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.moves.clearance_levels import Level, clearance_levels
 from rrtik_ompl.moves.fine_grids import FineGrids, rounds_before
-from rrtik_ompl.moves.lower_bounds import sharper_bound
+from rrtik_ompl.moves.lower_bounds import remembered
 from rrtik_ompl.moves.reach_bound import reach_bound
 from rrtik_ompl.moves.rules import Joints, PerJoint
-from rrtik_ompl.moves.search import MOST_NODES, MoveSearch
+from rrtik_ompl.moves.search import MOST_NODES, MoveSearch, Proof
 from rrtik_ompl.moves.staircase import one_joint_moves
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.ompl_bridge.motion_checker import WorldChecker
@@ -114,6 +113,7 @@ class FewestMoves(OneJointPlanner):
         )
         self.searches = whole_number(searches, "searches:", least=1)
         self.rounds = whole_number(rounds, "rounds:")
+        self._prove: Proof | None = None
         self.clearance = None if clearance is None else not_negative(clearance, "clearance")
 
     def completed(self, found: SearchResult, path: Matrix) -> SearchResult:
@@ -127,6 +127,7 @@ class FewestMoves(OneJointPlanner):
         world = self._world
         if not isinstance(world, World):
             return self._found(_Question(starts, goals, checker, ptc))
+        self._prove = remembered(world, self._movable(starts))
         best: SearchResult | None = None
         levels = clearance_levels(world, starts[:1], self.clearance)
         for number in range(len(levels)):
@@ -199,7 +200,7 @@ class FewestMoves(OneJointPlanner):
             frozen=frozen,
             smallest_move=self.options.smallest_move,
             most_nodes=FEW_NODES if world is None else MOST_NODES,
-            prove=partial(sharper_bound, world, self._movable(asked.starts)) if isinstance(world, World) else None,
+            prove=self._prove,
             all_free=None if asked.level is None or world is None else world.motion_valid_batch,
         )
         moves.try_corner_routes(asked.stop)

@@ -7,7 +7,7 @@ until each part is refuted: on every route is a collision so deep that no value 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from typing import TypeAlias
 
@@ -48,6 +48,22 @@ def sharper_bound(world: World, joints: Sequence[int], start: Vector, goal: Vect
     twice = [j for j in joints if j not in changing] if len(changing) == 1 else changing
     proofs = (OneFreeValue(world, start, goal, joint, stop).refuted() for joint in twice)
     return known + 1 if all(proofs) else known
+
+
+def remembered(world: World, joints: Sequence[int]) -> Callable[[Vector, Vector, Stop], int]:
+    """:func:`sharper_bound` of a world, computed once for each start and goal; again if it was stopped."""
+    known: dict[tuple[bytes, bytes], int] = {}
+
+    def bound(start: Vector, goal: Vector, stop: Stop) -> int:
+        ends = (start.tobytes(), goal.tobytes())
+        if ends not in known:
+            found = sharper_bound(world, joints, start, goal, stop)
+            if stop():
+                return found
+            known[ends] = found
+        return known[ends]
+
+    return bound
 
 
 class OneFreeValue:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property
 
 import numpy as np
 
@@ -13,10 +13,10 @@ from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.moves.clearance_levels import Level, clearance_levels
 from rrtik_ompl.moves.fine_grids import FineGrids, rounds_before
 from rrtik_ompl.moves.lattice import MoveLattice
-from rrtik_ompl.moves.lower_bounds import sharper_bound
+from rrtik_ompl.moves.lower_bounds import remembered, sharper_bound
 from rrtik_ompl.moves.reach_bound import reach_bound
 from rrtik_ompl.moves.rules import MoveRules
-from rrtik_ompl.moves.search import MoveSearch
+from rrtik_ompl.moves.search import MoveSearch, Proof
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.transitions import lower_bound, merge_moves, single_joint, transitions
@@ -102,7 +102,7 @@ def fewest_moves(
     return MovesFound(best, transitions(best), bound)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class _Work:
     """What is asked of :func:`fewest_moves`."""
 
@@ -119,6 +119,11 @@ class _Work:
         resting = [*self.rules.frozen_joints, *self.rules.last_joints]
         return [joint for joint in range(self.world.robot.dof) if joint not in resting]
 
+    @cached_property
+    def prove(self) -> Proof:
+        """A sharper bound, the same on all levels."""
+        return remembered(self.world, self.joints)
+
     def improved(self, level: Level, offered: Matrix) -> MoveSearch:
         """A search on a level of clearance that starts from a route, if that keeps it."""
         search = MoveSearch(
@@ -130,7 +135,7 @@ class _Work:
             costs=self.rules.joint_costs,
             frozen=[*self.rules.frozen_joints, *self.rules.last_joints],
             smallest_move=self.rules.smallest_move,
-            prove=partial(sharper_bound, self.world, self.joints),
+            prove=self.prove,
             all_free=self.world.motion_valid_batch,
         )
         if _free(level, offered):
