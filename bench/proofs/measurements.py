@@ -33,6 +33,7 @@ from rrtik_ompl.world import World
 
 PLATE, NEEDLE = 1e-4, 2e-4  # [m] thickness, radius
 PLANNERS = ("fastrrtconnect", "bicrdt", "RRTConnect")
+FEWEST = 10.0  # [s] for fewest-moves
 THIN = 6  # obstacles added to a generated scene
 
 
@@ -100,9 +101,11 @@ def shortened(arm: str, family: str, seed: int, method: ShorteningMethod) -> Jud
     raw = None if problem is None else rrtik.plan(problem, "bicrdt" if single else "fastrrtconnect", seed=seed).path
     if problem is None or raw is None or len(raw.waypoints) < 3:
         return Judged(found=False)
-    short = rrtik.shorten(raw, problem, method=method, seed=seed)
+    seconds = FEWEST if single else None
+    short = rrtik.shorten(raw, problem, method=method, seed=seed, seconds=seconds)
     dense = densely_checked(problem)
-    old = raw.with_waypoints(METHODS[method].run(raw.waypoints, Task(dense.world, seed=seed, clearance=0.0), dense))
+    task = Task(dense.world, seed=seed, clearance=0.0, seconds=np.inf if seconds is None else seconds)
+    old = raw.with_waypoints(METHODS[method].run(raw.waypoints, task, dense))
     proof = short.proof
     return Judged(
         found=True,

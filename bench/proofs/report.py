@@ -125,7 +125,7 @@ GENERATED = (
 )
 SHORTENED = (
     "The same scenes and judge. Before: the same method with the same seed, motions checked in steps half as long as "
-    "the motion resolution, without clearance and proofs."
+    "the motion resolution, without clearance and proofs. fewest-moves has 10 s each time."
 )
 MBM = (
     "`plan(problem, 'fastrrtconnect')` of every problem, kernels warm, robot known; proof of one path: `World.prove` "

@@ -14,6 +14,8 @@ from rrtik_ompl.problem import Problem, densely_checked
 from rrtik_ompl.world.detours import with_detours
 from rrtik_ompl.world.kept_clearance import Room, room_between
 
+TOUCHING = 1e-6  # [m]; bodies that are nearer to their margin than this count as touching
+
 
 class SecondCheck:
     """Accepts paths of planners.
@@ -59,6 +61,10 @@ class SecondCheck:
         start = self._problem.start
         if self._proof != "required" or self._problem.world.motion_proven(start, start):
             return ""
+        near = self._problem.world.closest(start)
+        if near is not None and near.clearance < TOUCHING:
+            remedy = "list the pair in allowed_collisions if it may touch"
+            return f"the start is not proven free: '{near.first}' and '{near.second}' touch; {remedy}"
         return f"the start is not proven free: {self._first_gap(np.stack([start, start]))}"
 
     def strict(self, *, proving: bool) -> Problem:

@@ -94,6 +94,17 @@ def test_a_clearance_that_the_start_cannot_keep_is_refused_with_what_is_possible
     assert most == pytest.approx(1e3 * problem.world.clearance(q), abs=2e-3)
 
 
+def test_bodies_that_touch_are_named_with_the_remedy():
+    """A disc that stands on a wall, five nanometres above it."""
+    world = disc_world((5.0, 2.0 - 0.3 - 0.5 - 5e-9, 8.0, 1.0))
+    problem = rrtik.Problem(world, [2.0, 2.0], [8.0, 5.0])
+    assert plan(problem, "RRTConnect", seed=1).proven is False
+    refused = plan(problem, "RRTConnect", seed=1, proof="required")
+    assert not refused.found
+    assert "touch; list the pair in allowed_collisions" in refused.reason
+    assert "'box0'" in refused.reason
+
+
 def test_an_unknown_mode_is_refused():
     with pytest.raises(UnknownNameError, match="proof"):
         plan(rrtik.load_problem("planar3_b"), proof="always")
