@@ -17,6 +17,7 @@ import pinocchio as pin
 import rrtik_ompl as rrtik
 from bench.shared.pages import add_out
 from bench.shared.problems import goal_joints
+from rrtik_bench.report.machine import processes
 from rrtik_bench.report.page import Report
 from rrtik_bench.shortening.plane_arms import PlaneArm, PlaneGrid
 from rrtik_ompl.problem import Problem
@@ -152,9 +153,10 @@ def outcome(number: int) -> Outcome:
     )
 
 
-def page(found: list[Outcome]) -> Report:
+def page(found: list[Outcome], jobs: int) -> Report:
     """What was found."""
-    report = Report("Fewest moves beside an exact oracle", "python bench/moves/fewest_moves_oracle.py")
+    command = "python bench/moves/fewest_moves_oracle.py"
+    report = Report("Fewest moves beside an exact oracle", command, processes(jobs))
     worse = [one for one in found if one.moves > one.oracle]
     equal = 1.0 - len(worse) / len(found)
     text = f"{100 * equal:.1f} % of {len(found)}"
@@ -209,7 +211,7 @@ def main() -> None:
         for one in pool.map(outcome, range(options.first, options.first + options.cases)):
             found.append(one)
             print("  ".join(one.line), "" if one.free else "COLLIDES", flush=True)
-    page(found).finish(options.out)
+    page(found, options.jobs).finish(options.out)
 
 
 if __name__ == "__main__":
