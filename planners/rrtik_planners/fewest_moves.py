@@ -23,7 +23,7 @@ from rrtik_ompl.ompl_bridge.motion_checker import WorldChecker
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.shortening import Task
 from rrtik_ompl.shortening.random_cut import shortcut
-from rrtik_ompl.transitions import merge_moves, transitions
+from rrtik_ompl.transitions import lower_bound, merge_moves, transitions
 from rrtik_ompl.world import World
 from rrtik_planners.bicrdt import BiCRDT
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
@@ -137,6 +137,7 @@ class FewestMoves(OneJointPlanner):
                 continue
             found = self._found(asked, patient=number == len(levels) - 1)
             checker.checked_motions += asked.checker.checked_motions
+            found = _bounded(found, starts, goals) if len(asked.goals) < len(goals) else found
             best = found if best is None else _fewer(best, found)
         assert best is not None
         if best.path is None or best.statistics["gap"] == 0 or self.rounds == 0 or ptc():
@@ -271,6 +272,15 @@ def _offer(moves: MoveSearch, route: Matrix, level: Level | None) -> None:
     """Offer a route that has been checked in steps; on a level of clearance only if it keeps that."""
     if level is None or level.proving.motion_valid_batch(route[:-1], route[1:]).all():
         moves.offer(route)
+
+
+def _bounded(found: SearchResult, starts: Matrix, goals: Matrix) -> SearchResult:
+    """The result of some of the goals with a bound that holds for all."""
+    if found.path is None:
+        return found
+    plain = min(lower_bound(start, goal) for start in starts for goal in goals)
+    bound = min(int(found.statistics["lower_bound"]), plain)
+    return replace(found, statistics={**found.statistics, "lower_bound": bound, "gap": transitions(found.path) - bound})
 
 
 def _fewer(one: SearchResult, other: SearchResult) -> SearchResult:

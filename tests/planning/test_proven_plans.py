@@ -8,12 +8,15 @@ from ompl import geometric as og
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.ompl_bridge.motion_checker import WorldChecker
+from rrtik_ompl.ompl_bridge.setup import unchecked_space
 from rrtik_ompl.planning import plan
 from rrtik_ompl.poses import pose
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box, Sphere
 from rrtik_ompl.world.detours import with_detours
 from rrtik_ompl.world.kept_clearance import CLEARANCE, room_between
+from rrtik_planners import FewestMoves
 
 PLANNERS = ("bicrdt", "fastrrtconnect", "fewest-moves", "RRTConnect", "KPIECE1")
 
@@ -182,3 +185,14 @@ def test_worlds_with_a_clearance_share_everything_else():
     assert wide.certify(problem.start[None]).all()
     assert problem.world.proving(0.01).fast is None
     assert dataclasses.is_dataclass(problem.world.prove([problem.start]))
+
+
+def test_bounds_hold_for_goals_that_do_not_keep_the_clearance_too():
+    """Of two goals the nearer in moves stands 4 mm beside a wall: the bound of a path to the other is not above it."""
+    world = disc_world((8.0, 2.0 - 0.3 - 0.004 - 0.5, 1.0, 1.0))
+    problem = rrtik.Problem(world, [2.0, 2.0], [8.0, 2.0])
+    goals = np.array([[8.0, 2.0], [4.0, 6.0]])
+    planner = FewestMoves(unchecked_space(problem, goals), world=world, seed=1)
+    found = planner.search(problem.start[None], goals, WorldChecker(world), lambda: False)
+    assert len(found.path) == 2
+    assert found.statistics["lower_bound"] == 1
