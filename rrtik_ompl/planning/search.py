@@ -87,12 +87,13 @@ class Search:
                 path = self._path(number, aims)
             if path is not None:
                 return path
-        self.reason = self._check.reason or self._goals.reason
+        self.reason = "" if self._check.best is not None else self._check.reason or self._goals.reason
         return self._check.best
 
     def _done(self) -> bool:
         """Whether there is no time left, or nothing better to be expected."""
-        return self._left() <= 0.0 or self._check.settled or self._check.open > ROUNDS
+        enough = self._check.best is not None and self._check.open > ROUNDS
+        return self._left() <= 0.0 or self._check.settled or enough
 
     def _left(self) -> float:
         return self._deadline - time.perf_counter()
@@ -138,7 +139,7 @@ class Search:
         The first one of an anytime planner does: an optimal path touches what it goes round.
         """
         first = self._traits.anytime and number == 0 and len(self._seeds) > 1
-        return self._check.proves and not self._traits.leaves_room and (first or self._check.best is not None)
+        return self._check.proves and not self._traits.leaves_room and (first or self._check.open > 0)
 
     def _strict_path(self, strict: Problem, number: int, aims: Matrix) -> JointPath | None:
         """Of an attempt with room to spare."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.choices import ProofMode
+from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.moves.clearance_levels import PREFERRED_CLEARANCE
 from rrtik_ompl.ompl_bridge.attempt import Attempt
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits
@@ -58,14 +59,17 @@ class SecondCheck:
 
     def impossible(self) -> str:
         """Why there can be no proven path if that is required, in a line; "" if there may be one."""
-        start = self._problem.start
-        if self._proof != "required" or self._problem.world.motion_proven(start, start):
-            return ""
-        near = self._problem.world.closest(start)
-        if near is not None and near.clearance < TOUCHING:
-            remedy = "list the pair in allowed_collisions if it may touch"
-            return f"the start is not proven free: '{near.first}' and '{near.second}' touch; {remedy}"
-        return f"the start is not proven free: {self._first_gap(np.stack([start, start]))}"
+        world, goal = self._problem.world, self._problem.goal
+        ends = {"start": self._problem.start} | ({"goal": goal.q} if isinstance(goal, JointGoal) else {})
+        for what, q in ends.items() if self._proof == "required" else ():
+            if world.motion_proven(q, q):
+                continue
+            near = world.closest(q)
+            if near is not None and near.clearance < TOUCHING:
+                remedy = "list the pair in allowed_collisions if it may touch"
+                return f"the {what} is not proven free: '{near.first}' and '{near.second}' touch; {remedy}"
+            return f"the {what} is not proven free: {self._first_gap(np.stack([q, q]))}"
+        return ""
 
     def strict(self, *, proving: bool) -> Problem:
         """The problem for searches that leave room: motions keep more than the clearance in steps, and may be proven.

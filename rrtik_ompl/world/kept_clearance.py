@@ -37,8 +37,7 @@ def room_between(world: World, ends: Matrix, clearance: float | None) -> Room | 
         clearance: Wanted [m]; None for a millimetre, or less if the ends have less.
     """
     wanted = CLEARANCE if clearance is None else clearance
-    most = wanted + min(wanted, SPARE)
-    for searched in (*(most * 0.5**k for k in range(HALVINGS)), 0.0):
+    for searched in (wanted + min(wanted, SPARE), *(wanted * 0.5**k for k in range(HALVINGS)), 0.0):
         if world.motions_proven(ends, ends, clearance=searched).all():
             return Room(min(wanted, searched), searched)
     return None

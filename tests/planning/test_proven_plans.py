@@ -196,3 +196,24 @@ def test_bounds_hold_for_goals_that_do_not_keep_the_clearance_too():
     found = planner.search(problem.start[None], goals, WorldChecker(world), lambda: False)
     assert len(found.path) == 2
     assert found.statistics["lower_bound"] == 1
+
+
+def test_where_a_proof_is_required_the_planner_goes_on_with_room(monkeypatch):
+    """A first path that cannot be proven, for its detours are kept from it, is not the last one."""
+    problem = rrtik.load_problem("titan4_sdu")
+    monkeypatch.setattr("rrtik_ompl.planning.second_check.with_detours", lambda *_, **__: None)
+    seeds = [k for k in range(20) if not _first_is_proven(problem, k)]
+    assert seeds
+    for seed in seeds:
+        for proof in ("required", "preferred"):
+            found = plan(problem, "RRTConnect", seed=seed, proof=proof, clearance=0.013)
+            assert found.found
+            assert found.proven
+            assert found.path.proof.clearance == 0.013
+            assert found.reason == ""
+            assert found.statistics["attempts"] > 1
+
+
+def _first_is_proven(problem, seed):
+    path = plan(problem, "RRTConnect", seed=seed, proof="off").path
+    return problem.world.prove(path.waypoints, clearance=0.013).proven
