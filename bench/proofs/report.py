@@ -52,13 +52,14 @@ def shortenings(report: Report, measure: Parts, scenes: int, arms: list[str]) ->
     rows = []
     for method in METHODS:
         own = [each for part, each in zip(parts, found, strict=True) if part[3] == method and each.found]
-        longer = np.sum([each.length for each in own]) / max(np.sum([each.before for each in own]), 1e-9) - 1.0
+        sound = [each for each in own if each.cut_before <= DEEP]
+        longer = np.sum([each.length for each in sound]) / max(np.sum([each.before for each in sound]), 1e-9) - 1.0
         old = sum(each.cut_before > DEEP for each in own)
         deepest = 1e3 * max((each.cut_before for each in own), default=0.0)
         rows.append([method, *_judged(own), f"{100 * longer:+.2f} %", f"{old}, {deepest:.2f} mm"])
         if not METHODS[method].keeps_moves:
             report.bar(f"{method}: length beside before", "within 0.5 %", f"{100 * longer:+.2f} %", longer <= 0.005)
-    heads = ["method", *HEADS, "length beside before", "paths that cut before, deepest"]
+    heads = ["method", *HEADS, "length beside before (those that cut nothing)", "paths that cut before, deepest"]
     report.table("Shortened paths", heads, rows, text=SHORTENED)
     done = [each for each in found if each.found]
     proven = [each for each in done if each.proven]

@@ -22,6 +22,7 @@ from rrtik_ompl.problem import Problem, densely_checked
 SHORTEST = 1e-3  # [s] that an attempt gets at least
 ROUNDS = 6  # attempts to find a proven path, once there is one that is checked in steps
 IN_KERNELS = 3  # of them, without proofs while searching, for planners that run in kernels
+MOVE_RULES = ("frozen_joints", "last_joints", "smallest_move")  # options of planners, see MoveRules
 ANYTIME_SHARE = 0.8  # of the time, for the first attempt of an anytime planner, which keeps a clearance
 
 
@@ -65,8 +66,9 @@ class Search:
         self._parameters = {**wanted, **parameters}
         self._aimless = self._traits.finds_goals and not joints
         self._long_ways = joints and bool(problem.robot.continuous.any()) and len(seeds) > 1
-        self._check = SecondCheck(problem, name, proof, clearance, self._traits)
-        self._strict = cache(self._check.strict)
+        ruled = any(option in parameters for option in MOVE_RULES)
+        self._check = SecondCheck(problem, name, proof, clearance, self._traits, ruled=ruled)
+        self._strict, self._strict_attempts = cache(self._check.strict), 0
 
     def run(self) -> JointPath | None:
         """The path, or None and a reason."""
@@ -124,7 +126,7 @@ class Search:
     def _path(self, number: int, aims: Matrix) -> JointPath | None:
         """Of an attempt with exact checks, with room to spare as soon as a path was not proven."""
         if self._leaves_room(number):
-            strict = self._strict(proving=not self._traits.kernels or self._check.open > IN_KERNELS)
+            strict = self._strict(proving=not self._traits.kernels or self._strict_attempts >= IN_KERNELS)
             roomy = aims[strict.world.valid_batch(aims)]
             if len(roomy) or self._aimless:
                 return self._strict_path(strict, number, roomy)
@@ -134,16 +136,18 @@ class Search:
         return self._accepted(self._attempt(asked, number, aims, self._share(number) * self._left(), effort))
 
     def _leaves_room(self, number: int) -> bool:
-        """Whether an attempt keeps more than the clearance.
+        """Whether an attempt keeps more than the clearance: every second one, from the first unproven path on.
 
         The first one of an anytime planner does: an optimal path touches what it goes round.
         """
         first = self._traits.anytime and number == 0 and len(self._seeds) > 1
-        return self._check.proves and not self._traits.leaves_room and (first or self._check.open > 0)
+        turn = self._check.open > 0 and (self._traits.anytime or number % 2 == 1 or self._strict_attempts == 0)
+        return self._check.proves and not self._traits.leaves_room and (first or turn)
 
     def _strict_path(self, strict: Problem, number: int, aims: Matrix) -> JointPath | None:
         """Of an attempt with room to spare."""
-        effort = 2**self._check.open if self._traits.supports_iteration_limit else None
+        self._strict_attempts += 1
+        effort = 2**self._strict_attempts if self._traits.supports_iteration_limit else None
         share = ANYTIME_SHARE if self._traits.anytime else self._share(number)
         return self._accepted(self._attempt(strict, number, aims, share * self._left(), effort))
 

@@ -35,17 +35,25 @@ class SecondCheck:
         name: Of the planner, for messages.
         proof: See :func:`rrtik_ompl.planning.plan`.
         clearance: Likewise.
-        traits: Of the planner. Paths that move one joint at a time get no detours.
+        traits: Of the planner.
+        ruled: Whether its options say which moves there may be, so that none are added.
     """
 
     def __init__(
-        self, problem: Problem, name: str, proof: ProofMode, clearance: float | None, traits: PlannerTraits
+        self,
+        problem: Problem,
+        name: str,
+        proof: ProofMode,
+        clearance: float | None,
+        traits: PlannerTraits,
+        *,
+        ruled: bool,
     ) -> None:
         self.best: JointPath | None = None
         self._ends_proven = True
         self.reason, self.rejected, self.open = "", 0, 0
         self._problem, self._name, self._proof, self._clearance = problem, name, proof, clearance
-        self._traits = traits
+        self._traits, self._ruled = traits, ruled
 
     @property
     def proves(self) -> bool:
@@ -113,9 +121,10 @@ class SecondCheck:
         if first.proof is not None and first.proof.proven:
             self.reason = ""
             return first
-        if self._traits.one_joint:
+        if self._ruled:
             return None
-        repaired = with_detours(world, rows, clearance=room.kept, rng=np.random.default_rng(seed))
+        rng, single = np.random.default_rng(seed), self._traits.one_joint
+        repaired = with_detours(world, rows, clearance=room.kept, rng=rng, one_joint=single)
         if repaired is None:
             return None
         self.reason = ""

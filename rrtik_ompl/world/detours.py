@@ -1,4 +1,7 @@
-"""Detours around what is not proven: two motions in the place of one, or of a few, through a point near by."""
+"""Detours around what is not proven: two motions in the place of one, or of a few, through a point near by.
+
+In a path that moves one joint at a time another joint moves out of the way before, and back afterwards.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +14,13 @@ from rrtik_ompl.world import World
 SIZES = (0.01, 0.03, 0.1, 0.3)  # of a detour, shares of the stretch's length
 POINTS = 12  # of each size
 WIDER = 3  # stretches that are tried, each with a motion more at both ends
+SIDESTEPS = tuple(0.005 * 2.0**k for k in range(8))  # [rad] or [m] by which another joint moves out of the way
 MOST_REPAIRS = 24  # of a route
 
 
-def with_detours(world: World, rows: Matrix, *, clearance: float, rng: np.random.Generator) -> Matrix | None:
+def with_detours(
+    world: World, rows: Matrix, *, clearance: float, rng: np.random.Generator, one_joint: bool = False
+) -> Matrix | None:
     """A route, shape (k, dof), with detours in the place of what is not proven; None if one of them is not found.
 
     Args:
@@ -22,6 +28,7 @@ def with_detours(world: World, rows: Matrix, *, clearance: float, rng: np.random
         rows: The route.
         clearance: To be kept from obstacles beside their margins [m].
         rng: Of the points that are tried.
+        one_joint: Whether each motion moves one joint alone, and has to.
 
     Returns:
         A proven route with the same ends, shape (m, dof); the given one if it is proven.
@@ -30,7 +37,11 @@ def with_detours(world: World, rows: Matrix, *, clearance: float, rng: np.random
         open_ = world.prove(rows, clearance=clearance).unproven
         if not open_:
             return rows
-        repaired = _repaired(world, rows, open_[0].motion, clearance, rng)
+        motion = open_[0].motion
+        if one_joint:
+            repaired = _sidestepped(world, rows, motion, clearance)
+        else:
+            repaired = _repaired(world, rows, motion, clearance, rng)
         if repaired is None:
             return None
         rows = repaired
@@ -45,6 +56,23 @@ def _repaired(world: World, rows: Matrix, motion: int, clearance: float, rng: np
         if via is not None:
             return np.vstack([rows[: first + 1], via, rows[last:]])
     return None
+
+
+def _sidestepped(world: World, rows: Matrix, motion: int, clearance: float) -> Matrix | None:
+    """The route with one of its moves made beside its place: another joint moves away before and back afterwards."""
+    a, b = rows[motion], rows[motion + 1]
+    others = np.flatnonzero(a == b)
+    sizes = np.array([sign * size for size in SIDESTEPS for sign in (1.0, -1.0)])
+    tried = np.zeros((len(sizes), len(others), len(a)))
+    tried[:, np.arange(len(others)), others] = sizes[:, None]
+    steps: Matrix = tried.reshape(-1, len(a))
+    for sides in ((a, b), (a, None), (b, None)):  # beside the move, out of its way, and back to it
+        heads = steps + (sides[0] if sides[1] is None else sides[1])
+        tails = np.tile(sides[0], (len(steps), 1)) if sides[1] is None else steps + sides[0]
+        steps = steps[world.motions_proven(tails, heads, clearance=clearance)]
+    if len(steps) == 0:
+        return None
+    return np.vstack([rows[: motion + 1], a + steps[0], b + steps[0], rows[motion + 1 :]])
 
 
 def _via(world: World, stretch: Matrix, clearance: float, rng: np.random.Generator) -> Matrix | None:
