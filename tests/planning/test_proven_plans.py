@@ -217,3 +217,23 @@ def test_where_a_proof_is_required_the_planner_goes_on_with_room(monkeypatch):
 def _first_is_proven(problem, seed):
     path = plan(problem, "RRTConnect", seed=seed, proof="off").path
     return problem.world.prove(path.waypoints, clearance=0.013).proven
+
+
+def test_single_joint_moves_get_detours_of_another_joint():
+    """A wall ends half a millimetre inside the way of the disc's only move."""
+    world = disc_world((5.0, 2.0 - 0.3 + 0.0005 - 0.5, 1.0, 1.0))
+    rows = np.array([[2.0, 2.0], [8.0, 2.0]])
+    assert not world.motion_proven(*rows)
+    found = with_detours(world, rows, clearance=0.001, rng=np.random.default_rng(0), one_joint=True)
+    assert len(found) == 4
+    assert (found[[0, -1]] == rows).all()
+    assert ((np.diff(found, axis=0) != 0.0).sum(axis=1) == 1).all()
+    assert world.prove(found, clearance=0.001).proven
+
+
+def test_rules_of_moves_hold_for_paths_that_had_to_be_proven():
+    problem = rrtik.load_problem("planar3_boxes")
+    for seed in range(6):
+        found = plan(problem, "bicrdt", seed=seed, parameters={"smallest_move": 0.1})
+        changes = np.abs(np.diff(found.path.waypoints, axis=0)).max(axis=1)
+        assert changes.min() >= 0.1 - 1e-9
