@@ -220,6 +220,11 @@ class JointPath:
         object.__setattr__(other, "proof", world.prove(self.waypoints, clearance=clearance, seconds=seconds))
         return other
 
+    @property
+    def proven(self) -> bool:
+        """Whether its proof covers every motion; False without a proof."""
+        return self.proof is not None and self.proof.proven
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the path to a file: .json (complete), .csv (a header of joint names), .txt (OMPL's matrix text).
 
@@ -248,7 +253,7 @@ def proved_as_clear(path: JointPath, world: World, clearance: float) -> JointPat
     """A path with a proof that it keeps a clearance [m], or as much as a millimetre of it, or that it is free."""
     proved = path.proved(world, clearance=clearance)
     for kept in sorted({min(clearance, CLEARANCE), 0.0} - {clearance}, reverse=True):
-        if proved.proof is not None and proved.proof.proven:
+        if proved.proven:
             break
         proved = path.proved(world, clearance=kept)
     return proved

@@ -135,9 +135,7 @@ class FewestMoves(OneJointPlanner):
             settled = best is not None and best.path is not None and (best.statistics["gap"] == 0 or ptc())
             if settled or len(asked.goals) == 0:
                 continue
-            found = self._found(asked, patient=number == len(levels) - 1)
-            checker.checked_motions += asked.checker.checked_motions
-            found = _bounded(found, starts, goals) if len(asked.goals) < len(goals) else found
+            found = self._bounded(asked, starts, goals, checker, patient=number == len(levels) - 1)
             best = found if best is None else _fewer(best, found)
         assert best is not None
         if best.path is None or best.statistics["gap"] == 0 or self.rounds == 0 or ptc():
@@ -181,9 +179,20 @@ class FewestMoves(OneJointPlanner):
             return best
         route, number = found
         asked = self._asked(starts, goals, levels, number, ptc)._replace(known=route)
-        better = self._found(asked)
+        return _fewer(best, self._bounded(asked, starts, goals, checker))
+
+    def _bounded(
+        self, asked: _Question, starts: Matrix, goals: Matrix, checker: MotionChecker, *, patient: bool = True
+    ) -> SearchResult:
+        """What is found on a level, its motions counted, with a bound that holds for the goals left out there too."""
+        found = self._found(asked, patient=patient)
         checker.checked_motions += asked.checker.checked_motions
-        return _fewer(best, better)
+        if found.path is None or len(asked.goals) == len(goals):
+            return found
+        plain = min(lower_bound(start, goal) for start in starts for goal in goals)
+        bound = min(int(found.statistics["lower_bound"]), plain)
+        counts = {"lower_bound": bound, "gap": transitions(found.path) - bound}
+        return replace(found, statistics={**found.statistics, **counts})
 
     def _movable(self, starts: Matrix) -> list[int]:
         return [joint for joint in range(starts.shape[1]) if joint not in self.options.staying]
@@ -272,15 +281,6 @@ def _offer(moves: MoveSearch, route: Matrix, level: Level | None) -> None:
     """Offer a route that has been checked in steps; on a level of clearance only if it keeps that."""
     if level is None or level.proving.motion_valid_batch(route[:-1], route[1:]).all():
         moves.offer(route)
-
-
-def _bounded(found: SearchResult, starts: Matrix, goals: Matrix) -> SearchResult:
-    """The result of some of the goals with a bound that holds for all."""
-    if found.path is None:
-        return found
-    plain = min(lower_bound(start, goal) for start in starts for goal in goals)
-    bound = min(int(found.statistics["lower_bound"]), plain)
-    return replace(found, statistics={**found.statistics, "lower_bound": bound, "gap": transitions(found.path) - bound})
 
 
 def _fewer(one: SearchResult, other: SearchResult) -> SearchResult:

@@ -71,17 +71,16 @@ class Certificate:
             rows = np.column_stack([motion.solids, motion.intervals]).tolist()
             ways = [way if any(way) else [] for way in motion.normals.tolist()]
             motions.append([row + way for row, way in zip(rows, ways, strict=True)])
-        heads = {"version": self.version, "kind": KIND, "robot": self.robot}
-        digests = {"robot_digest": self.robot_digest, "scene_digest": self.scene_digest}
-        return (
-            heads
-            | digests
-            | {
-                "clearance": self.clearance,
-                "waypoints": self.waypoints.tolist(),
-                "motions": motions,
-            }
-        )
+        return {
+            "version": self.version,
+            "kind": KIND,
+            "robot": self.robot,
+            "robot_digest": self.robot_digest,
+            "scene_digest": self.scene_digest,
+            "clearance": self.clearance,
+            "waypoints": self.waypoints.tolist(),
+            "motions": motions,
+        }
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the certificate to a JSON file, whole or not at all.

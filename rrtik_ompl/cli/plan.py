@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, get_args
 
 import typer
 
-from rrtik_ompl.choices import CommandShortening, ProofMode, ShorteningMethod, one_of
+from rrtik_ompl.choices import CommandShortening, Name, ProofMode, ShorteningMethod, one_of
 from rrtik_ompl.cli.terminal import note, progress, say
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
@@ -22,20 +23,16 @@ SHORTEN: tuple[CommandShortening, ...] = get_args(CommandShortening)
 PROOF_MODES: tuple[ProofMode, ...] = get_args(ProofMode)
 
 
-def _method(name: str) -> CommandShortening:
-    """What to do to the raw path: the name of a method of shortening, or "none"."""
-    try:
-        return one_of(SHORTEN, name, "shortening method")
-    except UnknownNameError:
-        raise typer.BadParameter(f"'{name}' is not one of {', '.join(map(repr, SHORTEN))}.") from None
+def _chosen(names: tuple[Name, ...], what: str) -> Callable[[str], Name]:
+    """What turns an option's text into one of some names."""
 
+    def parse(name: str) -> Name:
+        try:
+            return one_of(names, name, what)
+        except UnknownNameError:
+            raise typer.BadParameter(f"'{name}' is not one of {', '.join(map(repr, names))}.") from None
 
-def _proof_mode(name: str) -> ProofMode:
-    """Whether proofs are preferred, required, or not wanted."""
-    try:
-        return one_of(PROOF_MODES, name, "proof")
-    except UnknownNameError:
-        raise typer.BadParameter(f"'{name}' is not one of {', '.join(map(repr, PROOF_MODES))}.") from None
+    return parse
 
 
 def plan(
@@ -53,7 +50,7 @@ def plan(
     shorten: Annotated[
         CommandShortening,
         typer.Option(
-            parser=_method,
+            parser=_chosen(SHORTEN, "shortening method"),
             metavar=f"[{'|'.join(SHORTEN)}]",
             help="How the path is made shorter; auto: fewest-moves for single-joint moves.",
         ),
@@ -61,7 +58,7 @@ def plan(
     proof: Annotated[
         ProofMode,
         typer.Option(
-            parser=_proof_mode,
+            parser=_chosen(PROOF_MODES, "proof"),
             metavar=f"[{'|'.join(PROOF_MODES)}]",
             help="Whether every motion has to be proven free for its whole length.",
         ),

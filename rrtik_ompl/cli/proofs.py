@@ -20,7 +20,7 @@ def write_certificate(problem: Problem, path: JointPath, file: Path) -> str:
         InputError: If the file cannot be written.
     """
     world = problem.world
-    kept = path.proof.clearance if path.proof is not None and path.proof.proven else 0.0
+    kept = path.proof.clearance if path.proof is not None and path.proven else 0.0
     found = certificate_of(world, path, kept)
     if found is None:
         gaps = world.prove(path.waypoints, clearance=kept).unproven

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.world import World
-from rrtik_ompl.world.kept_clearance import CLEARANCE, room_between
+from rrtik_ompl.world.kept_clearance import CLEARANCE, Room, room_between
 
 PREFERRED_CLEARANCE = 0.01  # [m] of single-joint moves, which a person may follow by hand
 
@@ -33,13 +33,18 @@ def clearance_levels(world: World, ends: Matrix, clearance: float | None) -> lis
         ends: Where moves begin and end, shape (k, dof); all of them keep all levels.
         clearance: Wanted [m]; None for a centimetre. Less is kept where the ends have less.
     """
-    room = room_between(world, ends, PREFERRED_CLEARANCE if clearance is None else clearance)
+    room = roomiest(world, ends, clearance)
     if room is None:
         return [Level(0.0, world, world)]
     kept = sorted({room.kept, min(room.kept, CLEARANCE), 0.0}, reverse=True)
     return [_level(world, each, min(room.searched, each + min(each, CLEARANCE))) for each in kept]
 
 
+def roomiest(world: World, ends: Matrix, clearance: float | None) -> Room | None:
+    """As :func:`room_between`, with a centimetre where nothing is said."""
+    return room_between(world, ends, PREFERRED_CLEARANCE if clearance is None else clearance)
+
+
 def _level(world: World, kept: float, searched: float) -> Level:
-    roomy = world.with_clearance(searched) if searched > 0.0 else world
+    roomy = world.with_clearance(searched)
     return Level(kept, roomy, roomy.proving(kept))

@@ -6,6 +6,7 @@ together they pass no more than the ``2^n`` corners of the piece's box, and its 
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TypeAlias
@@ -19,7 +20,7 @@ from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.transitions import SAME, merge_moves
 from rrtik_ompl.world import World
-from rrtik_ompl.world.kept_clearance import check_clearance, room_between
+from rrtik_ompl.world.kept_clearance import check_route_clearance, provable_clearances
 from rrtik_ompl.world.motion_queries import MotionsFree
 from rrtik_ompl.world.route_check import VERIFICATION_DENSITY
 
@@ -65,27 +66,17 @@ def one_joint_moves(
     if faults:
         raise InputError(f"path to convert: edge {faults[0].edge + 1} is not valid: {faults[0].reason}")
     least = FINEST * world.motion_resolution if finest is None else positive(finest, "finest", "give metres")
-    check_clearance(world, clearance, {"the start": path.start, "the end of the path": path.end})
-    for kept in _provable(path, world, clearance):
-        try:
-            return path.with_waypoints(_converted(path.waypoints, world.proving(kept), least)).proved(
-                world, clearance=kept
-            )
-        except InputError:  # no staircase that keeps so much; another form may
-            continue
+    check_route_clearance(world, clearance, path.waypoints)
+    for kept in provable_clearances(world, path.waypoints, clearance):
+        with suppress(InputError):  # no staircase keeps so much; one that keeps less may
+            converted = path.with_waypoints(_converted(path.waypoints, world.proving(kept), least))
+            return converted.proved(world, clearance=kept)
     for density in DENSITIES:
         finer = world.with_resolution(world.motion_resolution / density)
         converted = path.with_waypoints(_converted(path.waypoints, finer, least))
         if not converted.violations(world):
             return converted.proved(world)
     raise InputError("path to convert: its single-joint moves do not pass the second check; lower motion_resolution")
-
-
-def _provable(path: JointPath, world: World, clearance: float | None) -> list[float]:
-    """The clearances that the path itself is proven to keep, of what is wanted and none [m]."""
-    room = room_between(world, path.waypoints[[0, -1]], clearance)
-    wanted = [] if room is None else sorted({room.kept, 0.0}, reverse=True)
-    return [kept for kept in wanted if world.prove(path.waypoints, clearance=kept).proven]
 
 
 def staircase_orders(a: Vector, b: Vector, motions_free: MotionsFree) -> list[Order]:

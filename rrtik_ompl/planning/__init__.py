@@ -11,7 +11,7 @@ from typing import Any, get_args
 import numpy as np
 
 from rrtik_ompl import catalog
-from rrtik_ompl.arrays import Vector, positive, whole_number
+from rrtik_ompl.arrays import positive, whole_number
 from rrtik_ompl.choices import Accuracy, ProofMode, one_of
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.fast.simd.library import library
@@ -22,6 +22,7 @@ from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning.planner_names import find_planner as find_planner
 from rrtik_ompl.planning.planner_names import list_planners as list_planners
 from rrtik_ompl.planning.search import Search
+from rrtik_ompl.planning.second_check import fixed_ends
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.world.kept_clearance import check_clearance
 from rrtik_ompl.world.proof import PROOF_KERNELS
@@ -125,7 +126,7 @@ def plan(
     seeds = [int(child) for child in np.random.SeedSequence(used).generate_state(restarts + 1, np.uint32)]
     one_of(PROOF_MODES, proof, "proof")
     _load_kernels(problem, factory)
-    check_clearance(problem.world, clearance, _ends(problem))
+    check_clearance(problem.world, clearance, fixed_ends(problem))
     begin = time.perf_counter()
     search = Search(problem, factory, name, begin + limit, seeds, parameters or {}, proof, clearance)
     if _nothing_to_do(problem):  # some planners return a detour, others crash
@@ -148,12 +149,6 @@ def _load_kernels(problem: Problem, factory: PlannerFactory) -> None:
     if problem.world.fast is not None:
         for name in (*traits_of(factory).kernels, PROOF_KERNELS):
             library(name)
-
-
-def _ends(problem: Problem) -> dict[str, Vector]:
-    """The configurations that every path of a problem passes, by what they are."""
-    goal = problem.goal
-    return {"start": problem.start} | ({"goal": goal.q} if isinstance(goal, JointGoal) else {})
 
 
 def _nothing_to_do(problem: Problem) -> bool:

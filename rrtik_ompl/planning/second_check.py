@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.choices import ProofMode
 from rrtik_ompl.goal import JointGoal
-from rrtik_ompl.moves.clearance_levels import PREFERRED_CLEARANCE
+from rrtik_ompl.moves.clearance_levels import roomiest
 from rrtik_ompl.ompl_bridge.attempt import Attempt
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits
 from rrtik_ompl.path import JointPath, proved_as_clear
@@ -67,9 +67,8 @@ class SecondCheck:
 
     def impossible(self) -> str:
         """Why there can be no proven path if that is required, in a line; "" if there may be one."""
-        world, goal = self._problem.world, self._problem.goal
-        ends = {"start": self._problem.start} | ({"goal": goal.q} if isinstance(goal, JointGoal) else {})
-        for what, q in ends.items() if self._proof == "required" else ():
+        world = self._problem.world
+        for what, q in fixed_ends(self._problem).items() if self._proof == "required" else ():
             if world.motion_proven(q, q):
                 continue
             near = world.closest(q)
@@ -87,7 +86,7 @@ class SecondCheck:
         """
         room = self._room(self._problem.start[None]) or Room(0.0, 0.0)
         strict = densely_checked(self._problem)
-        world = strict.world.with_clearance(room.searched) if room.searched > 0.0 else strict.world
+        world = strict.world.with_clearance(room.searched)
         return strict.with_world(world.proving(room.kept) if proving else world)
 
     def accepted(self, outcome: Attempt, seed: int) -> JointPath | None:
@@ -118,7 +117,7 @@ class SecondCheck:
         world, rows = self._problem.world, path.waypoints
         leaves_room = self._traits.leaves_room
         first = proved_as_clear(path, world, room.kept) if leaves_room else path.proved(world, clearance=room.kept)
-        if first.proof is not None and first.proof.proven:
+        if first.proven:
             self.reason = ""
             return first
         if self._ruled:
@@ -135,8 +134,7 @@ class SecondCheck:
         world = self._problem.world
         if self.proves:
             path = path.proved(world)
-        proven = path.proof is not None and path.proof.proven
-        faults = () if proven else path.violations(world)
+        faults = () if path.proven else path.violations(world)
         if faults:
             self.rejected += 1
             self.reason = f"the path of {self._name} was rejected by the second check: {faults[0].reason}"
@@ -145,18 +143,24 @@ class SecondCheck:
         if not self.proves:
             return path
         self.open += 1
-        if proven or self._proof == "preferred":
+        if path.proven or self._proof == "preferred":
             self.best = path if self.best is None or _rank(path) < _rank(self.best) else self.best
         else:
             self.reason = f"no path that is proven free: {self._first_gap(path.waypoints)}"
         return self.best if self.settled else None
 
     def _room(self, ends: Matrix) -> Room | None:
-        wanted = PREFERRED_CLEARANCE if self._traits.leaves_room and self._clearance is None else self._clearance
-        return room_between(self._problem.world, ends, wanted)
+        room = roomiest if self._traits.leaves_room else room_between
+        return room(self._problem.world, ends, self._clearance)
 
     def _first_gap(self, rows: Matrix) -> str:
         return str(next(iter(self._problem.world.prove(rows).unproven), ""))
+
+
+def fixed_ends(problem: Problem) -> dict[str, Vector]:
+    """The configurations that every path of a problem passes, by what they are."""
+    goal = problem.goal
+    return {"start": problem.start} | ({"goal": goal.q} if isinstance(goal, JointGoal) else {})
 
 
 def _rank(path: JointPath) -> tuple[int, float]:

@@ -27,7 +27,7 @@ from rrtik_ompl.shortening.random_cut import random_cut, shortcut
 from rrtik_ompl.shortening.retraction import retract
 from rrtik_ompl.shortening.sequential import sequential_cut
 from rrtik_ompl.shortening.task import Task
-from rrtik_ompl.world.kept_clearance import check_clearance
+from rrtik_ompl.world.kept_clearance import check_route_clearance
 
 __all__ = ["METHODS", "Method", "MoveRules", "Task", "shorten"]
 
@@ -190,7 +190,7 @@ def _checked(
     faults = path.violations(problem.world)
     if faults:
         raise InputError(f"path to shorten: edge {faults[0].edge + 1} is not valid: {faults[0].reason}")
-    check_clearance(problem.world, clearance, {"the start": path.start, "the end of the path": path.end})
+    check_route_clearance(problem.world, clearance, path.waypoints)
     if one_joint and not path.one_joint_at_a_time:
         raise InputError("path to shorten: it moves several joints at once, so one_joint cannot be kept")
     if one_joint and not chosen.can_keep_moves:

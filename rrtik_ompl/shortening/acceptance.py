@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.moves.clearance_levels import PREFERRED_CLEARANCE
+from rrtik_ompl.moves.clearance_levels import roomiest
 from rrtik_ompl.path import JointPath, proved_as_clear
 from rrtik_ompl.problem import Problem, densely_checked
 from rrtik_ompl.world.detours import with_detours
@@ -38,8 +38,8 @@ class Acceptance:
     ) -> None:
         self._leaves_room = leaves_room
         self._problem, self._one_joint, self._seed = problem, one_joint, seed
-        wanted = PREFERRED_CLEARANCE if leaves_room and clearance is None else clearance
-        self._room = room_between(problem.world, path.waypoints[[0, -1]], wanted)
+        room = roomiest if leaves_room else room_between
+        self._room = room(problem.world, path.waypoints[[0, -1]], clearance)
         self.input = self._proved(path)
         self._input_keeps = self._keeps(self.input)
 
@@ -53,7 +53,7 @@ class Acceptance:
         if self._leaves_room:
             return [(dense, 1.0)]
         if self._room is not None:
-            roomy = dense.world.with_clearance(self._room.searched) if self._room.searched > 0.0 else dense.world
+            roomy = dense.world.with_clearance(self._room.searched)
             found = [(roomy, 0.7), (roomy.proving(self._room.kept), 1.0 if self._input_keeps else 0.5)]
         if not self._input_keeps:
             found.append((dense.world, 1.0))
@@ -69,9 +69,9 @@ class Acceptance:
             rows = with_detours(self._problem.world, shorter.waypoints, clearance=self._room.kept, rng=rng)
             if rows is not None:
                 return self._proved(shorter.with_waypoints(rows))
-        if self._leaves_room and _proven(proved):
+        if self._leaves_room and proved.proven:
             return proved
-        if self._input_keeps or (_proven(self.input) and not _proven(proved)):
+        if self._input_keeps or (self.input.proven and not proved.proven):
             return None
         return None if shorter.violations(self._problem.world) else proved
 
@@ -82,8 +82,5 @@ class Acceptance:
 
     def _keeps(self, proved: JointPath) -> bool:
         """Whether a path is proven to keep the clearance."""
-        return self._room is not None and _proven(proved) and proved.proof.clearance == self._room.kept  # type: ignore[union-attr]
-
-
-def _proven(path: JointPath) -> bool:
-    return path.proof is not None and path.proof.proven
+        proof = proved.proof
+        return self._room is not None and proof is not None and proof.proven and proof.clearance == self._room.kept

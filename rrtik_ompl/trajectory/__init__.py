@@ -18,7 +18,7 @@ from rrtik_ompl.trajectory.load import load_trajectory
 from rrtik_ompl.trajectory.motion import Peaks, State, Trajectory
 from rrtik_ompl.trajectory.pieces import joined
 from rrtik_ompl.world import World
-from rrtik_ompl.world.kept_clearance import check_clearance, room_between
+from rrtik_ompl.world.kept_clearance import check_route_clearance, provable_clearances
 
 __all__ = ["Peaks", "RateLimits", "State", "Trajectory", "load_trajectory", "time_parameterize"]
 
@@ -75,7 +75,7 @@ def time_parameterize(
     if world is None:
         raise InputError("a path with rounded corners leaves the checked one: pass world=problem.world, to check it")
     require(world, World, "world of a path with rounded corners")
-    check_clearance(world, clearance, {"the start": path.start, "the end of the path": path.end})
+    check_route_clearance(world, clearance, path.waypoints)
     free = _free_test(path, world, clearance)
     rounded = rounding(corners, reach, world)
     for _ in range(MAX_ROUNDINGS):
@@ -90,11 +90,10 @@ def time_parameterize(
 
 def _free_test(path: JointPath, world: World, clearance: float | None) -> Callable[[Trajectory], bool]:
     """What a motion has to pass: a proof of as much as the path itself is proven to keep, or a check in steps."""
-    room = room_between(world, path.waypoints[[0, -1]], clearance)
-    for kept in sorted({room.kept, 0.0}, reverse=True) if room is not None else ():
-        if world.prove(path.waypoints, clearance=kept).proven:
-            return lambda motion: motion.prove(world, clearance=kept).proven
-    return lambda motion: not motion.faults(world)
+    kept = next(provable_clearances(world, path.waypoints, clearance), None)
+    if kept is None:
+        return lambda motion: not motion.faults(world)
+    return lambda motion: motion.prove(world, clearance=kept).proven
 
 
 def _corners(path: JointPath) -> Matrix:

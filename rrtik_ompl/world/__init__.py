@@ -139,18 +139,18 @@ class World:
     refined = Renamed("with_resolution")
 
     def with_clearance(self, clearance: float) -> World:
-        """The same world, whose checks keep a distance [m] from every obstacle on top of its margin.
+        """The same world for searches that leave room: its checks keep a distance [m] on top of obstacles' margins.
 
-        For searches that are to leave room: :meth:`contacts`, :meth:`certify` and proofs stay as they are.
+        :meth:`contacts`, :meth:`certify` and proofs stay as they are.
 
         Raises:
             InputError: If the clearance is negative or infinite.
         """
-        wider = not_negative(clearance, "clearance")
+        if (wider := not_negative(clearance, "clearance")) == 0.0:
+            return self
         other = copy.copy(self)
-        other._checks = self._checks.with_bodies(
-            tuple(replace(b, margin=b.margin + wider) if b.kind == "obstacle" else b for b in self.bodies)
-        )
+        wide = tuple(replace(b, margin=b.margin + wider) if b.kind == "obstacle" else b for b in self.bodies)
+        other._checks = self._checks.with_bodies(wide)
         return other
 
     def proving(self, clearance: float = 0.0) -> World:
@@ -212,8 +212,8 @@ class World:
         Raises:
             InputError: If waypoints are not finite rows of ``dof`` numbers, or a distance is negative or infinite.
         """
-        kept = {"clearance": not_negative(clearance, "clearance"), "slack": not_negative(slack, "slack")}
-        return self.prover.route(self._rows(waypoints, 2), **kept, seconds=seconds)
+        kept, spare = not_negative(clearance, "clearance"), not_negative(slack, "slack")
+        return self.prover.route(self._rows(waypoints, 2), clearance=kept, slack=spare, seconds=seconds)
 
     def steps(self, a: ArrayLike, b: ArrayLike, resolution: float | None = None) -> int:
         """Number of steps in which a motion is checked: the bound on the arm's displacement over the resolution."""

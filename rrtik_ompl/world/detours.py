@@ -5,6 +5,8 @@ In a path that moves one joint at a time another joint moves out of the way befo
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
@@ -66,10 +68,10 @@ def _sidestepped(world: World, rows: Matrix, motion: int, clearance: float) -> M
     tried = np.zeros((len(sizes), len(others), len(a)))
     tried[:, np.arange(len(others)), others] = sizes[:, None]
     steps: Matrix = tried.reshape(-1, len(a))
-    for sides in ((a, b), (a, None), (b, None)):  # beside the move, out of its way, and back to it
-        heads = steps + (sides[0] if sides[1] is None else sides[1])
-        tails = np.tile(sides[0], (len(steps), 1)) if sides[1] is None else steps + sides[0]
-        steps = steps[world.motions_proven(tails, heads, clearance=clearance)]
+    proven = partial(world.motions_proven, clearance=clearance)
+    steps = steps[proven(a + steps, b + steps)]  # beside the move
+    steps = steps[proven(a + 0.0 * steps, a + steps)]  # out of its way
+    steps = steps[proven(b + steps, b + 0.0 * steps)]  # and back to it
     if len(steps) == 0:
         return None
     return np.vstack([rows[: motion + 1], a + steps[0], b + steps[0], rows[motion + 1 :]])
@@ -78,14 +80,15 @@ def _sidestepped(world: World, rows: Matrix, motion: int, clearance: float) -> M
 def _via(world: World, stretch: Matrix, clearance: float, rng: np.random.Generator) -> Matrix | None:
     """What to pass between the ends of a stretch, shape (0 or 1, dof), on proven motions; None if nothing is found."""
     a, b = stretch[0], stretch[-1]
-    if len(stretch) > 2 and world.motions_proven(a[None], b[None], clearance=clearance)[0]:
+    proven = partial(world.motions_proven, clearance=clearance)
+    if len(stretch) > 2 and proven(a[None], b[None])[0]:
         return stretch[:0]
     length = route_length(stretch)
     for size in SIZES:
         points = _near(world, stretch, size * length, rng)
-        points = points[world.motions_proven(points, points, clearance=clearance)]
-        points = points[world.motions_proven(np.tile(a, (len(points), 1)), points, clearance=clearance)]
-        points = points[world.motions_proven(points, np.tile(b, (len(points), 1)), clearance=clearance)]
+        points = points[proven(points, points)]
+        points = points[proven(a + 0.0 * points, points)]
+        points = points[proven(points, b + 0.0 * points)]
         if len(points):
             lengths = np.linalg.norm(points - a, axis=1) + np.linalg.norm(points - b, axis=1)
             best: Matrix = points[[lengths.argmin()]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -63,6 +64,25 @@ def check_clearance(world: World, clearance: float | None, ends: dict[str, Matri
             most = 1e3 * _most(world, q, wanted)
             pair = f"'{gap.first}' and '{gap.second}'"
             raise InputError(f"clearance: {what} cannot keep {1e3 * wanted:g} mm: {pair}; at most {most:.3f} mm here")
+
+
+def check_route_clearance(world: World, clearance: float | None, rows: Matrix) -> None:
+    """Refuse a clearance that an end of a route, shape (k, dof), cannot keep; see :func:`check_clearance`."""
+    check_clearance(world, clearance, {"the start": rows[0], "the end of the path": rows[-1]})
+
+
+def provable_clearances(world: World, rows: Matrix, clearance: float | None) -> Iterator[float]:
+    """The clearances that a route, shape (k, dof), is itself proven to keep, of what is wanted and none [m].
+
+    Args:
+        world: The world.
+        rows: The route.
+        clearance: Wanted [m]; None for a millimetre, or less if the ends have less.
+    """
+    room = room_between(world, rows[[0, -1]], clearance)
+    for kept in sorted({room.kept, 0.0}, reverse=True) if room is not None else ():
+        if world.prove(rows, clearance=kept).proven:
+            yield kept
 
 
 def _most(world: World, q: Matrix, refused: float) -> float:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.fast.ik.branch_layout import REACH_TOLERANCE, SHOULDER_ROOT, SINGULAR
-from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver, Branches, Limits, two_links, wrapped
+from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver, Branches, two_links, wrapped
 
 Numbers = NDArray[np.float64]
 MISFIT = 1e-9  # sine of the angle between axis 5 and where a pose wants it; more is out of reach for five joints
@@ -67,11 +67,7 @@ def five_joint_form(geometry: PumaGeometry, tool: float) -> AnalyticSolver:
 
 
 def puma_branches(
-    g: PumaGeometry,
-    poses: Numbers,
-    near: Matrix | None = None,
-    slack: float = 0.0,
-    limits: Limits | None = None,
+    g: PumaGeometry, poses: Numbers, near: Matrix | None = None, slack: float = 0.0, *_: object
 ) -> Branches:
     """All eight branches for T_base_tip, shape (m, 4, 4), labelled as in ``BRANCHES``.
 
@@ -80,9 +76,8 @@ def puma_branches(
         poses: Targets; their origin is the wrist centre.
         near: Configurations, shape (m, 6), whose theta4 a straight wrist takes; zeros if None.
         slack: Sine of theta5 up to which the wrist counts as straight, if more than rounding.
-        limits: Not used: theta6 can take every direction, so that no theta4 inside its limits is lost.
+        _: Limits are not used: theta6 can take every direction, so that no theta4 inside its limits is lost.
     """
-    del limits
     numbers, count = np.ascontiguousarray(poses.transpose(1, 2, 0)), len(poses)
     u, v, w, p = numbers[:3].transpose(1, 0, 2)
     arm, real = _arm(g, p[0], p[1], p[2] - g.base)
@@ -106,15 +101,8 @@ def puma_branches(
     return Branches(q.reshape(6, 8, count).transpose(2, 1, 0), both.reshape(8, count).T, singular)
 
 
-def arm_branches(
-    g: PumaGeometry,
-    poses: Numbers,
-    near: Matrix | None = None,
-    slack: float = 0.0,
-    limits: Limits | None = None,
-) -> Branches:
+def arm_branches(g: PumaGeometry, poses: Numbers, *_: object) -> Branches:
     """All four branches that bring the wrist centre to the origins of poses, shape (m, 4, 4); none is singular."""
-    del near, slack, limits
     x, y, z = np.ascontiguousarray(poses[:, :3, 3].T)
     q, real = _arm(g, x, y, g.base - z)
     return Branches(
@@ -122,20 +110,12 @@ def arm_branches(
     )
 
 
-def five_joint_branches(
-    g: PumaGeometry,
-    tool: float,
-    poses: Numbers,
-    near: Matrix | None = None,
-    slack: float = 0.0,
-    limits: Limits | None = None,
-) -> Branches:
+def five_joint_branches(g: PumaGeometry, tool: float, poses: Numbers, *_: object) -> Branches:
     """All four branches for T_base_tip, shape (m, 4, 4); none is singular, for the wrist has no roll to give away.
 
     Five joints reach a set of poses with five dimensions: a branch whose axis 5 cannot point as the pose wants is not
     real, and its residual says how far off it is.
     """
-    del near, slack, limits
     arm = arm_branches(g, poses @ np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, -tool], [0, 0, 0, 1.0]]))
     theta1, forearm = arm.q[..., 0], arm.q[..., 1] + arm.q[..., 2]
     c1, s1, c, s = np.cos(theta1), np.sin(theta1), np.cos(forearm), np.sin(forearm)

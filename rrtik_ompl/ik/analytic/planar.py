@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver, Branches, Limits, two_links, wrapped
+from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver, Branches, two_links, wrapped
 from rrtik_ompl.robot import Robot
 
 BRANCHES = ("left", "right")
@@ -30,15 +30,8 @@ class PlanarArm:
     links: Matrix
     tip: NDArray[np.float64]
 
-    def solve(
-        self,
-        poses: NDArray[np.float64],
-        near: Matrix | None = None,
-        slack: float = 0.0,
-        limits: Limits | None = None,
-    ) -> Branches:
+    def solve(self, poses: NDArray[np.float64], *_: object) -> Branches:
         """Both branches for T_base_tip, shape (m, 4, 4); nothing else is used, for no pose is singular."""
-        del near, slack, limits
         targets = self.to_plane @ poses
         point, real = targets[:, :2, 3], np.abs(targets[:, 2, 3] - self.tip[2, 3]) <= IN_PLANE
         heading = np.zeros(len(poses))
