@@ -1,5 +1,5 @@
 // The distance from obstacles along the path: a curve with the present place, the least value, and what is not proven.
-const CURVE = { left: 42, right: 382, top: 8, bottom: 68 };
+const CURVE = { left: 56, right: 382, top: 8, bottom: 68 };
 const DECADES = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1];  // [m]
 
 function drawn(tag, attributes, text = "") {
