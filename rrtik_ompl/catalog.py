@@ -1,11 +1,11 @@
 """Names to things: robots, planners and problems that installed packages offer through entry points, and robot files.
 
 Another package adds its own by entry points in the groups ``rrtik_ompl.robots`` (name -> a function that takes keyword
-options and returns a `Robot`), ``rrtik_ompl.planners`` (name -> a class), ``rrtik_ompl.default_planner`` (the same, of
-the one planner that is used where none is named), ``rrtik_ompl.problems`` (any name -> the ``Path`` of a folder of
-problem files), ``rrtik_ompl.suites`` (the same of suites for ``rrtik bench``), ``rrtik_ompl.tables`` (any name ->
-published tables for ``rrtik reproduce``, see `rrtik_bench.tables.Collection`) and ``rrtik_ompl.workspaces`` (name of a
-robot -> a function that returns slices of its effective workspace, see `rrtik_ompl.reach.grid_map.Slice`).
+options and returns a `Robot`), ``rrtik_ompl.planners`` (name -> a class), ``rrtik_ompl.problems`` (any name -> the
+``Path`` of a folder of problem files), ``rrtik_ompl.suites`` (the same of suites for ``rrtik bench``),
+``rrtik_ompl.tables`` (any name -> published tables for ``rrtik reproduce``, see `rrtik_bench.tables.Collection`) and
+``rrtik_ompl.workspaces`` (name of a robot -> a function that returns slices of its effective workspace, see
+`rrtik_ompl.reach.grid_map.Slice`).
 """
 
 from __future__ import annotations
@@ -60,21 +60,6 @@ def find_planner(name: str) -> Any:
         UnknownNameError: If no package offers it.
     """
     return _load("planner", "planners", name)
-
-
-def default_planner() -> str:
-    """Name of the planner that is used where none is named.
-
-    It is data of the packages: the first entry of the group ``rrtik_ompl.default_planner``, or the first planner that
-    there is.
-
-    Raises:
-        InputError: If no package offers a planner.
-    """
-    for group in ("default_planner", "planners"):
-        for name in _offers(group):
-            return name
-    raise InputError("no planner is installed; name one of OMPL's, such as RRTConnect")
 
 
 def find_workspace(robot: str) -> Callable[[], Any]:

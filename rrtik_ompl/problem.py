@@ -27,12 +27,14 @@ class Problem:
         start: Shape (dof,), read-only.
         goal: What to reach; a :class:`JointGoal` has been checked to be free.
         name: For messages and files.
+        planner: Name of the planner that :func:`rrtik_ompl.plan` uses where none is named, or None.
 
     Args:
         world: Robot and scene.
         start: Configuration, shape (dof,), rad or m.
         goal: A goal, or a configuration.
         name: For messages and files.
+        planner: Name of one of :func:`rrtik_ompl.list_planners`; it is looked up when it is used.
 
     Raises:
         ProblemError: If start or goal is in collision, within an obstacle's margin or outside the limits; pair, margin,
@@ -40,10 +42,20 @@ class Problem:
         InputError: If start or goal has the wrong number of joints or is not finite.
     """
 
-    def __init__(self, world: World, start: ArrayLike, goal: Goal | ArrayLike, *, name: str = "problem") -> None:
+    def __init__(
+        self,
+        world: World,
+        start: ArrayLike,
+        goal: Goal | ArrayLike,
+        *,
+        name: str = "problem",
+        planner: str | None = None,
+    ) -> None:
         require(world, World, "world of a problem", "use World(robot, scene)")
+        require(planner, str | None, "planner of a problem", "use a name of list_planners()")
         self.world = world
         self.name = name
+        self.planner = planner
         self.start: Vector = frozen(_usable(world, start, "start"))
         wanted = goal if isinstance(goal, Goal) else JointGoal(goal)
         if isinstance(wanted, JointGoal):

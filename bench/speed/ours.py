@@ -17,9 +17,9 @@ from rrtik_ompl.fast.search.connect import ConnectSearch
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.ompl_bridge.attempt import attempt
+from rrtik_ompl.ompl_bridge.planner_names import find_planner, list_planners
 from rrtik_ompl.ompl_bridge.setup import planning_bounds, unchecked_space
 from rrtik_ompl.ompl_bridge.states import StateIO
-from rrtik_ompl.planning import find_planner, list_planners
 
 Search = Callable[[int], Matrix | None]  # from a seed to a path
 

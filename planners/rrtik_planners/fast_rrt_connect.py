@@ -30,6 +30,7 @@ class FastRRTConnect(SafePlanner):
     kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
     supports_iteration_limit: ClassVar[bool] = True
     proof_iterations: ClassVar[int] = 20_000
+    portfolio_turn: ClassVar[int] = 1
 
     def __init__(
         self,

@@ -26,6 +26,7 @@ class MBRRT(BiCRDT):
 
     ompl_name: ClassVar[str] = "MBRRT"
     proof_iterations: ClassVar[int] = 0
+    portfolio_turn: ClassVar[int] = 0
 
     def __init__(
         self,

@@ -14,11 +14,9 @@ from rrtik_ompl.benchmark.campaign import all_jobs
 from rrtik_ompl.benchmark.sources import file_source
 from rrtik_ompl.benchmark.suite import Entrant, Suite
 from rrtik_ompl.benchmark.suite_file import NONE, SHORTENINGS
-from rrtik_ompl.catalog import default_planner
 from rrtik_ompl.choices import SuiteShortening, one_of
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.ompl_bridge.planner_options import planner_options
-from rrtik_ompl.planning import find_planner
+from rrtik_ompl.ompl_bridge.planner_names import AUTO, options_of
 
 
 def plan_batch(
@@ -64,7 +62,7 @@ def plan_batch(
         name="batch",
         title="batch",
         sources=tuple(replace(source, name=str(k)) for k, source in enumerate(named)),  # two may be of one name
-        entrants=(_entrant(planner or default_planner(), dict(parameters or {}), shorten),),
+        entrants=(_entrant(planner, dict(parameters or {}), shorten),),
         runs=1,
         seconds=limit,
         patience=3.0 * limit + 30.0,
@@ -77,9 +75,10 @@ def plan_batch(
     return [{**records[k], "problem": source.name} for k, source in enumerate(named)]
 
 
-def _entrant(planner: str, parameters: dict[str, Any], shorten: SuiteShortening) -> Entrant:
-    options = planner_options(find_planner(planner))
+def _entrant(planner: str | None, parameters: dict[str, Any], shorten: SuiteShortening) -> Entrant:
+    label = planner or AUTO
+    options = options_of(label)
     for key in parameters:
         if key not in options:
-            raise UnknownNameError(f"parameter of planner {planner}", key, options)
-    return Entrant(planner, planner, parameters, one_of(SHORTENINGS, shorten, "shortening method"))
+            raise UnknownNameError(f"parameter of planner {label}", key, options)
+    return Entrant(label, planner, parameters, one_of(SHORTENINGS, shorten, "shortening method"))

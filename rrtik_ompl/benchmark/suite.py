@@ -31,17 +31,16 @@ from rrtik_ompl.files.sections import parse
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.generated_problems import FAMILIES
-from rrtik_ompl.ompl_bridge.planner_options import planner_options
+from rrtik_ompl.ompl_bridge.planner_names import options_of
 from rrtik_ompl.ompl_bridge.planner_traits import unbound_planners
-from rrtik_ompl.planning import find_planner
 
 
 @dataclass(frozen=True, slots=True)
 class Entrant:
-    """A planner with its options under a label."""
+    """A planner with its options under a label; without a name, the one that a problem names."""
 
     label: str
-    name: str
+    name: str | None
     parameters: dict[str, Any]
     shorten: SuiteShortening
 
@@ -139,8 +138,7 @@ def _entrant(document: YamlDocument, place: Location, item: str | PlannerGroup, 
     group = PlannerGroup.model_validate({"name": item}) if isinstance(item, str) else item
     at = place if isinstance(item, str) else (*place, "name")
     with document.at(at):
-        factory = _planner(group.name)
-    options = planner_options(factory)
+        options = _options(group.name)
     for key in group.parameters:
         with document.at((*place, "parameters", key)):
             if key not in options:
@@ -150,9 +148,9 @@ def _entrant(document: YamlDocument, place: Location, item: str | PlannerGroup, 
     return Entrant(group.label or group.name, group.name, dict(group.parameters), method)
 
 
-def _planner(name: str) -> Any:
+def _options(name: str) -> tuple[str, ...]:
     try:
-        return find_planner(name)
+        return options_of(name)
     except UnknownNameError as error:
         error.args = (f"{error}; OMPL's wheel lacks {', '.join(unbound_planners())}",)
         raise

@@ -38,7 +38,7 @@ def _chosen(names: tuple[Name, ...], what: str) -> Callable[[str], Name]:
 def plan(
     problem: Annotated[str, typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.")],
     planner: Annotated[
-        str | None, typer.Option(help="See: rrtik list planners. If left out, the default of the installed packages.")
+        str | None, typer.Option(help="See: rrtik list planners. If left out, the problem's, or else auto.")
     ] = None,
     seconds: Annotated[float, typer.Option(help="Time limit [s].")] = 5.0,
     seed: Annotated[int | None, typer.Option(help="The same seed gives the same path; drawn if left out.")] = None,
@@ -81,16 +81,14 @@ def plan(
     check_target(html, (".html", ".htm"))
     check_target(certificate, (".json",))
     from rrtik_ompl import load_problem
-    from rrtik_ompl.catalog import default_planner
     from rrtik_ompl.cli import plan_report as report
-    from rrtik_ompl.planning import find_planner
+    from rrtik_ompl.ompl_bridge.planner_names import AUTO, options_of
     from rrtik_ompl.planning import plan as find_path
 
-    planner = default_planner() if planner is None else planner
-    find_planner(planner)
+    options_of(AUTO if planner is None else planner)
     options = _parameters(parameter or [])
     question = load_problem(problem)
-    with progress(f"planning {question.name} with {planner}"):
+    with progress(f"planning {question.name} with {planner or question.planner or AUTO}"):
         limits: dict[str, Any] = {"seconds": seconds, "restarts": restarts, "proof": proof, "clearance": clearance}
         found = find_path(question, planner, seed=seed, parameters=options, **limits)
     with progress("shortening"):
@@ -100,14 +98,21 @@ def plan(
     if as_json:
         print(json.dumps(report.document(question, found, path, shorten_seconds)))
     else:
-        say(*report.summary(question, found, path, shorten_seconds))
-        if path is not None:
-            say(report.moves_table(path) if path.one_joint_at_a_time else report.waypoints_table(path))
-        written = (out, html, None if lack else certificate)
-        say(*(f"wrote {file}" for file in written if path is not None and file is not None))
+        say(*report.summary(question, found, path, shorten_seconds, named=planner))
+        _say_path(path, (out, html, None if lack else certificate))
     if lack:
         note(lack)
     return 0 if found.found and not lack else 1
+
+
+def _say_path(path: Any, written: tuple[Path | None, ...]) -> None:
+    """Print the moves or waypoints of a path, if there is one, and the files that it was written to."""
+    if path is None:
+        return
+    from rrtik_ompl.cli import plan_report as report
+
+    say(report.moves_table(path) if path.one_joint_at_a_time else report.waypoints_table(path))
+    say(*(f"wrote {file}" for file in written if file is not None))
 
 
 def _write(problem: Any, path: Any, raw: Any, out: Path | None, html: Path | None, certificate: Path | None) -> str:

@@ -10,6 +10,7 @@ from rich.table import Table
 
 from rrtik_ompl.goal import JointGoal, PositionGoal
 from rrtik_ompl.moves.text import COLUMNS, moves_document
+from rrtik_ompl.ompl_bridge.planner_names import AUTO, is_auto
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning import Plan
 from rrtik_ompl.problem import Problem
@@ -76,9 +77,22 @@ def fewest_moves(problem: Problem, plan: Plan) -> int | None:
     return max(lower_bound(problem.start, problem.goal.q), int(plan.statistics.get("lower_bound", 0)))
 
 
-def summary(problem: Problem, plan: Plan, path: JointPath | None, shorten_seconds: float) -> list[str]:
-    """A few lines that say what was found, how good it is, and how long it took."""
-    lines = [f"problem {problem.name}, robot {problem.world.robot.name}, planner {plan.planner}, seed {plan.seed}"]
+def summary(
+    problem: Problem, plan: Plan, path: JointPath | None, shorten_seconds: float, named: str | None = None
+) -> list[str]:
+    """A few lines that say what was found, by which planner and why by that, how good it is, and how long it took.
+
+    Args:
+        problem: What was to be solved.
+        plan: The outcome.
+        path: What became of its path.
+        shorten_seconds: What that took [s].
+        named: The planner that was asked for, or None.
+    """
+    asked = named or problem.planner or AUTO
+    why = "" if named == plan.planner else f" ({asked})" if is_auto(asked) else " (named by the problem)"
+    planner = f"planner {plan.planner}{why}"
+    lines = [f"problem {problem.name}, robot {problem.world.robot.name}, {planner}, seed {plan.seed}"]
     if plan.path is None or path is None:
         return [*lines, f"not found: {plan.reason}"]
     bound = fewest_moves(problem, plan)

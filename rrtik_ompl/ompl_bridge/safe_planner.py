@@ -66,6 +66,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     one_joint: ClassVar[bool] = False
     brief_options: ClassVar[Mapping[str, Any]] = MappingProxyType({})
     proof_iterations: ClassVar[int] = 0
+    portfolio_turn: ClassVar[int] = 0
 
     def __init__(
         self, si: ob.SpaceInformation, name: str, *, world: MotionQueries | None = None, seed: int | None = None

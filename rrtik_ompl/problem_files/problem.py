@@ -45,6 +45,7 @@ class ProblemFile(Section):
         ge=FINEST_RESOLUTION,
         description="largest step of any point of the arm between two checked configurations [m]",
     )
+    planner: str | None = Field(None, description="planner that is used where none is named (rrtik list planners)")
     run: RunSection | None = Field(None, description="how to replan while the obstacles move (rrtik replan)")
 
 
@@ -69,8 +70,9 @@ def load_problem(name_or_file: FilePath, *, robot: Robot | FilePath | None = Non
         start = entry.start.configuration(world.robot)
     with document.at(("goal",)):
         goal = build_goal(entry.goal, world.robot)
+    planner = _planner(document, entry.planner)
     try:
-        return Problem(world, start, goal, name=path.stem)
+        return Problem(world, start, goal, name=path.stem, planner=planner)
     except ProblemError as error:
         line = document.lines[(error.part,)]
         error.args = (f"{path}:{line}: {error}",)
@@ -101,7 +103,8 @@ def save_problem(problem: Problem, path: FilePath) -> None:
     scene = scene_data(world.scene, folder)
     data |= {"scene": scene} if scene else {}
     data |= {"start": {"joints": problem.start.tolist()}, "goal": goal_data(problem.goal)}
-    write_yaml(path, data | {"motion_resolution": float(world.motion_resolution)})
+    data |= {"motion_resolution": float(world.motion_resolution)}
+    write_yaml(path, data if problem.planner is None else data | {"planner": problem.planner})
 
 
 def problem_schema() -> dict[str, Any]:
@@ -125,6 +128,16 @@ def problem_path(name_or_file: FilePath) -> Path:
         if path.is_file():
             return path
         raise
+
+
+def _planner(document: YamlDocument, name: str | None) -> str | None:
+    """The name of a planner, if there is such a planner."""
+    if name is not None:
+        from rrtik_ompl.ompl_bridge.planner_names import options_of  # loads OMPL, which few files need
+
+        with document.at(("planner",)):
+            options_of(name)
+    return name
 
 
 def _world(document: YamlDocument, entry: ProblemFile, robot: Robot | FilePath | None) -> World:

@@ -52,7 +52,7 @@ def test_the_same_seed_prints_the_same_moves(capsys):
 
 
 def test_json_is_one_object_with_everything(capsys):
-    code, out, _ = rrtik(capsys, "plan", "planar3_a", "--seed", "1", "--json")
+    code, out, _ = rrtik(capsys, "plan", "planar3_a", "--planner", "bicrdt", "--seed", "1", "--json")
     found = json.loads(out)
     assert code == 0
     assert found["found"] is True

@@ -15,6 +15,7 @@ from rrtik_ompl.errors import PlannerError
 from rrtik_ompl.ik.genetic.options import PRESETS
 from rrtik_ompl.ik.trajectory import list_ik_trajectory_methods
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult
+from rrtik_ompl.ompl_bridge.planner_names import find_planner
 from rrtik_ompl.ompl_bridge.planner_options import planner_options
 from rrtik_ompl.ompl_bridge.planner_traits import (
     OMPL_TRAITS,
@@ -24,7 +25,6 @@ from rrtik_ompl.ompl_bridge.planner_traits import (
     traits_of,
     unbound_planners,
 )
-from rrtik_ompl.planning import find_planner
 from rrtik_ompl.replanning import PLANNERS
 from rrtik_ompl.shortening import METHODS
 from rrtik_ompl.world import ACCURACIES
@@ -118,12 +118,6 @@ def test_options_that_a_problem_does_not_allow_are_refused_without_a_word_of_bre
     problem = rrtik_ompl.load_problem("planar3_b")
     with pytest.raises(PlannerError, match=r"^planner BiCRDT: frozen_joints: joint "):
         rrtik_ompl.plan(problem, "bicrdt", seed=1, parameters={"frozen_joints": [0]})
-
-
-def test_the_default_planner_is_data_of_the_packages():
-    assert catalog.default_planner() == "bicrdt"
-    problem = rrtik_ompl.load_problem("planar3_b")
-    assert rrtik_ompl.plan(problem, seed=1).planner == "bicrdt"
 
 
 @pytest.mark.parametrize("file", sorted(LIBRARY.rglob("*.py")), ids=lambda file: str(file.relative_to(LIBRARY)))

@@ -12,9 +12,10 @@ from ompl import base as ob
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.goal import PoseGoal, PositionGoal
+from rrtik_ompl.ompl_bridge.planner_names import find_planner, list_planners
 from rrtik_ompl.ompl_bridge.setup import ValidityCallback
 from rrtik_ompl.path import JointPath
-from rrtik_ompl.planning import find_planner, list_planners, plan
+from rrtik_ompl.planning import plan
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.scene import Obstacle, Scene

@@ -4,21 +4,38 @@ from __future__ import annotations
 
 from rrtik_ompl import catalog
 from rrtik_ompl.errors import UnknownNameError
+from rrtik_ompl.ompl_bridge.planner_options import planner_options
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, ompl_planners
+
+AUTO = "auto"  # a portfolio of planners, which `plan()` runs where none is named
 
 _OMPL_PREFIX, _MOVEIT_SUFFIX = "geometric::", "kConfigDefault"  # as in ompl_planning.yaml
 
 
 def list_planners() -> tuple[str, ...]:
-    """Names of all planners: ours and those of other packages in lower case, OMPL's as OMPL writes them."""
-    return (*catalog.list_planners(), *sorted(ompl_planners()))
+    """Names of all planners: "auto", ours and those of other packages in lower case, OMPL's as OMPL writes them."""
+    return (AUTO, *catalog.list_planners(), *sorted(ompl_planners()))
+
+
+def is_auto(name: str) -> bool:
+    """Whether a name means the portfolio, which is no class."""
+    return name.lower() == AUTO
+
+
+def options_of(name: str) -> tuple[str, ...]:
+    """Names of the options that a planner takes; the portfolio takes none.
+
+    Raises:
+        UnknownNameError: If there is no such planner; carries all names.
+    """
+    return () if is_auto(name) else tuple(planner_options(find_planner(name)))
 
 
 def find_planner(name: str) -> PlannerFactory:
     """The planner class of a name, in upper or lower case; MoveIt's way of writing OMPL's names is understood too.
 
     Raises:
-        UnknownNameError: If there is none; carries all names.
+        UnknownNameError: If there is none, as of "auto"; carries all names.
     """
     bare = name.removeprefix(_OMPL_PREFIX).removesuffix(_MOVEIT_SUFFIX).lower()
     wheel = {key.lower(): value for key, value in ompl_planners().items()}

@@ -1,0 +1,73 @@
+"""One planner at one problem, within a time limit: attempts, second check, and an outcome in words."""
+
+from __future__ import annotations
+
+import time
+from types import MappingProxyType
+
+import numpy as np
+
+from rrtik_ompl.fast.simd.library import library
+from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.ik.methods import load_kernels
+from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.planning.outcome import Plan, Request
+from rrtik_ompl.planning.search import Search
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.world.proof import PROOF_KERNELS
+
+
+def run_planner(problem: Problem, name: str, factory: PlannerFactory, request: Request) -> Plan:
+    """Let a planner search for a path that the second check accepts.
+
+    Args:
+        problem: What to solve.
+        name: Of the planner, for messages.
+        factory: Makes the planner.
+        request: Time, seed and the rest.
+
+    Raises:
+        InputError: If the planner does not take a parameter.
+        PlannerError: If the planner broke.
+    """
+    children = np.random.SeedSequence(request.seed).generate_state(request.restarts + 1, np.uint32)
+    _load_kernels(problem, factory)
+    begin = time.perf_counter()
+    search = Search(
+        problem,
+        factory,
+        name,
+        begin + request.seconds,
+        [int(child) for child in children],
+        request.parameters,
+        request.proof,
+        request.clearance,
+    )
+    if _nothing_to_do(problem):  # some planners return a detour, others crash
+        still = JointPath.of(problem.robot, problem.start[None])
+        path: JointPath | None = still if request.proof == "off" else still.proved(problem.world)
+    else:
+        path = search.run()
+    elapsed, reason = time.perf_counter() - begin - search.counting, search.reason
+    if path is None and elapsed >= request.seconds:
+        attempts = search.totals["attempts"]
+        tried = f"{attempts} attempt{'s' * (attempts != 1)}"
+        reason = f"no path within {request.seconds:g} s ({tried}; the last one: {reason or 'out of time'})"
+    return Plan(path is not None, path, reason, elapsed, name, request.seed, MappingProxyType(search.totals))
+
+
+def _load_kernels(problem: Problem, factory: PlannerFactory) -> None:
+    """Load what the search will use: compiling it for the first time is no part of planning."""
+    if not isinstance(problem.goal, JointGoal):
+        load_kernels(problem.robot)
+    if problem.world.fast is not None:
+        for name in (*traits_of(factory).kernels, PROOF_KERNELS):
+            library(name)
+
+
+def _nothing_to_do(problem: Problem) -> bool:
+    """Whether the start is the goal, to the bit if that is a configuration; a `Problem` has checked its start."""
+    if isinstance(problem.goal, JointGoal):
+        return bool((problem.start == problem.goal.q).all())
+    return problem.reached(problem.start)

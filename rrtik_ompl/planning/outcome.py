@@ -1,0 +1,61 @@
+"""What `plan()` is asked for, and what it returns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rrtik_ompl.choices import ProofMode
+from rrtik_ompl.path import JointPath
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Request:
+    """What `plan()` is asked for beside the problem and the planner; every value has been checked.
+
+    Attributes:
+        seconds: Time limit [s].
+        seed: Of everything random.
+        restarts: Further attempts at most.
+        parameters: Options of the planner.
+        proof: Whether motions are to be proven.
+        clearance: To be kept from obstacles [m], or None.
+    """
+
+    seconds: float
+    seed: int
+    restarts: int
+    parameters: Mapping[str, Any]
+    proof: ProofMode
+    clearance: float | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """The outcome of planning.
+
+    Attributes:
+        found: Whether there is a path.
+        path: The path, or None.
+        reason: "" if found, else a line that says why not.
+        seconds: Wall time of everything: planning, restarts and re-checks [s]; without what it took to count how
+            large an OMPL planner's graph has become.
+        planner: Name of the planner; with "auto" of the one that found the path, or that tried last.
+        seed: The seed that repeats this plan.
+        statistics: Plain counts, added up over all attempts: attempts, rejected paths, and the planner's own. Those
+            that describe the path (``path_statistics`` of the planner's class) are the last attempt's.
+    """
+
+    found: bool
+    path: JointPath | None
+    reason: str
+    seconds: float
+    planner: str
+    seed: int
+    statistics: Mapping[str, int | float]
+
+    @property
+    def proven(self) -> bool | None:
+        """Whether every motion of the path is proven free for its whole length; None without a path or a proof."""
+        return None if self.path is None or self.path.proof is None else self.path.proof.proven

@@ -1,0 +1,94 @@
+"""The planner "auto": planners that make up for each other's weaknesses, by turns, and a little shortening."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any
+
+from rrtik_ompl.errors import InputError, PlannerError
+from rrtik_ompl.fast.search.shortcut_layout import KERNELS
+from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner
+from rrtik_ompl.ompl_bridge.planner_traits import planners_with
+from rrtik_ompl.planning.one_planner import run_planner
+from rrtik_ompl.planning.outcome import Plan, Request
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.shortening import shorten
+from rrtik_ompl.world.motion_queries import has_kernels
+
+SHARE = 0.5  # of the time left, for each planner but the last
+SHORTENING_SECONDS = 0.02  # at most
+
+
+def run_portfolio(problem: Problem, request: Request) -> Plan:
+    """Let one planner after the other search until one finds a path, best a proven one, and shorten that.
+
+    Args:
+        problem: What to solve.
+        request: Time, seed and the rest; options of planners make no sense here.
+
+    Returns:
+        The plan of the planner that found the path, with the time and the counts of all that tried.
+
+    Raises:
+        InputError: If there are options, or no package offers a planner for this.
+        PlannerError: If every planner broke.
+    """
+    if request.parameters:
+        named = ", ".join(request.parameters)
+        raise InputError(f"planner '{AUTO}' takes no options, got {named}; name the planner that they are for")
+    best, reasons, totals, spent = _search(problem, request)
+    path, left = best.path, request.seconds - spent
+    if path is not None and len(path.waypoints) > 2 and left > 0.0:
+        has_kernels(problem.world, KERNELS)  # loads them, which is no part of planning
+        begin = time.perf_counter()
+        limits: dict[str, Any] = {"seconds": min(SHORTENING_SECONDS, left), "clearance": request.clearance}
+        shorter = shorten(path, problem, method="auto", seed=request.seed, **limits)
+        path = shorter.with_waypoints(shorter.waypoints) if request.proof == "off" else shorter
+        spent += time.perf_counter() - begin
+    reason = "" if best.found else reasons
+    return replace(best, path=path, reason=reason, seconds=spent, statistics=MappingProxyType(totals))
+
+
+def _search(problem: Problem, request: Request) -> tuple[Plan, str, dict[str, int | float], float]:
+    """The best plan of the planners that tried, why the others found none, the counts of all, and their time [s]."""
+    names, spent = members(problem), 0.0
+    best: Plan | None = None
+    broken: PlannerError | None = None
+    reasons: list[str] = []
+    totals: dict[str, int | float] = {}
+    for number, name in enumerate(names):
+        share = 1.0 if number == len(names) - 1 else SHARE
+        left = share * (request.seconds - spent)
+        if left <= 0.0:
+            break
+        try:
+            tried = run_planner(problem, name, find_planner(name), replace(request, seconds=left))
+        except PlannerError as error:
+            broken = error
+            reasons.append(str(error))
+            continue
+        spent += tried.seconds
+        for key, value in tried.statistics.items():
+            totals[key] = totals.get(key, 0) + value
+        reasons += [] if tried.found else [f"{name}: {tried.reason}"]
+        best = tried if best is None or _rank(tried) < _rank(best) else best
+        if best.found and best.proven is not False:
+            break
+    if best is None:
+        raise broken or InputError(f"planner '{AUTO}': no planner is installed; name one of OMPL's, such as RRTConnect")
+    return best, "; ".join(reasons), totals, spent
+
+
+def members(problem: Problem) -> tuple[str, ...]:
+    """Names of the planners that try a problem, in their order: those that seek the tip only if the goal is one."""
+    tip = not isinstance(problem.goal, JointGoal)
+    found = planners_with(lambda traits: traits.portfolio_turn and (tip or not traits.finds_goals))
+    return tuple(sorted(found, key=lambda name: found[name].portfolio_turn))
+
+
+def _rank(plan: Plan) -> tuple[bool, bool]:
+    """What is to be small: no path, then a path that is not proven."""
+    return not plan.found, plan.proven is False

@@ -1,0 +1,130 @@
+"""The planner "auto": who tries, in what order, what becomes of the path; and the planner that a problem names."""
+
+import numpy as np
+import pytest
+
+from rrtik_ompl import Problem, load_problem, plan, plan_batch, save_problem
+from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
+from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult
+from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner
+from rrtik_ompl.planning import portfolio
+from rrtik_ompl.planning.portfolio import members
+
+
+@pytest.fixture(scope="module")
+def boxes():
+    """To a configuration."""
+    question = load_problem("planar3_boxes")
+    return Problem(question.world, question.start, plan(question, "fastrrtconnect", seed=0).path.end)
+
+
+@pytest.fixture(scope="module")
+def pose():
+    return load_problem("planar6_c_pose")
+
+
+class Idle(SafePlanner):
+    """Finds nothing, at once."""
+
+    def __init__(self, si, *, world=None, seed=None):
+        super().__init__(si, "Idle", world=world, seed=seed)
+
+    def search(self, starts, goals, checker, ptc):
+        return SearchResult(None, {"iterations": 1})
+
+
+class Broken(Idle):
+    """Breaks."""
+
+    def search(self, starts, goals, checker, ptc):
+        raise RuntimeError("no luck")
+
+
+def replaced(monkeypatch, **classes):
+    """Other classes under the names of some planners of the portfolio."""
+    monkeypatch.setattr(portfolio, "find_planner", lambda name: classes.get(name) or find_planner(name))
+
+
+def test_planners_that_seek_the_tip_try_goals_of_the_tip_alone(boxes, pose):
+    joints, tip = members(boxes), members(pose)
+    assert joints[:2] == ("fastrrtconnect", "bicrdt")
+    assert set(tip) > set(joints)
+
+
+def test_the_default_is_the_portfolio_and_its_path_is_shorter_than_what_was_found(boxes):
+    found, first = plan(boxes, seed=3), plan(boxes, "fastrrtconnect", seed=3)
+    assert found.planner == "fastrrtconnect"
+    assert found.proven
+    assert found.path.length < first.path.length
+    assert (found.path.start == boxes.start).all()
+    assert boxes.reached(found.path.end)
+    assert found.path.proof.clearance >= 1e-3
+
+
+def test_the_next_planner_tries_where_one_finds_nothing_or_breaks(boxes, monkeypatch):
+    for other in (Idle, Broken):
+        replaced(monkeypatch, fastrrtconnect=other)
+        found = plan(boxes, seed=1)
+        assert found.planner == "bicrdt"
+        assert found.found
+        assert found.proven
+
+
+def test_where_nobody_finds_a_path_the_reason_names_everybody(boxes, monkeypatch):
+    replaced(monkeypatch, fastrrtconnect=Idle, bicrdt=Idle)
+    nothing = plan(boxes, seed=1, seconds=1.0)
+    assert not nothing.found
+    assert "fastrrtconnect: " in nothing.reason
+    assert "bicrdt: " in nothing.reason
+    assert nothing.statistics["attempts"] >= 2
+    replaced(monkeypatch, fastrrtconnect=Broken, bicrdt=Broken)
+    with pytest.raises(PlannerError, match="no luck"):
+        plan(boxes, seed=1, seconds=1.0)
+
+
+def test_the_portfolio_takes_no_options(boxes):
+    with pytest.raises(InputError, match="'auto' takes no options, got range; name the planner"):
+        plan(boxes, "auto", parameters={"range": 0.3})
+
+
+def test_without_proofs_nothing_is_said_of_them(boxes):
+    found = plan(boxes, seed=1, proof="off")
+    assert found.found
+    assert found.proven is None
+
+
+def test_a_start_that_is_the_goal_is_its_own_path(boxes):
+    still = plan(Problem(boxes.world, boxes.start, boxes.start))
+    assert still.found
+    assert len(still.path.waypoints) == 1
+
+
+def test_a_problem_names_its_planner(boxes, tmp_path):
+    named = Problem(boxes.world, boxes.start, boxes.goal, planner="bicrdt")
+    assert plan(named, seed=1).planner == "bicrdt"
+    assert plan(named, AUTO, seed=1).planner == "fastrrtconnect"
+    file = tmp_path / "named.yaml"
+    save_problem(named, file)
+    again = load_problem(file)
+    assert again.planner == "bicrdt"
+    assert np.array_equal(plan(again, seed=1).path.waypoints, plan(named, seed=1).path.waypoints)
+    (record,) = plan_batch([file], seed=1)
+    assert record["status"] == "solved"
+    assert record["transitions"] <= len(record["waypoints"])  # moves of one joint, as that planner's are
+
+
+def test_a_planner_that_there_is_not_is_named_with_its_line(boxes, tmp_path):
+    file = tmp_path / "typo.yaml"
+    save_problem(Problem(boxes.world, boxes.start, boxes.goal, planner="bicrdt"), file)
+    text = file.read_text()
+    line = 1 + text[: text.index("planner:")].count("\n")
+    file.write_text(text.replace("planner: bicrdt", "planner: bicrtd"))
+    with pytest.raises(InputError, match=rf"typo.yaml:{line}: planner: no planner 'bicrtd'; .* did you mean 'bicrdt'"):
+        load_problem(file)
+    with pytest.raises(UnknownNameError, match="no planner 'bicrtd'"):
+        plan(Problem(boxes.world, boxes.start, boxes.goal, planner="bicrtd"))
+
+
+def test_problems_of_the_arm_that_is_driven_joint_by_joint_name_such_a_planner():
+    problem = load_problem("titan4_prisms")
+    assert plan(problem, seed=1).path.one_joint_at_a_time
