@@ -72,6 +72,7 @@ def mesh(name, data, rest=""):
 
 CHECK = ("check", "task.yaml")
 # fmt: off
+OPTION = ("plan", "task.yaml", "--planner", "bicrdt", "--set")
 COMMAND_LINE = {
     # files
     "missing problem file": ({}, CHECK, ["task.yaml", "no such file"]),
@@ -220,10 +221,10 @@ COMMAND_LINE = {
     "endless time": (task(), ("plan", "task.yaml", "--seconds", "1e400"), ["seconds: must be a finite number"]),
     "more time than a clock has": (task(), ("plan", "task.yaml", "--seconds", "1e10"), ["seconds", "1e+09 or less"]),
     "endless restarts": (task(), ("plan", "task.yaml", "--restarts", "99999999999"), ["restarts", "from 0 to"]),
-    "parameter that nobody has": (task(), ("plan", "task.yaml", "--planner", "bicrdt", "--set", "max_iteration=9"),
+    "parameter that nobody has": (task(), (*OPTION, "max_iteration=9"),
                                   ["max_iteration", "did you mean 'max_iterations'"]),
-    "parameter that is not given by hand": (task(), ("plan", "task.yaml", "--planner", "bicrdt", "--set", "world=1"), ["world", "max_iter"]),
-    "parameter of another type": (task(), ("plan", "task.yaml", "--planner", "bicrdt", "--set", "max_iterations=few"), ["max_it", "'few'"]),
+    "parameter that is not given by hand": (task(), (*OPTION, "world=1"), ["world", "max_iter"]),
+    "parameter of another type": (task(), (*OPTION, "max_iterations=few"), ["max_it", "'few'"]),
     "parameter is nan": (task(), ("plan", "task.yaml", "--planner", "RRT", "--set", "range=NaN"), ["range", "finite"]),
     "time is nan": (task(), ("plan", "task.yaml", "--seconds", "nan"), ["seconds"]),
     "negative restarts": (task(), ("plan", "task.yaml", "--restarts", "-1"), ["restarts"]),
