@@ -218,7 +218,13 @@ def _recipe(name: str | os.PathLike[str]) -> _Recipe:
 
 @cache
 def _offers(group: str) -> dict[str, EntryPoint]:
-    return {entry.name: entry for entry in entry_points(group=f"rrtik_ompl.{group}")}
+    return {entry.name: entry for entry in _entry_points().select(group=f"rrtik_ompl.{group}")}
+
+
+@cache
+def _entry_points() -> Any:
+    """Those of all groups: looking through the installed packages takes most of the time."""
+    return entry_points()
 
 
 def _load(what: str, group: str, name: str) -> Any:

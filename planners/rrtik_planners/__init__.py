@@ -1,12 +1,35 @@
-"""Our motion planners, each an ``ompl.base.Planner``, one idea per file."""
+"""Our motion planners, each an ``ompl.base.Planner``, one idea per file, imported when it is asked for."""
 
-from rrtik_planners.bicrdt import BiCRDT
-from rrtik_planners.crdt import CRDT
-from rrtik_planners.drrt_con import DRRTCon
-from rrtik_planners.fast_rrt_connect import FastRRTConnect
-from rrtik_planners.fewest_moves import FewestMoves
-from rrtik_planners.ikurt import IKURT
-from rrtik_planners.ikurt_published import IKURTPublished
-from rrtik_planners.mbrrt import MBRRT
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rrtik_planners.bicrdt import BiCRDT as BiCRDT
+    from rrtik_planners.crdt import CRDT as CRDT
+    from rrtik_planners.drrt_con import DRRTCon as DRRTCon
+    from rrtik_planners.fast_rrt_connect import FastRRTConnect as FastRRTConnect
+    from rrtik_planners.fewest_moves import FewestMoves as FewestMoves
+    from rrtik_planners.ikurt import IKURT as IKURT
+    from rrtik_planners.ikurt_published import IKURTPublished as IKURTPublished
+    from rrtik_planners.mbrrt import MBRRT as MBRRT
 
 __all__ = ["CRDT", "IKURT", "MBRRT", "BiCRDT", "DRRTCon", "FastRRTConnect", "FewestMoves", "IKURTPublished"]
+
+_MODULES = {
+    "BiCRDT": "bicrdt",
+    "CRDT": "crdt",
+    "DRRTCon": "drrt_con",
+    "FastRRTConnect": "fast_rrt_connect",
+    "FewestMoves": "fewest_moves",
+    "IKURT": "ikurt",
+    "IKURTPublished": "ikurt_published",
+    "MBRRT": "mbrrt",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULES:
+        raise AttributeError(f"module 'rrtik_planners' has no attribute '{name}'")
+    return getattr(import_module(f"rrtik_planners.{_MODULES[name]}"), name)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import cache
 from types import MappingProxyType
 from typing import Any
 
@@ -11,7 +12,7 @@ from rrtik_ompl.errors import InputError, PlannerError
 from rrtik_ompl.fast.search.shortcut_layout import KERNELS
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner
-from rrtik_ompl.ompl_bridge.planner_traits import planners_with
+from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits, planners_with
 from rrtik_ompl.planning.one_planner import run_planner
 from rrtik_ompl.planning.outcome import Plan, Request
 from rrtik_ompl.problem import Problem
@@ -85,8 +86,14 @@ def _search(problem: Problem, request: Request) -> tuple[Plan, str, dict[str, in
 def members(problem: Problem) -> tuple[str, ...]:
     """Names of the planners that try a problem, in their order: those that seek the tip only if the goal is one."""
     tip = not isinstance(problem.goal, JointGoal)
-    found = planners_with(lambda traits: traits.portfolio_turn and (tip or not traits.finds_goals))
-    return tuple(sorted(found, key=lambda name: found[name].portfolio_turn))
+    return tuple(name for name, traits in _by_turn() if tip or not traits.finds_goals)
+
+
+@cache
+def _by_turn() -> tuple[tuple[str, PlannerTraits], ...]:
+    """The planners of the portfolio and their traits, in the order of their turns."""
+    found = planners_with(lambda traits: traits.portfolio_turn)
+    return tuple(sorted(found.items(), key=lambda item: item[1].portfolio_turn))
 
 
 def _rank(plan: Plan) -> tuple[bool, bool]:

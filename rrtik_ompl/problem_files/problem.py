@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import Field
 
-from rrtik_ompl.catalog import find_problem, load_robot, robot_from_entry
+from rrtik_ompl.catalog import find_problem, list_planners, load_robot, robot_from_entry
 from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError, require
 from rrtik_ompl.files.sections import Positive, Section, Version, parse, without_null
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml, write_yaml
@@ -132,7 +132,7 @@ def problem_path(name_or_file: FilePath) -> Path:
 
 def _planner(document: YamlDocument, name: str | None) -> str | None:
     """The name of a planner, if there is such a planner."""
-    if name is not None:
+    if name is not None and name.lower() not in list_planners():
         from rrtik_ompl.ompl_bridge.planner_names import options_of  # loads OMPL, which few files need
 
         with document.at(("planner",)):
