@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
@@ -143,9 +144,9 @@ class Scene:
             raise InputError(f"allowed_collisions of a scene must be pairs of names, got {list(pairs)}")
         object.__setattr__(self, "allowed_collisions", pairs)
         names = self.names
-        for name in names:
-            if names.count(name) > 1:
-                raise InputError(f"scene: the name '{name}' is used {names.count(name)} times; names must differ")
+        if len(set(names)) < len(names):
+            name, times = Counter(names).most_common(1)[0]
+            raise InputError(f"scene: the name '{name}' is used {times} times; names must differ")
 
     def __repr__(self) -> str:
         return f"Scene({', '.join(self.names) or 'empty'})"
@@ -168,6 +169,8 @@ class Scene:
 
     def at(self, time: float) -> Scene:
         """The scene with ``time`` [s] as its time 0: moving obstacles are where their motion puts them, and go on."""
+        if all(o.motion is None for o in self.obstacles):
+            return self
         moved = (
             o if o.motion is None else replace(o, pose=o.motion.pose_at(o.pose, time), motion=o.motion.seen_from(time))
             for o in self.obstacles

@@ -97,23 +97,31 @@ def colliding_pairs(robot: Robot, scene: Scene, bodies: tuple[Body, ...]) -> tup
     allowed = _allowed(robot, scene)
     parent = _carrying_parents(robot, bodies)
     checked_links = _self_collision_names(robot)
-    found = []
-    for i, first in enumerate(bodies):
-        for j in range(i + 1, len(bodies)):
-            second = bodies[j]
-            if first.kind == "obstacle" and second.kind == "obstacle":
-                continue
-            names = frozenset((first.name, second.name))
-            if names in allowed or len(names) == 1:
-                continue
-            if "obstacle" not in (first.kind, second.kind):
-                if not robot.self_collision or first.joint == second.joint:
-                    continue
-                between_links = first.kind == second.kind == "link"
-                if between_links and (_adjacent(first.joint, second.joint, parent) or names not in checked_links):
-                    continue
-            found.append((i, j))
-    return tuple(found)
+    own = [k for k, body in enumerate(bodies) if body.kind != "obstacle"]
+    found = [
+        (i, j)
+        for place, i in enumerate(own if robot.self_collision else ())
+        for j in own[place + 1 :]
+        if _may_meet(bodies[i], bodies[j], parent, checked_links)
+        and frozenset((bodies[i].name, bodies[j].name)) not in allowed
+    ]
+    obstacles = [(k, body.name) for k, body in enumerate(bodies) if body.kind == "obstacle"]
+    for i in own:
+        met = {name for pair in allowed if bodies[i].name in pair for name in pair}
+        found += [(i, j) if i < j else (j, i) for j, name in obstacles if name not in met]
+    return tuple(sorted(found))
+
+
+def _may_meet(
+    first: Body, second: Body, parent: dict[int, int], checked_links: frozenset[frozenset[str]]
+) -> bool:
+    """Whether two bodies of the robot, or what it holds, must not touch, as long as nobody allows it."""
+    if first.name == second.name or first.joint == second.joint:
+        return False
+    if not first.kind == second.kind == "link":
+        return True
+    names = frozenset((first.name, second.name))
+    return names in checked_links and not _adjacent(first.joint, second.joint, parent)
 
 
 def _allowed(robot: Robot, scene: Scene) -> set[frozenset[str]]:

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import coal
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
-
-UNBOUNDED_METRES = 1e9  # [m] half extent of a half-space's box
+from rrtik_ompl.collision.body_arrays import body_arrays
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,11 +43,10 @@ class Boxes:
     """The boxes of bodies, in the frames that carry them."""
 
     def __init__(self, bodies: Sequence[Body]) -> None:
-        joints = np.array([b.joint for b in bodies], dtype=np.int64)
-        self._moving, self._standing = np.flatnonzero(joints > 0), np.flatnonzero(joints == 0)
-        self._joints = joints[self._moving]
-        self._placements = np.array([b.placement.homogeneous for b in bodies]).reshape(-1, 4, 4)
-        self._centres, self._halves = _local_boxes(bodies)
+        own = body_arrays(bodies)
+        self._moving, self._standing = np.flatnonzero(own.joints > 0), np.flatnonzero(own.joints == 0)
+        self._joints, self._placements = own.joints[self._moving], own.placements
+        self._centres, self._halves = own.centres, own.halves
         self._still = self._around(self._placements[self._standing], self._standing)
 
     def placed(self, frames: NDArray[np.float64]) -> PlacedBoxes:
@@ -73,18 +70,3 @@ class Boxes:
         rotations = poses[:, :3, :3]
         centres = np.einsum("kij,kj->ki", rotations, self._centres[bodies]) + poses[:, :3, 3]
         return centres, np.einsum("kij,kj->ki", np.abs(rotations), self._halves[bodies])
-
-
-def _local_boxes(bodies: Sequence[Body]) -> tuple[Matrix, Matrix]:
-    """Centres and half extents of the bodies' own bounding boxes, shapes (g, 3); a half-space has an endless one."""
-    centres, halves = np.zeros((len(bodies), 3)), np.full((len(bodies), 3), UNBOUNDED_METRES)
-    for k, body in enumerate(bodies):
-        if not isinstance(body.geometry, coal.Halfspace):
-            centres[k], halves[k] = body.geometry.aabb_local.center(), half_extents(body.geometry)
-    return centres, halves
-
-
-def half_extents(geometry: coal.CollisionGeometry) -> Vector:
-    """Half extents of a coal geometry's own bounding box, shape (3,)."""
-    box = geometry.aabb_local
-    return 0.5 * np.array([box.width(), box.height(), box.depth()])

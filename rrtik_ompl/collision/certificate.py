@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.body_arrays import body_arrays
 from rrtik_ompl.collision.boxes import Boxes, PlacedBoxes
 from rrtik_ompl.collision.containment import Containment
-from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, kept_apart, request
+from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, request
 from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.robot import Robot
 
@@ -36,11 +37,8 @@ class Certificate:
         self._boxes = Boxes(bodies)
         self._approach = approach_weights(robot, bodies, pairs)  # [m per rad or m], shape (pairs, dof)
         self._planes = _half_space_pairs(bodies, pairs)
-        self._margins = np.array([kept_apart(bodies[i], bodies[j]) for i, j in pairs])
+        self._margins = body_arrays(bodies).kept_apart(self._pairs)
         self._containment = Containment(bodies, pairs)
-        places = self._containment.places
-        ways = [(places.get((i, j), -1), places.get((j, i), -1)) for i, j in pairs]
-        self._hollow = np.array(ways, dtype=np.int64).reshape(-1, 2)
 
     def free(self, Q: Matrix) -> Mask:
         """Which rows of Q, shape (m, dof), are collision-free. Shape (m,). Quickest where rows follow a path."""
@@ -106,7 +104,7 @@ class Certificate:
     def _reached(self, frames: NDArray[np.float64], run: Numbers, pair: Numbers) -> Mask:
         """Which of the pairs may be of a body inside a hollow one, in the middle of their runs, shape (k,)."""
         reached = np.zeros(len(pair), dtype=bool)
-        for places in self._hollow[pair].T:
+        for places in self._containment.ways[pair].T:
             given = np.flatnonzero(places >= 0)
             reached[given] |= self._containment.reached(places[given], frames[run[given]])
         return reached
@@ -173,11 +171,10 @@ def _half_space_pairs(
     bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]
 ) -> dict[int, tuple[int, Vector, float]]:
     """Pairs with a half-space that does not move, by number: side of the other body, outward normal and offset."""
-    found = {}
-    for k, pair in enumerate(pairs):
-        for side in (0, 1):
-            body = bodies[pair[side]]
-            if isinstance(body.geometry, coal.Halfspace) and body.joint == 0:
-                normal = np.array(body.placement.rotation @ body.geometry.n)
-                found[k] = 1 - side, normal, float(body.geometry.d + normal @ body.placement.translation)
+    own, found = body_arrays(bodies), {}
+    standing = (own.half_spaces & (own.joints == 0))[np.array(pairs, dtype=np.int64).reshape(-1, 2)]
+    for k, side in np.argwhere(standing).tolist():
+        body = bodies[pairs[k][side]]
+        normal = np.array(body.placement.rotation @ body.geometry.n)
+        found[k] = 1 - side, normal, float(body.geometry.d + normal @ body.placement.translation)
     return found

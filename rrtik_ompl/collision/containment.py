@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import cached_property, lru_cache
 from typing import Any
 
 import coal
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix
+from rrtik_ompl.arrays import Mask, Matrix, frozen
 from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.collision.boxes import half_extents
+from rrtik_ompl.collision.body_arrays import body_arrays
 from rrtik_ompl.collision.enclosure import enclosure
-from rrtik_ompl.collision.shape_table import core_of
-from rrtik_ompl.collision.solids import inside_mesh, is_closed, is_mesh, mesh_arrays
+from rrtik_ompl.collision.shape_table import has_core
+from rrtik_ompl.collision.solids import SameObject, inside_mesh, is_closed, is_mesh, mesh_arrays
 
 ROUNDING = 1e-9  # [m]
+END_POINTS = np.concatenate([np.eye(3), -np.eye(3)])  # of a body about its origin, in half extents
 
 
 class Containment:
@@ -27,7 +29,8 @@ class Containment:
 
     Attributes:
         pairs: Numbers of the bodies, the one that may hold first.
-        places: The place of each of them in ``pairs``.
+        ways: For each pair that was given its places in ``pairs``, in the order given and the other one; -1 where the
+            second body cannot be inside the first. Shape (given, 2).
     """
 
     def __init__(
@@ -40,21 +43,33 @@ class Containment:
             pairs: Numbers of those that must not touch.
             covers: For each body balls that contain it, shape (n, 4), as a first look for :meth:`between`.
         """
-        both_ways = [*pairs, *((j, i) for i, j in pairs)]
-        solid = {o for o in {o for o, _ in both_ways} if _has_inside(bodies[o])}
-        self.pairs = [(o, i) for o, i in both_ways if o in solid and _may_hold(bodies[o].geometry, bodies[i].geometry)]
-        self.places = {pair: k for k, pair in enumerate(self.pairs)}
-        outer, inner = ([bodies[p[k]] for p in self.pairs] for k in (0, 1))
-        self._outer_joint = np.array([b.joint for b in outer], dtype=np.int64)
-        self._inner_joint = np.array([b.joint for b in inner], dtype=np.int64)
-        points = [np.array([b.placement.act(p) for p in _end_points(b.geometry)]) for b in inner]
-        self._points = np.array(points).reshape(-1, 6, 3)
-        self._to_outer = np.array([b.placement.inverse().homogeneous for b in outer]).reshape(-1, 4, 4)
-        self._centres = np.array([b.geometry.aabb_local.center() for b in outer]).reshape(-1, 3)
-        self._halves = np.array([half_extents(b.geometry) for b in outer]).reshape(-1, 3) + ROUNDING
+        own = body_arrays(bodies)
+        listed = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        holding = np.full(len(bodies), -np.inf)  # [m] around the middle of a hollow body that may hold others
+        for k in np.unique(listed).tolist():
+            if _has_inside(bodies[k]):
+                holding[k] = bodies[k].geometry.aabb_radius
+        both_ways = np.concatenate([listed, listed[:, ::-1]])
+        may_hold = own.halves.max(axis=1, initial=0.0)[both_ways[:, 1]] <= holding[both_ways[:, 0]]
+        outer, inner = both_ways[may_hold].T
+        self.pairs: list[tuple[int, int]] = list(zip(outer.tolist(), inner.tolist(), strict=True))
+        self.ways = np.where(may_hold, np.cumsum(may_hold) - 1, -1).reshape(2, -1).T
+        self._outer_joint, self._inner_joint = own.joints[outer], own.joints[inner]
+        held = np.unique(inner)
+        points = _end_points([bodies[k].geometry for k in held.tolist()], own.halves[held])
+        placed = points @ own.placements[held, :3, :3].transpose(0, 2, 1) + own.placements[held, None, :3, 3]
+        self._points = placed[np.searchsorted(held, inner)]
+        self._to_outer = np.linalg.inv(own.placements)[outer]
+        self._centres, self._halves = own.centres[outer], own.halves[outer] + ROUNDING
         everywhere = np.array([[0.0, 0.0, 0.0, np.inf]])
-        self._covers = {o: everywhere if covers is None else covers[o] for o, _ in self.pairs}
-        self._meshes = {o: bodies[o].geometry for o, _ in self.pairs}
+        hollow = np.unique(outer).tolist()
+        self._covers = {o: everywhere if covers is None else covers[o] for o in hollow}
+        self._meshes = {o: bodies[o].geometry for o in hollow}
+
+    @cached_property
+    def _places(self) -> dict[tuple[int, int], int]:
+        """The place of each of the pairs."""
+        return {pair: k for k, pair in enumerate(self.pairs)}
 
     def holds(self, pair: tuple[int, int], frames: NDArray[np.float64]) -> bool:
         """Whether one of two bodies holds the other.
@@ -63,7 +78,7 @@ class Containment:
             pair: Numbers of the bodies, in either order.
             frames: Pose of every joint frame in the world, world first, shape (joints + 1, 4, 4).
         """
-        return any(self._holds(self.places[p], frames) for p in (pair, pair[::-1]) if p in self.places)
+        return any(self._holds(self._places[p], frames) for p in (pair, pair[::-1]) if p in self._places)
 
     def reached(self, places: NDArray[np.int64], frames: NDArray[np.float64]) -> Mask:
         """Which of some pairs may be such: the ends of the inner body are in the bounding box of the outer one.
@@ -97,9 +112,9 @@ class Containment:
             pairs: Numbers of the bodies.
             joints: ``pinocchio.SE3`` of every joint frame in the world, world first.
         """
-        both_ways = (pair for i, j in pairs for pair in ((i, j), (j, i)) if pair in self.places)
+        both_ways = (pair for i, j in pairs for pair in ((i, j), (j, i)) if pair in self._places)
         for pair in both_ways:
-            k = self.places[pair]
+            k = self._places[pair]
             between = joints[int(self._outer_joint[k])].actInv(joints[int(self._inner_joint[k])])
             in_joint = self._points[k] @ between.rotation.T + between.translation
             local = in_joint @ self._to_outer[k, :3, :3].T + self._to_outer[k, :3, 3]
@@ -126,21 +141,28 @@ def _has_inside(body: Body) -> bool:
     return is_mesh(body.geometry) and (body.kind == "link" or is_closed(body.geometry))
 
 
-def _may_hold(outer: coal.CollisionGeometry, inner: coal.CollisionGeometry) -> bool:
-    if isinstance(inner, coal.Halfspace):
-        return False
-    return bool(half_extents(inner).max() <= outer.aabb_radius)
+def _end_points(geometries: Sequence[Any], halves: Matrix) -> NDArray[np.float64]:
+    """Six points of each body in its own frame, its extremes along the axes, shape (n, 6, 3).
+
+    Args:
+        geometries: The bodies.
+        halves: Half extents of their bounding boxes [m], shape (n, 3).
+    """
+    points: NDArray[np.float64] = END_POINTS * halves[:, None, :]
+    for k, geometry in enumerate(geometries):
+        if not has_core(geometry):
+            points[k] = _extremes(SameObject(geometry))
+    return points
 
 
-def _end_points(geometry: coal.CollisionGeometry) -> Matrix:
-    """Six points of the body in its own frame, its extremes along the axes, shape (6, 3)."""
-    if is_mesh(geometry):
-        vertices, triangles = mesh_arrays(geometry)
+@lru_cache(maxsize=512)
+def _extremes(key: SameObject) -> Matrix:
+    """The vertices of a mesh or a convex solid that are farthest along the axes, shape (6, 3); 0 of other kinds."""
+    if is_mesh(key.geometry):
+        vertices, triangles = mesh_arrays(key.geometry)
         points = vertices[np.unique(triangles)]
-    elif isinstance(geometry, coal.ConvexBase):
-        points = np.array(geometry.points()).reshape(-1, 3)
-    elif core_of(geometry) is not None:
-        return np.concatenate([np.eye(3), -np.eye(3)]) * half_extents(geometry)
+    elif isinstance(key.geometry, coal.ConvexBase):
+        points = np.array(key.geometry.points()).reshape(-1, 3)
     else:
         return np.zeros((6, 3))
-    return np.asarray(points[np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])])
+    return frozen(points[np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])])

@@ -28,7 +28,10 @@ def approach_weights(robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple
 
     A joint that carries both of them turns them as one.
     """
-    each = np.array([_body_weights(robot, body) for body in bodies]).reshape(-1, len(robot.chain.parent))
+    each = np.zeros((len(bodies), len(robot.chain.parent)))
+    for k, body in enumerate(bodies):
+        if body.joint > 0:
+            each[k] = _body_weights(robot, body)
     first, second = each[np.array(pairs, dtype=np.int64).reshape(-1, 2).T]
     return frozen(np.where((first > 0.0) & (second > 0.0), 0.0, first + second) @ np.abs(robot.chain.gain))
 
@@ -36,7 +39,7 @@ def approach_weights(robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple
 @lru_cache(maxsize=512)
 def _body_weights(robot: Robot, body: Body) -> Vector:
     """See :func:`_joint_weights`; cached, for the links of a robot are those of all its worlds."""
-    return frozen(_joint_weights(robot, _balls([body]) if body.joint > 0 else []))
+    return frozen(_joint_weights(robot, _balls([body])))
 
 
 def _balls(bodies: Iterable[Body]) -> list[tuple[int, Vector, float]]:

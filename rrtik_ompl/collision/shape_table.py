@@ -197,15 +197,22 @@ def sizes_of(geometry: Any) -> Vector | None:
     return None if row is None else row.sizes(geometry)
 
 
+def has_core(geometry: Any) -> bool:
+    """Whether a coal geometry has one of the simple cores."""
+    row = _BY_GEOMETRY.get(type(geometry))
+    return row is not None and row.core is not None
+
+
 def core_of(geometry: Any) -> Core | None:
     """The core of a coal geometry; None if it has none of the simple ones."""
-    return _core(SameObject(geometry)) if type(geometry) in _BY_GEOMETRY else None
+    return _core(SameObject(geometry)) if has_core(geometry) else None
 
 
 @lru_cache(maxsize=4096)  # a solid that moves keeps its own
-def _core(key: SameObject) -> Core | None:
+def _core(key: SameObject) -> Core:
     row = _BY_GEOMETRY[type(key.geometry)]
-    return None if row.core is None else row.core(*row.sizes(key.geometry).tolist())
+    assert row.core is not None
+    return row.core(*row.sizes(key.geometry).tolist())
 
 
 def shape_of(geometry: Any) -> Shape | None:

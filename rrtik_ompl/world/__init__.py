@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import warnings
 from dataclasses import replace
+from functools import cache, partial
 from typing import get_args
 
 import numpy as np
@@ -89,14 +90,15 @@ class World:
         self.bodies = link_bodies(robot) + scene_bodies(robot, self.scene.at(0.0))
         self.weights = displacement_weights(robot, [b for b in self.bodies if b.kind != "obstacle"])
         pairs = colliding_pairs(robot, self.scene, self.bodies)
-        moving = tuple(p for p in pairs if any(self.bodies[i].joint > 0 for i in p))
+        moves = [body.joint > 0 for body in self.bodies]
+        moving = tuple((i, j) for i, j in pairs if moves[i] or moves[j])
         self.pairs = pairs
         self.accuracy = one_of(ACCURACIES, accuracy, "accuracy")
-        self._certificate = Certificate(robot, self.bodies, pairs)
+        self._certificate = cache(partial(Certificate, robot, self.bodies, pairs))
         self._motions: FastMotions | None = None
         self._proven_clearance: float | None = None
         self._checks = ExactChecker(robot, self.bodies, moving, conservative=accuracy == "conservative")
-        standing = tuple(p for p in pairs if all(self.bodies[i].joint == 0 for i in p))
+        standing = tuple((i, j) for i, j in pairs if not (moves[i] or moves[j]))
         self._always_colliding = fixed_contact(robot, self.bodies, standing) is not None
         self.prover = Prover(robot, self.bodies, moving, always_colliding=self._always_colliding)
 
@@ -225,7 +227,7 @@ class World:
         rows = self._rows(q, 1)
         found = list(measured(self.bodies, self.pairs, self.robot.joint_frames(rows)[0], near_only=True))
         if not found:
-            found = [inside(*names) for names in self._certificate.first_pairs(rows) if names is not None]
+            found = [inside(*names) for names in self._certificate().first_pairs(rows) if names is not None]
         return tuple(sorted(found, key=lambda c: c.clearance))
 
     def closest(self, q: ArrayLike, *, known_free: bool = False) -> Contact | None:
@@ -258,7 +260,7 @@ class World:
     def certify(self, Q: ArrayLike) -> Mask:
         """A second opinion on the rows of Q, independent of the checks that planners use. Shape (m,)."""
         mask = self.robot.within_limits(rows := self._rows(Q, 2))
-        mask[mask] = self._certificate.free(rows[mask])
+        mask[mask] = self._certificate().free(rows[mask])
         return mask
 
     def _both_ends(self, A: ArrayLike, B: ArrayLike) -> tuple[Matrix, Matrix]:

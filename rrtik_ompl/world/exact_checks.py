@@ -9,6 +9,7 @@ last support points and have been seen to miss overlaps.
 from __future__ import annotations
 
 import copy
+from functools import cache
 from typing import Any
 
 import coal
@@ -49,9 +50,8 @@ class ExactChecker:
         self._robot, self._bodies = robot, bodies
         self._pairs, self._covers = pairs, covers
         self._data = robot.model.createData()
-        self._standing = {k: self._transform(k) for k, body in enumerate(bodies) if body.joint == 0}
-        self._approaches = dict(zip(pairs, approach_weights(robot, bodies, pairs), strict=True))
-        self._containment = Containment(bodies, pairs, [outer for outer, _ in covers])
+        self._approaches = cache(lambda: dict(zip(pairs, approach_weights(robot, bodies, pairs), strict=True)))
+        self._containment = cache(lambda: Containment(bodies, pairs, [outer for outer, _ in covers]))
 
     def as_conservative(self, conservative: bool) -> ExactChecker:
         """The same checker, conservative or not; shares the tables."""
@@ -108,7 +108,7 @@ class ExactChecker:
             if gaps is None:
                 return False
             for pair, gap in zip(left, gaps, strict=True):
-                approach = float(self._approaches[pair] @ travel)  # [m] along the whole motion
+                approach = float(self._approaches()[pair] @ travel)  # [m] along the whole motion
                 certain = max(gap - DISTANCE_TOLERANCE, 0.0)
                 reach = int(min(steps * certain / approach, steps)) if approach > 0.0 else steps
                 mask = cleared.setdefault(pair, np.zeros(steps + 1, dtype=bool))
@@ -130,13 +130,13 @@ class ExactChecker:
         for i, j in pairs:
             for k in (i, j):
                 if k not in transforms:
-                    transforms[k] = self._standing.get(k) or self._transform(k)
+                    transforms[k] = self._transform(k)
             ends = (self._bodies[i].geometry, transforms[i], self._bodies[j].geometry, transforms[j])
             gap = distance(*ends, kept_apart(self._bodies[i], self._bodies[j]))
             if gap is None:
                 return None
             gaps.append(gap)
-        return None if self._containment.between(pairs, self._data.oMi) else gaps
+        return None if self._containment().between(pairs, self._data.oMi) else gaps
 
     def _transform(self, number: int) -> Any:
         """Coal's pose of a body in the world."""

@@ -1,0 +1,64 @@
+"""What the checks of a world ask of every body, as arrays: one call for thousands of bodies, whatever their number."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import coal
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.collision.bodies import Body
+
+UNBOUNDED_METRES = 1e9  # [m] half extent of a half-space's box
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyArrays:
+    """Numbers of n bodies.
+
+    Attributes:
+        joints: Pinocchio's numbers of their joints, 0 for what stands still, shape (n,).
+        placements: Their poses in the joints' frames, shape (n, 4, 4).
+        centres, halves: Of their bounding boxes in their own frames [m], shape (n, 3) each; a half-space has an endless
+            box about its origin.
+        half_spaces: Which are half-spaces, shape (n,).
+        margins: What has to stay away from each [m], shape (n,).
+    """
+
+    joints: NDArray[np.int64]
+    placements: NDArray[np.float64]
+    centres: Matrix
+    halves: Matrix
+    half_spaces: Mask
+    margins: Vector
+
+    def kept_apart(self, pairs: NDArray[np.int64]) -> Vector:
+        """How far the bodies of pairs, shape (k, 2), must stay apart [m]; see :func:`.margins.kept_apart`."""
+        first, second = pairs.T
+        standing = (self.joints[first] == 0) & (self.joints[second] == 0)
+        return np.where(standing, 0.0, self.margins[first] + self.margins[second])
+
+
+def body_arrays(bodies: Sequence[Body]) -> BodyArrays:
+    """Numbers of bodies; kept, for several checks of one world ask for the same."""
+    return _body_arrays(tuple(bodies))
+
+
+@lru_cache(maxsize=4)
+def _body_arrays(bodies: tuple[Body, ...]) -> BodyArrays:
+    boxes = [body.geometry.aabb_local for body in bodies]
+    half_spaces = np.array([isinstance(body.geometry, coal.Halfspace) for body in bodies], dtype=bool)
+    low, high = (np.array(ends).reshape(-1, 3) for ends in ([b.min_ for b in boxes], [b.max_ for b in boxes]))
+    low[half_spaces], high[half_spaces] = -UNBOUNDED_METRES, UNBOUNDED_METRES
+    return BodyArrays(
+        joints=np.array([body.joint for body in bodies], dtype=np.int64),
+        placements=np.array([body.placement.homogeneous for body in bodies]).reshape(-1, 4, 4),
+        centres=0.5 * low + 0.5 * high,
+        halves=0.5 * high - 0.5 * low,
+        half_spaces=half_spaces,
+        margins=np.array([body.margin for body in bodies]),
+    )
