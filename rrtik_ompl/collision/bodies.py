@@ -112,9 +112,7 @@ def colliding_pairs(robot: Robot, scene: Scene, bodies: tuple[Body, ...]) -> tup
     return tuple(sorted(found))
 
 
-def _may_meet(
-    first: Body, second: Body, parent: dict[int, int], checked_links: frozenset[frozenset[str]]
-) -> bool:
+def _may_meet(first: Body, second: Body, parent: dict[int, int], checked_links: frozenset[frozenset[str]]) -> bool:
     """Whether two bodies of the robot, or what it holds, must not touch, as long as nobody allows it."""
     if first.name == second.name or first.joint == second.joint:
         return False

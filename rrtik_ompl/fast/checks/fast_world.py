@@ -24,15 +24,16 @@ from rrtik_ompl.fast.tables.layout import INNER_LAST, MARKS, OUTER_PRIMITIVES, S
 from rrtik_ompl.fast.tables.memory import Table, table
 from rrtik_ompl.fast.tables.packing import (
     ArmTables,
+    Flags,
     PlacedPrimitives,
     alike,
     arm_tables,
     checked_table,
-    flag_places,
+    partners,
     standing_solids,
     standing_tables,
 )
-from rrtik_ompl.fast.tables.primitive_tables import primitive_table
+from rrtik_ompl.fast.tables.primitive_tables import joined, primitive_table
 from rrtik_ompl.fast.tables.robot_tables import Spheres
 from rrtik_ompl.fast.tables.scratch import probe_table, scratch_table
 from rrtik_ompl.fast.tables.solid_tables import NO_SOLIDS, Solids
@@ -86,17 +87,17 @@ class FastWorld:
         self._limits = joint_limits(chain, strokes)
         self._smallest_limit = float(self._limits.min(initial=LARGEST_ANGLE))
         kept = [(i, j) for i, j in pairs if bodies[i].joint > 0 or bodies[j].joint > 0]
-        concerned = sorted({k for pair in kept for k in pair})
-        moving = alike(bodies, kept)
-        standing = [k for k in concerned if bodies[k].joint == 0]
+        clear = partners(bodies, kept)
+        moving = alike(bodies, clear)
+        standing = [k for k in np.unique(np.array(kept, dtype=np.int64)).tolist() if bodies[k].joint == 0]
         self._pairs = kept
         solids = [NO_SOLIDS] * len(bodies) if solids is None else solids
         same = like._arm if like is not None and like._joints == self._joints else None
         self._arm: ArmTables = arm_tables(chain, bodies, moving, kept, outer, inner, solids, self._limits, like=same)
-        self._checked = checked_table(moving, standing, kept)
+        self._checked = checked_table(moving, standing, clear)
         self._primitives = standing_tables(bodies, standing, self._checked, outer, inner)
         self._standing, self._outer, self._placed = standing, outer, PlacedPrimitives()
-        self._flagged = flag_places(kept, self._arm, moving, standing)
+        self._flagged = Flags(clear, self._arm, moving, standing)
         self._reference = ReferenceChecks(self._arm.arm, self._arm.balls, self._primitives)
         self._kernels = library("checks.check_kernels") if compiled else None
         self._probe: Table | None = None
@@ -124,7 +125,7 @@ class FastWorld:
         around = self._placed.primitives(bodies, self._standing, self._outer, inflation)
         first = not self._moved
         self._moved = True
-        inside = primitive_table([], self._checked) if first else self._primitives[1]
+        inside = primitive_table(joined([]), self._checked) if first else self._primitives[1]
         self._primitives = primitive_table(around, self._checked), inside
         self._reference = ReferenceChecks(self._arm.arm, self._arm.balls, self._primitives)
         self._probe = None

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.arrays import Mask, Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.fast.tables.layout import PAIR_INTS, PAIR_ONE, PAIR_OTHER, PAIRS
 from rrtik_ompl.fast.tables.memory import Table
-from rrtik_ompl.fast.tables.primitive_tables import Primitive, primitive_table
+from rrtik_ompl.fast.tables.primitive_tables import Primitives, joined, primitive_table
 from rrtik_ompl.fast.tables.robot_tables import (
     MovingBody,
     Spheres,
@@ -64,19 +64,27 @@ class ArmTables:
         )
 
 
-def alike(bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> list[tuple[int, ...]]:
+def partners(bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> dict[int, Mask]:
+    """For each moving body that a pair names the bodies that it must not touch, shape (bodies,)."""
+    listed = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    named = [k for k in np.unique(listed).tolist() if bodies[k].joint > 0]
+    row = np.full(len(bodies), -1)
+    row[named] = np.arange(len(named))
+    found = np.zeros((len(named), len(bodies)), dtype=bool)
+    for first, second in (listed.T, listed.T[::-1]):
+        moves = row[first] >= 0
+        found[row[first[moves]], second[moves]] = True
+    return dict(zip(named, found, strict=True))
+
+
+def alike(bodies: Sequence[Body], keeps_clear: Mapping[int, Mask]) -> list[tuple[int, ...]]:
     """Numbers of the moving bodies in sets that one joint carries and that have the same bodies to keep clear of.
 
     To the kernels a set is one body: a link of many small solids costs no more than one with a cover of as many balls.
     """
-    partners: dict[int, set[int]] = {k: set() for pair in pairs for k in pair}
-    for i, j in pairs:
-        partners[i].add(j)
-        partners[j].add(i)
-    sets: dict[tuple[int, frozenset[int]], list[int]] = {}
-    for k in sorted(partners):
-        if bodies[k].joint > 0:
-            sets.setdefault((bodies[k].joint, frozenset(partners[k])), []).append(k)
+    sets: dict[tuple[int, bytes], list[int]] = {}
+    for k, others in keeps_clear.items():
+        sets.setdefault((bodies[k].joint, others.tobytes()), []).append(k)
     return [tuple(members) for members in sets.values()]
 
 
@@ -124,12 +132,11 @@ def as_one(parts: Sequence[MovingBody]) -> MovingBody:
 
 
 def checked_table(
-    moving: Sequence[tuple[int, ...]], standing: Sequence[int], pairs: Sequence[tuple[int, int]]
+    moving: Sequence[tuple[int, ...]], standing: Sequence[int], keeps_clear: Mapping[int, Mask]
 ) -> NDArray[np.bool_]:
     """Which moving bodies must not touch which standing ones, shape (moving, standing)."""
-    listed = {frozenset(pair) for pair in pairs}
-    checked = np.array([[frozenset((members[0], j)) in listed for j in standing] for members in moving], dtype=bool)
-    return checked.reshape(len(moving), len(standing))
+    rows = [keeps_clear[members[0]][standing] for members in moving]
+    return np.array(rows, dtype=bool).reshape(len(moving), len(standing))
 
 
 def standing_tables(
@@ -140,26 +147,32 @@ def standing_tables(
     inner: Sequence[Spheres],
 ) -> tuple[Table, Table]:
     """Primitives that contain what stands still, and primitives inside it."""
-    around = [(s, primitive) for s, k in enumerate(standing) for primitive in outer_primitives(bodies[k], outer[k])]
-    inside = [(s, primitive) for s, k in enumerate(standing) for primitive in inner_primitives(bodies[k], inner[k])]
-    return primitive_table(around, checked), primitive_table(inside, checked)
+    still, around, inside = ([each[k] for k in standing] for each in (bodies, outer, inner))
+    made = outer_primitives(still, around), inner_primitives(still, inside)
+    return primitive_table(made[0], checked), primitive_table(made[1], checked)
 
 
 class PlacedPrimitives:
     """Primitives around standing bodies; those of a body that has not changed are kept."""
 
     def __init__(self) -> None:
-        self._known: dict[int, tuple[Body, float, list[Primitive]]] = {}
+        self._known: dict[int, tuple[Body, float]] = {}
+        self._made = joined([])
 
     def primitives(
         self, bodies: Sequence[Body], standing: Sequence[int], outer: Sequence[Spheres], inflation: Sequence[float]
-    ) -> list[tuple[int, Primitive]]:
+    ) -> Primitives:
         """Primitives around all within margin and ``inflation`` [m] of bodies, with their places in ``standing``."""
-        for k in standing:
-            known = self._known.get(k)
-            if known is None or known[0] is not bodies[k] or known[1] != inflation[k]:
-                self._known[k] = bodies[k], inflation[k], outer_primitives(bodies[k], outer[k], inflation[k])
-        return [(place, primitive) for place, k in enumerate(standing) for primitive in self._known[k][2]]
+        now = [(bodies[k], inflation[k]) for k in standing]
+        places = [place for place, state in enumerate(now) if self._known.get(place) != state]
+        if places:
+            moved = [standing[place] for place in places]
+            covers, grown = [outer[k] for k in moved], [inflation[k] for k in moved]
+            made = outer_primitives([bodies[k] for k in moved], covers, grown)
+            kept = self._made.only(~np.isin(self._made.bodies, places))
+            self._made = joined([kept, replace(made, bodies=np.array(places)[made.bodies])])
+            self._known.update((place, now[place]) for place in places)
+        return self._made
 
 
 def standing_solids(bodies: Sequence[Body], standing: Sequence[int], solids: Sequence[Solids]) -> Table:
@@ -169,20 +182,35 @@ def standing_solids(bodies: Sequence[Body], standing: Sequence[int], solids: Seq
     return solid_table([(0, [each.placed(*pose, 0.0)]) for each, pose in zip(grown, poses, strict=True)])
 
 
-def flag_places(
-    pairs: Sequence[tuple[int, int]], arm: ArmTables, moving: Sequence[tuple[int, ...]], standing: Sequence[int]
-) -> dict[int, list[tuple[int, int]]]:
-    """For each flag that the kernels can set the pairs that it stands for."""
-    listed = {frozenset(pair): pair for pair in pairs}
+class Flags:
+    """For each flag that the kernels can set the pairs that it stands for.
 
-    def between(first: Sequence[int], second: Sequence[int]) -> list[tuple[int, int]]:
-        both = (frozenset((i, j)) for i in first for j in second)
-        return [listed[pair] for pair in both if pair in listed]
+    Args:
+        keeps_clear: See :func:`partners`.
+        arm: What moves.
+        moving: Sets of bodies that move, standing: bodies that do not.
+    """
 
-    crossing = [between(members, (j,)) for members in moving for j in standing]
-    pairs_of_arm = arm.balls[0][PAIRS].reshape(-1, PAIR_INTS)
-    own = [between(moving[pair[PAIR_ONE]], moving[pair[PAIR_OTHER]]) for pair in pairs_of_arm]
-    return dict(enumerate(crossing + own))
+    def __init__(
+        self,
+        keeps_clear: Mapping[int, Mask],
+        arm: ArmTables,
+        moving: Sequence[tuple[int, ...]],
+        standing: Sequence[int],
+    ) -> None:
+        self._keeps_clear, self._moving, self._standing = keeps_clear, moving, standing
+        self._own = arm.balls[0][PAIRS].reshape(-1, PAIR_INTS)
+
+    def __getitem__(self, flag: int) -> list[tuple[int, int]]:
+        """Pairs of bodies by number, the smaller one first; those of the arm come after the others."""
+        crossing = len(self._moving) * len(self._standing)
+        if flag < crossing:
+            members, place = divmod(flag, len(self._standing))
+            first, second = self._moving[members], (self._standing[place],)
+        else:
+            pair = self._own[flag - crossing]
+            first, second = self._moving[pair[PAIR_ONE]], self._moving[pair[PAIR_OTHER]]
+        return [(min(i, j), max(i, j)) for i in first for j in second if self._keeps_clear[i][j]]
 
 
 def _reach(body: Body, outer: Spheres) -> float:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.tables.layout import (
     BOX_RUNS,
@@ -38,55 +38,79 @@ from rrtik_ompl.fast.tables.layout import (
     STANDING_BODY,
     STANDING_COUNT,
 )
-from rrtik_ompl.fast.tables.memory import Table, table, whole_records
+from rrtik_ompl.fast.tables.memory import Table, table
 
 LANE_PADDING = 16  # boxes are compared this many at a time, or half as many
 UNBOUNDED_COORDINATE = 1e30  # [m]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Primitive:
-    """One solid of a kind of the layout. ``low`` and ``high`` bound it in the world, shape (3,)."""
+class Primitives:
+    """n solids of the layout's kinds.
 
-    kind: int
-    numbers: Vector
-    low: Vector
-    high: Vector
-    planes: Matrix | None = None
+    Attributes:
+        bodies: Places of the bodies that they stand for, shape (n,).
+        kinds: Shape (n,).
+        numbers: Shape (n, SHAPE_FLOATS).
+        lows, highs: Their bounds in the world, shape (n, 3) each.
+        planes: Planes of each, shape (m, PLANE_FLOATS); None if it has none.
+    """
+
+    bodies: NDArray[np.int64]
+    kinds: NDArray[np.int64]
+    numbers: Matrix
+    lows: Matrix
+    highs: Matrix
+    planes: tuple[Matrix | None, ...]
+
+    def __len__(self) -> int:
+        return len(self.kinds)
+
+    def only(self, chosen: NDArray[np.int64] | Mask) -> Primitives:
+        """Some of them, by their numbers or by a mask."""
+        places = np.arange(len(self))[chosen]
+        arrays = (each[places] for each in (self.bodies, self.kinds, self.numbers, self.lows, self.highs))
+        return Primitives(*arrays, tuple(self.planes[k] for k in places.tolist()))
 
 
-def primitive_table(primitives: Sequence[tuple[int, Primitive]], checked: NDArray[np.bool_]) -> Table:
-    """Rows with the numbers of their standing bodies; ``checked`` has shape (moving bodies, standing bodies).
+def joined(parts: Sequence[Primitives]) -> Primitives:
+    """Primitives one after the other; those of a body stay in their order."""
+    empty = np.zeros(0, dtype=np.int64)
+    names = ("bodies", "kinds", "numbers", "lows", "highs")
+    none = (empty, empty, np.zeros((0, SHAPE_FLOATS)), np.zeros((0, 3)), np.zeros((0, 3)))
+    columns = (np.concatenate([n, *(getattr(p, name) for p in parts)]) for name, n in zip(names, none, strict=True))
+    return Primitives(*columns, tuple(planes for part in parts for planes in part.planes))
+
+
+def primitive_table(primitives: Primitives, checked: NDArray[np.bool_]) -> Table:
+    """Table of primitives; ``checked`` has shape (moving bodies, standing bodies).
 
     The kind of balls comes first, so that the last primitive of a body is the one with its formula, if it has one.
 
     Raises:
         InputError: If a primitive is of a kind that the kernels do not know.
     """
-    unknown = sorted({primitive.kind for _, primitive in primitives} - set(KINDS))
+    unknown = sorted(set(primitives.kinds.tolist()) - set(KINDS))
     if unknown:
         raise InputError(f"primitives for kernels: unknown kind {unknown[0]}; have {KINDS.start} to {KINDS.stop - 1}")
-    ordered = sorted(primitives, key=lambda item: item[1].kind)
-    floats = np.zeros((len(ordered), SHAPE_FLOATS), dtype=np.float32)
-    heads = []
+    ordered = primitives.only(np.lexsort((primitives.bodies, primitives.kinds)))
+    heads = np.zeros((len(ordered), HEAD_INTS), dtype=np.int32)
+    ends = np.cumsum([0, *(0 if planes is None else len(planes) for planes in ordered.planes)])
+    heads[:, KIND], heads[:, STANDING_BODY] = ordered.kinds, ordered.bodies
+    heads[:, FIRST_PLANE], heads[:, END_PLANE] = ends[:-1], ends[1:]
     own = np.full(checked.shape[1], -1, dtype=np.int32)
-    planes: list[Matrix] = [np.zeros((0, PLANE_FLOATS))]
-    end = 0
-    for k, (body, primitive) in enumerate(ordered):
-        floats[k] = primitive.numbers
-        first, end = end, end + (0 if primitive.planes is None else len(primitive.planes))
-        own[body] = k
-        heads.append({KIND: primitive.kind, STANDING_BODY: body, FIRST_PLANE: first, END_PLANE: end})
-        planes += [] if primitive.planes is None else [primitive.planes]
-    boxes = _bounding_boxes([primitive for _, primitive in ordered])
+    own[ordered.bodies] = np.arange(len(ordered))  # the last one of a body remains
+    boxes = _bounding_boxes(ordered)
     return table(
         {
             PRIMITIVE_COUNT: len(ordered),
             PADDED_COUNT: boxes.shape[1],
             BOXES: boxes,
-            PRIMITIVES: floats,
-            NUMBERS: whole_records(HEAD_INTS, heads),
-            PLANES: np.concatenate(planes).astype(np.float32),
+            PRIMITIVES: ordered.numbers.astype(np.float32),
+            NUMBERS: heads,
+            PLANES: np.concatenate(
+                [np.zeros((0, PLANE_FLOATS)), *(planes for planes in ordered.planes if planes is not None)]
+            ).astype(np.float32),
             STANDING_COUNT: checked.shape[1],
             CHECKED: checked.astype(np.int32),
             EXCLUDING: np.asarray((~checked).any(axis=1), dtype=np.int32),
@@ -95,16 +119,13 @@ def primitive_table(primitives: Sequence[tuple[int, Primitive]], checked: NDArra
     )
 
 
-def _bounding_boxes(primitives: Sequence[Primitive]) -> NDArray[np.float32]:
+def _bounding_boxes(primitives: Primitives) -> NDArray[np.float32]:
     """Sides of boxes around primitives, a run for each side, filled up with boxes that nothing meets."""
     padded = -(-len(primitives) // LANE_PADDING) * LANE_PADDING
     boxes = np.empty((len(BOX_RUNS), padded), dtype=np.float32)
     low, high = boxes[LOW_X : HIGH_Z + 1 : 2], boxes[HIGH_X : HIGH_Z + 1 : 2]
     low[:], high[:] = UNBOUNDED_COORDINATE, -UNBOUNDED_COORDINATE
-    if primitives:
-        lows, highs = (
-            np.array(ends, dtype=np.float32).T for ends in zip(*((p.low, p.high) for p in primitives), strict=True)
-        )
-        low[:, : len(primitives)] = np.nextafter(lows, np.float32(-np.inf))
-        high[:, : len(primitives)] = np.nextafter(highs, np.float32(np.inf))
+    lows, highs = (ends.T.astype(np.float32) for ends in (primitives.lows, primitives.highs))
+    low[:, : len(primitives)] = np.nextafter(lows, np.float32(-np.inf))
+    high[:, : len(primitives)] = np.nextafter(highs, np.float32(np.inf))
     return boxes

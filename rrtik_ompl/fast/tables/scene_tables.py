@@ -6,14 +6,16 @@ There are two sets of them: the outer ones contain the bodies, the inner ones ar
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, cast
 
 import coal
 import numpy as np
+from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.shape_table import Core, core_of
 from rrtik_ompl.collision.solids import SameObject
@@ -43,7 +45,7 @@ from rrtik_ompl.fast.tables.layout import (
     SHAPE_FLOATS,
 )
 from rrtik_ompl.fast.tables.memory import record
-from rrtik_ompl.fast.tables.primitive_tables import UNBOUNDED_COORDINATE, Primitive
+from rrtik_ompl.fast.tables.primitive_tables import UNBOUNDED_COORDINATE, Primitives, joined
 from rrtik_ompl.fast.tables.robot_tables import Spheres, usable_cover
 
 MOST_PLANES = 64  # of the outer polyhedron of a convex solid: fewer planes make it larger, never smaller
@@ -55,145 +57,223 @@ SMALLEST_AREA = 1e-18  # [m^2] of a triangle that has a normal
 
 def needs_covers(body: Body) -> tuple[bool, bool]:
     """Whether a body needs outer and inner spheres: what stands still and has a formula can do without."""
-    if body.joint > 0:
-        return True, True
-    exact = _exact(body, grow=1.0)
-    return exact is None, exact is None or isinstance(body.geometry, coal.ConvexBase)
+    kind = None if body.joint > 0 else _formula(SameObject(body.geometry))
+    return kind is None, kind in (None, CONVEX)
 
 
-def outer_primitives(body: Body, cover: Spheres, inflation: float = 0.0) -> list[Primitive]:
-    """Rows whose union contains a standing body: its own formula if it has one, the balls of its cover otherwise.
+def outer_primitives(
+    bodies: Sequence[Body], covers: Sequence[Spheres], inflation: Sequence[float] | None = None
+) -> Primitives:
+    """Primitives whose union contains standing bodies: the formula of each that has one, the balls of its cover else.
 
-    They contain every point that is no farther from the body than its margin and ``inflation`` [m].
+    They contain every point that is no farther from its body than its margin and ``inflation`` [m].
     """
-    inflation += body.margin
-    exact = _exact(body, grow=1.0, inflation=inflation)
-    primitives = (
-        _balls(body, usable_cover(body.geometry, cover), grow=1.0, inflation=inflation) if exact is None else exact
-    )
-    whole = record(SHAPE_FLOATS, {BALL_RADIUS: UNBOUNDED_LENGTH})
-    everything = Primitive(BALL, whole, np.full(3, -UNBOUNDED_LENGTH), np.full(3, UNBOUNDED_LENGTH))
-    return [primitive if _fits(primitive) else everything for primitive in primitives]
+    beside = np.array([body.margin for body in bodies]) + (0.0 if inflation is None else np.asarray(inflation))
+    places = _by_formula(bodies)
+    rest = [(k, usable_cover(bodies[k].geometry, covers[k])) for k in places.pop(None, ())]
+    made = joined([*_exact(bodies, places, 1.0, beside), _balls(bodies, rest, 1.0, beside)])
+    endless = ~_fits(made)
+    if not endless.any():
+        return made
+    made.kinds[endless], made.numbers[endless] = BALL, 0.0
+    made.numbers[endless, BALL_RADIUS] = UNBOUNDED_LENGTH
+    made.lows[endless], made.highs[endless] = -UNBOUNDED_LENGTH, UNBOUNDED_LENGTH
+    return replace(made, planes=tuple(None if e else p for e, p in zip(endless, made.planes, strict=True)))
 
 
-def inner_primitives(body: Body, inner: Spheres) -> list[Primitive]:
-    """Rows that lie within the margin around a standing body, or inside it."""
-    core = core_of(body.geometry)
-    stays_round = isinstance(body.geometry, coal.Halfspace) if core is None else core.rounded
-    primitives = _exact(body, grow=-1.0, inflation=body.margin if stays_round else 0.0)
-    if primitives is None or isinstance(body.geometry, coal.ConvexBase):
-        balls = np.asarray(inner, dtype=np.float64).reshape(-1, 4)
-        primitives = (primitives or []) + _balls(body, balls, grow=-1.0, inflation=body.margin)
-    return [primitive for primitive in primitives if _fits(primitive)]
+def inner_primitives(bodies: Sequence[Body], inner: Sequence[Spheres]) -> Primitives:
+    """Primitives that lie within the margins around standing bodies, or inside these."""
+    margins = np.array([body.margin for body in bodies])
+    places = _by_formula(bodies)
+    rounded = [k for kind in (BALL, CAPSULE, HALF_SPACE) for k in places.get(kind, ())]
+    beside = np.zeros(len(bodies))
+    beside[rounded] = margins[rounded]  # what has corners does not keep its kind when it grows
+    rest = [(k, np.asarray(inner[k]).reshape(-1, 4)) for k in (*places.pop(None, ()), *places.get(CONVEX, ()))]
+    made = joined([*_exact(bodies, places, -1.0, beside), _balls(bodies, rest, -1.0, margins)])
+    return made.only(_fits(made))
 
 
-def _fits(primitive: Primitive) -> bool:
-    """Whether the kernels can square the numbers of a primitive."""
-    return float(np.abs(primitive.numbers).max()) < UNBOUNDED_LENGTH and (
-        primitive.planes is None or float(np.abs(primitive.planes).max()) < UNBOUNDED_LENGTH
-    )
+def _fits(primitives: Primitives) -> Mask:
+    """The primitives whose numbers the kernels can square, shape (n,)."""
+    fits: Mask = np.abs(primitives.numbers).max(axis=1, initial=0.0) < UNBOUNDED_LENGTH
+    for k, planes in enumerate(primitives.planes):
+        if planes is not None:
+            fits[k] &= bool(np.abs(planes).max() < UNBOUNDED_LENGTH)
+    return fits
 
 
-def _exact(body: Body, grow: float, inflation: float = 0.0) -> list[Primitive] | None:
-    """The body by the formula of its kind, a little larger (grow = 1) or smaller (-1), and by ``inflation`` [m] larger.
+def _by_formula(bodies: Sequence[Body]) -> dict[int | None, list[int]]:
+    """Places of the bodies by their kinds of primitive, None for those without a formula."""
+    found: dict[int | None, list[int]] = {}
+    for k, body in enumerate(bodies):
+        found.setdefault(_formula(SameObject(body.geometry)), []).append(k)
+    return found
 
-    None if there is no formula.
-    """
-    solid, pose = body.geometry, body.placement
+
+@lru_cache(maxsize=4096)
+def _formula(key: SameObject) -> int | None:
+    """The kind of primitive that a coal geometry is, None if it is none."""
+    solid = key.geometry
     if isinstance(solid, coal.ShapeBase) and solid.getSweptSphereRadius() != 0.0:
         return None
     if isinstance(solid, coal.Halfspace):
-        return [_half_space(solid, pose, grow, inflation)]
+        return HALF_SPACE
     if isinstance(solid, coal.ConvexBase):
-        planes = _known_planes(SameObject(solid))
-        return None if planes is None else _convex(solid, pose, planes, grow, inflation)
+        return None if _known_planes(key) is None else CONVEX
     core = core_of(solid)
     if core is None:
         return None
-    primitive = _primitive(core, np.array(pose.rotation), np.array(pose.translation), grow, inflation)
-    return [] if primitive is None else [primitive]
-
-
-def _primitive(core: Core, rotation: Matrix, centre: Vector, grow: float, inflation: float) -> Primitive | None:
-    """Primitive of a ball, capsule, box or cylinder, or None if nothing is left of it."""
-    z = rotation[:, 2]
-    half = core.half_sides
-    if half is not None:
-        half = half + grow * _slack(centre, float(np.linalg.norm(half))) + inflation
-        spread = np.abs(rotation) @ half
-        return _bounded_primitive(
-            BOX,
-            {SHAPE_CENTRE: centre, BOX_AXES: rotation.T.ravel(), BOX_HALF_SIZES: half},
-            centre,
-            spread,
-            half.min(),
-        )
-    length, radius = core.half_length, core.radius if core.disc is None else core.disc
-    radius = radius + grow * _slack(centre, radius + length) + inflation
+    if core.half_sides is not None:
+        return BOX
     if len(core.corners) == 1:
-        return _ball(centre, radius)
-    if core.disc is None:
-        axis = 2.0 * length * z
-        share = 1.0 / float(axis @ axis) if length > 1e-9 else 0.0
-        spread = length * np.abs(z) + radius
-        numbers = {SHAPE_CENTRE: centre - 0.5 * axis, CAPSULE_AXIS: axis, CAPSULE_INVERSE_SQUARE: share}
-        return _bounded_primitive(CAPSULE, numbers | {CAPSULE_RADIUS: radius}, centre, spread, radius)
-    length += grow * _slack(centre, radius + length) + inflation
-    spread = length * np.abs(z) + radius * np.sqrt(np.maximum(1.0 - z * z, 0.0))
-    numbers = {SHAPE_CENTRE: centre, CYLINDER_AXIS: z, CYLINDER_HALF_LENGTH: length, CYLINDER_RADIUS: radius}
-    return _bounded_primitive(CYLINDER, numbers, centre, spread, min(radius, length))
+        return BALL
+    return CAPSULE if core.disc is None else CYLINDER
 
 
-def _bounded_primitive(
-    kind: int, numbers: Mapping[int, Any], centre: Vector, spread: Vector, thickness: float
-) -> Primitive | None:
-    if thickness < 0.0:
-        return None
-    slack = _slack(centre, float(spread.max()))
-    return Primitive(kind, record(SHAPE_FLOATS, numbers), centre - spread - slack, centre + spread + slack)
+def _exact(
+    bodies: Sequence[Body], places: Mapping[int | None, Sequence[int]], grow: float, beside: Vector
+) -> list[Primitives]:
+    """Bodies by the formulas of their kinds, a little larger (grow = 1) or smaller (-1), and by ``beside`` [m] larger.
+
+    Args:
+        bodies: All bodies.
+        places: Those to take, by their kinds.
+        grow: See above.
+        beside: Of each body, shape (n,).
+    """
+    made = []
+    for kind, chosen in places.items():
+        own = np.array(chosen, dtype=np.int64)
+        if kind in (HALF_SPACE, CONVEX):
+            build = _half_space if kind == HALF_SPACE else _convex
+            made += [build(bodies[k], k, grow, float(beside[k])) for k in chosen]
+        elif kind is not None:
+            poses = np.array([bodies[k].placement.homogeneous for k in chosen])
+            cores = [cast(Core, core_of(bodies[k].geometry)) for k in chosen]
+            made.append(_MAKERS[kind](own, poses, cores, grow, beside[own]))
+    return made
 
 
-def _ball(centre: Vector, radius: float) -> Primitive | None:
-    numbers = {SHAPE_CENTRE: centre, BALL_RADIUS: radius}
-    return _bounded_primitive(BALL, numbers, centre, np.full(3, radius), radius)
+def _boxes(
+    own: NDArray[np.int64], poses: NDArray[np.float64], cores: Sequence[Core], grow: float, beside: Vector
+) -> Primitives:
+    centres, turns = poses[:, :3, 3], poses[:, :3, :3]
+    halves = np.array([core.half_sides for core in cores])
+    halves = halves + (grow * _slack(centres, np.linalg.norm(halves, axis=1)) + beside)[:, None]
+    spreads = np.einsum("nij,nj->ni", np.abs(turns), halves)
+    axes = turns.transpose(0, 2, 1).reshape(-1, 9)
+    numbers = {SHAPE_CENTRE: centres, BOX_AXES: axes, BOX_HALF_SIZES: halves}
+    return _bounded(BOX, own, numbers, centres, spreads, halves.min(axis=1))
 
 
-def _slack(centre: Vector, size: float) -> float:
-    return SLACK_PER_METRE * (1.0 + float(np.abs(centre).max()) + size)
+def _capsules(
+    own: NDArray[np.int64], poses: NDArray[np.float64], cores: Sequence[Core], grow: float, beside: Vector
+) -> Primitives:
+    centres, z = poses[:, :3, 3], poses[:, :3, 2]
+    lengths, radii = (np.array([getattr(core, name) for core in cores]) for name in ("half_length", "radius"))
+    radii = radii + grow * _slack(centres, radii + lengths) + beside
+    axes = 2.0 * lengths[:, None] * z
+    squares = np.einsum("ni,ni->n", axes, axes)
+    shares = np.where(lengths > 1e-9, 1.0 / np.where(lengths > 1e-9, squares, 1.0), 0.0)
+    spreads = lengths[:, None] * np.abs(z) + radii[:, None]
+    numbers = {SHAPE_CENTRE: centres - 0.5 * axes, CAPSULE_AXIS: axes, CAPSULE_INVERSE_SQUARE: shares[:, None]}
+    return _bounded(CAPSULE, own, numbers | {CAPSULE_RADIUS: radii[:, None]}, centres, spreads, radii)
 
 
-def _balls(body: Body, spheres: Spheres, grow: float, inflation: float = 0.0) -> list[Primitive]:
-    rotation, origin = np.array(body.placement.rotation), np.array(body.placement.translation)
-    primitives = []
-    for x, y, z, radius in spheres:
-        centre = rotation @ (x, y, z) + origin
-        size = radius + grow * _slack(centre, radius) + inflation
-        primitives.append(_ball(centre, size))
-    return [primitive for primitive in primitives if primitive is not None]
+def _cylinders(
+    own: NDArray[np.int64], poses: NDArray[np.float64], cores: Sequence[Core], grow: float, beside: Vector
+) -> Primitives:
+    centres, z = poses[:, :3, 3], poses[:, :3, 2]
+    lengths, radii = (np.array([getattr(core, name) for core in cores]) for name in ("half_length", "disc"))
+    radii = radii + grow * _slack(centres, radii + lengths) + beside
+    lengths = lengths + grow * _slack(centres, radii + lengths) + beside
+    across = np.sqrt(np.maximum(1.0 - z * z, 0.0))
+    spreads = lengths[:, None] * np.abs(z) + radii[:, None] * across
+    numbers = {SHAPE_CENTRE: centres, CYLINDER_AXIS: z, CYLINDER_HALF_LENGTH: lengths[:, None]}
+    thickness = np.minimum(radii, lengths)
+    return _bounded(CYLINDER, own, numbers | {CYLINDER_RADIUS: radii[:, None]}, centres, spreads, thickness)
 
 
-def _half_space(solid: Any, pose: Any, grow: float, inflation: float) -> Primitive:
-    normal = np.array(pose.rotation) @ np.array(solid.n)
-    offset = float(solid.d) + float(normal @ pose.translation)
-    offset += grow * _slack(np.array([offset]), 0.0) + inflation
+def _spheres(
+    own: NDArray[np.int64], poses: NDArray[np.float64], cores: Sequence[Core], grow: float, beside: Vector
+) -> Primitives:
+    return _round(own, poses[:, :3, 3], np.array([core.radius for core in cores]), grow, beside)
+
+
+_MAKERS = {BALL: _spheres, CAPSULE: _capsules, BOX: _boxes, CYLINDER: _cylinders}
+
+
+def _round(own: NDArray[np.int64], centres: Matrix, radii: Vector, grow: float, beside: Vector) -> Primitives:
+    """Balls that stand for bodies ``own``."""
+    radii = radii + grow * _slack(centres, radii) + beside
+    numbers = {SHAPE_CENTRE: centres, BALL_RADIUS: radii[:, None]}
+    return _bounded(BALL, own, numbers, centres, np.repeat(radii[:, None], 3, axis=1), radii)
+
+
+def _bounded(
+    kind: int,
+    own: NDArray[np.int64],
+    numbers: Mapping[int, Matrix],
+    centres: Matrix,
+    spreads: Matrix,
+    thickness: Vector,
+) -> Primitives:
+    """Primitives from runs of their numbers by the places of these; those of which nothing is left drop out."""
+    rows = np.zeros((len(own), SHAPE_FLOATS))
+    for place, run in numbers.items():
+        rows[:, place : place + run.shape[1]] = run
+    reaches = spreads + _slack(centres, spreads.max(axis=1, initial=0.0))[:, None]
+    kinds = np.full(len(own), kind, dtype=np.int64)
+    made = Primitives(own, kinds, rows, centres - reaches, centres + reaches, (None,) * len(own))
+    return made if (thickness >= 0.0).all() else made.only(thickness >= 0.0)
+
+
+def _slack(centres: Matrix, sizes: Vector) -> Vector:
+    """Of primitives [m], shape (n,)."""
+    slack: Vector = SLACK_PER_METRE * (1.0 + np.abs(centres).max(axis=1, initial=0.0) + sizes)
+    return slack
+
+
+def _balls(bodies: Sequence[Body], covers: Sequence[tuple[int, Spheres]], grow: float, beside: Vector) -> Primitives:
+    """Balls of covers, each with the place of its body."""
+    own = np.repeat(np.array([k for k, _ in covers], dtype=np.int64), [len(spheres) for _, spheres in covers])
+    placed = [np.zeros((0, 3))]
+    for k, spheres in covers:
+        pose = bodies[k].placement
+        placed.append(spheres[:, :3] @ np.array(pose.rotation).T + np.array(pose.translation))
+    radii = np.concatenate([np.zeros(0), *(spheres[:, 3] for _, spheres in covers)])
+    return _round(own, np.concatenate(placed), radii, grow, beside[own])
+
+
+def _half_space(body: Body, place: int, grow: float, inflation: float) -> Primitives:
+    normal = np.array(body.placement.rotation) @ np.array(body.geometry.n)
+    offset = float(body.geometry.d) + float(normal @ body.placement.translation)
+    offset += grow * SLACK_PER_METRE * (1.0 + abs(offset)) + inflation
     everywhere = np.full(3, UNBOUNDED_COORDINATE)
     numbers = record(SHAPE_FLOATS, {HALF_SPACE_NORMAL: normal, HALF_SPACE_OFFSET: offset})
-    return Primitive(HALF_SPACE, numbers, -everywhere, everywhere)
+    return _single(HALF_SPACE, place, numbers, -everywhere, everywhere, None)
 
 
-def _convex(solid: Any, pose: Any, planes: Matrix, grow: float, inflation: float) -> list[Primitive]:
+def _convex(body: Body, place: int, grow: float, inflation: float) -> Primitives:
     """A convex solid by its planes; a ball meets the inner primitive if its centre lies behind all of them."""
-    rotation, origin = np.array(pose.rotation), np.array(pose.translation)
-    corners = np.array(solid.points()).reshape(-1, 3) @ rotation.T + origin
+    planes = cast(Matrix, _known_planes(SameObject(body.geometry)))
+    rotation, origin = np.array(body.placement.rotation), np.array(body.placement.translation)
+    corners = np.array(body.geometry.points()).reshape(-1, 3) @ rotation.T + origin
     low, high = corners.min(axis=0), corners.max(axis=0)
-    inflation += _slack(0.5 * (low + high), float((high - low).max()))
+    inflation += float(_slack(0.5 * (low + high)[None], (high - low).max(keepdims=True))[0])
     kept = most_different(planes, MOST_PLANES) if grow > 0.0 else planes
     world = np.empty_like(kept)
     normals = world[:, PLANE_NORMAL : PLANE_NORMAL + 3]
     normals[:] = kept[:, :3] @ rotation.T
     world[:, PLANE_OFFSET] = kept[:, 3] + normals @ origin + (inflation if grow > 0.0 else -inflation - PLANE_SLACK)
     numbers = record(SHAPE_FLOATS, {CONVEX_SHARE: 1.0 if grow > 0.0 else 0.0})
-    return [Primitive(CONVEX, numbers, low - inflation, high + inflation, world)]
+    return _single(CONVEX, place, numbers, low - inflation, high + inflation, world)
+
+
+def _single(kind: int, place: int, numbers: Vector, low: Vector, high: Vector, planes: Matrix | None) -> Primitives:
+    """One primitive, of the body at a place."""
+    places, kinds = np.array([place], dtype=np.int64), np.array([kind], dtype=np.int64)
+    return Primitives(places, kinds, numbers[None], low[None], high[None], (planes,))
 
 
 @lru_cache(maxsize=4096)

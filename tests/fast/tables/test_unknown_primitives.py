@@ -71,8 +71,8 @@ def test_each_twin_refuses_it(twin):
 def test_no_table_is_packed_with_it():
     robot = rrtik.load_robot("point2d", radius=0.5, bounds=[[0, 10], [0, 10]])
     (body,) = scene_bodies(robot, rrtik.Scene([rrtik.Obstacle("box", rrtik.Box([1, 1, 1]))]))
-    (known,) = outer_primitives(body, np.zeros((0, 4)))
+    known = outer_primitives([body], [np.zeros((0, 4))])
     checked = np.ones((1, 1), dtype=bool)
-    assert primitive_table([(0, known)], checked).header[layout.PRIMITIVE_COUNT] == 1
+    assert primitive_table(known, checked).header[layout.PRIMITIVE_COUNT] == 1
     with pytest.raises(InputError, match=f"unknown kind {UNKNOWN}; have 0 to {UNKNOWN - 1}"):
-        primitive_table([(0, replace(known, kind=UNKNOWN))], checked)
+        primitive_table(replace(known, kinds=np.array([UNKNOWN])), checked)
