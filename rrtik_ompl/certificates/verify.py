@@ -21,7 +21,7 @@ from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.certificate import fixed_contact
 from rrtik_ompl.collision.digests import robot_digest, scene_digest
 from rrtik_ompl.fast.tables.layout import CONVEX_SOLID, HALF_SPACE_SOLID
-from rrtik_ompl.fast.tables.solid_tables import UNKNOWN, ConvexSolid, convex_solids
+from rrtik_ompl.fast.tables.solid_tables import UNKNOWN, ConvexSolid, convex_solids, placed_solids
 from rrtik_ompl.robot import Chain
 
 if TYPE_CHECKING:
@@ -116,8 +116,8 @@ class Motions:
 
     def _describe(self, number: int, body: Body) -> range:
         """Add the solids of a body; returns the numbers of its parts."""
-        turn, origin = np.array(body.placement.rotation), np.array(body.placement.translation)
-        parts = tuple(p.placed(turn, origin, 0.0) for p in convex_solids(body.geometry).around) or (UNKNOWN,)
+        own, pose = convex_solids(body.geometry).around, body.placement.homogeneous
+        parts, turn = tuple(placed_solids(own, np.array([pose] * len(own)))) or (UNKNOWN,), pose[:3, :3]
         for part in range(-1, len(parts)):
             self.numbers[number, part] = len(self.solids)
             self.solids.append(Solid(parts if part < 0 else (parts[part],), turn))

@@ -86,10 +86,11 @@ class FastWorld:
         self._joints = len(chain.parent)
         self._limits = joint_limits(chain, strokes)
         self._smallest_limit = float(self._limits.min(initial=LARGEST_ANGLE))
-        kept = [(i, j) for i, j in pairs if bodies[i].joint > 0 or bodies[j].joint > 0]
+        moves = [body.joint > 0 for body in bodies]
+        kept = [(i, j) for i, j in pairs if moves[i] or moves[j]]
         clear = partners(bodies, kept)
         moving = alike(bodies, clear)
-        standing = [k for k in np.unique(np.array(kept, dtype=np.int64)).tolist() if bodies[k].joint == 0]
+        standing = [k for k in np.unique(np.array(kept, dtype=np.int64)).tolist() if not moves[k]]
         self._pairs = kept
         solids = [NO_SOLIDS] * len(bodies) if solids is None else solids
         same = like._arm if like is not None and like._joints == self._joints else None

@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.collision.margins import kept_apart
+from rrtik_ompl.collision.body_arrays import body_arrays
 from rrtik_ompl.fast.proof import layout
 from rrtik_ompl.fast.proof.layout import CONVEX_SOLID, HALF_SPACE, NODES, UNKNOWN, WHOLE_BODY
 from rrtik_ompl.fast.tables.layout import CONVEX_SOLID as IS_CONVEX
 from rrtik_ompl.fast.tables.layout import HALF_SPACE_SOLID
 from rrtik_ompl.fast.tables.memory import Table, record, table
-from rrtik_ompl.fast.tables.solid_tables import ConvexSolid, Solids
+from rrtik_ompl.fast.tables.solid_tables import ConvexSolid, Solids, placed_bodies
 from rrtik_ompl.robot import Chain
 
 ROOM = 1e-8  # [m] for rounding: float64 misplaces points of an arm of 30 joints and 100 m by less than a tenth of it
@@ -71,7 +71,8 @@ def proof_pairs(
         strokes: Largest value of sliding joints [m], a number or shape (joints,).
     """
     joints = len(chain.parent)
-    parts = [_parts(body, around) for body, around in zip(bodies, solids, strict=True)]
+    poses = np.array([body.placement.homogeneous for body in bodies]).reshape(-1, 4, 4)
+    parts = [tuple(placed.around) or (_NOTHING,) for placed in placed_bodies(solids, poses)]
     reached = [
         _reaches(chain, body.joint, own, np.broadcast_to(strokes, joints))
         for body, own in zip(bodies, parts, strict=True)
@@ -82,8 +83,8 @@ def proof_pairs(
     ends = np.cumsum([0, *(len(part) + (len(part) > 1) for part in parts)])
     moving = [pair for pair in pairs if any(bodies[k].joint != 0 for k in pair)]
     groups = _groups(bodies, parts, moving)
-    grouped = [(member, still) for (members, still) in groups for member in members]
-    for i, j in [*grouped, *(pair for pair in moving if not {pair, pair[::-1]} & set(grouped))]:
+    grouped = {(member, still): None for (members, still) in groups for member in members}  # in this order
+    for i, j in [*grouped, *(pair for pair in moving if pair not in grouped and pair[::-1] not in grouped)]:
         one, other = (i, j) if _beyond(chain, bodies[i].joint, bodies[j].joint) else (j, i)
         base = _common(chain, bodies[one].joint, bodies[other].joint)
         own = [sweeps.setdefault(((k,), base), len(sweeps)) if bodies[k].joint != base else -1 for k in (one, other)]
@@ -143,7 +144,7 @@ def proof_pairs(
             layout.LOG_COUNT: np.zeros(1, dtype=np.int32),
         }
     )
-    margins = np.array([kept_apart(bodies[i], bodies[j]) for i, j in named], dtype=np.float64)
+    margins = body_arrays(bodies).kept_apart(named)
     obstacles = np.array([body.kind == "obstacle" for body in bodies], dtype=bool)
     return ProofPairs(made, named, sides, margins, obstacles[named[:, 0]] | obstacles[named[:, 1]])
 
@@ -159,12 +160,6 @@ def _groups(
         if bodies[still].joint == 0 and convex:
             found.setdefault((bodies[mover].joint, still), []).append(mover)
     return [(tuple(members), still) for (_, still), members in found.items() if len(members) > 1]
-
-
-def _parts(body: Body, solids: Solids) -> tuple[ConvexSolid, ...]:
-    """Convex solids around a body in its joint's frame; one of an unknown kind where there are none."""
-    rotation, origin = np.array(body.placement.rotation), np.array(body.placement.translation)
-    return tuple(solid.placed(rotation, origin, 0.0) for solid in solids.around) or (_NOTHING,)
 
 
 _NOTHING = ConvexSolid(np.zeros((1, 3)), inside=False, kind=-1)

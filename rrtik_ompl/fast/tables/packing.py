@@ -24,7 +24,7 @@ from rrtik_ompl.fast.tables.robot_tables import (
     usable_cover,
 )
 from rrtik_ompl.fast.tables.scene_tables import inner_primitives, outer_primitives
-from rrtik_ompl.fast.tables.solid_tables import Solids, solid_table
+from rrtik_ompl.fast.tables.solid_tables import Solids, placed_bodies, solid_table
 from rrtik_ompl.robot import Chain
 
 
@@ -114,15 +114,15 @@ def arm_tables(
         as_one([moving_body(chain, bodies[k], outer[k], inner[k], margin) for k in members]) for members in moving
     ]
     balls = (ball_table(packed, own, inner=False), ball_table(packed, own, inner=True))
-    placed = [(bodies[m[0]].joint, [_carried(chain, bodies[k], solids[k], margin) for k in m]) for m in moving]
+    turns = axis_turns(chain)
+    poses = np.zeros((len(carried), 4, 4))
+    for pose, body in zip(poses, carried, strict=True):  # in the turned frames of their joints
+        pose[:] = body.placement.homogeneous
+        pose[:3] = turns[body.joint - 1].T @ pose[:3]
+    parts = iter(placed_bodies(solids_of, poses, slack=margin))
+    placed = [(bodies[members[0]].joint, [next(parts) for _ in members]) for members in moving]
     tables = (arm_table(chain), balls, solid_table(placed))
     return ArmTables(carried, sizes, covers, solids_of, own, limits, margin, *tables)
-
-
-def _carried(chain: Chain, body: Body, solids: Solids, margin: float) -> Solids:
-    """A body's solids in the turned frame of its joint."""
-    turn = axis_turns(chain)[body.joint - 1].T
-    return solids.placed(turn @ np.array(body.placement.rotation), turn @ np.array(body.placement.translation), margin)
 
 
 def as_one(parts: Sequence[MovingBody]) -> MovingBody:
@@ -177,9 +177,9 @@ class PlacedPrimitives:
 
 def standing_solids(bodies: Sequence[Body], standing: Sequence[int], solids: Sequence[Solids]) -> Table:
     """Solids of what stands still, each with its margin around it."""
-    poses = [(np.array(bodies[k].placement.rotation), np.array(bodies[k].placement.translation)) for k in standing]
-    grown = [solids[k].grown(bodies[k].margin) for k in standing]
-    return solid_table([(0, [each.placed(*pose, 0.0)]) for each, pose in zip(grown, poses, strict=True)])
+    poses = np.array([bodies[k].placement.homogeneous for k in standing]).reshape(-1, 4, 4)
+    placed = placed_bodies([solids[k] for k in standing], poses, margins=[bodies[k].margin for k in standing])
+    return solid_table([(0, [each]) for each in placed])
 
 
 class Flags:

@@ -8,13 +8,13 @@ apart from others but never to overlap them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
-from itertools import accumulate
 from typing import Any
 
 import coal
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.shape_table import core_of
@@ -49,7 +49,7 @@ from rrtik_ompl.fast.tables.layout import (
     SPANS,
     UNKNOWN_SOLID,
 )
-from rrtik_ompl.fast.tables.memory import Table, record, table, whole_records
+from rrtik_ompl.fast.tables.memory import Table, table, whole_records
 
 MAX_COMPARED_SIZE = 1e4  # [m]; what is larger or farther away is not compared
 SLACK_PER_METRE = 2e-6  # rounding of corners and of their heights in float32, relative to the coordinates
@@ -77,32 +77,6 @@ class ConvexSolid:
     slack: float = 0.0
     kind: int = CONVEX_SOLID
 
-    def grown(self, margin: float) -> ConvexSolid:
-        """All that is no farther than ``margin`` [m] from the solid."""
-        if self.kind == HALF_SPACE_SOLID:
-            return replace(self, disc=self.disc + margin)
-        return replace(self, radius=self.radius + margin)
-
-    def placed(self, rotation: Matrix, origin: Vector, slack: float) -> ConvexSolid:
-        """The solid moved into another frame, its points misplaced by ``slack`` more."""
-        axis = rotation @ self.axis
-        if self.kind == HALF_SPACE_SOLID:
-            offset = self.disc + float(axis @ origin)
-            return replace(self, axis=axis, disc=offset, slack=slack + SLACK_PER_METRE * (1.0 + abs(offset)))
-        corners = self.corners @ rotation.T + origin
-        size = float(np.abs(corners).max()) + self.disc + self.radius
-        if not size < MAX_COMPARED_SIZE:
-            return UNKNOWN
-        return replace(self, corners=corners, axis=axis, slack=slack + SLACK_PER_METRE * (1.0 + size))
-
-    def sizes(self) -> Vector:
-        """Numbers for the kernels, see the layout."""
-        low, high = self.corners.min(axis=0), self.corners.max(axis=0)
-        centre = 0.5 * (low + high)
-        around = float(np.linalg.norm(self.corners - centre, axis=1).max()) + abs(self.disc) + self.radius
-        own: dict[int, float | Vector] = {DISC: self.disc, AXIS: self.axis, ROUND: self.radius, SLACK: self.slack}
-        return record(SIZE_COUNT, own | {BOUND_CENTRE: centre, BOUND_RADIUS: around})
-
 
 UNKNOWN = ConvexSolid(np.zeros((1, 3)), inside=False, kind=UNKNOWN_SOLID)
 
@@ -113,21 +87,6 @@ class Solids:
 
     around: tuple[ConvexSolid, ...] = ()
     inside: tuple[ConvexSolid, ...] = ()
-
-    def grown(self, margin: float) -> Solids:
-        """See :meth:`ConvexSolid.grown`."""
-        if margin == 0.0:
-            return self
-        around = tuple(solid.grown(margin) for solid in self.around)
-        same = self.inside == self.around
-        return Solids(around, around if same else tuple(solid.grown(margin) for solid in self.inside))
-
-    def placed(self, rotation: Matrix, origin: Vector, slack: float) -> Solids:
-        """See :meth:`ConvexSolid.placed`."""
-        around = tuple(solid.placed(rotation, origin, slack) for solid in self.around)
-        if self.inside == self.around:
-            return Solids(around, around)
-        return Solids(around, tuple(solid.placed(rotation, origin, slack) for solid in self.inside))
 
 
 NO_SOLIDS = Solids()
@@ -164,6 +123,65 @@ def _own_solid(solid: Any) -> ConvexSolid | None:
     return None
 
 
+def placed_solids(
+    solids: Sequence[ConvexSolid], poses: NDArray[np.float64], *, margins: ArrayLike = 0.0, slack: float = 0.0
+) -> list[ConvexSolid]:
+    """Solids in other frames; what is too large or too far away for comparisons is unknown.
+
+    Args:
+        solids: n of them.
+        poses: Of the frames that they are in, seen from the others, shape (n, 4, 4).
+        margins: All that is no farther than this from a solid belongs to it too [m], a number or shape (n,).
+        slack: How far their points are misplaced beside their own slack [m].
+    """
+    if not solids:
+        return []
+    owner, starts = _runs([len(s.corners) for s in solids])
+    turns, origins = poses[:, :3, :3], poses[:, :3, 3]
+    corners = np.einsum("nij,nj->ni", turns[owner], np.concatenate([s.corners for s in solids])) + origins[owner]
+    axes = np.einsum("nij,nj->ni", turns, np.array([s.axis for s in solids]))
+    discs, radii, slacks = np.array([(s.disc, s.radius, s.slack) for s in solids]).T
+    endless = np.array([s.kind == HALF_SPACE_SOLID for s in solids])
+    discs = discs + np.where(endless, margins + np.einsum("ni,ni->n", axes, origins), 0.0)
+    radii = radii + np.where(endless, 0.0, margins)
+    sizes = np.maximum.reduceat(np.abs(corners).max(axis=1), starts[:-1]) + discs + radii
+    slacks = slacks + slack + SLACK_PER_METRE * (1.0 + np.where(endless, np.abs(discs), sizes))
+    compared = endless | (sizes < MAX_COMPARED_SIZE)
+    return [
+        ConvexSolid(s.corners if plane else corners[a:b], s.inside, disc, axis, radius, own_slack, s.kind)
+        if near
+        else UNKNOWN
+        for s, near, plane, a, b, disc, axis, radius, own_slack in zip(
+            solids,
+            *(each.tolist() for each in (compared, endless, starts[:-1], starts[1:], discs)),
+            axes,
+            *(each.tolist() for each in (radii, slacks)),
+            strict=True,
+        )
+    ]
+
+
+def placed_bodies(
+    bodies: Sequence[Solids], poses: NDArray[np.float64], *, margins: ArrayLike = 0.0, slack: float = 0.0
+) -> list[Solids]:
+    """The solids of bodies in other frames; see :func:`placed_solids`."""
+    own = [each.around if each.inside == each.around else each.around + each.inside for each in bodies]
+    owner, starts = _runs(list(map(len, own)))
+    grown = np.broadcast_to(margins, len(bodies))[owner]
+    placed = placed_solids([solid for each in own for solid in each], poses[owner], margins=grown, slack=slack)
+    made = []
+    for each, first, end in zip(bodies, starts[:-1].tolist(), starts[1:].tolist(), strict=True):
+        middle = first + len(each.around)
+        around = tuple(placed[first:middle])
+        made.append(Solids(around, around if middle == end and each.inside else tuple(placed[middle:end])))
+    return made
+
+
+def _runs(counts: Sequence[int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The owner of each of sum(counts) things in runs, and where the runs start and the last one ends."""
+    return np.repeat(np.arange(len(counts)), counts), np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
+
+
 def solid_table(bodies: Sequence[tuple[int, Sequence[Solids]]]) -> Table:
     """Table of bodies: for each the frame that carries it and the solids of its parts in that frame.
 
@@ -179,23 +197,43 @@ def solid_table(bodies: Sequence[tuple[int, Sequence[Solids]]]) -> Table:
         first_inside = start if inside == around else middle
         span = {AROUND_FIRST: start, AROUND_END: middle, INSIDE_FIRST: first_inside, INSIDE_END: len(solids)}
         spans.append({SPAN_FRAME: frame} | span)
-    blocks = [_blocks(solid.corners) for solid in solids]
-    starts = list(accumulate(map(len, blocks), initial=0))
-    numbers = [
-        {SOLID_KIND: s.kind, FIRST_BLOCK: a, END_BLOCK: b, IS_INSIDE: int(s.inside)}
-        for s, a, b in zip(solids, starts[:-1], starts[1:], strict=True)
-    ]
+    counts = np.array([len(solid.corners) for solid in solids], dtype=np.int64)
+    blocks = np.concatenate([[0], np.cumsum(-(-counts // WIDTH))])
+    numbers = np.zeros((len(solids), SOLID_INTS), dtype=np.int32)
+    numbers[:, FIRST_BLOCK], numbers[:, END_BLOCK] = blocks[:-1], blocks[1:]
+    numbers[:, SOLID_KIND], numbers[:, IS_INSIDE] = [s.kind for s in solids], [s.inside for s in solids]
     return table(
         {
             SPANS: whole_records(SPAN_INTS, spans),
-            SOLIDS: whole_records(SOLID_INTS, numbers),
-            SIZES: np.array([s.sizes() for s in solids], dtype=np.float64).reshape(-1, SIZE_COUNT),
-            CORNERS: np.concatenate([np.zeros((0, 3, WIDTH)), *blocks]).astype(np.float32),
+            SOLIDS: numbers,
+            SIZES: _sizes(solids),
+            CORNERS: _blocks(solids).astype(np.float32),
         }
     )
 
 
-def _blocks(corners: Matrix) -> Matrix:
-    """Corners ``WIDTH`` at a time, shape (blocks, 3, WIDTH); the first one fills up the last block."""
-    padded = np.concatenate([corners, np.repeat(corners[:1], -len(corners) % WIDTH, axis=0)])
+def _sizes(solids: Sequence[ConvexSolid]) -> Matrix:
+    """Numbers for the kernels, see the layout, shape (n, SIZE_COUNT)."""
+    made = np.zeros((len(solids), SIZE_COUNT))
+    if solids:
+        corners = np.concatenate([solid.corners for solid in solids])
+        owner, starts = _runs([len(solid.corners) for solid in solids])
+        low, high = (end.reduceat(corners, starts[:-1]) for end in (np.minimum, np.maximum))
+        centres = 0.5 * (low + high)
+        away = np.maximum.reduceat(np.linalg.norm(corners - centres[owner], axis=1), starts[:-1])
+        made[:, DISC], made[:, ROUND], made[:, SLACK] = np.array([(s.disc, s.radius, s.slack) for s in solids]).T
+        made[:, AXIS : AXIS + 3] = [solid.axis for solid in solids]
+        made[:, BOUND_CENTRE : BOUND_CENTRE + 3] = centres
+        made[:, BOUND_RADIUS] = away + np.abs(made[:, DISC]) + made[:, ROUND]
+    return made
+
+
+def _blocks(solids: Sequence[ConvexSolid]) -> NDArray[np.float64]:
+    """Corners ``WIDTH`` at a time, shape (blocks, 3, WIDTH); the first one of a solid fills up its last block."""
+    counts = np.array([len(solid.corners) for solid in solids], dtype=np.int64)
+    owner, _ = _runs((-(-counts // WIDTH) * WIDTH).tolist())
+    starts = np.concatenate([[0], np.cumsum(counts)])[:-1]
+    within = np.arange(len(owner)) - np.searchsorted(owner, owner)
+    corners = np.concatenate([np.zeros((0, 3)), *(solid.corners for solid in solids)])
+    padded = corners[starts[owner] + np.where(within < counts[owner], within, 0)]
     return np.asarray(padded.reshape(-1, WIDTH, 3).transpose(0, 2, 1))
