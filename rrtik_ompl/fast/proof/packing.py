@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache, partial
 from typing import TypeAlias
 
 import numpy as np
@@ -16,7 +17,7 @@ from rrtik_ompl.fast.proof import layout
 from rrtik_ompl.fast.proof.layout import CONVEX_SOLID, HALF_SPACE, NODES, UNKNOWN, WHOLE_BODY
 from rrtik_ompl.fast.tables.layout import CONVEX_SOLID as IS_CONVEX
 from rrtik_ompl.fast.tables.layout import HALF_SPACE_SOLID
-from rrtik_ompl.fast.tables.memory import Table, record, table
+from rrtik_ompl.fast.tables.memory import Table, table
 from rrtik_ompl.fast.tables.solid_tables import ConvexSolid, Solids, placed_bodies
 from rrtik_ompl.robot import Chain
 
@@ -71,8 +72,7 @@ def proof_pairs(
         strokes: Largest value of sliding joints [m], a number or shape (joints,).
     """
     joints = len(chain.parent)
-    poses = np.array([body.placement.homogeneous for body in bodies]).reshape(-1, 4, 4)
-    parts = [tuple(placed.around) or (_NOTHING,) for placed in placed_bodies(solids, poses)]
+    parts = [own.around or (_NOTHING,) for own in placed_bodies(solids, body_arrays(bodies).placements)]
     reached = [
         _reaches(chain, body.joint, own, np.broadcast_to(strokes, joints))
         for body, own in zip(bodies, parts, strict=True)
@@ -80,14 +80,16 @@ def proof_pairs(
     sweeps: dict[tuple[Members, int], int] = {}
     whole: list[tuple[int, ...]] = []
     of_parts: list[tuple[int, ...]] = []
-    ends = np.cumsum([0, *(len(part) + (len(part) > 1) for part in parts)])
-    moving = [pair for pair in pairs if any(bodies[k].joint != 0 for k in pair)]
+    ends = np.cumsum([0, *(len(part) + (len(part) > 1) for part in parts)]).tolist()
+    on = [body.joint for body in bodies]
+    common = cache(partial(_common, chain))
+    moving = [(i, j) for i, j in pairs if on[i] or on[j]]
     groups = _groups(bodies, parts, moving)
     grouped = {(member, still): None for (members, still) in groups for member in members}  # in this order
     for i, j in [*grouped, *(pair for pair in moving if pair not in grouped and pair[::-1] not in grouped)]:
-        one, other = (i, j) if _beyond(chain, bodies[i].joint, bodies[j].joint) else (j, i)
-        base = _common(chain, bodies[one].joint, bodies[other].joint)
-        own = [sweeps.setdefault(((k,), base), len(sweeps)) if bodies[k].joint != base else -1 for k in (one, other)]
+        base = common(on[i], on[j])
+        one, other = (i, j) if base == on[j] else (j, i)
+        own = [sweeps.setdefault(((k,), base), len(sweeps)) if on[k] != base else -1 for k in (one, other)]
         first = len(of_parts)
         split = len(parts[one]) > 1 or len(parts[other]) > 1
         if split:
@@ -154,10 +156,10 @@ def _groups(
 ) -> list[tuple[Members, int]]:
     """Bodies that one joint carries, two or more, each time with a body that stands still and is none's to touch."""
     found: dict[tuple[int, int], list[int]] = {}
+    convex = [all(solid.kind == IS_CONVEX for solid in own) for own in parts]
     for i, j in pairs:
         mover, still = (i, j) if bodies[j].joint == 0 else (j, i)
-        convex = all(solid.kind == IS_CONVEX for solid in (*parts[mover], *parts[still]))
-        if bodies[still].joint == 0 and convex:
+        if bodies[still].joint == 0 and convex[mover] and convex[still]:
             found.setdefault((bodies[mover].joint, still), []).append(mover)
     return [(tuple(members), still) for (_, still), members in found.items() if len(members) > 1]
 
@@ -176,11 +178,6 @@ def _common(chain: Chain, first: int, second: int) -> int:
     while first != second:  # parents have smaller numbers
         first, second = min(first, second), int(chain.parent[max(first, second) - 1]) + 1
     return first
-
-
-def _beyond(chain: Chain, first: int, second: int) -> bool:
-    """Whether a frame is carried by another one."""
-    return _common(chain, first, second) == second
 
 
 def _joint_records(chain: Chain) -> Matrix:
@@ -214,57 +211,74 @@ def _reaches(chain: Chain, joint: int, parts: Sequence[ConvexSolid], strokes: Ve
     return reaches
 
 
-def _sizes(solids: Sequence[ConvexSolid], turn: Matrix) -> Vector:
-    """Ball and box around solids, the box along the columns of ``turn``, and the measures of the first solid."""
-    if any(solid.kind != IS_CONVEX for solid in solids):
-        own = solids[0]
-        return record(layout.SIZE_COUNT, {layout.DISC: own.disc, layout.DISC_AXIS: own.axis})
-    lows, highs = [], []
-    for solid in solids:
-        across = solid.disc * np.sqrt(np.maximum(0.0, 1.0 - (turn.T @ solid.axis) ** 2)) + solid.radius
-        along = solid.corners @ turn
-        lows.append(along.min(axis=0) - across)
-        highs.append(along.max(axis=0) + across)
-    low, high = np.min(lows, axis=0), np.max(highs, axis=0)
-    centre = turn @ (0.5 * (low + high))
-    radius = max(float(np.linalg.norm(s.corners - centre, axis=1).max()) + s.disc + s.radius for s in solids)
-    own = solids[0]
-    return record(
-        layout.SIZE_COUNT,
-        {
-            layout.BALL_CENTRE: centre,
-            layout.BALL_RADIUS: radius,
-            layout.BOX_AXES: turn.T.ravel(),
-            layout.BOX_MIDDLE: 0.5 * (low + high),
-            layout.BOX_HALF: 0.5 * (high - low),
-            layout.DISC: own.disc,
-            layout.DISC_AXIS: own.axis,
-            layout.ROUND: own.radius,
-        },
-    )
+def _sizes(groups: Sequence[Sequence[ConvexSolid]], turns: NDArray[np.float64]) -> Matrix:
+    """Ball and box around groups of solids, and the measures of the first of each, shape (n, SIZE_COUNT).
+
+    Args:
+        groups: n groups of one solid or more.
+        turns: Columns are the axes of the boxes, shape (n, 3, 3).
+    """
+    made = np.zeros((len(groups), layout.SIZE_COUNT))
+    first = [group[0] for group in groups]
+    made[:, layout.DISC] = [solid.disc for solid in first]
+    made[:, layout.DISC_AXIS : layout.DISC_AXIS + 3] = [solid.axis for solid in first]
+    known = np.array([all(solid.kind == IS_CONVEX for solid in group) for group in groups])
+    if not known.any():
+        return made
+    turns, kept = turns[known], [group for group, convex in zip(groups, known, strict=True) if convex]
+    solids = [solid for group in kept for solid in group]
+    counts = [len(solid.corners) for solid in solids]
+    group_of = np.repeat(np.arange(len(kept)), [len(group) for group in kept])
+    solid_of = np.repeat(np.arange(len(solids)), counts)
+    starts = np.searchsorted(group_of[solid_of], np.arange(len(kept)))
+    discs, rounds = np.array([(solid.disc, solid.radius) for solid in solids]).T
+    axes = np.einsum("nji,nj->ni", turns[group_of], np.array([solid.axis for solid in solids]))
+    across = discs[:, None] * np.sqrt(np.maximum(0.0, 1.0 - axes**2)) + rounds[:, None]
+    corners = np.concatenate([solid.corners for solid in solids])
+    along = np.einsum("nji,nj->ni", turns[group_of[solid_of]], corners)
+    low = np.minimum.reduceat(along - across[solid_of], starts)
+    high = np.maximum.reduceat(along + across[solid_of], starts)
+    centres = np.einsum("nij,nj->ni", turns, 0.5 * (low + high))
+    away = np.linalg.norm(corners - centres[group_of[solid_of]], axis=1) + (discs + rounds)[solid_of]
+    numbers = {
+        layout.BALL_CENTRE: centres,
+        layout.BALL_RADIUS: np.maximum.reduceat(away, starts)[:, None],
+        layout.BOX_AXES: turns.transpose(0, 2, 1).reshape(-1, 9),
+        layout.BOX_MIDDLE: 0.5 * (low + high),
+        layout.BOX_HALF: 0.5 * (high - low),
+        layout.ROUND: np.array([[group[0].radius] for group in kept]),
+    }
+    for place, run in numbers.items():
+        made[known, place : place + run.shape[1]] = run
+    return made
 
 
 def _solid_arrays(
     bodies: Sequence[Body], parts: Sequence[Sequence[ConvexSolid]], groups: Sequence[Members]
 ) -> dict[int, int | NDArray[np.int32] | NDArray[np.float64]]:
     """The arrays of all solids: a body of several parts comes before these, as a whole; groups of bodies come last."""
-    numbers, sizes, corners, count = [], [], [np.zeros((0, 3))], 0
-    for body, own in zip(bodies, parts, strict=True):
-        turn = np.array(body.placement.rotation)
+    numbers: list[tuple[int, ...]] = []
+    solids: list[Sequence[ConvexSolid]] = []
+    corners, count = [np.zeros((0, 3))], 0
+    owners: list[int] = []
+    for k, (body, own) in enumerate(zip(bodies, parts, strict=True)):
         if len(own) > 1:
             known = all(solid.kind == IS_CONVEX for solid in own)
             numbers.append((body.joint, 0, 0, WHOLE_BODY if known else UNKNOWN))
-            sizes.append(_sizes(own, turn))
+            solids.append(own)
         for solid in own:
             numbers.append((body.joint, count, count + len(solid.corners), _kind(body, solid)))
-            sizes.append(_sizes([solid], turn))
+            solids.append((solid,))
             corners.append(solid.corners)
             count += len(solid.corners)
+        owners += [k] * (len(numbers) - len(owners))
+    turns = body_arrays(bodies).placements[owners, :3, :3]
     for members in groups:
         numbers.append((bodies[members[0]].joint, 0, 0, WHOLE_BODY))
-        sizes.append(_sizes([solid for k in members for solid in parts[k]], np.eye(3)))
+        solids.append([solid for k in members for solid in parts[k]])
+    turns = np.concatenate([turns, np.tile(np.eye(3), (len(groups), 1, 1))])
     return {
         layout.SOLIDS: np.array(numbers, dtype=np.int32),
-        layout.SIZES: np.array(sizes, dtype=np.float64),
+        layout.SIZES: _sizes(solids, turns),
         layout.CORNERS: np.concatenate(corners),
     }
