@@ -112,14 +112,14 @@ class JointPath:
 
     @classmethod
     def of(cls, robot: Robot, waypoints: ArrayLike) -> JointPath:
-        """A path of this robot through ``waypoints``, shape (k, dof).
+        """A path of this robot through ``waypoints``, shape (k, dof); :meth:`rrtik_ompl.Robot.onto_limits` applies.
 
         Raises:
             InputError: If the rows do not have one value per joint of the robot.
         """
         require(robot, Robot, "robot of a path")
         rows = finite_array(waypoints, (None, robot.dof), f"path waypoints of robot '{robot.name}'")
-        return cls(rows, robot.joint_names, robot.prismatic, robot.name, robot.continuous)
+        return cls(robot.onto_limits(rows), robot.joint_names, robot.prismatic, robot.name, robot.continuous)
 
     def with_waypoints(self, waypoints: ArrayLike) -> JointPath:
         """The same joints, other waypoints."""

@@ -19,7 +19,7 @@ from rrtik_ompl.world.route_check import verification_resolution
 class Problem:
     """A planning problem.
 
-    Values up to 1e-6 outside a limit are moved onto it. For continuous joints the goal is turned to the equivalent
+    Values up to 1e-5 outside a limit are moved onto it. For continuous joints the goal is turned to the equivalent
     value nearest to the start, so that the straight motion goes the short way round.
 
     Attributes:
@@ -104,7 +104,7 @@ def _usable(world: World, values: ArrayLike, what: str) -> Vector:
     fault = robot.limit_fault(q)
     if fault:
         raise ProblemError(f"{what}: {fault}", part=what)
-    q = robot.clamp(q)
+    q = robot.onto_limits(q)
     # both opinions must agree, for the path through q will be certified by the second one
     if not world.valid(q) or not world.certify(q[None])[0]:
         touching = world.contacts(q)

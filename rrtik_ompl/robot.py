@@ -19,7 +19,7 @@ from rrtik_ompl.poses import cross_products, joint_motions
 from rrtik_ompl.units import shown_unit
 
 FEW = 16  # configurations up to which Pinocchio's calls cost less than numpy's
-LIMIT_TOLERANCE = 1e-6  # [rad] or [m]; a value this far outside counts as inside and is moved onto the limit
+LIMIT_TOLERANCE = 1e-5  # [rad] or [m]; a value this far outside counts as inside: URDF files write pi in six digits
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,8 +134,7 @@ class Robot:
     def within_limits(self, Q: ArrayLike, tolerance: float = LIMIT_TOLERANCE) -> Mask:
         """Which of the configurations Q, shape (m, dof), lie inside the limits. Shape (m,)."""
         rows, (lower, upper) = self._rows(Q), _widened_limits(self, tolerance)
-        inside: Mask = (rows >= lower) & (rows <= upper)
-        fits: Mask = np.logical_and.reduce(inside, axis=1)
+        fits: Mask = np.logical_and.reduce((rows >= lower) & (upper >= rows), axis=1)
         return fits
 
     def finite_range(self) -> tuple[Vector, Vector]:
@@ -146,19 +145,24 @@ class Robot:
 
     def limit_fault(self, q: Vector) -> str:
         """A line that names the first joint of q outside its limits, in degrees (m if it slides); "" if none is."""
-        outside = np.flatnonzero((q < self.lower - LIMIT_TOLERANCE) | (q > self.upper + LIMIT_TOLERANCE))
+        outside = np.flatnonzero(self.onto_limits(q) != self.clamp(q))
         if len(outside) == 0:
             return ""
         joint = int(outside[0])
         factor, unit = shown_unit(self.prismatic[joint])
-        value, low, high = (factor * float(x) for x in (q[joint], self.lower[joint], self.upper[joint]))
-        name = self.joint_names[joint]
-        return f"joint '{name}' is at {value:.6g} {unit}, outside its limits {low:.6g} .. {high:.6g} {unit}"
+        value, near, *ends = (factor * float(x[joint]) for x in (q, self.clamp(q), self.lower, self.upper))
+        digits = next(n for n in range(6, 18) if f"{value:.{n}g}" != f"{near:.{n}g}")  # enough to see the difference
+        limits = " .. ".join(f"{end:.{digits}g}" for end in ends)
+        return f"joint '{self.joint_names[joint]}' is at {value:.{digits}g} {unit}, outside its limits {limits} {unit}"
+
+    def onto_limits(self, Q: Matrix) -> Matrix:
+        """Values up to ``LIMIT_TOLERANCE`` outside a limit moved onto it, all others as they are. Shape as given."""
+        lower, upper = _widened_limits(self, LIMIT_TOLERANCE)
+        return np.where((lower <= Q) & (upper >= Q), self.clamp(Q), Q)
 
     def clamp(self, q: Vector) -> Vector:
         """Move values that lie up to any distance outside onto the limits. Shape as given."""
-        clamped: Vector = np.minimum(np.maximum(q, self.lower), self.upper)
-        return clamped
+        return np.asarray(np.minimum(np.maximum(q, self.lower), self.upper))
 
     def joint_values(self, Q: ArrayLike) -> Matrix:
         """Values of every joint of the chain, mimic joints resolved. Q: shape (m, dof) or (dof,); (m, joints)."""

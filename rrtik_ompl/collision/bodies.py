@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeAlias
 
 import coal
 import numpy as np
@@ -18,6 +18,8 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
 
 ALWAYS_COLLIDING_SAMPLES = 64
+
+Pairs: TypeAlias = tuple[tuple[int, int], ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,6 +112,13 @@ def colliding_pairs(robot: Robot, scene: Scene, bodies: tuple[Body, ...]) -> tup
         met = {name for pair in allowed if bodies[i].name in pair for name in pair}
         found += [(i, j) if i < j else (j, i) for j, name in obstacles if name not in met]
     return tuple(sorted(found))
+
+
+def by_motion(bodies: Sequence[Body], pairs: Pairs) -> tuple[Pairs, Pairs]:
+    """The pairs of which a body moves, and those that both stand still."""
+    moves = [body.joint > 0 for body in bodies]
+    moving = tuple((i, j) for i, j in pairs if moves[i] or moves[j])
+    return moving, tuple((i, j) for i, j in pairs if not (moves[i] or moves[j]))
 
 
 def _may_meet(first: Body, second: Body, parent: dict[int, int], checked_links: frozenset[frozenset[str]]) -> bool:

@@ -133,7 +133,19 @@ def fixed_contact(robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int
         bodies: All solids.
         pairs: Numbers of those that never move and must not touch.
     """
-    return Certificate(robot, bodies, pairs).first_pairs(np.zeros((1, robot.dof)))[0] if pairs else None
+    near = _boxes_meet(bodies, pairs)
+    return Certificate(robot, bodies, near).first_pairs(np.zeros((1, robot.dof)))[0] if near else None
+
+
+def _boxes_meet(bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
+    """The pairs of standing bodies whose bounding boxes meet."""
+    own, (first, second) = body_arrays(bodies), np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    poses = own.placements
+    centres = np.einsum("nij,nj->ni", poses[:, :3, :3], own.centres) + poses[:, :3, 3]
+    halves = np.einsum("nij,nj->ni", np.abs(poses[:, :3, :3]), own.halves)
+    gaps = np.abs(centres[first] - centres[second]) - (halves[first] + halves[second])
+    meet = (gaps <= DISTANCE_TOLERANCE).all(axis=1)
+    return tuple(pair for pair, near in zip(pairs, meet.tolist(), strict=True) if near)
 
 
 def _shorter(

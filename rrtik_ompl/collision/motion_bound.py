@@ -18,6 +18,12 @@ def displacement_weights(robot: Robot, bodies: Iterable[Body]) -> Vector:
     The bound adds what each joint contributes, hence holds for joint motion along a straight line in configuration
     space. The tip counts as a point of the arm.
     """
+    return _displacement_weights(robot, tuple(bodies))
+
+
+@lru_cache(maxsize=16)
+def _displacement_weights(robot: Robot, bodies: tuple[Body, ...]) -> Vector:
+    """See above; kept, for the links of a robot are those of all its worlds."""
     tip = robot.model.frames[robot.model.getFrameId(robot.tip)]
     points = [*_balls(bodies), (tip.parentJoint, tip.placement.translation, 0.0)]
     return frozen(np.abs(robot.chain.gain).T @ _joint_weights(robot, points))

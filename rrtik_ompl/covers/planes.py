@@ -1,10 +1,17 @@
-"""Planes that bound a convex solid, thinned out."""
+"""Planes that bound a convex solid, all of them or the most different ones."""
 
 from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, cast
 
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.collision.solids import SameObject
+
+MOST_PLANES = 64  # of the outer polyhedron of a convex solid: fewer planes make it larger, never smaller
+SMALLEST_AREA = 1e-18  # [m^2] of a triangle that has a normal
 
 
 def most_different(planes: Matrix, count: int) -> Matrix:
@@ -17,3 +24,38 @@ def most_different(planes: Matrix, count: int) -> Matrix:
         taken.append(int(np.argmin(nearest)))
         nearest = np.maximum(nearest, planes[:, :3] @ planes[taken[-1], :3])
     return planes[taken]
+
+
+@lru_cache(maxsize=4096)
+def known_planes(solid: SameObject) -> Matrix | None:
+    """See :func:`outward_planes`; a solid that moves keeps them."""
+    return outward_planes(solid.geometry)
+
+
+@lru_cache(maxsize=1024)
+def outer_planes(solid: SameObject) -> Matrix:
+    """The planes of the outer polyhedron of a convex solid."""
+    return most_different(cast(Matrix, known_planes(solid)), MOST_PLANES)
+
+
+def outward_planes(solid: Any) -> Matrix | None:
+    """Outward unit normals and offsets of a coal convex solid's faces, shape (k, 4); None if it has no thickness.
+
+    Each plane is moved to the outermost corner along its normal, so that the solid lies behind all of them whatever
+    the faces' own precision; almost parallel faces share one plane.
+    """
+    points = np.array(solid.points(), dtype=np.float64).reshape(-1, 3)
+    triangles = np.array([[t[0], t[1], t[2]] for t in (solid.polygons(k) for k in range(solid.num_polygons))])
+    if len(triangles) < 4:
+        return None
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    areas = np.linalg.norm(normals, axis=1)
+    solid_faces = areas > SMALLEST_AREA
+    normals, outward = normals[solid_faces] / areas[solid_faces, None], (a - points.mean(axis=0))[solid_faces]
+    if len(normals) < 4:
+        return None
+    normals *= np.where(np.einsum("ij,ij->i", normals, outward) < 0.0, -1.0, 1.0)[:, None]
+    normals = normals[np.argsort(-areas[solid_faces])]  # of almost parallel faces the largest stands for the others
+    normals = normals[np.sort(np.unique(np.round(normals, 6), axis=0, return_index=True)[1])]
+    return np.column_stack([normals, (points @ normals.T).max(axis=0)])

@@ -104,10 +104,10 @@ def _robot(name: FilePath, request: RequestMessage) -> Robot:
 
 
 def _scene(document: YamlDocument, message: SceneMessage, robot: Robot) -> Scene:
-    obstacles = []
+    obstacles, frames = [], ("world", robot.name, *robot.link_names[:1])
     for k, item in enumerate(message.world.collision_objects):
         with document.at(("world", "collision_objects", k)):
-            item.check_frame(("world", robot.name, *robot.link_names[:1]))
+            item.check_frame(frames)
             obstacles += list(item.build())
     with document.at(("world",)):
         scene = Scene(tuple(obstacles))

@@ -42,7 +42,7 @@ class GoalWaypoint(Section):
             q = robot.configuration(self.joints, what)
         if fault := robot.limit_fault(q):
             raise InputError(f"{what}: {fault}")
-        return q
+        return robot.onto_limits(q)
 
 
 class RunSection(Section):

@@ -245,7 +245,7 @@ def _goal(robot: Robot, goal_feed: GoalFeed, now: float) -> Matrix:
     q = robot.configuration(goal_feed(now), f"goal at {now:g} s")
     if fault := robot.limit_fault(q):
         raise InputError(f"goal at {now:g} s: {fault}")
-    return q[None]
+    return robot.onto_limits(q)[None]
 
 
 def _held_pairs(scene: Scene) -> tuple[tuple[str, str], ...]:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Matrix, finite_array, not_negative, positive
 from rrtik_ompl.choices import Accuracy, one_of
-from rrtik_ompl.collision.bodies import colliding_pairs, link_bodies, scene_bodies
+from rrtik_ompl.collision.bodies import by_motion, colliding_pairs, link_bodies, scene_bodies
 from rrtik_ompl.collision.certificate import Certificate, fixed_contact
 from rrtik_ompl.collision.contacts import Contact as Contact
 from rrtik_ompl.collision.contacts import inside, measured
@@ -90,15 +90,13 @@ class World:
         self.bodies = link_bodies(robot) + scene_bodies(robot, self.scene.at(0.0))
         self.weights = displacement_weights(robot, [b for b in self.bodies if b.kind != "obstacle"])
         pairs = colliding_pairs(robot, self.scene, self.bodies)
-        moves = [body.joint > 0 for body in self.bodies]
-        moving = tuple((i, j) for i, j in pairs if moves[i] or moves[j])
+        moving, standing = by_motion(self.bodies, pairs)
         self.pairs = pairs
         self.accuracy = one_of(ACCURACIES, accuracy, "accuracy")
         self._certificate = cache(partial(Certificate, robot, self.bodies, pairs))
         self._motions: FastMotions | None = None
         self._proven_clearance: float | None = None
         self._checks = ExactChecker(robot, self.bodies, moving, conservative=accuracy == "conservative")
-        standing = tuple((i, j) for i, j in pairs if not (moves[i] or moves[j]))
         self._always_colliding = fixed_contact(robot, self.bodies, standing) is not None
         self.prover = Prover(robot, self.bodies, moving, always_colliding=self._always_colliding)
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.bodies import Body, link_bodies
+from rrtik_ompl.collision.bodies import Pairs as Pairs
 from rrtik_ompl.covers.cache import cached_inner_spheres, cached_outer_cover
 from rrtik_ompl.fast import FastWorld, needs_covers
 from rrtik_ompl.fast.tables.solid_tables import convex_solids
@@ -24,7 +25,6 @@ SLIDING_MARGIN = 1e-3  # [m] beyond the limits of sliding joints that the tables
 MAX_ROBOTS = 16  # whose covers and tables are kept
 NO_SPHERES = np.empty((0, 4))
 
-Pairs = tuple[tuple[int, int], ...]
 Spheres = tuple[Matrix, Matrix]  # around and inside a body
 
 

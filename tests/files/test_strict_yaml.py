@@ -3,12 +3,15 @@
 import os
 
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rrtik_ompl.errors import InputError, ProblemError
-from rrtik_ompl.files.strict_yaml import key_path, plain_value, read_yaml, write_yaml
+from rrtik_ompl.files import yaml_values
+from rrtik_ompl.files.strict_yaml import key_path, read_yaml, write_yaml
 from rrtik_ompl.files.text import read_text, write_text
+from rrtik_ompl.files.yaml_values import plain_value
 
 
 def read(tmp_path, text):
@@ -200,3 +203,22 @@ def test_plain_scalars(text, value):
 
 def test_a_key_path_reads_like_the_file():
     assert key_path(("scene", "obstacles", 3, "box")) == "scene.obstacles[3].box"
+
+
+SAME = [
+    "a: [1, -2.5, .inf, ~, 'x', {b: [], c: {}}]\nd: &p {x: 1e-3}\ne: *p\nf:\n  - *p\n  - |\n    text\n",
+    *(text for text, _ in BAD.values() if isinstance(text, str) and "\x01" not in text),
+]
+
+
+@pytest.mark.parametrize("text", SAME)
+def test_libyaml_and_the_parser_in_python_build_the_same(tmp_path, monkeypatch, text):
+    found = []
+    for name in ("CSafeLoader", "SafeLoader"):
+        monkeypatch.setattr(yaml_values, "_LOADER", getattr(yaml, name))
+        try:
+            document = read(tmp_path, text)
+            found.append((document.data, document.lines))
+        except InputError as error:
+            found.append(str(error).partition(" (")[0])  # the parsers' own words for what is no YAML differ
+    assert found[0] == found[1]

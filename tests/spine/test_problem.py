@@ -1,5 +1,7 @@
 """A problem exists only if it is well posed."""
 
+import re
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -41,10 +43,27 @@ def test_a_value_outside_its_limit_is_named_in_degrees(world):
         Problem(world, FREE, bad)
 
 
-def test_a_hair_outside_the_limit_is_moved_onto_it(world):
+@pytest.mark.parametrize("beyond", [5e-7, 9.9e-6])
+def test_a_hair_outside_the_limit_is_moved_onto_it(world, beyond):
+    start, goal = FREE.copy(), FREE.copy()
+    start[1], goal[2] = world.robot.upper[1] + beyond, world.robot.lower[2] - beyond
+    moved = Problem(World(world.robot), start, goal)
+    assert moved.start[1] == world.robot.upper[1]
+    assert moved.goal.q[2] == world.robot.lower[2]
+    rows = JointPath.of(world.robot, [start, goal]).waypoints
+    assert (rows == [moved.start, moved.goal.q]).all()
+
+
+def test_a_value_just_too_far_outside_is_told_with_digits_enough(world):
     start = FREE.copy()
-    start[1] = world.robot.upper[1] + 5e-7
-    assert Problem(world, start, FREE).start[1] == world.robot.upper[1]
+    start[1] = world.robot.upper[1] + 2e-5
+    with pytest.raises(ProblemError, match="start: joint") as caught:
+        Problem(world, start, FREE)
+    value, high = re.search(r"is at (\S+) deg, .* \.\. (\S+) deg", str(caught.value)).groups()
+    assert value != high
+    assert float(value) - float(high) == pytest.approx(np.degrees(2e-5), rel=0.2)
+    rows = JointPath.of(world.robot, [start]).waypoints
+    assert rows[0, 1] == start[1]
 
 
 @pytest.mark.parametrize("bad", [[0.0] * 5, [np.nan] * 6, "stowed", [[0.0] * 6]])

@@ -147,7 +147,8 @@ def standing_tables(
     inner: Sequence[Spheres],
 ) -> tuple[Table, Table]:
     """Primitives that contain what stands still, and primitives inside it."""
-    still, around, inside = ([each[k] for k in standing] for each in (bodies, outer, inner))
+    still = [bodies[k] for k in standing]
+    around, inside = ([each[k] for k in standing] for each in (outer, inner))
     made = outer_primitives(still, around), inner_primitives(still, inside)
     return primitive_table(made[0], checked), primitive_table(made[1], checked)
 

@@ -69,17 +69,27 @@ class Primitives:
     def only(self, chosen: NDArray[np.int64] | Mask) -> Primitives:
         """Some of them, by their numbers or by a mask."""
         places = np.arange(len(self))[chosen]
-        arrays = (each[places] for each in (self.bodies, self.kinds, self.numbers, self.lows, self.highs))
-        return Primitives(*arrays, tuple(self.planes[k] for k in places.tolist()))
+        return Primitives(
+            self.bodies[places],
+            self.kinds[places],
+            self.numbers[places],
+            self.lows[places],
+            self.highs[places],
+            tuple(self.planes[k] for k in places.tolist()),
+        )
 
 
 def joined(parts: Sequence[Primitives]) -> Primitives:
     """Primitives one after the other; those of a body stay in their order."""
-    empty = np.zeros(0, dtype=np.int64)
-    names = ("bodies", "kinds", "numbers", "lows", "highs")
-    none = (empty, empty, np.zeros((0, SHAPE_FLOATS)), np.zeros((0, 3)), np.zeros((0, 3)))
-    columns = (np.concatenate([n, *(getattr(p, name) for p in parts)]) for name, n in zip(names, none, strict=True))
-    return Primitives(*columns, tuple(planes for part in parts for planes in part.planes))
+    whole, points = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+    return Primitives(
+        np.concatenate([whole, *(part.bodies for part in parts)]),
+        np.concatenate([whole, *(part.kinds for part in parts)]),
+        np.concatenate([np.zeros((0, SHAPE_FLOATS)), *(part.numbers for part in parts)]),
+        np.concatenate([points, *(part.lows for part in parts)]),
+        np.concatenate([points, *(part.highs for part in parts)]),
+        tuple(planes for part in parts for planes in part.planes),
+    )
 
 
 def primitive_table(primitives: Primitives, checked: NDArray[np.bool_]) -> Table:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any, cast
+from typing import cast
 
 import coal
 import numpy as np
@@ -19,7 +19,7 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.shape_table import Core, core_of
 from rrtik_ompl.collision.solids import SameObject
-from rrtik_ompl.covers.planes import most_different
+from rrtik_ompl.covers.planes import known_planes, outer_planes
 from rrtik_ompl.fast.tables.layout import (
     BALL,
     BALL_RADIUS,
@@ -48,11 +48,9 @@ from rrtik_ompl.fast.tables.memory import record
 from rrtik_ompl.fast.tables.primitive_tables import UNBOUNDED_COORDINATE, Primitives, joined
 from rrtik_ompl.fast.tables.robot_tables import Spheres, usable_cover
 
-MOST_PLANES = 64  # of the outer polyhedron of a convex solid: fewer planes make it larger, never smaller
 UNBOUNDED_LENGTH = 1e12  # [m] what is larger or farther away counts as being everywhere
 SLACK_PER_METRE = 1e-6  # rounding of a primitive's numbers and of the arithmetic on them, relative to the coordinates
 PLANE_SLACK = 1e-5  # [m] for planes that stand for a few others with almost the same normal
-SMALLEST_AREA = 1e-18  # [m^2] of a triangle that has a normal
 
 
 def needs_covers(body: Body) -> tuple[bool, bool]:
@@ -119,7 +117,7 @@ def _formula(key: SameObject) -> int | None:
     if isinstance(solid, coal.Halfspace):
         return HALF_SPACE
     if isinstance(solid, coal.ConvexBase):
-        return None if _known_planes(key) is None else CONVEX
+        return None if known_planes(key) is None else CONVEX
     core = core_of(solid)
     if core is None:
         return None
@@ -256,12 +254,12 @@ def _half_space(body: Body, place: int, grow: float, inflation: float) -> Primit
 
 def _convex(body: Body, place: int, grow: float, inflation: float) -> Primitives:
     """A convex solid by its planes; a ball meets the inner primitive if its centre lies behind all of them."""
-    planes = cast(Matrix, _known_planes(SameObject(body.geometry)))
+    planes = cast(Matrix, known_planes(SameObject(body.geometry)))
     rotation, origin = np.array(body.placement.rotation), np.array(body.placement.translation)
     corners = np.array(body.geometry.points()).reshape(-1, 3) @ rotation.T + origin
     low, high = corners.min(axis=0), corners.max(axis=0)
     inflation += float(_slack(0.5 * (low + high)[None], (high - low).max(keepdims=True))[0])
-    kept = most_different(planes, MOST_PLANES) if grow > 0.0 else planes
+    kept = outer_planes(SameObject(body.geometry)) if grow > 0.0 else planes
     world = np.empty_like(kept)
     normals = world[:, PLANE_NORMAL : PLANE_NORMAL + 3]
     normals[:] = kept[:, :3] @ rotation.T
@@ -274,32 +272,3 @@ def _single(kind: int, place: int, numbers: Vector, low: Vector, high: Vector, p
     """One primitive, of the body at a place."""
     places, kinds = np.array([place], dtype=np.int64), np.array([kind], dtype=np.int64)
     return Primitives(places, kinds, numbers[None], low[None], high[None], (planes,))
-
-
-@lru_cache(maxsize=4096)
-def _known_planes(solid: SameObject) -> Matrix | None:
-    """See :func:`outward_planes`; an obstacle that moves keeps them."""
-    return outward_planes(solid.geometry)
-
-
-def outward_planes(solid: Any) -> Matrix | None:
-    """Outward unit normals and offsets of a coal convex solid's faces, shape (k, 4); None if it has no thickness.
-
-    Each plane is moved to the outermost corner along its normal, so that the solid lies behind all of them whatever
-    the faces' own precision; almost parallel faces share one plane.
-    """
-    points = np.array(solid.points(), dtype=np.float64).reshape(-1, 3)
-    triangles = np.array([[t[0], t[1], t[2]] for t in (solid.polygons(k) for k in range(solid.num_polygons))])
-    if len(triangles) < 4:
-        return None
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    areas = np.linalg.norm(normals, axis=1)
-    solid_faces = areas > SMALLEST_AREA
-    normals, outward = normals[solid_faces] / areas[solid_faces, None], (a - points.mean(axis=0))[solid_faces]
-    if len(normals) < 4:
-        return None
-    normals *= np.where(np.einsum("ij,ij->i", normals, outward) < 0.0, -1.0, 1.0)[:, None]
-    normals = normals[np.argsort(-areas[solid_faces])]  # of almost parallel faces the largest stands for the others
-    normals = normals[np.sort(np.unique(np.round(normals, 6), axis=0, return_index=True)[1])]
-    return np.column_stack([normals, (points @ normals.T).max(axis=0)])

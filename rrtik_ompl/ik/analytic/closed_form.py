@@ -15,8 +15,9 @@ from rrtik_ompl.ik.analytic.kernel_branches import kernel_branches
 from rrtik_ompl.ik.analytic.planar import planar_form
 from rrtik_ompl.ik.analytic.reference_branches import reference_branches, tip_fault
 from rrtik_ompl.poses import LAST_ROW, LAST_ROW_TOLERANCE, NOT_RIGID, left_handed
-from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
+from rrtik_ompl.robot import Robot
 
+SAME_ANGLE = 1e-6  # [rad] or [m]
 SWEEP = 72  # samples of a singular pose's curve of solutions
 
 
@@ -123,7 +124,7 @@ def family(robot: Robot, target: ArrayLike, *, samples: int = SWEEP, slack: floa
         many = np.broadcast_to(goal, (samples, *goal.shape))
         found = solutions(robot, many, near=near, slack=slack, check=False)
     rows: Matrix = found.branches.transpose(1, 0, 2)[found.valid.T]
-    new = np.abs(np.diff(rows, axis=0, prepend=np.full((1, robot.dof), np.inf))).max(axis=1) > LIMIT_TOLERANCE
+    new = np.abs(np.diff(rows, axis=0, prepend=np.full((1, robot.dof), np.inf))).max(axis=1) > SAME_ANGLE
     different: Matrix = rows[new]
     return different
 
