@@ -227,6 +227,7 @@ def _entry_points() -> Any:
     return entry_points()
 
 
+@cache
 def _load(what: str, group: str, name: str) -> Any:
     offers = _offers(group)
     if name not in offers:

@@ -52,7 +52,7 @@ def ompl_overhead(problem: Problem, *, seconds: float, seed: int) -> Callable[[]
     if PLANNER not in KERNEL_PLANNERS:
         return None
     goals = goal_configurations(problem, np.random.default_rng(0)).rows
-    setup = og.SimpleSetup(unchecked_space(problem, goals))  # as plan() does: the planner asks the world itself
+    setup = og.SimpleSetup(unchecked_space(*planning_bounds(problem, goals)))  # the planner asks the world itself
     states, ends = StateIO(setup.getSpaceInformation()), []
     for row in (problem.start, goals[0]):
         ends.append(setup.getSpaceInformation().allocState())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from typing import ClassVar
 
 import numpy as np
@@ -9,13 +10,12 @@ from ompl import base as ob
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, positive
 from rrtik_ompl.fast.search.connect import ConnectSearch
+from rrtik_ompl.fast.search.connect_keeping import kept_search
 from rrtik_ompl.fast.search.connect_layout import KERNELS
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
-from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
-from rrtik_ompl.robot import Robot
 from rrtik_ompl.search.rrt_connect import ConnectRules, RrtConnect, straight_path
-from rrtik_ompl.world.motion_queries import has_kernels, is_conservative
+from rrtik_ompl.world.motion_queries import KernelWorld, has_kernels, is_conservative
 from rrtik_planners.one_joint_options import iteration_limit
 
 
@@ -59,32 +59,34 @@ class FastRRTConnect(SafePlanner):
         self.range = None if range is None else positive(range, "range")
         self.domain = None if domain is None else positive(domain, "domain")
         self.max_iterations = iteration_limit(max_iterations)
-        self._kept: tuple[FastMotions, tuple[Vector, Vector], ConnectSearch] | None = None
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
-        kernels = self._kernels()
-        if kernels is None:
+        world = self._world
+        if not has_kernels(world, KERNELS):
             return self._in_python(starts, goals, checker, ptc)
-        path = kernels.solve(
-            starts,
-            goals,
-            self.rng.bit_generator.random_raw(),
-            ask=None if is_conservative(self._world) else checker.motion_valid_batch,
-            stop=ptc,
-            max_iterations=self.max_iterations,
-        )
-        counts = kernels.statistics()
+        with self._kernels(world) as kernels:
+            path = kernels.solve(
+                starts,
+                goals,
+                self.rng.bit_generator.random_raw(),
+                ask=None if is_conservative(world) else checker.motion_valid_batch,
+                stop=ptc,
+                max_iterations=self.max_iterations,
+            )
+            counts = kernels.statistics()
         checker.checked_motions += int(counts["motions"] - counts["questions"])  # the questions it has counted
         return SearchResult(path, {**counts, "edges": counts["vertices"] - len(starts) - len(goals)})
 
     def ends_free(self, rows: Matrix, checker: MotionChecker) -> Mask:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.ends_free`; the kernels know in a few microseconds."""
-        kernels = self._kernels()
-        if kernels is None or not kernels.proven_free(rows):
-            return super().ends_free(rows, checker)
-        checker.checked_states += len(rows)
-        return np.ones(len(rows), dtype=bool)
+        if has_kernels(self._world, KERNELS):
+            with self._kernels(self._world) as kernels:
+                proven = kernels.proven_free(rows)
+            if proven:
+                checker.checked_states += len(rows)
+                return np.ones(len(rows), dtype=bool)
+        return super().ends_free(rows, checker)
 
     def _in_python(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """The same search, where every motion is decided at once."""
@@ -101,16 +103,13 @@ class FastRRTConnect(SafePlanner):
     def _lengths(self) -> tuple[float | None, float | None]:
         return self.range, self.domain
 
-    def _kernels(self) -> ConnectSearch | None:
-        """The search in kernels for the world and bounds of this solve, or None where the world has no kernels."""
-        world, bounds = self._world, self.bounds()
-        if not has_kernels(world, KERNELS):
-            return None
-        if self._kept is None or self._kept[0] is not world.motions or self._kept[1] is not bounds:
-            self._kept = world.motions, bounds, self._made(world.motions, world.robot, *bounds)
-        return self._kept[2]
+    def _kernels(self, world: KernelWorld) -> AbstractContextManager[ConnectSearch]:
+        """The search in kernels for a world and the bounds of this solve."""
+        lower, upper = self.bounds()
+        key = (lower.tobytes(), upper.tobytes(), *self._lengths)
+        return kept_search(world.motions, key, lambda: self._made(world, lower, upper))
 
-    def _made(self, motions: FastMotions, robot: Robot, lower: Vector, upper: Vector) -> ConnectSearch:
+    def _made(self, world: KernelWorld, lower: Vector, upper: Vector) -> ConnectSearch:
         range_, domain = connect_lengths(lower, upper, *self._lengths)
-        lower, upper = np.maximum(lower, robot.lower), np.minimum(upper, robot.upper)  # unknown to the kernels
-        return ConnectSearch(motions, lower, upper, range_=range_, domain=domain)
+        lower, upper = np.maximum(lower, world.robot.lower), np.minimum(upper, world.robot.upper)  # unknown to kernels
+        return ConnectSearch(world.motions, lower, upper, range_=range_, domain=domain)

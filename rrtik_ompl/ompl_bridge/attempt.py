@@ -1,4 +1,7 @@
-"""One attempt of one planner at one problem, with every OMPL object living and dying inside the call."""
+"""One attempt of one planner at one problem.
+
+A planner of ours works on arrays. For any other one every OMPL object lives and dies inside the call.
+"""
 
 from __future__ import annotations
 
@@ -18,12 +21,14 @@ from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import PlannerError
 from rrtik_ompl.ompl_bridge.planner_options import is_safe, other_planner, safe_planner
 from rrtik_ompl.ompl_bridge.planner_traits import OMPL_TRAITS, PlannerFactory, traits_of
+from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
 from rrtik_ompl.ompl_bridge.setup import (
     ValidityCallback,
     exact_path,
+    planning_bounds,
     problem_definition,
+    shared_space,
     space_information,
-    unchecked_space,
 )
 from rrtik_ompl.problem import Problem
 
@@ -68,21 +73,19 @@ def attempt(
     Raises:
         InputError: If the planner does not take a parameter.
         PlannerError: If the planner refused its options for this problem, or broke.
-        KeyboardInterrupt: After the planner has stopped in good order.
+        KeyboardInterrupt: After a planner of OMPL has stopped in good order; one of ours is left at once.
     """
     traits, name = traits_of(factory), getattr(factory, "__name__", str(factory))
     goals = goals[:1] if traits.one_goal else goals
     with quiet():
         ou.RNG.setSeed(1 + seed % (2**31 - 2))  # before any object that draws from it; OMPL does not take 0
-        validity = ValidityCallback(problem.world, most_motions=np.inf if effort is None else effort * EFFORT_MOTIONS)
-        own = is_safe(factory)
-        si = unchecked_space(problem, goals) if own else space_information(problem, goals, validity)
-        definition = problem_definition(problem, goals, si)
         if is_safe(factory):
             limit = {} if effort is None else {ITERATION_LIMIT: effort * EFFORT_ITERATIONS}
-            planner = safe_planner(factory, name, si, problem, seed, {**limit, **parameters})
-        else:
-            planner = other_planner(factory, name, si, definition, parameters)
+            return _on_arrays(problem, factory, name, goals, seconds, seed, {**limit, **parameters})
+        validity = ValidityCallback(problem.world, most_motions=np.inf if effort is None else effort * EFFORT_MOTIONS)
+        si = space_information(problem, goals, validity)
+        definition = problem_definition(problem, goals, si)
+        planner = other_planner(factory, name, si, definition, parameters)
         validity.deadline = time.monotonic() + seconds
         condition = ob.timedPlannerTerminationCondition(seconds)
         validity.stop = condition.terminate
@@ -100,11 +103,30 @@ def attempt(
         rows = exact_path(definition, si)
         if rows is None and validity.late and status in INVALID:  # only because all answers were no by then
             status = ob.PlannerStatus(ob.PlannerStatus.TIMEOUT)
-        if own:
-            return Attempt(rows, str(status), dict(planner.statistics), planner.reason)
         begin = time.perf_counter()
         graph = _graph(planner, si) if factory in OMPL_TRAITS and traits.has_graph else {}
         return Attempt(rows, str(status), {**validity.counts(), **graph}, counting=time.perf_counter() - begin)
+
+
+def _on_arrays(
+    problem: Problem,
+    factory: type[SafePlanner],
+    name: str,
+    goals: Matrix,
+    seconds: float,
+    seed: int,
+    options: Mapping[str, Any],
+) -> Attempt:
+    """Of a planner of ours, which needs of OMPL a space alone."""
+    end, bounds = time.perf_counter() + seconds, planning_bounds(problem, goals)
+    planner = safe_planner(factory, name, shared_space(*bounds), problem, seed, options)
+    planner.setup()
+    straight = _straight_motion(problem, goals) if factory.straight_first else None
+    if straight is not None:
+        return Attempt(straight, "Exact solution", {})
+    status, rows = planner.solve_rows(problem.start[None], goals, bounds, lambda: time.perf_counter() > end)
+    _raise_failure(planner, name, status, None)
+    return Attempt(rows, str(status), dict(planner.statistics), planner.reason)
 
 
 def _raise_failure(planner: ob.Planner, name: str, status: ob.PlannerStatus, error: Exception | None) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import re
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeGuard
@@ -12,7 +11,7 @@ from ompl import base as ob
 from rrtik_ompl.arrays import finite_array
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
-from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
+from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner, keyword_parameters
 from rrtik_ompl.problem import Problem
 
 
@@ -43,8 +42,9 @@ def safe_planner(
         UnknownNameError: If it has no option of a name.
         InputError: If it refuses an option.
     """
-    _check_names(factory, name, options)
-    goal: dict[str, Any] = {"goal": problem.goal} if "goal" in inspect.signature(factory).parameters else {}
+    if options:
+        _check_names(factory, name, options)
+    goal: dict[str, Any] = {"goal": problem.goal} if "goal" in keyword_parameters(factory) else {}
     try:
         return factory(si, world=problem.world, seed=seed, **goal, **options)
     except TypeError as error:

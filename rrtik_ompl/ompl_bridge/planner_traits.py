@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
+from functools import cache, lru_cache
 from typing import Any, TypeAlias
 
 from ompl import base as ob
@@ -90,6 +91,7 @@ _UNBOUND = (
 )
 
 
+@cache
 def ompl_planners() -> dict[str, type[ob.Planner]]:
     """OMPL's geometric planners of the installed wheel by their names."""
     found = {key: value for key, value in vars(og).items() if isinstance(value, type) and issubclass(value, ob.Planner)}
@@ -105,6 +107,7 @@ def unbound_planners() -> tuple[str, ...]:
 OMPL_TRAITS = {planner: _LISTED.get(name, PlannerTraits()) for name, planner in ompl_planners().items()}
 
 
+@lru_cache(maxsize=64)
 def traits_of(factory: PlannerFactory) -> PlannerTraits:
     """The traits of a planner: of OMPL's from the table, else the attributes of the class, as far as it has them."""
     if isinstance(factory, type) and factory in OMPL_TRAITS:

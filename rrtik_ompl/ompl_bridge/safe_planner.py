@@ -8,8 +8,8 @@ arrays at once, and ``solve`` always returns a status.
 from __future__ import annotations
 
 import inspect
-import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, ClassVar
 
@@ -21,14 +21,12 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen, whole_number
 from rrtik_ompl.errors import PlannerError
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker
+from rrtik_ompl.ompl_bridge.planner_inputs import NONE_USABLE, starts_and_goals
 from rrtik_ompl.ompl_bridge.results import Failure, IllPosed, SearchResult, explained, failure_of
 from rrtik_ompl.ompl_bridge.states import StateIO, real_vector_space, space_bounds
 from rrtik_ompl.world.motion_queries import MotionQueries, Stop
 
-GOAL_SAMPLES = 32  # how often a goal that can give any number of configurations is sampled
-WAIT_FOR_GOAL = 0.002  # [s] between two samples of a goal that is still computing its first sample
 GIVEN_OPTIONS = ("world", "seed", "goal")  # that `plan()` fills in
-NONE_USABLE = "none is given, or all are in collision or outside the bounds"
 
 
 class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
@@ -36,7 +34,8 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
 
     Every ``solve`` is a new attempt from the starts and goals of the problem definition; nothing is kept from an
     earlier one except the state of the random generator. ``solve`` never raises an Exception: it returns ``CRASH`` and
-    keeps the text in :attr:`error`. KeyboardInterrupt and SystemExit pass.
+    keeps the text in :attr:`error`. KeyboardInterrupt and SystemExit pass. `plan()` calls :meth:`solve_rows`, which
+    does the same without OMPL's states and goals.
 
     A planner refuses options by an InputError, from its constructor or, if it depends on starts and goals, from
     :meth:`search`. The options are the keyword parameters of the constructor; ``world``, ``seed`` and, for planners
@@ -92,14 +91,13 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self.failure: Failure | None = None
         self.reason = ""
         self._world = world
-        self._io = StateIO(si)  # holds the space, which knows nothing of planners, so both can be freed
+        self._states: StateIO | None = None
         self._known_bounds: tuple[Any, Any] = ((), ())  # numbers of the space, and the arrays made from them
 
     @classmethod
     def default_options(cls) -> dict[str, Any]:
         """The options that the planner takes, with their defaults."""
-        parameters = list(inspect.signature(cls).parameters.values())[1:]  # the first one is the space information
-        return {each.name: each.default for each in parameters if each.name not in GIVEN_OPTIONS}
+        return {name: default for name, default in keyword_parameters(cls).items() if name not in GIVEN_OPTIONS}
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """Look for a path from any start to any goal until ``ptc()`` is true. For subclasses.
@@ -129,15 +127,27 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         Returns:
             ``ompl.base.PlannerStatus``.
         """
-        self._forget()
-        try:
-            status = self._solve(_condition(ptc))
-        except IllPosed as refused:
-            status, self.error = refused.status, refused.reason
-        except Exception as error:
-            self.failure, self.error = failure_of(error), explained(error)
-            status = ob.PlannerStatus.CRASH
+        status, _ = self._searched(lambda: self._in_ompl(_condition(ptc)))
         return ob.PlannerStatus(status)
+
+    def solve_rows(
+        self, starts: Matrix, goals: Matrix, bounds: tuple[Vector, Vector], stop: Stop
+    ) -> tuple[ob.PlannerStatus, Matrix | None]:
+        """Solve as :meth:`solve` does, in the planner's world, without OMPL's states and goals.
+
+        Args:
+            starts: Configurations inside the bounds, shape (s, n).
+            goals: Likewise, shape (g, n); none are needed if :meth:`needs_goals` says so.
+            bounds: Lower and upper ones, shapes (n,), finite; those of the planner's space.
+            stop: Call it: true when it is time to stop.
+
+        Returns:
+            The status, and the path, shape (k, n), if there is an exact one.
+        """
+        self._known_bounds = (), bounds
+        status, found = self._searched(lambda: self._between(starts, goals, stop))
+        exact = found is not None and found.difference <= 0.0
+        return ob.PlannerStatus(status), found.path if found is not None and exact else None
 
     def clear(self) -> None:
         """Forget the last attempt; called by OMPL."""
@@ -155,6 +165,25 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         """
         return self._known_bounds[1] or self._read_bounds()
 
+    @property
+    def _io(self) -> StateIO:
+        if self._states is None:
+            self._states = StateIO(self.getSpaceInformation())  # holds the space, which knows nothing of planners
+        return self._states
+
+    def _searched(self, search: Callable[[], SearchResult]) -> tuple[ob.PlannerStatus, SearchResult | None]:
+        """The status of a search and what it brought back, if it did not break off."""
+        self._forget()
+        try:
+            found = search()
+        except IllPosed as refused:
+            self.error = refused.reason
+            return refused.status, None
+        except Exception as error:
+            self.failure, self.error = failure_of(error), explained(error)
+            return ob.PlannerStatus.CRASH, None
+        return _status(found), found
+
     def _forget(self) -> None:
         self.statistics, self.error, self.failure, self.reason = {}, None, None, ""
 
@@ -166,97 +195,66 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         known: tuple[Vector, Vector] = self._known_bounds[1]
         return known
 
-    def _solve(self, ptc: ob.PlannerTerminationCondition) -> ob.PlannerStatus:
+    def _in_ompl(self, ptc: ob.PlannerTerminationCondition) -> SearchResult:
+        """Search between the starts and goals of the problem definition, and hand the path to it."""
         si, pdef = self.getSpaceInformation(), self.getProblemDefinition()
         if pdef is None:
             raise PlannerError(f"{self.getName()}: no problem definition; use SimpleSetup or setProblemDefinition()")
         self._read_bounds()  # refuses missing ones in clearer words than OMPL
-        checker: MotionChecker = SpaceChecker(si) if self._world is None else WorldChecker(self._world)
-        starts, goals = self._inputs(checker, ptc)
-        result = self.search(starts, goals, checker, ptc)
-        if result.path is None and isinstance(pdef.getGoal(), GoalSampler):
+        if self._world is None and not si.isSetup():
+            si.setup()  # before it, checkMotion looks at the end point alone
+        inputs, aimless = self.getPlannerInputStates(), not self.needs_goals()
+        found = self._between(*starts_and_goals(inputs, pdef, self._io, ptc, aimless=aimless), ptc)
+        if found.path is None and isinstance(pdef.getGoal(), GoalSampler):
             pdef.getGoal().more()  # for the next attempt
-        self.statistics = {
-            **result.statistics,
-            "checked_states": checker.checked_states,
-            "checked_motions": checker.checked_motions,
-        }
-        self.reason = result.reason
-        return self._report(result)
+        if found.path is not None:
+            path = self._io.path(si, found.path)
+            pdef.addSolutionPath(path, found.difference > 0.0, float(found.difference), self.getName())
+        return found
 
-    def _inputs(self, checker: MotionChecker, ptc: Stop) -> tuple[Matrix, Matrix]:
-        """Starts and, if needed, goals of the problem definition, shapes (s, n) and (g, n), at least one each."""
-        inputs, io = self.getPlannerInputStates(), self._io
-        inputs.restart()
-        starts = self._starts(inputs, io)
-        if not starts:
-            raise IllPosed(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
+    def _between(self, starts: Matrix, goals: Matrix, stop: Stop) -> SearchResult:
+        """Search between those starts and goals, shapes (s, n) and (g, n), that are free."""
+        checker = SpaceChecker(self.getSpaceInformation()) if self._world is None else WorldChecker(self._world)
+        found = self.search(*self._free_ends(starts, goals, checker), checker, stop)
+        checked = {"checked_states": checker.checked_states, "checked_motions": checker.checked_motions}
+        self.statistics, self.reason = {**found.statistics, **checked}, found.reason
+        return found
+
+    def _free_ends(self, starts: Matrix, goals: Matrix, checker: MotionChecker) -> tuple[Matrix, Matrix]:
+        """The free ones of starts and, if needed, goals, at least one each."""
         if not self.needs_goals():
-            rows = np.array(starts)
-            rows = rows[checker.valid_batch(rows)]
-            if len(rows) == 0:
+            starts, goals = starts[checker.valid_batch(starts)], goals[:0]
+            if len(starts) == 0:
                 raise IllPosed(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
-            return rows, rows[:0]
-        goal = self.getProblemDefinition().getGoal()
-        if goal is not None and not isinstance(goal, ob.GoalSampleableRegion):
-            text = "the goal cannot be sampled; use a GoalState, GoalStates or a GoalSampleableRegion"
-            raise IllPosed(ob.PlannerStatus.UNRECOGNIZED_GOAL_TYPE, text)
-        goals = self._goals(inputs, io, goal, ptc)
-        rows, split = np.array([*starts, *goals]), len(starts)
-        free = self.ends_free(rows, checker).tolist()  # all at once: a call costs more than a check
-        if goals and all(free):
-            return rows[:split], rows[split:]
-        if not any(free[:split]):
+            return starts, goals
+        free = self.ends_free(np.concatenate([starts, goals]), checker)  # all at once: a call costs more than a check
+        if len(goals) and free.all():
+            return starts, goals
+        starts, goals = starts[free[: len(starts)]], goals[free[len(starts) :]]
+        if len(starts) == 0:
             raise IllPosed(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
-        if not any(free[split:]):
+        if len(goals) == 0:
             raise IllPosed(ob.PlannerStatus.INVALID_GOAL, f"no valid goal: {NONE_USABLE}")
-        return rows[:split][free[:split]], rows[split:][free[split:]]
-
-    def _starts(self, inputs: ob.PlannerInputStates, io: StateIO) -> list[Vector]:
-        rows = []
-        while inputs.haveMoreStartStates():
-            state = inputs.nextStart()  # borrowed; None if invalid
-            if state is not None:
-                rows.append(io.read(state))
-            del state
-        return _different(rows)
-
-    def _goals(self, inputs: ob.PlannerInputStates, io: StateIO, goal: ob.Goal, ptc: Stop) -> list[Vector]:
-        """Goal configurations: all of a finite goal; else a number of samples, or as many as it takes to find one.
-
-        Of a :class:`GoalSampler` those that it has.
-        """
-        limit = max(GOAL_SAMPLES, goal.getStateCount() if isinstance(goal, ob.GoalStates) else 0)
-        limit = len(goal.rows) if isinstance(goal, GoalSampler) else limit
-        lazy = isinstance(goal, ob.GoalLazySamples)
-        rows: list[Vector] = []
-        sampled = 0
-        while (sampled < limit or not rows) and not ptc():
-            if inputs.haveMoreGoalStates():
-                sampled += 1
-                state = inputs.nextGoal()  # borrowed, one buffer for all; None if invalid
-                if state is not None:
-                    rows.append(io.read(state))
-                del state
-            elif lazy and not rows and goal.isSampling():
-                time.sleep(WAIT_FOR_GOAL)  # lets the thread of the goal have the interpreter
-            else:
-                break
-        return _different(rows)
-
-    def _report(self, result: SearchResult) -> ob.PlannerStatus:
-        """Hand the path to OMPL; returns the status."""
-        if result.path is None:
-            return ob.PlannerStatus.TIMEOUT
-        path = self._io.path(self.getSpaceInformation(), result.path)
-        approximate = result.difference > 0.0
-        self.getProblemDefinition().addSolutionPath(path, approximate, float(result.difference), self.getName())
-        return ob.PlannerStatus.APPROXIMATE_SOLUTION if approximate else ob.PlannerStatus.EXACT_SOLUTION
+        return starts, goals
 
 
-def _different(rows: list[Vector]) -> list[Vector]:
-    """The rows in their order, each once."""
-    return rows if len(rows) < 2 else list({row.tobytes(): row for row in rows}.values())
+def _status(found: SearchResult) -> ob.PlannerStatus:
+    """OMPL's word for what a search brought back."""
+    if found.path is None:
+        return ob.PlannerStatus.TIMEOUT
+    return ob.PlannerStatus.APPROXIMATE_SOLUTION if found.difference > 0.0 else ob.PlannerStatus.EXACT_SOLUTION
+
+
+def keyword_parameters(planner: type[SafePlanner]) -> Mapping[str, Any]:
+    """The parameters of a planner's class but the first one, which is the space information, and their defaults."""
+    constructor: Any = planner
+    return _parameters(constructor)
+
+
+@lru_cache(maxsize=64)
+def _parameters(planner: Any) -> Mapping[str, Any]:
+    parameters = list(inspect.signature(planner).parameters.values())[1:]
+    return MappingProxyType({each.name: each.default for each in parameters})
 
 
 def _condition(ptc: ob.PlannerTerminationCondition | float) -> ob.PlannerTerminationCondition:

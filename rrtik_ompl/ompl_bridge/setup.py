@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import atexit
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import TAU, Matrix, Vector
+from rrtik_ompl.arrays import TAU, Matrix, Vector, frozen
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.world import World
@@ -88,15 +90,17 @@ class _Motions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no types
 def planning_bounds(problem: Problem, goals: Matrix) -> tuple[Vector, Vector]:
     """Finite bounds to sample in, shapes (n,): the limits; for continuous joints one turn beyond start and goals."""
     robot = problem.world.robot
+    if np.isfinite(robot.lower).all() and np.isfinite(robot.upper).all():
+        return robot.lower, robot.upper
     ends = np.vstack([problem.start, goals])
     lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - TAU)
     upper = np.where(np.isfinite(robot.upper), robot.upper, ends.max(axis=0) + TAU)
-    return lower, upper
+    return frozen(lower), frozen(upper)
 
 
 def space_information(problem: Problem, goals: Matrix, validity: ValidityCallback) -> ob.SpaceInformation:
     """A set-up ``ompl.base.SpaceInformation`` of a RealVectorStateSpace whose checks are the world's."""
-    si = _bounded(problem, goals)
+    si = _bounded(*planning_bounds(problem, goals))
     states = StateIO(si)
     si.setStateValidityChecker(lambda state: validity.valid(states.read(state)))
     si.setMotionValidator(_Motions(si, validity, StateIO(si)))
@@ -104,20 +108,32 @@ def space_information(problem: Problem, goals: Matrix, validity: ValidityCallbac
     return si
 
 
-def unchecked_space(problem: Problem, goals: Matrix) -> ob.SpaceInformation:
+def unchecked_space(lower: Vector, upper: Vector) -> ob.SpaceInformation:
     """As :func:`space_information`, but nothing is checked: for planners that use the world themselves.
 
     OMPL checks each start and goal that it hands out, and a call of Python costs more than some searches.
     """
-    si = _bounded(problem, goals)
+    si = _bounded(lower, upper)
     si.setStateValidityChecker(ob.AllValidStateValidityChecker(si))
     si.setup()
     return si
 
 
-def _bounded(problem: Problem, goals: Matrix) -> ob.SpaceInformation:
-    """A SpaceInformation whose space has the bounds of a problem."""
-    lower, upper = planning_bounds(problem, goals)
+def shared_space(lower: Vector, upper: Vector) -> ob.SpaceInformation:
+    """:func:`unchecked_space` for planners to be made with; the same object as long as the bounds are the same."""
+    return _kept_space(lower.tobytes(), upper.tobytes())
+
+
+@lru_cache(maxsize=8)
+def _kept_space(lower: bytes, upper: bytes) -> ob.SpaceInformation:
+    return unchecked_space(np.frombuffer(lower), np.frombuffer(upper))
+
+
+atexit.register(_kept_space.cache_clear)  # the bindings complain of objects that outlive the interpreter
+
+
+def _bounded(lower: Vector, upper: Vector) -> ob.SpaceInformation:
+    """A SpaceInformation whose space has bounds, shapes (n,)."""
     space = ob.RealVectorStateSpace(len(lower))
     bounds = ob.RealVectorBounds(len(lower))
     for k in range(len(lower)):

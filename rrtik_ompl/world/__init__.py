@@ -94,7 +94,7 @@ class World:
         self.pairs = pairs
         self.accuracy = one_of(ACCURACIES, accuracy, "accuracy")
         self._certificate = cache(partial(Certificate, robot, self.bodies, pairs))
-        self._motions: FastMotions | None = None
+        self._motions: dict[bool, FastMotions] = {}
         self._proven_clearance: float | None = None
         self._checks = ExactChecker(robot, self.bodies, moving, conservative=accuracy == "conservative")
         self._always_colliding = fixed_contact(robot, self.bodies, standing) is not None
@@ -112,8 +112,7 @@ class World:
     @property
     def motions(self) -> FastMotions | None:
         """How motions are checked, for searches in kernels: one table for all of them. None where ``fast`` is."""
-        self._motions = motions_of(self, self._motions)
-        return self._motions
+        return motions_of(self, self._motions)
 
     def with_accuracy(self, accuracy: Accuracy) -> World:
         """The same world, "exact" or "conservative"; shares everything else.
@@ -133,7 +132,7 @@ class World:
             InputError: If the size is no number greater than 0.
         """
         other = copy.copy(self)
-        other.motion_resolution = positive(motion_resolution, "motion_resolution")
+        other.motion_resolution, other._motions = positive(motion_resolution, "motion_resolution"), {}
         return other
 
     refined = Renamed("with_resolution")
@@ -150,7 +149,7 @@ class World:
             return self
         other = copy.copy(self)
         wide = tuple(replace(b, margin=b.margin + wider) if b.kind == "obstacle" else b for b in self.bodies)
-        other._checks = self._checks.with_bodies(wide)
+        other._checks, other._motions = self._checks.with_bodies(wide), {}
         return other
 
     def proving(self, clearance: float = 0.0) -> World:

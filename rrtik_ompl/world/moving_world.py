@@ -66,7 +66,7 @@ class MovingWorld:
             kept = tuple(p for p in kept if any(self._bodies[i].kind == "obstacle" for i in p))
         arm = arm_cache(self.robot)
         self._fast = arm.pack(self._bodies, kept, arm.covers_of(self._bodies), share=self_collision)
-        self._motions: FastMotions | None = None
+        self._motions: dict[bool, FastMotions] = {}
         self._inflation = [0.0] * len(self._bodies)
         self._fixed = tuple(p for p in world.pairs if all(self._bodies[i].joint == 0 for i in p))
         self.blocked = self._contact_of_base()
@@ -79,8 +79,7 @@ class MovingWorld:
     @property
     def motions(self) -> FastMotions | None:
         """How motions are checked, for searches in kernels, wherever obstacles are moved; None where ``fast`` is."""
-        self._motions = motions_of(self, self._motions)
-        return self._motions
+        return motions_of(self, self._motions)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from ompl import geometric as og
 import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.ompl_bridge.motion_checker import WorldChecker
-from rrtik_ompl.ompl_bridge.setup import unchecked_space
+from rrtik_ompl.ompl_bridge.setup import planning_bounds, unchecked_space
 from rrtik_ompl.planning import plan
 from rrtik_ompl.poses import pose
 from rrtik_ompl.scene import Obstacle, Scene
@@ -192,7 +192,7 @@ def test_bounds_hold_for_goals_that_do_not_keep_the_clearance_too():
     world = disc_world((8.0, 2.0 - 0.3 - 0.004 - 0.5, 1.0, 1.0))
     problem = rrtik.Problem(world, [2.0, 2.0], [8.0, 2.0])
     goals = np.array([[8.0, 2.0], [4.0, 6.0]])
-    planner = FewestMoves(unchecked_space(problem, goals), world=world, seed=1)
+    planner = FewestMoves(unchecked_space(*planning_bounds(problem, goals)), world=world, seed=1)
     found = planner.search(problem.start[None], goals, WorldChecker(world), lambda: False)
     assert len(found.path) == 2
     assert found.statistics["lower_bound"] == 1

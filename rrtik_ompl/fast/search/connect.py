@@ -74,7 +74,9 @@ class ConnectSearch:
         self._trees = [tree_table(dof, joints, FIRST_CAPACITY) for _ in range(2)]
         numbers = np.array([self.range, self.domain, connect_layout.UNBOUNDED_SPREAD])
         self._search = _search_table(motions, self._trees, box, numbers)
-        self._search.header[connect_layout.PATIENCE] = patience
+        fields: Any = self._search.header
+        self._fields = memoryview(fields)  # numpy takes ten times as long for one number
+        self._fields[connect_layout.PATIENCE] = patience
         self._roots = [np.empty((0, dof)), np.empty((0, dof))]
         self._places = [0, 0]  # addresses of the roots in memory, which numpy takes a microsecond to find
         for side in range(2):
@@ -100,7 +102,7 @@ class ConnectSearch:
             seed: Any whole number.
             ask: Decides motions (A, B), shapes (m, n), that the kernels leave undecided, shape (m,); if None, they
                 count as colliding.
-            stop: Called about every millisecond and after each question; true to give up.
+            stop: Called about every millisecond and before each question; true to give up.
             max_iterations: Samples at most.
 
         Returns:
@@ -109,17 +111,23 @@ class ConnectSearch:
         Raises:
             InputError: If shapes do not fit or a start or goal is not in the box.
         """
-        header = self._search.header
         self._set_roots(0, starts)
         self._set_roots(1, goals)
-        header[connect_layout.RESOLVE] = ask is not None
-        header[connect_layout.LIMIT] = NO_LIMIT if max_iterations is None else max_iterations
+        self._fields[connect_layout.RESOLVE] = ask is not None
+        self._fields[connect_layout.LIMIT] = NO_LIMIT if max_iterations is None else max_iterations
         self._questions = 0
-        outside = self._kernels.begin(self._search.address, len(starts), len(goals), int(seed) & (2**63 - 1))
-        if outside >= 0:
-            what = f"start {outside}" if outside < len(starts) else f"goal {outside - len(starts)}"
+        counts, number = (len(starts), len(goals)), int(seed) & (2**63 - 1)
+        status = self._kernels.solve(self._search.address, *counts, number, FIRST_BUDGET)
+        if status <= connect_layout.OUTSIDE:
+            root = connect_layout.OUTSIDE - status
+            what = f"start {root}" if root < counts[0] else f"goal {root - counts[0]}"
             raise InputError(f"search: {what} is not in the box of configurations")
-        return self._path() if self._run(ask, stop) == connect_layout.SOLVED else None
+        return self._path() if self._finished(status, ask, stop) == connect_layout.SOLVED else None
+
+    @property
+    def capacity(self) -> int:
+        """Vertices for which each tree has room."""
+        return int(self._trees[0].header[CAPACITY])
 
     def serve(self, roots: int, max_iterations: int) -> int:
         """Let other kernels begin searches, with as many roots on a side; the address of the table.
@@ -127,12 +135,12 @@ class ConnectSearch:
         Such a search asks nothing and draws ``max_iterations`` samples at most; :meth:`go_on` continues it.
         """
         self._fit_trees(roots)
-        self._search.header[connect_layout.RESOLVE], self._search.header[connect_layout.LIMIT] = 0, max_iterations
+        self._fields[connect_layout.RESOLVE], self._fields[connect_layout.LIMIT] = 0, max_iterations
         return self._search.address
 
     def go_on(self, stop: Callable[[], object]) -> bool:
         """Search on, where another kernel has begun; whether there is a path."""
-        return self._run(None, stop) == connect_layout.SOLVED
+        return self._finished(connect_layout.RUNNING, None, stop) == connect_layout.SOLVED
 
     def proven_free(self, rows: Matrix) -> bool:
         """Whether all configurations, shape (k, n), lie in the box and the covers prove them free."""
@@ -144,7 +152,7 @@ class ConnectSearch:
 
         Samples, vertices of both trees, motions checked, motions asked for, and paths that an answer has broken.
         """
-        iterations, rejected, motions = self._search.header[_COUNTS].tolist()
+        iterations, rejected, motions = self._fields[_COUNTS]
         vertices = sum(int(tree.header[SIZE]) for tree in self._trees)
         return {
             "iterations": iterations,
@@ -159,27 +167,26 @@ class ConnectSearch:
         tables = self._motions.intact() and all(own.intact() for own in (self._search, *self._trees))
         return tables and all(is_intact(rows) for rows in (*self._roots, self._path_rows))
 
-    def _run(self, ask: MotionsFree | None, stop: Callable[[], object] | None) -> int:
-        """Call the kernel until it is done; its last status."""
+    def _finished(self, status: int, ask: MotionsFree | None, stop: Callable[[], object] | None) -> int:
+        """Do what a status asks for and call the kernel again, until it is done; its last status."""
         budget = FIRST_BUDGET
-        while True:
-            begin = time.perf_counter()
-            status = self._kernels.resume(self._search.address, budget)
+        while status > connect_layout.EXHAUSTED:
+            if stop is not None and stop():
+                return connect_layout.RUNNING
             if status == connect_layout.ASKING and ask is not None:
                 self._answer(ask)
             elif status == connect_layout.FULL:
                 self._grow()
-            elif status == connect_layout.RUNNING:
-                elapsed = time.perf_counter() - begin
+            begin = time.perf_counter()
+            status = self._kernels.resume(self._search.address, budget)
+            elapsed = time.perf_counter() - begin
+            if status == connect_layout.RUNNING:
                 budget = min(2 * budget, MAX_BUDGET) if elapsed < 0.5 * CALL_SECONDS else budget
                 budget = max(budget // 2, MIN_BUDGET) if elapsed > 2.0 * CALL_SECONDS else budget
-            else:
-                return status
-            if stop is not None and stop():
-                return connect_layout.RUNNING
+        return status
 
     def _answer(self, ask: MotionsFree) -> None:
-        count, shape = int(self._search.header[connect_layout.QUESTIONS]), (-1, self._dof)
+        count, shape = self._fields[connect_layout.QUESTIONS], (-1, self._dof)
         ends = (self._search[place].reshape(shape)[:count].copy() for place in _QUESTIONS)
         self._search[connect_layout.ANSWERS][:count] = ask(*ends)
         self._questions += count
@@ -189,10 +196,10 @@ class ConnectSearch:
             grow(tree)
 
     def _path(self) -> Matrix:
-        count = self._kernels.write_path(self._search.address, self._path_place, len(self._path_rows))
+        count = self._fields[connect_layout.PATH_ROWS]
         if count > len(self._path_rows):
             self._make_path_room(2 * count)
-            self._kernels.write_path(self._search.address, self._path_place, count)
+            self._kernels.keep_path(self._search.address)
         return self._path_rows[:count].copy()
 
     def _set_roots(self, side: int, rows: Matrix) -> None:
@@ -204,17 +211,18 @@ class ConnectSearch:
         self._roots[side][: len(rows)] = rows
 
     def _fit_trees(self, roots: int) -> None:
-        while roots >= FIRST_CAPACITY and roots >= self._trees[0].header[CAPACITY]:
+        while roots >= FIRST_CAPACITY and roots >= self.capacity:
             self._grow()  # both are as large
 
     def _make_room(self, side: int, count: int) -> None:
         self._roots[side] = aligned(np.zeros(count * self._dof)).reshape(count, self._dof)
         self._places[side] = self._roots[side].ctypes.data
-        self._search.header[connect_layout.START_ROWS + side] = self._places[side]
+        self._fields[connect_layout.START_ROWS + side] = self._places[side]
 
     def _make_path_room(self, count: int) -> None:
         self._path_rows = aligned(np.zeros(count * self._dof)).reshape(count, self._dof)
-        self._path_place = self._path_rows.ctypes.data
+        self._fields[connect_layout.PATH] = self._path_rows.ctypes.data
+        self._fields[connect_layout.PATH_CAPACITY] = count
 
 
 _QUESTIONS = (connect_layout.QUESTION_STARTS, connect_layout.QUESTION_ENDS)

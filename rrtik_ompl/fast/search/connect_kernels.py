@@ -116,8 +116,8 @@ def samples_spent(search: ConnectTable) -> bool:
     return spent and field(search, connect_layout.PHASE) == connect_layout.EXTEND
 
 
-@entry
-def resume(search: ConnectTable, budget: int) -> int:
+@kernel
+def search_on(search: ConnectTable, budget: int) -> int:
     """Search on for at most ``budget`` motions or samples; returns the status.
 
     ASKING: there are QUESTIONS in the table; write the ANSWERS (1 for free) and call again. FULL: a tree needs room.
@@ -205,13 +205,6 @@ def begin_between(
     return starts + outside if outside >= 0 else -1
 
 
-@entry
-def begin(search: ConnectTable, starts: int, goals: int, seed: int) -> int:
-    """:func:`begin_between` the roots in the table."""
-    start_rows, goal_rows = field(search, connect_layout.START_ROWS), field(search, connect_layout.GOAL_ROWS)
-    return begin_between(search, start_rows, starts, goal_rows, goals, seed)
-
-
 @kernel
 def depth(tree: TreeTable, vertex: int) -> int:
     """Number of vertices from a vertex to its root."""
@@ -222,7 +215,7 @@ def depth(tree: TreeTable, vertex: int) -> int:
     return count
 
 
-@entry
+@kernel
 def write_path(search: ConnectTable, rows: Configuration, capacity: int) -> int:
     """Write the path that was found, start first, if there is room for it; returns its number of rows."""
     starts, goals, dof = tree_of(search, 0), tree_of(search, 1), dof_in(search)
@@ -243,3 +236,31 @@ def write_path(search: ConnectTable, rows: Configuration, capacity: int) -> int:
         place += 1
         other = parent_of(goals, other)
     return total
+
+
+@entry
+def keep_path(search: ConnectTable) -> int:
+    """Write the path to PATH, if there is room for it; returns its number of rows, PATH_ROWS."""
+    count = write_path(search, field(search, connect_layout.PATH), field(search, connect_layout.PATH_CAPACITY))
+    set_field(search, connect_layout.PATH_ROWS, count)
+    return count
+
+
+@entry
+def resume(search: ConnectTable, budget: int) -> int:
+    """:func:`search_on`; where it ends with a path, that is kept."""
+    status = search_on(search, budget)
+    if status == connect_layout.SOLVED:
+        keep_path(search)
+    return status
+
+
+@entry
+def solve(search: ConnectTable, starts: int, goals: int, seed: int, budget: int) -> int:
+    """Search anew between the roots in the table, for at most ``budget`` motions or samples; returns the status.
+
+    OUTSIDE less k: root number k is not in the box, goals counted after the starts.
+    """
+    start_rows, goal_rows = field(search, connect_layout.START_ROWS), field(search, connect_layout.GOAL_ROWS)
+    outside = begin_between(search, start_rows, starts, goal_rows, goals, seed)
+    return connect_layout.OUTSIDE - outside if outside >= 0 else resume(search, budget)

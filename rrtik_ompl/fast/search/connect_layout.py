@@ -24,7 +24,9 @@ QUESTION_SIDES, QUESTION_VERTICES, ANSWERS = range(30, 33)
 # ... and counts. CHECKED: motions. STRAIGHT_TRIED: of GOAL_COUNT goals.
 ITERATIONS, REJECTED, CHECKED, GOAL_COUNT, STRAIGHT_TRIED = range(33, 38)
 # Samples lie in the box around CENTRE whose sides are twice the number SPREAD, which grows with every sample.
-CENTRE, FIELD_COUNT = range(38, 40)
+CENTRE = 38
+# PATH: memory for PATH_CAPACITY rows, and how many the path has, which is there if these are enough.
+PATH, PATH_CAPACITY, PATH_ROWS, FIELD_COUNT = range(39, 43)
 
 # The numbers, all in the unit of the configurations. RANGE: longest motion of the trees · DOMAIN: radius in which a
 # vertex is extended once it was blocked.
@@ -36,4 +38,5 @@ STRAIGHT, EXTEND, CONNECT = range(3)  # phases
 NO_QUESTION, MOTION_QUESTION, PATH_QUESTION = range(3)  # what is asked
 NO_VERTEX = -1  # to which a question's motion leads
 SOLVED, EXHAUSTED, RUNNING, ASKING, FULL = range(5)  # status
+OUTSIDE = -1  # status that a root is not in the box; less its number
 MAX_QUESTIONS = 64  # at a time

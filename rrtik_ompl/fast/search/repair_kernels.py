@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rrtik_ompl.fast.search import connect_layout, repair_layout, shortcut_layout
-from rrtik_ompl.fast.search.connect_kernels import begin_between, resume, write_path
+from rrtik_ompl.fast.search.connect_kernels import begin_between, search_on, write_path
 from rrtik_ompl.fast.search.connect_layout import ConnectTable
 from rrtik_ompl.fast.search.connect_motions import meeting_of, tree_of
 from rrtik_ompl.fast.search.motions.motion_kernels import (
@@ -159,7 +159,7 @@ def repair_path(repair: RepairTable, seed: int, forgetting: int, budget: int) ->
         set_spread(search, connect_layout.UNBOUNDED_SPREAD)
     else:
         sample_near(repair, first, second)
-    status = resume(search, budget)
+    status = search_on(search, budget)
     if status == connect_layout.EXHAUSTED:
         return repair_layout.NO_PATH
     return finish(repair, seed) if status == connect_layout.SOLVED else repair_layout.UNFINISHED

@@ -49,6 +49,7 @@ class FastMotions:
         dof: Length of a configuration.
         resolution: See ``weights`` [m].
         resolve: Whether the world decides motions that the kernels leave undecided; False if it is conservative.
+        spare: What searches keep here from one call to the next, by its kind; whoever uses it takes it out meanwhile.
         identity: Whether joint values are the configuration itself.
         address: Of the table in memory, for kernels; valid as long as this object lives.
 
@@ -83,6 +84,7 @@ class FastMotions:
         if joints != len(fast.limits):
             raise InputError(f"gain and offset: expected {len(fast.limits)} rows, one for each joint, got {joints}")
         self.fast, self.resolve, self._gain, self._offset = fast, resolve, matrix, shift
+        self.spare: dict[str, Any] = {}
         self.resolution = positive(resolution, "resolution")
         self.identity = matrix.shape == (joints, joints) and bool((matrix == np.eye(joints)).all() and not shift.any())
         self._table = table(
@@ -144,17 +146,20 @@ class MotionSource(Protocol):
         """The tables of the checks, None where nothing can be checked in kernels."""
 
 
-def motions_of(world: MotionSource, kept: FastMotions | None) -> FastMotions | None:
-    """The motion table of a world: the one that was kept while it still fits, None where kernels cannot be used."""
+def motions_of(world: MotionSource, tables: dict[bool, FastMotions]) -> FastMotions | None:
+    """The motion table of a world: the one that is kept while it still fits, None where kernels cannot be used.
+
+    Args:
+        world: The world.
+        tables: Those that are kept, by whether doubtful motions are resolved.
+    """
     fast, resolve = world.fast, world.accuracy == "exact"
     if fast is None:
         return None
-    if (
-        kept is not None
-        and kept.fast is fast
-        and kept.resolution == world.motion_resolution
-        and kept.resolve == resolve
-    ):
-        return kept
-    chain, resolution = world.robot.chain, world.motion_resolution
-    return FastMotions(fast, chain.gain, chain.offset, weights=world.weights, resolution=resolution, resolve=resolve)
+    kept, resolution = tables.get(resolve), world.motion_resolution
+    if kept is None or kept.fast is not fast or kept.resolution != resolution:
+        chain = world.robot.chain
+        kept = tables[resolve] = FastMotions(
+            fast, chain.gain, chain.offset, weights=world.weights, resolution=resolution, resolve=resolve
+        )
+    return kept

@@ -1,0 +1,78 @@
+"""Starts and goals of an OMPL problem definition as arrays, those that its owner takes for valid."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from ompl import base as ob
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
+from rrtik_ompl.ompl_bridge.results import IllPosed
+from rrtik_ompl.ompl_bridge.states import StateIO
+from rrtik_ompl.world.motion_queries import Stop
+
+GOAL_SAMPLES = 32  # how often a goal that can give any number of configurations is sampled
+WAIT_FOR_GOAL = 0.002  # [s] between two samples of a goal that is still computing its first sample
+NONE_USABLE = "none is given, or all are in collision or outside the bounds"
+
+
+def starts_and_goals(
+    inputs: ob.PlannerInputStates, definition: ob.ProblemDefinition, io: StateIO, stop: Stop, *, aimless: bool
+) -> tuple[Matrix, Matrix]:
+    """All starts of a problem definition and, unless ``aimless``, goals, shapes (s, n) and (g, n); each row once.
+
+    Raises:
+        IllPosed: If there is no valid start, or the goal cannot be sampled.
+    """
+    inputs.restart()
+    starts, goals = _starts(inputs, io), []
+    if not starts:
+        raise IllPosed(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
+    if not aimless:
+        goal = definition.getGoal()
+        if goal is not None and not isinstance(goal, ob.GoalSampleableRegion):
+            text = "the goal cannot be sampled; use a GoalState, GoalStates or a GoalSampleableRegion"
+            raise IllPosed(ob.PlannerStatus.UNRECOGNIZED_GOAL_TYPE, text)
+        goals = _goals(inputs, io, goal, stop)
+    return np.array(starts), np.array(goals).reshape(-1, io.dof)
+
+
+def _starts(inputs: ob.PlannerInputStates, io: StateIO) -> list[Vector]:
+    rows = []
+    while inputs.haveMoreStartStates():
+        state = inputs.nextStart()  # borrowed; None if invalid
+        if state is not None:
+            rows.append(io.read(state))
+        del state
+    return _different(rows)
+
+
+def _goals(inputs: ob.PlannerInputStates, io: StateIO, goal: ob.Goal, stop: Stop) -> list[Vector]:
+    """Goal configurations: all of a finite goal; else a number of samples, or as many as it takes to find one.
+
+    Of a :class:`GoalSampler` those that it has.
+    """
+    limit = max(GOAL_SAMPLES, goal.getStateCount() if isinstance(goal, ob.GoalStates) else 0)
+    limit = len(goal.rows) if isinstance(goal, GoalSampler) else limit
+    lazy = isinstance(goal, ob.GoalLazySamples)
+    rows: list[Vector] = []
+    sampled = 0
+    while (sampled < limit or not rows) and not stop():
+        if inputs.haveMoreGoalStates():
+            sampled += 1
+            state = inputs.nextGoal()  # borrowed, one buffer for all; None if invalid
+            if state is not None:
+                rows.append(io.read(state))
+            del state
+        elif lazy and not rows and goal.isSampling():
+            time.sleep(WAIT_FOR_GOAL)  # lets the thread of the goal have the interpreter
+        else:
+            break
+    return _different(rows)
+
+
+def _different(rows: list[Vector]) -> list[Vector]:
+    """The rows in their order, each once."""
+    return rows if len(rows) < 2 else list({row.tobytes(): row for row in rows}.values())
