@@ -1,0 +1,1 @@
+"""What a person waits for: whole calls, of this version and of an earlier one."""
