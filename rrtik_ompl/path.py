@@ -118,7 +118,9 @@ class JointPath:
             InputError: If the rows do not have one value per joint of the robot.
         """
         require(robot, Robot, "robot of a path")
-        rows = finite_array(waypoints, (None, robot.dof), f"path waypoints of robot '{robot.name}'")
+        rows = np.asarray(waypoints)
+        if rows.dtype != np.float64 or rows.shape[1:] != (robot.dof,):
+            rows = finite_array(waypoints, (None, robot.dof), f"path waypoints of robot '{robot.name}'")
         return cls(robot.onto_limits(rows), robot.joint_names, robot.prismatic, robot.name, robot.continuous)
 
     def with_waypoints(self, waypoints: ArrayLike) -> JointPath:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import TAU, Vector, frozen
 from rrtik_ompl.choices import Accuracy
+from rrtik_ompl.copies import shallow_copy
 from rrtik_ompl.errors import ProblemError, Renamed, require
 from rrtik_ompl.goal import Goal, JointGoal
 from rrtik_ompl.robot import Robot
@@ -62,6 +63,8 @@ class Problem:
             q = _usable(world, wanted.q, "goal")
             wanted = JointGoal(_nearest_turn(world, self.start, q), wanted.tolerance)
         self.goal: Goal = wanted
+
+    __copy__ = shallow_copy
 
     def __repr__(self) -> str:
         return f"Problem('{self.name}', {self.world}, to a {type(self.goal).__name__})"

@@ -110,8 +110,8 @@ class Search:
             return np.zeros((0, self._problem.robot.dof))
         known = len(self._goals.rows)
         newer = number > 0 and self._goals.more()
-        rows = self._goals.first()
-        return rows[:1] if self._short_way(number) else np.roll(rows, -known if newer else -number, axis=0)
+        rows, first = self._goals.first(), known if newer else number
+        return rows[:1] if self._short_way(number) else np.roll(rows, -first, axis=0) if first else rows
 
     def _quick_path(self, aims: Matrix) -> JointPath | None:
         """Of a brief attempt on what the kernels can prove; None where it finds nothing or cannot prove an end."""

@@ -23,6 +23,7 @@ from rrtik_ompl.collision.containment import Containment
 from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, kept_apart, request
 from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.collision.solids import around
+from rrtik_ompl.copies import shallow_copy
 from rrtik_ompl.fast import FREE, UNDECIDED
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world.arm_cache import Pairs, arm_cache
@@ -52,6 +53,8 @@ class ExactChecker:
         self._data = robot.model.createData()
         self._approaches = cache(lambda: dict(zip(pairs, approach_weights(robot, bodies, pairs), strict=True)))
         self._containment = cache(lambda: Containment(bodies, pairs, [outer for outer, _ in covers]))
+
+    __copy__ = shallow_copy
 
     def as_conservative(self, conservative: bool) -> ExactChecker:
         """The same checker, conservative or not; shares the tables."""
