@@ -101,8 +101,6 @@ class World:
         self._always_colliding = fixed_contact(robot, self.bodies, standing) is not None
         self.prover = Prover(robot, self.bodies, moving, always_colliding=self._always_colliding)
 
-    __copy__ = shallow_copy
-
     def __repr__(self) -> str:
         return f"World({self.robot.name}, {self.scene}, motion_resolution={self.motion_resolution:g} m)"
 
@@ -139,6 +137,7 @@ class World:
         return other
 
     refined = Renamed("with_resolution")
+    __copy__ = shallow_copy
 
     def with_clearance(self, clearance: float) -> World:
         """The same world for searches that leave room: its checks keep a distance [m] on top of obstacles' margins.
@@ -248,9 +247,7 @@ class World:
 
     def explain(self, q: ArrayLike) -> str:
         """A line that says why q is not valid: the joint outside its limit, or the pair in collision; "" if it is."""
-        row = self._rows(q, 1)[0]
-        fault = self.robot.limit_fault(row)
-        if fault:
+        if fault := self.robot.limit_fault(row := self._rows(q, 1)[0]):
             return fault
         touching = self.contacts(row)
         if not touching:
