@@ -82,6 +82,10 @@ class MeshWarning(UserWarning):
     """A mesh is missing or cannot be the solid that its author probably meant, but work can go on."""
 
 
+class PathWarning(UserWarning):
+    """What was asked for does not apply to a path, which stays as it is."""
+
+
 class Renamed:
     """An attribute that has another name now; whoever asks for it is told so.
 

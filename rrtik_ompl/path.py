@@ -227,6 +227,10 @@ class JointPath:
         """Whether its proof covers every motion; False without a proof."""
         return self.proof is not None and self.proof.proven
 
+    def proven_in(self, world: World) -> bool:
+        """Whether its proof covers every motion, and was made by this world or another form of it."""
+        return self.proof is not None and self.proof.proven and world.prover.made(self.proof)
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the path to a file: .json (complete), .csv (a header of joint names), .txt (OMPL's matrix text).
 

@@ -29,7 +29,7 @@ def main() -> None:
         if found.path is None:
             failed.append(f"seed {seed}: {found.reason}")
             continue
-        path = shorten(found.path, problem)
+        path = shorten(found.path, problem, method="axis")
         seconds = time.perf_counter() - begin
         rows.append((found.path.transitions, path.transitions, found.path.length, path.length, found.seconds, seconds))
     table = np.array(rows)

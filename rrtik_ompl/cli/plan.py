@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args
 
 import typer
 
-from rrtik_ompl.choices import CommandShortening, Name, ProofMode, ShorteningMethod, one_of
+from rrtik_ompl.choices import CommandShortening, Name, ProofMode, one_of
 from rrtik_ompl.cli.terminal import note, progress, say
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
@@ -140,9 +140,8 @@ def _shortened(
     if path is None or method == "none" or len(path.waypoints) < 2:
         return path, 0.0
     begin = time.perf_counter()
-    wanted: ShorteningMethod = "fewest-moves" if method == "auto" and path.one_joint_at_a_time else method
     kept = MoveRules(problem.robot.joint_names, **rules) if rules and path.one_joint_at_a_time else None
-    shorter = shorten(path, problem, method=wanted, seed=seed, rules=kept, clearance=clearance)
+    shorter = shorten(path, problem, method=method, seed=seed, rules=kept, clearance=clearance)
     return shorter, time.perf_counter() - begin
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -12,7 +13,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, positive, whole_number
 from rrtik_ompl.choices import ShorteningMethod, one_of
-from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.errors import InputError, PathWarning, require
 from rrtik_ompl.moves.axis_cut import double_axis_cut
 from rrtik_ompl.moves.axis_cut_rounds import axis_cut_rounds
 from rrtik_ompl.moves.rules import MoveRules
@@ -43,6 +44,8 @@ class Method:
         can_keep_moves: Whether it stays one if that is wanted.
         moves_only: Whether it takes nothing but such a path.
         leaves_room: Whether it keeps a clearance itself, where that costs no move.
+        samples: Whether it checks motions in steps, by the problem's world alone.
+        chooses: Whether it leaves single-joint moves to other methods, and takes no path that is longer.
     """
 
     run: Callable[[Matrix, Task, Problem], Matrix]
@@ -50,6 +53,8 @@ class Method:
     can_keep_moves: bool = True
     moves_only: bool = False
     leaves_room: bool = False
+    samples: bool = False
+    chooses: bool = False
 
 
 def _ompl(route: Matrix, task: Task, problem: Problem) -> Matrix:
@@ -82,20 +87,22 @@ METHODS: Mapping[ShorteningMethod, Method] = MappingProxyType(
         "shortcut": Method(lambda route, task, _: shortcut(route, task)),
         "retraction": Method(lambda route, task, _: retract(route, task)),
         "corners": Method(lambda route, task, _: snap_corners(route, task), can_keep_moves=False),
-        "ompl": Method(_ompl, can_keep_moves=False),
-        "auto": Method(lambda route, task, _: best_in_time(route, task)),
+        "ompl": Method(_ompl, can_keep_moves=False, samples=True),
+        "auto": Method(lambda route, task, _: best_in_time(route, task), chooses=True),
     }
 )
+_SINGLE_JOINT = METHODS["fewest-moves"], METHODS["axis-rounds"]  # in whose place "auto" is asked for single-joint moves
 
 
 def shorten(
     path: JointPath,
     problem: Problem,
     *,
-    method: ShorteningMethod = "axis",
+    method: ShorteningMethod = "auto",
     seconds: float | None = None,
+    checks: int | None = None,
     seed: int = 0,
-    one_joint: bool = False,
+    one_joint: bool | None = None,
     rules: MoveRules | None = None,
     on_better: Callable[[JointPath], object] | None = None,
     stop: Callable[[], bool] | None = None,
@@ -106,18 +113,21 @@ def shorten(
     Args:
         path: A valid path of the problem.
         problem: Its world checks the new motions.
-        method: "axis" is the published double axis cut: fewer moves of one joint at a time. "axis-rounds" goes on with
-            twenty passes in random joint orders: fewer moves still, several times as long. "fewest-moves" takes
+        method: "auto" pulls several cut paths taut and is the best choice for straight motions; single-joint moves it
+            leaves to "fewest-moves". "axis" is the published double axis cut: fewer moves of one joint at a time.
+            "axis-rounds" goes on with twenty passes in random joint orders: fewer moves still, several times as long.
+            Both return a path as it is, with a warning, if it moves several joints at once. "fewest-moves" takes
             single-joint moves and looks for the fewest, with the least travel among those. "sequential", "random" and
             "retraction" are the published methods for straight motions: quick, simple, and near the shortest path of
             the same class. "corners" pulls every bend to the corner that it goes round: nearer to that shortest path
             than "retraction" in its finest steps, with fewer checks. "shortcut" is a random cut that takes waypoints
-            as ends too and pulls them straight. "ompl" is OMPL's PathSimplifier. "auto" is the best that the quick
-            ones find together.
+            as ends too and pulls them straight. "ompl" is OMPL's PathSimplifier.
         seconds: Time limit [s]. With a limit, random methods go on until nothing is gained any more; without one they
             make a fixed number of tries, so that a seed always gives the same path.
+        checks: Most motions that are checked (tries, in random methods), a limit that always gives the same path: 100
+            take some milliseconds. None for no such limit; "ompl" and "fewest-moves" know no other than time.
         seed: Of the random methods.
-        one_joint: Keep a path of single-joint moves one: fewer moves first, length second.
+        one_joint: Keep a path of single-joint moves one: fewer moves first, length second. None: "auto" does.
         rules: What the path, of single-joint moves, keeps to and has to keep to: joints that must not move or move
             last, the smallest move, costs. Its last moves, of the joints that move last, stay as they are.
         on_better: Called with every better path in between; these have not yet passed the second check.
@@ -133,24 +143,53 @@ def shorten(
 
     Raises:
         UnknownNameError: If there is no such method.
-        InputError: If the path is not valid for the problem, does not keep to the rules or has one waypoint, the time
+        InputError: If the path is not valid for the problem, does not keep to the rules or has one waypoint, a limit
             is not positive, the seed is negative, the method cannot do it, or an end of the path cannot keep the
             clearance.
+
+    Example:
+        >>> problem = load_problem("planar3_boxes")
+        >>> found = plan(problem, "RRTConnect", seed=1)
+        >>> shorten(found.path, problem).length < found.path.length
+        True
     """
-    one_joint = one_joint or rules is not None
-    chosen = _checked(path, problem, method, seconds, seed, one_joint, clearance)
+    single = _single(path, method, one_joint) or rules is not None
+    chosen = _checked(path, problem, method, seconds, checks, seed, single, clearance)
     head, tail = _parts(path.waypoints, rules)
     if len(head) < 2:
         return path
+    if chosen.keeps_moves and not path.one_joint_at_a_time:
+        remedy = "use auto, or one_joint_moves(path, problem) first"
+        message = f"shortening method '{method}' is for single-joint moves, so the path stays as it is: {remedy}"
+        warnings.warn(PathWarning(message), stacklevel=2)
+        return path if path.proven_in(problem.world) else path.proved(problem.world)
+    given: dict[str, Any] = {"checks": np.inf if checks is None else checks, "seed": seed, "one_joint": single}
+    given |= {"rules": rules, "clearance": clearance, "stop": stop}
+    given["on_better"] = on_better and (lambda rows: on_better(path.with_waypoints(np.vstack([rows, tail]))))
     end = time.monotonic() + (np.inf if seconds is None else float(seconds))
-    listener = None if on_better is None else lambda rows: on_better(path.with_waypoints(np.vstack([rows, tail])))
-    single = one_joint or chosen.keeps_moves
-    acceptance = Acceptance(path, problem, clearance, one_joint=single, seed=seed, leaves_room=chosen.leaves_room)
-    for form, share in acceptance.forms():
-        left = share * (end - time.monotonic())
-        limits: dict[str, Any] = {"seconds": left, "on_better": listener, "stop": stop}
-        task = Task(form.world, seed=seed, one_joint=one_joint, rules=rules, clearance=clearance, **limits)
-        rows = np.vstack([chosen.run(head, task, form), tail])
+    for each in _SINGLE_JOINT if chosen.chooses and single else (chosen,):
+        found = _shortened(path, problem, each, (head, tail), given, end)
+        if not chosen.chooses or found.length <= path.length:
+            return found
+    return path
+
+
+def _shortened(
+    path: JointPath,
+    problem: Problem,
+    chosen: Method,
+    parts: tuple[Matrix, Matrix],
+    given: Mapping[str, Any],
+    end: float,
+) -> JointPath:
+    """The path after a method, in the first form of the problem in which that leads to one that is accepted."""
+    head, tail = parts
+    rules, single = given["rules"], given["one_joint"] or chosen.keeps_moves
+    traits = {"leaves_room": chosen.leaves_room, "samples": chosen.samples}
+    acceptance = Acceptance(path, problem, given["clearance"], one_joint=single, seed=given["seed"], **traits)
+    for form in acceptance.forms():
+        task = Task(form.motions, seconds=form.share * (end - time.monotonic()), **given)
+        rows = np.vstack([chosen.run(head, task, form.problem), tail])
         if not (rows[[0, -1]] == path.waypoints[[0, -1]]).all() or not (rules is None or rules.kept_by(rows)):
             continue
         shorter = acceptance.accepted(path.with_waypoints(rows))
@@ -158,6 +197,11 @@ def shorten(
             continue
         return shorter
     return acceptance.input
+
+
+def _single(path: JointPath, method: ShorteningMethod, one_joint: bool | None) -> bool:
+    """Whether the moves of a path have to stay single-joint moves."""
+    return one_joint if one_joint is not None else method == "auto" and path.one_joint_at_a_time
 
 
 def _parts(route: Matrix, rules: MoveRules | None) -> tuple[Matrix, Matrix]:
@@ -174,6 +218,7 @@ def _checked(
     problem: Problem,
     method: ShorteningMethod,
     seconds: float | None,
+    checks: int | None,
     seed: int,
     one_joint: bool,
     clearance: float | None,
@@ -184,10 +229,12 @@ def _checked(
     chosen = METHODS[one_of(METHODS, method, "shortening method")]
     if seconds is not None:
         positive(seconds, "seconds")
+    if checks is not None and whole_number(checks, "checks") < 1:
+        raise InputError("checks must be 1 or more, got 0")
     whole_number(seed, "seed")
     if len(path.waypoints) < 2:
         raise InputError("path to shorten: it has one waypoint, so there is nothing to shorten")
-    faults = path.violations(problem.world)
+    faults = () if path.proven_in(problem.world) else path.violations(problem.world)
     if faults:
         raise InputError(f"path to shorten: edge {faults[0].edge + 1} is not valid: {faults[0].reason}")
     check_route_clearance(problem.world, clearance, path.waypoints)

@@ -2,13 +2,32 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from rrtik_ompl.moves.clearance_levels import roomiest
 from rrtik_ompl.path import JointPath, proved_as_clear
 from rrtik_ompl.problem import Problem, densely_checked
+from rrtik_ompl.world import World
 from rrtik_ompl.world.detours import with_detours
 from rrtik_ompl.world.kept_clearance import room_between
+from rrtik_ompl.world.motion_queries import MotionQueries
+from rrtik_ompl.world.proven_motions import proven_motions
+
+
+class Form(NamedTuple):
+    """A form of the problem in which to shorten.
+
+    Attributes:
+        problem: With a world that checks what methods check themselves.
+        motions: What the others ask.
+        share: Of the time left.
+    """
+
+    problem: Problem
+    motions: MotionQueries
+    share: float
 
 
 class Acceptance:
@@ -24,6 +43,7 @@ class Acceptance:
         one_joint: Whether its moves of one joint have to stay such, so that there are no detours.
         seed: Of the detours.
         leaves_room: Whether the method keeps a clearance itself, where that costs no move.
+        samples: Whether the method checks motions in steps, by the problem's world alone.
     """
 
     def __init__(
@@ -35,29 +55,43 @@ class Acceptance:
         one_joint: bool,
         seed: int,
         leaves_room: bool = False,
+        samples: bool = False,
     ) -> None:
-        self._leaves_room = leaves_room
+        self._leaves_room, self._samples = leaves_room, samples
         self._problem, self._one_joint, self._seed = problem, one_joint, seed
         room = roomiest if leaves_room else room_between
         self._room = room(problem.world, path.waypoints[[0, -1]], clearance)
-        self.input = self._proved(path)
+        known = path.proven_in(problem.world) and self._keeps(path)
+        self.input = path if known else self._proved(path)
         self._input_keeps = self._keeps(self.input)
 
-    def forms(self) -> list[tuple[Problem, float]]:
-        """The problem in the forms in which to shorten, one after the other, and their shares of the time left.
+    def forms(self) -> list[Form]:
+        """The problem in the forms in which to shorten, one after the other.
 
-        What is as short as can be touches what it goes round, so motions are checked as densely as by the second check,
-        with room to spare; then with proofs too. Where the input does not keep the clearance, neither may help.
+        What is as short as can be touches what it goes round, so motions must be proven to count as free. Methods that
+        ask the world alone check as densely as the second check, with room to spare; then with proofs too. Where the
+        input does not keep the clearance, neither may help.
         """
-        dense, found = densely_checked(self._problem), []
+        dense = densely_checked(self._problem)
         if self._leaves_room:
-            return [(dense, 1.0)]
-        if self._room is not None:
+            return [Form(dense, dense.world, 1.0)]
+        found = []
+        if self._room is not None and self._samples:
             roomy = dense.world.with_clearance(self._room.searched)
-            found = [(roomy, 0.7), (roomy.proving(self._room.kept), 1.0 if self._input_keeps else 0.5)]
+            found = [self._sampled(dense, roomy, 0.7), self._sampled(dense, roomy.proving(self._room.kept), self._last)]
+        elif self._room is not None:
+            found = [Form(dense, proven_motions(dense.world, self._room.kept, self.input.waypoints), self._last)]
         if not self._input_keeps:
-            found.append((dense.world, 1.0))
-        return [(dense.with_world(world), share) for world, share in found]
+            found.append(Form(dense, dense.world, 1.0))
+        return found
+
+    @property
+    def _last(self) -> float:
+        """The share of the last form that leaves room."""
+        return 1.0 if self._input_keeps else 0.5
+
+    def _sampled(self, dense: Problem, world: World, share: float) -> Form:
+        return Form(dense.with_world(world), world, share)
 
     def accepted(self, shorter: JointPath) -> JointPath | None:
         """The path, with what is proven of it and with detours where it needs them, or None."""
@@ -83,4 +117,4 @@ class Acceptance:
     def _keeps(self, proved: JointPath) -> bool:
         """Whether a path is proven to keep the clearance."""
         proof = proved.proof
-        return self._room is not None and proof is not None and proof.proven and proof.clearance == self._room.kept
+        return self._room is not None and proof is not None and proof.proven and proof.clearance >= self._room.kept

@@ -17,6 +17,7 @@ from rrtik_ompl.world.motion_queries import is_conservative
 
 TRIES = 400  # where there is no end to the time
 PATIENCE = 2000  # tries without gain that end the search where there is one
+TRIES_PER_CALL = 64  # of the kernel, until the task may end it
 WAYPOINTS, PULLS = 0.5, 0.3  # what shortcuts do beyond the published random cut: see the kernel
 
 
@@ -58,11 +59,17 @@ def kernel_search(route: Matrix, task: Task, *, seed: int, share: float, pull: f
 def run(search: ShortcutSearch, task: Task, tries: int, patience: int = PATIENCE) -> None:
     """Let a search work until its tries, its patience or the time is up."""
 
+    before, known = task.asked, task.listened
+
     def stop() -> bool:
-        task.report(search.waypoints)
+        task.asked = before + search.tries
+        if known:
+            task.report(search.waypoints)
         return task.expired()
 
-    search.run(tries, patience=patience, ask=task.free_batch, stop=stop)
+    tries = int(min(tries, task.checks_left))
+    search.run(tries, patience=patience, ask=task.free_batch, stop=stop, chunk=TRIES_PER_CALL)
+    task.asked = before + search.tries
 
 
 def _plain(route: Matrix, task: Task, tries: int, share: float) -> Matrix:

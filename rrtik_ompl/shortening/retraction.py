@@ -42,13 +42,18 @@ def retract(route: Matrix, task: Task, *, step: float | None = None, fineness: f
             ahead = ahead[:0]
         else:
             bend, rest = _one_bend(pivot, ahead[seen:], coarse, coarse / fineness, task)
-            if not task.confirmed(np.vstack([pivot[None], bend, rest[:1]]), route):
+            if not task.confirmed(_joined([pivot[None], bend], rest, task), route):
                 bend, rest = task.moves(pivot, ahead[seen]), ahead[seen + 1 :]
             done.append(bend)
             pivot, ahead = bend[-1], rest
-        task.report(np.vstack([*done, ahead]))
-    found = without_repeats(np.vstack([*done, ahead]))
+        task.report(_joined(done, ahead, task))
+    found = without_repeats(_joined(done, ahead, task))
     return task.better(route, found) if task.confirmed(found, route) else route
+
+
+def _joined(done: list[Matrix], ahead: Matrix, task: Task) -> Matrix:
+    """The route so far, and the moves from there to what is ahead."""
+    return np.vstack([*done, task.moves(done[-1][-1], ahead[0]), ahead[1:]] if len(ahead) else done)
 
 
 def _one_bend(pivot: Vector, ahead: Matrix, coarse: float, fine: float, task: Task) -> tuple[Matrix, Matrix]:

@@ -27,13 +27,14 @@ class Task:
         one_joint: Whether every edge of the result must move one joint, as the edges of the given route do.
         rules: What single-joint moves have to keep to, or None.
         clearance: What was asked for [m], for methods that leave room themselves; or None.
-        bounded: Whether there is an end to the time.
-        asked: How many straight motions have been checked.
+        bounded: Whether there is an end to the time, or to the checks.
+        asked: How many straight motions have been checked, or tried in kernels.
         confirmed_again: How many motions of a result have been checked on top of that, as parts of free ones.
 
     Args:
         motions: A world, or anything else that checks straight motions.
         seconds: Time limit [s].
+        checks: Most motions that are checked; then the time is up.
         seed: See above.
         one_joint: See above.
         rules: See above.
@@ -47,6 +48,7 @@ class Task:
         motions: MotionQueries,
         *,
         seconds: float = np.inf,
+        checks: float = np.inf,
         seed: int = 0,
         one_joint: bool = False,
         rules: MoveRules | None = None,
@@ -57,10 +59,16 @@ class Task:
         self.motions = motions
         self.seed, self.one_joint, self.rules, self.clearance = seed, one_joint, rules, clearance
         self.asked = self.confirmed_again = 0
-        self.bounded = bool(np.isfinite(seconds))
+        self.bounded = bool(np.isfinite(min(seconds, checks)))
+        self._checks = checks
         self._deadline = time.monotonic() + seconds
         self._known: set[tuple[bytes, bytes]] = set()
         self._on_better, self._stop, self._reported = on_better, stop, (np.inf, np.inf)
+
+    @property
+    def listened(self) -> bool:
+        """Whether anybody is told of better routes."""
+        return self._on_better is not None
 
     @property
     def seconds_left(self) -> float:
@@ -75,9 +83,14 @@ class Task:
         world = self.motions
         return world if not self.one_joint and has_kernels(world, KERNELS) else None
 
+    @property
+    def checks_left(self) -> float:
+        """Motions that may still be checked; +inf without a limit."""
+        return max(self._checks - self.asked, 0.0)
+
     def expired(self) -> bool:
-        """Whether the time is up."""
-        return self.seconds_left <= 0.0
+        """Whether the time is up, or the checks are spent."""
+        return self.checks_left <= 0.0 or self.seconds_left <= 0.0
 
     def free_batch(self, A: Matrix, B: Matrix) -> Mask:
         """Which straight motions are free, shapes (m, n) and (m,); none when the time is up."""

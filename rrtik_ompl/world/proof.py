@@ -17,7 +17,7 @@ import numpy as np
 from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.digests import world_digest
-from rrtik_ompl.fast.proof.layout import ProofTable
+from rrtik_ompl.fast.proof.layout import WAYS, ProofTable
 from rrtik_ompl.fast.proof.log import ProofLog, logged
 from rrtik_ompl.fast.proof.packing import ProofPairs, proof_pairs
 from rrtik_ompl.fast.simd.library import library
@@ -136,6 +136,20 @@ class Prover:
         both = None if sound is None else sound[: len(starts)] & sound[len(starts) :]
         mask[[gap.motion for gap in self._gaps(values, values[len(starts) :], both, (clearance, 0.0), None)]] = False
         return mask
+
+    def table(self, clearance: float) -> int:
+        """Where the table is for kernels that prove motions of their own, with a clearance [m] until the next proof.
+
+        They keep a little more than what is asked for, so that a proof from the other end of a motion agrees. Planes
+        are forgotten, so that nothing depends on what was proven before.
+        """
+        packed = self._packed_for(clearance, SPARE)
+        packed.table[WAYS][:] = 0.0
+        return packed.table.address
+
+    def made(self, proof: Proof) -> bool:
+        """Whether a proof is one of these bodies, by this object."""
+        return proof._digest is self._digest
 
     def still_gaps(self, rows: Matrix, *, clearance: float) -> list[Gap]:
         """The configurations, shape (m, dof), that are not proven free; each counts as a motion that stands still."""

@@ -147,6 +147,7 @@ class ShortcutSearch:
         self._table.header[shortcut_layout.MAX_TRIES] = min(tries, NO_LIMIT)
         self._table.header[shortcut_layout.PATIENCE] = min(patience, NO_LIMIT)
         while True:
+            self._motions.make_ready()
             status = self._kernels.resume(self._table.address, chunk)
             if status == shortcut_layout.DONE:
                 return True

@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.fast.search import shortcut_layout
-from rrtik_ompl.fast.search.motions.motion_kernels import check_motion, dof_of
+from rrtik_ompl.fast.search.motions.motion_kernels import dof_of
 from rrtik_ompl.fast.search.motions.motion_layout import MotionTable
+from rrtik_ompl.fast.search.motions.proven_kernels import judge_motion, proof_of
 from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row, row_at
 from rrtik_ompl.fast.search.shortcut_layout import FIRST_INSIDE, SECOND_INSIDE, ShortcutTable
 from rrtik_ompl.fast.simd.access import count_up, field_reader
@@ -176,7 +177,7 @@ def propose_shortcut(search: ShortcutTable) -> bool:
 def check_edge(search: ShortcutTable, a: Configuration, b: Configuration) -> int:
     """Check a straight motion; one that is left undecided becomes a question. The same from both sides."""
     resolve = field(search, shortcut_layout.RESOLVE) != 0
-    answer: int = check_motion(motions_of(search), a, b, resolve)
+    answer: int = judge_motion(motions_of(search), a, b, resolve)
     if answer == UNDECIDED:
         number, dof = field(search, shortcut_layout.QUESTIONS), dof_in(search)
         copy_row(dof, a, row_at(field(search, shortcut_layout.QUESTION_STARTS), dof, number))
@@ -204,10 +205,12 @@ def ends_of_part(search: ShortcutTable, part: int) -> Any:
 
 @kernel
 def check_parts(search: ShortcutTable) -> int:
-    """Check all motions that a shortcut or a pull would bring."""
+    """Check all motions that a shortcut or a pull would bring; what remains of a proven motion is proven."""
     set_field(search, shortcut_layout.QUESTIONS, 0)
     worst = FREE
-    for part in range(shortcut_layout.MAX_QUESTIONS):
+    pulled = field(search, shortcut_layout.CUTS) == shortcut_layout.PULL
+    proven = proof_of(motions_of(search)) != 0
+    for part in range(1 if proven and not pulled else shortcut_layout.MAX_QUESTIONS):
         a, b = ends_of_part(search, part)
         if a != b:
             worst = max(worst, check_edge(search, a, b))

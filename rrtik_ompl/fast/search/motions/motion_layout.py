@@ -9,8 +9,9 @@ MotionTable = NewType("MotionTable", int)  # of a motion table
 # WORLD: the tables of the checks · joint values are GAIN @ q + OFFSET, shapes (JOINTS, DOF) and (JOINTS,)
 # WEIGHTS: no point of the arm moves farther than WEIGHTS @ |b - a| [m] from a to b · NUMBERS: float64, see below
 # ENDS: memory for the joint values of both ends of a motion · RESOLVE: 1 if doubtful motions are resolved, by the
-# narrow phase and what it leaves undecided by the world; 0 in a conservative world
-WORLD, DOF, JOINTS, GAIN, OFFSET, WEIGHTS, NUMBERS, ENDS, RESOLVE = range(9)
+# narrow phase and what it leaves undecided by the world; 0 in a conservative world · PROOF: the table of proofs of a
+# world where only proven motions count as free, else 0
+WORLD, DOF, JOINTS, GAIN, OFFSET, WEIGHTS, NUMBERS, ENDS, RESOLVE, PROOF = range(10)
 
 # A motion takes WEIGHTS @ |b - a| / RESOLUTION [m] steps, or STEPS_PER_UNIT times its Euclidean length if those are
 # more, rounded up.

@@ -60,6 +60,7 @@ class FastMotions:
         resolution: See ``weights``, above 0 [m].
         steps_per_unit: At least this many steps for each unit of Euclidean length; with zero weights the only rule.
         resolve: See above.
+        proof: Makes the table of proofs ready and says where it is, in a world where only proven motions count as free.
 
     Raises:
         InputError: If there are no kernels, shapes do not fit, or a number is out of range.
@@ -75,6 +76,7 @@ class FastMotions:
         resolution: float,
         steps_per_unit: float = 0.0,
         resolve: bool = True,
+        proof: Callable[[], int] | None = None,
     ) -> None:
         if fast.address == 0:
             raise InputError("search in kernels: there are none; install numba")
@@ -83,7 +85,7 @@ class FastMotions:
         shift = finite_array(offset, (joints,), "offset")
         if joints != len(fast.limits):
             raise InputError(f"gain and offset: expected {len(fast.limits)} rows, one for each joint, got {joints}")
-        self.fast, self.resolve, self._gain, self._offset = fast, resolve, matrix, shift
+        self.fast, self.resolve, self._gain, self._offset, self._proof = fast, resolve, matrix, shift, proof
         self.spare: dict[str, Any] = {}
         self.resolution = positive(resolution, "resolution")
         self.identity = matrix.shape == (joints, joints) and bool((matrix == np.eye(joints)).all() and not shift.any())
@@ -98,6 +100,7 @@ class FastMotions:
                 motion_layout.NUMBERS: np.array([self.resolution, steps_per_unit]),
                 motion_layout.ENDS: np.zeros((2, joints)),
                 motion_layout.RESOLVE: int(resolve),
+                motion_layout.PROOF: 0,
             }
         )
         self.address = self._table.address
@@ -110,6 +113,11 @@ class FastMotions:
     def joint_values(self, Q: Matrix) -> Matrix:
         """Joint values of configurations, shapes (m, dof) and (m, joints)."""
         return Q @ self._gain.T + self._offset
+
+    def make_ready(self) -> None:
+        """To be called before kernels that ask for proofs: others may have proven with another clearance meanwhile."""
+        if self._proof is not None:
+            self._table.header[motion_layout.PROOF] = self._proof()
 
     def intact(self) -> bool:
         """Whether no kernel has written beyond this table or those of the checks."""

@@ -1,0 +1,80 @@
+"""Straight motions of a world that count as free only if they are proven: for searches that need no second look."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.choices import Accuracy
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.fast import FREE, FastWorld
+from rrtik_ompl.fast.search.motions.motion_table import FastMotions
+from rrtik_ompl.fast.simd.library import library
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.world import World
+from rrtik_ompl.world.motion_queries import MotionQueries, has_kernels
+
+KERNELS = "search.motions.proven_kernels"
+
+
+class ProvenMotions(MotionQueries):
+    """Motions between configurations within the limits, free only if proven to keep a clearance at every point.
+
+    A proof costs less than a check in small steps, and leaves nothing undecided.
+
+    Attributes:
+        robot, weights, motion_resolution: Those of the world.
+        accuracy: "conservative", for there is nothing to ask about.
+        fast: The tables of the world's checks, which see collisions sooner than a proof fails.
+        motions: How kernels judge motions.
+
+    Args:
+        world: With kernels.
+        clearance: To be kept from obstacles beside their margins [m].
+
+    Raises:
+        InputError: If the world has no kernels.
+    """
+
+    accuracy: Accuracy = "conservative"
+
+    def __init__(self, world: World, clearance: float) -> None:
+        fast, kernels = world.fast, library(KERNELS)
+        if fast is None or kernels is None:
+            raise InputError("proven motions: the world has no kernels")
+        self.robot: Robot = world.robot
+        self.weights: Vector = world.weights
+        self.motion_resolution = world.motion_resolution
+        self.fast: FastWorld = fast
+        chain = world.robot.chain
+        self.motions = FastMotions(
+            fast,
+            chain.gain,
+            chain.offset,
+            weights=world.weights,
+            resolution=world.motion_resolution,
+            proof=partial(world.prover.table, clearance),
+        )
+        self._kernels = kernels
+
+    def motion_valid_batch(self, A: Matrix, B: Matrix) -> Mask:
+        """Which straight motions A[k] -> B[k], shapes (m, n), are proven free, shape (m,)."""
+        starts, ends = np.ascontiguousarray(A), np.ascontiguousarray(B)
+        answers = np.zeros(len(starts), dtype=np.int32)
+        self.motions.make_ready()
+        at = starts.ctypes.data, ends.ctypes.data
+        self._kernels.judge(self.motions.address, *at, len(starts), answers.ctypes.data)
+        return answers == FREE
+
+
+def proven_motions(world: World, clearance: float, within: Matrix) -> MotionQueries:
+    """Motions that must be proven to keep a clearance [m], in kernels where these can do it.
+
+    Args:
+        world: The world.
+        clearance: To be kept from obstacles beside their margins [m].
+        within: Corners of a box of configurations within the limits, shape (m, n), in which all motions are.
+    """
+    return ProvenMotions(world, clearance) if has_kernels(world, KERNELS, within=within) else world.proving(clearance)
