@@ -113,7 +113,8 @@ def _usable(world: World, values: ArrayLike, what: str) -> Vector:
         touching = world.contacts(q)
         pairs = [(c.first, c.second) for c in touching]
         if touching and all(c.distance > 0.0 for c in touching):
-            raise ProblemError(f"{what} is too near: {world.explain(q)}; move it or lower the margin", pairs, part=what)
+            remedy = "move it or lower the margin" + (", or allow the pair" if world.self_margin else "")
+            raise ProblemError(f"{what} is too near: {world.explain(q)}; {remedy}", pairs, part=what)
         raise ProblemError(f"{what} is in collision: {world.explain(q)}; move it or allow the pair", pairs, part=what)
     return q
 

@@ -145,7 +145,7 @@ def case_a_with_room(problem: Problem, outwards: float = 0.01) -> Problem:
         shift = outwards * np.sign(square.pose.translation)
         moved.append(replace(square, pose=pin.SE3(square.pose.rotation, square.pose.translation + shift)))
     scene = replace(world.scene, obstacles=tuple(moved))
-    roomy = rrtik.World(world.robot, scene, motion_resolution=world.motion_resolution)
+    roomy = world.with_scene(scene)
     return rrtik.Problem(roomy, problem.start, problem.goal, name=WITH_ROOM)
 
 

@@ -86,9 +86,7 @@ def executed_valid(problem: rrtik.Problem, run: ReplanRun) -> bool:
     scene = problem.world.scene
     for tick, after in zip(run.ticks[:-1], run.ticks[1:], strict=True):
         if tick.event in ("plan", "walk", "repair") and (tick.q != after.q).any():
-            now = rrtik.World(
-                problem.robot, still(scene.at(tick.time)), motion_resolution=problem.world.motion_resolution
-            )
+            now = problem.world.with_scene(still(scene.at(tick.time)))
             if not now.certify(np.linspace(tick.q, after.q, 11)).all():
                 return False
     return True

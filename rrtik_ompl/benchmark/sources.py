@@ -124,8 +124,9 @@ def _generated(robot: str, family: str, seed: int) -> Problem:
 
 def _resolved(name: str, resolution: float) -> Problem:
     problem = load_problem(name)
-    world = World(problem.world.robot, problem.world.scene, motion_resolution=resolution)
-    return Problem(world, problem.start, problem.goal, name=problem.name)
+    world = problem.world
+    finer = World(world.robot, world.scene, motion_resolution=resolution, self_margin=world.self_margin)
+    return Problem(finer, problem.start, problem.goal, name=problem.name)
 
 
 def _crowded(robot: str, seed: int, count: int) -> Problem:

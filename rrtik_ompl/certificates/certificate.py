@@ -17,7 +17,17 @@ from rrtik_ompl.files.text import known_ending, read_text, write_text
 
 VERSION = 1
 KIND = "path_certificate"
-FIELDS = ("version", "kind", "robot", "robot_digest", "scene_digest", "clearance", "waypoints", "motions")
+FIELDS = (
+    "version",
+    "kind",
+    "robot",
+    "robot_digest",
+    "scene_digest",
+    "clearance",
+    "self_margin",
+    "waypoints",
+    "motions",
+)
 DEEPEST = 30  # level of an interval that is read
 WHOLE = 6  # whole numbers of an entry: body, part, body, part, level, number; three numbers of a plane may follow
 
@@ -46,6 +56,7 @@ class Certificate:
         robot: Name of the robot.
         robot_digest, scene_digest: Of what it is about, see :mod:`rrtik_ompl.collision.digests`.
         clearance: What the path keeps from every obstacle beside its margin [m].
+        self_margin: What links, and what they hold, keep from each other [m].
         waypoints: Shape (k, dof), read-only.
         motions: One for each motion; a path of one waypoint has one that stands still.
         version: Of the format.
@@ -55,6 +66,7 @@ class Certificate:
     robot_digest: str
     scene_digest: str
     clearance: float
+    self_margin: float
     waypoints: Matrix
     motions: tuple[MotionEntries, ...]
     version: int = VERSION
@@ -78,6 +90,7 @@ class Certificate:
             "robot_digest": self.robot_digest,
             "scene_digest": self.scene_digest,
             "clearance": self.clearance,
+            "self_margin": self.self_margin,
             "waypoints": self.waypoints.tolist(),
             "motions": motions,
         }
@@ -120,16 +133,20 @@ def from_document(document: dict[str, Any]) -> Certificate:
     for name in ("robot", "robot_digest", "scene_digest"):
         if not isinstance(document[name], str):
             raise InputError(f"{name}: expected text")
-    if not _is_number(document["clearance"]):
-        raise InputError("clearance: expected a number")
-    clearance = not_negative(finite_number(document["clearance"], "clearance"), "clearance")
+    clearance, self_margin = (_distance(document[name], name) for name in ("clearance", "self_margin"))
     waypoints = _waypoints(document["waypoints"])
     motions, count = document["motions"], max(1, len(waypoints) - 1)
     if not isinstance(motions, list) or len(motions) != count:
         raise InputError(f"motions: expected a list of {count}, one for each motion between waypoints")
     entries = tuple(_entries(motion, f"motions[{k}]") for k, motion in enumerate(motions))
     names = (document["robot"], document["robot_digest"], document["scene_digest"])
-    return Certificate(*names, clearance, waypoints, entries)
+    return Certificate(*names, clearance, self_margin, waypoints, entries)
+
+
+def _distance(value: object, name: str) -> float:
+    if not _is_number(value):
+        raise InputError(f"{name}: expected a number")
+    return not_negative(finite_number(value, name), name)  # type: ignore[arg-type]
 
 
 def _waypoints(rows: object) -> Matrix:

@@ -20,6 +20,7 @@ from rrtik_ompl.certificates.certificate import DEEPEST, VERSION, Certificate, M
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.certificate import fixed_contact
 from rrtik_ompl.collision.digests import robot_digest, scene_digest
+from rrtik_ompl.collision.margins import kept_apart
 from rrtik_ompl.fast.tables.layout import CONVEX_SOLID, HALF_SPACE_SOLID
 from rrtik_ompl.fast.tables.solid_tables import UNKNOWN, ConvexSolid, convex_solids, placed_solids
 from rrtik_ompl.robot import Chain
@@ -55,6 +56,7 @@ def verify(certificate: Certificate, world: World, waypoints: ArrayLike, *, clea
     faults = {
         f"version {certificate.version} is not known here": certificate.version != VERSION,
         f"it is for another robot, '{certificate.robot}'": certificate.robot_digest != robot_digest(robot),
+        f"it is for another self margin, {certificate.self_margin:g} m": certificate.self_margin != world.self_margin,
         "it is for another scene": certificate.scene_digest != scene_digest(world.bodies, world.pairs),
         f"it is for a clearance of {kept:g} m, not {clearance:g} m": not max(0.0, clearance) <= kept < np.inf,
         "it is for another path: waypoints differ": not same,
@@ -109,9 +111,9 @@ class Motions:
         moving = [(i, j, _common(self.chain, joints[i], joints[j])) for i, j in world.pairs if joints[i] or joints[j]]
         self.pairs = [(i, j) if joints[j] == base else (j, i) for i, j, base in moving]
         self.bases = np.array([base for _, _, base in moving], dtype=np.int64)
-        kept = [clearance if "obstacle" in (self.bodies[i].kind, self.bodies[j].kind) else 0.0 for i, j in self.pairs]
-        margins = [self.bodies[i].margin + self.bodies[j].margin for i, j in self.pairs]
-        self.margins = np.array(margins) + np.array(kept) + ROUNDING
+        both = [(self.bodies[i], self.bodies[j]) for i, j in self.pairs]
+        kept = [kept_apart(a, b) + (clearance if "obstacle" in (a.kind, b.kind) else 0.0) for a, b in both]
+        self.margins = np.array(kept) + ROUNDING
         self.bends = np.array([self._bend(i, base) + self._bend(j, base) for i, j, base in moving])
 
     def _describe(self, number: int, body: Body) -> range:
@@ -234,9 +236,7 @@ class Motions:
         split = [(whole[k][:2], *self.pairs[whole[k][1]]) for k in self._open(whole)]
         rest = [self._all_of(*both, *ab) for both, i, j in split for ab in product(self.parts[i], self.parts[j])]
         rest = [side for side in rest if side[:4] not in until]
-        for k in self._open(rest)[:1]:
-            return self._say(rest[k], "are not shown apart from")
-        return ""
+        return next((self._say(rest[k], "are not shown apart from") for k in self._open(rest)), "")
 
 
 def _common(chain: Chain, first: int, second: int) -> int:

@@ -33,7 +33,7 @@ def certificate_of(world: World, path: JointPath, clearance: float = 0.0) -> Cer
     if told is None:
         return None
     digests = robot_digest(robot), scene_digest(world.bodies, world.pairs)
-    return Certificate(robot.name, *digests, kept, frozen(rows), tuple(map(_entries, told)))
+    return Certificate(robot.name, *digests, kept, world.self_margin, frozen(rows), tuple(map(_entries, told)))
 
 
 def _entries(told: ProofLog) -> MotionEntries:

@@ -32,7 +32,8 @@ class Body:
         placement: ``pinocchio.SE3`` in the joint's frame.
         geometry: The coal geometry.
         kind: "link", "attached" or "obstacle".
-        margin: How far what moves must stay from it [m].
+        margin: Of an obstacle how far what moves must stay from it, of a link or attached object how far other ones
+            must [m].
     """
 
     name: str
@@ -44,16 +45,16 @@ class Body:
 
 
 @lru_cache(maxsize=16)
-def link_bodies(robot: Robot) -> tuple[Body, ...]:
-    """The robot's own bodies."""
+def link_bodies(robot: Robot, margin: float = 0.0) -> tuple[Body, ...]:
+    """The robot's own bodies, with a margin [m]."""
     return tuple(
-        Body(robot.link_of(item), item.parentJoint, item.placement, solid, "link")
+        Body(robot.link_of(item), item.parentJoint, item.placement, solid, "link", margin)
         for item, solid in zip(robot.collision.geometryObjects, robot_solids(robot), strict=True)
     )
 
 
-def scene_bodies(robot: Robot, scene: Scene) -> tuple[Body, ...]:
-    """Bodies of all obstacles and attached objects.
+def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body, ...]:
+    """Bodies of all obstacles and attached objects, these with a margin [m].
 
     Raises:
         UnknownNameError: If an attached object names a link that the robot does not have.
@@ -74,7 +75,7 @@ def scene_bodies(robot: Robot, scene: Scene) -> tuple[Body, ...]:
         frame = robot.model.frames[robot.model.getFrameId(item.link, pin.FrameType.BODY)]
         mount = frame.placement * item.pose
         found += [
-            Body(item.name, frame.parentJoint, mount * piece.placement, piece.geometry, "attached")
+            Body(item.name, frame.parentJoint, mount * piece.placement, piece.geometry, "attached", margin)
             for piece in _pieces(item)
         ]
     return tuple(found)

@@ -34,9 +34,10 @@ def robot_digest(robot: Robot) -> str:
 
 
 def scene_digest(bodies: tuple[Body, ...], pairs: Iterable[tuple[int, int]]) -> str:
-    """Of the bodies that are no links, their margins, and the numbers of those that must not touch and move."""
+    """Of the bodies that are no links, all margins, and the numbers of those that must not touch and move."""
     moving = [_numbers(pair) for pair in pairs if any(bodies[k].joint > 0 for k in pair)]
-    return _hash([*_bodies(body for body in bodies if body.kind != "link"), b"pairs", *moving])
+    margins = [_numbers(body.margin) for body in bodies if body.kind == "link" and body.margin > 0.0]
+    return _hash([*_bodies(body for body in bodies if body.kind != "link"), *margins, b"pairs", *moving])
 
 
 def world_digest(robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> str:

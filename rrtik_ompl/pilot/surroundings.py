@@ -82,7 +82,7 @@ class Surroundings:
         given = self._given.scene
         scene = scene_with(given, [solid for each in self._seen.values() for solid in each.solids()])
         changed = replace(scene, allowed_collisions=(*given.allowed_collisions, *allowed))
-        return World(self._given.robot, changed, motion_resolution=self._given.motion_resolution)
+        return self._given.with_accuracy("exact").with_scene(changed)
 
 
 def _plain(seen: SeenObject) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from pydantic import Field
 
 from rrtik_ompl.catalog import find_problem, list_planners, load_robot, robot_from_entry
 from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError, require
-from rrtik_ompl.files.sections import Positive, Section, Version, parse, without_null
+from rrtik_ompl.files.sections import NotNegative, Positive, Section, Version, parse, without_null
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml, write_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.problem import Problem
@@ -46,6 +46,9 @@ class ProblemFile(Section):
         description="largest step of any point of the arm between two checked configurations [m]",
     )
     planner: str | None = Field(None, description="planner that is used where none is named (rrtik list planners)")
+    self_margin: NotNegative = Field(
+        0.0, description="[m] that links, and what they hold, keep from each other wherever they must not touch"
+    )
     run: RunSection | None = Field(None, description="how to replan while the obstacles move (rrtik replan)")
 
 
@@ -104,6 +107,7 @@ def save_problem(problem: Problem, path: FilePath) -> None:
     data |= {"scene": scene} if scene else {}
     data |= {"start": {"joints": problem.start.tolist()}, "goal": goal_data(problem.goal)}
     data |= {"motion_resolution": float(world.motion_resolution)}
+    data |= {"self_margin": world.self_margin} if world.self_margin else {}
     write_yaml(path, data if problem.planner is None else data | {"planner": problem.planner})
 
 
@@ -148,4 +152,4 @@ def _world(document: YamlDocument, entry: ProblemFile, robot: Robot | FilePath |
         robot = load_robot(robot)
     scene = entry.scene.build(document)
     with document.at(("scene",)):
-        return World(robot, scene, motion_resolution=entry.motion_resolution)
+        return World(robot, scene, motion_resolution=entry.motion_resolution, self_margin=entry.self_margin)

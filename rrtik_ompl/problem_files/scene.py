@@ -155,6 +155,7 @@ class SceneFile(Section):
     start: Any = None
     goal: Any = None
     motion_resolution: Any = None
+    self_margin: Any = None
 
 
 def load_scene(path: str | os.PathLike[str]) -> Scene:

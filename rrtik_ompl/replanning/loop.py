@@ -49,11 +49,11 @@ class Loop:
         self._clock = clock
         robot, scene = problem.robot, feed(0.0)
         self._problem, self._feed, self._settings, self._goal_feed = problem, feed, settings, goal_feed
-        first = World(robot, scene, motion_resolution=problem.world.motion_resolution)
+        first = problem.world.with_accuracy("exact").with_scene(scene)
         self._world = MovingWorld(first, copies=PREDICTED_PLACES if settings.lookahead_ticks else 1)
         self._near = MovingWorld(first, self_collision=False)
         empty = Scene((), scene.attached, _held_pairs(scene))
-        self._alone = World(robot, empty, motion_resolution=first.motion_resolution, accuracy="conservative")
+        self._alone = first.with_accuracy("conservative").with_scene(empty)
         self._tracker = MotionTracker(scene, settings.speed_bound)
         self._max_change = settings.max_change(robot)
         self._rng = np.random.default_rng(settings.seed)

@@ -11,7 +11,6 @@ from rrtik_ompl.poses import pose
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.sensing.scene_from_view import SeenObject
-from rrtik_ompl.world import World
 
 
 def scene_with(scene: Scene, solids: Iterable[Obstacle]) -> Scene:
@@ -49,6 +48,6 @@ def grasp_problem(problem: Problem, seen: Iterable[SeenObject], name: str, kind:
         raise InputError(f"grasp type '{kind}' of '{name}' has levels 1 to {levels}, not {level}")
     solids = [solid for each in objects for solid in each.solids()]
     scene = scene_with(problem.world.scene, solids)
-    world = World(problem.robot, scene, motion_resolution=problem.world.motion_resolution)
+    world = problem.world.with_accuracy("exact").with_scene(scene)
     before = wanted.grasp_pose(kind, level - 1) * pose([0.0, 0.0, -wanted.object.grasp(kind).approach])
     return Problem(world, problem.start, PoseGoal(before), name=f"{name}_{kind}_{level}")

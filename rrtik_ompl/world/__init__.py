@@ -24,7 +24,7 @@ from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions, motions_of, step_counts
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
-from rrtik_ompl.world.exact_checks import ExactChecker
+from rrtik_ompl.world.exact_checks import ExactChecker, one_way
 from rrtik_ompl.world.proof import Gap as Gap
 from rrtik_ompl.world.proof import Proof as Proof
 from rrtik_ompl.world.proof import Prover
@@ -35,7 +35,7 @@ FINEST_RESOLUTION = 1e-5  # [m]; a motion across an arm's reach is then some hun
 
 
 class World:
-    """Exact collision checks of a robot in a scene.
+    """Exact collision checks of a robot in a scene, for one thread at a time.
 
     Answers are coal's, on the robot's and the scene's own geometry; kernels give most of them without calling coal
     (:mod:`rrtik_ompl.world.exact_checks`). A conservative world never calls coal: what the kernels cannot prove free is
@@ -45,13 +45,11 @@ class World:
     no point of the arm moves more than ``motion_resolution`` between two checks. The same configurations are checked
     in both directions.
 
-    What moves of the arm has to stay farther from an obstacle than its margin; the base, which no posture moves, must
-    only not touch it.
-
-    A world is meant for one thread at a time.
+    What moves of the arm has to stay farther from an obstacle than its margin, and from the arm's other bodies than
+    ``self_margin``; the base, which no posture moves, must only not touch an obstacle.
 
     Attributes:
-        robot, scene, motion_resolution, accuracy: As given.
+        robot, scene, motion_resolution, accuracy, self_margin: As given.
         bodies: The solids of the robot and the scene.
         pairs: Numbers of the bodies that must not touch.
         prover: Proves motions free.
@@ -62,9 +60,10 @@ class World:
         scene: Its surroundings; empty if None. Moving obstacles are where they are at time 0.
         motion_resolution: Largest step of any point of the arm between two checked configurations [m].
         accuracy: "exact" or "conservative".
+        self_margin: How far links, and what they hold, must stay from each other where they must not touch [m].
 
     Raises:
-        InputError: If the scene names links that do not exist, or the resolution is not positive.
+        InputError: If the scene names links that do not exist, or a length makes no sense.
         UnknownNameError: If there is no such accuracy.
     """
 
@@ -75,6 +74,7 @@ class World:
         *,
         motion_resolution: float = MOTION_RESOLUTION,
         accuracy: Accuracy = "exact",
+        self_margin: float = 0.0,
     ) -> None:
         self.robot = robot
         self.scene = Scene() if scene is None else scene
@@ -88,7 +88,8 @@ class World:
         if not robot.collision.geometryObjects:
             message = f"robot '{robot.name}' has no collision geometry: every configuration counts as free"
             warnings.warn(MeshWarning(message), stacklevel=2)
-        self.bodies = link_bodies(robot) + scene_bodies(robot, self.scene.at(0.0))
+        self.self_margin = own = not_negative(self_margin, "self_margin")
+        self.bodies = link_bodies(robot, own) + scene_bodies(robot, self.scene.at(0.0), own)
         self.weights = displacement_weights(robot, [b for b in self.bodies if b.kind != "obstacle"])
         pairs = colliding_pairs(robot, self.scene, self.bodies)
         moving, standing = by_motion(self.bodies, pairs)
@@ -114,6 +115,11 @@ class World:
     def motions(self) -> FastMotions | None:
         """How motions are checked, for searches in kernels: one table for all of them. None where ``fast`` is."""
         return motions_of(self, self._motions)
+
+    def with_scene(self, scene: Scene) -> World:
+        """A world of the same robot in another scene, made anew with the same settings."""
+        lengths = {"motion_resolution": self.motion_resolution, "self_margin": self.self_margin}
+        return World(self.robot, scene, accuracy=self.accuracy, **lengths)
 
     def with_accuracy(self, accuracy: Accuracy) -> World:
         """The same world, "exact" or "conservative"; shares everything else.
@@ -284,16 +290,9 @@ class World:
 
     def _motions_free(self, starts: Matrix, ends: Matrix) -> Mask:
         mask = self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self._always_colliding)
-        starts, ends = _one_way(starts[mask], ends[mask])
+        starts, ends = one_way(starts[mask], ends[mask])
         steps = step_counts(starts, ends, self.weights, self.motion_resolution)
         mask[mask] = free = self._checks.motions_free(starts, ends, steps)
         if self._proven_clearance is not None:
             mask[mask] = self.prover.proven(starts[free], ends[free], clearance=self._proven_clearance)
         return mask
-
-
-def _one_way(starts: Matrix, ends: Matrix) -> tuple[Matrix, Matrix]:
-    """Motions turned so that both directions of one are the same to the bit: the lexically smaller end first."""
-    first_difference = (starts != ends).argmax(axis=1)[:, None]
-    turned = np.take_along_axis(starts, first_difference, axis=1) > np.take_along_axis(ends, first_difference, axis=1)
-    return np.where(turned, ends, starts), np.where(turned, starts, ends)

@@ -166,6 +166,13 @@ def distance(first: Any, first_pose: Any, second: Any, second_pose: Any, margin:
     return float(result.distance_lower_bound)
 
 
+def one_way(starts: Matrix, ends: Matrix) -> tuple[Matrix, Matrix]:
+    """Motions turned so that both directions of one are the same to the bit: the lexically smaller end first."""
+    first_difference = (starts != ends).argmax(axis=1)[:, None]
+    turned = np.take_along_axis(starts, first_difference, axis=1) > np.take_along_axis(ends, first_difference, axis=1)
+    return np.where(turned, ends, starts), np.where(turned, starts, ends)
+
+
 def spread_order(count: int) -> NDArray[np.float64]:
     """0..count with both ends first, then middles of ever finer halves, so that a collision shows early."""
     levels = [np.array([0, count])]

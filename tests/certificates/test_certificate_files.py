@@ -23,7 +23,7 @@ def certificate():
     entries = MotionEntries(solids, np.array([[1, 0], [1, 1]]), np.array([[0.6, 0.8, 0.0], [0.0, 0.0, 0.0]]))
     none = MotionEntries(np.zeros((0, 4), int), np.zeros((0, 2), int), np.zeros((0, 3)))
     rows = np.array([[0.1, -0.0], [1.0 / 3.0, 2e-300], [np.pi, -1e6]])
-    return Certificate("arm", "0123", "4567", 0.001, rows, (entries, none))
+    return Certificate("arm", "0123", "4567", 0.001, 0.002, rows, (entries, none))
 
 
 def test_a_certificate_is_read_as_it_was_written(tmp_path):
@@ -61,6 +61,8 @@ BROKEN = {
     "list for a digest": (_with("scene_digest", []), "scene_digest"),
     "text for a clearance": (_with("clearance", "0.001"), "clearance"),
     "true for a clearance": (_with("clearance", True), "clearance"),
+    "text for a self margin": (_with("self_margin", "0.001"), "self_margin"),
+    "negative self margin": (_with("self_margin", -1.0), "self_margin"),
     "nan for a clearance": (_with("clearance", NAN), "clearance"),
     "endless clearance": (_with("clearance", INFINITE), "clearance"),
     "negative clearance": (_with("clearance", -1.0), "clearance"),

@@ -79,6 +79,7 @@ from rrtik_ompl.fast.tables.accessors import (
     pairs_of,
     radius_at,
     scratch_of,
+    self_margin_of,
     standing_body_at,
     standing_count_of,
     stored_centre,
@@ -200,11 +201,11 @@ def measure_clusters(
     place_cluster(balls, scratch, first)
     place_cluster(balls, scratch, second)
     centres, all_balls = centres_of(scratch), balls_of(balls)
-    mine, others = cluster_of(balls, first), cluster_of(balls, second)
+    mine, others, kept = cluster_of(balls, first), cluster_of(balls, second), self_margin_of(balls)
     for ball in range(first_ball_of(mine), end_ball_of(mine)):
         x, y, z = stored_centre(centres, ball)
         for other in range(first_ball_of(others), end_ball_of(others)):
-            reach = radius_at(all_balls, ball) + radius_at(all_balls, other)
+            reach = radius_at(all_balls, ball) + radius_at(all_balls, other) + kept
             centre = stored_centre(centres, other)
             if within_best(probe, x, y, z, centre, reach):
                 apart = square_root(squared(x - centre[0], y - centre[1], z - centre[2]))
@@ -215,18 +216,19 @@ def measure_clusters(
 def measure_bodies(
     balls: BallTable, scratch: ScratchTable, probe: ProbeTable, first: int, second: int, pair: int
 ) -> None:
-    """Measure two bodies of the arm against each other."""
+    """Measure two bodies of the arm against each other, less the margin between them."""
     frames, one, two = frames_of(scratch), body_of(balls, first), body_of(balls, second)
     around, hulls = cluster_balls_of(balls), body_balls_of(balls)
     first_frame, second_frame = frame_at(frames, frame_of_body(one)), frame_at(frames, frame_of_body(two))
-    hull, radius = placed_centre(second_frame, hulls, second), radius_at(hulls, second)
+    kept = self_margin_of(balls)
+    hull, radius = placed_centre(second_frame, hulls, second), radius_at(hulls, second) + kept
     for mine in range(first_cluster_of_body(one), end_cluster_of_body(one)):
         x, y, z = placed_centre(first_frame, around, mine)
         extent = radius_at(around, mine)
         if not within_best(probe, x, y, z, hull, extent + radius):
             continue
         for other in range(first_cluster_of_body(two), end_cluster_of_body(two)):
-            reach = extent + radius_at(around, other)
+            reach = extent + radius_at(around, other) + kept
             if within_best(probe, x, y, z, placed_centre(second_frame, around, other), reach):
                 measure_clusters(balls, scratch, probe, mine, other, pair)
 
@@ -235,12 +237,12 @@ def measure_bodies(
 def measure_self(balls: BallTable, scratch: ScratchTable, probe: ProbeTable, start: int) -> None:
     """Measure the arm against itself; the pairs are numbered from ``start``."""
     groups, pairs = pair_groups_of(balls), pairs_of(balls)
-    around, centres = group_balls_of(balls), group_centres_of(scratch)
+    around, centres, kept = group_balls_of(balls), group_centres_of(scratch), self_margin_of(balls)
     for k in range(pair_group_count_of(balls)):
         group = pair_group_at(groups, k)
         first, second = one_group_of(group), other_group_of(group)
         x, y, z = stored_centre(centres, first)
-        reach = radius_at(around, first) + radius_at(around, second)
+        reach = radius_at(around, first) + radius_at(around, second) + kept
         if within_best(probe, x, y, z, stored_centre(centres, second), reach):
             for number in range(first_pair_of(group), end_pair_of(group)):
                 pair = pair_at(pairs, number)

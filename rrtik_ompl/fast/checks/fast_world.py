@@ -56,7 +56,7 @@ class FastWorld:
     Args:
         chain: The tree of joints.
         bodies: Things with ``joint`` (0 stands still), ``placement`` in the joint's frame, coal ``geometry``, and the
-            ``margin`` [m] that is to be kept from what stands still.
+            ``margin`` [m] that is to be kept from what stands still, or between those that move: one for all of these.
         pairs: Numbers of the bodies that must not touch; pairs that both stand still are left out.
         outer: For each body spheres (x, y, z, r) in its own frame whose union contains it, shape (n, 4); none stand
             for the bounding ball.
@@ -107,7 +107,8 @@ class FastWorld:
         if self._kernels is not None:
             self._scratch = scratch_table(self._arm.arm, self._arm.balls, self._primitives)
             self._solids = standing_solids(bodies, standing, solids)
-            tables = (self._arm.arm, *self._arm.balls, *self._primitives, self._scratch, self._arm.solids, self._solids)
+            arm = self._arm
+            tables = (arm.arm, *arm.balls, *self._primitives, self._scratch, arm.solids, self._solids, arm.wider_solids)
             self._world = table({k: t.address for k, t in enumerate(tables)})
             self.address = self._world.address
             self._marks = self._scratch[MARKS]
@@ -139,7 +140,7 @@ class FastWorld:
 
     def intact(self) -> bool:
         """Whether no kernel has written beyond its own memory; tests check it after each call."""
-        tables = [self._arm.arm, *self._arm.balls, *self._primitives, self._arm.solids]
+        tables = [self._arm.arm, *self._arm.balls, *self._primitives, self._arm.solids, self._arm.wider_solids]
         if self._kernels is not None:
             tables += [self._scratch, self._solids, self._world]
         return all(each.intact() for each in tables) and (self._probe is None or self._probe.intact())

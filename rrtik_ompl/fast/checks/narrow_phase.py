@@ -67,6 +67,7 @@ from rrtik_ompl.fast.tables.accessors import (
     span_of,
     standing_count_of,
     standing_solids_of,
+    wider_solids_of,
 )
 from rrtik_ompl.fast.tables.layout import (
     COLLIDING,
@@ -243,7 +244,7 @@ def narrow_phase(world: WorldTable, wanted: int) -> Any:
             first, second, others = k // standing, k % standing, standing_solids_of(world)
         else:
             pair = pair_at(pairs, k - crossing)
-            first, second, others = one_body_of(pair), other_body_of(pair), mine
+            first, second, others = one_body_of(pair), other_body_of(pair), wider_solids_of(world)
         left, hit = compare_bodies(scratch, mine, first, others, second, marked)
         if k < crossing and left != hit:
             hit |= corners_inside(world, first, second, left & ~hit)

@@ -206,7 +206,8 @@ class ReferenceChecks:
                 ).any(axis=1)
         for k, (i, j) in enumerate(zip(pairs[:, layout.PAIR_ONE], pairs[:, layout.PAIR_OTHER], strict=True)):
             gaps = np.linalg.norm(points[i][:, :, None] - points[j][:, None], axis=3)
-            found[:, body_count * standing + k] = (gaps < radii[i][:, None] + radii[j]).any(axis=(1, 2))
+            reaches = radii[i][:, None] + radii[j] + table[layout.SELF_MARGIN][0]
+            found[:, body_count * standing + k] = (gaps < reaches).any(axis=(1, 2))
         return found
 
 

@@ -39,6 +39,7 @@ def _all_gaps(poses: NDArray[np.float64], balls: Table, primitives: Table) -> tu
     pairs = balls[layout.PAIRS].reshape(-1, layout.PAIR_INTS)
     for k, (i, j) in enumerate(zip(pairs[:, layout.PAIR_ONE], pairs[:, layout.PAIR_OTHER], strict=True)):
         apart = np.linalg.norm(points[i][:, :, None] - points[j][:, None], axis=3)
-        gaps.append((apart - radii[i][:, None] - radii[j]).min(axis=(1, 2)))
+        reaches = radii[i][:, None] + radii[j] + balls[layout.SELF_MARGIN][0]
+        gaps.append((apart - reaches).min(axis=(1, 2)))
         numbers.append(body_count * standing + k)
     return np.reshape(gaps, (-1, len(poses))).T, np.array(numbers, dtype=np.int32)

@@ -40,6 +40,7 @@ from rrtik_ompl.fast.tables.accessors import (
     pair_groups_of,
     pairs_of,
     radius_at,
+    self_margin_of,
     stored_centre,
 )
 from rrtik_ompl.fast.tables.layout import NO_MARKS, BallTable, Marks, ScratchTable
@@ -53,17 +54,17 @@ def within(x: Any, y: Any, z: Any, centre: Any, reach: float) -> Any:
 
 @kernel
 def clusters_meet(balls: BallTable, scratch: ScratchTable, first: int, second: int, wanted: int) -> int:
-    """Lanes in which a ball of one cluster meets a ball of another."""
+    """Lanes in which a ball of one cluster meets a ball of another; all here meet that do not keep the margin."""
     place_cluster(balls, scratch, first)
     place_cluster(balls, scratch, second)
     centres, all_balls = centres_of(scratch), balls_of(balls)
     around, frames = cluster_balls_of(balls), frames_of(scratch)
     mine, others = cluster_of(balls, first), cluster_of(balls, second)
     hull = placed_centre(frame_at(frames, frame_of_cluster(others)), around, second)
-    meeting = 0
+    meeting, kept = 0, self_margin_of(balls)
     for ball in range(first_ball_of(mine), end_ball_of(mine)):
         x, y, z = stored_centre(centres, ball)
-        radius = radius_at(all_balls, ball)
+        radius = radius_at(all_balls, ball) + kept
         if within(x, y, z, hull, radius + radius_at(around, second)) & wanted & ~meeting == 0:
             continue
         for other in range(first_ball_of(others), end_ball_of(others)):
@@ -79,7 +80,8 @@ def bodies_meet(balls: BallTable, scratch: ScratchTable, first: int, second: int
     frames, one, two = frames_of(scratch), body_of(balls, first), body_of(balls, second)
     around, hulls = cluster_balls_of(balls), body_balls_of(balls)
     first_frame, second_frame = frame_at(frames, frame_of_body(one)), frame_at(frames, frame_of_body(two))
-    hull, radius = placed_centre(second_frame, hulls, second), radius_at(hulls, second)
+    kept = self_margin_of(balls)
+    hull, radius = placed_centre(second_frame, hulls, second), radius_at(hulls, second) + kept
     x, y, z = placed_centre(first_frame, hulls, first)
     close = within(x, y, z, hull, radius + radius_at(hulls, first)) & wanted
     meeting = 0
@@ -93,7 +95,7 @@ def bodies_meet(balls: BallTable, scratch: ScratchTable, first: int, second: int
             continue
         for other in range(first_cluster_of_body(two), end_cluster_of_body(two)):
             centre = placed_centre(second_frame, around, other)
-            both = within(x, y, z, centre, extent + radius_at(around, other)) & near & ~meeting
+            both = within(x, y, z, centre, extent + radius_at(around, other) + kept) & near & ~meeting
             if both != 0:
                 meeting |= clusters_meet(balls, scratch, mine, other, both)
         if meeting == close:
@@ -109,12 +111,12 @@ def self_collision(balls: BallTable, scratch: ScratchTable, wanted: int, marks: 
     """
     groups, pairs = pair_groups_of(balls), pairs_of(balls)
     around, centres = group_balls_of(balls), group_centres_of(scratch)
-    meeting = 0
+    meeting, kept = 0, self_margin_of(balls)
     for number in range(pair_group_count_of(balls)):
         group = pair_group_at(groups, number)
         first, second = one_group_of(group), other_group_of(group)
         x, y, z = stored_centre(centres, first)
-        reach = radius_at(around, first) + radius_at(around, second)
+        reach = radius_at(around, first) + radius_at(around, second) + kept
         close = within(x, y, z, stored_centre(centres, second), reach) & wanted
         if marks == NO_MARKS:
             close &= ~meeting

@@ -25,7 +25,7 @@ from rrtik_ompl.fast.simd.access import (
 from rrtik_ompl.fast.simd.access import double_row as _double_row
 from rrtik_ompl.fast.simd.access import int_row as _int_row
 from rrtik_ompl.fast.simd.compiled import WIDTH, inlined
-from rrtik_ompl.fast.simd.lanes import lanes_at, set_int, set_lanes
+from rrtik_ompl.fast.simd.lanes import float_at, lanes_at, set_int, set_lanes
 from rrtik_ompl.fast.tables import layout
 from rrtik_ompl.fast.tables.layout import DOUBLE_BYTES, FLOAT_BYTES, INT_BYTES
 
@@ -42,6 +42,7 @@ inner_primitives_of: Callable[[layout.WorldTable], layout.PrimitiveTable] = fiel
 scratch_of: Callable[[layout.WorldTable], layout.ScratchTable] = field_reader(layout.SCRATCH)
 moving_solids_of: Callable[[layout.WorldTable], layout.SolidTable] = field_reader(layout.MOVING_SOLIDS)
 standing_solids_of: Callable[[layout.WorldTable], layout.SolidTable] = field_reader(layout.STANDING_SOLIDS)
+wider_solids_of: Callable[[layout.WorldTable], layout.SolidTable] = field_reader(layout.WIDER_SOLIDS)
 
 # Arm
 joint_count_of: Callable[[layout.ArmTable], int] = field_reader(layout.JOINT_COUNT)
@@ -62,6 +63,7 @@ cluster_count_of: Callable[[layout.BallTable], int] = field_reader(layout.CLUSTE
 body_count_of: Callable[[layout.BallTable], int] = field_reader(layout.BODY_COUNT)
 pair_group_count_of: Callable[[layout.BallTable], int] = field_reader(layout.PAIR_GROUP_COUNT)
 pair_count_of: Callable[[layout.BallTable], int] = field_reader(layout.PAIR_COUNT)
+self_margins_of: Callable[[layout.BallTable], int] = field_reader(layout.SELF_MARGIN)
 balls_of: Callable[[layout.BallTable], layout.BallArray] = field_reader(layout.BALLS)
 group_balls_of: Callable[[layout.BallTable], layout.BallArray] = field_reader(layout.GROUP_BALLS)
 cluster_balls_of: Callable[[layout.BallTable], layout.BallArray] = field_reader(layout.CLUSTER_BALLS)
@@ -180,6 +182,13 @@ gaps_of: Callable[[layout.ProbeTable], layout.LaneArray] = field_reader(layout.G
 joint_row: Callable[[layout.JointValues, int, int], layout.JointValues] = _double_row
 checked_row: Callable[[layout.IntArray, int, int], layout.IntArray] = _int_row
 marks_row: Callable[[layout.Marks, int, int], layout.Marks] = _int_row
+
+
+@inlined
+def self_margin_of(balls: layout.BallTable) -> float:
+    """How far two bodies of the arm must stay apart."""
+    margin: float = float_at(self_margins_of(balls), 0)
+    return margin
 
 
 @inlined

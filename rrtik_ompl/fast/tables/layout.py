@@ -64,6 +64,7 @@ LastHit = NewType("LastHit", int)
 
 # World: addresses of the tables that a check needs.
 ARM, OUTER, INNER, OUTER_PRIMITIVES, INNER_PRIMITIVES, SCRATCH, MOVING_SOLIDS, STANDING_SOLIDS = range(8)
+WIDER_SOLIDS = 8  # the moving solids, each with the margin around it that the arm keeps from itself
 
 # Arm. PARENTS: frame that carries each joint · SLIDING: whether a joint slides · PLACEMENTS: of each joint in its
 # parent's frame
@@ -74,9 +75,10 @@ POSE_NUMBERS = 12
 ROTATION, ORIGIN = 0, 9
 
 # Balls (of the outer cover, or inner ones) in three levels: groups (all that a joint carries) of clusters of balls;
-# a body is a run of clusters too. GROUP_BALLS, CLUSTER_BALLS, BODY_BALLS: a ball around each group, cluster, body.
+# a body is a run of clusters too. GROUP_BALLS, CLUSTER_BALLS, BODY_BALLS: a ball around each group, cluster, body ·
+# SELF_MARGIN: one float, how far two bodies must stay apart
 GROUP_COUNT, GROUPS, GROUP_BALLS, CLUSTERS, CLUSTER_BALLS, BALLS, BODIES, BODY_BALLS = range(8)
-PAIR_GROUP_COUNT, PAIR_GROUPS, PAIRS, CLUSTER_COUNT, BODY_COUNT, PAIR_COUNT = range(8, 14)
+PAIR_GROUP_COUNT, PAIR_GROUPS, PAIRS, CLUSTER_COUNT, BODY_COUNT, PAIR_COUNT, SELF_MARGIN = range(8, 15)
 # Ball (floats): centre in the joint frame, radius.
 BALL_FLOATS = 4
 CENTRE, RADIUS = 0, 3

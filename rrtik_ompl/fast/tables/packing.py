@@ -42,6 +42,7 @@ class ArmTables:
     arm: Table
     balls: tuple[Table, Table]
     solids: Table
+    wider_solids: Table
 
     def serves(
         self,
@@ -113,7 +114,8 @@ def arm_tables(
     packed = [
         as_one([moving_body(chain, bodies[k], outer[k], inner[k], margin) for k in members]) for members in moving
     ]
-    balls = (ball_table(packed, own, inner=False), ball_table(packed, own, inner=True))
+    kept = max((body.margin for body in carried), default=0.0)  # one for all of them
+    balls = (ball_table(packed, own, inner=False, kept=kept), ball_table(packed, own, inner=True, kept=kept))
     turns = axis_turns(chain)
     poses = np.zeros((len(carried), 4, 4))
     for pose, body in zip(poses, carried, strict=True):  # in the turned frames of their joints
@@ -121,8 +123,9 @@ def arm_tables(
         pose[:3] = turns[body.joint - 1].T @ pose[:3]
     parts = iter(placed_bodies(solids_of, poses, slack=margin))
     placed = [(bodies[members[0]].joint, [next(parts) for _ in members]) for members in moving]
-    tables = (arm_table(chain), balls, solid_table(placed))
-    return ArmTables(carried, sizes, covers, solids_of, own, limits, margin, *tables)
+    single = solid_table(placed)
+    wider = single if kept == 0.0 else solid_table([(joint, [s.grown(kept) for s in them]) for joint, them in placed])
+    return ArmTables(carried, sizes, covers, solids_of, own, limits, margin, arm_table(chain), balls, single, wider)
 
 
 def as_one(parts: Sequence[MovingBody]) -> MovingBody:
@@ -222,9 +225,10 @@ def _reach(body: Body, outer: Spheres) -> float:
 
 
 def _same(first: Body, second: Body) -> bool:
-    """Whether two bodies are the same solid on the same joint, placed alike."""
+    """Whether two bodies are the same solid on the same joint, placed alike, with the same margin."""
     return (
         first.joint == second.joint
+        and first.margin == second.margin
         and first.geometry is second.geometry
         and np.array_equal(first.placement.homogeneous, second.placement.homogeneous)
     )

@@ -58,6 +58,7 @@ from rrtik_ompl.fast.tables.layout import (
     PLACEMENTS,
     POSE_NUMBERS,
     ROTATION,
+    SELF_MARGIN,
     SLIDING,
 )
 from rrtik_ompl.fast.tables.memory import Table, table, whole_records
@@ -168,13 +169,14 @@ def rounding_margin(chain: Chain, reaches: Sequence[tuple[int, float]], strokes:
     return max(SMALLEST_MARGIN, MARGIN_PER_LEVER * float(levers.sum()), MARGIN_PER_METRE * extent)
 
 
-def ball_table(bodies: Sequence[MovingBody], pairs: Sequence[tuple[int, int]], *, inner: bool) -> Table:
+def ball_table(bodies: Sequence[MovingBody], pairs: Sequence[tuple[int, int]], *, inner: bool, kept: float) -> Table:
     """Balls of the moving bodies in three levels, and the pairs of bodies (numbers in ``bodies``) to test.
 
     Args:
         bodies: The moving bodies.
         pairs: Pairs of them that must not touch.
         inner: Whether to take the inner balls; bodies without balls take no part.
+        kept: How far the bodies of a pair must stay apart [m].
     """
     shapes = [body.inner if inner else body.outer for body in bodies]
     frames = sorted({b.frame for b, balls in zip(bodies, shapes, strict=True) if len(balls)}, reverse=True)
@@ -217,6 +219,7 @@ def ball_table(bodies: Sequence[MovingBody], pairs: Sequence[tuple[int, int]], *
             CLUSTER_COUNT: len(clusters),
             BODY_COUNT: len(bodies),
             PAIR_COUNT: len(present),
+            SELF_MARGIN: np.array([kept], dtype=np.float32),
         }
     )
 

@@ -53,9 +53,8 @@ def _first_links(world: World, later: set[int]) -> World:
     names = {*(each.name for each in scene.obstacles), *(each.name for each in held), *robot.link_names}
     allowed = tuple(pair for pair in scene.allowed_collisions if set(pair) <= names)
     part = Scene(scene.obstacles, attached=held, allowed_collisions=allowed)
-    return World(
-        replace(robot, collision=kept), part, motion_resolution=world.motion_resolution, accuracy=world.accuracy
-    )
+    settings = {"motion_resolution": world.motion_resolution, "self_margin": world.self_margin}
+    return World(replace(robot, collision=kept), part, accuracy=world.accuracy, **settings)
 
 
 def _moves(robot: Robot, joint: int, later: set[int]) -> bool:
