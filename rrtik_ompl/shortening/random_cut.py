@@ -58,7 +58,6 @@ def kernel_search(route: Matrix, task: Task, *, seed: int, share: float, pull: f
 
 def run(search: ShortcutSearch, task: Task, tries: int, patience: int = PATIENCE) -> None:
     """Let a search work until its tries, its patience or the time is up."""
-
     before, known = task.asked, task.listened
 
     def stop() -> bool:

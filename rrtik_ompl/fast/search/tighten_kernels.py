@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import sqrt
-from typing import Any
 
 from rrtik_ompl.fast.search import tighten_layout
 from rrtik_ompl.fast.search.motions.motion_kernels import dof_of

@@ -121,11 +121,24 @@ def arm_tables(
     for pose, body in zip(poses, carried, strict=True):  # in the turned frames of their joints
         pose[:] = body.placement.homogeneous
         pose[:3] = turns[body.joint - 1].T @ pose[:3]
-    parts = iter(placed_bodies(solids_of, poses, slack=margin))
-    placed = [(bodies[members[0]].joint, [next(parts) for _ in members]) for members in moving]
-    single = solid_table(placed)
-    wider = single if kept == 0.0 else solid_table([(joint, [s.grown(kept) for s in them]) for joint, them in placed])
+    frames = [bodies[members[0]].joint for members in moving]
+    single = _solids(solids_of, poses, frames, sizes, kept=0.0, slack=margin)
+    wider = single if kept == 0.0 else _solids(solids_of, poses, frames, sizes, kept=kept, slack=margin)
     return ArmTables(carried, sizes, covers, solids_of, own, limits, margin, arm_table(chain), balls, single, wider)
+
+
+def _solids(
+    bodies: Sequence[Solids],
+    poses: NDArray[np.float64],
+    frames: Sequence[int],
+    sizes: Sequence[int],
+    *,
+    kept: float,
+    slack: float,
+) -> Table:
+    """Table of the solids of bodies that joints carry, ``sizes`` bodies in each frame, grown by what they keep [m]."""
+    parts = iter(placed_bodies(bodies, poses, margins=kept, slack=slack))
+    return solid_table([(frame, [next(parts) for _ in range(size)]) for frame, size in zip(frames, sizes, strict=True)])
 
 
 def as_one(parts: Sequence[MovingBody]) -> MovingBody:
