@@ -1,5 +1,7 @@
 """Motions that are proven free for their whole length."""
 
+from dataclasses import replace
+
 import coal
 import numpy as np
 import pinocchio as pin
@@ -12,6 +14,7 @@ from rrtik_ompl.fast.proof import layout
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box, Cylinder, HalfSpace, Sphere
 from rrtik_ompl.world import World
+from rrtik_tests.by_coal import free_by_coal
 from rrtik_tests.turning_slider import slider
 
 ARMS = ("panda", "ur5", "titan4", "planar10", "ur5_gripper", "puma560")
@@ -173,3 +176,13 @@ def test_a_proof_of_bad_numbers_is_refused_by_name():
             world.prove([q, q], clearance=clearance)
     with pytest.raises(InputError):
         world.prove([q, q * np.nan])
+
+
+def test_bodies_of_several_parts_are_not_proven_apart_from_a_half_space_that_they_touch():
+    robot = replace(rrtik.load_robot("ur5"), self_collision=False)
+    world = World(robot, Scene([Obstacle("ground", HalfSpace([0.1, 0.0, 1.0], -0.3))]))
+    Q = np.random.default_rng(0).uniform(-np.pi, np.pi, (400, robot.dof))
+    free, proven = free_by_coal(world, Q), world.motions_proven(Q, Q)
+    assert 20 < free.sum() < len(Q) - 20
+    assert not (proven & ~free).any()
+    assert proven[free].mean() > 0.8

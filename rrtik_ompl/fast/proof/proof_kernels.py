@@ -176,8 +176,9 @@ def beyond(table: ProofTable, pair: int, begin: int, end: int, width: float) -> 
     """Compare a pair of whole bodies: 1 if it is proven apart, 0 if shorter intervals may help, -1 if they will not."""
     pairs, solids = pairs_of(table), solids_of(table)
     one, other = one_of_pair(pairs, pair), other_of_pair(pairs, pair)
-    if kind_of_solid(solids, one) == layout.UNKNOWN or kind_of_solid(solids, other) == layout.UNKNOWN:
-        return -1
+    others = kind_of_solid(solids, other)
+    if kind_of_solid(solids, one) == layout.UNKNOWN or others == layout.UNKNOWN or others == layout.HALF_SPACE:
+        return -1  # neither has a ball
     kept = double_at(margins_of(table), pair)
     wanted = kept + sagitta(table, one_sweep_of(pairs, pair), width)
     wanted += sagitta(table, other_sweep_of(pairs, pair), width)
