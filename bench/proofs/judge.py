@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.collision.certificate import Certificate
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.world import World
 
@@ -28,5 +29,5 @@ def deepest_cut(world: World, path: JointPath) -> float:
 
 def _deepest(world: World, rows: Matrix) -> float:
     free = world.valid_batch(rows)
-    free[::EVERY] &= world.certify(rows[::EVERY])
+    free[::EVERY] &= Certificate(world.robot, world.bodies, world.pairs).free(rows[::EVERY])
     return max((-min(world.clearance(row), 0.0) for row in rows[~free]), default=0.0)

@@ -261,9 +261,10 @@ class World:
         return f"{touching[0]}" + (f" (and {more} more pair{'s' * (more > 1)})" if (more := len(touching) - 1) else "")
 
     def certify(self, Q: ArrayLike) -> Mask:
-        """A second opinion on the rows of Q, independent of the checks that planners use. Shape (m,)."""
+        """A second opinion on rows of Q, (m, dof) -> (m,), not by the checks of planners: proofs first, then coal."""
         mask = self.robot.within_limits(rows := self._rows(Q, 2))
-        mask[mask] = self._certificate().free(rows[mask])
+        open_ = mask & ~self.prover.still_proven(rows)
+        mask[open_] = self._certificate().free(rows[open_])
         return mask
 
     def _both_ends(self, A: ArrayLike, B: ArrayLike) -> tuple[Matrix, Matrix]:

@@ -29,6 +29,7 @@ LARGEST_VALUE = 1e3  # [rad] or [m] of a joint, up to which rounding is bounded
 PROOF_KERNELS = "proof.proof_kernels"
 SPARE = 1e-10  # [m] that a proof which is written down keeps beyond ROOM: who verifies it rounds in other places
 MOTIONS_AT_ONCE = 64  # between two looks at the clock
+FEW = 200  # configurations
 PROVEN, NOT_LOOKED_AT = -1, -2  # in the place of a pair's number
 DOUBLE, INT = 8, 4  # bytes of a number
 
@@ -150,6 +151,16 @@ class Prover:
     def made(self, proof: Proof) -> bool:
         """Whether a proof is one of these bodies, by this object."""
         return proof._digest is self._digest
+
+    def still_proven(self, rows: Matrix) -> Mask:
+        """Which configurations, shape (m, dof), are proven free. Shape (m,).
+
+        Of a few none is, as long as the table is not made: that takes longer than coal needs for them.
+        """
+        mask = np.full(len(rows), self._packed is not None or len(rows) > FEW)
+        if mask.any():
+            mask[[gap.motion for gap in self.still_gaps(rows, clearance=0.0)]] = False
+        return mask
 
     def still_gaps(self, rows: Matrix, *, clearance: float) -> list[Gap]:
         """The configurations, shape (m, dof), that are not proven free; each counts as a motion that stands still."""

@@ -13,6 +13,7 @@ from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere
 from rrtik_ompl.transitions import subdivided
 from rrtik_ompl.world import World
+from rrtik_tests.by_coal import free_by_coal
 
 
 def crowded(name, count, seed):
@@ -81,3 +82,15 @@ def test_no_rows_no_pairs_and_one_row_are_answered_too():
     assert world.certify(np.zeros((0, world.robot.dof))).shape == (0,)
     assert Certificate(world.robot, world.bodies, ()).free(q).all()
     assert [world.certify(row[None])[0] for row in q] == world.certify(q).tolist()
+
+
+@pytest.mark.parametrize(("name", "seed"), [("panda_primitives", 4), ("ur5", 5), ("titan4", 6)])
+def test_the_second_opinion_with_proofs_first_is_that_of_coal(name, seed):
+    world = crowded(name, 20, seed)
+    Q = np.vstack([path_rows(world.robot, seed, 300), world.robot.upper + 0.1])
+    judged = free_by_coal(world, Q)
+    assert 0.05 < judged.mean() < 0.98
+    assert (world.certify(Q) == judged).all()
+    few = Q[:: len(Q) // 30]
+    assert (world.certify(few) == free_by_coal(world, few)).all()
+    assert (World(world.robot, world.scene).certify(few) == free_by_coal(world, few)).all(), "without a table of proofs"

@@ -10,6 +10,7 @@ from rrtik_ompl.fast import COLLIDING, FREE, UNDECIDED
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
 from rrtik_ompl.world import World
+from rrtik_tests.by_coal import free_by_coal
 
 pytestmark = pytest.mark.kernels
 
@@ -60,7 +61,7 @@ def test_on_millions_of_configurations_the_world_says_what_coal_says(name, dente
     for _ in range(6):
         world = World(robot, surroundings(robot, rng, dented_cube))
         Q = short_sweeps(world, rng, 800)
-        ours, coals = world.valid_batch(Q), world.certify(Q)
+        ours, coals = world.valid_batch(Q), free_by_coal(world, Q)
         for q in Q[ours != coals]:
             assert abs(world.clearance(q)) < CONTACT
         compared, free = compared + len(Q), free + int(ours.sum())
@@ -78,7 +79,7 @@ def test_motions_are_free_exactly_if_all_their_configurations_are(name, dented_c
     for a, b in zip(starts, ends, strict=True):
         count = world.steps(a, b)
         shares = np.linspace(0.0, 1.0, count + 1)[:, None]
-        expected.append(bool(world.certify((1.0 - shares) * a + shares * b).all()))
+        expected.append(bool(free_by_coal(world, (1.0 - shares) * a + shares * b).all()))
     assert 0.1 < np.mean(expected) < 0.95
     np.testing.assert_array_equal(world.motion_valid_batch(starts, ends), expected)
     np.testing.assert_array_equal(world.motion_valid_batch(ends, starts), expected)
@@ -102,7 +103,7 @@ def test_what_kernels_are_sure_of_is_true_and_they_leave_little_open(name, dente
     robot, rng = load_robot(name), np.random.default_rng(17)
     world = World(robot, surroundings(robot, rng, dented_cube))
     Q = short_sweeps(world, rng, 300)
-    answers, free = world.fast.classify(robot.joint_values(Q)), world.certify(Q)
+    answers, free = world.fast.classify(robot.joint_values(Q)), free_by_coal(world, Q)
     for q in Q[(answers == FREE) & ~free | (answers == COLLIDING) & free]:
         assert abs(world.clearance(q)) < CONTACT
     assert (answers == UNDECIDED).mean() < 0.03
@@ -115,9 +116,9 @@ def test_the_certificate_says_the_same_in_whatever_order_rows_come(name, dented_
     world = World(robot, surroundings(robot, rng, dented_cube))
     Q = short_sweeps(world, rng, 150)  # neighbours stand for each other; strangers do not
     order = rng.permutation(len(Q))
-    in_line = world.certify(Q)
+    in_line = free_by_coal(world, Q)
     assert 0.05 < in_line.mean() < 0.995
-    np.testing.assert_array_equal(world.certify(Q[order]), in_line[order])
+    np.testing.assert_array_equal(free_by_coal(world, Q[order]), in_line[order])
 
 
 def reused_answers(world, sweeps):
@@ -152,5 +153,5 @@ def test_reused_collision_data_miss_overlaps_and_the_world_does_not(dented_cube)
     if len(missed) == 0:
         pytest.skip(f"coal {coal.__version__} no longer falls into the trap here")
     assert min(world.clearance(q) for q in missed) < -0.001
-    assert not world.certify(missed).any()
+    assert not free_by_coal(world, missed).any()
     assert not any(world.valid(q) for q in missed)

@@ -18,6 +18,7 @@ from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Obstacle, Scene
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
 from rrtik_ompl.world import World
 from rrtik_ompl.world.moving_world import MovingWorld
+from rrtik_tests.by_coal import free_by_coal
 
 NEARLY = 1e-5  # [m]; what coal's distances and the kernels' rounding may differ by
 GROOVED = Prism([(0, 0), (0.3, 0), (0.3, 0.1), (0.1, 0.1), (0.1, 0.3), (0, 0.3)], 0.2)
@@ -66,7 +67,7 @@ def test_what_is_valid_keeps_the_margin_and_what_keeps_it_is_valid(name, reach, 
     assert 0.05 < valid.mean() < 0.95
     assert (gaps[valid] > margin - NEARLY).all()
     assert valid[gaps > margin + NEARLY].all()
-    assert (world.certify(Q) == valid).all()
+    assert (free_by_coal(world, Q) == valid).all()
     between = (gaps > 0.0) & (gaps <= margin)
     assert between.any()
     assert [world.clearance(q) for q in Q[between][:5]] == pytest.approx(gaps[between][:5] - margin, abs=NEARLY)
@@ -94,7 +95,7 @@ def test_a_disc_is_free_where_it_is_farther_than_the_margin(shape, margin, seed)
     assert (gaps[valid] > margin - NEARLY).all()
     assert valid[gaps > margin + NEARLY].all()
     assert (gaps[careful.valid_batch(Q)] > margin).all()
-    assert (world.certify(Q) == valid).all()
+    assert (free_by_coal(world, Q) == valid).all()
 
 
 def disc_and_wall(margin, **options):

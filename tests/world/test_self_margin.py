@@ -22,6 +22,7 @@ from rrtik_ompl.shapes import Box, Capsule, Sphere
 from rrtik_ompl.shortening import shorten
 from rrtik_ompl.world import World
 from rrtik_ompl.world.moving_world import MovingWorld
+from rrtik_tests.by_coal import free_by_coal
 
 NEARLY = 1e-5  # [m]; what coal's distances and the kernels' rounding may differ by
 ROD = AttachedObject("rod", "panda_hand", Capsule(0.02, 0.3), pin.SE3(np.eye(3), np.array([0.1, 0.0, 0.2])))
@@ -71,6 +72,7 @@ def test_what_is_valid_keeps_the_margin_and_what_keeps_it_is_valid(name, margins
         assert (gaps[valid] > margin - NEARLY).all()
         assert valid[gaps > margin + NEARLY].all()
         assert (gaps[careful] > margin - 1e-6).all()
+        assert (free_by_coal(world, Q) == valid).all()
         assert (world.certify(Q) == valid).all()
         assert (last | ~valid).all(), "what keeps a wide margin keeps a narrow one"
         assert (world.motions_proven(Q, Q) <= valid).all()
@@ -91,7 +93,8 @@ def test_no_margin_is_as_before_and_an_obstacle_s_margin_is_its_own(name):
     assert (zero.valid_batch(Q) == bare.valid_batch(Q)).all()
     assert zero.prove(Q[:2]).digest == bare.prove(Q[:2]).digest
     assert World(bare.robot, bare.scene, self_margin=1e-3).prove(Q[:2]).digest != bare.prove(Q[:2]).digest
-    alone = Obstacle("ball", Sphere(0.01), pin.SE3(np.eye(3), bare.robot.fk(Q[0]).translation + [0.0, 0.0, 0.5]))
+    place = bare.robot.fk(Q[0]).translation + np.array([0.0, 0.0, 0.5])
+    alone = Obstacle("ball", Sphere(0.01), pin.SE3(np.eye(3), place))
     wide = World(bare.robot, Scene([alone], bare.scene.attached), self_margin=0.02)
     assert {c.margin for q in Q[:20] for c in [wide.closest(q)] if "ball" in (c.first, c.second)} <= {0.0}
 
