@@ -24,6 +24,9 @@ def replan_scenario(
     seed: Annotated[int, typer.Option(help="The same seed gives the same run.")] = 0,
     lookahead_ticks: Annotated[int | None, typer.Option(help="Predict obstacle motion this many ticks ahead.")] = None,
     predict: Annotated[int | None, typer.Option(hidden=True)] = None,
+    clearance: Annotated[
+        float | None, typer.Option(help="What the moves are proven to keep from obstacles beside margins [m].")
+    ] = None,
     seconds: Annotated[float | None, typer.Option(help="Simulated time at most [s].")] = None,
     record: Annotated[Path | None, typer.Option(help="Keep everything, on Ctrl-C too: .json.")] = None,
     replay: Annotated[Path | None, typer.Option(help="Show this record instead of a new run.")] = None,
@@ -38,7 +41,12 @@ def replan_scenario(
         raise InputError("--predict is now called --lookahead-ticks; use that")
     check_target(html, (".html", ".htm"))
     check_target(record, (".json",))
-    options: dict[str, Any] = {"lookahead_ticks": lookahead_ticks, "seconds": seconds, "record": record}
+    options: dict[str, Any] = {
+        "lookahead_ticks": lookahead_ticks,
+        "clearance": clearance,
+        "seconds": seconds,
+        "record": record,
+    }
     given = {name: value for name, value in options.items() if value is not None}
     if replay is not None and given:
         raise InputError(

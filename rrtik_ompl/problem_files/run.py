@@ -51,6 +51,7 @@ class RunSection(Section):
     step: Positive = Field(description="how far the robot goes in a tick [rad or m]")
     rate: Positive = Field(description="ticks a second [Hz]")
     margin: NotNegative = Field(0.0, description="distance to obstacles that is always kept [m]")
+    clearance: NotNegative | None = Field(None, description="what moves are proven to keep beside the margin [m]")
     speed_bound: Positive | None = Field(None, description="no point of an obstacle is faster [m/s]")
     max_edge: Positive | None = Field(None, description="longest edge of the trees [rad or m]")
     lookahead_ticks: Annotated[int, Field(strict=True, ge=0)] = Field(

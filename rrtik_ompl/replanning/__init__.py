@@ -29,6 +29,7 @@ def replan(  # noqa: D417 - the settings are described in one place
     planner: Replanner = DrrtCon.name,
     max_edge: float | None = None,
     margin: float = 0.0,
+    clearance: float | None = None,
     speed_bound: float | None = None,
     limits: RateLimits | None = None,
     lookahead_ticks: int = 0,
@@ -47,6 +48,9 @@ def replan(  # noqa: D417 - the settings are described in one place
     obstacles will do, unless ``lookahead_ticks`` says so. Where there is no path the robot waits; where an obstacle
     comes nearer than allowed the robot evades it.
 
+    Steps are proven: whatever obstacles do in the tick, as long as none is faster than ``speed_bound``, the arm keeps
+    ``margin`` and ``clearance`` in all of it. The record says which steps are not (:attr:`Tick.proven`).
+
     No contact can happen in a step along the path if no obstacle is faster than ``speed_bound``: the robot keeps a
     distance of ``margin``, and to moving obstacles also the distance that they can travel in a tick. An obstacle moves
     if it states a motion or was seen to move; an obstacle of a feed that begins to move beside the robot comes
@@ -58,8 +62,8 @@ def replan(  # noqa: D417 - the settings are described in one place
         scene_feed: The scene over time: a scene whose obstacles state their motion, a function of time [s], or
             pairs of a time and a scene; the problem's scene if None. The obstacles' names and shapes stay the same.
             A feed with fewer scenes than ticks makes obstacles jump; their speed is that of the jump in one tick.
-        step, rate, planner, max_edge, margin, speed_bound, limits, lookahead_ticks, seconds, repair_budget, seed: See
-            :class:`ReplanSettings`.
+        step, rate, planner, max_edge, margin, clearance, speed_bound, limits, lookahead_ticks, seconds, repair_budget,
+            seed: See :class:`ReplanSettings`.
         goal_feed: A goal that moves: the configuration at a time [s], in place of the problem's goal.
             It is reached when the robot is where it was at the begin of the last tick.
         record: A ``.json`` file for the record; it is written on Ctrl-C and errors too, once there is a tick.
@@ -74,8 +78,9 @@ def replan(  # noqa: D417 - the settings are described in one place
     """
     refuse_renamed(renamed)
     settings = ReplanSettings(
-        step=step, rate=rate, planner=planner, max_edge=max_edge, margin=margin, speed_bound=speed_bound,
-        limits=limits, lookahead_ticks=lookahead_ticks, seconds=seconds, repair_budget=repair_budget, seed=seed,
+        step=step, rate=rate, planner=planner, max_edge=max_edge, margin=margin, clearance=clearance,
+        speed_bound=speed_bound, limits=limits, lookahead_ticks=lookahead_ticks, seconds=seconds,
+        repair_budget=repair_budget, seed=seed,
     )  # fmt: skip
     return replan_with(settings, problem, scene_feed, goal_feed=goal_feed, record=record, clock=clock)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,11 +24,14 @@ from rrtik_ompl.replanning.walking import one_step, to_first_corner
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.world import World
+from rrtik_ompl.world.kept_clearance import CLEARANCE
 from rrtik_ompl.world.motion_queries import Stop
 from rrtik_ompl.world.moving_world import MovingWorld
 
 GoalFeed = Callable[[float], ArrayLike]
 Clock = Callable[[], float]
+
+TRIES = 3  # to find a path that is proven
 
 
 class Loop:
@@ -54,6 +58,9 @@ class Loop:
         self._near = MovingWorld(first, self_collision=False)
         empty = Scene((), scene.attached, _held_pairs(scene))
         self._alone = first.with_accuracy("conservative").with_scene(empty)
+        between = 0.5 * first.motion_resolution  # the margin holds between two checked configurations too
+        self._kept = min(CLEARANCE, between) if settings.clearance is None else settings.clearance
+        self._searched = between + (settings.clearance or 0.0)
         self._tracker = MotionTracker(scene, settings.speed_bound)
         self._max_change = settings.max_change(robot)
         self._rng = np.random.default_rng(settings.seed)
@@ -98,7 +105,9 @@ class Loop:
         else:
             event, reason, place = self._wait_or_evade()
         path = self._planner.path
-        self._record(now, here, event, {**spent, "all": self._clock() - begin}, checked, reason, path)
+        moves = (place != here).any()
+        proven = self._measured(spent, "prove", self._proven, here[None], place[None]) if moves else None
+        self._record(now, here, event, {**spent, "all": self._clock() - begin}, checked, reason, path, proven)
         self.q = place
         return True
 
@@ -108,8 +117,7 @@ class Loop:
         if not self._tracker.update(now, scene):
             return False
         settings = self._settings
-        between = 0.5 * self._world.motion_resolution  # the margin holds between two checked configurations too
-        clear = settings.margin + between
+        clear = settings.margin + self._searched
         self._distances = required_distances(scene, clear, settings.tick, settings.speed_bound, self._tracker.speeds)
         predicted = (self._tracker.later(scene, seconds) for seconds in self._lookahead())
         self._world.move(scene, *predicted, inflation=self._distances)
@@ -132,15 +140,36 @@ class Loop:
 
     def _repair(self) -> bool:
         """Find a free path; without the predicted places of obstacles if there is none with them."""
-        if self._new_path():
+        if self._new_proven_path():
             return True
         if not self._settings.lookahead_ticks:
             return False
         self._world.move(self._world.scene, inflation=self._distances)
-        return self._planner.check_path(self._world) or self._new_path()
+        return self._planner.check_path(self._world) or self._new_proven_path()
 
-    def _new_path(self) -> bool:
-        stop, planner = self._budget_ends(), self._planner
+    def _new_proven_path(self) -> bool:
+        """Find a free path, if need be some more times until one is proven; the last one if none is."""
+        planner, before, stop = self._planner, self._planner.path, self._budget_ends()
+        found: Matrix | None = None
+        for _ in range(TRIES):
+            if not self._new_path(stop):
+                break
+            found = planner.path
+            if found is None or stop() or self._proven(found[:-1], found[1:]):
+                return True
+            planner.path = before
+            planner.check_path(self._world)
+        if found is None:
+            return False
+        planner.path = found
+        return planner.check_path(self._world)
+
+    def _proven(self, starts: Matrix, ends: Matrix) -> bool:
+        """Whether motions, shapes (m, n), keep margin and clearance, whatever obstacles do within a tick."""
+        return bool(self._world.motions_proven(starts, ends, less=self._searched - self._kept).all())
+
+    def _new_path(self, stop: Stop) -> bool:
+        planner = self._planner
         if planner.path is None:
             return planner.begin(self.q, self._goals, self._world, stop)
         if self._world.valid(planner.path[-1]):
@@ -154,7 +183,8 @@ class Loop:
         if path is None or len(path) < 2:
             return self.q
         place, passed = one_step(path, settings.step, self._max_change)
-        if passed and not self._world.motion_valid(self.q, place):
+        round_corner = bool(passed) and self._world.motion_valid(self.q, place)
+        if passed and not (round_corner and self._proven(self.q[None], place[None])):
             place, passed = to_first_corner(path, settings.step, self._max_change)
         self._planner.advance(place, passed, self._world)
         return place
@@ -189,7 +219,7 @@ class Loop:
         clock, end = self._clock, self._clock() + self._settings.repair_seconds
         return lambda: clock() > end
 
-    def _measured(self, spent: dict[str, float], name: str, work: Callable[..., bool], *arguments: float) -> bool:
+    def _measured(self, spent: dict[str, float], name: str, work: Callable[..., bool], *arguments: Any) -> bool:
         begin = self._clock()
         result = work(*arguments)
         spent[name] = self._clock() - begin
@@ -197,14 +227,14 @@ class Loop:
 
     def _record(
         self, now: float, q: Vector, event: TickEvent, spent: Mapping[str, float], checked: int, reason: str,
-        path: Matrix | None = None,
+        path: Matrix | None = None, proven: bool | None = None,
     ) -> None:  # fmt: skip
         poses = {
             o.name: np.concatenate([o.pose.translation, quaternion_xyzw(o.pose)])
             for o in self._world.scene.obstacles
             if not np.array_equal(o.pose.homogeneous, self._first[o.name].homogeneous)
         }
-        self.run.ticks.append(Tick(now, q, event, path, poses, spent, checked, reason))
+        self.run.ticks.append(Tick(now, q, event, path, poses, spent, checked, reason, proven))
 
 
 def _check_start(q: Vector, scene: Scene, world: World, moving: MovingWorld) -> None:
@@ -219,7 +249,8 @@ def _check_start(q: Vector, scene: Scene, world: World, moving: MovingWorld) -> 
     if not moving.valid(q):
         nearest = world.closest(q)
         pair = "" if nearest is None else f" ('{nearest.first}' to '{nearest.second}': {nearest.distance:.3g} m)"
-        raise InputError(f"start: nearer to contact than the margin{pair}; lower margin or speed_bound, or raise rate")
+        remedy = "lower margin, clearance or speed_bound, or raise rate"
+        raise InputError(f"start: nearer to contact than the margin{pair}; {remedy}")
 
 
 def _goals(problem: Problem, alone: World, rng: np.random.Generator) -> Matrix:

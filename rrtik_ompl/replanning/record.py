@@ -39,9 +39,11 @@ class Tick:
             the last tick.
         poses: Of the obstacles that have moved since the first tick: x, y, z and quaternion x, y, z, w.
         seconds: Wall time of its parts [s]: "sense", "retarget", "look" (check of the path), "plan" or
-            "repair" (search and shortening), "all".
+            "repair" (search and shortening), "prove" (of the step), "all".
         checked: Number of configurations that were checked along the path.
         reason: Why the robot waits or evades, or "".
+        proven: Whether the motion to the next tick's configuration is proven to keep margin and clearance, as long as
+            no obstacle is faster than stated; None if there is no motion.
     """
 
     time: float
@@ -52,6 +54,7 @@ class Tick:
     seconds: Mapping[str, float]
     checked: int = 0
     reason: str = ""
+    proven: bool | None = None
 
 
 @dataclass(slots=True, eq=False)
@@ -103,6 +106,12 @@ class ReplanRun:
         """Number of ticks of a kind."""
         return sum(tick.event == event for tick in self.ticks)
 
+    @property
+    def moves(self) -> tuple[int, int]:
+        """Number of the motions from one tick to the next that were made, and how many of them are proven."""
+        made = [tick.proven for tick in self.ticks if tick.proven is not None]
+        return len(made), sum(made)
+
     def seconds(self, part: str, *events: TickEvent) -> NDArray[np.float64]:
         """Wall times of a part of the ticks (of some kinds alone) that have it [s], shape (m,)."""
         chosen = [tick for tick in self.ticks if not events or tick.event in events]
@@ -118,7 +127,9 @@ class ReplanRun:
         )
         why = f" ({self.reason})" if self.reason else ""
         end = f"{self.problem}: {self.outcome}{why} after {self.ticks[-1].time:.2f} s"
-        return f"{end}: {made}{worst}, {waits}, {evasions}, length {self.length:.2f}"
+        moves, proven = self.moves
+        share = f", {proven} of {moves} moves proven" if moves else ""
+        return f"{end}: {made}{worst}, {waits}, {evasions}, length {self.length:.2f}{share}"
 
     def figures(self) -> dict[str, Any]:
         """The run in numbers, for JSON: outcome, times [s], counts of events, length, and wall times of repairs [s]."""
@@ -128,6 +139,7 @@ class ReplanRun:
             "seconds": self.ticks[-1].time if self.ticks else 0.0,
             "length": self.length,
             **{event: self.count(event) for event in EVENTS},
+            **dict(zip(("moves", "moves_proven"), self.moves, strict=True)),
             "repair_median": float(np.median(repairs)) if len(repairs) else None,
             "repair_p95": float(np.percentile(repairs, 95)) if len(repairs) else None,
         }
@@ -194,7 +206,8 @@ def _tick_data(tick: Tick) -> dict[str, Any]:
     data: dict[str, Any] = {"time": tick.time, "q": tick.q.tolist(), "event": tick.event}
     data |= {"path": None if tick.path is None else tick.path.tolist()}
     data |= {"poses": {name: pose.tolist() for name, pose in tick.poses.items()}, "seconds": dict(tick.seconds)}
-    return data | {"checked": tick.checked} | ({"reason": tick.reason} if tick.reason else {})
+    data |= {"checked": tick.checked} | ({"reason": tick.reason} if tick.reason else {})
+    return data | ({} if tick.proven is None else {"proven": tick.proven})
 
 
 def _tick(entry: Mapping[str, Any], joints: int) -> Tick:
@@ -208,6 +221,7 @@ def _tick(entry: Mapping[str, Any], joints: int) -> Tick:
         {part: finite_number(value, f"seconds of '{part}'") for part, value in entry["seconds"].items()},
         whole_number(entry["checked"], "checked"),
         str(entry.get("reason", "")),
+        None if entry.get("proven") is None else bool(entry["proven"]),
     )
 
 

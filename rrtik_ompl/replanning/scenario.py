@@ -85,6 +85,7 @@ def _settings(entry: RunSection, robot: Robot) -> ReplanSettings:
         step=entry.step,
         rate=entry.rate,
         margin=entry.margin,
+        clearance=entry.clearance,
         speed_bound=entry.speed_bound,
         max_edge=entry.max_edge,
         lookahead_ticks=entry.lookahead_ticks,

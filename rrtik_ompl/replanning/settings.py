@@ -38,6 +38,8 @@ class ReplanSettings:
         planner: One of ``PLANNERS``.
         max_edge: Longest edge of the trees [as step]; what suits the robot's range if None.
         margin: Distance to obstacles that is always kept [m].
+        clearance: What motions are proven to keep from obstacles beside ``margin`` [m], if they are; 1 mm if None, or
+            half the world's motion resolution if that is less. Searches keep one that is stated, too.
         speed_bound: No point of an obstacle is faster [m/s]. One that is gives a ``SpeedWarning``.
         limits: Of the joints' speeds; those of the robot if None. Accelerations are not considered.
         lookahead_ticks: Predict the obstacles' motion this many ticks ahead: they are avoided where they will be then
@@ -57,6 +59,7 @@ class ReplanSettings:
     planner: Replanner = DrrtCon.name
     max_edge: float | None = None
     margin: float = 0.0
+    clearance: float | None = None
     speed_bound: float | None = None
     limits: RateLimits | None = None
     lookahead_ticks: int = 0
@@ -75,6 +78,7 @@ class ReplanSettings:
         checked: dict[str, float | None] = {"rate": rate}
         checked |= {name: whole_number(getattr(self, name), name) for name in ("lookahead_ticks", "seed")}
         checked["margin"] = not_negative(self.margin, "margin")
+        checked["clearance"] = None if self.clearance is None else not_negative(self.clearance, "clearance")
         for name, meaning in _POSITIVE.items():
             value = getattr(self, name)
             checked[name] = None if value is None and name in _OPTIONAL else positive(value, name, f"give {meaning}")

@@ -24,6 +24,7 @@ from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import same_shape
 from rrtik_ompl.world import World
 from rrtik_ompl.world.arm_cache import arm_cache
+from rrtik_ompl.world.moving_proof import MovingProver
 
 
 class MovingWorld:
@@ -70,6 +71,9 @@ class MovingWorld:
         self._inflation = [0.0] * len(self._bodies)
         self._fixed = tuple(p for p in world.pairs if all(self._bodies[i].joint == 0 for i in p))
         self.blocked = self._contact_of_base()
+        first = world.bodies  # copies, which come behind them, are not there yet
+        own = tuple(p for p in kept if max(p) < len(first))
+        self._prover = MovingProver(self.robot, first, own, always_colliding=bool(self.blocked))
 
     @property
     def fast(self) -> FastWorld | None:
@@ -116,6 +120,7 @@ class MovingWorld:
         self.scene = scenes[0]
         self.blocked = self._contact_of_base()
         self._fast.update_obstacles(self._bodies, self._inflation)
+        self._prover.place(self._bodies, self._inflation, always_colliding=bool(self.blocked))
 
     def clearance(self, Q: ArrayLike) -> Vector:
         """Lower bounds of the distance to contact of rows of Q, less margins and inflation [m]. (m, dof) -> (m,)."""
@@ -145,6 +150,15 @@ class MovingWorld:
         sides = self.robot.joint_values(starts), self.robot.joint_values(ends)
         free: Mask = self._fast.classify_edges(*sides, steps, resolve=False) == FREE
         return free & self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self.blocked)
+
+    def motions_proven(self, A: ArrayLike, B: ArrayLike, *, less: float = 0.0) -> Mask:
+        """Which straight motions A[k] -> B[k], shapes (m, dof), are proven free as a whole. Shape (m,).
+
+        They keep margins and ``inflation``, ``less`` [m] less of these, from where obstacles are now. Copies, which
+        stand where obstacles will be, do not count.
+        """
+        starts, ends = (finite_array(Q, (None, self.robot.dof), "ends of motions") for Q in (A, B))
+        return self._prover.proven(starts, ends, clearance=-less)
 
     def _contact_of_base(self) -> str:
         """See ``blocked``; predicted places do not count, for nothing can be done about them."""

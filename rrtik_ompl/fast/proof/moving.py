@@ -1,0 +1,75 @@
+"""Obstacles of a proof's table that are moved in place: no body is packed again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.fast.proof import layout
+from rrtik_ompl.fast.proof.packing import ProofPairs
+
+_BALL = slice(layout.BALL_CENTRE, layout.BALL_CENTRE + 3)
+_AXES = slice(layout.BOX_AXES, layout.BOX_AXES + 9)
+_MIDDLE = slice(layout.BOX_MIDDLE, layout.BOX_MIDDLE + 3)
+_DISC_AXIS = slice(layout.DISC_AXIS, layout.DISC_AXIS + 3)
+
+
+class MovedObstacles:
+    """The obstacles of a table, and where they were when it was packed.
+
+    Args:
+        packed: The table.
+        bodies: Those that it was packed for.
+    """
+
+    def __init__(self, packed: ProofPairs, bodies: Sequence[Body]) -> None:
+        self._packed = packed
+        self._numbers = [k for k, body in enumerate(bodies) if body.kind == "obstacle"]
+        self._back = [bodies[k].placement.inverse() for k in self._numbers]
+        place = {k: number for number, k in enumerate(self._numbers)}
+        below = packed.table[layout.PAIRS].reshape(-1, layout.PAIR_SIZE)[:, layout.PAIR_OTHER]
+        solids = dict(zip(below.tolist(), packed.sides[:, 2].tolist(), strict=True))  # what stands still is below
+        owners = {solid: place[body] for solid, body in sorted(solids.items()) if body in place}
+        self._solids, self._owners = (np.array(list(some), dtype=np.int64) for some in (owners, owners.values()))
+        records = packed.table[layout.SOLIDS].reshape(-1, layout.SOLID_SIZE)[self._solids]
+        counts = records[:, layout.END_CORNER] - records[:, layout.FIRST_CORNER]
+        spans = [np.arange(*ends) for ends in records[:, [layout.FIRST_CORNER, layout.END_CORNER]].tolist()]
+        self._corner_places = np.concatenate([np.zeros(0, dtype=np.int64), *spans])
+        self._corner_owners = np.repeat(self._owners, counts)
+        self._half = records[:, layout.SOLID_KIND] == layout.HALF_SPACE
+        self._sizes: Matrix = packed.table[layout.SIZES].reshape(-1, layout.SIZE_COUNT)[self._solids]
+        self._corners: Matrix = packed.table[layout.CORNERS].reshape(-1, 3)[self._corner_places]
+        sides = [(row, place[k]) for row, pair in enumerate(packed.bodies.tolist()) for k in pair if k in place]
+        self._pairs: NDArray[np.int64] = np.array(sides, dtype=np.int64).reshape(-1, 2)
+
+    def put(self, bodies: Sequence[Body], room: Sequence[float]) -> None:
+        """Put the obstacles where they are now.
+
+        Args:
+            bodies: As at the beginning, obstacles with other placements and margins.
+            room: For each body what is to be kept from it beside its margin [m]; read for obstacles.
+        """
+        packed, kept = self._packed, np.array([bodies[k].margin + room[k] for k in self._numbers])
+        packed.margins[self._pairs[:, 0]] = kept[self._pairs[:, 1]]
+        packed.kept = (float("nan"), packed.kept[1])  # so that margins are written anew
+        changes = [bodies[k].placement * back for k, back in zip(self._numbers, self._back, strict=True)]
+        turns = np.array([change.rotation for change in changes]).reshape(-1, 3, 3)
+        shifts = np.array([change.translation for change in changes]).reshape(-1, 3)
+        turn, shift, rows = turns[self._owners], shifts[self._owners], self._sizes.copy()
+        rows[:, _BALL] = _turned(turn, rows[:, _BALL]) + shift
+        axes = rows[:, _AXES].reshape(-1, 3, 3) @ turn.transpose(0, 2, 1)
+        rows[:, _AXES] = axes.reshape(-1, 9)
+        rows[:, _MIDDLE] += _turned(axes, shift)
+        rows[:, _DISC_AXIS] = _turned(turn, rows[:, _DISC_AXIS])
+        rows[:, layout.DISC] += self._half * (rows[:, _DISC_AXIS] * shift).sum(axis=1)
+        packed.table[layout.SIZES].reshape(-1, layout.SIZE_COUNT)[self._solids] = rows
+        corners = _turned(turns[self._corner_owners], self._corners) + shifts[self._corner_owners]
+        packed.table[layout.CORNERS].reshape(-1, 3)[self._corner_places] = corners
+
+
+def _turned(turns: NDArray[np.float64], a: Matrix) -> Matrix:
+    return np.asarray((turns @ a[:, :, None])[:, :, 0])
