@@ -24,7 +24,7 @@ from rrtik_ompl.cli.replan import replan_scenario
 from rrtik_ompl.cli.reproduce import reproduce
 from rrtik_ompl.cli.terminal import drop_output, note, prepare_streams, say, warn
 from rrtik_ompl.errors import RrtikError
-from rrtik_ompl.fast.simd import announce
+from rrtik_ompl.files import notice
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
 
@@ -223,7 +223,7 @@ def main() -> None:
 def run(arguments: list[str] | None = None) -> int:
     """Run the command line with ``arguments`` (the process's own if None) and return the exit code."""
     warnings.showwarning = warn
-    announce.on_compile = note
+    notice.listener = note
     prepare_streams()
     given = sys.argv[1:] if arguments is None else arguments
     try:

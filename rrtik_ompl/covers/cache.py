@@ -1,6 +1,7 @@
 """Covers kept on disk, so that a geometry is covered once per machine. Nothing here ever fails: no cache, no gain.
 
-One file per geometry, parameters and algorithm, named by a hash of all three.
+One file per geometry, parameters and algorithm, named by a hash of all three; the package brings those of the robots
+that come along.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.collision.shape_table import sizes_of
 from rrtik_ompl.collision.solids import is_mesh, mesh_arrays
+from rrtik_ompl.covers.shipped import shipped_cover
 from rrtik_ompl.files.cache import cache_folder, write_whole
+from rrtik_ompl.files.notice import COVERING, tell_once
 
 LAYOUT = 1
 ALGORITHM = 3  # counts up when rrtik_ompl.covers.spheres makes other spheres of the same geometry
@@ -82,18 +85,34 @@ def geometry_bytes(geometry: coal.CollisionGeometry) -> bytes | None:
     return b"\0".join(parts)
 
 
-def _cached(geometry: coal.CollisionGeometry, parameters: str, make: Callable[[], Matrix]) -> Matrix:
-    folder, data = cache_folder("covers"), geometry_bytes(geometry)
-    if folder is None or data is None:
-        return make()
+def cover_key(geometry: coal.CollisionGeometry, parameters: str) -> str | None:
+    """Hash of a geometry, of parameters and of the algorithm; None for a kind that is not cached."""
+    data = geometry_bytes(geometry)
+    if data is None:
+        return None
     head = f"layout {LAYOUT} algorithm {ALGORITHM} {parameters}\0".encode()
-    key = hashlib.sha256(head + data).hexdigest()
-    file = folder / f"{key}.npz"
-    found = _read(file, key)
+    return hashlib.sha256(head + data).hexdigest()
+
+
+def _cached(geometry: coal.CollisionGeometry, parameters: str, make: Callable[[], Matrix]) -> Matrix:
+    """A cover from the package, from the user's cache, or made and kept there."""
+    folder, key = cache_folder("covers"), cover_key(geometry, parameters)
+    if key is not None and (shipped := shipped_cover(key)) is not None:
+        return shipped
+    file = None if folder is None or key is None else folder / f"{key}.npz"
+    found = None if file is None or key is None else _read(file, key)
     if found is None:
+        if needs_long(geometry):
+            tell_once(COVERING)
         found = make()
-        _write(file, key, found)
+        if file is not None and key is not None:
+            _write(file, key, found)
     return found
+
+
+def needs_long(geometry: coal.CollisionGeometry) -> bool:
+    """Whether a cover takes so long that somebody may wonder: of a mesh or a hull, a second or so."""
+    return is_mesh(geometry) or isinstance(geometry, coal.ConvexBase)
 
 
 def _read(file: Path, key: str) -> Matrix | None:

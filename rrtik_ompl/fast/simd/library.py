@@ -15,7 +15,6 @@ from pathlib import Path
 from threading import RLock
 from typing import TYPE_CHECKING, Any
 
-from rrtik_ompl.fast.simd.announce import announce_compiling
 from rrtik_ompl.fast.simd.code_files import (
     FOLDER,
     PREFIX,
@@ -30,6 +29,7 @@ from rrtik_ompl.fast.simd.code_files import (
 )
 from rrtik_ompl.fast.simd.processor import target_machine
 from rrtik_ompl.files.cache import cache_folder
+from rrtik_ompl.files.notice import COMPILING, tell_once
 
 
 class Library:
@@ -117,7 +117,7 @@ def _made(name: str) -> Library:
     if code is None:
         from rrtik_ompl.fast.simd.bitcode import compiled_module
 
-        announce_compiling()
+        tell_once(COMPILING)
         code = machine_code(compiled_module(name))
     if code is None:
         raise RuntimeError("LLVM does not take the code that numba made")

@@ -17,7 +17,8 @@ from rrtik_ompl import load_problem
 from rrtik_ompl.cli import terminal
 from rrtik_ompl.cli.app import run
 from rrtik_ompl.fast import warm_up
-from rrtik_ompl.fast.simd import announce, bitcode, code_files, compiled, library
+from rrtik_ompl.fast.simd import bitcode, code_files, compiled, library
+from rrtik_ompl.files import notice
 
 pytestmark = pytest.mark.kernels
 
@@ -28,8 +29,8 @@ import coal, numpy as np, pinocchio as pin
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.fast import FastWorld
-from rrtik_ompl.fast.simd import announce
-announce.on_compile = lambda message: print("compiling", file=sys.stderr)
+from rrtik_ompl.files import notice
+notice.listener = lambda message: print("compiling", file=sys.stderr)
 chain = load_robot("titan4").chain
 at = [pin.SE3(np.eye(3), np.array(p)) for p in ([0.0, 0, 0], [0.1, 0, 0], [1.0, 0.5, 0.5], [-0.8, 0.3, 0.2])]
 bodies = [Body("b", j, at[k], coal.Sphere(0.25), "link") for k, j in enumerate((2, 6, 0, 0))]
@@ -148,7 +149,7 @@ DAMAGES = {
 
 @pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
 def test_a_damaged_file_is_made_anew(cached, damage, capfd, monkeypatch):
-    monkeypatch.setattr(announce, "on_compile", lambda message: None)  # a command line may have set its own
+    monkeypatch.setattr(notice, "listener", lambda message: None)  # a command line may have set its own
     whole = cached.read_bytes()
     cached.write_bytes(damage(whole))
     with warnings.catch_warnings():
@@ -235,10 +236,10 @@ def test_warming_up_makes_all_kernels(cached, capsys):
 
 
 def test_compiling_is_told_in_one_line(monkeypatch, capsys):
-    monkeypatch.setattr(announce, "on_compile", terminal.note)
-    monkeypatch.setattr(announce, "_told", False)
-    announce.announce_compiling()
-    announce.announce_compiling()
+    monkeypatch.setattr(notice, "listener", terminal.note)
+    monkeypatch.setattr(notice, "_told", set())
+    notice.tell_once(notice.COMPILING)
+    notice.tell_once(notice.COMPILING)
     assert capsys.readouterr().err == "rrtik: compiling kernels for this processor, once per machine: 10 to 80 s\n"
 
 

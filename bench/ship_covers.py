@@ -1,0 +1,53 @@
+"""Write the covers of all robots that come along into the package: ``python bench/ship_covers.py``.
+
+What the machine's cache holds is taken from there; ``--anew`` makes all of it, which takes minutes. The same covers
+always make the same file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import tempfile
+from collections.abc import Callable
+from unittest.mock import patch
+
+import coal
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.catalog import list_robots, load_robot
+from rrtik_ompl.covers import cache, shipped
+from rrtik_ompl.files.cache import FOLDER_VARIABLE
+from rrtik_ompl.world import World
+
+
+def covers_of_robots() -> dict[str, Matrix]:
+    """All covers that the worlds of the robots ask for, by their hashes."""
+    found: dict[str, Matrix] = {}
+    cached = cache._cached
+
+    def noted(geometry: coal.CollisionGeometry, parameters: str, make: Callable[[], Matrix]) -> Matrix:
+        rows, key = cached(geometry, parameters, make), cache.cover_key(geometry, parameters)
+        if key is not None:
+            found[key] = rows
+        return rows
+
+    with patch.object(cache, "_cached", noted), patch.object(cache, "shipped_cover", lambda key: None):
+        for name in list_robots():
+            World(load_robot(name))
+            print(f"{name}: {len(found)} covers so far", flush=True)
+    return found
+
+
+def main() -> None:
+    """Write the file."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--anew", action="store_true", help="make every cover, whatever the cache holds")
+    anew = parser.parse_args().anew
+    with tempfile.TemporaryDirectory() as empty, patch.dict(os.environ, {FOLDER_VARIABLE: empty} if anew else {}):
+        shipped.write_store(covers_of_robots())
+    print(f"{shipped.STORE}: {shipped.STORE.stat().st_size / 1e6:.2f} MB")
+
+
+if __name__ == "__main__":
+    main()
