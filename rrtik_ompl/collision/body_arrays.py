@@ -25,7 +25,7 @@ class BodyArrays:
         placements: Their poses in the joints' frames, shape (n, 4, 4).
         centres, halves: Of their bounding boxes in their own frames [m], shape (n, 3) each; a half-space has an endless
             box about its origin.
-        half_spaces: Which are half-spaces, shape (n,).
+        half_spaces, obstacles: Which are half-spaces and which obstacles, shape (n,) each.
         margins: What has to stay away from each [m], shape (n,).
     """
 
@@ -34,13 +34,14 @@ class BodyArrays:
     centres: Matrix
     halves: Matrix
     half_spaces: Mask
+    obstacles: Mask
     margins: Vector
 
     def kept_apart(self, pairs: NDArray[np.int64]) -> Vector:
         """How far the bodies of pairs, shape (k, 2), must stay apart [m]; see :func:`.margins.kept_apart`."""
         first, second = pairs.T
         standing = (self.joints[first] == 0) & (self.joints[second] == 0)
-        return np.where(standing, 0.0, self.margins[first] + self.margins[second])
+        return np.where(standing, 0.0, self.margins[np.where(self.obstacles[second], second, first)])
 
 
 def body_arrays(bodies: Sequence[Body]) -> BodyArrays:
@@ -60,5 +61,6 @@ def _body_arrays(bodies: tuple[Body, ...]) -> BodyArrays:
         centres=0.5 * low + 0.5 * high,
         halves=0.5 * high - 0.5 * low,
         half_spaces=half_spaces,
+        obstacles=np.array([body.kind == "obstacle" for body in bodies], dtype=bool),
         margins=np.array([body.margin for body in bodies]),
     )

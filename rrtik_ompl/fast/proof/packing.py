@@ -146,9 +146,8 @@ def proof_pairs(
             layout.LOG_COUNT: np.zeros(1, dtype=np.int32),
         }
     )
-    margins = body_arrays(bodies).kept_apart(named)
-    obstacles = np.array([body.kind == "obstacle" for body in bodies], dtype=bool)
-    return ProofPairs(made, named, sides, margins, obstacles[named[:, 0]] | obstacles[named[:, 1]])
+    numbers = body_arrays(bodies)
+    return ProofPairs(made, named, sides, numbers.kept_apart(named), numbers.obstacles[named].any(axis=1))
 
 
 def _groups(
