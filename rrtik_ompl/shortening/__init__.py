@@ -162,16 +162,22 @@ def shorten(
         remedy = "use auto, or one_joint_moves(path, problem) first"
         message = f"shortening method '{method}' is for single-joint moves, so the path stays as it is: {remedy}"
         warnings.warn(PathWarning(message), stacklevel=2)
-        return path if path.proven_in(problem.world) else path.proved(problem.world)
+        return _with_proof(path, problem)
     given: dict[str, Any] = {"checks": np.inf if checks is None else checks, "seed": seed, "one_joint": single}
     given |= {"rules": rules, "clearance": clearance, "stop": stop}
-    given["on_better"] = on_better and (lambda rows: on_better(path.with_waypoints(np.vstack([rows, tail]))))
+    if on_better is not None:
+        given["on_better"] = lambda rows: on_better(path.with_waypoints(np.vstack([rows, tail])))
     end = time.monotonic() + (np.inf if seconds is None else float(seconds))
     for each in _SINGLE_JOINT if chosen.chooses and single else (chosen,):
         found = _shortened(path, problem, each, (head, tail), given, end)
         if not chosen.chooses or found.length <= path.length:
             return found
-    return path
+    return _with_proof(path, problem)
+
+
+def _with_proof(path: JointPath, problem: Problem) -> JointPath:
+    """The path with what is proven of it."""
+    return path if path.proven_in(problem.world) else path.proved(problem.world)
 
 
 def _shortened(

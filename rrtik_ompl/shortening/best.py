@@ -20,8 +20,8 @@ from rrtik_ompl.world.motion_queries import KernelWorld, has_kernels
 STARTS = 3  # random shortcuts end in different classes of routes
 START_TRIES = 20  # shortcuts of a start
 START_CHECKS = 60  # motions that are checked to pull a start taut, as far as that goes
-ROUND_TRIES = 40  # shortcuts of a round
-ROUND_CHECKS = 200  # motions that are checked to pull it taut, at most
+ROUND_TRIES = 60  # shortcuts of a round
+ROUND_CHECKS = 60  # motions that are checked to pull it taut, at most
 ROUNDS_WITHOUT_LIMIT = 4  # where there is no end to time or checks
 LEAST_GAIN = 1e-4  # of the length, or a round gained nothing
 IDLE_ROUNDS = 6  # without gain end the work

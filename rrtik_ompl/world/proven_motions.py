@@ -66,7 +66,8 @@ class ProvenMotions(MotionQueries):
         self.motions.make_ready()
         at = starts.ctypes.data, ends.ctypes.data
         self._kernels.judge(self.motions.address, *at, len(starts), answers.ctypes.data)
-        return answers == FREE
+        free: Mask = answers == FREE
+        return free
 
 
 def proven_motions(world: World, clearance: float, within: Matrix) -> MotionQueries:
@@ -77,4 +78,5 @@ def proven_motions(world: World, clearance: float, within: Matrix) -> MotionQuer
         clearance: To be kept from obstacles beside their margins [m].
         within: Corners of a box of configurations within the limits, shape (m, n), in which all motions are.
     """
-    return ProvenMotions(world, clearance) if has_kernels(world, KERNELS, within=within) else world.proving(clearance)
+    known: object = world
+    return ProvenMotions(world, clearance) if has_kernels(known, KERNELS, within=within) else world.proving(clearance)

@@ -9,9 +9,10 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_bench.shortening import plane_worlds
 from rrtik_ompl.cli.plan import SHORTEN
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, PathWarning
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.shortening import METHODS, Task
+from rrtik_ompl.shortening.acceptance import Acceptance
 from rrtik_ompl.shortening.corners import snap_corners
 from rrtik_ompl.shortening.random_cut import random_cut
 from rrtik_ompl.shortening.retraction import retract
@@ -19,7 +20,7 @@ from rrtik_ompl.shortening.sequential import sequential_cut
 from rrtik_ompl.transitions import route_length, single_joint, transitions
 
 DISCS = [((2.0, 0.0), 1.0), ((5.0, 0.6), 1.2), ((8.0, -0.5), 1.0), ((5.0, -3.0), 0.8)]
-FOR_ALL_PATHS = [name for name, method in METHODS.items() if not method.moves_only]
+FOR_ALL_PATHS = [name for name, method in METHODS.items() if not method.keeps_moves]
 STRAIGHT = [name for name, method in METHODS.items() if not method.keeps_moves]
 
 
@@ -227,10 +228,58 @@ def test_methods_end_when_they_are_stopped(method, problem, raw):
     assert time.perf_counter() - begin < 20.0
 
 
-def test_auto_is_as_good_as_the_published_methods(problem, raw):
+def test_auto_is_better_than_the_published_methods_on_the_whole(problem, raw):
+    lengths = {
+        m: [rrtik.shorten(path, problem, method=m).length for path in raw] for m in ("sequential", "random", "auto")
+    }
+    assert (np.array(lengths["auto"]) <= lengths["sequential"]).all()
+    assert np.mean(lengths["auto"]) < 0.95 * np.mean(lengths["random"])
+
+
+def test_auto_with_more_checks_is_not_longer_and_a_number_of_checks_repeats_a_path(problem, raw):
     for path in raw:
-        lengths = {m: rrtik.shorten(path, problem, method=m).length for m in ("sequential", "random", "auto")}
-        assert lengths["auto"] <= min(lengths.values())
+        found = [rrtik.shorten(path, problem, checks=checks) for checks in (1, 30, 300, 3000, 3000)]
+        lengths = [path.length, *(each.length for each in found)]
+        assert lengths == sorted(lengths, reverse=True)
+        np.testing.assert_array_equal(found[-1].waypoints, found[-2].waypoints)
+
+
+def test_single_joint_moves_stay_single_joint_moves_and_get_no_longer(problem, raw_moves):
+    for path in raw_moves:
+        found = rrtik.shorten(path, problem)
+        assert found.one_joint_at_a_time
+        assert found.transitions <= path.transitions
+        assert found.length <= path.length
+
+
+@pytest.mark.parametrize("method", ["axis", "axis-rounds"])
+def test_methods_of_single_joint_moves_leave_other_paths_alone_and_say_so(method, problem, raw):
+    with pytest.warns(PathWarning, match=f"'{method}' is for single-joint moves, so the path stays as it is"):
+        found = rrtik.shorten(raw[0], problem, method=method)
+    np.testing.assert_array_equal(found.waypoints, raw[0].waypoints)
+
+
+@pytest.mark.parametrize("method", [name for name, each in METHODS.items() if each.can_keep_moves])
+def test_single_joint_moves_are_kept_whenever_the_work_ends(method, problem, raw_moves):
+    for most in range(0, 60, 4):
+        left, told = [most], []
+
+        def stop(left=left):
+            left[0] -= 1
+            return left[0] < 0
+
+        options = {"one_joint": True, "stop": stop, "on_better": told.append}
+        found = rrtik.shorten(raw_moves[0], problem, method=method, seed=1, **options)
+        assert all(path.one_joint_at_a_time for path in (found, *told))
+
+
+def test_a_path_that_plan_has_proven_is_not_proven_again(problem, raw, monkeypatch):
+    proofs = []
+    monkeypatch.setattr(type(problem.world), "prove", lambda *_, **__: proofs.append(1))
+    monkeypatch.setattr(JointPath, "violations", lambda *_, **__: pytest.fail("it is proven"))
+    chosen = Acceptance(raw[0], problem, None, one_joint=False, seed=0)
+    assert chosen.input is raw[0]
+    assert not proofs
 
 
 def test_better_paths_are_told(problem, raw):
@@ -249,6 +298,7 @@ def test_requests_that_make_no_sense_are_refused_in_one_line(problem, raw, raw_m
         (lambda: rrtik.shorten(single, problem), "one waypoint"),
         (lambda: rrtik.shorten(raw[0], problem, method="random", seed=-1), "seed must be a whole number"),
         (lambda: rrtik.shorten(JointPath([[0.0], [1.0]]), problem), "path of 1 joints: robot 'planar' has 3"),
+        (lambda: rrtik.shorten(raw[0], problem, checks=0), "checks must be 1 or more"),
         (lambda: rrtik.shorten(raw[0], problem, one_joint=True), "several joints"),
         (lambda: rrtik.shorten(raw_moves[0], problem, method="ompl", one_joint=True), "cannot keep one joint"),
     ):

@@ -119,10 +119,10 @@ def move_bend(route: TightenTable, bend: int, total: float) -> bool:
     if length - distance(dof, before, after) < LEAST_BEND * total or step < SHORTEST:
         return False
     set_field(route, tighten_layout.MOVED, 1)
-    if next_share(route, tighten_layout.RANDOM) < DROP:
-        if passes(route, before, after, double_row(hints_of(route), 2 * HINT_SIZE, 0)):
-            drop_bend(route, bend)
-            return True
+    dropping, hint = next_share(route, tighten_layout.RANDOM) < DROP, double_row(hints_of(route), 2 * HINT_SIZE, 0)
+    if dropping and passes(route, before, after, hint):
+        drop_bend(route, bend)
+        return True
     shorter = propose(route, bend, step) < length - LEAST_GAIN * total
     if shorter and fits(route, bend):
         copy_row(dof, point_of(route), here)
