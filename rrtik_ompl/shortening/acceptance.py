@@ -16,6 +16,9 @@ from rrtik_ompl.world.motion_queries import MotionQueries
 from rrtik_ompl.world.proven_motions import proven_motions
 
 
+SPARE = 2.5e-4  # [m] beyond the clearance that searches keep if the ends have it: chords of timed motions need 0.1 mm
+
+
 class Form(NamedTuple):
     """A form of the problem in which to shorten.
 
@@ -80,7 +83,8 @@ class Acceptance:
             roomy = dense.world.with_clearance(self._room.searched)
             found = [self._sampled(dense, roomy, 0.7), self._sampled(dense, roomy.proving(self._room.kept), self._last)]
         elif self._room is not None:
-            found = [Form(dense, proven_motions(dense.world, self._room.kept, self.input.waypoints), self._last)]
+            kept = min(self._room.searched, self._room.kept + SPARE)
+            found = [Form(dense, proven_motions(dense.world, kept, self.input.waypoints), self._last)]
         if not self._input_keeps:
             found.append(Form(dense, dense.world, 1.0))
         return found

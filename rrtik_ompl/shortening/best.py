@@ -7,8 +7,8 @@ taut only new bends can make it shorter: random shortcuts make them. All of it c
 from __future__ import annotations
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.fast.search import tighten_layout
-from rrtik_ompl.fast.search.tighten import Tightening
+from rrtik_ompl.fast.search.taut import layout
+from rrtik_ompl.fast.search.taut.tightening import Tightening
 from rrtik_ompl.moves.axis_cut_rounds import axis_cut_rounds
 from rrtik_ompl.shortening.random_cut import PULLS, WAYPOINTS, kernel_search, random_cut, run
 from rrtik_ompl.shortening.retraction import STEPS, retract
@@ -33,7 +33,7 @@ def best_in_time(route: Matrix, task: Task) -> Matrix:
     if task.one_joint:
         return task.better(route, axis_cut_rounds(route, task.free_batch, seed=task.seed, stop=task.expired))
     world = task.kernel_world
-    if len(route) < 3 or world is None or not has_kernels(world, tighten_layout.KERNELS):
+    if len(route) < 3 or world is None or not has_kernels(world, layout.KERNELS):
         return _without_kernels(route, task)
     best = _best_start(route, task, world)
     rounds = idle = 0

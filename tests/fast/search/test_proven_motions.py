@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.fast.search.tighten import Tightening
+from rrtik_ompl.fast.search.taut.tightening import Tightening
 from rrtik_ompl.transitions import route_length
 from rrtik_ompl.world.proven_motions import ProvenMotions, proven_motions
 

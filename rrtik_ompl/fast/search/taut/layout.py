@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NewType
 
-KERNELS = "search.tighten_kernels"  # their library
+KERNELS = "search.taut.kernels"  # their library
 TightenTable = NewType("TightenTable", int)  # of the table of a route
 
 # MOTIONS: the motion table of the world · ROUTE: waypoints · POINT: where a bend is to go · STEPS: of each bend, the

@@ -8,8 +8,8 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.search import tighten_layout
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions
+from rrtik_ompl.fast.search.taut import layout
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.tables.memory import table
 
@@ -32,38 +32,38 @@ class Tightening:
     """
 
     def __init__(self, motions: FastMotions, waypoints: Matrix, *, seed: int = 0) -> None:
-        dof, kernels = motions.dof, library(tighten_layout.KERNELS)
+        dof, kernels = motions.dof, library(layout.KERNELS)
         rows = finite_array(waypoints, (None, dof), "waypoints to pull taut")
         if kernels is None or len(rows) < 2 or not motions.fast.covered(motions.joint_values(rows)):
             raise InputError("waypoints to pull taut: expected a route of two or more that kernels can check")
         self._kernels, self._motions, self._dof = kernels, motions, dof
         self._table = table(
             {
-                tighten_layout.MOTIONS: motions.address,
-                tighten_layout.ROUTE: rows.copy(),
-                tighten_layout.POINT: np.zeros(dof),
-                tighten_layout.STEPS: np.full(len(rows), FIRST_STEP),
-                tighten_layout.HINTS: np.full((len(rows), 2 * tighten_layout.HINT_SIZE), -1.0),
-                tighten_layout.COUNT: len(rows),
-                tighten_layout.RANDOM: seed % 2**62,
-                tighten_layout.BEND: 1,
-                tighten_layout.CHECKS: 0,
-                tighten_layout.SWEEPS: 0,
-                tighten_layout.MOVED: 0,
+                layout.MOTIONS: motions.address,
+                layout.ROUTE: rows.copy(),
+                layout.POINT: np.zeros(dof),
+                layout.STEPS: np.full(len(rows), FIRST_STEP),
+                layout.HINTS: np.full((len(rows), 2 * layout.HINT_SIZE), -1.0),
+                layout.COUNT: len(rows),
+                layout.RANDOM: seed % 2**62,
+                layout.BEND: 1,
+                layout.CHECKS: 0,
+                layout.SWEEPS: 0,
+                layout.MOVED: 0,
             }
         )
 
     @property
     def waypoints(self) -> Matrix:
         """The route as it is now, shape (k, dof); a copy."""
-        flat: Vector = self._table[tighten_layout.ROUTE]
-        count = int(self._table.header[tighten_layout.COUNT])
+        flat: Vector = self._table[layout.ROUTE]
+        count = int(self._table.header[layout.COUNT])
         return flat[: count * self._dof].reshape(-1, self._dof).copy()
 
     @property
     def checks(self) -> int:
         """How many motions have been checked."""
-        return int(self._table.header[tighten_layout.CHECKS])
+        return int(self._table.header[layout.CHECKS])
 
     def run(self, checks: int, *, stop: Callable[[], bool] | None = None) -> bool:
         """Go on until so many motions have been checked since the beginning, nothing moves, or ``stop`` says so.
@@ -75,7 +75,7 @@ class Tightening:
         while until < checks:
             until = min(until + CHECKS_PER_CALL, checks)
             self._motions.make_ready()
-            if self._kernels.tighten(self._table.address, until) == tighten_layout.DONE:
+            if self._kernels.tighten(self._table.address, until) == layout.DONE:
                 return True
             if stop is not None and stop():
                 break

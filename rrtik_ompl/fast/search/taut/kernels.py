@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import sqrt
 
-from rrtik_ompl.fast.search import tighten_layout
 from rrtik_ompl.fast.search.motions.motion_kernels import dof_of
 from rrtik_ompl.fast.search.motions.motion_layout import MotionTable
 from rrtik_ompl.fast.search.motions.proven_kernels import judge_near
 from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row, distance, row_at
-from rrtik_ompl.fast.search.tighten_layout import HINT_SIZE, TightenTable
+from rrtik_ompl.fast.search.taut import layout
+from rrtik_ompl.fast.search.taut.layout import HINT_SIZE, TightenTable
 from rrtik_ompl.fast.simd.access import count_up, double_row, field_reader
 from rrtik_ompl.fast.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field
@@ -28,12 +28,12 @@ SHORTEST = 1e-3  # step that is not worth its checks
 LEAST_BEND = 1e-4  # of the route's length: a bend that is less of a detour stays
 LEAST_GAIN = 1e-6  # of the route's length: a step that gains less is none
 
-motions_of: Callable[[TightenTable], MotionTable] = field_reader(tighten_layout.MOTIONS)
-route_of: Callable[[TightenTable], Configuration] = field_reader(tighten_layout.ROUTE)
-point_of: Callable[[TightenTable], Configuration] = field_reader(tighten_layout.POINT)
-steps_of: Callable[[TightenTable], DoubleArray] = field_reader(tighten_layout.STEPS)
-hints_of: Callable[[TightenTable], DoubleArray] = field_reader(tighten_layout.HINTS)
-count_of: Callable[[TightenTable], int] = field_reader(tighten_layout.COUNT)
+motions_of: Callable[[TightenTable], MotionTable] = field_reader(layout.MOTIONS)
+route_of: Callable[[TightenTable], Configuration] = field_reader(layout.ROUTE)
+point_of: Callable[[TightenTable], Configuration] = field_reader(layout.POINT)
+steps_of: Callable[[TightenTable], DoubleArray] = field_reader(layout.STEPS)
+hints_of: Callable[[TightenTable], DoubleArray] = field_reader(layout.HINTS)
+count_of: Callable[[TightenTable], int] = field_reader(layout.COUNT)
 
 
 @inlined
@@ -60,7 +60,7 @@ def length_of(route: TightenTable) -> float:
 @inlined
 def passes(route: TightenTable, start: Configuration, end: Configuration, hint: DoubleArray) -> bool:
     """Whether a motion is free; the hint says where one like it failed last."""
-    count_up(route, tighten_layout.CHECKS)
+    count_up(route, layout.CHECKS)
     return bool(judge_near(motions_of(route), start, end, hint) == FREE)
 
 
@@ -72,7 +72,7 @@ def drop_bend(route: TightenTable, bend: int) -> None:
     copy_row(after, steps_of(route) + 8 * (bend + 1), steps_of(route) + 8 * bend)
     size = 2 * HINT_SIZE
     copy_row(after * size, double_row(hints_of(route), size, bend + 1), double_row(hints_of(route), size, bend))
-    set_field(route, tighten_layout.COUNT, count_of(route) - 1)
+    set_field(route, layout.COUNT, count_of(route) - 1)
 
 
 @kernel
@@ -86,7 +86,7 @@ def propose(route: TightenTable, bend: int, step: float) -> float:
     for k in range(dof):
         way = (1.0 - share) * double_at(before, k) + share * double_at(after, k) - double_at(here, k)
         straight += way * way
-        drawn = 2.0 * next_share(route, tighten_layout.RANDOM) - 1.0
+        drawn = 2.0 * next_share(route, layout.RANDOM) - 1.0
         aside += drawn * drawn
         set_double(target, k, drawn)
     size = sqrt(straight / max(aside, 1e-300))
@@ -118,8 +118,8 @@ def move_bend(route: TightenTable, bend: int, total: float) -> bool:
     length, step = distance(dof, before, here) + distance(dof, here, after), double_at(steps, bend)
     if length - distance(dof, before, after) < LEAST_BEND * total or step < SHORTEST:
         return False
-    set_field(route, tighten_layout.MOVED, 1)
-    dropping, hint = next_share(route, tighten_layout.RANDOM) < DROP, double_row(hints_of(route), 2 * HINT_SIZE, 0)
+    set_field(route, layout.MOVED, 1)
+    dropping, hint = next_share(route, layout.RANDOM) < DROP, double_row(hints_of(route), 2 * HINT_SIZE, 0)
     if dropping and passes(route, before, after, hint):
         drop_bend(route, bend)
         return True
@@ -135,15 +135,15 @@ def move_bend(route: TightenTable, bend: int, total: float) -> bool:
 @entry
 def tighten(route: TightenTable, checks: int) -> int:
     """Go on until ``checks`` motions have been checked since the beginning. Returns DONE or RUNNING."""
-    while field(route, tighten_layout.CHECKS) < checks:
-        bend = field(route, tighten_layout.BEND)
+    while field(route, layout.CHECKS) < checks:
+        bend = field(route, layout.BEND)
         if bend >= count_of(route) - 1:
-            if field(route, tighten_layout.MOVED) == 0:
-                return tighten_layout.DONE
-            set_field(route, tighten_layout.MOVED, 0)
-            count_up(route, tighten_layout.SWEEPS)
-            set_field(route, tighten_layout.BEND, 1)
+            if field(route, layout.MOVED) == 0:
+                return layout.DONE
+            set_field(route, layout.MOVED, 0)
+            count_up(route, layout.SWEEPS)
+            set_field(route, layout.BEND, 1)
             continue
         if not move_bend(route, bend, length_of(route)):
-            set_field(route, tighten_layout.BEND, bend + 1)
-    return tighten_layout.RUNNING
+            set_field(route, layout.BEND, bend + 1)
+    return layout.RUNNING

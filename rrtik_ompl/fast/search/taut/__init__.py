@@ -1,0 +1,1 @@
+"""Routes pulled taut in a kernel: the table, the kernel, and the object that keeps it between two calls."""
