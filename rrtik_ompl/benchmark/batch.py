@@ -16,7 +16,7 @@ from rrtik_ompl.benchmark.suite import Entrant, Suite
 from rrtik_ompl.benchmark.suite_file import NONE, SHORTENINGS
 from rrtik_ompl.choices import SuiteShortening, one_of
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.ompl_bridge.planner_names import AUTO, options_of
+from rrtik_ompl.ompl_bridge.planner_names import AUTO, is_auto, options_of, refuse_options
 
 
 def plan_batch(
@@ -78,6 +78,8 @@ def plan_batch(
 def _entrant(planner: str | None, parameters: dict[str, Any], shorten: SuiteShortening) -> Entrant:
     label = planner or AUTO
     options = options_of(label)
+    if is_auto(label):
+        refuse_options(parameters)
     for key in parameters:
         if key not in options:
             raise UnknownNameError(f"parameter of planner {label}", key, options)

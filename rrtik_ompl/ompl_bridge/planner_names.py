@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from rrtik_ompl import catalog
-from rrtik_ompl.errors import UnknownNameError
+from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.ompl_bridge.planner_options import planner_options
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, ompl_planners
 
@@ -20,6 +22,16 @@ def list_planners() -> tuple[str, ...]:
 def is_auto(name: str) -> bool:
     """Whether a name means the portfolio, which is no class."""
     return name.lower() == AUTO
+
+
+def refuse_options(given: Iterable[str]) -> None:
+    """Refuse options of the portfolio, which takes none.
+
+    Raises:
+        InputError: If there are any.
+    """
+    if named := ", ".join(given):
+        raise InputError(f"planner '{AUTO}' takes no options, got {named}; name the planner that they are for")
 
 
 def options_of(name: str) -> tuple[str, ...]:

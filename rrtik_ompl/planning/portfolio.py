@@ -11,7 +11,7 @@ from typing import Any
 from rrtik_ompl.errors import InputError, PlannerError
 from rrtik_ompl.fast.search.shortcut_layout import KERNELS
 from rrtik_ompl.goal import JointGoal
-from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner
+from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, refuse_options
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits, planners_with
 from rrtik_ompl.planning.one_planner import run_planner
 from rrtik_ompl.planning.outcome import Plan, Request
@@ -37,9 +37,7 @@ def run_portfolio(problem: Problem, request: Request) -> Plan:
         InputError: If there are options, or no package offers a planner for this.
         PlannerError: If every planner broke.
     """
-    if request.parameters:
-        named = ", ".join(request.parameters)
-        raise InputError(f"planner '{AUTO}' takes no options, got {named}; name the planner that they are for")
+    refuse_options(request.parameters)
     best, reasons, totals, spent = _search(problem, request)
     path, left = best.path, request.seconds - spent
     if path is not None and len(path.waypoints) > 2 and left > 0.0:

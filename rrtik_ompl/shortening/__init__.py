@@ -153,6 +153,7 @@ def shorten(
         >>> shorten(found.path, problem).length < found.path.length
         True
     """
+    require(path, JointPath, "path to shorten", "a plan has one if plan.found")
     single = _single(path, method, one_joint) or rules is not None
     chosen = _checked(path, problem, method, seconds, checks, seed, single, clearance)
     head, tail = _parts(path.waypoints, rules)
@@ -230,7 +231,6 @@ def _checked(
     clearance: float | None,
 ) -> Method:
     """The method, if the request makes sense."""
-    require(path, JointPath, "path to shorten", "a plan has one if plan.found")
     require(problem, Problem, "problem of a path to shorten")
     chosen = METHODS[one_of(METHODS, method, "shortening method")]
     if seconds is not None:

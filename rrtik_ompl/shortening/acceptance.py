@@ -15,7 +15,6 @@ from rrtik_ompl.world.kept_clearance import room_between
 from rrtik_ompl.world.motion_queries import MotionQueries
 from rrtik_ompl.world.proven_motions import proven_motions
 
-
 SPARE = 2.5e-4  # [m] beyond the clearance that searches keep if the ends have it: chords of timed motions need 0.1 mm
 
 

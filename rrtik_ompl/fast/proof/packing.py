@@ -146,8 +146,9 @@ def proof_pairs(
             layout.LOG_COUNT: np.zeros(1, dtype=np.int32),
         }
     )
-    numbers = body_arrays(bodies)
-    return ProofPairs(made, named, sides, numbers.kept_apart(named), numbers.obstacles[named].any(axis=1))
+    arrays = body_arrays(bodies)
+    beside = np.asarray(arrays.obstacles[named].any(axis=1))
+    return ProofPairs(made, named, sides, arrays.kept_apart(named), beside)
 
 
 def _groups(
