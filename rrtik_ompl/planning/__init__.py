@@ -58,7 +58,7 @@ def plan(
         problem: What to solve.
         planner: Name of one of :func:`list_planners` (``geometric::`` may stand before OMPL's names), or a planner
             class that is built from a SpaceInformation alone. "auto" lets several search one after the other, until
-            one finds a path, and shortens that for 20 ms at most. None: what the problem names, or else "auto".
+            one finds a path, and shortens that a little. None: what the problem names, or else "auto".
         seconds: Time limit for all attempts together [s].
         seed: The same seed gives the same path, as long as the time limit does not cut in; drawn if None. PRM and
             PRMstar work by the clock, so theirs may differ.

@@ -20,7 +20,7 @@ from rrtik_ompl.shortening import shorten
 from rrtik_ompl.world.motion_queries import has_kernels
 
 SHARE = 0.5  # of the time left, for each planner but the last
-SHORTENING_SECONDS = 0.02  # at most
+SHORTENING_CHECKS = 600  # motions, which take some 10 ms; a count, so that the same seed gives the same path
 
 
 def run_portfolio(problem: Problem, request: Request) -> Plan:
@@ -43,8 +43,8 @@ def run_portfolio(problem: Problem, request: Request) -> Plan:
     if path is not None and len(path.waypoints) > 2 and left > 0.0:
         has_kernels(problem.world, KERNELS)  # loads them, which is no part of planning
         begin = time.perf_counter()
-        limits: dict[str, Any] = {"seconds": min(SHORTENING_SECONDS, left), "clearance": request.clearance}
-        shorter = shorten(path, problem, method="auto", seed=request.seed, **limits)
+        limits: dict[str, Any] = {"seconds": left, "checks": SHORTENING_CHECKS, "clearance": request.clearance}
+        shorter = shorten(path, problem, method="auto", one_joint=False, seed=request.seed, **limits)
         path = shorter.with_waypoints(shorter.waypoints) if request.proof == "off" else shorter
         spent += time.perf_counter() - begin
     reason = "" if best.found else reasons

@@ -1,5 +1,7 @@
 """The planner "auto": who tries, in what order, what becomes of the path; and the planner that a problem names."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -59,6 +61,16 @@ def test_the_default_is_the_portfolio_and_its_path_is_shorter_than_what_was_foun
     assert (found.path.start == boxes.start).all()
     assert boxes.reached(found.path.end)
     assert found.path.proof.clearance >= 1e-3
+
+
+def test_the_same_seed_gives_the_same_path_however_fast_the_machine_is(monkeypatch):
+    problem = load_problem("titan4_prisms")
+    quick = plan(problem, AUTO, seed=1, seconds=600.0)
+    clock = time.monotonic
+    monkeypatch.setattr(time, "monotonic", lambda: 50.0 * clock())
+    slow = plan(problem, AUTO, seed=1, seconds=600.0)
+    assert len(quick.path.waypoints) > 2
+    assert np.array_equal(quick.path.waypoints, slow.path.waypoints)
 
 
 def test_the_next_planner_tries_where_one_finds_nothing_or_breaks(boxes, monkeypatch):
