@@ -43,7 +43,7 @@ def _robot(folder: Path, arm: str, balls: bool) -> Any:
     return load_robot(folder / name, srdf=folder / f"{arm}.srdf", group=ARMS[arm])
 
 
-def _problem(file: str, *, balls: bool) -> Problem | None:
+def problem_of(file: str, *, balls: bool) -> Problem | None:
     """A problem of a set on exact meshes; or on the balls and obstacles of VAMP, None if an end collides there."""
     scene = Path(file)
     folder, arm = scene.parent.parent.parent, scene.parent.name.rsplit("_", 1)[1]
@@ -66,7 +66,7 @@ def _vamp_shape(shape: Any, boxes: bool) -> Any:
     return Box((2.0 * shape.radius, 2.0 * shape.radius, shape.length)) if boxes else Capsule(shape.radius, shape.length)
 
 
-def _spent(call: Callable[[], Any]) -> tuple[float, Any]:
+def spent(call: Callable[[], Any]) -> tuple[float, Any]:
     """Processor time of a call [s], and what it returned."""
     begin = time.process_time()
     result = call()
@@ -75,7 +75,7 @@ def _spent(call: Callable[[], Any]) -> tuple[float, Any]:
 
 def search_on_balls(file: str) -> dict[str, Any]:
     """A bare search for each seed, the best of a few calls [us]; motions checked, and how many paths coal certifies."""
-    problem = _problem(file, balls=True)
+    problem = problem_of(file, balls=True)
     if problem is None:
         return {}
     world, chain = problem.world, problem.robot.chain
@@ -87,8 +87,8 @@ def search_on_balls(file: str) -> dict[str, Any]:
     best, checked, certified = [], [], 0
     for seed in SEEDS:
         call = partial(_search, search, problem, seed, end)
-        runs = [_spent(call) for _ in range(REPEATS)]
-        best.append(1e6 * min(spent for spent, _ in runs))
+        runs = [spent(call) for _ in range(REPEATS)]
+        best.append(1e6 * min(taken for taken, _ in runs))
         checked.append(search.statistics()["motions"])
         rows = runs[0][1]
         certified += rows is not None and bool(world.certify(_dense(rows)).all())
@@ -108,7 +108,7 @@ def _dense(rows: Any) -> Any:
 
 def plan_on_meshes(file: str) -> dict[str, Any]:
     """`plan()` with everything that it does by default, see :func:`_planned`."""
-    problem = _problem(file, balls=False)
+    problem = problem_of(file, balls=False)
     assert problem is not None
     return _planned(problem, SEEDS)
 
@@ -127,10 +127,10 @@ def _planned(problem: Problem, seeds: Iterable[int]) -> dict[str, Any]:
     call(seed=0)
     whole, around, found = [], [], 0
     for seed in seeds:
-        runs = [_spent(partial(call, seed=seed)) for _ in range(2)]
-        whole.append(1e3 * min(spent for spent, _ in runs))
+        runs = [spent(partial(call, seed=seed)) for _ in range(2)]
+        whole.append(1e3 * min(taken for taken, _ in runs))
         with _clocked() as inside:
-            again, _ = _spent(partial(call, seed=seed))
+            again, _ = spent(partial(call, seed=seed))
         around.append(1e3 * (again - sum(inside)))
         found += runs[0][1].found
     return {"ms": whole, "around": around, "found": found}
@@ -148,10 +148,10 @@ def _clocked() -> Iterator[list[float]]:
                 return usual(*arguments, **options)
             within[0] = True
             try:
-                spent, result = _spent(partial(usual, *arguments, **options))
+                taken, result = spent(partial(usual, *arguments, **options))
             finally:
                 within[0] = False
-            inside.append(spent)
+            inside.append(taken)
             return result
 
         return call
@@ -171,17 +171,17 @@ def _clocked() -> Iterator[list[float]]:
 
 def plan_many(file: str) -> dict[str, Any]:
     """Plans between random free configurations in one world: processor time of each [ms], and of a `Problem` [ms]."""
-    problem = _problem(file, balls=False)
+    problem = problem_of(file, balls=False)
     assert problem is not None
     world, rng = problem.world, np.random.default_rng(1)
     rows = rng.uniform(*world.robot.finite_range(), (3 * QUERIES, world.robot.dof))
     free = rows[world.valid_batch(rows)]
     free = free[world.certify(free)][: QUERIES + 1]
-    made = [_spent(partial(Problem, world, a, b)) for a, b in pairwise(free)]
-    runs = [_spent(partial(plan, each, PLANNER, seed=k, seconds=SECONDS)) for k, (_, each) in enumerate(made)]
+    made = [spent(partial(Problem, world, a, b)) for a, b in pairwise(free)]
+    runs = [spent(partial(plan, each, PLANNER, seed=k, seconds=SECONDS)) for k, (_, each) in enumerate(made)]
     return {
-        "ms": [1e3 * spent for spent, _ in runs],
-        "problem": [1e3 * spent for spent, _ in made],
+        "ms": [1e3 * taken for taken, _ in runs],
+        "problem": [1e3 * taken for taken, _ in made],
         "found": sum(found.found for _, found in runs),
     }
 
