@@ -162,7 +162,7 @@ def thousand_boxes(report: Report) -> None:
     """A UR5 among a thousand small boxes."""
     robot, rng = load_robot("ur5"), np.random.default_rng(1)
     away = rng.normal(size=(1000, 3))
-    away *= (rng.uniform(0.5, 2.0, 1000) / np.linalg.norm(away, axis=1))[:, None]
+    away *= (np.cbrt(rng.uniform(0.03, 1.0, 1000)) * 1.5 / np.linalg.norm(away, axis=1))[:, None]  # not in the base
     boxes = tuple(Obstacle(f"box{k}", Box([0.02] * 3), pose(p)) for k, p in enumerate(away))
     made = [spent(partial(World, robot, Scene(boxes))) for _ in range(6)][1:]
     world = made[0][1]
@@ -214,13 +214,13 @@ def main() -> int:
     known = {file for arm in files for file in the_70(given.folder, arm)}
     cases = {arm: loaded(them, arm) for arm, them in files.items()}
     report = Report("Whole calls: the others", "python bench/whole_calls/calls.py FOLDER")
-    report.note("Where", machine())
     default_plans(report, cases, known)
     shortenings(report, cases)
     kinematics(report)
     loading(report, {arm: them[::5] for arm, them in files.items()})
     thousand_boxes(report)
     first_plans(report)
+    report.note("Where", machine())
     return report.finish(given.out)
 
 

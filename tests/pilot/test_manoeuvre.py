@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rrtik_ompl import load_robot
+from rrtik_ompl import Cylinder, Obstacle, load_robot, pose
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.routes.manoeuvre import check_move, escape_move, free_until, joint_range
@@ -58,6 +58,18 @@ def test_little_room_is_warned_of():
     verdict = check_move(WORLD, PROBLEM.goal.q, 2, until)
     assert any("mm between" in warning for warning in verdict.warnings)
     assert 0.0 <= verdict.clearance < 0.02
+
+
+def test_a_move_that_steps_over_a_needle_is_warned_of():
+    needle = Obstacle("needle", Cylinder(2e-4, 1.0), pose([2.0, 0.0, 0.0]))
+    world = World(load_robot("planar3", radius=0.01), Scene([needle]), motion_resolution=0.2)
+    over = [q for q in np.linspace(-1.2, -0.4, 40) if world.motion_valid([q, 0.0, 0.0], [0.9, 0.0, 0.0])]
+    assert over  # the check in steps does not see what stands in the way
+    for first in over:
+        verdict = check_move(world, np.array([first, 0.0, 0.0]), 0, 0.9)
+        assert "free in steps, but not proven in between" in verdict.warnings
+    beside = check_move(world, np.array([0.1, 0.0, 0.0]), 0, 0.9)
+    assert not any("proven" in warning for warning in beside.warnings)
 
 
 def test_the_room_of_a_joint_names_what_ends_it_and_where_the_arm_is_singular():

@@ -1,9 +1,11 @@
 """Routes for a pilot: few moves, a place before the object that few joints lead on from, and room for small errors."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from rrtik_ompl import load_problem
+from rrtik_ompl import Cylinder, Obstacle, Scene, World, load_problem, load_robot, pose
 from rrtik_ompl.pilot.devices.arm import joint_rates
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
 from rrtik_ompl.pilot.lamps import stage_poses
@@ -46,6 +48,8 @@ def test_a_route_to_a_grasp_is_short_and_free_and_forgives_small_errors(kind, le
     assert world.certify(rows[: route.grasp_from + 1]).all()
     assert world.motion_valid_batch(rows[: route.grasp_from], rows[1 : route.grasp_from + 1]).all()
     assert not route.path.violations(holding)
+    assert route.proven
+    assert world.prove(rows[: route.grasp_from + 1]).proven
     made = executions(route.path, slack(route.path), 300, np.random.default_rng(11))
     before, after = made[:, : route.grasp_from + 1], made[:, route.grasp_from :]
     assert (free_rows(world, before) & free_rows(holding, after)).mean() >= 0.97
@@ -94,6 +98,24 @@ def test_where_no_joint_alone_goes_round_a_planner_finds_the_route(name):
     assert route.path.one_joint_at_a_time
     assert not route.path.violations(problem.world)
     assert route.grasp_from == len(route.path.moves())
+
+
+def test_a_route_that_is_proven_is_taken_before_others_and_one_that_is_not_says_so():
+    robot = load_robot("planar3", radius=0.01)
+    rates, goal = joint_rates(robot), np.array([0.9, 0.0, 0.0])
+    needle = Obstacle("needle", Cylinder(2e-4, 1.0), pose([2.9, 0.0, 0.0]))  # within reach of a straight arm alone
+    world = World(robot, Scene([needle]), motion_resolution=0.2)
+    starts = [np.array([q, 0.3, 0.0]) for q in np.linspace(-0.7, -0.4, 12)]
+    routes = [route_to(world, start, goal, rates, 1) for start in starts]
+    assert all(route.proven and world.prove(route.path.waypoints).proven for route in routes)
+    search = RouteSearch(world, world, starts[0], 1)
+    straight = [np.array([[q, 0.0, 0.0], goal]) for q in np.linspace(-0.7, -0.4, 12)]
+    over = [rows for rows in straight if world.motion_valid(*rows)]
+    assert over
+    assert not any(search.proven(GraspRoute(rows, 1)) for rows in over)
+    unsure = replace(routes[0], path=routes[0].path.with_waypoints(over[0]), proven=False)
+    assert "not proven free" in unsure.summary()
+    assert "not proven" not in routes[0].summary()
 
 
 def test_an_arm_that_stands_in_something_is_told_so():

@@ -55,7 +55,7 @@ class MoveCheck:
     Attributes:
         allowed: Whether it may be made.
         reason: Why not: the limit, or the pair that would touch and where; "" if it may.
-        warnings: Small clearance, singular postures.
+        warnings: Small clearance, singular postures, a move that is only checked in steps.
         clearance: The least distance to anything along the move, at some samples [m]; -inf if it collides.
     """
 
@@ -99,6 +99,8 @@ def check_move(world: World, q: Vector, joint: int, target: float) -> MoveCheck:
     warnings = [*_singular(world, end)]
     if nearest is not None and clearance < CLEARANCE_WARNING:
         warnings.append(f"only {1e3 * max(clearance, 0.0):.0f} mm between {nearest.first} and {nearest.second}")
+    if not world.motion_proven(start, end):
+        warnings.append("free in steps, but not proven in between")
     return MoveCheck(True, "", tuple(warnings), float(clearance))
 
 

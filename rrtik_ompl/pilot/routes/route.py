@@ -40,6 +40,7 @@ class Route:
         clearance: Least distance to anything, at samples along it [m].
         joints: Names of the joints that move.
         robustness: Share of executions that touch nothing although every move ends with an error of up to a degree.
+        proven: Whether every move is proven free for its whole length; else some are checked in steps.
     """
 
     path: JointPath
@@ -49,11 +50,13 @@ class Route:
     clearance: float
     joints: tuple[str, ...]
     robustness: float
+    proven: bool
 
     def summary(self) -> str:
         """The head of the list in one line, with a warning where a small error may touch something."""
         clear = "nothing near" if np.isinf(self.clearance) else f"at least {1e3 * self.clearance:.0f} mm away"
         line = f"{len(self.path.moves())} moves, {self.seconds:.0f} s, {clear}"
+        line += "" if self.proven else ", not proven free: checked in steps"
         if self.robustness >= MIN_ROBUSTNESS:
             return line
         return (
@@ -136,4 +139,5 @@ def _route(world: World, holding: World, q: Vector, tails: Sequence[Tail], rates
     seconds = sum(abs(move.change) / rates[names.index(move.joint)] for move in moves)
     used = tuple(name for name in names if any(move.joint == name for move in moves))
     travel = sum(abs(move.change) for move in moves)
-    return Route(path, found.grasp_from, travel, float(seconds), float(clearance), used, search.robustness(found))
+    figures = travel, float(seconds), float(clearance), used, search.robustness(found), search.proven(found)
+    return Route(path, found.grasp_from, *figures)

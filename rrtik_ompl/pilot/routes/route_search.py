@@ -46,7 +46,7 @@ class RouteSearch:
         self._slack = slack(self._path)
 
     def find(self, tails: Sequence[Tail]) -> GraspRoute | NoRoute:
-        """The best route.
+        """The best route; one that is not proven free only where no other is found.
 
         Args:
             tails: Last parts, grouped by where they begin; the best beginning first.
@@ -54,21 +54,32 @@ class RouteSearch:
         Raises:
             ProblemError: If the arm is in collision, or the last parts begin in collision.
         """
-        best = self._best(route for tail in tails for route in self._direct(tail))
-        best = best or self._best(self._around(tails[0]))
-        if best is not None:
-            return best
+        unproven = None
+        for routes in (self._all_direct(tails), self._around(tails[0])):
+            best = self._best(routes)
+            if best is not None and self.proven(best):
+                return best
+            unproven = unproven or best
         first = planned(self._world, self._q, tails[0][0][0], self._seed)
         if isinstance(first, NoRoute):
-            return first
+            return unproven or first
         best = self._best(_joined(first, part) for part in tails[0])
-        return best or NoRoute("it comes too close to something to be sure")
+        if best is not None and self.proven(best):
+            return best
+        return unproven or best or NoRoute("it comes too close to something to be sure")
 
     def robustness(self, route: GraspRoute, count: int = EXECUTIONS) -> float:
         """Share of executions that touch nothing although every move ends with a small error."""
         made = executions(self._path.with_waypoints(route.rows), self._slack, count, np.random.default_rng(self._seed))
         before, after = made[:, : route.grasp_from + 1], made[:, route.grasp_from :]
         return float((free_rows(self._world, before) & free_rows(self._holding, after)).mean())
+
+    def proven(self, route: GraspRoute) -> bool:
+        """Whether all moves of a route are proven free for their whole length."""
+        return all(world.prove(rows).proven for world, rows in self._parts(route) if len(rows) > 1)
+
+    def _all_direct(self, tails: Sequence[Tail]) -> Iterator[GraspRoute]:
+        return (route for tail in tails for route in self._direct(tail))
 
     def _direct(self, tail: Tail) -> Iterator[GraspRoute]:
         """Routes in which every joint moves once before the last part."""
@@ -91,7 +102,8 @@ class RouteSearch:
     def _best(self, routes: Iterable[GraspRoute]) -> GraspRoute | None:
         finalists = sorted(routes, key=lambda route: self._rank(route, TRIALS))[:FINALISTS]
         ranked = sorted(finalists, key=lambda route: self._rank(route, EXECUTIONS))
-        return next((route for route in ranked if not self._fault(route)), None)
+        proven = next(filter(self.proven, ranked), None)
+        return proven or next((route for route in ranked if not self._fault(route)), None)
 
     def _rank(self, route: GraspRoute, count: int) -> tuple[float, int, float, float]:
         """Sorting key, the best first: executions that touch something, in tenths; moves; their exact share; travel."""
@@ -101,9 +113,13 @@ class RouteSearch:
 
     def _fault(self, route: GraspRoute) -> str:
         """Why a second, independent check refuses a route; "" if it does not."""
+        faults = (path_fault(world, self._path.with_waypoints(rows)) for world, rows in self._parts(route))
+        return next(filter(None, faults), "")
+
+    def _parts(self, route: GraspRoute) -> tuple[tuple[World, Matrix], ...]:
+        """What may touch nothing and what may touch the object, each with its world."""
         before, after = route.rows[: route.grasp_from + 1], route.rows[route.grasp_from :]
-        parts = ((self._world, before), (self._holding, after))
-        return next(filter(None, (path_fault(w, self._path.with_waypoints(rows)) for w, rows in parts)), "")
+        return (self._world, before), (self._holding, after)
 
 
 def _joined(first: Matrix, last: Matrix) -> GraspRoute:
