@@ -7,7 +7,10 @@ import numpy as np
 from rrtik_ompl.arrays import TAU, Vector, positive
 
 RANGE_SHARE = 0.08  # of the diagonal of the box, no joint counted for more than a turn
-DOMAIN_SHARE = 6.0**-0.5  # of the diagonal of the box: the root mean square distance of two random configurations
+# Of the diagonal of the box: four fifths of the root mean square distance of two random configurations, which is
+# 6 ** -0.5 of it. Searches among narrow passages are a quarter shorter than with all of it, others as long; with half
+# of it most are longer.
+DOMAIN_SHARE = 0.8 * 6.0**-0.5
 MIN_RANGE = 1e-9  # [unit of the box] where lower and upper bounds coincide
 
 
