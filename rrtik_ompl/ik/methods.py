@@ -7,6 +7,7 @@ from functools import partial
 from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.choices import IkMethod
@@ -14,6 +15,7 @@ from rrtik_ompl.fast.ik import branch_layout, ik_layout
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.ik.analytic.closed_form import branches_of, family, form_of, has_closed_form
+from rrtik_ompl.ik.analytic.kernel_branches import valid_branches
 from rrtik_ompl.ik.analytic.reference_branches import tip_fault
 from rrtik_ompl.ik.baselines.ccd import ccd
 from rrtik_ompl.ik.baselines.damped import damped_least_squares, pinocchio_iteration
@@ -49,13 +51,13 @@ def _closed_form_misfit(robot: Robot, target: Target) -> str:
 def _closed_form(request: IkRequest) -> IkResponse:
     """All branches of all targets; if none will do, the curves of those that are singular within their tolerances."""
     robot, targets = request.robot, request.targets
-    poses = np.array([_matrix(target) for target in targets])
-    hints = np.array([request.near] * len(targets))
-    found = branches_of(robot, poses, hints, check=False)
-    q = found.branches[found.valid]
+    q = valid_branches(robot, form_of(robot), _matrix(targets[0]), request.near) if len(targets) == 1 else None
+    if q is None:
+        found = branches_of(robot, *_poses_and_hints(request), check=False)
+        q = found.branches[found.valid]
     if len(q) and request.accept(q).any():  # the usual case; forward kinematics checks what is returned
         return IkResponse(q, request.near)
-    found = branches_of(robot, poses, hints)
+    found = branches_of(robot, *_poses_and_hints(request))
     rows, owner = found.branches.reshape(-1, robot.dof), np.repeat(np.arange(len(targets)), found.real.shape[1])
     residuals = np.asarray(found.residuals).reshape(-1, 2)
     near_enough = residuals <= np.array([tolerances(target) for target in targets])[owner]
@@ -66,6 +68,11 @@ def _closed_form(request: IkRequest) -> IkResponse:
     outside = np.maximum(robot.lower - rows, rows - robot.upper).max(axis=1)
     best = np.argmin(np.where(reaching, outside, np.inf) if reaching.any() else residuals.sum(axis=1))
     return IkResponse(q, rows[int(best)], singular=leaves_a_curve(robot, targets))
+
+
+def _poses_and_hints(request: IkRequest) -> tuple[NDArray[np.float64], Matrix]:
+    """Of all targets, shapes (m, 4, 4) and (m, dof)."""
+    return np.array([_matrix(target) for target in request.targets]), np.array([request.near] * len(request.targets))
 
 
 def leaves_a_curve(robot: Robot, targets: Sequence[Target]) -> bool:
@@ -83,11 +90,11 @@ def _slack(target: Target) -> float:
 
 
 def _matrix(target: Target) -> Matrix:
+    if not isinstance(target, PositionGoal):
+        return np.asarray(target.T_world_tip.homogeneous, dtype=np.float64)
     matrix: Matrix = np.eye(4)
-    if isinstance(target, PositionGoal):
-        matrix[:3, 3] = target.position
-        return matrix
-    return np.asarray(target.T_world_tip.homogeneous, dtype=np.float64)
+    matrix[:3, 3] = target.position
+    return matrix
 
 
 def _walks(walk: Walk, starts: int = STARTS, rounds: int = MAX_ROUNDS) -> Callable[[IkRequest], IkResponse]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.fast.ik import branch_layout, ik_layout
 from rrtik_ompl.fast.ik.branch_layout import BRANCHES, DOF
 from rrtik_ompl.fast.simd.library import library
@@ -42,12 +42,37 @@ def kernel_branches(
     return answers
 
 
+def valid_branches(robot: Robot, form: AnalyticSolver, pose: Matrix, hint: Vector) -> Matrix | None:
+    """The branches of one pose, shape (4, 4), inside the joint limits, shape (k, dof), in their order.
+
+    The call of the kernel is kept from one use to the next: to make it takes longer than it runs.
+
+    Returns:
+        None if the pose is singular, or there is no kernel for the arm.
+    """
+    kernels = library(branch_layout.KERNELS) if form.kernel else None
+    arm = None if kernels is None else _arm_of(robot, form)
+    if kernels is None or arm is None:
+        return None
+    try:  # taken out while it is used, so that threads do not meet
+        call = arm.spare.pop()
+    except IndexError:
+        call = _Call(pose[None], hint[None], 0.0, False)
+    else:
+        call.begin(pose, hint)
+    getattr(kernels, form.kernel)(arm.table.address, call.address)
+    rows = call.valid_rows()
+    arm.spare.append(call)
+    return rows
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Arm:
-    """Its table, and the table that this one points at."""
+    """Its table, the table that this one points at, and calls for one pose with a hint that nobody uses now."""
 
     table: Table
     limb: Table
+    spare: list[_Call] = field(default_factory=list)
 
 
 @lru_cache(maxsize=64)
@@ -82,6 +107,25 @@ class _Call:
         memory[branch_layout.SLACK][:] = slack
         if hints is not None:
             memory[branch_layout.NEAR].reshape(hints.shape)[:] = hints
+
+    def begin(self, pose: Matrix, hint: Vector) -> None:
+        """Put another pose and hint in place of the only ones."""
+        self._memory[branch_layout.POSES].reshape(pose.shape)[:] = pose
+        self._memory[branch_layout.NEAR][:] = hint
+
+    def valid_rows(self) -> Matrix | None:
+        """Of the only pose the branches inside the limits, shape (k, dof); None if it is to be answered otherwise."""
+        if self.odd[0]:
+            return None
+        memory = self._memory
+        q = memory[branch_layout.Q].reshape(DOF, *self._shape)[:, :, 0]
+        real, fits = (memory[place].view(np.bool_)[::WIDTH] for place in (branch_layout.REAL, branch_layout.FITS))
+        rows: Matrix = q.T[real & fits]
+        return rows
+
+    def intact(self) -> bool:
+        """Whether no kernel has written beyond an array."""
+        return self._memory.intact()
 
     @property
     def odd(self) -> NDArray[np.bool_]:

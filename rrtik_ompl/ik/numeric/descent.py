@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix
+from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.fast.ik.ik_layout import KERNELS
-from rrtik_ompl.fast.simd.library import library
+from rrtik_ompl.fast.simd.library import Library, library
+from rrtik_ompl.fast.tables.memory import Table
 from rrtik_ompl.goal import TipGoal
 from rrtik_ompl.ik.goal_rows import goal_rows
-from rrtik_ompl.ik.numeric.kernel_call import KernelCall
+from rrtik_ompl.ik.numeric.kernel_call import KernelCall, spare_calls
 from rrtik_ompl.ik.numeric.reference_descent import farness, walk_plainly
 from rrtik_ompl.ik.serial_chain import SEEDS, limb_of, seeded_limb_of, seeds_of
 from rrtik_ompl.robot import Robot
@@ -51,6 +52,39 @@ def descend(robot: Robot, goal: TipGoal, starts: Matrix, *, iterations: int = ST
     """
     Q, _, taken = walk(robot, goal_rows(goal), starts, steps=iterations)
     return Q, taken
+
+
+class SearchOfOne:
+    """`Search` for a single goal, by kernels, in memory that is kept between searches.
+
+    Args:
+        kernels: The library.
+        limb: With seeds, see `rrtik_ompl.ik.serial_chain`.
+        aim: The goal, shape (1, 18).
+        near: Posture inside the limits to start from, shape (dof,).
+
+    Attributes:
+        steps: Taken by all starts together.
+    """
+
+    def __init__(self, kernels: Library, limb: Table, aim: Matrix, near: Vector) -> None:
+        self._kernels, self._limb, self.steps = kernels, limb, 0
+        try:
+            self._call = spare_calls(limb).pop()
+        except IndexError:
+            self._call = KernelCall(limb, aim, near[None], STEPS, PATIENCE, near[None], np.zeros(1, dtype=np.int64))
+        else:
+            self._call.begin(aim, near)
+
+    def advance(self) -> Matrix:
+        """The next solution, shape (1, dof); of shape (0, dof) at the end of the starts."""
+        solved = self._kernels.solve(self._limb.address, self._call.address)
+        self.steps += self._call.steps
+        return self._call.q[:solved].copy()
+
+    def close(self) -> None:
+        """Leave the memory to the next search; this one has ended."""
+        spare_calls(self._limb).append(self._call)
 
 
 class Search:

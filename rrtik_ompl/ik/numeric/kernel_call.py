@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix
+from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.fast.ik import ik_layout
 from rrtik_ompl.fast.tables.memory import WORD, PlannedTable, Table, TablePlan
 
@@ -54,6 +54,16 @@ class KernelCall:
         if following is not None:
             self.next[:] = following
 
+    def begin(self, aim: Matrix, near: Vector) -> None:
+        """Start anew, in a call for a single row: from a posture, shape (dof,), to a goal, shape (1, 18)."""
+        self.aims[:] = aim
+        self._memory[ik_layout.NEAR][:] = near
+        self.next[:] = 0
+
+    def intact(self) -> bool:
+        """Whether no kernel has written beyond an array."""
+        return self._memory.intact()
+
     @property
     def reached(self) -> Mask:
         """Which rows are at their goals, shape (m,)."""
@@ -64,6 +74,17 @@ class KernelCall:
     def steps(self) -> int:
         """How many have been taken."""
         return int(self._memory.header[ik_layout.DONE])
+
+
+@lru_cache(maxsize=64)
+def spare_calls(limb: Table) -> list[KernelCall]:
+    """Calls for a single row with all fields, that outlive a use: to make one takes longer than most of them run.
+
+    Whoever uses one takes it out, so that threads do not meet, and puts it back; one that an exception has left is
+    not put back.
+    """
+    del limb
+    return []
 
 
 @lru_cache(maxsize=64)

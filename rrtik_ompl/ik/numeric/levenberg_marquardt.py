@@ -7,11 +7,14 @@ import time
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.fast.ik.ik_layout import KERNELS
+from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.goal import TipGoal
 from rrtik_ompl.ik.goal_rows import goal_rows
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse
-from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS, Search, walk
+from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS, Search, SearchOfOne, walk
 from rrtik_ompl.ik.numeric.restarts import MAX_ROUNDS, STARTS, aims_of, nearest_posture
+from rrtik_ompl.ik.serial_chain import seeded_limb_of
 from rrtik_ompl.robot import Robot
 
 AT_ONCE = 32  # members of a goal, between two readings of the clock, when others have their turn
@@ -44,6 +47,9 @@ def numeric(request: IkRequest) -> IkResponse:
     if request.all:
         return _many(request)
     aims, timed_out = aims_of(request), False
+    kernels, limb = library(KERNELS), seeded_limb_of(request.robot)
+    if len(aims) == 1 and kernels is not None and limb is not None:
+        return _alone(request, SearchOfOne(kernels, limb, aims, request.robot.clamp(request.near)))
     search, waiting = Search(request.robot, aims, request.near), np.arange(len(aims))
     found = []
     while len(waiting):
@@ -55,6 +61,17 @@ def numeric(request: IkRequest) -> IkResponse:
             break
         waiting = np.concatenate([waiting, going])
     return _answered(request, np.concatenate(found), search.steps, timed_out)
+
+
+def _alone(request: IkRequest, search: SearchOfOne) -> IkResponse:
+    """The same for a goal of one member."""
+    found = [search.advance()]
+    timed_out = time.monotonic() > request.deadline
+    while not timed_out and len(found[-1]) and not request.accept(found[-1])[0]:
+        found.append(search.advance())
+        timed_out = time.monotonic() > request.deadline
+    search.close()
+    return _answered(request, found[0] if len(found) == 1 else np.concatenate(found), search.steps, timed_out)
 
 
 def _many(request: IkRequest) -> IkResponse:
