@@ -101,6 +101,8 @@ def whole_number(value: object, what: str, least: int = 0) -> int:
     Raises:
         InputError: If it is none, or less than ``least``.
     """
+    if type(value) is int and value >= least:
+        return value
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
         raise InputError(f"{what} must be a whole number of at least {least}, got {value!r}")
     return int(value)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -26,11 +27,17 @@ NO_BOX = frozen([0.0, 0.0, 0.0])
 def joint_difference(robot: Robot, Q: ArrayLike, q: ArrayLike) -> NDArray[np.float64]:
     """``Q - q`` per joint, continuous joints the short way round (into [-pi, pi]). Shape of Q."""
     difference: NDArray[np.float64] = np.asarray(Q, dtype=np.float64) - np.asarray(q, dtype=np.float64)
-    if not robot.continuous.any():
+    if not has_continuous(robot):
         return difference
     turned = wrapped(difference)
     shortest: NDArray[np.float64] = np.where(robot.continuous, turned, difference)
     return shortest
+
+
+@lru_cache(maxsize=64)
+def has_continuous(robot: Robot) -> bool:
+    """Whether a joint of a robot turns without limits."""
+    return bool(robot.continuous.any())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,6 +181,8 @@ def parts_of(goal: TipGoal) -> tuple[GoalPart, ...]:
 
 def has_task_regions(goal: TipGoal) -> bool:
     """Whether a goal is a task-space region or has one among its members."""
+    if isinstance(goal, PoseGoal | PositionGoal):
+        return False
     members = goal.members if isinstance(goal, GoalSet) else (goal,)
     return any(isinstance(member, TaskRegion) for member in members)
 

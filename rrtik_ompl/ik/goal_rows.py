@@ -18,7 +18,6 @@ from rrtik_ompl.fast.ik.ik_layout import (
 )
 from rrtik_ompl.goal import GoalPart, GoalSet, PoseGoal, PositionGoal, TipGoal
 from rrtik_ompl.ik.residual import SHARE
-from rrtik_ompl.task_region import TaskRegion
 
 POSE = PoseGoal(np.eye(4))  # for its tolerances
 
@@ -49,14 +48,14 @@ def pose_rows(poses: NDArray[np.float64]) -> Matrix:
 
 
 def _row(goal: GoalPart) -> NDArray[np.float64]:
-    if isinstance(goal, TaskRegion):
+    if not isinstance(goal, PoseGoal | PositionGoal):
         raise InputError("goal: no row holds a task-space region; use projection, or targets drawn from it")
     row = np.zeros(AIM_FLOATS)
     if isinstance(goal, PositionGoal):
         row[[0, 4, 8]], row[9:12] = 1.0, goal.position
         row[POSITION_TOLERANCE], row[CHORD_TOLERANCE], row[FREE_TURN] = SHARE * goal.tolerance, 1.0, ANY_TURN
         return row
-    row[:9], row[9:12] = np.ravel(goal.T_world_tip.rotation), goal.T_world_tip.translation
+    row[:9], row[9:12] = goal.T_world_tip.rotation.ravel(), goal.T_world_tip.translation
     row[POSITION_TOLERANCE] = SHARE * goal.position_tolerance
     row[CHORD_TOLERANCE], row[FREE_TURN] = SHARE * goal.orientation_tolerance, NO_TURN
     return row

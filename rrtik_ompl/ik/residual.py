@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from functools import lru_cache
+from threading import get_ident
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix
+from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.robot import Robot
@@ -23,6 +27,32 @@ def well_inside(robot: Robot, goal: Target, Q: Matrix) -> Mask:
         return goal.distance(robot, Q) <= SHARE * goal.tolerance
     position, angle = goal.errors(robot, Q)
     return (position <= SHARE * goal.position_tolerance) & (angle <= SHARE * goal.orientation_tolerance)
+
+
+def error_of_one(robot: Robot, goal: Target, q: Vector) -> tuple[float, float]:
+    """Distance [m] and angle [rad] (0 for a position) of the tip from a goal, for one q, shape (dof,).
+
+    By Pinocchio and in numbers of Python's own: as `tip_errors`, up to rounding, in a quarter of its time.
+    """
+    model, data, frame, plain = _tip_of(robot, get_ident())
+    pin.forwardKinematics(model, data, q if plain else robot.pinocchio_configuration(q)[0])
+    tip = pin.updateFramePlacement(model, data, frame)
+    if isinstance(goal, PositionGoal):
+        return math.dist(tip.translation.tolist(), goal.position.tolist()), 0.0
+    target = goal.T_world_tip
+    a, b, c = target.actInv(tip).rotation.tolist()
+    sine = 0.5 * math.hypot(c[1] - b[2], a[2] - c[0], b[0] - a[1])
+    away = math.dist(tip.translation.tolist(), target.translation.tolist())
+    return away, math.atan2(sine, 0.5 * (a[0] + b[1] + c[2] - 1.0))
+
+
+@lru_cache(maxsize=64)
+def _tip_of(robot: Robot, thread: int) -> tuple[Any, Any, int, bool]:
+    """Pinocchio's model, working memory of one thread's own, the tip's number; whether q is as Pinocchio wants it."""
+    del thread
+    chain, model = robot.chain, robot.model
+    plain = model.nq == robot.dof and np.array_equal(chain.gain, np.eye(robot.dof)) and not chain.offset.any()
+    return model, model.createData(), int(model.getFrameId(robot.tip)), plain
 
 
 def walked(

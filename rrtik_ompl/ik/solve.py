@@ -13,11 +13,20 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen, not_negative
 from rrtik_ompl.choices import IkMethod, one_of
 from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.goal import PositionGoal, TipGoal, has_task_regions, joint_difference, parts_of, tip_errors
+from rrtik_ompl.goal import (
+    PositionGoal,
+    TipGoal,
+    has_continuous,
+    has_task_regions,
+    joint_difference,
+    parts_of,
+    tip_errors,
+)
 from rrtik_ompl.ik.mb_rrt.search import out_of_reach
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target, tolerances
 from rrtik_ompl.ik.methods import METHODS, load_kernels
 from rrtik_ompl.ik.random_stream import RandomStream
+from rrtik_ompl.ik.residual import error_of_one
 from rrtik_ompl.ik.targets import leaves_freedom, targets
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
@@ -111,19 +120,29 @@ def solve_ik(
         return free_of_collision(world, Q)
 
     request = IkRequest(robot, goal, drawn, posture, accept, all, begin + limit, random, world)
-    answer, q, residuals, free = _tried(request, name)
+    return _solved(request, name, method == "auto", begin)
+
+
+def _solved(request: IkRequest, name: IkMethod, auto: bool, begin: float) -> IkResult:
+    """The answer of a method; if it has none and was chosen by "auto", of the one that walks to the goal."""
+    robot, goal = request.robot, request.goal
+    answer = METHODS[name].run(request)
+    nearest = None if request.all else _nearest(request, answer.q)
+    if nearest is not None:
+        return IkResult(*nearest, "", "", answer.iterations, name, time.monotonic() - begin)
+    q, residuals, free = _reaching(request, answer.q)
     walked = _draws(name, goal) or (name == "closed-form" and answer.singular and len(q) == 0)
-    if method == "auto" and not free.any() and walked:
-        other = _tried(request, _walker(goal))
-        if other[3].any() or _draws(name, goal):  # else the closed form knows better why there is nothing
-            name, (answer, q, residuals, free) = _walker(goal), other
-    turned = joint_difference(robot, q, posture)
+    if auto and not free.any() and walked:
+        other = _solved(request, _walker(goal), False, begin)
+        if other.found or _draws(name, goal):  # else the closed form knows better why there is nothing
+            return other
+    turned = joint_difference(robot, q, request.near)
     (rows,) = free.nonzero()
     order = rows[np.vecdot(turned, turned)[rows].argsort(kind="stable")]
-    kept = different_rows(turned, order) if all else order[:1]
+    kept = different_rows(turned, order) if request.all else order[:1]
     reason, detail = ("", "") if len(kept) else _why(request, answer, name, q)
     return IkResult(
-        solutions=frozen(np.where(robot.continuous, posture + turned[kept], q[kept])),
+        solutions=frozen(np.where(robot.continuous, request.near + turned[kept], q[kept])),
         residuals=frozen(residuals[kept]),
         reason=reason,
         detail=detail,
@@ -148,7 +167,11 @@ def chosen_method(robot: Robot, drawn: tuple[Target, ...], method: IkMethod) -> 
     """
 
     def misfit(name: IkMethod) -> str:
-        return next((m for m in (METHODS[name].misfit(robot, target) for target in drawn) if m), "")
+        for target in drawn:
+            fault = METHODS[name].misfit(robot, target)
+            if fault:
+                return fault
+        return ""
 
     if method == "auto":
         return next(name for name in METHODS if not misfit(name))
@@ -167,27 +190,37 @@ def free_of_collision(world: World | None, Q: Matrix) -> Mask:
     All are if there is no world.
     """
     if world is None or len(Q) == 0:
-        return np.ones(len(Q), dtype=bool)
+        return ~np.zeros(len(Q), dtype=bool)  # in a third of the time of numpy's own ones
     free = np.array(world.valid_batch(Q))
     free[free] = world.certify(Q[free])
     return free
 
 
-def _tried(request: IkRequest, name: IkMethod) -> tuple[IkResponse, Matrix, Matrix, Mask]:
-    """What a method returns: of that the rows at the goal, shape (k, dof), their residuals, and which are accepted.
+def _nearest(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix] | None:
+    """Of rows inside the limits the nearest to the posture, shape (1, dof), and its residuals, shape (1, 2).
 
-    If one is enough, the nearest is checked first and alone: mostly it is accepted.
+    It is checked first and alone, for mostly it will do: None if it is not at the goal or not accepted.
     """
-    robot, answer = request.robot, METHODS[name].run(request)
-    inside = robot.clamp(answer.q[robot.within_limits(answer.q)])
-    if not request.all and len(inside) > 1:
+    robot, goal = request.robot, request.goal
+    inside = robot.clamp(q[robot.within_limits(q)])
+    if len(inside) > 1:
         away = joint_difference(robot, inside, request.near)
         nearest = int(np.vecdot(away, away).argmin())
-        q, residuals = _at_goal(robot, request.goal, inside[nearest : nearest + 1])
-        if len(q) and request.accept(q)[0]:
-            return answer, q, residuals, np.ones(1, dtype=bool)
-    q, residuals = _at_goal(robot, request.goal, inside)
-    return answer, q, residuals, request.accept(q)
+        inside = inside[nearest : nearest + 1]
+    reaching, residuals = _at_goal(robot, goal, inside)
+    if len(reaching) == 0 or not request.accept(reaching)[0]:
+        return None
+    if has_continuous(robot):
+        turned = joint_difference(robot, reaching, request.near)
+        reaching = np.where(robot.continuous, request.near + turned, reaching)
+    return frozen(reaching), frozen(residuals)
+
+
+def _reaching(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix, Mask]:
+    """The rows of q inside the limits and at the goal, shape (k, dof), their residuals, and which are accepted."""
+    robot = request.robot
+    rows, residuals = _at_goal(robot, request.goal, robot.clamp(q[robot.within_limits(q)]))
+    return rows, residuals, request.accept(rows)
 
 
 def different_rows(rows: Matrix, order: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -203,6 +236,10 @@ def _at_goal(robot: Robot, goal: TipGoal, q: Matrix) -> tuple[Matrix, Matrix]:
     """The rows of q at the goal, and their residuals, shape (k, 2): of a region from the part a row is nearest to."""
     if len(q) == 0:
         return q, np.zeros((0, 2))
+    if len(q) == 1 and isinstance(goal, Target):
+        (position, angle), (near, turned) = error_of_one(robot, goal, q[0]), tolerances(goal)
+        kept = int(position <= near and angle <= turned)
+        return q[:kept], np.array([[position, angle]])[:kept]
     residuals = np.array(tip_errors(goal, robot, q)).T
     at = (residuals <= tolerances(goal)).all(axis=1) if isinstance(goal, Target) else goal.satisfied(robot, q)
     return q[at], residuals[at]

@@ -1,4 +1,4 @@
-"""One pose after the other: memory of kernels that outlives a call."""
+"""One pose after the other: memory of kernels that outlives a call, and forward kinematics of one configuration."""
 
 from concurrent.futures import ThreadPoolExecutor
 from threading import Barrier
@@ -9,15 +9,18 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.fast.ik import ik_layout
 from rrtik_ompl.fast.simd.library import library
+from rrtik_ompl.goal import tip_errors
 from rrtik_ompl.ik.analytic import kernel_branches
 from rrtik_ompl.ik.analytic.closed_form import branches_of, form_of
 from rrtik_ompl.ik.goal_rows import goal_rows
 from rrtik_ompl.ik.numeric.descent import Search, SearchOfOne
 from rrtik_ompl.ik.numeric.kernel_call import spare_calls
+from rrtik_ompl.ik.residual import error_of_one
 from rrtik_ompl.ik.serial_chain import seeded_limb_of
 from rrtik_ompl.ik.solve import mid_range_configuration, solve_ik
 
 ARMS = ("ur5", "panda", "titan4")
+ROUNDING = 1e-12  # [m] and [rad]
 
 
 def drawn(robot, count, seed=0):
@@ -111,3 +114,22 @@ def test_a_pose_is_solved_while_another_is_being_accepted(name, monkeypatch):
     assert len(inner) > 0
     for found in inner:
         np.testing.assert_array_equal(found, expected[1])
+
+
+@pytest.mark.parametrize("name", rrtik.list_robots())
+def test_the_error_of_one_configuration_is_that_of_many(name):
+    robot = rrtik.load_robot(name)
+    Q = drawn(robot, 10)
+    near, half_turn = robot.fk(Q[0]), robot.fk(Q[1]) * rrtik.pose(quat_xyzw=[1.0, 0.0, 0.0, 0.0])
+    goals = [rrtik.PoseGoal(near), rrtik.PoseGoal(half_turn), rrtik.PositionGoal(near.translation)]
+    for goal in goals:
+        one = [error_of_one(robot, goal, q) for q in Q]
+        np.testing.assert_allclose(one, np.transpose(tip_errors(goal, robot, Q)), rtol=0, atol=ROUNDING)
+
+
+def test_an_answer_that_misses_the_goal_is_not_returned(monkeypatch):
+    """The solver's own word is not enough: the tip is placed anew, by Pinocchio."""
+    robot = rrtik.load_robot("ur5")
+    advance = SearchOfOne.advance
+    monkeypatch.setattr(SearchOfOne, "advance", lambda self: advance(self) + 0.1)
+    assert not solve_ik(robot, poses(robot, 1)[0]).found
