@@ -53,6 +53,7 @@ class Robot:
     Attributes:
         name: Name used in messages and files.
         joint_names: The actuated joints, in the order of q.
+        movable: All joints of the description that are not fixed: actuated ones, those that follow and those held.
         lower, upper: Position limits, shape (dof,), -inf and +inf for continuous joints.
         velocity, acceleration, jerk: Limits [rad/s, rad/s^2, rad/s^3 or m], shape (dof,), inf where unknown.
         prismatic, continuous: Masks, shape (dof,).
@@ -65,6 +66,7 @@ class Robot:
 
     name: str
     joint_names: tuple[str, ...]
+    movable: frozenset[str]
     lower: Vector
     upper: Vector
     velocity: Vector
@@ -95,7 +97,7 @@ class Robot:
     @property
     def link_names(self) -> tuple[str, ...]:
         """Names of all links (bodies), base first."""
-        return tuple(f.name for f in self.model.frames if f.type == pin.FrameType.BODY)
+        return _link_names(self)
 
     def link_of(self, geometry: Any) -> str:
         """Name of the link that carries a geometry object of this robot."""
@@ -200,15 +202,7 @@ class Robot:
         return frames
 
     def fk_batch(self, Q: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
-        """Forward kinematics of a batch: T_world_tip (or another frame) as matrices.
-
-        Args:
-            Q: Shape (m, dof).
-            frame: Frame or link name; the tip if None.
-
-        Returns:
-            Shape (m, 4, 4).
-        """
+        """Forward kinematics of Q, shape (m, dof): T_world_tip, or of another frame or link. Shape (m, 4, 4)."""
         return self._poses(self._rows(Q), self._frame_id(frame))
 
     def _poses(self, rows: Matrix, frame: int, joint_frames: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
@@ -276,6 +270,11 @@ class Robot:
 @lru_cache(maxsize=64)
 def _widened_limits(robot: Robot, tolerance: float) -> tuple[Vector, Vector]:
     return robot.lower - tolerance, robot.upper + tolerance
+
+
+@lru_cache(maxsize=64)
+def _link_names(robot: Robot) -> tuple[str, ...]:
+    return tuple(f.name for f in robot.model.frames if f.type == pin.FrameType.BODY)
 
 
 @lru_cache(maxsize=256)

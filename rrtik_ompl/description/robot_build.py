@@ -103,6 +103,7 @@ def build_robot(
     return Robot(
         name=name,
         joint_names=actuated,
+        movable=frozenset(movable),
         tip=tip_name,
         postures=MappingProxyType(named),
         allowed_collisions=frozenset(frozenset(pair) for pair in allowed_collisions),

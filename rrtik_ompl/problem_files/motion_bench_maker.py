@@ -11,7 +11,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.sections import parse
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
 from rrtik_ompl.goal import Goal, JointGoal, PoseGoal, PositionGoal
@@ -94,13 +94,10 @@ def _robot(name: FilePath, request: RequestMessage) -> Robot:
     base = request.start_state.base_pose()
     if not np.array_equal(base.homogeneous, np.eye(4)):
         options["base_pose"] = base
-    moved = load_robot(name, **options).joint_names
-    locked = {joint: value for joint, value in request.start_state.values().items() if joint not in moved}
-    try:
-        return load_robot(name, locked=locked, **options)
-    except UnknownNameError as error:  # a joint of the start state that this robot has fixed or does not have
-        held = {joint: value for joint, value in locked.items() if joint in error.alternatives}
-        return load_robot(name, locked=held, **options)
+    free = load_robot(name, **options)
+    held = free.movable.difference(free.joint_names)  # the start state may name joints that this robot has fixed
+    locked = {joint: value for joint, value in request.start_state.values().items() if joint in held}
+    return load_robot(name, locked=locked, **options)
 
 
 def _scene(document: YamlDocument, message: SceneMessage, robot: Robot) -> Scene:
