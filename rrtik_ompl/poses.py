@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError
 
 IDENTITY_QUATERNION = (0.0, 0.0, 0.0, 1.0)  # x, y, z, w
@@ -111,18 +111,17 @@ def rpy_matrices(angles: Matrix) -> NDArray[np.float64]:
     return matrices
 
 
-def joint_motions(axis: Vector, prismatic: bool, values: Vector) -> NDArray[np.float64]:
-    """Transforms of one joint for many values, shape (m, 4, 4): a translation, or Rodrigues' rotation formula."""
-    motion = np.zeros((len(values), 4, 4))
-    motion[:, [0, 1, 2, 3], [0, 1, 2, 3]] = 1.0
-    if prismatic:
-        motion[:, :3, 3] = values[:, None] * axis
-        return motion
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    sine, cosine = np.sin(values)[:, None, None], np.cos(values)[:, None, None]
-    motion[:, :3, :3] += sine * cross + (1.0 - cosine) * (cross @ cross)
-    return motion
+def joint_motions(axes: Matrix, prismatic: Mask, values: Matrix) -> NDArray[np.float64]:
+    """Transforms of n joints for values of shape (m, n): translations, or Rodrigues' rotation formula. (m, n, 4, 4)."""
+    motions = np.zeros((*values.shape, 4, 4))
+    motions[..., [0, 1, 2, 3], [0, 1, 2, 3]] = 1.0
+    cross = np.zeros((len(axes), 3, 3))
+    cross[:, [2, 0, 1], [1, 2, 0]], cross[:, [1, 2, 0], [2, 0, 1]] = axes, -axes
+    cross[prismatic] = 0.0  # they do not turn
+    sine, cosine = np.sin(values)[..., None, None], np.cos(values)[..., None, None]
+    motions[..., :3, :3] += sine * cross + (1.0 - cosine) * (cross @ cross)
+    motions[..., :3, 3][:, prismatic] = values[:, prismatic, None] * axes[prismatic]
+    return motions
 
 
 def cross_products(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:

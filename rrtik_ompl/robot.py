@@ -196,9 +196,9 @@ class Robot:
         values = self.joint_values(rows)
         frames = np.empty((len(rows), len(self.chain.parent) + 1, 4, 4))
         frames[:, 0] = np.eye(4)
+        motions = joint_motions(self.chain.axis, self.chain.prismatic, values)
         for k, parent in enumerate(self.chain.parent):
-            motion = joint_motions(self.chain.axis[k], bool(self.chain.prismatic[k]), values[:, k])
-            frames[:, k + 1] = frames[:, parent + 1] @ self.chain.placement[k] @ motion
+            frames[:, k + 1] = frames[:, parent + 1] @ self.chain.placement[k] @ motions[:, k]
         return frames
 
     def fk_batch(self, Q: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
