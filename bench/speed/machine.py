@@ -24,4 +24,4 @@ def machine() -> str:
 
 def lanes() -> str:
     """Width of the kernels on this machine."""
-    return "none, plain numpy" if library("kernels") is None else f"{WIDTH} lanes"
+    return "none, plain numpy" if library("checks.check_kernels") is None else f"{WIDTH} lanes"
