@@ -3,7 +3,7 @@
     python bench/whole_calls/calls.py FOLDER
 
 FOLDER holds mbm_panda and mbm_ur5. Lengths are compared with the shortest known ones (`best_known.py`). Processor time
-of this version; the bars name what the version before measured.
+of this version.
 """
 
 from __future__ import annotations
@@ -63,20 +63,18 @@ class Case:
     """One problem of a set.
 
     Attributes:
-        arm: Of the set.
         file: Its scene.
         problem: Loaded.
     """
 
-    arm: str
     file: str
     problem: Problem
 
 
-def loaded(files: Iterable[str], arm: str) -> list[Case]:
+def loaded(files: Iterable[str]) -> list[Case]:
     """The problems of files."""
     found = [(file, problem_of(file, balls=False)) for file in files]
-    return [Case(arm, file, problem) for file, problem in found if problem is not None]
+    return [Case(file, problem) for file, problem in found if problem is not None]
 
 
 def default_plans(report: Report, cases: dict[str, list[Case]], known: set[str]) -> None:
@@ -101,7 +99,7 @@ def default_plans(report: Report, cases: dict[str, list[Case]], known: set[str])
 
 
 def shortenings(report: Report, cases: dict[str, list[Case]]) -> None:
-    """`shorten(path, problem)` without limits, and for 100 checks."""
+    """`shorten(path, problem)` without limits, and for 200 checks."""
     rows = []
     for arm, them in cases.items():
         whole, brief, gains, early = [], [], [], []
@@ -212,7 +210,7 @@ def main() -> int:
     warnings.simplefilter("ignore")
     files = {arm: scene_files(given.folder, arm, given.problems) for arm in ("panda", "ur5")}
     known = {file for arm in files for file in the_70(given.folder, arm)}
-    cases = {arm: loaded(them, arm) for arm, them in files.items()}
+    cases = {arm: loaded(them) for arm, them in files.items()}
     report = Report("Whole calls: the others", "python bench/whole_calls/calls.py FOLDER")
     default_plans(report, cases, known)
     shortenings(report, cases)

@@ -9,6 +9,7 @@ from rrtik_ompl import Cylinder, Obstacle, Scene, World, load_problem, load_robo
 from rrtik_ompl.pilot.devices.arm import joint_rates
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
 from rrtik_ompl.pilot.lamps import stage_poses
+from rrtik_ompl.pilot.routes import route_search
 from rrtik_ompl.pilot.routes.approach import MAX_JOINTS, MAX_OFFSET, MAX_TILT, STANDOFF_FACTORS, approaches
 from rrtik_ompl.pilot.routes.clearance import executions, free_rows
 from rrtik_ompl.pilot.routes.follower import slack
@@ -17,6 +18,7 @@ from rrtik_ompl.pilot.routes.route import route_to, route_to_grasp
 from rrtik_ompl.pilot.routes.route_search import GraspRoute, RouteSearch
 from rrtik_ompl.pilot.surroundings import Surroundings
 from rrtik_ompl.sensing.scene_from_view import SeenObject
+from rrtik_ompl.world import proof
 
 PROBLEM = load_problem("titan4_sdu")
 ROBOT, RATES = PROBLEM.robot, joint_rates(PROBLEM.robot)
@@ -116,6 +118,15 @@ def test_a_route_that_is_proven_is_taken_before_others_and_one_that_is_not_says_
     unsure = replace(routes[0], path=routes[0].path.with_waypoints(over[0]), proven=False)
     assert "not proven free" in unsure.summary()
     assert "not proven" not in routes[0].summary()
+
+
+def test_where_nothing_can_be_proven_no_planner_is_asked_for_a_proven_route(monkeypatch):
+    monkeypatch.setattr(proof, "library", lambda name: None)  # as without kernels
+    monkeypatch.setattr(route_search, "planned", lambda *given: pytest.fail("a planner was asked"))
+    route = route_to(PROBLEM.world, np.array(PROBLEM.start), np.array(PROBLEM.goal.q), RATES, 1)
+    assert not route.path.violations(PROBLEM.world)
+    assert not route.proven
+    assert "not proven free" in route.summary()
 
 
 def test_an_arm_that_stands_in_something_is_told_so():

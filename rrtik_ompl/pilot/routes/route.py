@@ -139,5 +139,5 @@ def _route(world: World, holding: World, q: Vector, tails: Sequence[Tail], rates
     seconds = sum(abs(move.change) / rates[names.index(move.joint)] for move in moves)
     used = tuple(name for name in names if any(move.joint == name for move in moves))
     travel = sum(abs(move.change) for move in moves)
-    figures = travel, float(seconds), float(clearance), used, search.robustness(found), search.proven(found)
-    return Route(path, found.grasp_from, *figures)
+    robustness, proven = search.robustness(found), search.proven(found)
+    return Route(path, found.grasp_from, travel, float(seconds), float(clearance), used, robustness, proven)

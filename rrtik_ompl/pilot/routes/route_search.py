@@ -46,7 +46,7 @@ class RouteSearch:
         self._slack = slack(self._path)
 
     def find(self, tails: Sequence[Tail]) -> GraspRoute | NoRoute:
-        """The best route; one that is not proven free only where no other is found.
+        """The best route; one that is not proven free only where no other is found, or none can be proven.
 
         Args:
             tails: Last parts, grouped by where they begin; the best beginning first.
@@ -57,7 +57,7 @@ class RouteSearch:
         unproven = None
         for routes in (self._all_direct(tails), self._around(tails[0])):
             best = self._best(routes)
-            if best is not None and self.proven(best):
+            if best is not None and (self.proven(best) or not self._provable(tails[0])):
                 return best
             unproven = unproven or best
         first = planned(self._world, self._q, tails[0][0][0], self._seed)
@@ -77,6 +77,11 @@ class RouteSearch:
     def proven(self, route: GraspRoute) -> bool:
         """Whether all moves of a route are proven free for their whole length."""
         return all(world.prove(rows).proven for world, rows in self._parts(route) if len(rows) > 1)
+
+    def _provable(self, tail: Tail) -> bool:
+        """Whether there may be a proven route: not without kernels, nor where an end cannot be proven."""
+        end = tail[0][-1]
+        return self._world.motion_proven(self._q, self._q) and self._holding.motion_proven(end, end)
 
     def _all_direct(self, tails: Sequence[Tail]) -> Iterator[GraspRoute]:
         return (route for tail in tails for route in self._direct(tail))
