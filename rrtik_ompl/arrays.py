@@ -14,6 +14,7 @@ Matrix: TypeAlias = NDArray[np.float64]  # shape (m, n)
 Mask: TypeAlias = NDArray[np.bool_]  # shape (m,)
 
 TAU = 2.0 * np.pi  # [rad] a full turn
+LARGEST = 1e6  # [m] or [rad]; numbers beyond are a slip of the pen, and the kernels' float32 cannot hold them
 
 
 def frozen(values: ArrayLike, dtype: Any = np.float64) -> NDArray[Any]:
@@ -51,6 +52,18 @@ def finite_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) ->
     return array
 
 
+def bounded_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) -> NDArray[np.float64]:
+    """As :func:`finite_array`, of numbers that reach the tables of the kernels: none beyond ``LARGEST``.
+
+    Raises:
+        InputError: As :func:`finite_array`, or if a number is larger.
+    """
+    array = finite_array(values, shape, what)
+    if (largest := np.abs(array).max(initial=0.0)) > LARGEST:
+        raise InputError(f"{what}: found {largest:g}, more than {LARGEST:g}; check units: metres, radians")
+    return array
+
+
 def _has_shape(array: NDArray[np.float64], shape: tuple[int | None, ...]) -> bool:
     return array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape, strict=True))
 
@@ -81,6 +94,15 @@ def positive(value: ArrayLike, what: str, remedy: str = "") -> float:
     if number <= 0.0:
         raise InputError(f"{what}: must be greater than 0, got {number:g}" + (f"; {remedy}" if remedy else ""))
     return number
+
+
+def length(value: ArrayLike, what: str) -> float:
+    """A length of a solid [m] given by a user: greater than 0, at most ``LARGEST``.
+
+    Raises:
+        InputError: If it is none.
+    """
+    return positive(bounded_array(value, (), what), what)
 
 
 def not_negative(value: ArrayLike, what: str) -> float:

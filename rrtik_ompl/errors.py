@@ -8,6 +8,15 @@ from types import UnionType
 from typing import NoReturn, get_args
 
 
+def printable(text: str) -> str:
+    """The text with every letter that a terminal would obey instead of showing it, or cannot show, spelt out."""
+    return text if text.isprintable() else "".join(c if c.isprintable() else _spelt(c) for c in text)
+
+
+def _spelt(letter: str) -> str:
+    return letter.encode("unicode_escape").decode("ascii")
+
+
 class RrtikError(Exception):
     """Root of every error raised on purpose by the toolkit.
 
@@ -15,7 +24,7 @@ class RrtikError(Exception):
     """
 
     def __init__(self, message: str) -> None:
-        super().__init__(" ".join(str(message).split()))
+        super().__init__(printable(" ".join(str(message).split())))
 
 
 class InputError(RrtikError):
@@ -76,6 +85,30 @@ def require(value: object, kind: type | UnionType, what: str, remedy: str = "") 
         wanted = " or ".join(each.__name__ for each in get_args(kind) or (kind,))
         hint = f"; {remedy}" if remedy else ""
         raise InputError(f"{what} must be of type {wanted}, got {type(value).__name__}{hint}")
+
+
+def name_of(value: object, what: str) -> str:
+    """A name of a link, joint or solid: text that can be shown and written to a file.
+
+    Raises:
+        InputError: If it is no text, or has letters that no terminal shows.
+    """
+    require(value, str, f"name of {what}")
+    name = str(value)
+    if not name.isprintable():
+        raise InputError(f"name of {what}: '{name}' has letters that cannot be shown; rename it")
+    return name
+
+
+def at_most(count: float, limit: float, what: str, remedy: str = "") -> None:
+    """Refuse a number of things above what is sensible.
+
+    Raises:
+        InputError: It says the number and the limit.
+    """
+    if count > limit:
+        hint = f"; {remedy}" if remedy else ""
+        raise InputError(f"{what}: {count:.0f} are more than the {limit:.0f} that are allowed{hint}")
 
 
 class MeshWarning(UserWarning):

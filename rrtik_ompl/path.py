@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
-from rrtik_ompl.errors import InputError, in_file, require
+from rrtik_ompl.arrays import LARGEST, Mask, Matrix, Vector, finite_array, frozen, positive
+from rrtik_ompl.errors import InputError, in_file, name_of, require
 from rrtik_ompl.files.tables import FORMATS, dumps, loads
 from rrtik_ompl.files.text import known_ending, read_text, write_text
 from rrtik_ompl.robot import Robot
@@ -32,7 +32,7 @@ from rrtik_ompl.world.kept_clearance import CLEARANCE
 from rrtik_ompl.world.route_check import VERIFICATION_DENSITY as VERIFICATION_DENSITY
 from rrtik_ompl.world.route_check import Violation, route_violations, verification_resolution
 
-MAX_VALUE = 1e6  # of a joint [rad or m], as everywhere in our files
+MAX_VALUE = LARGEST  # of a joint [rad or m]
 
 
 class Move(NamedTuple):
@@ -93,7 +93,8 @@ class JointPath:
                 f"path waypoints: found {np.abs(rows).max():g}, more than {MAX_VALUE:g} rad or m; check units"
             )
         count = rows.shape[1]
-        names = tuple(f"joint{k + 1}" for k in range(count)) if joint_names is None else tuple(joint_names)
+        joint_names = (f"joint{k + 1}" for k in range(count)) if joint_names is None else joint_names
+        names = tuple(name_of(name, "a joint of a path") for name in joint_names)
         kinds = (prismatic, continuous)
         sliding, endless = (np.zeros(count, dtype=bool) if k is None else np.asarray(k, dtype=bool) for k in kinds)
         if not len(names) == count == sliding.size == endless.size:

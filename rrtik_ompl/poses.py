@@ -9,13 +9,14 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
+from rrtik_ompl.arrays import LARGEST, Mask, Matrix, Vector, bounded_array, finite_array, frozen
 from rrtik_ompl.errors import InputError
 
 IDENTITY_QUATERNION = (0.0, 0.0, 0.0, 1.0)  # x, y, z, w
 LAST_ROW = frozen([0.0, 0.0, 0.0, 1.0])  # of every pose
 LAST_ROW_TOLERANCE = 1e-8
-NOT_RIGID = 1e-3  # largest entry of R^T R - 1 that still counts as rounding of a file
+NOT_RIGID = 1e-6  # largest entry of R R^T - 1 that still counts as rounding, and is removed
+ROUNDING = 1e-12  # the same of a rotation that stays as it is
 
 
 def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), quat_xyzw: ArrayLike = IDENTITY_QUATERNION, what: str = "pose") -> Any:
@@ -24,7 +25,7 @@ def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), quat_xyzw: ArrayLike = IDENTITY_QUATE
     Raises:
         InputError: If a number is not finite, or the quaternion's length differs from 1 by more than 1e-3.
     """
-    position = finite_array(xyz, (3,), f"{what}: xyz")
+    position = bounded_array(xyz, (3,), f"{what}: xyz")
     quaternion = finite_array(quat_xyzw, (4,), f"{what}: quat_xyzw")
     length = float(np.linalg.norm(quaternion))
     if abs(length - 1.0) > 1e-3:
@@ -35,8 +36,8 @@ def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), quat_xyzw: ArrayLike = IDENTITY_QUATE
 
 def pose_from_rpy(xyz: ArrayLike, rpy: ArrayLike, what: str = "pose") -> Any:
     """Make a pose from a position [m] and fixed-axis roll, pitch, yaw [rad] (URDF's convention)."""
-    roll, pitch, yaw = finite_array(rpy, (3,), f"{what}: rpy")
-    return pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), finite_array(xyz, (3,), f"{what}: xyz"))
+    roll, pitch, yaw = bounded_array(rpy, (3,), f"{what}: rpy")
+    return pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), bounded_array(xyz, (3,), f"{what}: xyz"))
 
 
 def quaternion_xyzw(placement: Any) -> Vector:
@@ -46,15 +47,20 @@ def quaternion_xyzw(placement: Any) -> Vector:
 
 
 def rigid(T: Any, what: str) -> Any:
-    """A pose given as ``pinocchio.SE3`` or as a matrix, shape (4, 4).
+    """A copy of a pose given as ``pinocchio.SE3`` or as a matrix, shape (4, 4): every pose from outside passes here.
+
+    What rounding has left of a rotation, up to ``NOT_RIGID``, is made one again.
 
     Raises:
-        InputError: If it is neither, or scales, skews or mirrors.
+        InputError: If it is neither, has a number that is not finite, lies beyond ``LARGEST`` [m], or scales, skews or
+            mirrors.
     """
     matrix = finite_array(T.homogeneous if isinstance(T, pin.SE3) else T, (4, 4), what)
     x, y, z, last = matrix.tolist()  # numbers of Python's own: four rows are too few for numpy
     if max(abs(last[0]), abs(last[1]), abs(last[2]), abs(last[3] - 1.0)) > LAST_ROW_TOLERANCE:
         raise InputError(f"{what}: the last row must be 0 0 0 1, got {last}")
+    if max(abs(x[3]), abs(y[3]), abs(z[3])) > LARGEST:
+        raise InputError(f"{what}: its position {[x[3], y[3], z[3]]} is farther than {LARGEST:g} m away; check units")
     lengths, corners = (_dot(x, x), _dot(y, y), _dot(z, z)), (_dot(x, y), _dot(y, z), _dot(z, x))
     off = max(*(abs(square - 1.0) for square in lengths), *map(abs, corners))  # lengths first: they are never nan
     if off > NOT_RIGID:
@@ -66,6 +72,9 @@ def rigid(T: Any, what: str) -> Any:
         raise InputError(
             f"{what}: its upper left 3 x 3 part mirrors (determinant -1); make it orthonormal and right-handed"
         )
+    if off > ROUNDING:
+        outer, _, inner = np.linalg.svd(matrix[:3, :3])  # the nearest rotation
+        return pin.SE3(outer @ inner, matrix[:3, 3])
     return pin.SE3(matrix)
 
 

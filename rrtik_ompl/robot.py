@@ -14,7 +14,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.poses import cross_products, joint_motions
 from rrtik_ompl.units import shown_unit
 
@@ -100,7 +100,7 @@ class Robot:
         return _link_names(self)
 
     def link_of(self, geometry: Any) -> str:
-        """Name of the link that carries a geometry object of this robot."""
+        """Name of the link of a geometry object."""
         return str(self.model.frames[geometry.parentFrame].name)
 
     def configuration(self, values: ArrayLike, what: str = "configuration") -> Vector:
@@ -279,6 +279,7 @@ def _link_names(robot: Robot) -> tuple[str, ...]:
 
 @lru_cache(maxsize=256)
 def _frame_number(robot: Robot, name: str) -> int:
+    require(name, str, f"frame of robot '{robot.name}'")
     if not robot.model.existFrame(name):
         raise UnknownNameError(f"frame of robot '{robot.name}'", name, (f.name for f in robot.model.frames))
     return int(robot.model.getFrameId(name))

@@ -11,8 +11,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Vector, finite_array, frozen
-from rrtik_ompl.errors import InputError, UnknownNameError, require
+from rrtik_ompl.arrays import LARGEST, Vector, bounded_array, finite_array, finite_number, frozen
+from rrtik_ompl.errors import InputError, UnknownNameError, name_of, require
+from rrtik_ompl.poses import rigid
 from rrtik_ompl.shapes import SHAPES, Shape
 
 
@@ -23,10 +24,16 @@ class ConstantVelocity:
     velocity: Vector
 
     def __init__(self, velocity: ArrayLike) -> None:
-        object.__setattr__(self, "velocity", frozen(finite_array(velocity, (3,), "motion velocity")))
+        object.__setattr__(self, "velocity", frozen(bounded_array(velocity, (3,), "motion velocity")))
 
     def pose_at(self, start: pin.SE3, time: float) -> pin.SE3:
-        """Pose at ``time`` [s] of an obstacle that is at ``start`` at time 0."""
+        """Pose at ``time`` [s] of an obstacle that is at ``start`` at time 0.
+
+        Raises:
+            InputError: If it has left the world by then.
+        """
+        if not abs(time) * float(np.abs(self.velocity).max()) <= LARGEST:
+            raise InputError(f"motion: at {time:g} s an obstacle of velocity {self.velocity.tolist()} m/s is far away")
         return pin.SE3(start.rotation, start.translation + time * self.velocity)
 
     def seen_from(self, time: float) -> ConstantVelocity:
@@ -43,7 +50,8 @@ class TimedPoses:
     poses: tuple[pin.SE3, ...]
 
     def __init__(self, times: ArrayLike, poses: Iterable[pin.SE3]) -> None:
-        stamps, stations = finite_array(times, (None,), "motion times"), tuple(poses)
+        stamps = finite_array(times, (None,), "motion times")
+        stations = tuple(rigid(pose, f"motion: pose {k}") for k, pose in enumerate(poses, start=1))
         if len(stamps) == 0 or len(stamps) != len(stations):
             raise InputError(
                 f"motion needs as many times as poses, at least one; got {len(stamps)} and {len(stations)}"
@@ -72,13 +80,18 @@ class TimedPoses:
 Motion: TypeAlias = ConstantVelocity | TimedPoses
 
 
-def _check_solid(name: object, shape: object, pose: object) -> None:
-    require(name, str, "name of an obstacle or attached object")
+def _checked_solid(name: object, shape: object, pose: object) -> pin.SE3:
+    """The pose of an obstacle or attached object, if all three are what they have to be.
+
+    A pose that is not finite would compare as farther away than anything, and what is there would not be seen.
+    """
+    name_of(name, "an obstacle or attached object")
     if not isinstance(shape, Shape):
         kinds = " or ".join(kind.__name__ for kind in SHAPES.values())
         found = f"must be of type {kinds}, got {type(shape).__name__}"
         raise InputError(f"shape of '{name}' {found}; use rrtik_ompl.shapes")
     require(pose, pin.SE3, f"pose of '{name}'", "use rrtik_ompl.poses.pose(xyz, quat_xyzw)")
+    return rigid(pose, f"pose of '{name}'")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,9 +113,9 @@ class Obstacle:
     margin: float = 0.0
 
     def __post_init__(self) -> None:
-        _check_solid(self.name, self.shape, self.pose)
+        object.__setattr__(self, "pose", _checked_solid(self.name, self.shape, self.pose))
         require(self.motion, Motion | None, f"motion of '{self.name}'")
-        margin = float(finite_array(self.margin, (), f"margin of '{self.name}'"))
+        margin = float(bounded_array(self.margin, (), f"margin of '{self.name}'"))
         if margin < 0.0:
             raise InputError(f"margin of '{self.name}' must be 0 metres or more, got {margin:g}")
         object.__setattr__(self, "margin", margin)
@@ -119,7 +132,7 @@ class AttachedObject:
     allow: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        _check_solid(self.name, self.shape, self.pose)
+        object.__setattr__(self, "pose", _checked_solid(self.name, self.shape, self.pose))
         if not self.shape.bounded:
             raise InputError("a half-space cannot be attached to a link")
 
@@ -168,7 +181,12 @@ class Scene:
         raise UnknownNameError("obstacle", name, (o.name for o in self.obstacles))
 
     def at(self, time: float) -> Scene:
-        """The scene with ``time`` [s] as its time 0: moving obstacles are where their motion puts them, and go on."""
+        """The scene with ``time`` [s] as its time 0: moving obstacles are where their motion puts them, and go on.
+
+        Raises:
+            InputError: If the time is not finite, or an obstacle has left the world by then.
+        """
+        time = finite_number(time, "time of a scene")
         if all(o.motion is None for o in self.obstacles):
             return self
         moved = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from rrtik_ompl.benchmark.sources import file_source
 from rrtik_ompl.benchmark.suite import Entrant, Suite
 from rrtik_ompl.benchmark.suite_file import NONE, SHORTENINGS
 from rrtik_ompl.choices import SuiteShortening, one_of
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, is_auto, options_of, refuse_options
 
 
@@ -54,8 +54,9 @@ def plan_batch(
         UnknownNameError: If there is no such problem, planner, parameter or method of shortening.
         InputError: If a number makes no sense, a file is not there, or the scheduler cannot be used.
     """
-    if isinstance(problems, str | os.PathLike):
-        raise InputError(f"problems must be a list of names or files, got '{os.fspath(problems)}'")
+    if isinstance(problems, str | os.PathLike) or not isinstance(problems, Iterable):
+        raise InputError(f"problems must be a list of names or files, got {problems!r:.80}")
+    require(parameters, Mapping | None, "parameters of a planner", "use {name of an option: value}")
     named = [file_source(os.fspath(each), Path.cwd()) for each in problems]
     limit = positive(seconds, "seconds")
     suite = Suite(

@@ -45,7 +45,7 @@ class Contact:
         if self.distance > 0.0:
             return f"{pair} are {1e3 * self.distance:.4g} mm apart, within the margin of {1e3 * self.margin:.4g} mm"
         known = np.isfinite(self.point_first).all()
-        return f"{pair} overlap{f' by {-1e3 * self.distance:.3g} mm' if known else ''}"
+        return f"{pair} overlap{f' by {1e3 * abs(self.distance):.3g} mm' if known else ''}"
 
 
 def measured(
@@ -80,10 +80,9 @@ def inside(first: str, second: str) -> Contact:
 def _distance(ends: tuple[Any, Any, Any, Any], *, depth: bool) -> tuple[float, Vector, Vector]:
     """Signed distance of two geometries at their places [m], and the points that it is between."""
     touching, result = coal.CollisionResult(), coal.DistanceResult()
-    meshes = depth and is_mesh(ends[0]) and is_mesh(ends[2])
+    distance = float(coal.distance(*ends, coal.DistanceRequest(), result))
+    meshes = depth and distance <= 0.0 and is_mesh(ends[0]) and is_mesh(ends[2])
     if meshes and coal.collide(*ends, request(0.0), touching):
-        result = touching.getContact(0)  # between two meshes that touch coal knows no distance
+        result = touching.getContact(0)  # between two meshes that overlap coal knows no distance
         distance = float(result.penetration_depth)
-    else:
-        distance = float(coal.distance(*ends, coal.DistanceRequest(), result))
     return distance, np.array(result.getNearestPoint1()), np.array(result.getNearestPoint2())

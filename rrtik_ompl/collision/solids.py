@@ -9,7 +9,7 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import LARGEST, Matrix, Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
 
@@ -17,8 +17,8 @@ from rrtik_ompl.robot import Robot
 # contains the mesh, so nothing that touches the mesh is missed.
 CONVEX_VOLUME_RATIO = 0.999
 
-# Hulls outside these are refused: thickness over extent, and extent [m].
-FLATTEST, SMALLEST, LARGEST = 1e-7, 1e-6, 1e6
+# Hulls below these are refused: thickness over extent, and extent [m].
+FLATTEST, SMALLEST = 1e-7, 1e-6
 
 
 def bvh(vertices: Matrix, triangles: NDArray[np.int64]) -> Any:

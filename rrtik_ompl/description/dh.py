@@ -11,11 +11,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import finite_array
+from rrtik_ompl.arrays import bounded_array, finite_array
 from rrtik_ompl.choices import DhConvention
 from rrtik_ompl.description.robot_build import JointLimits, build_robot
 from rrtik_ompl.description.tree import Joint, Link, Solid, Tree
 from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.poses import rigid
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.shapes import Capsule
 
@@ -103,7 +104,7 @@ def robot_from_dh(
     if convention not in CONVENTIONS:
         raise UnknownNameError("DH convention", convention, CONVENTIONS, where=f"robot '{name}'")
     radii = _radii(name, radius, len(table))
-    T_last_tip = pin.SE3.Identity() if tool is None else tool
+    T_last_tip = pin.SE3.Identity() if tool is None else rigid(tool, f"robot '{name}': tool")
     before, after = _fixed_parts(table, convention, T_last_tip)
     names = ["base", *(f"link{k}" for k in range(1, len(table) + 1))]
     joints = [
@@ -142,13 +143,13 @@ def _checked(name: str, rows: Iterable[DhRow]) -> list[DhRow]:
         if row.kind not in ROW_KINDS:
             raise UnknownNameError("joint type", row.kind, ROW_KINDS, where=where)
         for key in ("a", "alpha", "d", "theta"):
-            finite_array(getattr(row, key), (), f"{where}: {key}")
+            bounded_array(getattr(row, key), (), f"{where}: {key}")
     return table
 
 
 def _radii(name: str, radius: float | Sequence[float], count: int) -> list[float]:
     values = np.asarray(radius, dtype=np.float64)
-    values = finite_array(np.full(count, values) if values.ndim == 0 else values, (count,), f"robot '{name}': radius")
+    values = bounded_array(np.full(count, values) if values.ndim == 0 else values, (count,), f"robot '{name}': radius")
     if (values < 0.0).any():
         raise InputError(f"robot '{name}': radius must not be negative, got {values.min():g}")
     return [max(float(value), SMALLEST_RADIUS) for value in values]

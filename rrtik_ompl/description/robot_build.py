@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import TAU, Vector, finite_array, frozen
+from rrtik_ompl.arrays import LARGEST, TAU, Vector, bounded_array, frozen
+from rrtik_ompl.description.robot_source import BasePose
+from rrtik_ompl.description.robot_source import base_pose as checked_base
 from rrtik_ompl.description.tree import Joint, Tree
 from rrtik_ompl.description.tree_model import build_models
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.robot import Chain, Robot
-
-if TYPE_CHECKING:
-    from rrtik_ompl.description.robot_source import BasePose
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +27,9 @@ class Mimic:
     source: str
     multiplier: float = 1.0
     offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        bounded_array([self.multiplier, self.offset], (2,), f"joint '{self.joint}': multiplier and offset")
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +92,7 @@ def build_robot(
                 "give that one limits"
             )
     held = _held_values(name, movable, actuated, ties, locked or {})
-    model, collision, visual = build_models(tree.hold(held), base_pose)
+    model, collision, visual = build_models(tree.hold(held), checked_base(base_pose, f"robot '{name}': base_pose"))
     tip_name = _last_link(tree, actuated) if tip is None else tip
     if not model.existFrame(tip_name):
         raise UnknownNameError(f"frame of robot '{name}' for the tip", tip_name, (f.name for f in model.frames))
@@ -151,7 +153,7 @@ def _held_values(
     for joint in movable.values():
         neutral = 0.0 if joint.kind == "continuous" else min(max(0.0, joint.lower), joint.upper)
         given = locked.get(joint.name, neutral)
-        values[joint.name] = float(finite_array(given, (), f"robot '{name}': locked value of joint '{joint.name}'"))
+        values[joint.name] = float(bounded_array(given, (), f"robot '{name}': locked value of joint '{joint.name}'"))
     for tie in ties.values():
         if tie.joint not in locked:
             values[tie.joint] = tie.multiplier * values[tie.source] + tie.offset
@@ -199,8 +201,10 @@ def _limits(name: str, joints: Iterable[Joint], given: Mapping[str, JointLimits]
                 f"robot '{name}': joint '{joint.name}' has limits {low:g} .. {high:g}; "
                 "lower must be below upper: correct the limits, or leave the joint out of joints=[...]"
             )
-        if joint.kind == "prismatic" and not np.isfinite([low, high]).all():
-            raise InputError(f"robot '{name}': prismatic joint '{joint.name}' needs finite limits, in metres")
+        if joint.kind == "prismatic" and not max(abs(low), abs(high)) <= LARGEST:
+            raise InputError(
+                f"robot '{name}': prismatic joint '{joint.name}' needs finite limits, in metres, up to {LARGEST:g}"
+            )
         rates = [joint.velocity if wanted.velocity is None else wanted.velocity]
         rates += [np.inf if rate is None else rate for rate in (wanted.acceleration, wanted.jerk)]
         for what, rate in zip(("velocity", "acceleration", "jerk"), rates, strict=True):

@@ -11,8 +11,9 @@ from typing import Any, TypeAlias
 import numpy as np
 import pinocchio as pin
 
+from rrtik_ompl.arrays import finite_array
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.poses import pose, pose_from_rpy, quaternion_xyzw
+from rrtik_ompl.poses import pose, pose_from_rpy, quaternion_xyzw, rigid
 
 BasePose: TypeAlias = "pin.SE3 | Mapping[str, Sequence[float]] | None"
 POSE_KEYS = ("xyz", "quat_xyzw", "rpy_deg")
@@ -48,7 +49,7 @@ def base_pose(value: BasePose, what: str = "base_pose") -> pin.SE3 | None:
         InputError: If it is neither, or a key or number in it makes no sense.
     """
     if value is None or isinstance(value, pin.SE3):
-        return value
+        return None if value is None else rigid(value, what)
     if not isinstance(value, Mapping):
         raise InputError(f"{what}: expected a pinocchio.SE3 or {{xyz: [x, y, z], quat_xyzw: [x, y, z, w]}}")
     for key in value:
@@ -59,4 +60,4 @@ def base_pose(value: BasePose, what: str = "base_pose") -> pin.SE3 | None:
         return pose(xyz, value.get("quat_xyzw", (0.0, 0.0, 0.0, 1.0)), what)
     if "quat_xyzw" in value:
         raise InputError(f"{what}: give quat_xyzw or rpy_deg, not both")
-    return pose_from_rpy(xyz, np.radians(np.asarray(value["rpy_deg"], dtype=np.float64)), what)
+    return pose_from_rpy(xyz, np.radians(finite_array(value["rpy_deg"], (3,), f"{what}: rpy_deg")), what)

@@ -16,8 +16,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Vector, finite_array, frozen
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.arrays import Vector, bounded_array, frozen
+from rrtik_ompl.errors import InputError, UnknownNameError, name_of
+from rrtik_ompl.poses import rigid
 from rrtik_ompl.shapes import Shape
 
 KINDS = ("revolute", "continuous", "prismatic", "fixed")
@@ -41,6 +42,9 @@ class Solid:
     shape: Shape | MeshFile
     T_link_solid: Any = field(default_factory=pin.SE3.Identity)
     colour: tuple[float, float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_link_solid", rigid(self.T_link_solid, "pose of a solid in its link"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,12 +92,13 @@ class Joint:
         upper: float = np.pi,
         velocity: float = np.inf,
     ) -> None:
-        direction = finite_array(axis, (3,), f"joint '{name}': axis")
+        direction = bounded_array(axis, (3,), f"joint '{name}': axis")
         length = float(np.linalg.norm(direction))
         if length < 1e-9:
             raise InputError(f"joint '{name}': axis is the zero vector; give a direction such as 0 0 1")
+        where = f"joint '{name}': pose in its parent"
         values = {"name": name, "kind": kind, "parent": parent, "child": child, "lower": lower, "upper": upper}
-        values |= {"T_parent_joint": pin.SE3.Identity() if T_parent_joint is None else pin.SE3(T_parent_joint)}
+        values |= {"T_parent_joint": pin.SE3.Identity() if T_parent_joint is None else rigid(T_parent_joint, where)}
         values |= {"axis": frozen(direction / length), "velocity": velocity}
         for key, value in values.items():
             object.__setattr__(self, key, value)
@@ -177,7 +182,9 @@ def _check_names(tree: Tree) -> None:
         twice = [name for name, count in Counter(names).items() if count > 1]
         if twice:
             raise InputError(f"{tree.where}: {what} name '{twice[0]}' stands there twice; rename one")
-    known = [link.name for link in tree.links]
+        for name in names:
+            name_of(name, f"a {what} of {tree.where}")
+    known = {link.name for link in tree.links}
     for joint in tree.joints:
         for role, link in (("parent", joint.parent), ("child", joint.child)):
             if link not in known:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,14 +9,14 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from rrtik_ompl.arrays import bounded_array
 from rrtik_ompl.collision.shape_table import pieces
 from rrtik_ompl.description.tree import Joint, Link, MeshFile, Tree
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.mesh import MAX_BYTES, finite_numbers
 from rrtik_ompl.files.text import read_bytes
 
 GREY = (0.7, 0.7, 0.7, 1.0)
-MAX_MESH_BYTES = 256 * 1024 * 1024
-_NOT_FINITE = re.compile(rb"[\s>][-+]?(nan|inf)(inity)?[\s<]", re.IGNORECASE)
 
 
 def build_models(tree: Tree, T_world_base: pin.SE3 | None = None) -> tuple[Any, Any, Any]:
@@ -125,7 +124,7 @@ def _geometry(tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any]
 
 def _load(mesh: MeshFile, meshes: dict[MeshFile, Any], where: str) -> coal.CollisionGeometry:
     if mesh not in meshes:
-        if not _finite(read_bytes(mesh.path, MAX_MESH_BYTES)):
+        if not finite_numbers(read_bytes(mesh.path, MAX_BYTES)):
             raise InputError(f"{where}: mesh {mesh.path} holds numbers that are not finite; export it again")
         try:
             meshes[mesh] = coal.MeshLoader().load(str(mesh.path), np.array(mesh.scale))
@@ -133,13 +132,5 @@ def _load(mesh: MeshFile, meshes: dict[MeshFile, Any], where: str) -> coal.Colli
             raise InputError(
                 f"{where}: mesh {mesh.path} cannot be read as triangles; export it again as STL, OBJ or DAE"
             ) from error
+        bounded_array(meshes[mesh].vertices(), (None, 3), f"{where}: mesh {mesh.path}: vertices")
     return meshes[mesh]
-
-
-def _finite(data: bytes) -> bool:
-    """Whether a mesh file is free of NaN and infinity, about which the C++ library would write to the terminal."""
-    count = int.from_bytes(data[80:84], "little")
-    if len(data) == 84 + 50 * count:  # binary STL: per triangle twelve floats and two bytes
-        rows = np.frombuffer(data, dtype=[("corners", "<f4", 12), ("rest", "<u2")], offset=84)
-        return bool(np.isfinite(rows["corners"]).all())
-    return _NOT_FINITE.search(data) is None

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -21,6 +20,11 @@ from rrtik_ompl.shapes import Mesh
 
 SUFFIXES = (".stl", ".obj", ".dae")
 MAX_BYTES = 256 * 1024 * 1024
+# In a text: nan, inf, and what overflows float32, in which assimp reads.
+_NOT_FINITE = re.compile(
+    rb"[\s>][-+]?(?:(?:nan|inf)(?:inity)?|[0-9.]+e\+?0*(?:[0-9]{3,}|[4-9][0-9]|39)|[0-9]{39,}[0-9.]*)(?=[\s<]|$)",
+    re.IGNORECASE,
+)
 
 
 def load_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
@@ -46,6 +50,8 @@ def load_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
     data = read_bytes(path, MAX_BYTES)
     if not data:
         raise InputError(f"{path}: the file is empty; export the mesh again")
+    if not finite_numbers(data):
+        raise InputError(f"{path}: not a usable mesh: it holds numbers that are not finite; export it again")
     vertices, triangles = _read(path, factor * _stated_unit(path, data))
     mesh = Mesh(vertices, triangles, source=os.path.abspath(path), scale=factor)
     if not mesh.closed:
@@ -58,8 +64,7 @@ def load_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
 
 def _read(path: str | os.PathLike[str], scale: float) -> tuple[Matrix, NDArray[np.int64]]:
     try:
-        with _silent_stderr():  # coal prints on numbers that are not finite before we can refuse them
-            model = coal.MeshLoader().load(os.fspath(path), np.full(3, scale))
+        model = coal.MeshLoader().load(os.fspath(path), np.full(3, scale))
     except (ValueError, RuntimeError) as error:
         raise InputError(f"{path}: not a usable mesh: {_reason(error)}; export it again as STL, OBJ or DAE") from error
     corners: list[Any] = [model.tri_indices(k) for k in range(model.num_tris)]
@@ -98,14 +103,10 @@ def _volume(mesh: Mesh) -> float:
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
 
-@contextmanager
-def _silent_stderr() -> Iterator[None]:
-    """Send what C++ writes to file descriptor 2 to nowhere."""
-    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 2)
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nowhere)
+def finite_numbers(data: bytes) -> bool:
+    """Whether a mesh file is free of NaN and infinity, about which the C++ library would write to the terminal."""
+    count = int.from_bytes(data[80:84], "little")
+    if len(data) == 84 + 50 * count:  # binary STL: per triangle twelve floats and two bytes
+        rows = np.frombuffer(data, dtype=[("corners", "<f4", 12), ("rest", "<u2")], offset=84)
+        return bool(np.isfinite(rows["corners"]).all())
+    return _NOT_FINITE.search(data) is None

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
+from rrtik_ompl.arrays import LARGEST
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, describe
 from rrtik_ompl.files.text import is_number
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 
-LARGEST, SMALLEST = 1e6, 1e-6  # [m]; geometry beyond is a slip of the pen and breaks collision checking
+SMALLEST = 1e-6  # [m]; geometry below is a slip of the pen and breaks collision checking
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=LARGEST)]

@@ -13,7 +13,7 @@ import yaml
 
 from rrtik_ompl.errors import InputError, RrtikError
 from rrtik_ompl.files.text import file_name, read_text, write_text
-from rrtik_ompl.files.yaml_values import Builder, Group, plain_value
+from rrtik_ompl.files.yaml_values import MAX_DEPTH, Builder, Group, plain_value
 from rrtik_ompl.files.yaml_values import Location as Location
 from rrtik_ompl.files.yaml_values import key_path as key_path
 
@@ -76,6 +76,8 @@ def read_yaml(path: str | os.PathLike[str]) -> YamlDocument:
     try:
         builder.read(text)
     except yaml.MarkedYAMLError as error:
+        if "nesting depth" in (error.problem or ""):  # libyaml's own limit, met before its events reach ours
+            raise InputError(f"{path}: nested deeper than {MAX_DEPTH} levels") from error
         raise InputError(_syntax(file, text, error)) from error
     except yaml.YAMLError as error:  # a control character, most often
         raise InputError(f"{path}: not valid YAML: {str(error).splitlines()[0]}; is it a text file?") from error

@@ -87,7 +87,10 @@ def table_rows(text: str, separator: str | None) -> tuple[list[str] | None, list
         raise InputError("the file is empty; expected one configuration a line")
     names = None
     if separator is not None:
-        names = [name.strip() for name in next(csv.reader(io.StringIO(lines[0][1])))]
+        try:
+            names = [name.strip() for name in next(csv.reader(io.StringIO(lines[0][1])))]
+        except csv.Error as error:
+            raise InputError(f"line {lines[0][0]}: no names of joints: {error}") from None
         if all(is_number(name) for name in names):
             raise InputError("line 1: expected the names of the joints, found numbers; add a line of names")
         lines = lines[1:]

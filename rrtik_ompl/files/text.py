@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import secrets
+import stat
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -53,38 +55,57 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
     Raises:
         InputError: If the folder does not exist or the file cannot be written.
     """
-    write_bytes(path, text.encode("utf-8"))
+    try:
+        data = text.encode("utf-8")
+    except UnicodeEncodeError as error:
+        found = text[error.start].encode("unicode_escape").decode("ascii")
+        raise InputError(f"{path}: cannot be written: a name in it holds {found}, half a letter; rename it") from None
+    write_bytes(path, data)
 
 
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
     """Write a file so that an interruption leaves the old file or the new one, never a half.
 
-    The data goes to a temporary name in the same folder, which then takes the place of the old file. Devices and
-    pipes (``/dev/stdout``) are written directly.
+    The data goes to a temporary name in the same folder, which then takes the place of the old file, and its mode.
+    Devices and pipes (``/dev/stdout``) are written directly.
 
     Raises:
-        InputError: If the folder does not exist or the file cannot be written.
+        InputError: If the folder does not exist, or the file cannot be written or is write-protected.
     """
     name = file_name(path)
     try:
         target = Path(os.path.realpath(name))  # a link stays a link: the file it points to is replaced
-        temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-        if target.exists() and not target.is_file() and not target.is_dir():
-            target.write_bytes(data)
-            return
         if target.is_dir():
             raise IsADirectoryError(None, "this is a folder; give a file name")
-        try:
-            temporary.write_bytes(data)
-            os.replace(temporary, target)
-        finally:
-            temporary.unlink(missing_ok=True)
+        if target.exists() and not target.is_file():
+            target.write_bytes(data)
+        else:
+            _replace(target, data)
     except FileNotFoundError:
         folder = name.parent
         remedy = "no file can be made in it; choose another one" if folder.is_dir() else "does not exist; create it"
         raise InputError(f"{path}: cannot be written: folder '{folder}': {remedy}") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be written: {getattr(error, 'strerror', None) or error}") from error
+
+
+def _replace(target: Path, data: bytes) -> None:
+    """Write a file aside, under a name of its own, and let it take the place of another."""
+    try:
+        mode = stat.S_IMODE(target.stat().st_mode)
+    except FileNotFoundError:
+        mode = None
+    if mode is not None and (not mode & 0o222 or not os.access(target, os.W_OK)):
+        raise PermissionError(None, "it is write-protected; choose another name")
+    temporary = target.with_name(f".{secrets.token_hex(8)}.tmp")
+    try:
+        with open(temporary, "xb") as file:
+            file.write(data)
+        if mode is not None:
+            temporary.chmod(mode)
+        os.replace(temporary, target)
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
 def make_folder(path: str | os.PathLike[str]) -> None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from typing import Any, TypeGuard
 
 from ompl import base as ob
 
 from rrtik_ompl.arrays import finite_array
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner, keyword_parameters
 from rrtik_ompl.problem import Problem
@@ -65,13 +66,15 @@ def other_planner(
         InputError: If it refuses an option.
     """
     planner = factory(si)
+    require(planner, ob.Planner, f"what planner '{name}' makes of a SpaceInformation")
     try:
         for key, value in options.items():
             _check_names(type(planner), name, (key,))
             _set(planner, name, key, value)
     except InputError:
         planner.setProblemDefinition(definition)  # AORRTC ends the process if it is destroyed before it was set up
-        planner.setup()
+        with suppress(RuntimeError):  # which may refuse as much
+            planner.setup()
         raise
     return planner
 
@@ -91,6 +94,8 @@ def _set(planner: ob.Planner, name: str, key: str, value: object) -> None:
         getattr(planner, setter)(value)
     except TypeError:
         raise InputError(f"planner {name}: parameter {key} cannot be {value!r}") from None
+    except (RuntimeError, ValueError, OverflowError) as error:  # what its C++ says of a number out of range
+        raise InputError(f"planner {name}: parameter {key} cannot be {value!r}: {error}") from None
 
 
 def _snake(setter: str) -> str:

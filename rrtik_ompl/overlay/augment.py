@@ -19,6 +19,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.overlay.canvas import NEAREST_DRAWN, Canvas
 from rrtik_ompl.overlay.figure import Figure, figure_of, placed, tinted
 from rrtik_ompl.overlay.surfaces import ROBOT_TRIANGLES, obstacle_surfaces, robot_surfaces
+from rrtik_ompl.poses import rigid
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle
 from rrtik_ompl.sensing.cameras.camera import Camera
@@ -138,7 +139,7 @@ class Augmenter:
         if picture.shape[:2] != (height, width):
             raise InputError(f"picture has shape {picture.shape[:2]}, the camera's has {(height, width)}")
         drawn: NDArray[np.uint8] = np.array(picture if picture.ndim == 3 else cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR))
-        T_camera_base = T_base_camera.inverse().homogeneous
+        T_camera_base = rigid(T_base_camera, "pose of the camera").inverse().homogeneous
         hidden_by = self._depths(real, T_camera_base)
         for ghost in ghosts:
             self._draw_ghost(drawn, ghost, T_camera_base, hidden_by)

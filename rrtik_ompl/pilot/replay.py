@@ -122,7 +122,5 @@ def _check(entry: Entry, robot: Robot, marker_map: MarkerMap) -> None:
 def _seen(marker_map: MarkerMap, entry: Entry) -> SeenObject:
     thing = marker_map.named(entry["name"])
     xyz, turn = finite_array(entry["xyz"], (3,), "xyz"), finite_array(entry["rotation"], (3, 3), "rotation")
-    if not np.allclose(turn @ turn.T, np.eye(3), atol=1e-6):
-        raise InputError(f"rotation of {thing.name} is none")
     spread = finite_array(entry.get("covariance", np.zeros((6, 6))), (6, 6), "covariance")
     return SeenObject(thing, pin.SE3(turn, xyz), spread, None, entry.get("sigmas", SIGMAS))

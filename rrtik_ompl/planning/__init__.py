@@ -84,6 +84,7 @@ def plan(
         raise InputError(f"seconds must be {MAX_SECONDS:g} or less, got {limit:g}")
     if isinstance(restarts, bool) or not isinstance(restarts, int) or not 0 <= restarts <= MAX_RESTARTS:
         raise InputError(f"restarts must be a whole number from 0 to {MAX_RESTARTS}, got {restarts!r}")
+    require(parameters, Mapping | None, "parameters of a planner", "use {name of an option: value}")
     used = int(np.random.default_rng().integers(2**31)) if seed is None else whole_number(seed, "seed")
     one_of(PROOF_MODES, proof, "proof")
     request = Request(limit, used, restarts, parameters or {}, proof, clearance)

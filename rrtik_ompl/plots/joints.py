@@ -53,8 +53,9 @@ def plot_joints(motion: Trajectory | JointPath, file: str | os.PathLike[str]) ->
         panel.set_ylabel(f"{name} [{unit}{power}]")
     panels[-1].set_xlabel(label)
     lines = {line.get_label(): line for panel in panels for line in panel.get_lines()}
-    handles = [lines[name] for name in motion.joint_names]
-    figure.legend(handles, motion.joint_names, loc="outside upper center", ncols=min(len(handles), 6), frameon=False)
+    names = [_plain(name) for name in motion.joint_names]
+    handles = [lines[name] for name in names]
+    figure.legend(handles, names, loc="outside upper center", ncols=min(len(handles), 6), frameon=False)
     save_figure(figure, file)
 
 
@@ -71,6 +72,11 @@ def save_figure(figure: Figure, file: str | os.PathLike[str], *, dpi: int = 150)
     with matplotlib.rc_context({"svg.hashsalt": "rrtik", "svg.fonttype": "none"}):
         figure.savefig(picture, format=ending[1:], dpi=dpi, metadata=metadata)
     write_bytes(file, picture.getvalue())
+
+
+def _plain(name: str) -> str:
+    """A name as a label that matplotlib takes for no formula, and does not leave out of a legend."""
+    return " " * name.startswith("_") + name.replace("$", r"\$")
 
 
 def tidy(panel: Axes, *, grid: bool = True) -> None:
@@ -99,6 +105,6 @@ def _draw(panel: Axes, over: Vector, values: Matrix, mask: NDArray[np.bool_], mo
         style: dict[str, Any] = {"color": COLORS[k % len(COLORS)]}
         style["linestyle"] = DASHES[k // len(COLORS) % len(DASHES)]
         marker: dict[str, Any] = {"marker": "o", "markersize": 3} if isinstance(motion, JointPath) else {}
-        panel.plot(over, values[:, k], label=motion.joint_names[k], linewidth=1.6, **style, **marker)
+        panel.plot(over, values[:, k], label=_plain(motion.joint_names[k]), linewidth=1.6, **style, **marker)
     tidy(panel)
     panel.margins(x=0.01)

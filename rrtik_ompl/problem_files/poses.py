@@ -60,7 +60,10 @@ def load_poses(path: str | os.PathLike[str]) -> NDArray[np.float64]:
 
 
 def _from_csv(path: str | os.PathLike[str]) -> NDArray[np.float64]:
-    lines = [row for row in csv.reader(io.StringIO(read_text(path))) if any(cell.strip() for cell in row)]
+    try:
+        lines = [row for row in csv.reader(io.StringIO(read_text(path))) if any(cell.strip() for cell in row)]
+    except csv.Error as error:
+        raise InputError(f"{path}: not a table of poses: {error}") from None
     names = [name.strip().lower() for name in lines[0]] if lines else []
     extra = tuple(name for name in names if name not in POSITION)
     if sorted(names) not in [sorted(POSITION + more) for more in ((), QUATERNION, ANGLES)]:

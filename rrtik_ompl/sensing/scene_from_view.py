@@ -8,9 +8,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, finite_array
+from rrtik_ompl.arrays import Matrix, finite_array, frozen
 from rrtik_ompl.collision.extent import farthest
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.poses import rigid
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.frames import base_from_camera, place_in_base
@@ -41,6 +42,9 @@ class SeenObject:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sigmas", checked_sigmas(self.sigmas))
+        where = f"object '{self.object.name}'"
+        object.__setattr__(self, "T_base_object", rigid(self.T_base_object, f"{where}: its pose"))
+        object.__setattr__(self, "covariance", frozen(finite_array(self.covariance, (6, 6), f"{where}: covariance")))
 
     @property
     def position_sigma(self) -> float:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import TAU, Matrix, Vector, finite_array, frozen, positive
+from rrtik_ompl.arrays import TAU, Matrix, Vector, bounded_array, frozen, length
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.shapes.half_space import HalfSpace
 from rrtik_ompl.shapes.mesh import Mesh
@@ -50,7 +50,7 @@ class Box(Shape):
     size: Vector
 
     def __init__(self, size: ArrayLike) -> None:
-        sides = finite_array(size, (3,), "box size")
+        sides = bounded_array(size, (3,), "box size")
         if (sides <= 0.0).any():
             raise InputError(f"box size must be three numbers greater than 0, got {sides.tolist()}")
         object.__setattr__(self, "size", frozen(sides))
@@ -86,7 +86,7 @@ class Sphere(Shape):
     radius: float
 
     def __post_init__(self) -> None:
-        positive(self.radius, "sphere radius")
+        object.__setattr__(self, "radius", length(self.radius, "sphere radius"))
 
     @property
     def bounding_radius(self) -> float:
@@ -115,8 +115,8 @@ class Cylinder(Shape):
     length: float
 
     def __post_init__(self) -> None:
-        positive(self.radius, "cylinder radius")
-        positive(self.length, "cylinder length")
+        object.__setattr__(self, "radius", length(self.radius, "cylinder radius"))
+        object.__setattr__(self, "length", length(self.length, "cylinder length"))
 
     @property
     def bounding_radius(self) -> float:
@@ -150,8 +150,8 @@ class Capsule(Shape):
     length: float
 
     def __post_init__(self) -> None:
-        positive(self.radius, "capsule radius")
-        positive(self.length, "capsule length")
+        object.__setattr__(self, "radius", length(self.radius, "capsule radius"))
+        object.__setattr__(self, "length", length(self.length, "capsule length"))
 
     @property
     def bounding_radius(self) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Vector, finite_array, frozen
+from rrtik_ompl.arrays import Vector, bounded_array, finite_number, frozen
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.shapes.shape import Measure, Shape
 from rrtik_ompl.shapes.surfaces import Triangles
@@ -28,12 +28,13 @@ class HalfSpace(Shape):
     offset: float
 
     def __init__(self, normal: ArrayLike, offset: float = 0.0) -> None:
-        direction = finite_array(normal, (3,), "half-space normal")
+        direction = bounded_array(normal, (3,), "half-space normal")
         length = float(np.linalg.norm(direction))
         if length < 1e-9:
             raise InputError("half-space normal must not be the zero vector")
+        scaled = finite_number(offset, "half-space offset") / length
         object.__setattr__(self, "normal", frozen(direction / length))
-        object.__setattr__(self, "offset", float(finite_array(offset, (), "half-space offset")) / length)
+        object.__setattr__(self, "offset", float(bounded_array(scaled, (), "half-space offset")))
 
     @property
     def bounding_radius(self) -> float:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Matrix, finite_array, frozen
+from rrtik_ompl.arrays import Matrix, bounded_array, finite_array, frozen, positive
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.shapes.shape import Shape
 from rrtik_ompl.shapes.surfaces import Triangles
@@ -35,11 +35,14 @@ class Mesh(Shape):
 
     def __init__(self, vertices: ArrayLike, triangles: ArrayLike, source: str = "", scale: float = 1.0) -> None:
         what = f"mesh {source}" if source else "mesh"
-        points = finite_array(vertices, (None, 3), f"{what}: vertices")
+        points = bounded_array(vertices, (None, 3), f"{what}: vertices")
         faces = np.asarray(triangles)
         if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
             raise InputError(f"{what}: needs at least one triangle (three vertex numbers each); export it triangulated")
-        faces = finite_array(faces, (None, 3), f"{what}: triangles").astype(np.int64)
+        numbers = finite_array(faces, (None, 3), f"{what}: triangles")
+        if (odd := numbers[numbers != np.floor(numbers)]).size:
+            raise InputError(f"{what}: vertex numbers of triangles must be whole, got {odd[0]:g}")
+        faces = numbers.astype(np.int64)
         if faces.min() < 0 or faces.max() >= len(points):
             raise InputError(f"{what}: a triangle names vertex {int(faces.max())}, but there are only {len(points)}")
         points, faces = _welded(points, faces)
@@ -48,7 +51,7 @@ class Mesh(Shape):
         object.__setattr__(self, "vertices", frozen(points))
         object.__setattr__(self, "triangles", frozen(faces, np.int64))
         object.__setattr__(self, "source", source)
-        object.__setattr__(self, "scale", float(scale))
+        object.__setattr__(self, "scale", positive(scale, f"{what}: scale"))
         object.__setattr__(self, "open_edges", _open_edges(faces))
 
     @property

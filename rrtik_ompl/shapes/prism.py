@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Matrix, finite_array, frozen, positive
+from rrtik_ompl.arrays import Matrix, bounded_array, frozen, length
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.shapes.polygons import check_simple, without_repeats
 from rrtik_ompl.shapes.shape import Measure, Shape
@@ -35,12 +35,12 @@ class Prism(Shape):
     height: float
 
     def __init__(self, polygon: ArrayLike, height: float = 1.0) -> None:
-        vertices = without_repeats(finite_array(polygon, (None, 2), "polygon"))
+        vertices = without_repeats(bounded_array(polygon, (None, 2), "polygon"))
         if len(vertices) < 3:
             raise InputError(f"polygon needs at least 3 different vertices, got {len(vertices)}")
         check_simple(vertices)
         object.__setattr__(self, "polygon", frozen(vertices))
-        object.__setattr__(self, "height", positive(height, "polygon height"))
+        object.__setattr__(self, "height", length(height, "polygon height"))
 
     @property
     def bounding_radius(self) -> float:

@@ -154,6 +154,7 @@ def shorten(
         True
     """
     require(path, JointPath, "path to shorten", "a plan has one if plan.found")
+    require(rules, MoveRules | None, "rules of a path to shorten")
     single = _single(path, method, one_joint) or rules is not None
     chosen = _checked(path, problem, method, seconds, checks, seed, single, clearance)
     head, tail = _parts(path.waypoints, rules)

@@ -224,8 +224,8 @@ class World:
 
     def steps(self, a: ArrayLike, b: ArrayLike, resolution: float | None = None) -> int:
         """Number of steps in which a motion is checked: the bound on the arm's displacement over the resolution."""
-        start, end = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
-        return int(step_counts(start, end, self.weights, self.motion_resolution if resolution is None else resolution))
+        size = self.motion_resolution if resolution is None else positive(resolution, "resolution", "give metres")
+        return int(step_counts(self._rows(a, 1), self._rows(b, 1), self.weights, size)[0])
 
     def contacts(self, q: ArrayLike) -> tuple[Contact, ...]:
         """Every pair of bodies that touches or is within its margin at q, deepest first; empty if q is free."""

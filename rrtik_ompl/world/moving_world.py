@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Vector, finite_array
+from rrtik_ompl.arrays import Mask, Vector, finite_array, not_negative
 from rrtik_ompl.choices import Accuracy
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.certificate import fixed_contact
@@ -108,8 +108,7 @@ class MovingWorld:
         for name, metres in (inflation or {}).items():
             if name not in self._known:
                 raise UnknownNameError("obstacle", name, self._known, where="inflation")
-            if not metres >= 0.0:
-                raise InputError(f"inflation: that of '{name}' must be 0 metres or more, got {metres}")
+            not_negative(metres, f"inflation of '{name}' [m]")
         for k, body in enumerate(self._bodies):
             if body.kind == "obstacle":
                 pose, margin = places[min(self._copy[k], len(places) - 1)][body.name]

@@ -1,10 +1,14 @@
 """Mesh files: every format and its scale, closed or open, and that a broken one is one line and never a crash."""
 
+import os
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.errors import InputError, MeshWarning
 from rrtik_ompl.files.mesh import load_mesh
 
@@ -182,3 +186,30 @@ def test_a_damaged_file_gives_a_mesh_or_one_line(tmp_path, name, wounds):
     except InputError as error:
         message = str(error)
     assert name in message if message else np.isfinite(mesh.vertices).all()
+
+
+@pytest.mark.parametrize("number", ["nan", "-inf", "1e999", "1.5E+0308", "1e39", "9" * 60])
+def test_numbers_that_are_not_finite_are_refused_before_c_sees_them(tmp_path, capfd, number):
+    file = tmp_path / "a.stl"
+    file.write_bytes(stl_text().replace(b"vertex 1 0 0", f"vertex {number} 0 0".encode()))
+    urdf = f"""<robot name="arm"><link name="a"><collision><geometry><mesh filename="{file}"/></geometry></collision>
+        </link><link name="b"/><joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint></robot>"""
+    for load in (lambda: load_mesh(file), lambda: robot_from_urdf_text(urdf)):
+        with pytest.raises(InputError, match="not finite"):
+            load()
+    assert capfd.readouterr().err == ""
+
+
+def test_a_mesh_beyond_the_world_is_refused(tmp_path):
+    file = tmp_path / "a.stl"
+    file.write_bytes(stl_text().replace(b"vertex 1 0 0", b"vertex 1e30 0 0"))
+    with pytest.raises(InputError, match="check units"):
+        load_mesh(file)
+
+
+def test_threads_that_read_meshes_leave_standard_error_alone(tmp_path):
+    (tmp_path / "a.stl").write_bytes(stl_text())
+    before = os.fstat(2)
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(lambda _: load_mesh(tmp_path / "a.stl"), range(200)))
+    assert os.path.samestat(before, os.fstat(2))

@@ -220,5 +220,6 @@ def test_libyaml_and_the_parser_in_python_build_the_same(tmp_path, monkeypatch, 
             document = read(tmp_path, text)
             found.append((document.data, document.lines))
         except InputError as error:
-            found.append(str(error).partition(" (")[0])  # the parsers' own words for what is no YAML differ
+            said = str(error).partition(" (")[0]  # the parsers' own words for what is no YAML differ
+            found.append(said if "nested deeper" not in said else "nested deeper")  # libyaml may not say where
     assert found[0] == found[1]

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.overlay.augment import Augmenter
+from rrtik_ompl.poses import rigid
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.sensing.cameras.camera import Camera
@@ -54,8 +55,9 @@ class SimulatedCamera:
             T_base_camera: Pose of the camera.
             seed: Of the noise.
         """
-        self.camera, self.marker_map, self.T_base_camera = camera, marker_map, T_base_camera
-        self.places = dict(places)
+        self.camera, self.marker_map = camera, marker_map
+        self.T_base_camera = rigid(T_base_camera, "pose of the camera")
+        self.places = {name: rigid(T, f"pose of object '{name}'") for name, T in places.items()}
         self._scene, self._arm = scene, Augmenter(robot, camera, TRIANGLES)
         rng, size = np.random.default_rng(seed), (camera.height, camera.width, 1)
         grey = [np.rint(rng.normal(0.0, NOISE, size)).astype(np.int16) for _ in range(NOISE_PICTURES)]

@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from rrtik_ompl.arrays import Matrix, frozen, not_negative
 from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.poses import rigid
 from rrtik_ompl.scene import Obstacle
 from rrtik_ompl.sensing.markers.corner_pose import square_corners
 
@@ -28,6 +29,7 @@ class MountedMarker:
     T_object_marker: pin.SE3 = field(default_factory=pin.SE3.Identity)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "T_object_marker", rigid(self.T_object_marker, f"marker {self.number}: its pose"))
         if not 0.0 < self.side < 100.0:
             raise InputError(f"marker {self.number}: side must be between 0 and 100 m, got {self.side:g}")
 
@@ -55,7 +57,8 @@ class GraspType:
 
     def __init__(self, name: str, levels: Iterable[pin.SE3], approach: float = 0.1, lift: float = 0.1) -> None:
         object.__setattr__(self, "name", name)
-        object.__setattr__(self, "levels", tuple(levels))
+        poses = (rigid(T, f"grasp type '{name}': level {k}") for k, T in enumerate(levels, start=1))
+        object.__setattr__(self, "levels", tuple(poses))
         for word, value in (("approach", approach), ("lift", lift)):
             object.__setattr__(self, word, not_negative(value, f"grasp type '{name}': {word}"))
         if not self.levels:
@@ -123,6 +126,8 @@ class MarkerMap:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "objects", tuple(self.objects))
+        if self.T_base_camera is not None:
+            object.__setattr__(self, "T_base_camera", rigid(self.T_base_camera, "pose of the camera"))
         for what, names in (
             ("object", [o.name for o in self.objects]),
             ("marker", [m.number for o in self.objects for m in o.markers]),

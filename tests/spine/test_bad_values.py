@@ -1,0 +1,84 @@
+"""Values that make no sense where no file says them: one line of ours, never an error of Python or of a library."""
+
+import numpy as np
+import pytest
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.errors import InputError, RrtikError
+from rrtik_ompl.world.moving_world import MovingWorld
+
+
+def world():
+    return rrtik.World(
+        rrtik.load_robot("planar3"), rrtik.Scene([rrtik.Obstacle("far", rrtik.Sphere(0.1), rrtik.pose([9, 9, 9]))])
+    )
+
+
+def small():
+    return rrtik.Problem(world(), [0, 0, 0], [0.5, 0, 0])
+
+
+def inflated(metres):
+    MovingWorld(world()).move(world().scene, inflation={"far": metres})
+
+
+def straight():
+    return rrtik.JointPath.of(small().robot, [[0, 0, 0], [0.5, 0, 0]])
+
+
+NAN = float("nan")
+CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+OMPL_OPTIONS = {
+    "KPIECE1": {"border_fraction": 2.0},
+    "FMT": {"free_space_volume": -1.0},
+    "BFMT": {"radius_multiplier": 0.0},
+    "BITstar": {"prune_threshold_fraction": -1.0},
+}
+CASES = {
+    "resolution below 0": (lambda: world().with_resolution(-1), "motion_resolution: must be greater than 0"),
+    "steps of NaN": (lambda: world().steps([NAN, 0, 0], [0, 0, 0]), "finite"),
+    "steps of size 0": (lambda: world().steps([0, 0, 0], [1, 0, 0], 0.0), "resolution: must be greater than 0"),
+    "frame of a number": (lambda: small().robot.fk([0, 0, 0], 5), "frame of robot 'planar3' must be of type str"),
+    "parameters in a list": (lambda: rrtik.plan(small(), parameters=["range"]), "parameters of a planner"),
+    "batch of nothing": (lambda: rrtik.plan_batch(None), "problems must be a list"),
+    "batch with a list": (lambda: rrtik.plan_batch(["planar3_boxes"], parameters=[1]), "parameters of a planner"),
+    "planner that makes nothing": (lambda: rrtik.plan(small(), lambda si: None), "type Planner, got NoneType"),
+    "rules in a list": (lambda: rrtik.shorten(straight(), small(), rules=["joint1"]), "rules.*MoveRules"),
+    "half a vertex": (lambda: rrtik.Mesh(CORNERS, [[0, 1.5, 2]]), "whole, got 1.5"),
+    "scale of a mesh": (lambda: rrtik.Mesh(CORNERS, [[0, 1, 2]], scale=NAN), "scale"),
+    "escape in a name": (lambda: rrtik.Obstacle("a\x1b]0;b\x07", rrtik.Sphere(1)), r"a\\x1b\]0;b\\x07"),
+    "half a letter in a name": (lambda: rrtik.JointPath([[0.0]], ["\ud800"]), r"\\ud800"),
+    "number as a name": (lambda: rrtik.JointPath([[0.0]], [3]), "name of a joint of a path"),
+    "inflation of NaN": (lambda: inflated(NAN), "inflation of 'far'"),
+    "inflation without end": (lambda: inflated(np.inf), "inflation"),
+} | {
+    f"option of {name}": (
+        lambda name=name, given=given: rrtik.plan(small(), name, parameters=given),
+        f"planner {name}.*cannot be",
+    )
+    for name, given in OMPL_OPTIONS.items()
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_it_is_refused_in_one_line(case):
+    call, message = CASES[case]
+    with pytest.raises(InputError, match=message) as caught:
+        call()
+    assert str(caught.value).isprintable()
+
+
+def test_steps_are_a_whole_number_that_grows_with_the_motion():
+    counts = [world().steps([0, 0, 0], [share, 0, 0]) for share in (0.1, 0.2, 0.4)]
+    assert 1 < counts[0] < counts[1] < counts[2]
+
+
+def test_no_message_moves_the_cursor_of_a_terminal():
+    assert str(RrtikError("a\x1b[2Jb\nc\ud800")) == "a\\x1b[2Jb c\\ud800"
+
+
+def test_names_that_matplotlib_would_read_as_formulas_are_drawn(tmp_path):
+    names = [r"$\frac$", "_hidden", "$a$"]
+    rrtik.plot_joints(rrtik.JointPath([[0, 0, 0], [1, 2, 3]], names), tmp_path / "a.svg")
+    drawn = (tmp_path / "a.svg").read_text()
+    assert [name for name in names if name not in drawn] == []
