@@ -191,7 +191,7 @@ def test_a_damaged_file_gives_a_mesh_or_one_line(tmp_path, name, wounds):
 @pytest.mark.parametrize("number", ["nan", "-inf", "1e999", "1.5E+0308", "1e39", "9" * 60])
 def test_numbers_that_are_not_finite_are_refused_before_c_sees_them(tmp_path, capfd, number):
     file = tmp_path / "a.stl"
-    file.write_bytes(stl_text().replace(b"vertex 1 0 0", f"vertex {number} 0 0".encode()))
+    file.write_bytes(stl_text().replace(b"vertex 1.0 0.0 0.0", f"vertex {number} 0 0".encode()))
     urdf = f"""<robot name="arm"><link name="a"><collision><geometry><mesh filename="{file}"/></geometry></collision>
         </link><link name="b"/><joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint></robot>"""
     for load in (lambda: load_mesh(file), lambda: robot_from_urdf_text(urdf)):
@@ -202,7 +202,7 @@ def test_numbers_that_are_not_finite_are_refused_before_c_sees_them(tmp_path, ca
 
 def test_a_mesh_beyond_the_world_is_refused(tmp_path):
     file = tmp_path / "a.stl"
-    file.write_bytes(stl_text().replace(b"vertex 1 0 0", b"vertex 1e30 0 0"))
+    file.write_bytes(stl_text().replace(b"vertex 1.0 0.0 0.0", b"vertex 1e30 0 0"))
     with pytest.raises(InputError, match="check units"):
         load_mesh(file)
 
