@@ -70,6 +70,11 @@ if TYPE_CHECKING:
     from rrtik_ompl.shortening import MoveRules as MoveRules
     from rrtik_ompl.shortening import shorten as shorten
     from rrtik_ompl.task_region import TaskRegion as TaskRegion
+    from rrtik_ompl.tip_motion import StraightResult as StraightResult
+    from rrtik_ompl.tip_motion import arc as arc
+    from rrtik_ompl.tip_motion import linear as linear
+    from rrtik_ompl.tip_motion import screw as screw
+    from rrtik_ompl.tip_motion import straight as straight
     from rrtik_ompl.trajectory import RateLimits as RateLimits
     from rrtik_ompl.trajectory import Trajectory as Trajectory
     from rrtik_ompl.trajectory import load_trajectory as load_trajectory
@@ -104,6 +109,7 @@ else:
         "shapes": ("Box", "Capsule", "Cylinder", "HalfSpace", "Mesh", "Prism", "Sphere"),
         "shortening": ("MoveRules", "shorten"),
         "task_region": ("TaskRegion",),
+        "tip_motion": ("StraightResult", "arc", "linear", "screw", "straight"),
         "trajectory": ("RateLimits", "Trajectory", "load_trajectory", "time_parameterize"),
         "viewer": ("view",),
         "world": ("World",),

@@ -47,14 +47,21 @@ def quaternion_xyzw(placement: Any) -> Vector:
 
 
 def rigid(T: Any, what: str) -> Any:
-    """A copy of a pose given as ``pinocchio.SE3`` or as a matrix, shape (4, 4): every pose from outside passes here.
+    """A copy (``pinocchio.SE3``) of a pose in any form that a person may give: every pose from outside passes here.
 
     What rounding has left of a rotation, up to ``NOT_RIGID``, is made one again.
 
+    Args:
+        T: ``pinocchio.SE3``; a matrix, shape (4, 4); a position [x, y, z] alone [m], which is not turned; with roll,
+            pitch, yaw [rad] behind it, shape (6,); or with a quaternion x, y, z, w, shape (7,).
+        what: Its name, for messages.
+
     Raises:
-        InputError: If it is neither, has a number that is not finite, lies beyond ``LARGEST`` [m], or scales, skews or
-            mirrors.
+        InputError: If it is none of these, has a number that is not finite, lies beyond ``LARGEST`` [m], or scales,
+            skews or mirrors.
     """
+    if not isinstance(T, pin.SE3) and np.ndim(T) == 1:
+        return _written_pose(T, what)
     matrix = finite_array(T.homogeneous if isinstance(T, pin.SE3) else T, (4, 4), what)
     x, y, z, last = matrix.tolist()  # numbers of Python's own: four rows are too few for numpy
     if max(abs(last[0]), abs(last[1]), abs(last[2]), abs(last[3] - 1.0)) > LAST_ROW_TOLERANCE:
@@ -76,6 +83,20 @@ def rigid(T: Any, what: str) -> Any:
         outer, _, inner = np.linalg.svd(matrix[:3, :3])  # the nearest rotation
         return pin.SE3(outer @ inner, matrix[:3, 3])
     return pin.SE3(matrix)
+
+
+def _written_pose(numbers: ArrayLike, what: str) -> Any:
+    values = finite_array(numbers, (None,), what)
+    if len(values) == 3:
+        return pin.SE3(np.eye(3), values)
+    if len(values) == 6:
+        return pose_from_rpy(values[:3], values[3:], what)
+    if len(values) == 7:
+        return pose(values[:3], values[3:], what)
+    raise InputError(
+        f"{what}: a pose is a pinocchio.SE3, a 4 x 4 matrix, [x, y, z], [x, y, z, roll, pitch, yaw] or "
+        f"[x, y, z, qx, qy, qz, qw], not {len(values)} numbers"
+    )
 
 
 def left_handed(x: Any, y: Any, z: Any) -> Any:

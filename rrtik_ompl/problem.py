@@ -57,10 +57,10 @@ class Problem:
         self.world = world
         self.name = name
         self.planner = planner
-        self.start: Vector = frozen(_usable(world, start, "start"))
+        self.start: Vector = frozen(usable_configuration(world, start, "start"))
         wanted = goal if isinstance(goal, Goal) else JointGoal(goal)
         if isinstance(wanted, JointGoal):
-            q = _usable(world, wanted.q, "goal")
+            q = usable_configuration(world, wanted.q, "goal")
             wanted = JointGoal(_nearest_turn(world, self.start, q), wanted.tolerance)
         self.goal: Goal = wanted
 
@@ -100,8 +100,13 @@ def densely_checked(problem: Problem) -> Problem:
     return problem.with_resolution(verification_resolution(problem.world))
 
 
-def _usable(world: World, values: ArrayLike, what: str) -> Vector:
-    """A configuration that can be a start or a goal: finite, inside the limits, free."""
+def usable_configuration(world: World, values: ArrayLike, what: str) -> Vector:
+    """A configuration given by a user that can be a start or a goal: finite, inside the limits, free. Shape (dof,).
+
+    Raises:
+        ProblemError: If it is in collision, within an obstacle's margin or outside the limits.
+        InputError: If it has the wrong number of joints or is not finite.
+    """
     robot = world.robot
     q = robot.configuration(values, what)
     fault = robot.limit_fault(q)

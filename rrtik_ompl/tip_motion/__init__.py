@@ -1,0 +1,255 @@
+"""Motions of the tip along straight lines, arcs and screws: joints that follow them without jumps and collisions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import Matrix, not_negative, positive, whole_number
+from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.goal import PoseGoal
+from rrtik_ompl.ik.solve import solve_ik
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.poses import rigid
+from rrtik_ompl.problem import usable_configuration
+from rrtik_ompl.tip_motion.attempts import Way, farthest, path_of
+from rrtik_ompl.tip_motion.rails import Rail, arc_rail, screw_rail, straight_rail
+from rrtik_ompl.tip_motion.values import Tolerance
+from rrtik_ompl.units import DEGREE
+from rrtik_ompl.world import World
+
+DEVIATION = 1e-4  # [m]
+TURN_DEVIATION = 0.1 * DEGREE  # [rad]
+BRANCHES = 16  # configurations of a pose from which it is tried
+NO_LENGTH = 1e-12  # [m], [rad]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StraightResult:
+    """How far the tip came.
+
+    Attributes:
+        path: Its configurations, every motion of it proven free; None if the fraction is 0.
+        fraction: Share of the way that it covers, from 0 to 1.
+        reason: Why it ends there: the limit of a joint, a singular posture, the pair in contact; "" if it is whole.
+    """
+
+    path: JointPath | None
+    fraction: float
+    reason: str
+
+
+def straight(
+    world: World,
+    q: ArrayLike | str | Any,
+    T_world_goal: Any,
+    *,
+    deviation: float = DEVIATION,
+    turn_deviation: float = TURN_DEVIATION,
+    clearance: float = 0.0,
+    seed: int = 0,
+) -> StraightResult:
+    """Move the tip in a straight line, its axes turning about one axis, as far as the arm can and nothing is touched.
+
+    The tip stays within the deviations at every point of the motions between the waypoints, not only at these: that is
+    bounded by the derivatives of the kinematics. Joints move without jumps, at most 0.25 rad or m between waypoints.
+    All motions are proven free (:meth:`World.prove`). A redundant arm uses its freedom to stay away from its limits
+    [60], and tries other ways to use it if it is stopped.
+
+    Args:
+        world: Robot and scene.
+        q: Where to begin: a configuration, shape (dof,), the name of a posture, or a pose of the tip as ``SE3`` or
+            matrix, shape (4, 4). Of the configurations at a pose that is taken from which the tip comes farthest.
+        T_world_goal: Pose of the tip at the end, see :func:`rrtik_ompl.poses.rigid`. A position alone, [x, y, z],
+            keeps the orientation of the beginning.
+        deviation: Of the tip from the line at most [m].
+        turn_deviation: Of its orientation at most [rad].
+        clearance: To be kept from every obstacle on top of its margin [m].
+        seed: Of the random numbers with which a redundant arm tries other ways.
+
+    Raises:
+        ProblemError: If q is in collision or outside the limits.
+        InputError: If an argument makes no sense.
+        UnknownNameError: If there is no posture of that name.
+
+    Example:
+        >>> import rrtik_ompl as rrtik
+        >>> world = rrtik.World(rrtik.load_robot("ur5"))
+        >>> lift = rrtik.straight(world, [0.0, -1.6, 1.8, -0.2, 1.6, 0.0], [0.45, 0.11, 0.6])
+        >>> lift.fraction, lift.path.proven
+        (1.0, True)
+    """
+
+    def rails(begin: Any) -> list[Rail]:
+        return [straight_rail(begin, _goal(T_world_goal, begin, "T_world_goal"))]
+
+    return _moved(world, q, rails, _settings(deviation, turn_deviation, clearance, seed))
+
+
+def arc(
+    world: World,
+    q: ArrayLike | str | Any,
+    T_world_goal: Any,
+    through: ArrayLike,
+    *,
+    deviation: float = DEVIATION,
+    turn_deviation: float = TURN_DEVIATION,
+    clearance: float = 0.0,
+    seed: int = 0,
+) -> StraightResult:
+    """Move the tip on the circle that leads through a point to a goal; all else is as for :func:`straight`.
+
+    Args:
+        world: Robot and scene.
+        q: Where to begin, see :func:`straight`.
+        T_world_goal: Pose of the tip at the end, see :func:`straight`.
+        through: Point of the world that the tip passes [m], shape (3,).
+        deviation: Of the tip from the line at most [m].
+        turn_deviation: Of its orientation at most [rad].
+        clearance: To be kept from every obstacle on top of its margin [m].
+        seed: Of the random numbers with which a redundant arm tries other ways.
+
+    Raises:
+        ProblemError: See :func:`straight`.
+        UnknownNameError: See there.
+        InputError: See there; also if the three points lie on a line.
+    """
+
+    def rails(begin: Any) -> list[Rail]:
+        return [arc_rail(begin, _goal(T_world_goal, begin, "T_world_goal"), through)]
+
+    return _moved(world, q, rails, _settings(deviation, turn_deviation, clearance, seed))
+
+
+def screw(
+    world: World,
+    q: ArrayLike | str | Any,
+    T_world_goal: Any,
+    *,
+    turns: int = 0,
+    deviation: float = DEVIATION,
+    turn_deviation: float = TURN_DEVIATION,
+    clearance: float = 0.0,
+    seed: int = 0,
+) -> StraightResult:
+    """Move the tip about and along one line of the world at once, as a screw, a door or a valve goes.
+
+    Args:
+        world: Robot and scene.
+        q: Where to begin, see :func:`straight`.
+        T_world_goal: Pose of the tip at the end, see :func:`straight`.
+        turns: Whole turns on top of the shortest way to the goal; a negative number turns the other way.
+        deviation: Of the tip from the line at most [m].
+        turn_deviation: Of its orientation at most [rad].
+        clearance: To be kept from every obstacle on top of its margin [m].
+        seed: Of the random numbers with which a redundant arm tries other ways.
+
+    Raises:
+        ProblemError: See :func:`straight`.
+        UnknownNameError: See there.
+        InputError: See there; also if turns are wanted of a goal that is not turned.
+    """
+
+    def rails(begin: Any) -> list[Rail]:
+        return [screw_rail(begin, _goal(T_world_goal, begin, "T_world_goal"), turns)]
+
+    return _moved(world, q, rails, _settings(deviation, turn_deviation, clearance, seed))
+
+
+def linear(
+    world: World,
+    q: ArrayLike | str | Any,
+    poses: Sequence[Any],
+    *,
+    deviation: float = DEVIATION,
+    turn_deviation: float = TURN_DEVIATION,
+    clearance: float = 0.0,
+    seed: int = 0,
+) -> StraightResult:
+    """Move the tip in straight lines from pose to pose; all else is as for :func:`straight`.
+
+    Args:
+        world: Robot and scene.
+        q: Where to begin, see :func:`straight`.
+        poses: Poses of the tip one after the other, each as ``T_world_goal`` of :func:`straight`.
+        deviation: Of the tip from the line at most [m].
+        turn_deviation: Of its orientation at most [rad].
+        clearance: To be kept from every obstacle on top of its margin [m].
+        seed: Of the random numbers with which a redundant arm tries other ways.
+
+    Raises:
+        ProblemError: See :func:`straight`.
+        InputError: See there; also if there is no pose.
+        UnknownNameError: See there.
+    """
+
+    def rails(begin: Any) -> list[Rail]:
+        stations = [begin]
+        for k, each in enumerate(poses):
+            stations.append(_goal(each, stations[-1], f"poses[{k}]"))
+        if len(stations) < 2:
+            raise InputError("poses: a motion of the tip needs at least one pose to go to")
+        return [straight_rail(a, b) for a, b in pairwise(stations)]
+
+    return _moved(world, q, rails, _settings(deviation, turn_deviation, clearance, seed))
+
+
+def begin_configurations(world: World, q: ArrayLike | str | Any, seed: int) -> Matrix:
+    """Configurations from which a motion of the tip may begin, shape (k, dof): the one given, or those of a pose.
+
+    Raises:
+        ProblemError: If it is in collision or outside the limits.
+        InputError: If no configuration is at the pose, or q is neither.
+        UnknownNameError: If there is no posture of that name.
+    """
+    robot = world.robot
+    if isinstance(q, str):
+        q = robot.posture(q)
+    if not isinstance(q, pin.SE3) and np.ndim(q) < 2:
+        return usable_configuration(world, q, "start")[None]
+    found = solve_ik(robot, PoseGoal(rigid(q, "start")), all=True, world=world, seed=seed)
+    if not found.found:
+        raise InputError(f"start: no configuration of robot '{robot.name}' is at this pose: {found.detail}")
+    return found.solutions[:BRANCHES]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Settings:
+    tolerance: Tolerance
+    clearance: float
+    seed: int
+
+
+def _settings(deviation: float, turn_deviation: float, clearance: float, seed: int) -> _Settings:
+    tolerance = Tolerance(positive(deviation, "deviation"), positive(turn_deviation, "turn_deviation"))
+    if tolerance.turn > 1.0:
+        raise InputError(f"turn_deviation must be 1 rad at most, got {tolerance.turn:g}; is it in radians?")
+    return _Settings(tolerance, not_negative(clearance, "clearance"), whole_number(seed, "seed"))
+
+
+def _goal(value: Any, begin: Any, what: str) -> Any:
+    """A pose (SE3); a position alone keeps the orientation of the beginning."""
+    goal = rigid(value, what)
+    if not isinstance(value, pin.SE3) and np.shape(value) == (3,):
+        return pin.SE3(begin.rotation, goal.translation)
+    return goal
+
+
+def _moved(
+    world: World, q: ArrayLike | str | Any, rails: Callable[[Any], list[Rail]], settings: _Settings
+) -> StraightResult:
+    """Follow the rails that begin where the tip is."""
+    require(world, World, "world", "use World(robot, scene)")
+    starts = begin_configurations(world, q, settings.seed)
+    begin = rigid(q, "start") if isinstance(q, pin.SE3) or np.ndim(q) == 2 else world.robot.fk(starts[0])
+    way = Way(tuple(rails(begin)), settings.tolerance, settings.clearance)
+    if way.measures(world.robot).sum() <= NO_LENGTH:
+        raise InputError("the tip is at the goal already: there is no line to follow")
+    made = farthest(world, way, starts, settings.seed)
+    return StraightResult(path_of(world, made), made.fraction, made.reason)
