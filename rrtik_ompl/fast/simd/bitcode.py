@@ -1,6 +1,7 @@
 """A kernel module as one piece of LLVM bitcode: numba compiles its functions, plain C functions lead to them.
 
-Bitcode is the same for every processor of a kind; code for one processor is made of it by LLVM alone.
+Bitcode is the same for every processor of a kind of machine, and is retargeted to other kinds. LLVM alone makes code of
+it, for one processor.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from numba.core.registry import cpu_target
 
 from rrtik_ompl.fast.simd import compiled
 from rrtik_ompl.fast.simd.code_files import PREFIX, Code, bitcode_key, bitcode_name, kernel_modules, write_code
+from rrtik_ompl.fast.simd.targets import Target, targets_of_this_width
 
 WHOLE = ir.IntType(64)
 RUNTIMES = ("Py", "_Py", "NRT_", "numba_", "__svml")  # beginnings of names that only Python or numba can provide
@@ -85,10 +87,39 @@ def _hide_all_but(module: Any, shown: set[str]) -> None:
     passes.run(module, builder)
 
 
+def retargeted(code: Code, target: Target) -> Code:
+    """Bitcode for another kind of machine.
+
+    Raises:
+        RuntimeError: If LLVM cannot make code for it, or finds the bitcode invalid.
+    """
+    module = llvm.parse_bitcode(code.code)
+    module.triple = target.triple
+    module.data_layout = str(target_generator(target).target_data)
+    module.verify()
+    return Code(code.entries, module.as_bitcode())
+
+
+def target_generator(target: Target, effort: int = 3) -> Any:
+    """LLVM's code generator for any processor of a kind of machine; ``effort`` is 0 to 3, LLVM's level.
+
+    Raises:
+        RuntimeError: If this LLVM was built without it.
+    """
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    return llvm.Target.from_triple(target.triple).create_target_machine(opt=effort, reloc="pic", codemodel="default")
+
+
 def write_bitcode(folder: Path) -> None:
-    """Compile all kernels into files that :mod:`rrtik_ompl.fast.simd.library` takes instead of compiling."""
+    """Compile all kernels into files that :mod:`rrtik_ompl.fast.simd.library` takes instead of compiling.
+
+    There is one file a kernel module and kind of machine that has this width.
+    """
     for name in kernel_modules():
-        write_code(folder / bitcode_name(name), bitcode_key(name), compiled_module(name))
+        code = compiled_module(name)
+        for target in targets_of_this_width():
+            write_code(folder / bitcode_name(name, target), bitcode_key(name, target), retargeted(code, target))
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from rrtik_ompl.fast.simd.processor import WIDTH, processor_identity
+from rrtik_ompl.fast.simd.targets import Target
 from rrtik_ompl.files.cache import write_whole
 
 LAYOUT = 2
@@ -90,14 +91,18 @@ def _dotted(file: Path) -> str:
     return ".".join(file.relative_to(FOLDER).with_suffix("").parts)
 
 
-def bitcode_key(name: str) -> str:
-    """What the bitcode of a kernel module depends on; the same for every processor of a kind."""
+def _contents(name: str) -> str:
     return f"layout {LAYOUT} {name} {WIDTH} lanes sources {sources_digest(name)}"
+
+
+def bitcode_key(name: str, target: Target) -> str:
+    """What the bitcode of a kernel module depends on; the same for every processor of a kind."""
+    return f"{_contents(name)} {target.name}"
 
 
 def machine_key(name: str) -> str:
     """What the machine code of a kernel module depends on."""
-    return f"{bitcode_key(name)} {processor_identity()}"
+    return f"{_contents(name)} {processor_identity()}"
 
 
 def file_name(name: str, key: str) -> str:
@@ -105,9 +110,9 @@ def file_name(name: str, key: str) -> str:
     return f"{name}-{sha256(key.encode()).hexdigest()[:24]}.code"
 
 
-def bitcode_name(name: str) -> str:
-    """Name of the file of the bitcode that the package may bring."""
-    return f"{name}-{WIDTH}.bitcode"
+def bitcode_name(name: str, target: Target) -> str:
+    """Name of the file of the bitcode that the package may bring for a kind of machine."""
+    return f"{name}-{target.name}-{WIDTH}.bitcode"
 
 
 def read_code(file: Path, key: str) -> Code | None:

@@ -28,6 +28,7 @@ from rrtik_ompl.fast.simd.code_files import (
     write_code,
 )
 from rrtik_ompl.fast.simd.processor import target_machine
+from rrtik_ompl.fast.simd.targets import UnknownMachineError, target_of, this_target
 from rrtik_ompl.files.cache import cache_folder
 from rrtik_ompl.files.notice import COMPILING, tell_once
 
@@ -83,14 +84,20 @@ _warned = False
 def _tried(name: str) -> Library | None:
     global _warned
     try:
+        this_target()  # code is not even tried on a machine that it has never been made for
         return _kept(name) or _made(name)
     except Exception as error:  # another version of a compiler may fail in any way, and numpy has the same answers
         if not _warned:
-            reason = f"{error}; install numba" if isinstance(error, ImportError) else f"{type(error).__name__}: {error}"
-            message = f"collision checks run in plain numpy, many times slower: {reason}"
+            message = f"collision checks run in plain numpy, many times slower: {_reason(error)}"
             warnings.warn(message, RuntimeWarning, stacklevel=4)
         _warned = True
         return None
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, ImportError):
+        return f"{error}; install numba"
+    return str(error) if isinstance(error, UnknownMachineError) else f"{type(error).__name__}: {error}"
 
 
 def _file(name: str) -> Path | None:
@@ -112,7 +119,8 @@ def _kept(name: str) -> Library | None:
 
 def _made(name: str) -> Library:
     """The library from the package's bitcode or else its source; kept in the user's cache if that can be written."""
-    packaged = read_code(FOLDER / bitcode_name(name), bitcode_key(name))
+    target = this_target()
+    packaged = read_code(FOLDER / bitcode_name(name, target), bitcode_key(name, target))
     code = None if packaged is None else machine_code(packaged)
     if code is None:
         from rrtik_ompl.fast.simd.bitcode import compiled_module
@@ -129,7 +137,7 @@ def _made(name: str) -> Library:
 
 
 def machine_code(bitcode: Code) -> Code | None:
-    """Bitcode as code of this processor; None if it was made for another kind of processor or a newer LLVM."""
+    """Bitcode as code of this processor; None if it was made for another kind of machine or a newer LLVM."""
     import llvmlite.binding as llvm
 
     machine = target_machine()
@@ -137,8 +145,9 @@ def machine_code(bitcode: Code) -> Code | None:
         module = llvm.parse_bitcode(bitcode.code)
     except RuntimeError:
         return None
-    if module.triple != machine.triple or module.data_layout != str(machine.target_data):
+    if target_of(module.triple) != this_target():
         return None
+    module.triple, module.data_layout = machine.triple, str(machine.target_data)  # versions of LLVM spell them anew
     return Code(bitcode.entries, machine.emit_object(module))
 
 

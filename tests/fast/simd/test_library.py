@@ -18,6 +18,7 @@ from rrtik_ompl.cli import terminal
 from rrtik_ompl.cli.app import run
 from rrtik_ompl.fast import warm_up
 from rrtik_ompl.fast.simd import bitcode, code_files, compiled, library
+from rrtik_ompl.fast.simd.targets import this_target
 from rrtik_ompl.files import notice
 
 pytestmark = pytest.mark.kernels
@@ -265,7 +266,7 @@ def packaged(cached, tmp_path, monkeypatch):
     monkeypatch.setattr(library, "FOLDER", folder)
     monkeypatch.setattr(bitcode, "compiled_module", fail)
     monkeypatch.setattr(library, "_warned", False)
-    return folder / code_files.bitcode_name(KERNELS)
+    return folder / code_files.bitcode_name(KERNELS, this_target())
 
 
 def test_bitcode_of_the_package_saves_compiling(world, packaged, cached):
@@ -315,6 +316,18 @@ def test_a_wheel_is_built_without_a_compiler(hook, monkeypatch):
     made.initialize("standard", build)
     assert build == {"force_include": {}}
     assert [message.partition(":")[0] for message in said] == ["kernels as bitcode"] * 2
+
+
+def test_a_wheel_that_must_have_all_kernels_is_not_built_without(hook, monkeypatch):
+    made, names, _ = hook
+    monkeypatch.setitem(names, "SETTING", "1")
+    ends = [sys.executable, "-c", "import sys; sys.exit(int(sys.argv[1]))"]
+    for missing in ("8", "16"):
+        monkeypatch.setitem(
+            names, "_compiler", lambda w, *_, bad=missing: subprocess.Popen([*ends, str(int(w == bad))])
+        )
+        with pytest.raises(RuntimeError, match="not all could be compiled"):
+            made.initialize("standard", {"force_include": {}})
 
 
 def test_a_damaged_cache_of_numba_is_not_trusted(tmp_path):
