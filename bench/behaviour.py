@@ -37,7 +37,7 @@ from behaviour_calls import inverse_kinematics, others, replans
 from behaviour_paths import plain, plans, shortenings, trajectories
 from behaviour_problems import Result
 
-LIBRARIES = ("ompl", "pin", "coal", "numpy", "scipy", "numba", "llvmlite", "ruckig", "toppra")
+LIBRARIES = ("ompl", "pin", "coal", "numpy", "scipy", "numba", "llvmlite")
 GROUPS = (plans, plain, shortenings, trajectories, inverse_kinematics, replans, others)
 SLOW = 5.0  # [s] a case that takes longer is named
 

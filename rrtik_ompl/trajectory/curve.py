@@ -1,82 +1,143 @@
-"""Along a curve from rest to rest in the shortest time under velocity and acceleration limits, by toppra.
+"""Curves through rounded corners: their curvature is continuous, and they leave the path no farther than is said.
 
-Source: [19].
+A path is the sum of a line and one bend a corner. Each bend is replaced by its mean over a stretch of the path, with
+the weights of a triangle whose half width is the corner's radius: a cubic in three pieces whose second derivative is
+continuous. Roundings may overlap, so that many near corners become one smooth curve; the sum stays what it is. The idea
+of rounding corners is that of [20].
 """
 
 from __future__ import annotations
 
-from itertools import pairwise
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.errors import PlannerError
-from rrtik_ompl.trajectory.corners import Curve
-from rrtik_ompl.trajectory.limits import RateLimits
-from rrtik_ompl.trajectory.pieces import Pieces
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.fast.simd.library import library
+from rrtik_ompl.fast.tables.memory import table
+from rrtik_ompl.fast.timing import layout, reference
 
-if TYPE_CHECKING:
-    from toppra.interpolator import AbstractGeometricPath
+LEAST_STEPS = 150  # of the grid along a whole curve
+STEPS_PER_RADIUS = 12  # of the grid within a rounded corner
+STEPS_PER_LINE = 8  # of the grid between two of them
+SAME_PLACE = 1e-9  # of the length of a curve; nearer points of a grid are one
 
-STEPS_PER_PIECE = 80  # grid steps of each piece of a curve
 
+class Samples(NamedTuple):
+    """A curve at m places: position, and first and second derivative by the place.
 
-def along_curve(curve: Curve, limits: RateLimits) -> Pieces:
-    """The fastest motion along a curve that keeps the limits at the points of a grid.
-
-    Between two of them every joint follows the cubic through its positions and velocities there.
-
-    Raises:
-        PlannerError: If toppra finds no motion.
+    Attributes:
+        values: Side by side, shape (m, 3 n).
     """
-    path = _path(curve)
-    ends = np.concatenate([np.zeros(1), np.cumsum(curve.lengths)])
-    shares = np.arange(STEPS_PER_PIECE) / STEPS_PER_PIECE
-    inside = [begin + (end - begin) * shares for begin, end in pairwise(ends)]
-    grid = np.append(np.concatenate(inside), ends[-1])
-    speeds = _speeds(path, grid, limits)
-    durations = 2.0 * np.diff(grid) / (speeds[1:] + speeds[:-1])
-    positions, velocities = path(grid), path(grid, 1) * speeds[:, None]
-    positions[0], positions[-1] = curve.points[0, 0], curve.points[-1, -1]
-    h, mean = durations[:, None], np.diff(positions, axis=0) / durations[:, None]
-    accelerations = (6.0 * mean - 4.0 * velocities[:-1] - 2.0 * velocities[1:]) / h
-    return Pieces(durations, positions[:-1], velocities[:-1], accelerations)
+
+    values: Matrix
+
+    @property
+    def positions(self) -> Matrix:
+        """Shape (m, n)."""
+        return self.values[:, : self.values.shape[1] // 3]
+
+    @property
+    def slopes(self) -> Matrix:
+        """First derivative, shape (m, n)."""
+        n = self.values.shape[1] // 3
+        return self.values[:, n : 2 * n]
+
+    @property
+    def bends(self) -> Matrix:
+        """Second derivative, shape (m, n)."""
+        return self.values[:, 2 * (self.values.shape[1] // 3) :]
 
 
-def _speeds(path: AbstractGeometricPath, grid: Vector, limits: RateLimits) -> Vector:
-    """Speed of the parameter at the points of the grid, 0 at both ends."""
-    from toppra.algorithm import TOPPRA
-    from toppra.constraint import DiscretizationType, JointAccelerationConstraint, JointVelocityConstraint
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """A run through rounded corners, from rest to rest. Places on it are distances along the path.
 
-    v, a = (np.stack([-row, row], axis=1) for row in (limits.velocity, limits.acceleration))
-    rules = [
-        JointVelocityConstraint(v),
-        JointAccelerationConstraint(a, discretization_scheme=DiscretizationType.Interpolation),
-    ]
-    _, speeds, _ = TOPPRA(rules, path, gridpoints=grid, solver_wrapper="seidel").compute_parameterization(0.0, 0.0)
-    if speeds is None or not np.isfinite(speeds).all() or not ((speeds[1:] + speeds[:-1]) > 0.0).all():
-        raise PlannerError("toppra finds no timing for the rounded path; round its corners less, or not at all")
-    found: Vector = speeds
-    return found
+    Attributes:
+        vertices: Of the path, shape (k, n).
+        along: Place of each, shape (k,), from 0.
+        directions: Of the edges, of length 1, shape (k - 1, n).
+        radii: Of the corners, shape (k,); 0 at both ends.
+    """
 
+    vertices: Matrix
+    along: Vector
+    directions: Matrix
+    radii: Vector
 
-def _path(curve: Curve) -> AbstractGeometricPath:
-    """The curve in toppra's interface: values and derivatives at many places, by scipy's Bernstein polynomials."""
-    from scipy.interpolate import BPoly
-    from toppra.interpolator import AbstractGeometricPath
+    @classmethod
+    def of(cls, vertices: Matrix, radii: Vector) -> Curve:
+        """The curve through vertices, shape (k, n), whose inner ones are rounded, shape (k - 2,)."""
+        edges = np.diff(vertices, axis=0)
+        lengths = np.linalg.norm(edges, axis=1)
+        along = np.concatenate([np.zeros(1), np.cumsum(lengths)])
+        widths = np.zeros(len(along))
+        widths[1:-1] = np.minimum(radii, np.minimum(along[1:-1], along[-1] - along[1:-1]))
+        return cls(vertices, along, edges / lengths[:, None], widths)
 
-    ends = np.concatenate([np.zeros(1), np.cumsum(curve.lengths)])
-    values = BPoly(np.moveaxis(curve.points, 0, 1), ends)
-    orders = (values, values.derivative(1), values.derivative(2))
+    @property
+    def length(self) -> float:
+        """Of the path [rad or m]."""
+        return float(self.along[-1])
 
-    class Path(AbstractGeometricPath):  # type: ignore[misc]
-        dof = curve.points.shape[2]
-        path_interval = ends[[0, -1]]
+    def at(self, places: Vector) -> Samples:
+        """Position and derivatives at places that do not decrease, shape (m,)."""
+        kernels, n = library(layout.KERNELS), self.vertices.shape[1]
+        if kernels is None:
+            values = reference.sample_curve(self.vertices, self.along, self.directions, self.radii, places)
+        else:
+            task = table(
+                {
+                    layout.VERTICES: self.vertices,
+                    layout.ALONG: self.along,
+                    layout.DIRECTIONS: self.directions,
+                    layout.RADII: self.radii,
+                    layout.AT: places,
+                    layout.VALUES: np.empty((len(places), 3 * n)),
+                    layout.WIDEST: np.array([self.radii.max()]),
+                    layout.DOF: n,
+                    layout.COUNT: len(self.along),
+                    layout.PLACES: len(places),
+                }
+            )
+            kernels.sample_curve(task.address)
+            values = task[layout.VALUES].reshape(-1, 3 * n)
+        return Samples(values)
 
-        def __call__(self, places: ArrayLike, order: int = 0) -> NDArray[np.float64]:
-            values: NDArray[np.float64] = orders[order](places)
-            return values
+    def edges(self, places: Vector) -> NDArray[np.int64]:
+        """Numbers of the edges on which places lie, shape (m,)."""
+        return np.clip(np.searchsorted(self.along, places, side="right") - 1, 0, len(self.along) - 2)
 
-    return Path()
+    def path_at(self, places: Vector) -> Matrix:
+        """The path itself, not rounded, at places, shape (m, n)."""
+        edge = self.edges(places)
+        ahead: Vector = (places - self.along[edge])[:, None]
+        return self.vertices[edge] + ahead * self.directions[edge]
+
+    def tightest(self, places: Vector) -> Vector:
+        """The smallest radius, rounded down to a power of 2, of the corners within which places lie; inf for none."""
+        at, radii = self.along[1:-1], self.radii[1:-1]
+        octaves, found = np.exp2(np.floor(np.log2(np.maximum(radii, 1e-300)))), np.full(len(places), np.inf)
+        for radius in np.unique(octaves)[::-1]:
+            alike = octaves == radius
+            starts, ends = np.sort(at[alike] - radii[alike]), np.sort(at[alike] + radii[alike])
+            found[np.searchsorted(starts, places) > np.searchsorted(ends, places)] = radius
+        return found
+
+    def grid(self) -> Vector:
+        """Places from the beginning to the end, close where the curve bends: wherever its third derivative jumps."""
+        at, radii = self.along[1:-1], self.radii[1:-1]
+        knots = np.unique(np.concatenate([at - radii, at, at + radii, self.along[[0, -1]]]))
+        knots = knots[np.concatenate([[True], np.diff(knots) > SAME_PLACE * self.length])]
+        knots[-1] = self.length
+        middles = 0.5 * (knots[1:] + knots[:-1])
+        widths = np.diff(knots)
+        tightest = self.tightest(middles)
+        steps = np.where(np.isinf(tightest), widths / STEPS_PER_LINE, tightest / STEPS_PER_RADIUS)
+        steps = np.minimum(steps, self.length / LEAST_STEPS)
+        counts = np.maximum(np.ceil(widths / steps), 1.0).astype(np.int64)
+        first = np.repeat(np.cumsum(counts) - counts, counts)
+        shares = (np.arange(counts.sum()) - first) / np.repeat(counts, counts)
+        return np.append(np.repeat(knots[:-1], counts) + shares * np.repeat(widths, counts), self.length)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Vector, finite_array, frozen
+from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.robot import Robot
 
@@ -85,10 +85,11 @@ class RateLimits:
         j = _of_robot(robot, jerk, "jerk", robot.jerk, a / ONSET_SECONDS)
         return cls(part * v, part * a, part * j)
 
-    def along(self, direction: Vector) -> tuple[float, float, float]:
-        """Limits of the speed along a straight line, its acceleration and jerk, for a direction of shape (n,)."""
+    def along(self, directions: Matrix) -> tuple[Vector, Vector, Vector]:
+        """Limits of the speed along straight lines, its acceleration and jerk, for directions of shape (m, n)."""
         with np.errstate(divide="ignore", over="ignore"):
-            v, a, j = (float((row / np.abs(direction)).min()) for row in (self.velocity, self.acceleration, self.jerk))
+            steep = 1.0 / np.abs(directions)
+            v, a, j = ((row * steep).min(axis=1) for row in (self.velocity, self.acceleration, self.jerk))
         return v, a, j
 
     def for_joints(self, count: int) -> RateLimits:

@@ -192,18 +192,8 @@ class Trajectory:
         """
         require(world, World, "world of a trajectory's check")
         finite_array(self.positions, (None, world.robot.dof), f"trajectory for robot '{world.robot.name}'")
-        h, peak = np.diff(self.times), np.abs(self.velocities)
-        speed = np.maximum(peak[1:], peak[:-1]) + h[:, None] * np.abs(self.jerks * h[:, None]) / 8.0
-        counts = (
-            np.ceil(h * (speed @ world.weights) * VERIFICATION_DENSITY / world.motion_resolution).astype(np.int64) + 1
-        )
-        clock = np.concatenate([t + d * np.arange(n) / n for t, d, n in zip(self.times, h, counts, strict=False)])
-        pieces = np.repeat(np.arange(len(h)), counts)
-        clock, pieces = np.append(clock, self.duration), np.append(pieces, len(h) - 1)
-        rows = self(clock).positions
-        bad = np.flatnonzero(~world.certify(rows))
-        _, first = np.unique(pieces[bad], return_index=True)
-        return tuple(f"after {clock[k]:.3f} s: {world.explain(rows[k])}" for k in bad[first])
+        clock = bad_moments(self, world)
+        return tuple(f"after {t:.3f} s: {world.explain(q)}" for t, q in zip(clock, self(clock).positions, strict=True))
 
     def prove(self, world: World, *, clearance: float = 0.0) -> Proof:
         """Prove the motion itself free, at every time, not the path it was made from.
@@ -223,11 +213,7 @@ class Trajectory:
         """
         require(world, World, "world of a trajectory's proof")
         finite_array(self.positions, (None, world.robot.dof), f"trajectory for robot '{world.robot.name}'")
-        h, begin = np.diff(self.times), self.accelerations[:-1]
-        pushes = np.maximum(np.abs(begin), np.abs(begin + h[:, None] * self.jerks))
-        chords = chords_of(h, pushes @ world.weights)
-        rows = self(np.append(self.times[chords.pieces] + chords.shares * h[chords.pieces], self.duration)).positions
-        return chords.joined(world.prove(rows, clearance=clearance, slack=CHORD_SLACK))
+        return proof_of_pieces(self, world, clearance, 0, len(self.times) - 1)
 
     def save(self, file: str | os.PathLike[str]) -> None:
         """Write the motion to a file: .json (the shape of a JointTrajectory message) or .csv (``time,<joint>...``).
@@ -247,6 +233,31 @@ class Trajectory:
 
     def _names(self) -> dict[str, Any]:
         return {"joint_names": self.joint_names, "prismatic": self.prismatic, "robot_name": self.robot_name}
+
+
+def proof_of_pieces(motion: Trajectory, world: World, clearance: float, first: int, end: int) -> Proof:
+    """A proof of the pieces from ``first`` up to ``end``; see :meth:`Trajectory.prove`."""
+    h, begin = np.diff(motion.times)[first:end], motion.accelerations[first:end]
+    pushes = np.maximum(np.abs(begin), np.abs(begin + h[:, None] * motion.jerks[first:end]))
+    chords = chords_of(h, pushes @ world.weights)
+    clock = motion.times[first:end][chords.pieces] + chords.shares * h[chords.pieces]
+    rows = motion(np.append(clock, motion.times[end])).positions
+    return chords.joined(world.prove(rows, clearance=clearance, slack=CHORD_SLACK))
+
+
+def bad_moments(motion: Trajectory, world: World) -> Vector:
+    """Times of the first fault of every piece that has one; see :meth:`Trajectory.faults`."""
+    h, peak = np.diff(motion.times), np.abs(motion.velocities)
+    speed = np.maximum(peak[1:], peak[:-1]) + h[:, None] * np.abs(motion.jerks * h[:, None]) / 8.0
+    counts = np.ceil(h * (speed @ world.weights) * VERIFICATION_DENSITY / world.motion_resolution).astype(np.int64) + 1
+    pieces = np.append(np.repeat(np.arange(len(h)), counts), len(h) - 1)
+    first = np.repeat(np.cumsum(counts) - counts, counts)
+    shares = (np.arange(counts.sum()) - first) / np.repeat(counts, counts)
+    clock = np.append(motion.times[pieces[:-1]] + shares * h[pieces[:-1]], motion.duration)
+    bad = np.flatnonzero(~world.certify(motion(clock).positions))
+    _, where = np.unique(pieces[bad], return_index=True)
+    found: Vector = clock[bad[where]]
+    return found
 
 
 def _jerks(times: Vector, velocities: Matrix, accelerations: Matrix) -> Matrix:

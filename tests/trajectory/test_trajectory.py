@@ -125,17 +125,6 @@ def test_without_a_jerk_limit_a_straight_motion_is_the_trapezoid():
     assert motion([0.75]).accelerations == pytest.approx(np.zeros((1, 1)))
 
 
-def test_toppra_agrees_with_the_trapezoid_on_a_straight_line():
-    from rrtik_ompl.trajectory.corners import Curve
-    from rrtik_ompl.trajectory.curve import along_curve
-
-    a, b = np.array([0.0, 1.0]), np.array([1.0, -1.0])
-    limits = RateLimits([1.0, 1.5], [2.0, 2.5])
-    curve = Curve(np.array([np.linalg.norm(b - a)]), np.linspace(a, b, 6)[None])
-    best = time_parameterize(JointPath([a, b]), limits).duration
-    assert best <= along_curve(curve, limits).durations.sum() <= 1.01 * best
-
-
 def test_waypoints_that_coincide_or_lie_on_a_line_are_no_stops():
     limits = RateLimits([1.0, 1.0], [2.0, 2.0], [10.0, 10.0])
     once = time_parameterize(JointPath([[0, 0], [1, 1]]), limits)

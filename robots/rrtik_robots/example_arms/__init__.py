@@ -8,6 +8,7 @@ from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rrtik_ompl.description.robot_build import JointLimits
 from rrtik_ompl.description.urdf import robot_from_urdf
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
@@ -46,6 +47,7 @@ class ExampleArm:
         joints: Actuated joints.
         srdf: File with postures and allowed collisions, if there is one.
         postures: Further named postures, one number [rad] per joint.
+        acceleration, jerk: Limits that the URDF cannot state, one per joint [rad/s^2, rad/s^3]; empty if unknown.
     """
 
     name: str
@@ -54,6 +56,8 @@ class ExampleArm:
     joints: tuple[str, ...]
     srdf: str = ""
     postures: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    acceleration: tuple[float, ...] = ()
+    jerk: tuple[float, ...] = ()
 
     def __call__(
         self, *, tip: str | None = None, locked: Mapping[str, float] | None = None, base_pose: BasePose = None
@@ -78,6 +82,10 @@ class ExampleArm:
             locked=locked,
             base_pose=base_pose,
             postures={key: dict(zip(self.joints, q, strict=True)) for key, q in self.postures.items()},
+            limits={
+                joint: JointLimits(acceleration=acceleration, jerk=jerk)
+                for joint, acceleration, jerk in zip(self.joints, self.acceleration, self.jerk, strict=False)
+            },
         )
 
 
@@ -89,6 +97,8 @@ _UR = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_join
 _SO = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
 _BAXTER = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
 _PANDA = _numbered("panda_joint", 7)
+_PANDA_ACCELERATION = (15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0)
+_PANDA_JERK = (7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0)
 _UR_SRDF = "ur_description/srdf/ur5_joint_limited_robot.srdf"  # link names are the same for all three sizes
 _UR_UP = {"up": (0.0, -1.5707963267948966, 0.0, -1.5707963267948966, 0.0, 0.0)}
 
@@ -98,6 +108,8 @@ panda = ExampleArm(
     "panda_hand_tcp",
     _PANDA,
     "panda_description/srdf/panda.srdf",
+    acceleration=_PANDA_ACCELERATION,
+    jerk=_PANDA_JERK,
 )
 panda_primitives = ExampleArm(
     "panda_primitives",
@@ -105,6 +117,8 @@ panda_primitives = ExampleArm(
     "panda_hand_tcp",
     _PANDA,
     "panda_description/srdf/panda.srdf",
+    acceleration=_PANDA_ACCELERATION,
+    jerk=_PANDA_JERK,
 )
 ur3 = ExampleArm("ur3", "ur_description/urdf/ur3_robot.urdf", "tool0", _UR, _UR_SRDF, postures=_UR_UP)
 ur5 = ExampleArm("ur5", "ur_description/urdf/ur5_robot.urdf", "tool0", _UR, _UR_SRDF, postures=_UR_UP)

@@ -1,0 +1,101 @@
+"""The shortest time along a curve under limits of velocity and acceleration, by reachability along the path [19]."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrtik_ompl.arrays import Vector
+from rrtik_ompl.fast.simd.library import library
+from rrtik_ompl.fast.tables.memory import table
+from rrtik_ompl.fast.timing import layout, reference
+from rrtik_ompl.fast.timing.reference import Rows
+from rrtik_ompl.trajectory.curve import Samples
+from rrtik_ompl.trajectory.limits import RateLimits
+
+MOST = 1e200  # path speed squared where nothing bounds it
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bounds:
+    """What else a motion must keep at the points of a grid, in path acceleration u and path speed squared x.
+
+    Attributes:
+        rows: Shape (m, r) each; low at most 0, high at least 0, so that standing still is allowed.
+        cap: Largest x, shape (m,).
+    """
+
+    rows: Rows
+    cap: Vector
+
+    @classmethod
+    def capped(cls, cap: Vector) -> Bounds:
+        """Only the speed is bounded."""
+        none = np.empty((len(cap), 0))
+        return cls(Rows(none, none, none, none), np.minimum(cap, MOST))
+
+    def and_also(self, other: Bounds) -> Bounds:
+        """Both."""
+        rows = Rows(*(np.hstack(pair) for pair in zip(self.rows, other.rows, strict=True)))
+        return Bounds(rows, np.minimum(self.cap, other.cap))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PathTiming:
+    """When a motion along a curve is where.
+
+    Attributes:
+        grid: Places, shape (m,).
+        squares: Path speed squared there, shape (m,).
+        times: From the beginning [s], shape (m,).
+    """
+
+    grid: Vector
+    squares: Vector
+    times: Vector
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return float(self.times[-1])
+
+    def places(self, clock: Vector) -> Vector:
+        """Where the motion is at times, shape (k,); at its ends before and after."""
+        t = np.clip(clock, 0.0, self.duration)
+        k = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 2)
+        ahead = t - self.times[k]
+        speeds = np.sqrt(self.squares)
+        push = (self.squares[k + 1] - self.squares[k]) / (2.0 * (self.grid[k + 1] - self.grid[k]))
+        found = self.grid[k] + ahead * (speeds[k] + 0.5 * ahead * push)
+        return np.maximum.accumulate(np.clip(found, self.grid[0], self.grid[-1]))
+
+
+def fastest(grid: Vector, samples: Samples, limits: RateLimits, bounds: Bounds) -> PathTiming:
+    """The motion from rest to rest in the shortest time, along a curve that has these samples at the grid."""
+    kernels = library(layout.KERNELS)
+    if kernels is None:
+        rows, cap = reference.all_rows(samples.values, limits.velocity, limits.acceleration, bounds.rows, bounds.cap)
+        squares = reference.find_squares(rows, cap, grid)
+    else:
+        task = table(
+            dict(zip((layout.FIRST, layout.SECOND, layout.LOW, layout.HIGH), bounds.rows, strict=True))
+            | {
+                layout.SHAPE: samples.values,
+                layout.VELOCITY: limits.velocity,
+                layout.ACCELERATION: limits.acceleration,
+                layout.CAP: bounds.cap,
+                layout.GRID: grid,
+                layout.SQUARES: np.zeros(len(grid)),
+                layout.REACHED: np.zeros(len(grid)),
+                layout.JOINTS: len(limits.velocity),
+                layout.ROWS: bounds.rows.first.shape[1],
+                layout.POINTS: len(grid),
+            }
+        )
+        kernels.find_squares(task.address)
+        squares = task[layout.SQUARES].copy()
+    speeds = np.sqrt(squares)
+    with np.errstate(divide="ignore"):
+        steps = 2.0 * np.diff(grid) / (speeds[1:] + speeds[:-1])
+    return PathTiming(grid, squares, np.concatenate([np.zeros(1), np.cumsum(steps)]))

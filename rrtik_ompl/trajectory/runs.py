@@ -1,0 +1,131 @@
+"""Runs from stop to stop: a straight one, or a curve through rounded corners; each becomes a motion of its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.trajectory.corners import COINCIDENCE
+from rrtik_ompl.trajectory.curve import Curve, Samples
+from rrtik_ompl.trajectory.fastest import Bounds, fastest
+from rrtik_ompl.trajectory.limits import RateLimits
+from rrtik_ompl.trajectory.line import along_lines
+from rrtik_ompl.trajectory.pieces import Pieces
+from rrtik_ompl.trajectory.smoothing import Spline, smoothed, steps_for, widest_window
+
+PERIOD = 1e-3  # [s] the least piece of a curve: the control period of a fast drive
+WINDOWS = (1.0, 0.6, 0.35)  # of the widest one, tried in turn
+SHORT_WINDOW = 0.02  # [s]
+SMOOTHED_SHARE = 0.12  # of a corner's radius: by which the smoothing over time alone may leave the rounded corner
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """A motion from rest to rest.
+
+    Attributes:
+        pieces: Its cubics, m of them.
+        places: Where on the path each begins, from the beginning of the path, shape (m,).
+        apart: How far from there the motion is, shape (m,) [rad or m].
+        on_path: Which of them do not leave the path, shape (m,).
+    """
+
+    pieces: Pieces
+    places: Vector
+    apart: Vector
+    on_path: Mask
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return float(self.pieces.durations.sum())
+
+
+def runs(corners: Matrix, radii: Vector, limits: RateLimits, room: float = np.inf) -> list[Run]:
+    """The motions from stop to stop, each as fast as the limits allow.
+
+    Args:
+        corners: The vertices, shape (k, n).
+        radii: How far from each inner one its rounding begins, shape (k - 2,); 0 for a stop.
+        limits: Of n joints.
+        room: How far from the path the motion may be, if that can be.
+    """
+    stops = [0, *(np.flatnonzero(radii == 0.0) + 1).tolist(), len(corners) - 1]
+    straight = iter(along_lines(corners, limits)) if len(stops) > 2 or len(corners) == 2 else iter(())
+    along = np.concatenate([np.zeros(1), np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+    lines = {k: pieces for k, pieces in enumerate(straight)}
+    found = []
+    for first, last in pairwise(stops):
+        if last == first + 1:
+            found.append(_straight(lines[first], corners[first], along[first]))
+        else:
+            curve = Curve.of(corners[first : last + 1], radii[first : last - 1])
+            found.append(along_curve(curve, limits, room, along[first]))
+    return found
+
+
+def along_curve(curve: Curve, limits: RateLimits, room: float = np.inf, begin: float = 0.0) -> Run:
+    """The motion along a curve; where its jerk is limited it passes bends on their inner side.
+
+    Args:
+        curve: From rest to rest.
+        limits: Of its joints.
+        room: How far from the path the motion may be; kept where one of the windows does.
+        begin: Where on the whole path the curve begins.
+
+    Raises:
+        InputError: If numbers do not suffice.
+    """
+    grid = curve.grid()
+    shape = curve.at(grid)
+    tried = [_along(curve, _smooth(curve, grid, shape, limits, share), begin) for share in _windows(limits)]
+    return min(tried, key=lambda run: (run.apart.max() > room, run.duration))
+
+
+def _along(curve: Curve, spline: Spline, begin: float) -> Run:
+    """A spline in joints and place as the run that it is."""
+    knots, velocities, accelerations = (rows[:-1] for rows in spline.knots())
+    n = curve.vertices.shape[1]
+    apart = np.linalg.norm(knots[:, :n] - curve.path_at(knots[:, n]), axis=1)
+    # a piece lies among its four control points: on an edge, if all of them lie on it
+    controls, at = spline.controls[:, :n], spline.controls[:, n]
+    near = np.linalg.norm(controls - curve.path_at(at), axis=1) <= COINCIDENCE
+    edge = curve.edges(at)
+    count = len(knots)
+    on_path = (edge[:count] == edge[3 : 3 + count]) & np.logical_and.reduce([near[k : k + count] for k in range(4)])
+    pieces = Pieces(np.full(count, spline.step), knots[:, :n], velocities[:, :n], accelerations[:, :n])
+    return Run(pieces, begin + knots[:, n], apart, on_path)
+
+
+def _windows(limits: RateLimits) -> tuple[float, ...]:
+    """Shares of the widest window to try: one where it is so short that it costs nothing."""
+    return WINDOWS if widest_window(limits) > SHORT_WINDOW else (1.0,)
+
+
+def _smooth(curve: Curve, grid: Vector, shape: Samples, limits: RateLimits, share: float) -> Spline:
+    """The fastest motion that windows of up to this share of the widest one leave near the curve."""
+    widest = share * widest_window(limits)
+    timing = fastest(grid, shape, limits, _near(curve, grid, shape.bends, widest))
+    if not np.isfinite(timing.duration) or timing.duration <= 0.0:
+        raise InputError(
+            f"no motion along {curve.length:.3g} rad or m could be calculated; choose limits of an ordinary size"
+        )
+    step, count, most = steps_for(timing.duration, widest, PERIOD)
+    places = timing.places(np.linspace(0.0, timing.duration, count + 1))
+    return smoothed(np.column_stack([curve.at(places).positions, places]), step, most, limits)
+
+
+def _near(curve: Curve, grid: Vector, bends: Matrix, window: float) -> Bounds:
+    """Slow enough in bends that the smoothing over time stays near them."""
+    room = SMOOTHED_SHARE * curve.tightest(grid)
+    bow = np.maximum(np.linalg.norm(bends, axis=1), 1e-300)
+    return Bounds.capped(2.0 * room / (bow * (window**2 / 12.0 + PERIOD**2 / 3.0)))
+
+
+def _straight(pieces: Pieces, start: Vector, begin: float) -> Run:
+    travelled = np.linalg.norm(pieces.positions - start, axis=1)
+    return Run(pieces, begin + travelled, np.zeros(len(travelled)), np.ones(len(travelled), dtype=bool))
