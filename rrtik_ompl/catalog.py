@@ -24,7 +24,6 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.description.dh_file import DH_OPTIONS, robot_from_dh_file
 from rrtik_ompl.description.robot_cache import RobotCache
 from rrtik_ompl.description.robot_source import base_pose, plain, source_entry
 from rrtik_ompl.description.urdf import URDF_OPTIONS, robot_from_urdf
@@ -207,7 +206,9 @@ def _recipe(name: str | os.PathLike[str]) -> _Recipe:
     suffix = path.suffix.lower()
     if suffix == ".xacro":
         raise InputError(f"{text}: xacro must be expanded first: xacro {path.name} > {path.stem}")
-    if suffix in (".yaml", ".yml"):
+    if suffix in (".yaml", ".yml"):  # what reads YAML is not loaded before there is some
+        from rrtik_ompl.description.dh_file import DH_OPTIONS, robot_from_dh_file
+
         return _Recipe("dh", str(path.resolve()), lambda **given: robot_from_dh_file(path, **given), DH_OPTIONS)
     if suffix in (".urdf", ".xml"):
         return _Recipe("urdf", str(path.resolve()), lambda **given: robot_from_urdf(path, **given), URDF_OPTIONS)

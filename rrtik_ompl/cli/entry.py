@@ -9,6 +9,8 @@ import sys
 
 def main() -> None:
     """Run the command line and exit with its code."""
+    # The threads that numpy starts for its matrices: ours are small, and starting them takes as long as all of numpy.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     usual = signal.getsignal(signal.SIGINT)
     if usual is signal.default_int_handler:  # not in a shell's background, where Ctrl-C is ignored
         signal.signal(signal.SIGINT, _leave)

@@ -45,7 +45,7 @@ _TAG = "<"  # tags of unions begin with it, so that they differ from the keys in
 class Section(BaseModel):
     """A group of keys in a file; a key that it does not know is an error that lists those it knows."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)  # built when a file has such a section
 
     @model_validator(mode="before")
     @classmethod

@@ -60,13 +60,13 @@ class MoveLattice:
         Returns:
             Shape (moves + 1, n), or None if there is no such route.
         """
-        end = self._index(goal)
+        end, steps = self._index(goal), self._steps()
         levels = [np.full(self._shape, np.inf)]
         levels[0][self._index(start)] = 0.0
         while not np.isfinite(levels[-1][end]):
             if len(levels) - 1 == most:
                 return None
-            levels.append(self._after_a_move(levels[-1]))
+            levels.append(_after_a_move(levels[-1], steps))
             if (np.isfinite(levels[-1]) == np.isfinite(levels[-2])).all():
                 return None
         return self._traced(levels, end, [self._joints.index(joint) for joint in order if joint in self._joints])
@@ -113,25 +113,12 @@ class MoveLattice:
     def _index(self, q: Vector) -> Index:
         return tuple(int(np.searchsorted(v, q[joint])) for v, joint in zip(self._varied, self._joints, strict=True))
 
-    def _after_a_move(self, costs: Costs) -> Costs:
-        """The least costs after one more move, or as before where no move helps."""
-        best = costs.copy()
-        for joint in range(len(self._shape)):
-            if self._shape[joint] > 1:
-                self._spread(costs, best, joint)
-        return best
-
-    def _spread(self, costs: Costs, best: Costs, joint: int) -> None:
-        """Carry costs along the runs of a joint, both ways."""
-        source, sink = np.moveaxis(costs, joint, 0), np.moveaxis(best, joint, 0)
-        open_, gaps = np.moveaxis(self._open[joint], joint, 0), np.diff(self._places[joint])
-        count = len(source)
-        for forward in (True, False):
-            carried = np.full(source.shape[1:], np.inf)
-            for k in range(count - 1) if forward else range(count - 1, 0, -1):
-                segment, head = (k, k + 1) if forward else (k - 1, k - 1)
-                carried = np.where(open_[segment], np.minimum(carried, source[k]) + gaps[segment], np.inf)
-                sink[head] = np.minimum(sink[head], carried)
+    def _steps(self) -> list[tuple[int, Costs]]:
+        """Axes with more than one value, and what each step along them costs, that axis first; infinite if closed."""
+        axes = [axis for axis, count in enumerate(self._shape) if count > 1]
+        opened = [self._open[axis].swapaxes(axis, 0) for axis in axes]
+        gaps = [np.diff(self._places[axis]).reshape(-1, *[1] * (len(self._shape) - 1)) for axis in axes]
+        return [(axis, np.where(open_, gap, np.inf)) for axis, open_, gap in zip(axes, opened, gaps, strict=True)]
 
     def _traced(self, levels: list[Costs], end: Index, order: Sequence[int]) -> Matrix:
         """The route to a configuration, from the last move to the first."""
@@ -158,6 +145,21 @@ class MoveLattice:
         after = int(np.searchsorted(blocked, here[joint]))
         low = int(blocked[after - 1]) + 1 if after > 0 else 0
         return low, int(blocked[after]) if after < len(blocked) else len(open_)
+
+
+def _after_a_move(costs: Costs, steps: list[tuple[int, Costs]]) -> Costs:
+    """The least costs after one more move, or as before where no move helps: carried along all runs, both ways."""
+    best = costs.copy()
+    for axis, step in steps:
+        source, sink, count = costs.swapaxes(axis, 0), best.swapaxes(axis, 0), len(step)
+        for forward in (True, False):
+            carried = np.full(source.shape[1:], np.inf)
+            for k in range(count) if forward else range(count - 1, -1, -1):
+                tail, head = (k, k + 1) if forward else (k + 1, k)
+                np.minimum(carried, source[tail], out=carried)
+                carried += step[k]
+                np.minimum(sink[head, ...], carried, out=sink[head, ...])
+    return best
 
 
 def _line(cells: NDArray[Any], here: Index, joint: int) -> NDArray[Any]:

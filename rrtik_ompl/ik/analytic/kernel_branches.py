@@ -18,7 +18,7 @@ from rrtik_ompl.fast.tables.memory import WORD, PlannedTable, Table, TablePlan, 
 from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver
 from rrtik_ompl.ik.analytic.reference_branches import mountings, reference_branches
 from rrtik_ompl.ik.serial_chain import limb_of, pose_numbers
-from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
+from rrtik_ompl.robot import FEW, LIMIT_TOLERANCE, Robot
 
 UNBOUNDED_ANGLE = 1e300  # limits of continuous joints: kernels know no infinity
 
@@ -36,10 +36,28 @@ def kernel_branches(
     answers = call.answers()
     (odd,) = call.odd.nonzero()
     if len(odd):
-        rest = reference_branches(robot, form, poses[odd], None if hints is None else hints[odd], slack, check)
+        rest = _singular_branches(robot, form, poses[odd], None if hints is None else hints[odd], slack, check)
         for whole, part in zip(answers, rest, strict=True):
             whole[..., odd] = part
     return answers
+
+
+def _singular_branches(
+    robot: Robot, form: AnalyticSolver, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool
+) -> list[NDArray[Any]]:
+    """As `reference_branches`; of few poses remembered, for every plan to one of them asks again."""
+    if len(poses) > FEW:
+        return reference_branches(robot, form, poses, hints, slack, check)
+    return _remembered(robot, form, poses.tobytes(), None if hints is None else hints.tobytes(), slack, check)
+
+
+@lru_cache(maxsize=256)
+def _remembered(
+    robot: Robot, form: AnalyticSolver, poses: bytes, hints: bytes | None, slack: float, check: bool
+) -> list[NDArray[Any]]:
+    """The same, of the bytes of poses and hints."""
+    near = None if hints is None else np.frombuffer(hints).reshape(-1, robot.dof)
+    return reference_branches(robot, form, np.frombuffer(poses).reshape(-1, 4, 4), near, slack, check)
 
 
 def valid_branches(robot: Robot, form: AnalyticSolver, pose: Matrix, hint: Vector) -> Matrix | None:
