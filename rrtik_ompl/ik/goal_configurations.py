@@ -72,13 +72,15 @@ class GoalSearch:
             and configurations.
     """
 
-    def __init__(self, problem: Problem, rng: np.random.Generator, *, all_turns: bool = True) -> None:
-        """Prepare the search; see :func:`goal_configurations`."""
+    def __init__(self, problem: Problem, rng: np.random.Generator | int, *, all_turns: bool = True) -> None:
+        """Prepare the search; see :func:`goal_configurations`. A seed will do for a generator."""
         self.rows: Matrix = frozen(np.zeros((0, problem.world.robot.dof)))
         self.exhausted = isinstance(problem.goal, JointGoal)
-        self._problem, self._rng, self._rounds, self._found = problem, rng, 0, self.rows
+        self._problem, self._rounds, self._found = problem, 0, self.rows
         if isinstance(problem.goal, JointGoal):
             self.rows = frozen(_turns(problem, problem.goal.q) if all_turns else problem.goal.q[None])
+        else:
+            self._rng = np.random.default_rng(rng)
 
     def first(self) -> Matrix:
         """Search until there is a free configuration, for a few rounds; all rows."""

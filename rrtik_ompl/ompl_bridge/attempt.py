@@ -63,12 +63,14 @@ def attempt(
     seed: int,
     parameters: Mapping[str, Any],
     effort: int | None = None,
+    checked: bool = False,
 ) -> Attempt:
     """Let a planner work for at most ``seconds`` from the start of a problem to any of ``goals``, shape (k, n).
 
     There may be none if the planner finds goals itself; one that takes one goal gets the first. With an ``effort`` (for
     planners that support an iteration limit) the attempt ends after a number of iterations or checked motions, so that
-    what it finds does not depend on the computer's speed.
+    what it finds does not depend on the computer's speed. With ``checked``, start and goals are known to be free,
+    and a planner of ours does not check them again.
 
     Raises:
         InputError: If the planner does not take a parameter.
@@ -81,7 +83,7 @@ def attempt(
         ou.RNG.setSeed(1 + seed % (2**31 - 2))  # before any object that draws from it; OMPL does not take 0
         if is_safe(factory):
             limit = {} if effort is None else {ITERATION_LIMIT: effort * EFFORT_ITERATIONS}
-            return _on_arrays(problem, factory, name, goals, seconds, seed, {**limit, **parameters})
+            return _on_arrays(problem, factory, name, goals, seconds, seed, {**limit, **parameters}, checked=checked)
         validity = ValidityCallback(problem.world, most_motions=np.inf if effort is None else effort * EFFORT_MOTIONS)
         si = space_information(problem, goals, validity)
         definition = problem_definition(problem, goals, si)
@@ -116,6 +118,8 @@ def _on_arrays(
     seconds: float,
     seed: int,
     options: Mapping[str, Any],
+    *,
+    checked: bool,
 ) -> Attempt:
     """Of a planner of ours, which needs of OMPL a space alone."""
     end, bounds = time.perf_counter() + seconds, planning_bounds(problem, goals)
@@ -124,7 +128,9 @@ def _on_arrays(
     straight = _straight_motion(problem, goals) if factory.straight_first else None
     if straight is not None:
         return Attempt(straight, "Exact solution", {})
-    status, rows = planner.solve_rows(problem.start[None], goals, bounds, lambda: time.perf_counter() > end)
+    status, rows = planner.solve_rows(
+        problem.start[None], goals, bounds, lambda: time.perf_counter() > end, checked=checked
+    )
     _raise_failure(planner, name, status, None)
     return Attempt(rows, str(status), dict(planner.statistics), planner.reason)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from types import MappingProxyType
 from typing import Any, ClassVar
 
@@ -85,7 +85,6 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         used = _seed(seed)
         super().__init__(si, name)
         self.seed = used
-        self.rng = np.random.default_rng(self.seed)
         self.statistics: dict[str, int | float] = {}
         self.error: str | None = None
         self.failure: Failure | None = None
@@ -93,6 +92,11 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self._world = world
         self._states: StateIO | None = None
         self._known_bounds: tuple[Any, Any] = ((), ())  # numbers of the space, and the arrays made from them
+
+    @cached_property
+    def rng(self) -> np.random.Generator:
+        """Random numbers, from the seed; made when they are first used, which takes as long as an easy search."""
+        return np.random.default_rng(self.seed)
 
     @classmethod
     def default_options(cls) -> dict[str, Any]:
@@ -131,7 +135,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         return ob.PlannerStatus(status)
 
     def solve_rows(
-        self, starts: Matrix, goals: Matrix, bounds: tuple[Vector, Vector], stop: Stop
+        self, starts: Matrix, goals: Matrix, bounds: tuple[Vector, Vector], stop: Stop, *, checked: bool = False
     ) -> tuple[ob.PlannerStatus, Matrix | None]:
         """Solve as :meth:`solve` does, in the planner's world, without OMPL's states and goals.
 
@@ -140,12 +144,13 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
             goals: Likewise, shape (g, n); none are needed if :meth:`needs_goals` says so.
             bounds: Lower and upper ones, shapes (n,), finite; those of the planner's space.
             stop: Call it: true when it is time to stop.
+            checked: Whether starts and goals are known to be free.
 
         Returns:
             The status, and the path, shape (k, n), if there is an exact one.
         """
         self._known_bounds = (), bounds
-        status, found = self._searched(lambda: self._between(starts, goals, stop))
+        status, found = self._searched(lambda: self._between(starts, goals, stop, known_free=checked))
         exact = found is not None and found.difference <= 0.0
         return ob.PlannerStatus(status), found.path if found is not None and exact else None
 
@@ -212,10 +217,12 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
             pdef.addSolutionPath(path, found.difference > 0.0, float(found.difference), self.getName())
         return found
 
-    def _between(self, starts: Matrix, goals: Matrix, stop: Stop) -> SearchResult:
+    def _between(self, starts: Matrix, goals: Matrix, stop: Stop, *, known_free: bool = False) -> SearchResult:
         """Search between those starts and goals, shapes (s, n) and (g, n), that are free."""
         checker = SpaceChecker(self.getSpaceInformation()) if self._world is None else WorldChecker(self._world)
-        found = self.search(*self._free_ends(starts, goals, checker), checker, stop)
+        given = known_free and len(goals) > 0 and self.needs_goals()
+        ends = (starts, goals) if given else self._free_ends(starts, goals, checker)
+        found = self.search(*ends, checker, stop)
         checked = {"checked_states": checker.checked_states, "checked_motions": checker.checked_motions}
         self.statistics, self.reason = {**found.statistics, **checked}, found.reason
         return found

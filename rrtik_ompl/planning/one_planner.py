@@ -39,7 +39,7 @@ def run_planner(problem: Problem, name: str, factory: PlannerFactory, request: R
         factory,
         name,
         begin + request.seconds,
-        [int(child) for child in children],
+        children.tolist(),
         request.parameters,
         request.proof,
         request.clearance,

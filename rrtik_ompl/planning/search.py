@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -60,7 +59,7 @@ class Search:
         self.reason, self.counting = "", 0.0
         self._problem, self._factory = problem, factory
         self._deadline, self._seeds = deadline, seeds
-        self._goals = GoalSearch(problem, np.random.default_rng(seeds[0]))
+        self._goals = GoalSearch(problem, seeds[0])
         self._traits, joints = traits_of(factory), isinstance(problem.goal, JointGoal)
         wanted = {"clearance": clearance} if self._traits.leaves_room and clearance is not None else {}
         self._parameters = {**wanted, **parameters}
@@ -68,7 +67,8 @@ class Search:
         self._long_ways = joints and bool(problem.robot.continuous.any()) and len(seeds) > 1
         ruled = any(option in parameters for option in MOVE_RULES)
         self._check = SecondCheck(problem, name, proof, clearance, self._traits, ruled=ruled)
-        self._strict, self._strict_attempts = cache(self._check.strict), 0
+        self._strict: dict[bool, Problem] = {}  # by whether motions have to be proven
+        self._strict_attempts = 0
 
     def run(self) -> JointPath | None:
         """The path, or None and a reason."""
@@ -127,14 +127,22 @@ class Search:
     def _path(self, number: int, aims: Matrix) -> JointPath | None:
         """Of an attempt with exact checks, with room to spare as soon as a path was not proven."""
         if self._leaves_room(number):
-            strict = self._strict(proving=not self._traits.kernels or self._strict_attempts >= IN_KERNELS)
+            strict = self._strict_problem(not self._traits.kernels or self._strict_attempts >= IN_KERNELS)
             roomy = aims[strict.world.valid_batch(aims)]
             if len(roomy) or self._aimless:
                 return self._strict_path(strict, number, roomy)
         effort = 2**number if self._traits.supports_iteration_limit and self._others(number) else None
         dense = self._traits.anytime or self._check.rejected
         asked = densely_checked(self._problem) if dense else self._problem
-        return self._accepted(self._attempt(asked, number, aims, self._share(number) * self._left(), effort))
+        checked = asked.world.accuracy == "exact"  # by the problem and by the search for goals
+        seconds = self._share(number) * self._left()
+        return self._accepted(self._attempt(asked, number, aims, seconds, effort, checked=checked))
+
+    def _strict_problem(self, proving: bool) -> Problem:
+        """See :meth:`SecondCheck.strict`; made once."""
+        if proving not in self._strict:
+            self._strict[proving] = self._check.strict(proving=proving)
+        return self._strict[proving]
 
     def _leaves_room(self, number: int) -> bool:
         """Whether an attempt keeps more than the clearance: every second one, from the first unproven path on.
@@ -168,8 +176,17 @@ class Search:
             return False
         return not self._goals.exhausted or (self._traits.one_goal and number + 1 < len(self._goals.rows))
 
-    def _attempt(self, problem: Problem, number: int, aims: Matrix, seconds: float, effort: int | None) -> Attempt:
-        """One attempt, counted."""
+    def _attempt(
+        self,
+        problem: Problem,
+        number: int,
+        aims: Matrix,
+        seconds: float,
+        effort: int | None,
+        *,
+        checked: bool = False,
+    ) -> Attempt:
+        """One attempt, counted; ``checked``: start and goals are known to be free."""
         outcome = attempt(
             problem,
             self._factory,
@@ -178,6 +195,7 @@ class Search:
             seed=self._seeds[number],
             parameters=self._parameters,
             effort=effort,
+            checked=checked,
         )
         self.counting += outcome.counting
         self._deadline += outcome.counting

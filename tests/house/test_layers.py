@@ -41,6 +41,13 @@ def test_importing_the_package_imports_nothing_heavy():
     assert done.stdout.strip() == "[]"
 
 
+def test_what_plan_needs_is_imported_without_what_checks_files():
+    code = "import sys, rrtik_ompl; rrtik_ompl.plan, rrtik_ompl.Problem, rrtik_ompl.World, rrtik_ompl.load_robot"
+    code += "; print([m for m in ('pydantic', 'numba', 'scipy') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
 def test_a_world_is_loaded_without_a_compiler_and_without_what_covers_are_made_with():
     code = "import sys, rrtik_ompl.world, rrtik_ompl.covers.cache, rrtik_ompl.fast.checks.fast_world"
     code += "; print([m for m in ('numba', 'scipy') if m in sys.modules])"

@@ -16,6 +16,8 @@ from rrtik_ompl.fast.search import connect
 from rrtik_ompl.fast.search.connect import ConnectSearch
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.ompl_bridge import StateIO
+from rrtik_ompl.ompl_bridge.attempt import attempt
+from rrtik_ompl.problem import Problem
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box, Sphere
 from rrtik_ompl.world import World
@@ -340,6 +342,16 @@ def test_ends_that_only_the_world_knows_to_collide_are_refused(coarse):
     _, status, path = solved_by_planner(world, goals=np.vstack([colliding, GOAL]))
     assert status == "Exact solution"
     require_path(world, path, START, GOAL)
+
+
+def test_ends_that_are_known_to_be_free_are_not_checked_again():
+    problem = Problem(three_joints(True), START[0], GOAL[0])
+    once, again = (
+        attempt(problem, FastRRTConnect, GOAL, seconds=10.0, seed=1, parameters={}, checked=checked)
+        for checked in (True, False)
+    )
+    assert (once.statistics["checked_states"], again.statistics["checked_states"]) == (0, 2)
+    np.testing.assert_array_equal(once.rows, again.rows)
 
 
 def test_what_the_owner_of_the_space_refuses_is_refused():

@@ -52,6 +52,19 @@ def test_asked_near_the_original_the_original_is_among_the_answers_of_every_sing
     assert np.where(found.real, errors, np.inf).min(axis=1).max() < 1e-5
 
 
+def test_a_singular_pose_that_is_asked_for_again_has_the_same_answers_near_each_posture(titan):
+    Q = singular_configurations("shoulder wrist", 3, np.random.default_rng(3))
+    pose = titan.fk_batch(Q[:1])
+    first = solutions(titan, pose, near=Q[0])
+    solutions(titan, pose, near=Q[1])  # the same pose near another posture, and others near the same
+    solutions(titan, titan.fk_batch(Q[1:2]), near=Q[0])
+    again, whole = solutions(titan, pose, near=Q[0]), solutions(titan, titan.fk_batch(Q), near=Q[[0, 0, 0]])
+    np.testing.assert_array_equal(first.residuals, again.residuals)
+    for name in ("branches", "real", "valid", "singular"):
+        np.testing.assert_array_equal(getattr(first, name), getattr(again, name))
+        np.testing.assert_array_equal(getattr(first, name)[0], getattr(whole, name)[0])
+
+
 @pytest.mark.parametrize(
     ("case", "flag"), [("wrist", 1), ("shoulder", 2), ("shoulder wrist", 3), ("case 1", 3), ("case 2", 2)]
 )
