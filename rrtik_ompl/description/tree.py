@@ -67,6 +67,7 @@ class Joint:
         axis: Unit axis in the joint frame, shape (3,).
         lower, upper: Position limits [rad or m]; without meaning for continuous and fixed joints.
         velocity: Limit [rad/s or m/s], inf if unknown.
+        effort: Limit [N m or N], inf if unknown.
     """
 
     name: str
@@ -78,6 +79,7 @@ class Joint:
     lower: float
     upper: float
     velocity: float
+    effort: float
 
     def __init__(
         self,
@@ -91,6 +93,7 @@ class Joint:
         lower: float = -np.pi,
         upper: float = np.pi,
         velocity: float = np.inf,
+        effort: float = np.inf,
     ) -> None:
         direction = bounded_array(axis, (3,), f"joint '{name}': axis")
         length = float(np.linalg.norm(direction))
@@ -99,7 +102,7 @@ class Joint:
         where = f"joint '{name}': pose in its parent"
         values = {"name": name, "kind": kind, "parent": parent, "child": child, "lower": lower, "upper": upper}
         values |= {"T_parent_joint": pin.SE3.Identity() if T_parent_joint is None else rigid(T_parent_joint, where)}
-        values |= {"axis": frozen(direction / length), "velocity": velocity}
+        values |= {"axis": frozen(direction / length), "velocity": velocity, "effort": effort}
         for key, value in values.items():
             object.__setattr__(self, key, value)
 

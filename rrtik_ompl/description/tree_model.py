@@ -70,7 +70,7 @@ def _add_joint(model: pin.Model, joint: Joint, parent: _Place) -> _Place:
         kind,
         placement * turn,
         joint.name,
-        np.full(1, np.inf),
+        np.full(1, joint.effort),
         np.full(1, joint.velocity),
         np.full(size, lower),
         np.full(size, upper),

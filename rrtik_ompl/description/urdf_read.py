@@ -196,11 +196,14 @@ class _Reader:
         child = attribute(element.find("child"), "child", "link", where)
         axis_element = element.find("axis")
         axis = [1.0, 0.0, 0.0] if axis_element is None else numbers(axis_element, "xyz", 3, (1.0, 0.0, 0.0), where)
-        lower, upper, velocity = _limit(element.find("limit"), kind, where)
+        limit = element.find("limit")
+        lower, upper, velocity = _limit(limit, kind, where)
+        effort = numbers(limit, "effort", 1, (0.0,), where)[0] if limit is not None and kind != "fixed" else 0.0
+        bounds = {"lower": lower, "upper": upper, "velocity": velocity, "effort": effort if effort > 0.0 else np.inf}
         with located(self.where):
             axis = [1.0, 0.0, 0.0] if kind == "fixed" else axis
             origin = _origin(element, where)
-            return Joint(name, kind, parent, child, origin, axis, lower=lower, upper=upper, velocity=velocity)
+            return Joint(name, kind, parent, child, origin, axis, **bounds)
 
     def mimics(self, element: Element) -> Iterator[Mimic]:
         tie = element.find("mimic")

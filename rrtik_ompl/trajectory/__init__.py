@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from numpy.typing import ArrayLike
+
 from rrtik_ompl.arrays import Matrix, finite_array
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.trajectory.blending import blended, fault_finder, within
+from rrtik_ompl.trajectory.blending import blended, fault_finder, stopped
 from rrtik_ompl.trajectory.corners import vertices
+from rrtik_ompl.trajectory.dynamics import DynamicLimits
 from rrtik_ompl.trajectory.limits import RateLimits
-from rrtik_ompl.trajectory.line import along_lines
 from rrtik_ompl.trajectory.load import load_trajectory
 from rrtik_ompl.trajectory.motion import Peaks, State, Trajectory
-from rrtik_ompl.trajectory.pieces import joined
 from rrtik_ompl.world import World
 from rrtik_ompl.world.kept_clearance import check_route_clearance
 
@@ -26,6 +27,10 @@ def time_parameterize(
     blend: float = 0.0,
     world: World | None = None,
     clearance: float | None = None,
+    tip_speed: float | None = None,
+    tip_acceleration: float | None = None,
+    torque: ArrayLike | bool | None = None,
+    payload: float = 0.0,
 ) -> Trajectory:
     """Give a path its times: as fast as the limits allow, beginning and ending at rest.
 
@@ -47,14 +52,22 @@ def time_parameterize(
         world: For a blend: what the rounded corners must not touch.
         clearance: What a blended motion keeps from every obstacle on top of its margin [m], if the path keeps it. None:
             1 mm, or what the ends of the path have.
+        tip_speed: Largest speed of the tip's origin [m/s]. Limits of the tip and of torques need a robot: pass it as
+            ``limits``, or a world.
+        tip_acceleration: Largest acceleration of the tip's origin [m/s^2].
+        torque: Largest torques, one number or one per joint [N m; N if it slides], by rigid-body dynamics; True for the
+            efforts of the robot's description.
+        payload: Mass at the tip's origin that the torques carry too [kg].
 
     Returns:
         A motion whose largest velocity, acceleration and jerk are within the limits everywhere (to 1e-9 of them), not
-        at samples: see :meth:`Trajectory.peaks`.
+        at samples: see :meth:`Trajectory.peaks`. Limits of the tip and of torques are kept at the knots, and to 0.1 %
+        between them.
 
     Raises:
         InputError: If the path has one waypoint, does not move, or has another number of joints than the limits; if the
-            blend is negative or comes without a world, or an end of the path cannot keep the clearance.
+            blend is negative or comes without a world, an end of the path cannot keep the clearance, or the arm cannot
+            be held still within the torques.
     """
     require(path, JointPath, "path to time", "a plan has one if plan.found")
     bounds = RateLimits.of(limits) if isinstance(limits, Robot) else limits
@@ -64,14 +77,21 @@ def time_parameterize(
     reach = float(finite_array(blend, (), "blend"))
     if reach < 0.0:
         raise InputError(f"blend must be 0 or greater, got {reach:g}")
-    stopping = within(joined(along_lines(corners, bounds), path), bounds)
+    arm = limits if isinstance(limits, Robot) else None if world is None else world.robot
+    wanted = (tip_speed, tip_acceleration, torque, payload or None)
+    more = None
+    if any(option is not None for option in wanted):
+        more = DynamicLimits.of(
+            arm, tip_speed=tip_speed, tip_acceleration=tip_acceleration, torque=torque, payload=payload
+        )
+    stopping = stopped(path, corners, bounds, more)
     if reach == 0.0:
         return stopping
     if world is None:
         raise InputError("a path with rounded corners leaves the checked one: pass world=problem.world, to check it")
     require(world, World, "world of a path with rounded corners")
     check_route_clearance(world, clearance, path.waypoints)
-    return blended(path, bounds, reach, stopping.duration, fault_finder(path, world, clearance)) or stopping
+    return blended(path, bounds, reach, stopping.duration, fault_finder(path, world, clearance), more) or stopping
 
 
 def _corners(path: JointPath) -> Matrix:

@@ -7,9 +7,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Vector
+from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.trajectory.corners import MERGED_SHARE, first_radii, spaced, vertices
+from rrtik_ompl.trajectory.dynamics import DynamicLimits
 from rrtik_ompl.trajectory.limits import RateLimits
 from rrtik_ompl.trajectory.motion import Trajectory, bad_moments, proof_of_pieces
 from rrtik_ompl.trajectory.pieces import joined
@@ -24,14 +25,21 @@ LEAST_RADIUS = 1.0 / 32.0  # of the blend; a corner that has to be rounded less 
 Faults = Callable[[Trajectory, Mask], NDArray[np.int64]]  # pieces that are not known to be free, of those off the path
 
 
-def blended(path: JointPath, limits: RateLimits, blend: float, slowest: float, faults: Faults) -> Trajectory | None:
+def blended(
+    path: JointPath,
+    limits: RateLimits,
+    blend: float,
+    slowest: float,
+    faults: Faults,
+    more: DynamicLimits | None = None,
+) -> Trajectory | None:
     """The motion through rounded corners; None where no such motion is faster than ``slowest`` [s], or none is free."""
     corners = vertices(path.waypoints)
     rows = vertices(corners[spaced(corners, MERGED_SHARE * blend)])
     along = np.concatenate([np.zeros(1), np.cumsum(np.linalg.norm(np.diff(rows, axis=0), axis=1))])
     radii, room = first_radii(rows, blend), (DEVIATION_SHARE - MERGED_SHARE) * blend
     for _ in range(MAX_ROUNDS):
-        parts = runs(rows, radii, limits, room)
+        parts = runs(rows, radii, limits, room=room, more=more)
         motion = within(joined([run.pieces for run in parts], path), limits)
         if motion.duration >= slowest:
             return None
@@ -44,6 +52,12 @@ def blended(path: JointPath, limits: RateLimits, blend: float, slowest: float, f
             return motion
         radii = _narrower(radii, along[1:-1], bad, LEAST_RADIUS * blend)
     return None
+
+
+def stopped(path: JointPath, corners: Matrix, limits: RateLimits, more: DynamicLimits | None) -> Trajectory:
+    """The motion along a path with these vertices that stops at each of them."""
+    parts = runs(corners, np.zeros(len(corners) - 2), limits, more=more)
+    return within(joined([run.pieces for run in parts], path), limits)
 
 
 def within(motion: Trajectory, limits: RateLimits, rounds: int = 10) -> Trajectory:

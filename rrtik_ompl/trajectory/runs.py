@@ -11,6 +11,7 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.trajectory.corners import COINCIDENCE
 from rrtik_ompl.trajectory.curve import Curve, Samples
+from rrtik_ompl.trajectory.dynamics import DynamicLimits
 from rrtik_ompl.trajectory.fastest import Bounds, fastest
 from rrtik_ompl.trajectory.limits import RateLimits
 from rrtik_ompl.trajectory.line import along_lines
@@ -20,6 +21,7 @@ from rrtik_ompl.trajectory.smoothing import Spline, smoothed, steps_for, widest_
 PERIOD = 1e-3  # [s] the least piece of a curve: the control period of a fast drive
 WINDOWS = (1.0, 0.6, 0.35)  # of the widest one, tried in turn
 SHORT_WINDOW = 0.02  # [s]
+MAX_SLOWINGS = 3  # by limits of the tip or of torques; two are enough but for rounding
 SMOOTHED_SHARE = 0.12  # of a corner's radius: by which the smoothing over time alone may leave the rounded corner
 
 
@@ -45,7 +47,9 @@ class Run:
         return float(self.pieces.durations.sum())
 
 
-def runs(corners: Matrix, radii: Vector, limits: RateLimits, room: float = np.inf) -> list[Run]:
+def runs(
+    corners: Matrix, radii: Vector, limits: RateLimits, *, room: float = np.inf, more: DynamicLimits | None = None
+) -> list[Run]:
     """The motions from stop to stop, each as fast as the limits allow.
 
     Args:
@@ -53,28 +57,36 @@ def runs(corners: Matrix, radii: Vector, limits: RateLimits, room: float = np.in
         radii: How far from each inner one its rounding begins, shape (k - 2,); 0 for a stop.
         limits: Of n joints.
         room: How far from the path the motion may be, if that can be.
+        more: Limits of the tip or of torques.
     """
     stops = [0, *(np.flatnonzero(radii == 0.0) + 1).tolist(), len(corners) - 1]
-    straight = iter(along_lines(corners, limits)) if len(stops) > 2 or len(corners) == 2 else iter(())
     along = np.concatenate([np.zeros(1), np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
-    lines = {k: pieces for k, pieces in enumerate(straight)}
+    lines = along_lines(corners, limits) if more is None and (len(stops) > 2 or len(corners) == 2) else []
     found = []
     for first, last in pairwise(stops):
-        if last == first + 1:
+        if last == first + 1 and more is None:
             found.append(_straight(lines[first], corners[first], along[first]))
         else:
             curve = Curve.of(corners[first : last + 1], radii[first : last - 1])
-            found.append(along_curve(curve, limits, room, along[first]))
+            found.append(along_curve(curve, limits, room=room, more=more, begin=along[first]))
     return found
 
 
-def along_curve(curve: Curve, limits: RateLimits, room: float = np.inf, begin: float = 0.0) -> Run:
+def along_curve(
+    curve: Curve,
+    limits: RateLimits,
+    *,
+    room: float = np.inf,
+    more: DynamicLimits | None = None,
+    begin: float = 0.0,
+) -> Run:
     """The motion along a curve; where its jerk is limited it passes bends on their inner side.
 
     Args:
         curve: From rest to rest.
         limits: Of its joints.
         room: How far from the path the motion may be; kept where one of the windows does.
+        more: Limits of the tip or of torques.
         begin: Where on the whole path the curve begins.
 
     Raises:
@@ -82,7 +94,9 @@ def along_curve(curve: Curve, limits: RateLimits, room: float = np.inf, begin: f
     """
     grid = curve.grid()
     shape = curve.at(grid)
-    tried = [_along(curve, _smooth(curve, grid, shape, limits, share), begin) for share in _windows(limits)]
+    extra = None if more is None else more.bounds(shape)
+    splines = (_smooth(curve, (grid, shape, extra), limits, share) for share in _windows(limits))
+    tried = [_along(curve, spline if more is None else _slowed(spline, more), begin) for spline in splines]
     return min(tried, key=lambda run: (run.apart.max() > room, run.duration))
 
 
@@ -106,10 +120,12 @@ def _windows(limits: RateLimits) -> tuple[float, ...]:
     return WINDOWS if widest_window(limits) > SHORT_WINDOW else (1.0,)
 
 
-def _smooth(curve: Curve, grid: Vector, shape: Samples, limits: RateLimits, share: float) -> Spline:
+def _smooth(curve: Curve, samples: tuple[Vector, Samples, Bounds | None], limits: RateLimits, share: float) -> Spline:
     """The fastest motion that windows of up to this share of the widest one leave near the curve."""
     widest = share * widest_window(limits)
-    timing = fastest(grid, shape, limits, _near(curve, grid, shape.bends, widest))
+    grid, shape, extra = samples
+    bounds = _near(curve, grid, shape.bends, widest)
+    timing = fastest(grid, shape, limits, bounds if extra is None else bounds.and_also(extra))
     if not np.isfinite(timing.duration) or timing.duration <= 0.0:
         raise InputError(
             f"no motion along {curve.length:.3g} rad or m could be calculated; choose limits of an ordinary size"
@@ -124,6 +140,17 @@ def _near(curve: Curve, grid: Vector, bends: Matrix, window: float) -> Bounds:
     room = SMOOTHED_SHARE * curve.tightest(grid)
     bow = np.maximum(np.linalg.norm(bends, axis=1), 1e-300)
     return Bounds.capped(2.0 * room / (bow * (window**2 / 12.0 + PERIOD**2 / 3.0)))
+
+
+def _slowed(spline: Spline, more: DynamicLimits) -> Spline:
+    """The spline, slowed until it keeps the limits of the tip and of torques at its knots."""
+    n = more.robot.dof
+    for _ in range(MAX_SLOWINGS):
+        factor = more.slowing(*(rows[:, :n] for rows in spline.knots()))
+        if factor == 1.0:
+            break
+        spline = spline.slowed(factor)
+    return spline
 
 
 def _straight(pieces: Pieces, start: Vector, begin: float) -> Run:

@@ -30,6 +30,6 @@ def test_all_forms_of_a_pose_mean_the_same(form, meant):
 
 @pytest.mark.parametrize("form", [[0.1, 0.2], [[0.0, 1.0]], "here", [*XYZ, 0.0, 0.0, 2.0, 0.0], [0.0, np.nan, 0.0]])
 def test_what_is_no_pose_is_refused_in_a_line(form):
-    with pytest.raises(InputError, match="^here:") as caught:
+    with pytest.raises(InputError, match=r"^here:") as caught:
         rigid(form, "here")
     assert "\n" not in str(caught.value)
