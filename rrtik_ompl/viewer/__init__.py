@@ -1,6 +1,6 @@
 """Pictures that a person can turn, play and step through: one HTML page, written to a file or served to this machine.
 
-Nothing below this package imports it, and meshcat is imported only when something is to be shown.
+Nothing below this package imports it, and of meshcat it takes the viewer's script, without an import.
 """
 
 from __future__ import annotations

@@ -8,10 +8,13 @@ import json
 from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
+from importlib.util import find_spec
+from pathlib import Path
 from string import Template
 
 from numpy.typing import ArrayLike
 
+from rrtik_ompl.errors import InputError
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.picture import draw
@@ -50,7 +53,7 @@ def page(
         InputError: If that cannot be shown.
     """
     subject = subject_of(shown, path, before, ghosts, tuple(marks)) if run is None else subject_of_run(shown, run)
-    window, frame = draw(subject)
+    recording, frame = draw(subject)
     heading = _title(subject) if title is None else title
     story = json.dumps(story_of(subject, frame, heading), allow_nan=False, separators=(",", ":"))
     return Template(_asset("page.html")).substitute(
@@ -60,7 +63,7 @@ def page(
         notice=_meshcat("main.min.js.LICENSE.txt").replace("--", "- -"),
         meshcat=_meshcat("main.min.js"),
         story=story.replace("<", "\\u003c"),  # so that no name can end the element that holds it
-        commands=json.dumps([base64.b64encode(command).decode("ascii") for command in window.commands], indent=0),
+        commands=json.dumps([base64.b64encode(command).decode("ascii") for command in recording.commands], indent=0),
         script="\n".join(_asset(name) for name in SCRIPTS),
     )
 
@@ -81,4 +84,9 @@ def _asset(name: str) -> str:
 
 @cache
 def _meshcat(name: str) -> str:
-    return files("meshcat").joinpath("viewer", "dist", name).read_text(encoding="utf-8")
+    """A file of meshcat's viewer, found without an import of meshcat, which would take a second."""
+    spec = find_spec("meshcat")
+    folders = [] if spec is None else list(spec.submodule_search_locations or ())
+    if not folders:
+        raise InputError("the page needs the viewer of meshcat: pip install meshcat")
+    return Path(folders[0], "viewer", "dist", name).read_text(encoding="utf-8")

@@ -1,11 +1,9 @@
-"""The whole picture of a subject, recorded as meshcat commands, and the box that the camera shows."""
+"""The whole picture of a subject, recorded as commands of meshcat's viewer, and the box that the camera shows."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-import meshcat
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -16,6 +14,7 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.viewer.drawing.framing import Frame, frame_around
 from rrtik_ompl.viewer.drawing.marks import draw_marks
 from rrtik_ompl.viewer.drawing.meshes import thickened
+from rrtik_ompl.viewer.drawing.nodes import Node, Recording
 from rrtik_ompl.viewer.drawing.robot_picture import (
     GHOST_TRIANGLES,
     Part,
@@ -28,19 +27,15 @@ from rrtik_ompl.viewer.drawing.robot_picture import (
 from rrtik_ompl.viewer.drawing.scene_picture import draw_goal, draw_scene, draw_triad, goal_frames
 from rrtik_ompl.viewer.drawing.trail import draw_before, draw_trail
 from rrtik_ompl.viewer.subject import Subject
-from rrtik_ompl.viewer.window import RecordingWindow
-
-if TYPE_CHECKING:
-    from meshcat.visualizer import Visualizer
 
 FRAMING_SAMPLES = 100
 MIN_THICKNESS = 0.01  # of the picture: of a link that is a line
 
 
-def draw(subject: Subject) -> tuple[RecordingWindow, Frame]:
+def draw(subject: Subject) -> tuple[Recording, Frame]:
     """Draw a subject: arm in its first posture, obstacles, goal and trail (ghosts are the page's copies of the arm)."""
-    window = RecordingWindow()
-    vis = meshcat.Visualizer(window=window)
+    recording = Recording()
+    vis = recording.root
     robot, scene = subject.robot, subject.scene
     if robot is None:
         frame = frame_around(None, scene, [mark.vertices for mark in subject.marks])
@@ -58,10 +53,10 @@ def draw(subject: Subject) -> tuple[RecordingWindow, Frame]:
     draw_triad(vis["frames"]["world"], pin.SE3.Identity(), 0.1 * frame.arm)
     if robot is not None and robot.planar:
         _flatten(vis, frame)
-    return window, frame
+    return recording, frame
 
 
-def _draw_robot(vis: Visualizer, robot: Robot, subject: Subject) -> Frame:
+def _draw_robot(vis: Node, robot: Robot, subject: Subject) -> Frame:
     """Draw the arm in its first posture, and one for the page to copy as ghosts; return the box around everything."""
     shown = _spread(subject.waypoints)
     if subject.end is not None:
@@ -84,7 +79,7 @@ def _draw_robot(vis: Visualizer, robot: Robot, subject: Subject) -> Frame:
     return frame
 
 
-def _draw_parts(node: Visualizer, robot: Robot, parts: list[Part], frames: NDArray[np.float64], frame: Frame) -> None:
+def _draw_parts(node: Node, robot: Robot, parts: list[Part], frames: NDArray[np.float64], frame: Frame) -> None:
     """Draw the arm; one that consists of lines and points alone is made thick enough to be visible."""
     least = MIN_THICKNESS * frame.size
     seen = [replace(part, look=thickened(part.look, least)) for part in parts]
@@ -99,7 +94,7 @@ def _spread(waypoints: Matrix) -> Matrix:
     return np.stack([np.interp(wanted, places, column) for column in waypoints.T], 1)
 
 
-def _flatten(vis: Visualizer, frame: Frame) -> None:
+def _flatten(vis: Node, frame: Frame) -> None:
     """Make the obstacles of a plane world thin, so that seen from above they are beside the arm, not over it."""
     height = max(2.0 * float(np.abs([frame.low[2], frame.high[2]]).max()), 1e-9)
     squeeze = np.diag([1.0, 1.0, min(0.01 * frame.size / height, 1.0), 1.0])

@@ -20,6 +20,7 @@ from rrtik_ompl.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.viewer.drawing.framing import frame_around
 from rrtik_ompl.viewer.drawing.meshes import look_of_margin
+from rrtik_ompl.viewer.drawing.objects import TriangleGeometry
 from rrtik_ompl.viewer.drawing.viewpoint import behind, overview
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.picture import draw
@@ -48,6 +49,7 @@ def gap_to_capsule(points: np.ndarray) -> np.ndarray:
 def test_a_margin_is_drawn_as_far_from_the_shape_as_it_is_wide(shape: Shape, gap: Any) -> None:
     look = look_of_margin(shape, 0.05)
     assert look is not None
+    assert isinstance(look.geometry, TriangleGeometry)
     corners = look.geometry.vertices
     assert gap(corners) == pytest.approx(0.05)
     a, b, c = (corners[look.geometry.faces[:, k]] for k in range(3))

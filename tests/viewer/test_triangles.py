@@ -9,6 +9,7 @@ from rrtik_ompl.collision.shape_table import pieces
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
 from rrtik_ompl.shapes.surfaces import extruded
 from rrtik_ompl.viewer.drawing.meshes import half_space_plate, look_of_coal, look_of_shape, thickened
+from rrtik_ompl.viewer.drawing.objects import SphereGeometry
 from rrtik_ompl.viewer.drawing.triangles import split_creases, thin_out, tube
 
 L_SHAPE = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]])
@@ -100,6 +101,7 @@ def test_what_is_too_thin_to_be_seen_is_drawn_as_a_rod_or_a_bead() -> None:
     rod = thickened(look_of_shape(Capsule(1e-4, 2.0)), 0.05)
     assert np.allclose(np.ptp(rod.corners, axis=0), [0.05, 0.05, 2.0], atol=1e-2)
     bead = thickened(look_of_shape(Cylinder(1e-4, 1e-4)), 0.05)
+    assert isinstance(bead.geometry, SphereGeometry)
     assert 0.025 <= bead.geometry.radius <= 0.05
 
 

@@ -1,1 +1,1 @@
-"""What a page shows as meshcat geometries: arm, scene, trail, marks, colours, the first viewpoint."""
+"""What a page shows as three.js draws it: arm, scene, trail, marks, colours, the first viewpoint."""

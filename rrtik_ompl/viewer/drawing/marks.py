@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypedDict
 
-import meshcat.geometry as mg
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -14,10 +13,11 @@ from rrtik_ompl.arrays import Matrix, frozen
 from rrtik_ompl.shapes.surfaces import Faces, round_ended
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.meshes import look_of_triangles
+from rrtik_ompl.viewer.drawing.nodes import Node
+from rrtik_ompl.viewer.drawing.objects import Material
 from rrtik_ompl.viewer.drawing.triangles import tube
 
 if TYPE_CHECKING:
-    from meshcat.visualizer import Visualizer
     from typing_extensions import Unpack
 
 TUBE_SIDES = 6  # few, for there may be thousands of tubes
@@ -105,13 +105,11 @@ def cubes(
     return Mark(name, color, frozen(corners.reshape(-1, 3)), frozen(faces, np.int64), **options)
 
 
-def draw_marks(vis: Visualizer, marks: Iterable[Mark]) -> None:
+def draw_marks(vis: Node, marks: Iterable[Mark]) -> None:
     """Draw marks under ``marks/<number>``."""
     for number, mark in enumerate(marks):
         solid = mark.opacity == 1.0
-        material = mg.MeshPhongMaterial(
-            color=palette.number(mark.color), opacity=mark.opacity, shininess=10, depthWrite=solid
-        )
+        material = Material(color=palette.number(mark.color), opacity=mark.opacity, shininess=10, hides=solid)
         vis["marks"][f"{number}"].set_object(look_of_triangles(mark.vertices, mark.faces).geometry, material)
 
 

@@ -1,4 +1,4 @@
-"""What a shape or a coal geometry looks like: a meshcat geometry, its placement, and the box around it."""
+"""What a shape or a coal geometry looks like: its geometry, its placement, and the box around it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import coal
-import meshcat.geometry as mg
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -17,6 +16,7 @@ from rrtik_ompl.collision.solids import is_mesh
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.shapes import Box, Cylinder, HalfSpace, Mesh, Shape, Sphere
 from rrtik_ompl.shapes.surfaces import Faces
+from rrtik_ompl.viewer.drawing.objects import BoxGeometry, CylinderGeometry, Geometry, SphereGeometry, TriangleGeometry
 from rrtik_ompl.viewer.drawing.triangles import box_corners, split_creases, thin_out, tube
 
 MAX_OBSTACLE_TRIANGLES = 30_000  # a drawn mesh above this is thinned out; the one that is checked stays as it is
@@ -29,12 +29,12 @@ class Look:
     """How one solid is drawn.
 
     Attributes:
-        geometry: ``meshcat.geometry.Geometry``.
+        geometry: The solid that three.js draws.
         placement: Pose (or pose and scale) of that geometry in the solid's frame, shape (4, 4).
         corners: Corners of a box around the solid in its frame, shape (8, 3) [m].
     """
 
-    geometry: Any
+    geometry: Geometry
     placement: NDArray[np.float64]
     corners: Matrix
 
@@ -64,7 +64,7 @@ def look_of_margin(shape: Shape, margin: float) -> Look | None:
 
 def look_of_triangles(vertices: Matrix, faces: Faces) -> Look:
     """How a triangle mesh is drawn, as it is."""
-    return Look(mg.TriangularMeshGeometry(vertices, faces), np.eye(4), box_corners(vertices))
+    return Look(TriangleGeometry(vertices, faces), np.eye(4), box_corners(vertices))
 
 
 def half_space_plate(shape: HalfSpace, centre: ArrayLike, size: float) -> tuple[Look, NDArray[np.float64]]:
@@ -95,7 +95,7 @@ def thickened(look: Look, least: float) -> Look:
         return look_of_triangles(*tube(np.stack([middle - half, middle + half]), 0.5 * least))
     place = np.eye(4)
     place[:3, 3] = middle
-    return Look(mg.Sphere(BEAD * least), place, look.corners)
+    return Look(SphereGeometry(BEAD * least), place, look.corners)
 
 
 def triangle_count(geometry: Any) -> int:
@@ -107,10 +107,10 @@ def look_of_coal(geometry: Any, limit: int = MAX_OBSTACLE_TRIANGLES) -> Look | N
     """How a coal geometry is drawn, with at most ``limit`` triangles; None if it has no bounded surface (a plane)."""
     if isinstance(geometry, coal.Ellipsoid):
         stretch = np.diag([*geometry.radii, 1.0])
-        return Look(mg.Sphere(1.0), stretch, box_corners([-geometry.radii, geometry.radii]))
+        return Look(SphereGeometry(1.0), stretch, box_corners([-geometry.radii, geometry.radii]))
     if isinstance(geometry, coal.Cone):
         half = [geometry.radius, geometry.radius, geometry.halfLength]
-        cone = mg.Cylinder(2.0 * geometry.halfLength, radiusTop=0.0, radiusBottom=geometry.radius)
+        cone = CylinderGeometry(2.0 * geometry.halfLength, 0.0, geometry.radius)
         return _primitive(cone, _Y_TO_Z, half)
     try:
         shape = shape_of(geometry)
@@ -119,7 +119,7 @@ def look_of_coal(geometry: Any, limit: int = MAX_OBSTACLE_TRIANGLES) -> Look | N
         return None
 
 
-def _primitive(geometry: Any, placement: NDArray[np.float64], half: ArrayLike) -> Look:
+def _primitive(geometry: Geometry, placement: NDArray[np.float64], half: ArrayLike) -> Look:
     sides = np.asarray(half, dtype=np.float64)
     return Look(geometry, placement, box_corners([-sides, sides]))
 
@@ -134,9 +134,11 @@ def _frame_along(normal: NDArray[np.float64]) -> NDArray[np.float64]:
 
 # What three.js draws by itself, smoother and in fewer bytes than triangles.
 OWN_LOOKS: dict[type[Shape], Callable[[Any], Look]] = {
-    Sphere: lambda ball: _primitive(mg.Sphere(ball.radius), np.eye(4), np.full(3, ball.radius)),
+    Sphere: lambda ball: _primitive(SphereGeometry(ball.radius), np.eye(4), np.full(3, ball.radius)),
     Cylinder: lambda solid: _primitive(
-        mg.Cylinder(solid.length, solid.radius), _Y_TO_Z, [solid.radius, solid.radius, 0.5 * solid.length]
+        CylinderGeometry(solid.length, solid.radius, solid.radius),
+        _Y_TO_Z,
+        [solid.radius, solid.radius, 0.5 * solid.length],
     ),
-    Box: lambda box: _primitive(mg.Box(box.size.tolist()), np.eye(4), 0.5 * box.size),
+    Box: lambda box: _primitive(BoxGeometry(tuple(box.size.tolist())), np.eye(4), 0.5 * box.size),
 }

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-import meshcat.geometry as mg
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -17,9 +15,8 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import AttachedObject
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.meshes import Look, look_of_coal, look_of_shape, triangle_count
-
-if TYPE_CHECKING:
-    from meshcat.visualizer import Visualizer
+from rrtik_ompl.viewer.drawing.nodes import Node
+from rrtik_ompl.viewer.drawing.objects import Material
 
 ROBOT_TRIANGLES = 100_000  # drawn for the whole arm at most; its meshes are thinned out above that
 GHOST_TRIANGLES = 15_000  # of each ghost
@@ -99,14 +96,14 @@ def attached_parts(robot: Robot, attached: tuple[AttachedObject, ...]) -> list[P
     return parts
 
 
-def draw_parts(node: Visualizer, robot: Robot, parts: list[Part], frames: NDArray[np.float64]) -> None:
+def draw_parts(node: Node, robot: Robot, parts: list[Part], frames: NDArray[np.float64]) -> None:
     """Draw the arm below a node, at the joint frames of one configuration, shape (joints + 1, 4, 4)."""
     names = joint_nodes(robot)
     for name, placement in zip(names, frames, strict=True):
         node[name].set_transform(placement)
     for part in parts:
         leaf = node[names[part.joint]][part.name]
-        leaf.set_object(part.look.geometry, mg.MeshPhongMaterial(color=palette.number(part.color), shininess=40))
+        leaf.set_object(part.look.geometry, Material(color=palette.number(part.color), shininess=40))
         leaf.set_transform(part.placement @ part.look.placement)
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-import meshcat.geometry as mg
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -17,18 +14,17 @@ from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.framing import Frame
 from rrtik_ompl.viewer.drawing.meshes import Look, half_space_plate, look_of_margin, look_of_shape, look_of_triangles
+from rrtik_ompl.viewer.drawing.nodes import Node
+from rrtik_ompl.viewer.drawing.objects import Material
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
 from rrtik_ompl.viewer.drawing.triangles import tube
-
-if TYPE_CHECKING:
-    from meshcat.visualizer import Visualizer
 
 MAX_GOALS_DRAWN = 20
 FRAMES_PER_RANGE = 7
 LATER_SECONDS = (1.0, 2.0, 3.0)  # when an obstacle of constant velocity is drawn again, faintly
 
 
-def draw_scene(vis: Visualizer, scene: Scene, frame: Frame) -> None:
+def draw_scene(vis: Node, scene: Scene, frame: Frame) -> None:
     """Draw obstacles and their margins under ``obstacles``, the later poses of moving ones under ``later``."""
     for obstacle in scene.at(0.0).obstacles:
         _draw_obstacle(vis["obstacles"][node_name(obstacle.name)], obstacle, frame)
@@ -46,7 +42,7 @@ def obstacle_look(obstacle: Obstacle, frame: Frame) -> tuple[Look, Matrix]:
     return look, look.placement
 
 
-def _draw_obstacle(node: Visualizer, obstacle: Obstacle, frame: Frame) -> None:
+def _draw_obstacle(node: Node, obstacle: Obstacle, frame: Frame) -> None:
     look, placement = obstacle_look(obstacle, frame)
     opacity = 1.0 if obstacle.shape.bounded else 0.2
     node.set_object(look.geometry, _material(palette.OBSTACLE, opacity))
@@ -54,7 +50,7 @@ def _draw_obstacle(node: Visualizer, obstacle: Obstacle, frame: Frame) -> None:
     _draw_margin(node["margin"], obstacle, placement)
 
 
-def _draw_margin(node: Visualizer, obstacle: Obstacle, placement: Matrix) -> None:
+def _draw_margin(node: Node, obstacle: Obstacle, placement: Matrix) -> None:
     """Draw what lies within an obstacle's margin under its node, which has ``placement`` in the obstacle's frame."""
     look = look_of_margin(obstacle.shape, obstacle.margin) if obstacle.margin else None
     if look is not None:
@@ -62,7 +58,7 @@ def _draw_margin(node: Visualizer, obstacle: Obstacle, placement: Matrix) -> Non
         node.set_transform(np.linalg.solve(placement, look.placement))
 
 
-def _draw_motion(node: Visualizer, obstacle: Obstacle, motion: Motion, frame: Frame) -> None:
+def _draw_motion(node: Node, obstacle: Obstacle, motion: Motion, frame: Frame) -> None:
     times = LATER_SECONDS if isinstance(motion, ConstantVelocity) else tuple(motion.times[motion.times > 0.0])
     look = look_of_shape(obstacle.shape)
     for k, time in enumerate(times):
@@ -72,7 +68,7 @@ def _draw_motion(node: Visualizer, obstacle: Obstacle, motion: Motion, frame: Fr
     draw_tube(node["way"], stations, 0.003 * frame.arm, palette.OBSTACLE)
 
 
-def draw_goal(vis: Visualizer, goal: Goal | None, frame: Frame) -> None:
+def draw_goal(vis: Node, goal: Goal | None, frame: Frame) -> None:
     """Draw under ``goal`` the frame of a pose, the point of a position, or all parts of a region."""
     if goal is None or isinstance(goal, JointGoal):
         return
@@ -88,7 +84,7 @@ def draw_goal(vis: Visualizer, goal: Goal | None, frame: Frame) -> None:
             node["point"].set_transform(pin.SE3(np.eye(3), np.array(part.position)).homogeneous)
 
 
-def _draw_region(node: Visualizer, region: TaskRegion, frame: Frame) -> None:
+def _draw_region(node: Node, region: TaskRegion, frame: Frame) -> None:
     """Draw the box of a region's positions and frames of the tip along each of its ranges."""
     low, high = region.bounds.T
     if (low < high)[:3].any():
@@ -111,18 +107,18 @@ def goal_frames(region: TaskRegion) -> NDArray[np.float64]:
     return region.poses(np.array(rows))
 
 
-def draw_triad(node: Visualizer, pose: pin.SE3, length: float) -> None:
+def draw_triad(node: Node, pose: pin.SE3, length: float) -> None:
     """Draw a frame: x, y and z axes of a given length [m] in three colours."""
     node.set_transform(pose.homogeneous)
     for axis, color, direction in zip("xyz", palette.AXES, np.eye(3), strict=True):
         draw_tube(node[axis], np.stack([0.0 * direction, length * direction]), 0.035 * length, color)
 
 
-def draw_tube(node: Visualizer, points: Matrix, radius: float, color: str) -> None:
+def draw_tube(node: Node, points: Matrix, radius: float, color: str) -> None:
     """Draw a line through points, shape (k, 3), as a tube, because WebGL draws lines one pixel wide."""
     look = look_of_triangles(*tube(points, radius))
     node.set_object(look.geometry, _material(color))
 
 
-def _material(color: str, opacity: float = 1.0) -> mg.MeshPhongMaterial:
-    return mg.MeshPhongMaterial(color=palette.number(color), opacity=opacity, shininess=10, depthWrite=opacity == 1.0)
+def _material(color: str, opacity: float = 1.0) -> Material:
+    return Material(color=palette.number(color), opacity=opacity, shininess=10, hides=opacity == 1.0)

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
-import meshcat.geometry as mg
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.viewer.drawing import palette
+from rrtik_ompl.viewer.drawing.nodes import Node
+from rrtik_ompl.viewer.drawing.objects import Material, SphereGeometry
 from rrtik_ompl.viewer.drawing.scene_picture import draw_tube
-
-if TYPE_CHECKING:
-    from meshcat.visualizer import Visualizer
 
 RING_STEP = np.deg2rad(3.0)  # [rad] between two rings of the tube; for sliding joints a share of the move
 MAX_RINGS = 1500  # of all tubes together, about
@@ -29,7 +26,7 @@ def pieces(waypoints: Matrix) -> NDArray[np.int64]:
     return np.arange(moves) * min(moves, MAX_PIECES) // max(moves, 1)
 
 
-def draw_before(vis: Visualizer, robot: Robot, waypoints: Matrix, radius: float) -> None:
+def draw_before(vis: Node, robot: Robot, waypoints: Matrix, radius: float) -> None:
     """Draw the tip's trail on another path, thinner, under ``before``; arguments as of :func:`draw_trail`."""
     tips = robot.fk_batch(_dense(robot, waypoints, len(waypoints)))[:, :3, 3]
     tips = tips[np.insert(np.linalg.norm(np.diff(tips, axis=0), axis=1) > 0.05 * radius, 0, True)]
@@ -38,7 +35,7 @@ def draw_before(vis: Visualizer, robot: Robot, waypoints: Matrix, radius: float)
 
 
 def draw_trail(
-    vis: Visualizer,
+    vis: Node,
     robot: Robot,
     waypoints: Matrix,
     radius: float,
@@ -49,7 +46,7 @@ def draw_trail(
     """Draw the tip's trail under ``trail/piece N`` and a bead at every waypoint under ``beads``.
 
     Args:
-        vis: ``meshcat.Visualizer``.
+        vis: The root of the tree of nodes.
         robot: The arm.
         waypoints: Shape (k, dof) with k at least 2.
         radius: Of the tube [m].
@@ -67,7 +64,7 @@ def draw_trail(
     if beads and len(waypoints) <= MAX_PIECES:
         for k, tip in enumerate(robot.fk_batch(waypoints)):
             bead = vis["beads"][f"waypoint {k}"]
-            bead.set_object(mg.Sphere(2.0 * radius), mg.MeshPhongMaterial(color=palette.number(palette.TRAIL)))
+            bead.set_object(SphereGeometry(2.0 * radius), Material(color=palette.number(palette.TRAIL)))
             bead.set_transform(tip)
 
 
