@@ -15,6 +15,11 @@ if TYPE_CHECKING:
     from rrtik_ompl.catalog import list_problems as list_problems
     from rrtik_ompl.catalog import list_robots as list_robots
     from rrtik_ompl.catalog import load_robot as load_robot
+    from rrtik_ompl.constraints.shorthands import inside as inside
+    from rrtik_ompl.constraints.shorthands import on_line as on_line
+    from rrtik_ompl.constraints.shorthands import on_plane as on_plane
+    from rrtik_ompl.constraints.shorthands import orientation_of as orientation_of
+    from rrtik_ompl.constraints.shorthands import upright as upright
     from rrtik_ompl.errors import InputError as InputError
     from rrtik_ompl.errors import PlannerError as PlannerError
     from rrtik_ompl.errors import ProblemError as ProblemError
@@ -85,6 +90,7 @@ else:
     _HOMES = {
         "catalog": ("list_problems", "list_robots", "load_robot"),
         "benchmark.batch": ("plan_batch",),
+        "constraints.shorthands": ("inside", "on_line", "on_plane", "orientation_of", "upright"),
         "errors": ("InputError", "PlannerError", "ProblemError", "RrtikError", "UnknownNameError"),
         "goal": ("GoalSet", "JointGoal", "PoseGoal", "PositionGoal"),
         "ik.batch": ("IkBatch", "solve_ik_batch"),

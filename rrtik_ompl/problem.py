@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import TAU, Vector, frozen
 from rrtik_ompl.choices import Accuracy
+from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
 from rrtik_ompl.copies import shallow_copy
-from rrtik_ompl.errors import ProblemError, Renamed, require
-from rrtik_ompl.goal import Goal, JointGoal
+from rrtik_ompl.errors import InputError, ProblemError, Renamed, require
+from rrtik_ompl.goal import Goal, JointGoal, parts_of
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.world import World
+from rrtik_ompl.world.holding_world import HoldingWorld
 from rrtik_ompl.world.route_check import verification_resolution
 
 
@@ -29,6 +33,9 @@ class Problem:
         goal: What to reach; a :class:`JointGoal` has been checked to be free.
         name: For messages and files.
         planner: Name of the planner that :func:`rrtik_ompl.plan` uses where none is named, or None.
+        constraints: Regions that a frame must not leave on the whole path, those ``from_start`` placed in the world.
+            The world is then a :class:`~rrtik_ompl.world.holding_world.HoldingWorld`, where only motions that keep
+            them are free.
 
     Args:
         world: Robot and scene.
@@ -38,8 +45,8 @@ class Problem:
         planner: Name of one of :func:`rrtik_ompl.list_planners`; it is looked up when it is used.
 
     Raises:
-        ProblemError: If start or goal is in collision, within an obstacle's margin or outside the limits; pair, margin,
-            joint and limit are named.
+        ProblemError: If start or goal is in collision, within an obstacle's margin, outside the limits or outside the
+            region of a constraint; pair, margin, joint, limit, or constraint and amount are named.
         InputError: If start or goal has the wrong number of joints or is not finite.
     """
 
@@ -51,6 +58,7 @@ class Problem:
         *,
         name: str = "problem",
         planner: str | None = None,
+        constraints: Iterable[TaskRegion] = (),
     ) -> None:
         require(world, World, "world of a problem", "use World(robot, scene)")
         require(planner, str | None, "planner of a problem", "use a name of list_planners()")
@@ -58,10 +66,18 @@ class Problem:
         self.name = name
         self.planner = planner
         self.start: Vector = frozen(usable_configuration(world, start, "start"))
+        held = held_regions(world.robot, world.scene, constraints, self.start)
+        self.constraints = tuple(each.region for each in held.regions)
+        if held.regions:
+            self.world = world = HoldingWorld(world, held)
+            _keep(held, self.start, "start")
         wanted = goal if isinstance(goal, Goal) else JointGoal(goal)
         if isinstance(wanted, JointGoal):
             q = usable_configuration(world, wanted.q, "goal")
+            _keep(held, q, "goal")
             wanted = JointGoal(_nearest_turn(world, self.start, q), wanted.tolerance)
+        elif any(part.frame or part.from_start for part in parts_of(wanted) if isinstance(part, TaskRegion)):
+            raise InputError("goal region: frame and from_start are for path constraints; a goal is of the tip")
         self.goal: Goal = wanted
 
     __copy__ = shallow_copy
@@ -113,6 +129,7 @@ def usable_configuration(world: World, values: ArrayLike, what: str) -> Vector:
     if fault:
         raise ProblemError(f"{what}: {fault}", part=what)
     q = robot.onto_limits(q)
+    world = world.unheld if isinstance(world, HoldingWorld) else world
     # both opinions must agree, for the path through q will be certified by the second one
     if not world.valid(q) or not world.certify(q[None])[0]:
         touching = world.contacts(q)
@@ -122,6 +139,11 @@ def usable_configuration(world: World, values: ArrayLike, what: str) -> Vector:
             raise ProblemError(f"{what} is too near: {world.explain(q)}; {remedy}", pairs, part=what)
         raise ProblemError(f"{what} is in collision: {world.explain(q)}; move it or allow the pair", pairs, part=what)
     return q
+
+
+def _keep(held: HeldRegions, q: Vector, what: str) -> None:
+    if fault := held.explain(q):
+        raise ProblemError(f"{what} breaks {fault}; move it, or widen the tolerance", part=what)
 
 
 def _nearest_turn(world: World, start: Vector, q: Vector) -> Vector:

@@ -8,7 +8,7 @@ radians.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector, finite_array, frozen, positive
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.poses import rigid, rotation_angles, rpy_matrices, unit_vector
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.tip_distance import metres_per_radian
@@ -61,6 +61,9 @@ class TaskRegion(WithinTolerances):
         T_w_tip: The tip where D is zero.
         position_tolerance: [m].
         orientation_tolerance: [rad].
+        frame: What has to be there in place of the tip, for path constraints: a link or an attached object.
+        from_start: Whether ``T_world_w`` is the frame of the region as seen from the constrained frame at the start of
+            a path; a :class:`rrtik_ompl.Problem` makes a region of the world of it.
     """
 
     T_world_w: Any
@@ -68,6 +71,8 @@ class TaskRegion(WithinTolerances):
     T_w_tip: Any = field(default_factory=pin.SE3.Identity)
     position_tolerance: float = 1e-3
     orientation_tolerance: float = 1e-2
+    frame: str | None = None
+    from_start: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_world_w", rigid(self.T_world_w, "goal region: T_world_w"))
@@ -78,6 +83,7 @@ class TaskRegion(WithinTolerances):
         object.__setattr__(self, "bounds", frozen(bounds))
         for name in ("position_tolerance", "orientation_tolerance"):
             object.__setattr__(self, name, positive(getattr(self, name), f"goal region: {name}"))
+        require(self.frame, str | None, "frame of a region", "name a link or an attached object")
 
     @classmethod
     def about_axis(
@@ -119,6 +125,12 @@ class TaskRegion(WithinTolerances):
         """Which of the six coordinates have a range, shape (6,)."""
         ranges: Mask = self.bounds[:, 0] < self.bounds[:, 1]
         return ranges
+
+    def started_at(self, T_world_frame: Any) -> TaskRegion:
+        """The region of the world that a region ``from_start`` is, for a pose of its frame at the start."""
+        if not self.from_start:
+            return self
+        return replace(self, T_world_w=T_world_frame * self.T_world_w, from_start=False)
 
     def poses(self, coordinates: Matrix) -> NDArray[np.float64]:
         """T_world_tip for displacements, shape (m, 6): (m, 4, 4)."""
@@ -167,18 +179,18 @@ def nearest_angles(rotations: NDArray[np.float64], bounds: Matrix) -> Matrix:
     if len(wide) == 0:
         return best
     likeness = np.full(len(rotations), -np.inf)
-    first = _roll_pitch_yaw(rotations)
+    first = roll_pitch_yaw(rotations)
     for start in (first, first * [1.0, -1.0, 1.0] + np.pi):
-        angles = _into(start, bounds[:, 0], bounds[:, 1])
+        angles = into_range(start, bounds[:, 0], bounds[:, 1])
         for k in np.tile(wide[::-1], 1 if len(wide) == 1 else SWEEPS):
-            angles[:, k] = _into(_best_angle(rotations, angles, int(k)), *bounds[k])
+            angles[:, k] = into_range(_best_angle(rotations, angles, int(k)), *bounds[k])
         found = np.einsum("mij,mij->m", rotations, rpy_matrices(angles))
         better = found > likeness
         best[better], likeness[better] = angles[better], found[better]
     return best
 
 
-def _roll_pitch_yaw(R: NDArray[np.float64]) -> Matrix:
+def roll_pitch_yaw(R: NDArray[np.float64]) -> Matrix:
     """Of R = Rz(yaw) Ry(pitch) Rx(roll), pitch within a quarter turn; shape (m, 3)."""
     pitch = np.arctan2(-R[:, 2, 0], np.hypot(R[:, 0, 0], R[:, 1, 0]))
     return np.column_stack([np.arctan2(R[:, 2, 1], R[:, 2, 2]), pitch, np.arctan2(R[:, 1, 0], R[:, 0, 0])])
@@ -198,7 +210,7 @@ def _best_angle(R: NDArray[np.float64], angles: Matrix, k: int) -> Vector:
     return angle
 
 
-def _into(angles: NDArray[np.float64], low: ArrayLike, high: ArrayLike) -> NDArray[np.float64]:
+def into_range(angles: NDArray[np.float64], low: ArrayLike, high: ArrayLike) -> NDArray[np.float64]:
     """The nearest of equal angles within bounds, or the nearer bound."""
     low, high = np.asarray(low), np.asarray(high)
     middle = 0.5 * (low + high)

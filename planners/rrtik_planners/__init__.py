@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rrtik_planners.bicrdt import BiCRDT as BiCRDT
+    from rrtik_planners.cbirrt import CBiRRT as CBiRRT
     from rrtik_planners.crdt import CRDT as CRDT
     from rrtik_planners.drrt_con import DRRTCon as DRRTCon
     from rrtik_planners.fast_rrt_connect import FastRRTConnect as FastRRTConnect
@@ -15,10 +16,11 @@ if TYPE_CHECKING:
     from rrtik_planners.ikurt_published import IKURTPublished as IKURTPublished
     from rrtik_planners.mbrrt import MBRRT as MBRRT
 
-__all__ = ["CRDT", "IKURT", "MBRRT", "BiCRDT", "DRRTCon", "FastRRTConnect", "FewestMoves", "IKURTPublished"]
+__all__ = ["CRDT", "IKURT", "MBRRT", "BiCRDT", "CBiRRT", "DRRTCon", "FastRRTConnect", "FewestMoves", "IKURTPublished"]
 
 _MODULES = {
     "BiCRDT": "bicrdt",
+    "CBiRRT": "cbirrt",
     "CRDT": "crdt",
     "DRRTCon": "drrt_con",
     "FastRRTConnect": "fast_rrt_connect",

@@ -64,7 +64,8 @@ class FastRRTConnect(SafePlanner):
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         world = self._world
         if not has_kernels(world, KERNELS):
-            return self._in_python(starts, goals, checker, ptc)
+            rules = python_rules(self.bounds(), *self._lengths, self.max_iterations)
+            return search_in_python(starts, goals, rules, checker, ptc, self.rng)
         with self._kernels(world) as kernels:
             path = kernels.solve(
                 starts,
@@ -88,17 +89,6 @@ class FastRRTConnect(SafePlanner):
                 return np.ones(len(rows), dtype=bool)
         return super().ends_free(rows, checker)
 
-    def _in_python(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
-        """The same search, where every motion is decided at once."""
-        lower, upper = self.bounds()
-        range_, domain = connect_lengths(lower, upper, *self._lengths)
-        rules = ConnectRules(lower, upper, range_, domain, balanced=True, max_iterations=self.max_iterations)
-        search = RrtConnect(starts, goals, rules, checker.motion_valid, self.rng)
-        path = straight_path(starts, goals, checker.motion_valid, ptc)
-        path = search.run(ptc) if path is None else path
-        edges = search.vertices - len(starts) - len(goals)
-        return SearchResult(path, {"iterations": search.iterations, "vertices": search.vertices, "edges": edges})
-
     @property
     def _lengths(self) -> tuple[float | None, float | None]:
         return self.range, self.domain
@@ -113,3 +103,23 @@ class FastRRTConnect(SafePlanner):
         range_, domain = connect_lengths(lower, upper, *self._lengths)
         lower, upper = np.maximum(lower, world.robot.lower), np.minimum(upper, world.robot.upper)  # unknown to kernels
         return ConnectSearch(world.motions, lower, upper, range_=range_, domain=domain)
+
+
+def python_rules(
+    bounds: tuple[Vector, Vector], range_: float | None, domain: float | None, max_iterations: int | None
+) -> ConnectRules:
+    """How the trees grow in Python; see `FastRRTConnect` for the arguments."""
+    lower, upper = bounds
+    lengths = connect_lengths(lower, upper, range_, domain)
+    return ConnectRules(lower, upper, *lengths, balanced=True, max_iterations=max_iterations)
+
+
+def search_in_python(
+    starts: Matrix, goals: Matrix, rules: ConnectRules, checker: MotionChecker, ptc: Stop, rng: np.random.Generator
+) -> SearchResult:
+    """The search without kernels, where every motion is decided at once."""
+    search = RrtConnect(starts, goals, rules, checker.motion_valid, rng)
+    path = straight_path(starts, goals, checker.motion_valid, ptc)
+    path = search.run(ptc) if path is None else path
+    edges = search.vertices - len(starts) - len(goals)
+    return SearchResult(path, {"iterations": search.iterations, "vertices": search.vertices, "edges": edges})

@@ -26,7 +26,7 @@ def _displacement_weights(robot: Robot, bodies: tuple[Body, ...]) -> Vector:
     """See above; kept, for the links of a robot are those of all its worlds."""
     tip = robot.model.frames[robot.model.getFrameId(robot.tip)]
     points = [*_balls(bodies), (tip.parentJoint, tip.placement.translation, 0.0)]
-    return frozen(np.abs(robot.chain.gain).T @ _joint_weights(robot, points))
+    return frozen(np.abs(robot.chain.gain).T @ joint_weights(robot, points))
 
 
 def approach_weights(robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> Matrix:
@@ -44,8 +44,8 @@ def approach_weights(robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple
 
 @lru_cache(maxsize=512)
 def _body_weights(robot: Robot, body: Body) -> Vector:
-    """See :func:`_joint_weights`; cached, for the links of a robot are those of all its worlds."""
-    return frozen(_joint_weights(robot, _balls([body])))
+    """See :func:`joint_weights`; cached, for the links of a robot are those of all its worlds."""
+    return frozen(joint_weights(robot, _balls([body])))
 
 
 def _balls(bodies: Iterable[Body]) -> list[tuple[int, Vector, float]]:
@@ -53,7 +53,7 @@ def _balls(bodies: Iterable[Body]) -> list[tuple[int, Vector, float]]:
     return [(b.joint, b.placement.act(b.geometry.aabb_center), b.geometry.aabb_radius) for b in bodies]
 
 
-def _joint_weights(robot: Robot, balls: list[tuple[int, Vector, float]]) -> Vector:
+def joint_weights(robot: Robot, balls: list[tuple[int, Vector, float]]) -> Vector:
     """For each joint how far a point of the balls moves at most per unit of it, shape (joints,).
 
     For a revolute joint that is the largest distance that any point beyond it can have from its axis (over all

@@ -20,7 +20,7 @@ from rrtik_ompl.ik.numeric.reference_descent import (
     SHARE_GROWTH,
     STALLED,
 )
-from rrtik_ompl.ik.tip_columns import tip_columns
+from rrtik_ompl.ik.tip_columns import TipColumns, tip_columns
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.tip_distance import reach_of
 
@@ -45,7 +45,11 @@ def seeds_of(robot: Robot) -> Seeds:
 @lru_cache(maxsize=64)
 def limb_of(robot: Robot) -> Table | None:
     """The table of a robot's limb without seeds; None if a joint hangs on several numbers of q."""
-    tip = tip_columns(robot)
+    return limb_table(robot, tip_columns(robot))
+
+
+def limb_table(robot: Robot, tip: TipColumns) -> Table | None:
+    """The table of the joints that move a frame, without seeds; None if one of them hangs on several numbers of q."""
     if (np.count_nonzero(tip.gain, axis=1) > 1).any():
         return None
     columns = np.argmax(np.abs(tip.gain), axis=1)

@@ -58,16 +58,22 @@ class TipColumns:
 @lru_cache(maxsize=64)
 def tip_columns(robot: Robot) -> TipColumns:
     """The chain from the base to the robot's tip."""
-    chain, target = robot.chain, robot.model.frames[robot.model.getFrameId(robot.tip)]
-    rows = [target.parentJoint - 1]
-    while chain.parent[rows[0]] >= 0:
-        rows.insert(0, int(chain.parent[rows[0]]))
+    target = robot.model.frames[robot.model.getFrameId(robot.tip)]
+    return frame_columns(robot, int(target.parentJoint), target.placement.homogeneous)
+
+
+def frame_columns(robot: Robot, joint: int, placement: Numbers) -> TipColumns:
+    """The chain from the base to a frame, given by its joint's number (0: the world) and its pose in the joint's."""
+    chain, rows, row = robot.chain, list[int](), joint - 1
+    while row >= 0:
+        rows.insert(0, row)
+        row = int(chain.parent[row])
     turned, fixed = np.eye(4), []
     for row in rows:
         to_axis = _z_along(chain.axis[row])
         fixed.append(_exact(turned.T @ chain.placement[row] @ to_axis))
         turned = to_axis
-    fixed.append(_exact(turned.T @ target.placement.homogeneous))
+    fixed.append(_exact(turned.T @ placement))
     return TipColumns(chain.gain[rows], chain.offset[rows], np.array(fixed), chain.prismatic[rows])
 
 

@@ -42,6 +42,7 @@ class PlannerTraits:
             no such options. The pilot's routes are planned by the first ``one_joint`` planner that has some.
         proof_iterations: Its ``max_iterations`` where it is to prove that a generated problem has a solution; 0 if it
             is not used for that. So what it finds decides which problems a seed gives.
+        keeps_constraints: It keeps the path constraints of a problem; any other planner is refused there.
         portfolio_turn: Its turn, from 1, where `plan()` tries planners one after the other ("auto"); 0 if it has none.
     """
 
@@ -58,6 +59,7 @@ class PlannerTraits:
     brief_options: Mapping[str, Any] = field(default_factory=dict)
     proof_iterations: int = 0
     portfolio_turn: int = 0
+    keeps_constraints: bool = False
 
 
 ANYTIME = PlannerTraits(anytime=True, supports_iteration_limit=False)

@@ -43,8 +43,8 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
 
     Traits of the class, for `plan()`; see :class:`~rrtik_ompl.ompl_bridge.planner_traits.PlannerTraits`:
     ``anytime``, ``one_goal``, ``finds_goals``, ``straight_first``, ``supports_iteration_limit`` (such a planner has the
-    option ``max_iterations``), ``path_statistics``, ``kernels``, ``one_joint``, ``brief_options`` and
-    ``proof_iterations``.
+    option ``max_iterations``), ``path_statistics``, ``kernels``, ``one_joint``, ``brief_options``,
+    ``proof_iterations`` and ``keeps_constraints``.
 
     Attributes:
         seed: The seed in use; given, or drawn from OMPL's, so that ``ompl.util.RNG.setSeed`` fixes it too.
@@ -66,6 +66,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     brief_options: ClassVar[Mapping[str, Any]] = MappingProxyType({})
     proof_iterations: ClassVar[int] = 0
     portfolio_turn: ClassVar[int] = 0
+    keeps_constraints: ClassVar[bool] = False
 
     def __init__(
         self, si: ob.SpaceInformation, name: str, *, world: MotionQueries | None = None, seed: int | None = None

@@ -7,10 +7,11 @@ from types import MappingProxyType
 
 import numpy as np
 
+from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ik.methods import load_kernels
-from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
+from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, planners_with, traits_of
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning.outcome import Plan, Request
 from rrtik_ompl.planning.search import Search
@@ -31,6 +32,8 @@ def run_planner(problem: Problem, name: str, factory: PlannerFactory, request: R
         InputError: If the planner does not take a parameter.
         PlannerError: If the planner broke.
     """
+    if problem.constraints:
+        _refuse_if_it_breaks_constraints(name, factory)
     children = np.random.SeedSequence(request.seed).generate_state(request.restarts + 1, np.uint32)
     _load_kernels(problem, factory)
     begin = time.perf_counter()
@@ -61,9 +64,19 @@ def _load_kernels(problem: Problem, factory: PlannerFactory) -> None:
     """Load what the search will use: compiling it for the first time is no part of planning."""
     if not isinstance(problem.goal, JointGoal):
         load_kernels(problem.robot)
-    if problem.world.fast is not None:
+    if problem.world.fast is not None or problem.constraints:
         for name in (*traits_of(factory).kernels, PROOF_KERNELS):
             library(name)
+
+
+def _refuse_if_it_breaks_constraints(name: str, factory: PlannerFactory) -> None:
+    """Refuse a planner whose paths would leave the regions of a problem's path constraints."""
+    traits = traits_of(factory)
+    if traits.keeps_constraints:
+        return
+    able = ", ".join(planners_with(lambda traits: traits.keeps_constraints)) or "none is installed"
+    why = "moves one joint at a time, which leaves their regions" if traits.one_joint else "does not keep them"
+    raise InputError(f"planner {name}: the problem has path constraints, and it {why}; use {able}")
 
 
 def _nothing_to_do(problem: Problem) -> bool:

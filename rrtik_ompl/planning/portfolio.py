@@ -82,7 +82,12 @@ def _search(problem: Problem, request: Request) -> tuple[Plan, str, dict[str, in
 
 
 def members(problem: Problem) -> tuple[str, ...]:
-    """Names of the planners that try a problem, in their order: those that seek the tip only if the goal is one."""
+    """Names of the planners that try a problem, in their order: those that seek the tip only if the goal is one.
+
+    With path constraints those that keep them.
+    """
+    if problem.constraints:
+        return tuple(planners_with(lambda traits: traits.keeps_constraints))
     tip = not isinstance(problem.goal, JointGoal)
     return tuple(name for name, traits in _by_turn() if tip or not traits.finds_goals)
 

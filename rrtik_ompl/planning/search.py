@@ -22,6 +22,7 @@ SHORTEST = 1e-3  # [s] that an attempt gets at least
 ROUNDS = 6  # attempts to find a proven path, once there is one that is checked in steps
 IN_KERNELS = 3  # of them, without proofs while searching, for planners that run in kernels
 MOVE_RULES = ("frozen_joints", "last_joints", "smallest_move")  # options of planners, see MoveRules
+SEPARATED = 2  # attempts with further goal configurations, once none that is known can be reached
 ANYTIME_SHARE = 0.8  # of the time, for the first attempt of an anytime planner, which keeps a clearance
 
 
@@ -95,7 +96,12 @@ class Search:
     def _done(self) -> bool:
         """Whether there is no time left, or nothing better to be expected."""
         enough = self._check.best is not None and self._check.open > ROUNDS
-        return self._left() <= 0.0 or self._check.settled or enough
+        return self._left() <= 0.0 or self._check.settled or enough or self._separated()
+
+    def _separated(self) -> bool:
+        """Whether path constraints keep start and goal apart, as far as the planner sees."""
+        seen = self.totals.get("separated", 0)
+        return seen > 0 and (self._goals.exhausted or seen > SEPARATED)
 
     def _left(self) -> float:
         return self._deadline - time.perf_counter()

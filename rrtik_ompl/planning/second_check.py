@@ -120,7 +120,7 @@ class SecondCheck:
         if first.proven:
             self.reason = ""
             return first
-        if self._ruled:
+        if self._ruled or self._problem.constraints:
             return None
         rng, single = np.random.default_rng(seed), self._traits.one_joint
         repaired = with_detours(world, rows, clearance=room.kept, rng=rng, one_joint=single)

@@ -6,6 +6,7 @@ A MotionBenchMaker file (scene or request) is recognised by its keys and read as
 from __future__ import annotations
 
 import os
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from rrtik_ompl.files.text import file_name
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_files.goal import GoalSection, StartSection, build_goal, goal_data
 from rrtik_ompl.problem_files.motion_bench_maker import is_motion_bench_maker, load_motion_bench_maker
+from rrtik_ompl.problem_files.path_constraints import ConstraintSection, build_constraints, constraint_data
 from rrtik_ompl.problem_files.robot import RobotEntry, robot_data
 from rrtik_ompl.problem_files.run import RunSection
 from rrtik_ompl.problem_files.scene import SceneEntry, scene_data
@@ -49,6 +51,9 @@ class ProblemFile(Section):
     self_margin: NotNegative = Field(
         0.0, description="[m] that links, and what they hold, keep from each other wherever they must not touch"
     )
+    path_constraints: list[ConstraintSection] = Field(
+        default=[], description="regions that a frame of the arm must not leave on the whole path"
+    )
     run: RunSection | None = Field(None, description="how to replan while the obstacles move (rrtik replan)")
 
 
@@ -74,12 +79,14 @@ def load_problem(name_or_file: FilePath, *, robot: Robot | FilePath | None = Non
     with document.at(("goal",)):
         goal = build_goal(entry.goal, world.robot)
     planner = _planner(document, entry.planner)
-    try:
-        return Problem(world, start, goal, name=path.stem, planner=planner)
-    except ProblemError as error:
-        line = document.lines[(error.part,)]
-        error.args = (f"{path}:{line}: {error}",)
-        raise
+    constraints = build_constraints(document, entry.path_constraints, world.robot)
+    with document.at(("path_constraints",)) if constraints else nullcontext():
+        try:
+            return Problem(world, start, goal, name=path.stem, planner=planner, constraints=constraints)
+        except ProblemError as error:
+            line = document.lines[(error.part,)]
+            error.args = (f"{path}:{line}: {error}",)
+            raise
 
 
 def _read(path: Path) -> YamlDocument:
@@ -108,6 +115,8 @@ def save_problem(problem: Problem, path: FilePath) -> None:
     data |= {"start": {"joints": problem.start.tolist()}, "goal": goal_data(problem.goal)}
     data |= {"motion_resolution": float(world.motion_resolution)}
     data |= {"self_margin": world.self_margin} if world.self_margin else {}
+    held = [constraint_data(region) for region in problem.constraints]
+    data |= {"path_constraints": held} if held else {}
     write_yaml(path, data if problem.planner is None else data | {"planner": problem.planner})
 
 

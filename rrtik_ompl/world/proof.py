@@ -41,7 +41,8 @@ class Gap:
     Attributes:
         motion: Number of the motion.
         share: Where on it, from 0 at its start to 1 at its end; nan if the whole motion was not looked at.
-        first, second: Names of the two bodies that are not proven apart; "" if there was no time to look.
+        first, second: Names of the two bodies that are not proven apart. Without a second one, the first says what else
+            is wrong; both are "" if there was no time to look.
     """
 
     motion: int
@@ -50,8 +51,8 @@ class Gap:
     second: str
 
     def __str__(self) -> str:
-        if not self.first:
-            return f"motion {self.motion}: not looked at"
+        if not self.second:
+            return f"motion {self.motion}: {self.first or 'not looked at'}"
         return f"motion {self.motion} at {self.share:.4f} of it: '{self.first}' and '{self.second}'"
 
 

@@ -13,6 +13,7 @@ from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.transitions import in_parts, subdivided
 from rrtik_ompl.world import Proof, World
+from rrtik_ompl.world.holding_world import HoldingWorld
 
 VERIFICATION_DENSITY = 2.0  # how many times finer than the motion resolution a motion is checked again
 MAX_CHECKS = 30_000_000  # of a path; more than that take minutes
@@ -47,7 +48,7 @@ def how_checked(world: World, rows: Matrix, known: Proof | None = None) -> str:
         kept = f", {margins}{1e3 * proof.clearance:g} mm clear of every obstacle" if proof.clearance else ""
         return f"proven free at every configuration{kept}"
     sampled, first = len(proof.unproven), proof.unproven[0]
-    where = f", first motion {first.motion + 1}" + (f" ('{first.first}' and '{first.second}')" if first.first else "")
+    where = f", first motion {first.motion + 1}" + (f" ('{first.first}' and '{first.second}')" if first.second else "")
     step = f"checked every {1e3 * verification_resolution(world):g} mm"
     return f"{proof.motions - sampled} of {proof.motions} motions proven free, the others {step}{where}"
 
@@ -63,6 +64,12 @@ def route_violations(world: World, rows: Matrix, resolution: float) -> tuple[Vio
     Raises:
         InputError: If the path is too long for its checks.
     """
+    if isinstance(world, HoldingWorld):
+        broken = _not_held(world, rows)
+        others = route_violations(world.unheld, rows, resolution)
+        edges = {violation.edge for violation in broken}
+        found = [*broken, *(violation for violation in others if violation.edge not in edges)]
+        return tuple(sorted(found, key=lambda violation: violation.edge))
     counts = np.array([world.steps(a, b, resolution) for a, b in pairwise(rows)], dtype=np.float64)
     if counts.sum() > MAX_CHECKS:
         raise InputError(
@@ -70,10 +77,20 @@ def route_violations(world: World, rows: Matrix, resolution: float) -> tuple[Vio
             f"raise motion_resolution, or check whether the joint values are rad and m"
         )
     open_ = np.flatnonzero(~world.motions_proven(rows[:-1], rows[1:]))
-    found: list[Violation] = []
+    found = []
     for run in np.split(open_, np.flatnonzero(np.diff(open_) > 1) + 1) if len(open_) else ():
         found += _sampled(world, rows, counts, run)
     return tuple(found)
+
+
+def _not_held(world: HoldingWorld, rows: Matrix) -> list[Violation]:
+    """The motions that do not keep the path constraints."""
+    constraints = world.constraints
+    left = np.flatnonzero(~constraints.motions_held(rows[:-1], rows[1:]))
+    ends = [rows[k] if constraints.explain(rows[k]) else rows[k + 1] for k in left]
+    return [
+        Violation(int(k), frozen(q), constraints.why(rows[k], rows[k + 1])) for k, q in zip(left, ends, strict=True)
+    ]
 
 
 def _sampled(world: World, rows: Matrix, counts: Vector, run: NDArray[np.int64]) -> Iterator[Violation]:

@@ -14,9 +14,9 @@ from ompl import base as ob
 from rrtik_ompl.errors import PlannerError
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult, check_planner
 from rrtik_ompl.ompl_bridge.contract import CONTRACT, Clause, moves_one_joint_at_a_time, small_problem, solution_rows
-from rrtik_planners import CRDT, IKURT, MBRRT, BiCRDT, DRRTCon, FastRRTConnect, FewestMoves, IKURTPublished
+from rrtik_planners import CRDT, IKURT, MBRRT, BiCRDT, CBiRRT, DRRTCon, FastRRTConnect, FewestMoves, IKURTPublished
 
-PLANNERS = (BiCRDT, CRDT, DRRTCon, FastRRTConnect, FewestMoves, IKURT, IKURTPublished, MBRRT)
+PLANNERS = (BiCRDT, CBiRRT, CRDT, DRRTCon, FastRRTConnect, FewestMoves, IKURT, IKURTPublished, MBRRT)
 SINGLE_JOINT = (BiCRDT, CRDT, FewestMoves, MBRRT)
 
 SOAK = 10_000
@@ -69,11 +69,11 @@ def run_strictly(code: str) -> subprocess.CompletedProcess[str]:
 CHECK_ALL = """
 from ompl import util as ou
 from rrtik_ompl.ompl_bridge import check_planner
-from rrtik_planners import CRDT, IKURT, MBRRT, BiCRDT, DRRTCon, FastRRTConnect, FewestMoves, IKURTPublished
+from rrtik_planners import CRDT, IKURT, MBRRT, BiCRDT, CBiRRT, DRRTCon, FastRRTConnect, FewestMoves, IKURTPublished
 ou.setLogLevel(ou.LogLevel.LOG_NONE)
 def main():
     for _ in range(5):
-        for planner in (BiCRDT, CRDT, FastRRTConnect, FewestMoves, IKURT, IKURTPublished, MBRRT):
+        for planner in (BiCRDT, CBiRRT, CRDT, FastRRTConnect, FewestMoves, IKURT, IKURTPublished, MBRRT):
             check_planner(planner, single_joint_moves=planner in (BiCRDT, CRDT, FewestMoves, MBRRT))
     print("kept")
 main()

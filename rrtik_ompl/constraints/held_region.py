@@ -1,0 +1,214 @@
+"""One task-space region that is held along a path: how far configurations are from it, how far motions may leave it.
+
+Each region is a convex set of a few smooth functions of the configuration ("measures"), so that a straight motion in
+configuration space leaves it by no more than its ends do and a second-order term: where ``f`` is such a function,
+``|f(t) - (1 - t) f(0) - t f(1)| <= max |f''| / 8``. The second derivatives are bounded by the ways of the joints, after
+the geometric Jacobian: those of a frame's origin by levers, those of its axes and of its quaternion by angles alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import TAU, Matrix, Vector
+from rrtik_ompl.collision.motion_bound import joint_weights
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.poses import rpy_matrices
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import Scene
+from rrtik_ompl.task_region import TaskRegion, into_range, roll_pitch_yaw
+
+SLACK_POSITION = 5e-4  # [m] by which motions between stored configurations may leave a region
+SLACK_ANGLE = np.radians(0.2)  # [rad]
+LARGEST_PITCH = np.radians(75.0)  # of ranges of roll, pitch and yaw: beyond, roll and yaw run away
+ANYWHERE = 1000.0  # [m]; bounds of a position from here on are none: farther than any arm reaches
+BEHIND = 2.0  # measure of an axis that points more than a quarter turn away; more than any that is allowed
+
+
+class Turning(IntEnum):
+    """What a region says of the orientation."""
+
+    FREE = 0
+    AXIS = 1  # an axis of the frame keeps a direction within a cone
+    BALL = 2  # one orientation, within an angle
+    RANGES = 3  # of roll, pitch and yaw
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldRegion:
+    """A region of a frame, prepared for a robot.
+
+    Attributes:
+        robot: The arm.
+        region: In the world, not ``from_start``.
+        label: Of the region, for messages.
+        link: Frame of the robot on which it is.
+        joint: Number of the joint that carries it, 0 for the world.
+        T_joint_d: Frame of the displacement in that of the joint, shape (4, 4); turned so that for AXIS its z axis
+            is the one that is kept, and for BALL it is the world's frame w where the orientation is the right one.
+        T_w_world: World seen from the region's frame, shape (4, 4).
+        turning: What is said of the orientation.
+        direction: Of AXIS, where z has to point in w, shape (3,).
+        levers: Largest distance of the frame's origin from the axis of each joint that turns it, 1 for one that slides
+            it, shape (joints,); all 0 where the region says nothing of the position.
+        turns: Which joints turn the frame, 1 or 0, shape (joints,).
+    """
+
+    robot: Robot
+    region: TaskRegion
+    label: str
+    link: str
+    joint: int
+    T_joint_d: NDArray[np.float64]
+    T_w_world: NDArray[np.float64]
+    turning: Turning
+    direction: Vector
+    levers: Vector
+    turns: Vector
+
+    @property
+    def T_world_w(self) -> NDArray[np.float64]:
+        """Frame of the region, shape (4, 4)."""
+        placed: NDArray[np.float64] = self.region.T_world_w.homogeneous
+        return placed
+
+    @property
+    def frame(self) -> str:
+        """Name of the frame."""
+        return self.robot.tip if self.region.frame is None else self.region.frame
+
+    def displacements(self, Q: Matrix) -> NDArray[np.float64]:
+        """The frame as seen from the region's frame for configurations, shape (m, dof): (m, 4, 4)."""
+        return self.T_w_world @ self.robot.joint_frames(Q)[:, self.joint] @ self.T_joint_d
+
+    def measures(self, Q: Matrix) -> Matrix:
+        """How far configurations, shape (m, dof), are from the region, without its tolerances, shape (m, 2).
+
+        Metres, and for the orientation what `limits` makes of an angle.
+        """
+        D = self.displacements(Q)
+        away = D[:, :3, 3] - np.clip(D[:, :3, 3], *self.region.bounds[:3].T)
+        return np.column_stack([np.linalg.norm(away, axis=1), self._turned(D[:, :3, :3])])
+
+    def limits(self, *, slack: bool) -> Vector:
+        """The largest measures allowed: at stored configurations or, with the slack, in between; shape (2,)."""
+        region = self.region
+        metres = region.position_tolerance + (SLACK_POSITION if slack else 0.0)
+        angle = min(region.orientation_tolerance + (SLACK_ANGLE if slack else 0.0), 0.5 * np.pi)
+        if self.turning == Turning.AXIS:
+            angle = np.sin(angle)
+        elif self.turning == Turning.BALL:
+            angle = np.sin(0.5 * angle)
+        return np.array([metres, angle])
+
+    def deviations(self, A: Matrix, B: Matrix) -> Matrix:
+        """How far the measures of motions A[k] -> B[k], shapes (m, dof), exceed those of their ends, shape (m, 2)."""
+        ways = np.abs((B - A) @ self.robot.chain.gain.T)
+        turned = ways * self.turns
+        before = np.cumsum(turned, axis=1) - turned  # of the joints nearer to the base, which come first
+        origin = (ways * self.levers * (turned + 2.0 * before)).sum(axis=1)
+        angle = turned.sum(axis=1)
+        return np.column_stack([origin, self.curvature * angle * angle]) / 8.0
+
+    @property
+    def curvature(self) -> float:
+        """Second derivative of the orientation's measure for joint speeds whose sum is 1 rad."""
+        if self.turning == Turning.RANGES:
+            steep = 1.0 / np.cos(np.abs(self.region.bounds[4]).max() + self.region.orientation_tolerance + SLACK_ANGLE)
+            return float(3.0 * (0.5 * steep + 2.0 * steep * steep))
+        return {Turning.FREE: 0.0, Turning.AXIS: 1.0, Turning.BALL: 0.25}[self.turning]
+
+    def outside(self, q: Vector) -> tuple[float, float]:
+        """By how much a configuration, shape (dof,), is outside the tolerances [m; rad]."""
+        metres, angle = self.measures(q[None])[0]
+        if self.turning == Turning.AXIS:
+            z = self.displacements(q[None])[0, :3, 2]
+            angle = np.arctan2(np.linalg.norm(np.cross(z, self.direction)), z @ self.direction)
+        elif self.turning == Turning.BALL:
+            angle = 2.0 * np.arcsin(min(angle, 1.0))
+        region = self.region
+        return max(metres - region.position_tolerance, 0.0), max(float(angle) - region.orientation_tolerance, 0.0)
+
+    def _turned(self, R: NDArray[np.float64]) -> Vector:
+        if self.turning == Turning.AXIS:
+            z = R[:, :, 2]
+            sine = np.linalg.norm(np.cross(z, self.direction), axis=1)
+            away: Vector = np.where(z @ self.direction > 0.0, sine, BEHIND)
+            return away
+        if self.turning == Turning.BALL:
+            half: Vector = np.linalg.norm(R - np.eye(3), axis=(1, 2)) / np.sqrt(8.0)  # sine of half the angle
+            return half
+        if self.turning == Turning.RANGES:
+            angles = roll_pitch_yaw(R)
+            excess = np.abs(angles - into_range(angles, *self.region.bounds[3:].T))
+            total: Vector = np.minimum(excess, TAU - excess).sum(axis=1)
+            return total
+        return np.zeros(len(R))
+
+
+def held_region(robot: Robot, scene: Scene, region: TaskRegion, label: str) -> HeldRegion:
+    """A region prepared for a robot in a scene.
+
+    Raises:
+        InputError: If its ranges of angles cannot be held: pitch too near to a quarter turn.
+        UnknownNameError: If its frame is neither a link nor an attached object.
+    """
+    link, joint, T_joint_frame = frame_place(robot, scene, region.frame, label)
+    turning, before, after = _turning(region, label)
+    T_joint_d = (T_joint_frame * region.T_w_tip.inverse()).homogeneous.copy()
+    T_joint_d[:3, :3] = T_joint_d[:3, :3] @ after
+    carried = [(joint, T_joint_d[:3, 3], 0.0)]
+    somewhere = bool((np.abs(region.bounds[:3]) < ANYWHERE).any())
+    levers = joint_weights(robot, carried) if joint and somewhere else np.zeros(len(robot.chain.parent))
+    turns = (_carries(robot, joint) & ~robot.chain.prismatic).astype(np.float64)
+    T_w_world = region.T_world_w.inverse().homogeneous
+    return HeldRegion(robot, region, label, link, joint, T_joint_d, T_w_world, turning, before, levers, turns)
+
+
+def frame_place(robot: Robot, scene: Scene, frame: str | None, label: str) -> tuple[str, int, Any]:
+    """The robot's frame that a frame is on, the joint that carries it, and its pose in the joint's frame."""
+    held = next((each for each in scene.attached if each.name == frame), None)
+    name = robot.tip if frame is None else frame if held is None else held.link
+    if not robot.model.existFrame(name):
+        names = [*(each.name for each in robot.model.frames), *(each.name for each in scene.attached)]
+        raise UnknownNameError(f"frame of {label}", name, names)
+    target = robot.model.frames[robot.model.getFrameId(name)]
+    return name, int(target.parentJoint), target.placement * (pin.SE3.Identity() if held is None else held.pose)
+
+
+def _carries(robot: Robot, joint: int) -> NDArray[np.bool_]:
+    """Which joints of the chain move a joint's frame."""
+    carries, row = np.zeros(len(robot.chain.parent), dtype=bool), joint - 1
+    while row >= 0:
+        carries[row], row = True, int(robot.chain.parent[row])
+    return carries
+
+
+def _turning(region: TaskRegion, label: str) -> tuple[Turning, Vector, NDArray[np.float64]]:
+    """What a region says of the orientation, where z has to point, and by what the frame is turned to say it so."""
+    low, high = region.bounds[3:].T
+    full, single = high - low >= TAU - 1e-9, low == high
+    nowhere = np.zeros(3)
+    if full.all():
+        return Turning.FREE, nowhere, np.eye(3)
+    if single.all():
+        return Turning.BALL, nowhere, rpy_matrices(low[None])[0].T
+    if full.sum() == 1 and single.sum() == 2:
+        k = int(np.flatnonzero(full)[0])
+        x, y, z = (rpy_matrices((np.where(full, 0.0, low) * unit)[None])[0] for unit in np.eye(3))
+        before, after = ((z @ y, np.eye(3)), (z, x), (np.eye(3), y @ x))[k]
+        R = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), np.eye(3)[k]).matrix()
+        return Turning.AXIS, before[:, k], after.T @ R
+    pitch = np.abs(region.bounds[4]).max()
+    if pitch > LARGEST_PITCH:
+        raise InputError(
+            f"{label}: pitch may reach {np.degrees(pitch):.1f} degrees beside ranges of roll or yaw, more than "
+            f"{np.degrees(LARGEST_PITCH):g}; turn the frame of the region, or use two constraints"
+        )
+    return Turning.RANGES, nowhere, np.eye(3)

@@ -1,0 +1,117 @@
+"""Several regions held at once: which configurations and motions keep all of them, and what breaks one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.constraints.held_region import HeldRegion, frame_place, held_region
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import Scene
+from rrtik_ompl.task_region import TaskRegion
+
+HALVINGS = 7  # of a motion, at most, to see that it keeps to a region
+ROUNDING = 1e-9  # without unit; of a measure
+
+
+class HeldRegions:
+    """The path constraints of a problem.
+
+    A configuration is held if its frames are in all regions, within their tolerances. A straight motion is held if that
+    is so at both ends and it leaves no region by more than 0.5 mm and 0.2 degrees in between; this is proven, by the
+    bound of :meth:`HeldRegion.deviations` on parts of it, not looked up at samples.
+
+    Attributes:
+        regions: One or more.
+    """
+
+    def __init__(self, regions: Iterable[HeldRegion]) -> None:
+        self.regions = tuple(regions)
+
+    def held(self, Q: Matrix) -> Mask:
+        """Which configurations, shape (m, dof), are in all regions, shape (m,)."""
+        mask = np.ones(len(Q), dtype=bool)
+        for region in self.regions:
+            mask &= (region.measures(Q) <= region.limits(slack=False) + ROUNDING).all(axis=1)
+        return mask
+
+    def motions_held(self, A: Matrix, B: Matrix) -> Mask:
+        """Which straight motions A[k] -> B[k], shapes (m, dof), keep all regions, shape (m,)."""
+        mask = self.held(A) & self.held(B)
+        for region in self.regions:
+            mask[mask] = _keeps(region, A[mask], B[mask])
+        return mask
+
+    def explain(self, q: Vector) -> str:
+        """A line that says which region a configuration, shape (dof,), is outside, and by how much; "" for none."""
+        for region in self.regions:
+            metres, angle = region.outside(q)
+            measured = region.measures(q[None])[0] <= region.limits(slack=False) + ROUNDING
+            if not measured.all():
+                amounts = [f"{1e3 * metres:.3g} mm"] * (not measured[0])
+                amounts += [f"{np.degrees(angle):.3g} degrees"] * (not measured[1])
+                return f"{region.label} (frame '{region.frame}'): {' and '.join(amounts)} outside"
+        return ""
+
+    def why(self, a: Vector, b: Vector) -> str:
+        """A line that says what is wrong with a motion, shapes (dof,), that is not held."""
+        between = ", ".join(f"'{region.frame}'" for region in self.regions)
+        return self.explain(a) or self.explain(b) or f"it leaves the region of {between} in between"
+
+
+def held_regions(robot: Robot, scene: Scene, regions: Iterable[TaskRegion], start: Vector | None) -> HeldRegions:
+    """Path constraints prepared for a robot in a scene.
+
+    Args:
+        robot: The arm.
+        scene: With the attached objects that may carry a frame.
+        regions: What is to be held.
+        start: Configuration in which regions ``from_start`` begin, shape (dof,).
+
+    Raises:
+        InputError: If one of them is no region, names no frame, or cannot be held.
+    """
+    prepared = []
+    for number, region in enumerate(regions, 1):
+        label = f"path constraint {number}"
+        if not isinstance(region, TaskRegion):
+            raise InputError(
+                f"{label} must be a TaskRegion, got {type(region).__name__}; use upright, on_plane, on_line, "
+                "orientation_of or inside"
+            )
+        prepared.append(_placed(robot, scene, region, label, start))
+    return HeldRegions(prepared)
+
+
+def _placed(robot: Robot, scene: Scene, region: TaskRegion, label: str, start: Vector | None) -> HeldRegion:
+    """One of them, in the world."""
+    if region.from_start and start is not None:
+        _, joint, T_joint_frame = frame_place(robot, scene, region.frame, label)
+        region = region.started_at(pin.SE3(robot.joint_frames(start)[0, joint]) * T_joint_frame)
+    return held_region(robot, scene, region, label)
+
+
+def _keeps(region: HeldRegion, A: Matrix, B: Matrix) -> Mask:
+    """Which motions keep one region: halved until the bound on each part is small enough, or one end is outside."""
+    deviations, most = region.deviations(A, B), region.limits(slack=True)
+    kept, open_ = np.zeros(len(A), dtype=bool), np.arange(len(A))
+    for level in range(HALVINGS + 1):
+        parts = 2**level
+        rows = _nodes(A[open_], B[open_], parts)
+        worst = region.measures(rows.reshape(-1, A.shape[1])).reshape(len(open_), parts + 1, 2).max(axis=1)
+        done = (worst + deviations[open_] / parts**2 <= most).all(axis=1)
+        kept[open_[done]] = True
+        open_ = open_[~done & (worst <= most).all(axis=1)]
+        if len(open_) == 0:
+            break
+    return kept
+
+
+def _nodes(A: Matrix, B: Matrix, parts: int) -> Matrix:
+    """Ends of equal parts of motions, shape (m, parts + 1, dof)."""
+    shares = np.linspace(0.0, 1.0, parts + 1)[:, None]
+    return (1.0 - shares) * A[:, None] + shares * B[:, None]

@@ -1,0 +1,127 @@
+"""How a configuration has to move to come into regions: residuals, their derivatives, and projection, in numpy.
+
+:mod:`rrtik_ompl.fast.search.constrained.projection_kernels` is the same in kernels.
+
+Sources: damped Gauss-Newton steps on the residuals of all regions at once [17, 22].
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector
+from rrtik_ompl.constraints.held_region import HeldRegion, Turning
+from rrtik_ompl.constraints.held_regions import HeldRegions
+from rrtik_ompl.poses import cross_products
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.task_region import into_range, roll_pitch_yaw
+from rrtik_ompl.tip_distance import PER_RADIAN, reach_of
+
+KEPT_SHARE = 0.95  # of a tolerance, up to which configurations are left where they are
+AIMED_SHARE = 0.8  # of a tolerance, to which others are moved
+DAMPING, SHARE = 1e-9, 0.5  # added to the squares of the derivatives: a constant, and so much of the squared residual
+LARGEST_STEP = 0.5  # [rad] or [m] of any joint in one step
+STEPS = 60  # of a projection from anywhere
+SMALL = 1e-12  # [rad]; of a smaller angle the axis is not known, or it is none
+STEEPEST = 1e-3  # cosine of the pitch, at least
+
+
+def projected_rows(robot: Robot, constraints: HeldRegions, rows: Matrix, steps: int = STEPS) -> tuple[Matrix, Mask]:
+    """Move configurations into all regions, inside the joint limits.
+
+    Args:
+        robot: The arm.
+        constraints: The regions.
+        rows: Shape (m, dof).
+        steps: At most.
+
+    Returns:
+        Where each has come to, shape (m, dof), and which are in all regions, shape (m,).
+    """
+    Q, there = np.array(rows, dtype=np.float64), np.zeros(len(rows), dtype=bool)
+    for number in range(steps + 1):
+        parts = [residual(robot, region, Q) for region in constraints.regions]
+        error = np.concatenate([part[0] for part in parts], axis=1)
+        J = np.concatenate([part[1] for part in parts], axis=1)
+        square = np.vecdot(error, error)
+        there = square == 0.0
+        if there.all() or number == steps:
+            break
+        pull = np.einsum("mkn,mk->mn", J, error)
+        damped = np.swapaxes(J, 1, 2) @ J + (DAMPING + SHARE * square)[:, None, None] * np.eye(robot.dof)
+        change = np.linalg.solve(damped, pull[..., None])[..., 0]
+        change *= LARGEST_STEP / np.maximum(np.abs(change).max(axis=1, keepdims=True), LARGEST_STEP)
+        Q = np.where(there[:, None], Q, robot.clamp(Q + change))
+    return Q, there
+
+
+def residual(robot: Robot, region: HeldRegion, Q: Matrix) -> tuple[Matrix, NDArray[np.float64]]:
+    """The way into a region, a little beyond its rim, and the derivative of what has to move it.
+
+    Args:
+        robot: The arm.
+        region: The region.
+        Q: Configurations, shape (m, dof).
+
+    Returns:
+        Without unit, shape (m, 6), 0 where the region is kept; and shape (m, 6, dof).
+    """
+    D, measures = region.displacements(Q), region.measures(Q)
+    moves = measures > KEPT_SHARE * region.limits(slack=False)
+    J = _twists(robot, region, Q)
+    away = D[:, :3, 3] - np.clip(D[:, :3, 3], *region.region.bounds[:3].T)
+    share = 1.0 - AIMED_SHARE * region.region.position_tolerance / np.where(moves[:, 0], measures[:, 0], 1.0)
+    held = (moves[:, :1] & (away != 0.0)) / reach_of(robot)
+    turn, felt, kept = _turn(region, D[:, :3, :3], measures[:, 1], J[:, 3:])
+    weights = np.hstack([held, kept * moves[:, 1:] * PER_RADIAN])
+    error = np.hstack([-away * share[:, None], turn]) * weights
+    return error, np.concatenate([J[:, :3], felt], axis=1) * weights[:, :, None]
+
+
+def _twists(robot: Robot, region: HeldRegion, Q: Matrix) -> NDArray[np.float64]:
+    """Geometric Jacobians of the displacement, in the axes of the region, shape (m, 6, dof)."""
+    poses, J = robot.fk_jacobian_batch(Q, region.link)
+    origin = (region.T_world_w @ region.displacements(Q))[:, :3, 3]
+    lever = np.repeat(origin - poses[:, :3, 3], robot.dof, axis=0)
+    turned = cross_products(np.swapaxes(J[:, 3:], 1, 2).reshape(-1, 3), lever)
+    J[:, :3] += np.swapaxes(turned.reshape(len(Q), robot.dof, 3), 1, 2)
+    R = region.T_w_world[:3, :3]
+    return np.concatenate([R @ J[:, :3], R @ J[:, 3:]], axis=1)
+
+
+def _turn(
+    region: HeldRegion, R: NDArray[np.float64], measure: Vector, J: NDArray[np.float64]
+) -> tuple[Matrix, NDArray[np.float64], Matrix]:
+    """The turn into the region [rad], what turns change of it, and which of its numbers count."""
+    aimed, ones = AIMED_SHARE * region.region.orientation_tolerance, np.ones((len(R), 3))
+    if region.turning == Turning.FREE:
+        return 0.0 * ones, J, 0.0 * ones
+    if region.turning == Turning.RANGES:
+        angles = roll_pitch_yaw(R)
+        away = angles - into_range(angles, *region.region.bounds[3:].T)
+        away -= TAU * np.round(away / TAU)
+        away[np.abs(away) < SMALL] = 0.0
+        share = 1.0 - aimed / np.where(measure > 0.0, measure, 1.0)
+        return -away * share[:, None], _rates(R) @ J, (away != 0.0).astype(np.float64)
+    if region.turning == Turning.AXIS:
+        z = R[:, :, 2]
+        axis, cosine = cross_products(z, np.tile(region.direction, (len(z), 1))), z @ region.direction
+        J = J - z[:, :, None] * np.einsum("mi,mik->mk", z, J)[:, None]
+    else:
+        axis = 0.5 * np.column_stack([R[:, 1, 2] - R[:, 2, 1], R[:, 2, 0] - R[:, 0, 2], R[:, 0, 1] - R[:, 1, 0]])
+        cosine = 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0)
+    sine = np.linalg.norm(axis, axis=1)
+    known = sine >= SMALL
+    axis = np.where(known[:, None], axis / np.where(known, sine, 1.0)[:, None], R[:, :, 0])
+    return axis * (np.arctan2(sine, cosine) - aimed)[:, None], J, ones
+
+
+def _rates(R: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What angular velocities make of roll, pitch and yaw, shape (m, 3, 3)."""
+    a, b = R[:, 0, 0], R[:, 1, 0]
+    level = np.maximum(np.hypot(a, b), STEEPEST)
+    a, b, sine, zero = a / level, b / level, -R[:, 2, 0], np.zeros(len(R))
+    roll = np.stack([a / level, b / level, zero])
+    yaw = np.stack([sine * roll[0], sine * roll[1], zero + 1.0])
+    return np.moveaxis(np.stack([roll, np.stack([-b, a, zero]), yaw]), 2, 0)

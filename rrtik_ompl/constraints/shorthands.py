@@ -1,0 +1,167 @@
+"""Path constraints by name: task-space regions [17] of a frame of the arm, to be held along a whole path."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import Matrix, finite_array, finite_number, positive
+from rrtik_ompl.choices import FrameAxis
+from rrtik_ompl.constraints.held_region import ANYWHERE
+from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.poses import rigid, unit_vector
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.task_region import TaskRegion
+
+LARGEST_TILT_DEG = 80.0
+
+
+def upright(robot: Robot, axis: FrameAxis = "z", *, tolerance_deg: float = 5.0, frame: str | None = None) -> TaskRegion:
+    """Keep an axis of a frame within an angle of the direction in the world that it has at the start of the path.
+
+    Turning about the axis and moving anywhere are free. A cup that starts upside down stays so.
+
+    Args:
+        robot: The arm.
+        axis: "x", "y" or "z" of the frame.
+        tolerance_deg: Largest angle [deg], at most 80.
+        frame: A link or an attached object; the robot's tip if None.
+
+    Raises:
+        InputError: If there is no such axis, or the tolerance is out of range.
+
+    Example:
+        >>> import rrtik_ompl as rrtik
+        >>> robot = rrtik.load_robot("ur5")
+        >>> start, goal = robot.configuration([0, -1.5, 1.5, 0, 0, 0]), robot.configuration([1, -1.5, 1.5, 0, 0, 0])
+        >>> problem = rrtik.Problem(rrtik.World(robot), start, goal, constraints=[rrtik.upright(robot)])
+    """
+    require(robot, Robot, "robot of a path constraint", "use load_robot(name)")
+    if axis not in ("x", "y", "z"):
+        raise InputError(f"upright: axis must be x, y or z, got {axis!r}")
+    tolerance = positive(tolerance_deg, "upright: tolerance_deg")
+    if tolerance > LARGEST_TILT_DEG:
+        raise InputError(f"upright: tolerance_deg must be {LARGEST_TILT_DEG:g} or less, got {tolerance:g}")
+    direction = np.eye(3)["xyz".index(axis)]
+    R = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), direction).matrix()
+    T_frame_w = pin.SE3(R, np.zeros(3))
+    bounds = _anywhere()
+    bounds[3:5] = 0.0
+    return TaskRegion(
+        T_frame_w,
+        bounds,
+        T_frame_w.inverse(),
+        orientation_tolerance=np.radians(tolerance),
+        frame=frame,
+        from_start=True,
+    )
+
+
+def on_plane(point: ArrayLike, normal: ArrayLike, *, tolerance: float = 1e-3, frame: str | None = None) -> TaskRegion:
+    """Keep the origin of a frame on a plane of the world, its orientation free.
+
+    Args:
+        point: Of the plane [m], shape (3,).
+        normal: Of length 1, shape (3,).
+        tolerance: Largest distance from the plane [m].
+        frame: A link or an attached object; the robot's tip if None.
+
+    Raises:
+        InputError: If the normal is not of length 1, or the tolerance is not positive.
+
+    Example:
+        >>> table = rrtik.on_plane([0, 0, 0.3], [0, 0, 1], tolerance=0.002)
+    """
+    bounds = _anywhere()
+    bounds[2] = 0.0
+    return TaskRegion(_placed(point, normal, "on_plane: normal"), bounds, position_tolerance=tolerance, frame=frame)
+
+
+def on_line(point: ArrayLike, direction: ArrayLike, *, tolerance: float = 1e-3, frame: str | None = None) -> TaskRegion:
+    """Keep the origin of a frame on a straight line of the world, its orientation free.
+
+    Args:
+        point: Of the line [m], shape (3,).
+        direction: Of length 1, shape (3,).
+        tolerance: Largest distance from the line [m].
+        frame: A link or an attached object; the robot's tip if None.
+
+    Raises:
+        InputError: If the direction is not of length 1, or the tolerance is not positive.
+
+    Example:
+        >>> rail = rrtik.on_line([0.5, 0, 0.3], [0, 1, 0])
+    """
+    bounds = _anywhere()
+    bounds[:2] = 0.0
+    return TaskRegion(
+        _placed(point, direction, "on_line: direction"), bounds, position_tolerance=tolerance, frame=frame
+    )
+
+
+def orientation_of(pose: Any, tolerances_deg: ArrayLike = 1.0, *, frame: str | None = None) -> TaskRegion:
+    """Keep the orientation of a frame, its position free.
+
+    Args:
+        pose: ``pinocchio.SE3`` or a matrix of shape (4, 4) whose orientation is kept.
+        tolerances_deg: Largest angle from it [deg]; or three, of roll, pitch and yaw about its axes, shape (3,).
+        frame: A link or an attached object; the robot's tip if None.
+
+    Raises:
+        InputError: If the pose is none, or a tolerance is negative or too large.
+
+    Example:
+        >>> level = rrtik.orientation_of(robot.fk(start), 2.0)
+    """
+    given = np.asarray(tolerances_deg, dtype=np.float64)
+    bounds = _anywhere()
+    bounds[3:] = 0.0
+    placed = rigid(pose, "orientation_of: pose")
+    if given.ndim == 0:
+        angle = positive(finite_number(given, "orientation_of: tolerances_deg"), "orientation_of: tolerances_deg")
+        if angle > LARGEST_TILT_DEG:
+            raise InputError(f"orientation_of: tolerances_deg must be {LARGEST_TILT_DEG:g} or less, got {angle:g}")
+        return TaskRegion(placed, bounds, orientation_tolerance=np.radians(angle), frame=frame)
+    angles = finite_array(given, (3,), "orientation_of: tolerances_deg")
+    if (angles < 0.0).any():
+        raise InputError(f"orientation_of: tolerances_deg must not be negative, got {angles.tolist()}")
+    bounds[3:] = np.radians(np.minimum(angles, 180.0))[:, None] * [-1.0, 1.0]
+    return TaskRegion(placed, bounds, frame=frame)
+
+
+def inside(pose: Any, sides: ArrayLike, *, tolerance: float = 1e-3, frame: str | None = None) -> TaskRegion:
+    """Keep the origin of a frame inside a box of the world, its orientation free.
+
+    Args:
+        pose: Of the box's centre, ``pinocchio.SE3`` or a matrix of shape (4, 4).
+        sides: Full side lengths [m], shape (3,).
+        tolerance: Largest distance from the box [m].
+        frame: A link or an attached object; the robot's tip if None.
+
+    Raises:
+        InputError: If the pose is none, a side is negative, or the tolerance is not positive.
+
+    Example:
+        >>> fence = rrtik.inside(rrtik.pose([0.4, 0, 0.4]), [0.4, 0.8, 0.6])
+    """
+    lengths = finite_array(sides, (3,), "inside: sides")
+    if (lengths < 0.0).any():
+        raise InputError(f"inside: sides must not be negative, got {lengths.tolist()}")
+    bounds = _anywhere()
+    bounds[:3] = 0.5 * lengths[:, None] * [-1.0, 1.0]
+    return TaskRegion(rigid(pose, "inside: pose"), bounds, position_tolerance=tolerance, frame=frame)
+
+
+def _anywhere() -> Matrix:
+    """Bounds that leave everything free."""
+    return np.outer([ANYWHERE] * 3 + [np.pi] * 3, [-1.0, 1.0])
+
+
+def _placed(point: ArrayLike, direction: ArrayLike, what: str) -> Any:
+    """A frame at a point, its z axis along a direction."""
+    axis = unit_vector(direction, what)
+    R = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), axis).matrix()
+    return pin.SE3(R, finite_array(point, (3,), what.split(":")[0] + ": point"))

@@ -1,0 +1,132 @@
+"""Path constraints as tables for kernels, and configurations moved onto them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rrtik_ompl.arrays import Mask, Matrix
+from rrtik_ompl.constraints.held_region import HeldRegion
+from rrtik_ompl.constraints.held_regions import HeldRegions
+from rrtik_ompl.constraints.residuals import AIMED_SHARE, DAMPING, KEPT_SHARE, LARGEST_STEP, STEPS, projected_rows
+from rrtik_ompl.fast.ik import ik_layout
+from rrtik_ompl.fast.search.constrained import layout
+from rrtik_ompl.fast.simd.library import library
+from rrtik_ompl.fast.tables.memory import Table, aligned, record, table
+from rrtik_ompl.ik.serial_chain import limb_table, pose_numbers
+from rrtik_ompl.ik.tip_columns import frame_columns
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.tip_distance import PER_RADIAN, reach_of
+
+
+class HeldTables:
+    """The tables of path constraints for a robot.
+
+    Attributes:
+        regions: What is held.
+        held: The table of all regions.
+        address: Where it is; valid as long as this object lives.
+    """
+
+    def __init__(self, robot: Robot, constraints: HeldRegions, limbs: list[Table]) -> None:
+        self.regions, self._limbs = constraints.regions, limbs
+        dof, made = robot.dof, [_region_tables(*pair) for pair in zip(constraints.regions, limbs, strict=True)]
+        addresses = [region.address for region, _ in made]
+        self._parts = [part for parts in made for part in parts]
+        numbers = np.array([1.0 / reach_of(robot), PER_RADIAN, DAMPING, LARGEST_STEP])
+        self.held = table(
+            {
+                layout.COUNT: len(addresses),
+                layout.REGIONS: np.array(addresses, dtype=np.int64),
+                layout.HELD_DOF: dof,
+                layout.HELD_LOWER: np.asarray(robot.lower),
+                layout.HELD_UPPER: np.asarray(robot.upper),
+                layout.HELD_NUMBERS: numbers,
+                layout.COLUMNS: np.zeros(ik_layout.TWIST_NUMBERS * dof),
+                layout.SQUARE: np.zeros(dof * dof),
+                layout.CHANGE: np.zeros(dof),
+                layout.ERROR: np.zeros(ik_layout.TWIST_NUMBERS),
+                layout.WEIGHTS: np.zeros(ik_layout.TWIST_NUMBERS),
+                layout.NODE: np.zeros(dof),
+                layout.MEASURES: np.zeros(2 * len(addresses)),
+            }
+        )
+        self.address = self.held.address
+
+    def project(self, rows: Matrix, steps: int = STEPS) -> tuple[Matrix, Mask]:
+        """Move configurations, shape (m, dof), into all regions; where they are then, and which are there, (m,)."""
+        kernels = library(layout.KERNELS)
+        moved, reached = aligned(np.asarray(rows)), aligned(np.zeros(len(rows), dtype=np.int32))
+        if kernels is not None:
+            kernels.project_rows(self.address, moved.ctypes.data, len(rows), steps, reached.ctypes.data)
+        return moved.reshape(rows.shape).copy(), reached != 0
+
+    def intact(self) -> bool:
+        """Whether no kernel has written beyond an array."""
+        return all(part.intact() for part in (self.held, *self._parts, *self._limbs))
+
+
+def held_tables(robot: Robot, constraints: HeldRegions) -> HeldTables | None:
+    """The tables of path constraints; None where there are no kernels, or a joint hangs on several numbers of q."""
+    if library(layout.KERNELS) is None:
+        return None
+    limbs = [limb_table(robot, frame_columns(robot, each.joint, each.T_joint_d)) for each in constraints.regions]
+    known = [limb for limb in limbs if limb is not None]
+    return HeldTables(robot, constraints, known) if len(known) == len(limbs) else None
+
+
+def _region_tables(region: HeldRegion, limb: Table) -> tuple[Table, Table]:
+    """The table of a region, and the memory of its frames."""
+    joints = int(limb.header[ik_layout.JOINTS])
+    fixed = limb[ik_layout.FIXED].reshape(-1, ik_layout.POSE_NUMBERS)[0]
+    first = np.eye(4)
+    first[:3, :3], first[:3, 3] = fixed[:9].reshape(3, 3), fixed[9:]
+    fields = dict.fromkeys(range(ik_layout.DONE + 1), 0)
+    call = table(
+        fields
+        | {
+            ik_layout.FIRST: pose_numbers((region.T_w_world @ first)[None]).ravel(),
+            ik_layout.FRAMES: np.zeros(ik_layout.POSE_NUMBERS * (joints + 1)),
+        }
+    )
+    made = table(
+        {
+            layout.LIMB: limb.address,
+            layout.CALL: call.address,
+            layout.TURNING: int(region.turning),
+            layout.RECORD: _record(region),
+        }
+    )
+    return made, call
+
+
+def _record(region: HeldRegion) -> Matrix:
+    """The numbers of a region."""
+    bounds, limits = region.region.bounds, region.limits(slack=False)
+    chain, row, levers = region.robot.chain, region.joint - 1, list[float]()
+    while row >= 0:
+        levers.insert(0, float(region.levers[row]))
+        row = int(chain.parent[row])
+    turn = region.region.orientation_tolerance
+    return record(
+        layout.LEVERS + len(levers),
+        {
+            layout.LOW: bounds[:3, 0],
+            layout.HIGH: bounds[:3, 1],
+            layout.ANGLES_LOW: bounds[3:, 0],
+            layout.ANGLES_HIGH: bounds[3:, 1],
+            layout.DIRECTION: region.direction,
+            layout.KEPT: KEPT_SHARE * limits,
+            layout.AIMED: AIMED_SHARE * np.array([region.region.position_tolerance, turn]),
+            layout.MOST: region.limits(slack=True),
+            layout.CURVATURE: region.curvature,
+            layout.LEVERS: np.array(levers),
+        },
+    )
+
+
+def projected_onto(robot: Robot, constraints: HeldRegions, rows: Matrix) -> Matrix:
+    """Configurations, shape (m, dof), moved into all regions; those that got there, shape (k, dof)."""
+    tables = held_tables(robot, constraints)
+    moved, there = projected_rows(robot, constraints, rows) if tables is None else tables.project(rows)
+    held: Matrix = moved[there & constraints.held(moved)]
+    return held

@@ -1,0 +1,170 @@
+"""The ``path_constraints:`` section of a problem file <-> task-space regions that are held along a path."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Annotated, Any, Literal, TypeAlias
+
+from pydantic import Field, Tag
+
+from rrtik_ompl.constraints.shorthands import inside, on_line, on_plane, orientation_of, upright
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.sections import Name, NotNegative, Positive, Section, Vector3, tag, told_apart_by
+from rrtik_ompl.files.strict_yaml import YamlDocument
+from rrtik_ompl.problem_files.goal import TaskRegionEntry, goal_data
+from rrtik_ompl.problem_files.scene import PoseEntry
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.task_region import TaskRegion
+
+
+class Constraint(Section):
+    """What all path constraints have."""
+
+    frame: Name | None = Field(None, description="link or attached object that is constrained; the tip if absent")
+
+
+class UprightEntry(Section):
+    """An axis of the frame keeps the direction that it has at the start."""
+
+    axis: Literal["x", "y", "z"] = Field("z", description="of the frame")
+    tolerance_deg: Positive = Field(5.0, description="largest angle from the direction at the start [deg]")
+
+
+class Upright(Constraint):
+    """A cup that must not spill."""
+
+    upright: UprightEntry
+
+    def build(self, robot: Robot) -> TaskRegion:
+        """The constraint."""
+        return upright(robot, self.upright.axis, tolerance_deg=self.upright.tolerance_deg, frame=self.frame)
+
+
+class OnPlaneEntry(Section):
+    """A plane of the world."""
+
+    point: Vector3 = Field(description="[m]")
+    normal: Vector3 = Field(description="of length 1")
+    tolerance: Positive = Field(1e-3, description="[m]")
+
+
+class OnPlane(Constraint):
+    """The frame's origin stays on a plane."""
+
+    on_plane: OnPlaneEntry
+
+    def build(self, robot: Robot) -> TaskRegion:
+        """The constraint."""
+        del robot
+        entry = self.on_plane
+        return on_plane(entry.point, entry.normal, tolerance=entry.tolerance, frame=self.frame)
+
+
+class OnLineEntry(Section):
+    """A straight line of the world."""
+
+    point: Vector3 = Field(description="[m]")
+    direction: Vector3 = Field(description="of length 1")
+    tolerance: Positive = Field(1e-3, description="[m]")
+
+
+class OnLine(Constraint):
+    """The frame's origin stays on a line."""
+
+    on_line: OnLineEntry
+
+    def build(self, robot: Robot) -> TaskRegion:
+        """The constraint."""
+        del robot
+        entry = self.on_line
+        return on_line(entry.point, entry.direction, tolerance=entry.tolerance, frame=self.frame)
+
+
+class OrientationEntry(Section):
+    """An orientation, and how far the frame may turn away from it."""
+
+    pose: PoseEntry
+    tolerance_deg: Positive | None = Field(None, description="largest angle from it [deg]; 1 if nothing is said")
+    tolerances_deg: Annotated[list[NotNegative], Field(min_length=3, max_length=3)] | None = Field(
+        None, description="in place of it, of roll, pitch and yaw about the axes of the pose [deg]"
+    )
+
+
+class OrientationOf(Constraint):
+    """The frame keeps an orientation."""
+
+    orientation_of: OrientationEntry
+
+    def build(self, robot: Robot) -> TaskRegion:
+        """The constraint."""
+        del robot
+        entry = self.orientation_of
+        if entry.tolerance_deg is not None and entry.tolerances_deg is not None:
+            raise InputError("give tolerance_deg or tolerances_deg, not both")
+        return orientation_of(entry.pose.build(), entry.tolerances_deg or entry.tolerance_deg or 1.0, frame=self.frame)
+
+
+class InsideEntry(Section):
+    """A box of the world."""
+
+    pose: PoseEntry = Field(description="of its centre")
+    sides: Vector3 = Field(description="full side lengths [m]")
+    tolerance: Positive = Field(1e-3, description="[m]")
+
+
+class Inside(Constraint):
+    """The frame's origin stays in a box."""
+
+    inside: InsideEntry
+
+    def build(self, robot: Robot) -> TaskRegion:
+        """The constraint."""
+        del robot
+        entry = self.inside
+        return inside(entry.pose.build(), entry.sides, tolerance=entry.tolerance, frame=self.frame)
+
+
+class InTaskRegion(Constraint):
+    """The frame stays in a task-space region."""
+
+    task_region: TaskRegionEntry
+
+    def build(self, robot: Robot) -> TaskRegion:
+        """The constraint."""
+        del robot
+        return replace(self.task_region.build(), frame=self.frame)
+
+
+KEYS = ("upright", "on_plane", "on_line", "orientation_of", "inside", "task_region")
+
+ConstraintSection: TypeAlias = Annotated[
+    Annotated[Upright, Tag(tag("upright"))]
+    | Annotated[OnPlane, Tag(tag("on_plane"))]
+    | Annotated[OnLine, Tag(tag("on_line"))]
+    | Annotated[OrientationOf, Tag(tag("orientation_of"))]
+    | Annotated[Inside, Tag(tag("inside"))]
+    | Annotated[InTaskRegion, Tag(tag("task_region"))],
+    told_apart_by(*KEYS, what="a path constraint"),
+]
+
+
+def build_constraints(
+    document: YamlDocument, sections: Iterable[ConstraintSection], robot: Robot
+) -> tuple[TaskRegion, ...]:
+    """The constraints that a file describes.
+
+    Raises:
+        InputError: If one makes no sense; with file, line and key.
+    """
+    built = []
+    for number, section in enumerate(sections):
+        with document.at(("path_constraints", number)):
+            built.append(section.build(robot))
+    return tuple(built)
+
+
+def constraint_data(region: TaskRegion) -> dict[str, Any]:
+    """What the ``path_constraints:`` section of a file says about one of them."""
+    data = goal_data(region)
+    return data if region.frame is None else {**data, "frame": region.frame}

@@ -1,0 +1,207 @@
+"""Regions held along paths: what they mean, that the bound on motions is one, and what is refused."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.constraints.held_region import SLACK_ANGLE, SLACK_POSITION, Turning
+from rrtik_ompl.constraints.held_regions import held_regions
+from rrtik_ompl.constraints.residuals import projected_rows, residual
+from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError
+from rrtik_ompl.poses import rotation_angles
+from rrtik_ompl.scene import AttachedObject, Scene
+
+START = np.array([0.3, -1.2, 1.4, -0.4, 0.6, 0.2])
+
+
+@pytest.fixture(scope="module")
+def ur5():
+    return rrtik.load_robot("ur5_limited")
+
+
+def regions_of(robot, q):
+    """One region of each kind, all of which a configuration is in."""
+    T = robot.fk(q)
+    return {
+        "axis": rrtik.upright(robot, "y", tolerance_deg=4.0),
+        "ball": rrtik.orientation_of(T, 3.0),
+        "ranges": rrtik.orientation_of(T, [5.0, 10.0, 30.0]),
+        "plane": rrtik.on_plane(T.translation, [0.0, 0.6, 0.8]),
+        "line": rrtik.on_line(T.translation, [0.0, 1.0, 0.0], tolerance=0.002),
+        "box": rrtik.inside(T, [0.2, 0.1, 0.3]),
+    }
+
+
+def prepared(robot, q, name):
+    return held_regions(robot, Scene(), [regions_of(robot, q)[name]], q)
+
+
+KINDS = ("axis", "ball", "ranges", "plane", "line", "box")
+
+
+def tilt(robot, Q, direction, axis=2):
+    """Angle of an axis of the tip from a direction, by forward kinematics alone."""
+    return np.arccos(np.clip(robot.fk_batch(Q)[:, :3, axis] @ direction, -1.0, 1.0))
+
+
+def test_upright_keeps_the_direction_of_the_start_and_leaves_the_turn_about_it_free(ur5):
+    held = held_regions(ur5, Scene(), [rrtik.upright(ur5, tolerance_deg=5.0)], START)
+    rng = np.random.default_rng(1)
+    Q = np.vstack([START + rng.normal(0.0, 0.06, (300, 6)), START + np.outer([1.0, 2.5], np.eye(6)[5])])
+    angles = tilt(ur5, Q, ur5.fk(START).rotation[:, 2])
+    np.testing.assert_array_equal(held.held(Q), angles <= np.radians(5.0))
+    assert held.held(Q)[-2:].all()
+    assert 30 < held.held(Q).sum() < 270
+
+
+def test_a_cup_that_starts_upside_down_stays_so(ur5):
+    other = np.array(START)
+    region = rrtik.upright(ur5)
+    down = region.started_at(ur5.fk(other) * pin.SE3(pin.rpy.rpyToMatrix(np.pi, 0.0, 0.0), np.zeros(3)))
+    up = region.started_at(ur5.fk(other))
+    np.testing.assert_allclose(down.T_world_w.rotation[:, 2], -up.T_world_w.rotation[:, 2], atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_projected_configurations_are_in_the_region_by_the_errors_of_task_regions(ur5, kind):
+    held = prepared(ur5, START, kind)
+    Q = START + np.random.default_rng(2).normal(0.0, 0.3, (60, 6))
+    rows, there = projected_rows(ur5, held, Q)
+    assert there.mean() > 0.9
+    assert held.held(rows[there]).all()
+    region = held.regions[0].region
+    assert region.satisfied(ur5, rows[there]).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_bound_on_motions_holds_at_every_place(ur5, kind):
+    region = prepared(ur5, START, kind).regions[0]
+    rng, shares = np.random.default_rng(3), np.linspace(0.0, 1.0, 51)[:, None]
+    for size in (0.02, 0.08, 0.2):
+        near = START + rng.normal(0.0, 0.02, (40, 6))
+        for a, b in zip(near, near + rng.normal(0.0, size, (40, 6)), strict=True):
+            measures = region.measures((1.0 - shares) * a + shares * b)
+            allowed = measures[[0, -1]].max(axis=0) + region.deviations(a[None], b[None])[0]
+            assert (measures.max(axis=0) <= allowed + 1e-12).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_motions_that_are_held_leave_the_region_by_no_more_than_the_slack(ur5, kind):
+    held = prepared(ur5, START, kind)
+    task, rng, shares = held.regions[0].region, np.random.default_rng(4), np.linspace(0.0, 1.0, 101)[:, None]
+    rows, there = projected_rows(ur5, held, START + rng.normal(0.0, 0.1, (120, 6)))
+    rows = rows[there]
+    seen = held.motions_held(rows[:-1], rows[1:])
+    kept = np.flatnonzero(seen)
+    assert len(kept) > 0
+    for k in kept[:25]:
+        position, angle = task.errors(ur5, (1.0 - shares) * rows[k] + shares * rows[k + 1])
+        assert position.max() <= task.position_tolerance + SLACK_POSITION + 1e-9
+        assert angle.max() <= task.orientation_tolerance + SLACK_ANGLE + 1e-6
+
+
+def test_the_way_into_a_region_is_the_derivative_of_the_displacement(ur5):
+    """By differences of poses: J times a small change of the joints is the twist that it makes."""
+    held = prepared(ur5, START, "ball")
+    region, Q = held.regions[0], START + np.random.default_rng(5).normal(0.0, 0.3, (20, 6))
+    _, J = residual(ur5, region, Q)
+    step = np.random.default_rng(6).normal(0.0, 1e-6, (20, 6))
+    before, after = region.displacements(Q), region.displacements(Q + step)
+    turned = after[:, :3, :3] @ np.swapaxes(before[:, :3, :3], 1, 2)
+    made = np.einsum("mkn,mn->mk", J[:, 3:], step) / 0.5
+    np.testing.assert_allclose(np.linalg.norm(made, axis=1), rotation_angles(turned), rtol=1e-4)
+
+
+def test_several_regions_hold_all_at_once(ur5):
+    T = ur5.fk(START)
+    both = [rrtik.upright(ur5), rrtik.on_plane(T.translation, [0.0, 0.0, 1.0])]
+    held = held_regions(ur5, Scene(), both, START)
+    rows, there = projected_rows(ur5, held, START + np.random.default_rng(7).normal(0.0, 0.4, (40, 6)))
+    tips = ur5.fk_batch(rows[there])
+    assert np.abs(tips[:, 2, 3] - T.translation[2]).max() <= 1e-3
+    assert tilt(ur5, rows[there], T.rotation[:, 2]).max() <= np.radians(5.0)
+
+
+def test_an_attached_object_may_carry_the_frame(ur5):
+    cup = AttachedObject("cup", ur5.tip, rrtik.Cylinder(0.03, 0.1), pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.1])))
+    scene = Scene(attached=[cup])
+    point = (ur5.fk(START) * cup.pose).translation
+    held = held_regions(ur5, scene, [rrtik.on_plane(point, [0.0, 0.0, 1.0], frame="cup")], START)
+    turned = START + 0.1
+    away = (ur5.fk(turned) * cup.pose).translation[2] - point[2]
+    assert held.regions[0].measures(turned[None])[0, 0] == pytest.approx(abs(away))
+
+
+@pytest.mark.parametrize(
+    ("kind", "turning"),
+    [("axis", Turning.AXIS), ("ball", Turning.BALL), ("ranges", Turning.RANGES), ("plane", Turning.FREE)],
+)
+def test_what_bounds_say_of_the_orientation_is_seen(ur5, kind, turning):
+    assert prepared(ur5, START, kind).regions[0].turning == turning
+
+
+@pytest.mark.parametrize("free", range(3))
+def test_any_angle_may_be_the_free_one(ur5, free):
+    bounds = np.outer([1000.0] * 3 + [0.0] * 3, [-1.0, 1.0])
+    bounds[3:] += np.array([[0.3], [-0.4], [0.5]])
+    bounds[3 + free] = -np.pi, np.pi
+    task = rrtik.TaskRegion(ur5.fk(START), bounds, orientation_tolerance=0.1)
+    held = held_regions(ur5, Scene(), [task], START)
+    rows, there = projected_rows(ur5, held, START + np.random.default_rng(8).normal(0.0, 0.5, (30, 6)))
+    assert there.mean() > 0.8
+    assert task.satisfied(ur5, rows[there]).all()
+
+
+# --- problems ------------------------------------------------------------------------------------------------------
+
+
+def test_a_start_or_goal_outside_is_refused_by_name_and_amount(ur5):
+    world, T = rrtik.World(ur5), ur5.fk(START)
+    level = rrtik.on_plane(T.translation - [0.0, 0.0, 0.05], [0.0, 0.0, 1.0])
+    with pytest.raises(ProblemError, match=r"start breaks path constraint 1 \(frame 'tool0'\): 49 mm outside"):
+        rrtik.Problem(world, START, START, constraints=[level])
+    goal = START + 0.3 * np.eye(6)[3]
+    amount = np.degrees(tilt(ur5, goal[None], T.rotation[:, 2])[0]) - 5.0
+    with pytest.raises(ProblemError, match=rf"goal breaks path constraint 2 .*: {amount:.3g} degrees outside"):
+        rrtik.Problem(world, START, goal, constraints=[rrtik.inside(T, [9, 9, 9]), rrtik.upright(ur5)])
+
+
+def test_what_makes_no_sense_is_refused_in_a_line(ur5):
+    world, T = rrtik.World(ur5), ur5.fk(START)
+    with pytest.raises(UnknownNameError, match="frame of path constraint 1"):
+        rrtik.Problem(world, START, START, constraints=[rrtik.upright(ur5, frame="mug")])
+    with pytest.raises(InputError, match="path constraint 1 must be a TaskRegion, got str"):
+        rrtik.Problem(world, START, START, constraints=["upright"])
+    with pytest.raises(InputError, match="pitch may reach 80"):
+        rrtik.Problem(world, START, START, constraints=[rrtik.orientation_of(T, [10.0, 80.0, 10.0])])
+    with pytest.raises(InputError, match="frame and from_start are for path constraints"):
+        rrtik.Problem(world, START, rrtik.upright(ur5))
+    with pytest.raises(InputError, match="axis must be x, y or z"):
+        rrtik.upright(ur5, "w")
+    with pytest.raises(InputError, match="normal must have length 1"):
+        rrtik.on_plane([0, 0, 0], [0, 0, 2])
+    with pytest.raises(InputError, match="tolerance_deg must be 80 or less"):
+        rrtik.upright(ur5, tolerance_deg=90.0)
+
+
+def test_the_world_of_a_problem_obeys_in_checks_proofs_and_violations(ur5):
+    goal = START + 0.8 * np.eye(6)[0]
+    free = rrtik.Problem(rrtik.World(ur5), START, goal)
+    held = rrtik.Problem(rrtik.World(ur5), START, goal, constraints=[rrtik.on_line(*line_of(ur5, START, goal))])
+    path = rrtik.JointPath.of(ur5, np.stack([START, goal]))  # the tip goes along an arc
+    assert path.violations(free.world) == ()
+    assert path.proved(free.world).proven
+    assert "leaves the region of 'tool0' in between" in path.violations(held.world)[0].reason
+    proved = path.proved(held.world)
+    assert not proved.proven
+    assert "leaves the region" in str(proved.proof.unproven[0])
+    assert not held.world.motion_valid(START, goal)
+    assert path.proved(free.world).proven_in(free.world)
+    assert not path.proved(free.world).proven_in(held.world)
+
+
+def line_of(robot, a, b):
+    """A point and the direction of the line between the tips of two configurations."""
+    first, second = (robot.fk(q).translation for q in (a, b))
+    return first, (second - first) / np.linalg.norm(second - first)
