@@ -83,6 +83,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.trajectory import RateLimits as RateLimits
     from rrtik_ompl.trajectory import Trajectory as Trajectory
     from rrtik_ompl.trajectory import load_trajectory as load_trajectory
+    from rrtik_ompl.trajectory import motion_report as motion_report
     from rrtik_ompl.trajectory import time_parameterize as time_parameterize
     from rrtik_ompl.viewer import view as view
     from rrtik_ompl.world import World as World
@@ -116,7 +117,7 @@ else:
         "shortening": ("MoveRules", "shorten"),
         "task_region": ("TaskRegion",),
         "tip_motion": ("StraightResult", "arc", "linear", "screw", "straight"),
-        "trajectory": ("RateLimits", "Trajectory", "load_trajectory", "time_parameterize"),
+        "trajectory": ("RateLimits", "Trajectory", "load_trajectory", "motion_report", "time_parameterize"),
         "viewer": ("view",),
         "world": ("World",),
     }

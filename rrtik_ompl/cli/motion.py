@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.path import JointPath
     from rrtik_ompl.problem import Problem as PlanningProblem
 
-TRAJECTORY_FORMATS, PLOT_FORMATS = (".json", ".csv"), (".png", ".svg")
+TRAJECTORY_FORMATS, PLOT_FORMATS = (".json", ".csv", ".yaml", ".mcap"), (".png", ".svg")
 
 Problem = Annotated[str, typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.")]
 GivenPath = Annotated[Path, typer.Argument(help="A path file: .json, .csv or .txt.")]
@@ -74,7 +74,14 @@ def time_path(
     jerk: Annotated[str | None, typer.Option(help=f"{UNITS.format('^3')} inf: no limit.")] = None,
     share: Annotated[float, typer.Option(help="Of all limits, above 0 to 1: 0.5 is half as fast.")] = 1.0,
     blend: Annotated[float, typer.Option(help="Round corners from this far before them [deg]; 0 stops there.")] = 0.0,
-    out: Annotated[Path | None, typer.Option(help="Save the trajectory: .json (JointTrajectory) or .csv.")] = None,
+    tip_speed: Annotated[float | None, typer.Option(help="Largest speed of the tip [m/s].")] = None,
+    tip_acceleration: Annotated[float | None, typer.Option(help="Largest acceleration of the tip [m/s^2].")] = None,
+    torque: Annotated[bool, typer.Option(help="Keep the efforts of the robot's description.")] = False,
+    payload: Annotated[float, typer.Option(help="Mass at the tip that the torques carry too [kg].")] = 0.0,
+    rate: Annotated[float | None, typer.Option(help="Save points at a control rate [1/s], not the knots.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Save the trajectory: .json, .yaml (JointTrajectory of ROS 2), .csv or .mcap.")
+    ] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw the joints over time: .png or .svg.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> int:
@@ -102,13 +109,22 @@ def time_path(
         robot, share=share, **{name: None if row is None else _scaled(row, factors) for name, row in given.items()}
     )
     with progress("timing"):
-        found = time_parameterize(route, limits, blend=float(np.deg2rad(blend)), world=task.world)
+        found = time_parameterize(
+            route,
+            limits,
+            blend=float(np.deg2rad(blend)),
+            world=task.world,
+            tip_speed=tip_speed,
+            tip_acceleration=tip_acceleration,
+            torque=torque or None,
+            payload=payload,
+        )
     if out is not None:
-        found.save(out)
+        found.save(out, rate=rate)
     if plot is not None:
-        plot_joints(found, plot)
+        plot_joints(found, plot, limits=limits)
     if as_json:
-        print(json.dumps(report.timing_document(task, found)))
+        print(json.dumps(report.timing_document(task, found, limits)))
     else:
         say(f"{task.name}: {found.duration:.3f} s", report.peaks_table(found, limits))
         say(*(f"wrote {file}" for file in (out, plot) if file is not None))

@@ -14,7 +14,7 @@ from rrtik_ompl.ompl_bridge.planner_names import AUTO, is_auto
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning import Plan
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.trajectory import RateLimits, Trajectory
+from rrtik_ompl.trajectory import RateLimits, Trajectory, motion_report
 from rrtik_ompl.transitions import lower_bound
 from rrtik_ompl.units import reading, shown_unit
 from rrtik_ompl.world.route_check import how_checked
@@ -51,15 +51,16 @@ def waypoints_table(path: JointPath) -> Table:
 def peaks_table(trajectory: Trajectory, limits: RateLimits) -> Table:
     """One row per joint: its largest velocity, acceleration and jerk beside their limits; degrees, or metres."""
     heads = (f"{what}{end}" for what in ("velocity", "acceleration", "jerk") for end in ("", " limit"))
-    table = Table("joint", *heads, "unit", box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in table.columns[1:-1]:
+    table = Table("joint", *heads, "unit", "switches/s", box=box.SIMPLE_HEAD, pad_edge=False)
+    for column in (*table.columns[1:-2], table.columns[-1]):
         column.justify = "right"
+    often = motion_report(trajectory, limits).switches
     peaks, words = trajectory.peaks(), ("jumps", "none")  # said of a peak, of a limit, that is infinite
     pairs = ((peaks.velocity, limits.velocity), (peaks.acceleration, limits.acceleration), (peaks.jerk, limits.jerk))
     for k, name in enumerate(trajectory.joint_names):
         factor, unit = shown_unit(trajectory.prismatic[k])
         cells = (_rate(factor * float(row[k]), word) for pair in pairs for row, word in zip(pair, words, strict=True))
-        table.add_row(name, *cells, unit)
+        table.add_row(name, *cells, unit, f"{often[k]:.1f}")
     return table
 
 
@@ -143,9 +144,9 @@ def document(problem: Problem, plan: Plan, path: JointPath | None, shorten_secon
     return found
 
 
-def timing_document(problem: Problem, trajectory: Trajectory) -> dict[str, Any]:
+def timing_document(problem: Problem, trajectory: Trajectory, limits: RateLimits) -> dict[str, Any]:
     """A timed motion for machines: duration and each joint's peaks (a jerk of null is a jump of acceleration)."""
-    peaks = trajectory.peaks()
+    peaks, report = trajectory.peaks(), motion_report(trajectory, limits)
     return {
         "problem": problem.name,
         "robot": trajectory.robot_name,
@@ -156,4 +157,6 @@ def timing_document(problem: Problem, trajectory: Trajectory) -> dict[str, Any]:
             name: [float(x) if np.isfinite(x) else None for x in row]
             for name, row in zip(peaks._fields, peaks, strict=True)
         },
+        "switches_a_second": report.switches.tolist(),
+        "largest_jump": report.jump.tolist(),
     }

@@ -12,7 +12,8 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.errors import require
 from rrtik_ompl.files.text import known_ending, write_bytes
 from rrtik_ompl.path import JointPath
-from rrtik_ompl.trajectory import Trajectory
+from rrtik_ompl.trajectory import RateLimits, Trajectory
+from rrtik_ompl.trajectory.motion import JUMP_SHARE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,7 +28,9 @@ COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#1d
 DASHES = ("solid", (0, (5, 2)), (0, (1, 1.5)))  # for the ninth joint and those after it
 
 
-def plot_joints(motion: Trajectory | JointPath, file: str | os.PathLike[str]) -> None:
+def plot_joints(
+    motion: Trajectory | JointPath, file: str | os.PathLike[str], *, limits: RateLimits | None = None
+) -> None:
     """Draw the joints of a motion over time: positions, velocities and accelerations; of a path, its positions.
 
     Degrees for turning joints, metres for sliding ones, in rows of their own. The same input gives the same file.
@@ -35,12 +38,17 @@ def plot_joints(motion: Trajectory | JointPath, file: str | os.PathLike[str]) ->
     Args:
         motion: A trajectory, or a path, whose waypoints are then drawn at equal distances.
         file: A .png or .svg file; written whole or not at all.
+        limits: Drawn as thin lines in the colours of their joints, for a trajectory. Where the acceleration jumps there
+            is a triangle in any case.
 
     Raises:
-        InputError: If the ending is another one, the file cannot be written, or ``motion`` is something else.
+        InputError: If the ending is another one, the file cannot be written, ``motion`` is something else, or the
+            limits are for another number of joints.
     """
     known_ending(file, FORMATS, "plot")
     require(motion, Trajectory | JointPath, "motion to plot")
+    require(limits, RateLimits | None, "limits to plot", "use RateLimits.of(robot)")
+    bounds = None if limits is None else limits.for_joints(len(motion.joint_names))
     over, label, rows = _rows(motion)
     from matplotlib.figure import Figure
 
@@ -51,6 +59,11 @@ def plot_joints(motion: Trajectory | JointPath, file: str | os.PathLike[str]) ->
     for panel, (name, power, values, (mask, unit)) in zip(panels, pairs, strict=True):
         _draw(panel, over, np.rad2deg(values) if unit == "deg" else values, mask, motion)
         panel.set_ylabel(f"{name} [{unit}{power}]")
+        factor = np.rad2deg(1.0) if unit == "deg" else 1.0
+        if bounds is not None and power:
+            _draw_limits(panel, factor * (bounds.velocity if power == "/s" else bounds.acceleration), mask)
+        if isinstance(motion, Trajectory) and power == "/s²":
+            _mark_jumps(panel, motion, mask, factor)
     panels[-1].set_xlabel(label)
     lines = {line.get_label(): line for panel in panels for line in panel.get_lines()}
     names = [_plain(name) for name in motion.joint_names]
@@ -98,6 +111,21 @@ def _rows(motion: Trajectory | JointPath) -> tuple[Vector, str, list[tuple[str, 
     state = motion(clock)
     values = (("position", "", state.positions), ("velocity", "/s", state.velocities))
     return clock, "time [s]", [*values, ("acceleration", "/s²", state.accelerations)]
+
+
+def _draw_limits(panel: Axes, limits: Vector, mask: NDArray[np.bool_]) -> None:
+    for k in np.flatnonzero(mask):
+        for end in (-limits[k], limits[k]):
+            panel.axhline(end, color=COLORS[k % len(COLORS)], linewidth=0.7, linestyle=(0, (1, 3)), zorder=1)
+
+
+def _mark_jumps(panel: Axes, motion: Trajectory, mask: NDArray[np.bool_], factor: float) -> None:
+    jumps = motion.jumps()
+    for k in np.flatnonzero(mask):
+        at = np.flatnonzero(jumps[:, k] > JUMP_SHARE * max(np.abs(motion.accelerations).max(), 1e-300))
+        if len(at):
+            values = factor * motion.accelerations[at, k]
+            panel.plot(motion.times[at], values, "v", color=COLORS[k % len(COLORS)], markersize=4, label="_jump")
 
 
 def _draw(panel: Axes, over: Vector, values: Matrix, mask: NDArray[np.bool_], motion: Trajectory | JointPath) -> None:

@@ -14,10 +14,20 @@ from rrtik_ompl.trajectory.dynamics import DynamicLimits
 from rrtik_ompl.trajectory.limits import RateLimits
 from rrtik_ompl.trajectory.load import load_trajectory
 from rrtik_ompl.trajectory.motion import Peaks, State, Trajectory
+from rrtik_ompl.trajectory.report import MotionReport, motion_report
 from rrtik_ompl.world import World
 from rrtik_ompl.world.kept_clearance import check_route_clearance
 
-__all__ = ["Peaks", "RateLimits", "State", "Trajectory", "load_trajectory", "time_parameterize"]
+__all__ = [
+    "MotionReport",
+    "Peaks",
+    "RateLimits",
+    "State",
+    "Trajectory",
+    "load_trajectory",
+    "motion_report",
+    "time_parameterize",
+]
 
 
 def time_parameterize(

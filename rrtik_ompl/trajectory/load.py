@@ -14,13 +14,13 @@ from rrtik_ompl.trajectory.text import FORMATS, loads
 
 
 def load_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) -> Trajectory:
-    """Read a motion written by :meth:`Trajectory.save`, or a JointTrajectory message as JSON.
+    """Read a motion written by :meth:`Trajectory.save`, or a JointTrajectory message as JSON or YAML.
 
     Accelerations that lead elsewhere than to the next point (other programs join their points by other curves) are
     left out: then the motion is the cubic through positions and velocities.
 
     Args:
-        file: A .json or .csv file.
+        file: A .json, .yaml or .csv file.
         robot: If given, the motion must have its joints.
 
     Raises:

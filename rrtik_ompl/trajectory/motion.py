@@ -15,6 +15,8 @@ from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.files.text import known_ending, write_text
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.trajectory.chords import CHORD_SLACK, chords_of
+from rrtik_ompl.trajectory.cubics import ends_of, hermite_accelerations, jerks_of
+from rrtik_ompl.trajectory.messages import write_mcap
 from rrtik_ompl.trajectory.text import FORMATS, dumps
 from rrtik_ompl.units import joint_units
 from rrtik_ompl.world import Proof, World
@@ -93,10 +95,10 @@ class Trajectory:
             raise InputError("trajectory times: expected two or more, beginning with 0, each greater than the last")
         rates = finite_array(velocities, rows.shape, "trajectory velocities")
         if accelerations is None:
-            bends = _hermite_accelerations(clock, rows, rates)
+            bends = hermite_accelerations(clock, rows, rates)
         else:
             bends = finite_array(accelerations, rows.shape, "trajectory accelerations")
-            apart = np.abs(_ends(clock, rows, rates, bends) - rows[1:]).max(axis=1)
+            apart = np.abs(ends_of(clock, rows, rates, bends) - rows[1:]).max(axis=1)
             if apart.max() > FIT_TOLERANCE * max(1.0, np.abs(rates).max()):
                 raise InputError(
                     f"trajectory: point {int(apart.argmax()) + 2} is {apart.max():.2g} away from where the point "
@@ -139,7 +141,7 @@ class Trajectory:
     @property
     def jerks(self) -> Matrix:
         """Jerk of each piece [rad/s^3 or m/s^3], shape (m - 1, n)."""
-        return _jerks(self.times, self.velocities, self.accelerations)
+        return jerks_of(self.times, self.velocities, self.accelerations)
 
     def peaks(self) -> Peaks:
         """The largest velocity, acceleration and jerk of each joint: exact, not sampled, for every piece is a cubic."""
@@ -215,21 +217,50 @@ class Trajectory:
         finite_array(self.positions, (None, world.robot.dof), f"trajectory for robot '{world.robot.name}'")
         return proof_of_pieces(self, world, clearance, 0, len(self.times) - 1)
 
-    def save(self, file: str | os.PathLike[str]) -> None:
-        """Write the motion to a file: .json (the shape of a JointTrajectory message) or .csv (``time,<joint>...``).
+    def jumps(self) -> Matrix:
+        """How much the acceleration jumps at each knot, shape (m, n): from rest at the first, to rest at the last."""
+        a = self.accelerations
+        ends = a[:-1] + np.diff(self.times)[:, None] * self.jerks
+        before, after = np.vstack([np.zeros_like(a[:1]), ends]), np.vstack([a[:-1], np.zeros_like(a[:1])])
+        found: Matrix = np.abs(after - before)
+        return found
 
-        One point per knot. Both give back the same motion by :func:`load_trajectory`. The file is written whole or not
-        at all.
+    def sampled(self, rate: float) -> tuple[Vector, State]:
+        """Times at a control rate [1/s] from 0 to the end, shape (k,), and the states then; the end is the last one.
+
+        Raises:
+            InputError: If the rate is no number greater than 0.
+        """
+        step = 1.0 / positive(rate, "control rate of a trajectory")
+        clock = np.append(np.arange(0.0, self.duration - 1e-9 * step, step), self.duration)
+        return clock, self(clock)
+
+    def save(self, file: str | os.PathLike[str], *, rate: float | None = None, accelerations: bool = True) -> None:
+        """Write the motion to a file.
+
+        A .json or .csv file (``time,<joint>...``) gives back the same motion by :func:`load_trajectory`. A .yaml file
+        is the message JointTrajectory of ROS 2 and nothing else. A .mcap file has joint states for Foxglove (it needs
+        the package mcap). Each is written whole or not at all.
+
+        Args:
+            file: See above.
+            rate: Points at a control rate [1/s]; None for one point a knot.
+            accelerations: Whether points have accelerations: controllers of ROS then follow quintics, else cubics.
+                Files of .csv and .mcap always have them.
 
         Raises:
             InputError: If the ending is another one or the file cannot be written.
         """
-        units = joint_units(self.prismatic)
-        columns = (self.times, self.positions, self.velocities, self.accelerations)
-        points = [column.tolist() for column in columns]
-        write_text(
-            file, dumps(self.robot_name, self.joint_names, units, points, known_ending(file, FORMATS, "trajectory"))
-        )
+        ending = known_ending(file, (*FORMATS, ".mcap"), "trajectory")
+        state = State(self.positions, self.velocities, self.accelerations)
+        clock, state = (self.times, state) if rate is None else self.sampled(rate)
+        columns = [(column + 0.0).tolist() for column in (clock, *state)]
+        if ending == ".mcap":
+            write_mcap(file, self.robot_name, self.joint_names, columns)
+            return
+        if not accelerations and ending != ".csv":
+            columns.pop()
+        write_text(file, dumps(self.robot_name, self.joint_names, joint_units(self.prismatic), columns, ending))
 
     def _names(self) -> dict[str, Any]:
         return {"joint_names": self.joint_names, "prismatic": self.prismatic, "robot_name": self.robot_name}
@@ -258,26 +289,3 @@ def bad_moments(motion: Trajectory, world: World) -> Vector:
     _, where = np.unique(pieces[bad], return_index=True)
     found: Vector = clock[bad[where]]
     return found
-
-
-def _jerks(times: Vector, velocities: Matrix, accelerations: Matrix) -> Matrix:
-    """The jerk with which each piece comes to the velocity of the next knot, shape (m - 1, n)."""
-    h = np.diff(times)[:, None]
-    jerks: Matrix = 2.0 * (np.diff(velocities, axis=0) - h * accelerations[:-1]) / h**2
-    return jerks
-
-
-def _ends(times: Vector, positions: Matrix, velocities: Matrix, accelerations: Matrix) -> Matrix:
-    """Where the cubic of each piece ends, shape (m - 1, n)."""
-    h = np.diff(times)[:, None]
-    v, a, j = velocities[:-1], accelerations[:-1], _jerks(times, velocities, accelerations)
-    ends: Matrix = positions[:-1] + h * (v + h * (a / 2.0 + h * j / 6.0))
-    return ends
-
-
-def _hermite_accelerations(times: Vector, positions: Matrix, velocities: Matrix) -> Matrix:
-    """Accelerations at the beginning of the cubics through positions and velocities, and at the end of the last one."""
-    h = np.diff(times)[:, None]
-    mean, first, last = np.diff(positions, axis=0) / h, velocities[:-1], velocities[1:]
-    begin, end = (6.0 * mean - 4.0 * first - 2.0 * last) / h, (2.0 * first + 4.0 * last - 6.0 * mean) / h
-    return np.vstack([begin, end[-1:]])

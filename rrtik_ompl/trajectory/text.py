@@ -1,4 +1,4 @@
-"""The text of a trajectory file: JSON in the shape of ROS's JointTrajectory, or CSV; written and read."""
+"""The text of a trajectory file: JSON in the shape of ROS's JointTrajectory, that message as YAML, or CSV."""
 
 from __future__ import annotations
 
@@ -10,18 +10,21 @@ from typing import Any
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.tables import json_object, table_rows
+from rrtik_ompl.trajectory.messages import from_yaml, joint_trajectory, to_yaml
 
-FORMATS = (".json", ".csv")
+FORMATS = (".json", ".csv", ".yaml")
 KIND = "joint_trajectory"
 FIELDS = ("positions", "velocities", "accelerations")
 _DURATION = (("sec", "secs"), ("nanosec", "nsecs"))
 
 
 def dumps(robot: str, names: Sequence[str], units: Sequence[str], columns: Sequence[list[Any]], ending: str) -> str:
-    """Text of a trajectory; ``columns`` are times (m) and positions, velocities and accelerations (m, n)."""
+    """Text of a trajectory; ``columns``: times (m), positions, velocities and, not always, accelerations (m, n)."""
+    if ending == ".yaml":
+        return to_yaml(joint_trajectory(names, columns))
     if ending == ".json":
         points = [
-            dict(zip(FIELDS, values, strict=True)) | {"time_from_start": time}
+            dict(zip(FIELDS, values, strict=False)) | {"time_from_start": time}
             for time, *values in zip(*columns, strict=True)
         ]
         head = {"version": 1, "kind": KIND, "robot": robot, "joint_names": list(names), "units": list(units)}
@@ -40,7 +43,9 @@ def loads(text: str, ending: str) -> dict[str, Any]:
     Raises:
         InputError: If the text is malformed; the message names the line, the point or the key.
     """
-    return _from_json(text) if ending == ".json" else _from_csv(text)
+    if ending == ".csv":
+        return _from_csv(text)
+    return _from_message(json_object(text, KIND, "points") if ending == ".json" else from_yaml(text))
 
 
 def _header(names: Iterable[str]) -> list[str]:
@@ -48,8 +53,7 @@ def _header(names: Iterable[str]) -> list[str]:
     return ["time", *own, *(f"{name} velocity" for name in own), *(f"{name} acceleration" for name in own)]
 
 
-def _from_json(text: str) -> dict[str, Any]:
-    document = json_object(text, KIND, "points")
+def _from_message(document: dict[str, Any]) -> dict[str, Any]:
     points = document["points"]
     if not isinstance(points, list) or not all(isinstance(point, dict) for point in points):
         raise InputError("points: expected a list of objects with positions, velocities and time_from_start")

@@ -40,7 +40,8 @@ def view(
 
     Args:
         shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
-        path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m]; nothing moves if None.
+        path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m]; nothing moves if None. A ``Trajectory`` plays
+            in real time.
         before: Another path to compare with, such as the one that ``path`` was shortened from: the trail of its tip
             is drawn too.
         ghosts: Configurations at which the arm is drawn like tinted glass, shape (k, dof), such as the solutions of

@@ -44,7 +44,7 @@ def draw(subject: Subject) -> tuple[Recording, Frame]:
         draw_goal(vis, subject.goal, frame)
         if len(subject.waypoints) > 1:
             doubtful = () if subject.curve is None else subject.curve.unproven
-            beads = subject.run is None
+            beads = subject.run is None and subject.times is None
             draw_trail(vis, robot, subject.waypoints, 0.0035 * frame.arm, beads=beads, unproven=doubtful)
         if subject.before is not None:
             draw_before(vis, robot, subject.before, 0.0035 * frame.arm)

@@ -50,6 +50,7 @@ def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
         "before": "" if subject.before is None else _compared(subject.before, subject.waypoints),
         "moves": [] if robot is None else _moves(subject.waypoints),
         "times": [] if robot is None else _numbers(_times(subject, robot, frame)),
+        "timed": subject.times is not None,
         "clearance": None if robot is None or subject.curve is None else _clearance(subject.curve),
         "run": None if subject.run is None or robot is None else run_story(subject.run, robot, subject.scene, frame),
         "frame": {"low": _numbers(frame.low), "high": _numbers(frame.high)},
@@ -74,7 +75,9 @@ def _clearance(curve: ClearanceCurve) -> dict[str, Any]:
 
 
 def _times(subject: Subject, robot: Robot, frame: Frame) -> Vector:
-    """Time [s] at which each waypoint is shown: of a run its own."""
+    """Time [s] at which each waypoint is shown: of a run or a timed motion its own."""
+    if subject.times is not None:
+        return subject.times
     return play_times(robot, subject.waypoints, frame.arm) if subject.run is None else subject.run.times
 
 

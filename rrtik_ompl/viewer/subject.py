@@ -15,6 +15,7 @@ from rrtik_ompl.path import JointPath
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
+from rrtik_ompl.trajectory import Trajectory
 from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.world import World
 from rrtik_ompl.world.clearance_curve import ClearanceCurve, clearance_along
@@ -44,6 +45,7 @@ class Subject:
         marks: Further bodies.
         run: The run whose ticks the waypoints are, or None.
         curve: How far the path stays from obstacles, or None if that is not known.
+        times: When the waypoints of a timed motion are reached [s], shape (k,), or None.
     """
 
     name: str
@@ -57,6 +59,7 @@ class Subject:
     marks: tuple[Mark, ...] = ()
     run: ReplanRun | None = None
     curve: ClearanceCurve | None = None
+    times: Vector | None = None
 
     @property
     def start(self) -> Vector | None:
@@ -94,7 +97,10 @@ class Shown:
 
 
 Showable: TypeAlias = HasWorld | Shown | World | Robot | Scene
-ShownPath: TypeAlias = JointPath | ArrayLike
+ShownPath: TypeAlias = JointPath | Trajectory | ArrayLike
+
+FRAME_RATE = 30.0  # [1/s] of a timed motion
+MOST_FRAMES = 900
 
 
 def subject_of(
@@ -108,7 +114,7 @@ def subject_of(
 
     Args:
         shown: A ``Problem``, a ``World``, a ``Robot`` or a ``Scene``.
-        path: A ``JointPath``, or waypoints of shape (k, dof) with k at least 1 [rad or m].
+        path: A ``JointPath``, a ``Trajectory``, or waypoints of shape (k, dof) with k at least 1 [rad or m].
         before: Another path to compare with.
         ghosts: Configurations, shape (m, dof).
         marks: Further bodies.
@@ -137,9 +143,10 @@ def subject_of(
     tinted = None if ghosts is None else _waypoints(robot, ghosts)
     if path is not None:
         earlier = None if before is None else _waypoints(robot, before)
+        times, path = _timed(robot, path)
         rows = _waypoints(robot, path)
         curve = _curve(getattr(shown, "world", shown), rows)
-        return Subject(name, robot, scene, goal, rows, True, earlier, tinted, marks, curve=curve)
+        return Subject(name, robot, scene, goal, rows, True, earlier, tinted, marks, curve=curve, times=times)
     start = getattr(shown, "start", None)
     posture = robot.clamp(np.zeros(robot.dof)) if start is None else robot.configuration(start, "start")
     return Subject(name, robot, scene, goal, frozen(posture[None]), False, None, tinted, marks)
@@ -171,6 +178,20 @@ def _curve(world: object, rows: Matrix) -> ClearanceCurve | None:
         return None
     found = clearance_along(world, rows)
     return found if any(first for first, _ in found.pairs) else None
+
+
+def _timed(robot: Robot, path: ShownPath) -> tuple[Vector | None, ShownPath]:
+    """Times and frames of a timed motion; a path has no times."""
+    if not isinstance(path, Trajectory):
+        return None, path
+    if path.joint_names != robot.joint_names:
+        raise InputError(
+            f"view: the trajectory moves {', '.join(path.joint_names)}, but robot '{robot.name}' has the joints "
+            f"{', '.join(robot.joint_names)}"
+        )
+    count = int(np.clip(np.ceil(FRAME_RATE * path.duration), 2, MOST_FRAMES))
+    clock = np.linspace(0.0, path.duration, count + 1)
+    return clock, path(clock).positions
 
 
 def _waypoints(robot: Robot, path: ShownPath) -> Matrix:

@@ -209,7 +209,7 @@ function addLabels() {
   if (last === 0) return;
   const between = [...Array(last - 1).keys()].map((k) => k + 1);
   const places = [];
-  for (const k of last <= 200 && !story.run ? [0, last, ...between] : [0, last]) {
+  for (const k of last <= 200 && !story.run && !story.timed ? [0, last, ...between] : [0, last]) {
     const text = k === 0 ? "start" : k === last ? "goal" : `${k}`;
     const tip = tipPosition(story.waypoints[k]);
     const same = places.find((place) => place.tip.distanceTo(tip) < 0.01 * size);

@@ -12,12 +12,13 @@ function show(time) {
   const k = moveAt(now);
   const arrived = now >= total;
   showJoints(q, story.moves[k], !arrived);
-  showMove(arrived ? null : k);
+  if (!story.timed) showMove(arrived ? null : k);
   highlightPiece(arrived ? null : story.moves[k].piece);
   scrub.value = now;
   showClearance(now);
   if (run) showRun(now, arrived ? k + 1 : k, arrived ? 0 : (now - story.times[k]) / (story.times[k + 1] - story.times[k]));
-  document.getElementById("now").textContent = run ? nowText(k, arrived) : arrived
+  document.getElementById("now").textContent = run ? nowText(k, arrived) : story.timed
+    ? `${now.toFixed(2)} of ${total.toFixed(2)} s` : arrived
     ? `Goal reached after ${count(story.moves.length, "move")}`
     : `Move ${k + 1} of ${story.moves.length}: ${describe(k)}`;
 }
@@ -79,7 +80,8 @@ function addPlayer() {
   addEventListener("click", (event) => {  // after a click with the mouse the space bar plays again
     if (event.detail > 0 && event.target.matches("button, [type=checkbox]")) event.target.blur();
   });
-  const marked = run ? run.groups.filter((group) => group.event !== "walk").map((group) => story.times[group.first]) : story.times;
+  const seconds = [...Array(Math.floor(total) + 1).keys()];
+  const marked = story.timed ? seconds : run ? run.groups.filter((group) => group.event !== "walk").map((group) => story.times[group.first]) : story.times;
   if (marked.length <= 200) {
     for (const time of marked) {
       const tick = document.createElement("i");
@@ -104,7 +106,7 @@ if (robot) {
   buildJoints();
   if (story.moves.length) {
     if (run) buildEvents(goTo);
-    else buildMoves(goTo);
+    else if (!story.timed) buildMoves(goTo);
     if (story.clearance) showClearance = buildClearance(goTo);
     addPlayer();
   } else {

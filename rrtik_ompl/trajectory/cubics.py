@@ -1,0 +1,30 @@
+"""Cubics between knots: what follows from times, positions, velocities and accelerations."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix, Vector
+
+
+def jerks_of(times: Vector, velocities: Matrix, accelerations: Matrix) -> Matrix:
+    """The jerk with which each piece comes to the velocity of the next knot, shape (m - 1, n)."""
+    h = np.diff(times)[:, None]
+    jerks: Matrix = 2.0 * (np.diff(velocities, axis=0) - h * accelerations[:-1]) / h**2
+    return jerks
+
+
+def ends_of(times: Vector, positions: Matrix, velocities: Matrix, accelerations: Matrix) -> Matrix:
+    """Where the cubic of each piece ends, shape (m - 1, n)."""
+    h = np.diff(times)[:, None]
+    v, a, j = velocities[:-1], accelerations[:-1], jerks_of(times, velocities, accelerations)
+    ends: Matrix = positions[:-1] + h * (v + h * (a / 2.0 + h * j / 6.0))
+    return ends
+
+
+def hermite_accelerations(times: Vector, positions: Matrix, velocities: Matrix) -> Matrix:
+    """Accelerations at the beginning of the cubics through positions and velocities, and at the end of the last one."""
+    h = np.diff(times)[:, None]
+    mean, first, last = np.diff(positions, axis=0) / h, velocities[:-1], velocities[1:]
+    begin, end = (6.0 * mean - 4.0 * first - 2.0 * last) / h, (2.0 * first + 4.0 * last - 6.0 * mean) / h
+    return np.vstack([begin, end[-1:]])
