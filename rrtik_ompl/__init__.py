@@ -75,6 +75,14 @@ if TYPE_CHECKING:
     from rrtik_ompl.shortening import MoveRules as MoveRules
     from rrtik_ompl.shortening import shorten as shorten
     from rrtik_ompl.task_region import TaskRegion as TaskRegion
+    from rrtik_ompl.tasks import Alternatives as Alternatives
+    from rrtik_ompl.tasks import Attach as Attach
+    from rrtik_ompl.tasks import Detach as Detach
+    from rrtik_ompl.tasks import Gripper as Gripper
+    from rrtik_ompl.tasks import MoveTo as MoveTo
+    from rrtik_ompl.tasks import Straight as Straight
+    from rrtik_ompl.tasks import Task as Task
+    from rrtik_ompl.tasks import TaskPlan as TaskPlan
     from rrtik_ompl.tip_motion import StraightResult as StraightResult
     from rrtik_ompl.tip_motion import arc as arc
     from rrtik_ompl.tip_motion import linear as linear
@@ -116,6 +124,7 @@ else:
         "shapes": ("Box", "Capsule", "Cylinder", "HalfSpace", "Mesh", "Prism", "Sphere"),
         "shortening": ("MoveRules", "shorten"),
         "task_region": ("TaskRegion",),
+        "tasks": ("Alternatives", "Attach", "Detach", "Gripper", "MoveTo", "Straight", "Task", "TaskPlan"),
         "tip_motion": ("StraightResult", "arc", "linear", "screw", "straight"),
         "trajectory": ("RateLimits", "Trajectory", "load_trajectory", "motion_report", "time_parameterize"),
         "viewer": ("view",),

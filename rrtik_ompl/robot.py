@@ -62,6 +62,7 @@ class Robot:
         allowed_collisions: Pairs of link names that are never checked against each other.
         model, collision, visual: Pinocchio's model and geometry; do not change them.
         closed_form: The robot's own inverse kinematics, if it brings one.
+        gripper: The joints that open and close its gripper, `rrtik_ompl.description.gripper.GripperJoints`, or None.
     """
 
     name: str
@@ -83,6 +84,7 @@ class Robot:
     chain: Chain
     self_collision: bool = True
     closed_form: Callable[..., Any] | None = None
+    gripper: Any = None
     planar: bool = False
     source: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
@@ -172,14 +174,7 @@ class Robot:
         return values
 
     def pinocchio_configuration(self, Q: ArrayLike) -> Matrix:
-        """Pinocchio's configuration vectors for Q: adds mimic joints and (cos, sin) of continuous ones.
-
-        Args:
-            Q: Shape (m, dof) or (dof,).
-
-        Returns:
-            Shape (m, nq).
-        """
+        """Pinocchio's vectors for Q, (m, dof) or (dof,): with mimic joints and (cos, sin) of endless ones; (m, nq)."""
         rows = self._rows(Q)
         values = self.joint_values(rows)
         if self.model.nq == len(self.chain.parent):

@@ -90,7 +90,6 @@ def _checked_solid(name: object, shape: object, pose: object) -> pin.SE3:
         kinds = " or ".join(kind.__name__ for kind in SHAPES.values())
         found = f"must be of type {kinds}, got {type(shape).__name__}"
         raise InputError(f"shape of '{name}' {found}; use rrtik_ompl.shapes")
-    require(pose, pin.SE3, f"pose of '{name}'", "use rrtik_ompl.poses.pose(xyz, quat_xyzw)")
     return rigid(pose, f"pose of '{name}'")
 
 
@@ -179,6 +178,64 @@ class Scene:
             if obstacle.name == name:
                 return obstacle
         raise UnknownNameError("obstacle", name, (o.name for o in self.obstacles))
+
+    def with_(self, *obstacles: Obstacle) -> Scene:
+        """The scene with further obstacles.
+
+        Raises:
+            InputError: If one is none, or its name is used already.
+        """
+        return replace(self, obstacles=(*self.obstacles, *obstacles))
+
+    def without(self, *names: str) -> Scene:
+        """The scene without some of its obstacles and attached objects, and without the pairs that name them.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+        """
+        for name in names:
+            if name not in self.names:
+                raise UnknownNameError("obstacle or attached object", name, self.names)
+        return Scene(
+            tuple(o for o in self.obstacles if o.name not in names),
+            tuple(a for a in self.attached if a.name not in names),
+            tuple(pair for pair in self.allowed_collisions if not set(pair) & set(names)),
+        )
+
+    def attaching(
+        self, name: str, link: str, allow: Iterable[str] = (), *, pose: ArrayLike | pin.SE3 | None = None
+    ) -> Scene:
+        """The scene in which an obstacle has become an attached object.
+
+        Args:
+            name: Of the obstacle.
+            link: That holds it from now on.
+            allow: Links and obstacles that it may touch beside that link.
+            pose: T_link_object, in any form that :func:`rrtik_ompl.poses.rigid` takes; the link's own frame if None.
+
+        Raises:
+            UnknownNameError: If there is no obstacle of that name.
+            InputError: If it has no end, or the pose is none.
+        """
+        taken, rest = self.obstacle(name), self.without(name)
+        held = AttachedObject(name, link, taken.shape, pin.SE3.Identity() if pose is None else pose)
+        beside = {o.name for o in rest.obstacles} | {a.name for a in rest.attached}
+        names = tuple(allow)
+        pairs = (*rest.allowed_collisions, *((name, other) for other in names if other in beside))
+        links = tuple(other for other in names if other not in beside)
+        return Scene(rest.obstacles, (*rest.attached, replace(held, allow=links)), pairs)
+
+    def detaching(self, name: str, pose: ArrayLike | pin.SE3) -> Scene:
+        """The scene in which an attached object has become an obstacle at T_world_object.
+
+        Raises:
+            UnknownNameError: If there is no attached object of that name.
+            InputError: If the pose is none.
+        """
+        held = {a.name: a for a in self.attached}
+        if name not in held:
+            raise UnknownNameError("attached object", name, held)
+        return self.without(name).with_(Obstacle(name, held[name].shape, pose))
 
     def at(self, time: float) -> Scene:
         """The scene with ``time`` [s] as its time 0: moving obstacles are where their motion puts them, and go on.

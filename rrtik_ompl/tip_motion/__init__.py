@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -47,8 +46,8 @@ class StraightResult:
 
 def straight(
     world: World,
-    q: ArrayLike | str | Any,
-    T_world_goal: Any,
+    q: ArrayLike | str | pin.SE3,
+    T_world_goal: ArrayLike | pin.SE3,
     *,
     deviation: float = DEVIATION,
     turn_deviation: float = TURN_DEVIATION,
@@ -86,7 +85,7 @@ def straight(
         (1.0, True)
     """
 
-    def rails(begin: Any) -> list[Rail]:
+    def rails(begin: pin.SE3) -> list[Rail]:
         return [straight_rail(begin, _goal(T_world_goal, begin, "T_world_goal"))]
 
     return _moved(world, q, rails, _settings(deviation, turn_deviation, clearance, seed))
@@ -94,8 +93,8 @@ def straight(
 
 def arc(
     world: World,
-    q: ArrayLike | str | Any,
-    T_world_goal: Any,
+    q: ArrayLike | str | pin.SE3,
+    T_world_goal: ArrayLike | pin.SE3,
     through: ArrayLike,
     *,
     deviation: float = DEVIATION,
@@ -121,7 +120,7 @@ def arc(
         InputError: See there; also if the three points lie on a line.
     """
 
-    def rails(begin: Any) -> list[Rail]:
+    def rails(begin: pin.SE3) -> list[Rail]:
         return [arc_rail(begin, _goal(T_world_goal, begin, "T_world_goal"), through)]
 
     return _moved(world, q, rails, _settings(deviation, turn_deviation, clearance, seed))
@@ -129,8 +128,8 @@ def arc(
 
 def screw(
     world: World,
-    q: ArrayLike | str | Any,
-    T_world_goal: Any,
+    q: ArrayLike | str | pin.SE3,
+    T_world_goal: ArrayLike | pin.SE3,
     *,
     turns: int = 0,
     deviation: float = DEVIATION,
@@ -156,7 +155,7 @@ def screw(
         InputError: See there; also if turns are wanted of a goal that is not turned.
     """
 
-    def rails(begin: Any) -> list[Rail]:
+    def rails(begin: pin.SE3) -> list[Rail]:
         return [screw_rail(begin, _goal(T_world_goal, begin, "T_world_goal"), turns)]
 
     return _moved(world, q, rails, _settings(deviation, turn_deviation, clearance, seed))
@@ -164,8 +163,8 @@ def screw(
 
 def linear(
     world: World,
-    q: ArrayLike | str | Any,
-    poses: Sequence[Any],
+    q: ArrayLike | str | pin.SE3,
+    poses: Sequence[ArrayLike | pin.SE3],
     *,
     deviation: float = DEVIATION,
     turn_deviation: float = TURN_DEVIATION,
@@ -189,7 +188,7 @@ def linear(
         UnknownNameError: See there.
     """
 
-    def rails(begin: Any) -> list[Rail]:
+    def rails(begin: pin.SE3) -> list[Rail]:
         stations = [begin]
         for k, each in enumerate(poses):
             stations.append(_goal(each, stations[-1], f"poses[{k}]"))
@@ -200,7 +199,7 @@ def linear(
     return _moved(world, q, rails, _settings(deviation, turn_deviation, clearance, seed))
 
 
-def begin_configurations(world: World, q: ArrayLike | str | Any, seed: int) -> Matrix:
+def begin_configurations(world: World, q: ArrayLike | str | pin.SE3, seed: int) -> Matrix:
     """Configurations from which a motion of the tip may begin, shape (k, dof): the one given, or those of a pose.
 
     Raises:
@@ -233,7 +232,7 @@ def _settings(deviation: float, turn_deviation: float, clearance: float, seed: i
     return _Settings(tolerance, not_negative(clearance, "clearance"), whole_number(seed, "seed"))
 
 
-def _goal(value: Any, begin: Any, what: str) -> Any:
+def _goal(value: ArrayLike | pin.SE3, begin: pin.SE3, what: str) -> pin.SE3:
     """A pose (SE3); a position alone keeps the orientation of the beginning."""
     goal = rigid(value, what)
     if not isinstance(value, pin.SE3) and np.shape(value) == (3,):
@@ -242,7 +241,7 @@ def _goal(value: Any, begin: Any, what: str) -> Any:
 
 
 def _moved(
-    world: World, q: ArrayLike | str | Any, rails: Callable[[Any], list[Rail]], settings: _Settings
+    world: World, q: ArrayLike | str | pin.SE3, rails: Callable[[pin.SE3], list[Rail]], settings: _Settings
 ) -> StraightResult:
     """Follow the rails that begin where the tip is."""
     require(world, World, "world", "use World(robot, scene)")

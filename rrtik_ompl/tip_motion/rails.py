@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -87,13 +86,13 @@ class Rail:
         return row
 
 
-def straight_rail(T_begin: Any, T_end: Any) -> Rail:
+def straight_rail(T_begin: pin.SE3, T_end: pin.SE3) -> Rail:
     """From one pose to another (SE3): the place in a straight line, the axes the shortest way about one axis."""
     axis, angle = _turn_between(T_begin, T_end)
     return _rail(T_begin, T_end.translation - T_begin.translation, axis, angle)
 
 
-def arc_rail(T_begin: Any, T_end: Any, through: ArrayLike) -> Rail:
+def arc_rail(T_begin: pin.SE3, T_end: pin.SE3, through: ArrayLike) -> Rail:
     """From one pose to another (SE3): the place on the circle through a point [m], the axes as on a straight line.
 
     Raises:
@@ -117,7 +116,7 @@ def arc_rail(T_begin: Any, T_end: Any, through: ArrayLike) -> Rail:
     return Rail(T_begin.homogeneous, np.zeros(3), axis, own, centre, unit, float(angle))
 
 
-def screw_rail(T_begin: Any, T_end: Any, turns: int = 0) -> Rail:
+def screw_rail(T_begin: pin.SE3, T_end: pin.SE3, turns: int = 0) -> Rail:
     """From one pose to another (SE3) about and along one line of the world at once, with whole turns more or less.
 
     Raises:
@@ -136,11 +135,11 @@ def screw_rail(T_begin: Any, T_end: Any, turns: int = 0) -> Rail:
     return Rail(T_begin.homogeneous, along, axis, angle, centre, axis, angle)
 
 
-def _rail(T_begin: Any, slide: Vector, axis: Vector, angle: float) -> Rail:
+def _rail(T_begin: pin.SE3, slide: Vector, axis: Vector, angle: float) -> Rail:
     return Rail(T_begin.homogeneous, slide, axis, angle, T_begin.translation, np.array(Z), 0.0)
 
 
-def _turn_between(T_begin: Any, T_end: Any) -> tuple[Vector, float]:
+def _turn_between(T_begin: pin.SE3, T_end: pin.SE3) -> tuple[Vector, float]:
     """Axis in the world, of length 1, and angle [rad, 0 .. pi] of the turn from one pose to another."""
     vector = np.asarray(pin.log3(T_end.rotation @ T_begin.rotation.T))
     angle = float(np.linalg.norm(vector))

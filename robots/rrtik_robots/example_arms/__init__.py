@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rrtik_ompl.description.gripper import GripperJoints
 from rrtik_ompl.description.robot_build import JointLimits
 from rrtik_ompl.description.urdf import robot_from_urdf
 from rrtik_ompl.errors import InputError
@@ -48,6 +49,7 @@ class ExampleArm:
         srdf: File with postures and allowed collisions, if there is one.
         postures: Further named postures, one number [rad] per joint.
         acceleration, jerk: Limits that the URDF cannot state, one per joint [rad/s^2, rad/s^3]; empty if unknown.
+        gripper: Joints that open and close its gripper, if it can.
     """
 
     name: str
@@ -58,6 +60,7 @@ class ExampleArm:
     postures: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     acceleration: tuple[float, ...] = ()
     jerk: tuple[float, ...] = ()
+    gripper: GripperJoints | None = None
 
     def __call__(
         self, *, tip: str | None = None, locked: Mapping[str, float] | None = None, base_pose: BasePose = None
@@ -73,7 +76,7 @@ class ExampleArm:
             InputError: If the package is not installed, or an option makes no sense.
         """
         folder = data_folder()
-        return robot_from_urdf(
+        robot = robot_from_urdf(
             folder / self.urdf,
             name=self.name,
             srdf=folder / self.srdf if self.srdf else None,
@@ -87,6 +90,7 @@ class ExampleArm:
                 for joint, acceleration, jerk in zip(self.joints, self.acceleration, self.jerk, strict=False)
             },
         )
+        return replace(robot, gripper=self.gripper)
 
 
 def _numbered(prefix: str, count: int, first: int = 1) -> tuple[str, ...]:
@@ -99,6 +103,10 @@ _BAXTER = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
 _PANDA = _numbered("panda_joint", 7)
 _PANDA_ACCELERATION = (15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0)
 _PANDA_JERK = (7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0)
+_PANDA_HAND = GripperJoints(("panda_finger_joint1",), (0.04,), (0.0,), 0.08)  # the other finger follows
+_PANDA_READY = {
+    "ready": (0.0, -0.7853981633974483, 0.0, -2.356194490192345, 0.0, 1.5707963267948966, 0.7853981633974483)
+}
 _UR_SRDF = "ur_description/srdf/ur5_joint_limited_robot.srdf"  # link names are the same for all three sizes
 _UR_UP = {"up": (0.0, -1.5707963267948966, 0.0, -1.5707963267948966, 0.0, 0.0)}
 
@@ -110,6 +118,8 @@ panda = ExampleArm(
     "panda_description/srdf/panda.srdf",
     acceleration=_PANDA_ACCELERATION,
     jerk=_PANDA_JERK,
+    postures=_PANDA_READY,
+    gripper=_PANDA_HAND,
 )
 panda_primitives = ExampleArm(
     "panda_primitives",
@@ -119,6 +129,8 @@ panda_primitives = ExampleArm(
     "panda_description/srdf/panda.srdf",
     acceleration=_PANDA_ACCELERATION,
     jerk=_PANDA_JERK,
+    postures=_PANDA_READY,
+    gripper=_PANDA_HAND,
 )
 ur3 = ExampleArm("ur3", "ur_description/urdf/ur3_robot.urdf", "tool0", _UR, _UR_SRDF, postures=_UR_UP)
 ur5 = ExampleArm("ur5", "ur_description/urdf/ur5_robot.urdf", "tool0", _UR, _UR_SRDF, postures=_UR_UP)

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.fast.tables.layout import (
     BALL_FLOATS,
@@ -101,6 +102,7 @@ def arm_table(chain: Chain) -> Table:
     )
 
 
+@lru_cache(maxsize=64)
 def axis_turns(chain: Chain) -> NDArray[np.float64]:
     """For each joint a rotation that takes z to the joint's axis, shape (n, 3, 3)."""
     turns = np.empty((len(chain.parent), 3, 3))
@@ -108,7 +110,7 @@ def axis_turns(chain: Chain) -> NDArray[np.float64]:
         helper = np.eye(3)[np.argmin(np.abs(axis))]
         x = np.cross(helper, axis) / np.linalg.norm(np.cross(helper, axis))
         turns[row] = np.column_stack([x, np.cross(axis, x), axis])
-    return turns
+    return frozen(turns)
 
 
 def moving_body(chain: Chain, body: Body, outer: Spheres, inner: Spheres, margin: float) -> MovingBody:
@@ -250,6 +252,12 @@ def enclosing_ball(spheres: Spheres) -> Vector:
     """A small ball around balls, shape (4,): steps towards the farthest one [43], best kept."""
     if len(spheres) == 1:
         return np.array(spheres[0])
+    return _enclosing_ball(np.ascontiguousarray(spheres).tobytes())
+
+
+@lru_cache(maxsize=4096)  # worlds of one arm that holds different things have most of them in common
+def _enclosing_ball(numbers: bytes) -> Vector:
+    spheres = np.frombuffer(numbers).reshape(-1, BALL_FLOATS)
     centres, radii = spheres[:, :3], spheres[:, 3]
     centre = 0.5 * ((centres - radii[:, None]).min(axis=0) + (centres + radii[:, None]).max(axis=0))
     best, radius = centre, np.inf
@@ -260,4 +268,4 @@ def enclosing_ball(spheres: Spheres) -> Vector:
             best, radius = centre, float(depths[farthest])
         centre = centre + (centres[farthest] - centre) / (step + 3)
     slack = MARGIN_PER_LEVER * (radius + float(np.abs(best).max()))
-    return np.array([*best, radius + slack])
+    return frozen([*best, radius + slack])

@@ -1,0 +1,112 @@
+"""`Task`: several stages of work in a row, planned as a whole: pick and place, drawing a tool out of its holder."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import positive, whole_number
+from rrtik_ompl.errors import require
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.problem import usable_configuration
+from rrtik_ompl.tasks.branches import Branch
+from rrtik_ompl.tasks.program import check_program, steps_of
+from rrtik_ompl.tasks.search import TaskSearch
+from rrtik_ompl.tasks.setting import Setting
+from rrtik_ompl.tasks.stages import Alternatives as Alternatives
+from rrtik_ompl.tasks.stages import Attach as Attach
+from rrtik_ompl.tasks.stages import Detach as Detach
+from rrtik_ompl.tasks.stages import Gripper as Gripper
+from rrtik_ompl.tasks.stages import MoveTo as MoveTo
+from rrtik_ompl.tasks.stages import Stage, checked_stages
+from rrtik_ompl.tasks.stages import Straight as Straight
+from rrtik_ompl.world import World
+
+SECONDS = 10.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TaskPlan:
+    """The outcome of planning a task.
+
+    Attributes:
+        found: Whether all of it can be done.
+        paths: The motions, each from where the one before ends.
+        worlds: The world of each motion: what the arm holds and how far its gripper is open.
+        stages: The stage that each motion does.
+        chosen: Numbers of the alternatives that were taken, from 0, in their order.
+        reason: "" if found, else which stages failed, how often and why.
+    """
+
+    found: bool
+    paths: tuple[JointPath, ...]
+    worlds: tuple[World, ...]
+    stages: tuple[Stage, ...]
+    chosen: tuple[int, ...]
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Task:
+    """Stages to be done one after the other, each from where the one before ends.
+
+    Attributes:
+        stages: `MoveTo`, `Straight`, `Attach`, `Detach`, `Gripper`, `Alternatives`.
+
+    Raises:
+        InputError: If there is none, or something else among them.
+
+    Example:
+        >>> import rrtik_ompl as rrtik
+        >>> post = rrtik.Obstacle("post", rrtik.Box([0.05, 0.05, 0.4]), [0.4, -0.3, 0.2])
+        >>> world = rrtik.World(rrtik.load_robot("ur5"), rrtik.Scene([post]))
+        >>> ready = [0.0, -1.6, 1.8, -0.2, 1.6, 0.0]
+        >>> task = rrtik.Task([rrtik.MoveTo(ready), rrtik.Straight(by=[0.0, 0.0, 0.1])])
+        >>> plan = task.plan(world, "up", seed=1)
+        >>> plan.found, len(plan.paths)
+        (True, 2)
+    """
+
+    stages: tuple[Stage, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "stages", checked_stages(self.stages, "task"))
+
+    def plan(self, world: World, start: ArrayLike | str, *, seconds: float = SECONDS, seed: int = 0) -> TaskPlan:
+        """Choose alternatives and configurations such that the whole task works, and plan its motions.
+
+        Every motion is collision-free in its own world: straight lines are proven, the others as :func:`plan` has them.
+
+        Args:
+            world: Robot and scene at the beginning.
+            start: Configuration, shape (dof,), or the name of a posture.
+            seconds: Time limit [s].
+            seed: The same seed gives the same plan, as long as the time limit does not cut in.
+
+        Raises:
+            InputError: If the stages make no sense in this world: something is attached twice, or detached where it is
+                not held; the stage is named.
+            UnknownNameError: If there is no object, link or posture of a name.
+            ProblemError: If the start is in collision or outside the limits.
+        """
+        require(world, World, "world of a task", "use World(robot, scene)")
+        steps = steps_of(self.stages)
+        check_program(steps, world)
+        given: Any = world.robot.posture(start) if isinstance(start, str) else start
+        q = usable_configuration(world, given, "start")
+        search = TaskSearch(time.monotonic() + positive(seconds, "seconds"), whole_number(seed, "seed"))
+        motions = search.run(Branch(Setting.of(world), np.array(q), steps))
+        if motions is None:
+            return TaskPlan(False, (), (), (), (), search.reason())
+        return TaskPlan(
+            found=True,
+            paths=tuple(path for _, path in motions),
+            worlds=tuple(branch.setting.world for branch, _ in motions),
+            stages=tuple(branch.step.stage for branch, _ in motions if branch.step is not None),
+            chosen=motions[-1][0].chosen if motions else (),
+            reason="",
+        )

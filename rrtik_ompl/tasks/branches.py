@@ -1,0 +1,187 @@
+"""Where a task may go on from one place: the stages of a branch of the search, without the motions between postures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rrtik_ompl.arrays import Vector
+from rrtik_ompl.errors import InputError, ProblemError
+from rrtik_ompl.goal import Goal, JointGoal, joint_difference
+from rrtik_ompl.ik.goal_configurations import GoalSearch
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.tasks.program import Step, options_of
+from rrtik_ompl.tasks.setting import Setting
+from rrtik_ompl.tasks.stages import Alternatives, MoveTo, Straight
+from rrtik_ompl.tip_motion import DEVIATION, TURN_DEVIATION
+from rrtik_ompl.tip_motion.attempts import Attempt, Way, attempt, farthest, path_of
+from rrtik_ompl.tip_motion.freedom import centred
+from rrtik_ompl.tip_motion.rails import straight_rail
+from rrtik_ompl.tip_motion.values import Tolerance
+
+TOLERANCE = Tolerance(DEVIATION, TURN_DEVIATION)
+THOROUGH = 1  # round of the search from which straight lines are tried in all ways that a redundant arm has
+WHOLE = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Branch:
+    """A task done up to some place.
+
+    Attributes:
+        setting: What surrounds the arm there.
+        q: Where the arm is, shape (dof,).
+        rest: What is left to do.
+        before: The branch that it goes on from; None at the start.
+        step: What has been done since; None at the start.
+        path: Of a straight line; None elsewhere.
+        done: How many stages.
+        cost: Way of the joints so far [rad, metres counted alike].
+        chosen: Numbers of the alternatives taken, from 0.
+        effort: Round of the search that made it.
+    """
+
+    setting: Setting
+    q: Vector
+    rest: tuple[Step, ...]
+    before: Branch | None = None
+    step: Step | None = None
+    path: JointPath | None = None
+    done: int = 0
+    cost: float = 0.0
+    chosen: tuple[int, ...] = ()
+    effort: int = 0
+
+    def chain(self) -> list[Branch]:
+        """All branches from the start to this one, the start left out."""
+        links: list[Branch] = []
+        here: Branch | None = self
+        while here is not None and here.before is not None:
+            links.append(here)
+            here = here.before
+        return links[::-1]
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is a motion whose way has to be planned."""
+        return self.step is not None and isinstance(self.step.stage, MoveTo)
+
+
+@dataclass(slots=True, eq=False)
+class Choices:
+    """The configurations of a goal at one place of the search: those found, and more of them."""
+
+    branch: Branch
+    search: GoalSearch
+    used: int = 0
+
+
+@dataclass(slots=True, eq=False)
+class Expander:
+    """Makes the branches that follow a branch.
+
+    Attributes:
+        rng: Random numbers of inverse kinematics.
+        failures: Why steps failed, in the order in which they did.
+        choices: Goals of the tip, of which more configurations may be looked for.
+    """
+
+    rng: np.random.Generator
+    seed: int
+    failures: list[tuple[Branch, Step, str]] = field(default_factory=list)
+    choices: list[Choices] = field(default_factory=list)
+
+    def after(self, branch: Branch) -> Iterator[Branch]:
+        """The branches that go one step on; none if the step fails, which is noted."""
+        step, rest = branch.rest[0], branch.rest[1:]
+        stage = step.stage
+        try:
+            if isinstance(stage, Alternatives):
+                for number, row in enumerate(options_of(step)):
+                    yield from self.after(_with(branch, rest=(*row, *rest), chosen=(*branch.chosen, number)))
+            elif isinstance(stage, MoveTo):
+                yield from self._aims(branch, step, stage.goal)
+            elif isinstance(stage, Straight):
+                yield from self._line(branch, step, stage)
+            else:
+                yield _next(branch, step, branch.setting.after(stage, branch.q), branch.q)
+        except (ProblemError, InputError) as error:
+            self.failures.append((branch, step, str(error)))
+
+    def more(self) -> Iterator[Branch]:
+        """Branches with further configurations of goals that were met before."""
+        for choices in self.choices:
+            if not choices.search.exhausted:
+                choices.search.more()
+                yield from self._drawn(choices)
+
+    def _aims(self, branch: Branch, step: Step, goal: Goal | Vector | str) -> Iterator[Branch]:
+        world = branch.setting.world
+        if isinstance(goal, str):
+            goal = world.robot.posture(goal)
+        search = GoalSearch(Problem(world, branch.q, goal), self.rng)
+        search.first()
+        if search.reason:
+            self.failures.append((branch, step, search.reason))
+        choices = Choices(branch, search)
+        if not isinstance(goal, JointGoal):
+            self.choices.append(choices)
+        yield from self._drawn(choices)
+
+    def _drawn(self, choices: Choices) -> Iterator[Branch]:
+        branch, rows = choices.branch, choices.search.rows
+        for q in rows[choices.used :]:
+            yield _next(branch, branch.rest[0], branch.setting, q)
+        choices.used = len(rows)
+
+    def _line(self, branch: Branch, step: Step, stage: Straight) -> Iterator[Branch]:
+        world = branch.setting.world
+        if touching := world.explain(branch.q):
+            self.failures.append((branch, step, f"it cannot begin: {touching}; move it or allow the pair"))
+            return
+        made = self._followed(branch, stage)
+        if made.fraction < WHOLE:
+            self.failures.append((branch, step, f"ends at {100.0 * made.fraction:.3g} %: {made.reason}"))
+            return
+        yield _next(branch, step, branch.setting, made.rows[-1], path_of(world, made))
+
+    def _followed(self, branch: Branch, stage: Straight) -> Attempt:
+        world, tip = branch.setting.world, branch.setting.robot.fk(branch.q)
+        way = Way((straight_rail(tip, stage.goal(tip)),), TOLERANCE, 0.0)
+        if branch.effort >= THOROUGH:
+            return farthest(world, way, branch.q[None], self.seed)
+        return attempt(world, way, branch.q, centred(world.robot))
+
+
+def way_of(robot: Robot, a: Vector, b: Vector) -> float:
+    """Of the joints from one configuration to another [rad, metres counted alike]."""
+    return float(np.linalg.norm(joint_difference(robot, b, a)))
+
+
+def again(branch: Branch, effort: int) -> Branch:
+    """The same branch, to be tried with more effort."""
+    return _with(branch, rest=branch.rest, chosen=branch.chosen, effort=effort)
+
+
+def _with(branch: Branch, *, rest: tuple[Step, ...], chosen: tuple[int, ...], effort: int | None = None) -> Branch:
+    return Branch(
+        branch.setting,
+        branch.q,
+        rest,
+        branch.before,
+        branch.step,
+        branch.path,
+        branch.done,
+        branch.cost,
+        chosen,
+        branch.effort if effort is None else effort,
+    )
+
+
+def _next(branch: Branch, step: Step, setting: Setting, q: Vector, path: JointPath | None = None) -> Branch:
+    cost = branch.cost + (way_of(setting.robot, branch.q, q) if path is None else path.length)
+    return Branch(setting, q, branch.rest[1:], branch, step, path, branch.done + 1, cost, branch.chosen, branch.effort)

@@ -1,0 +1,96 @@
+"""A task as a program: its stages with the numbers that messages call them by, checked before anything is searched."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.tasks.setting import with_gripper
+from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, Gripper, MoveTo, Stage
+from rrtik_ompl.world import World
+
+Held = frozenset[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A stage and its number, such as "3", or "3.2.1" for the first stage of the second alternative of stage 3."""
+
+    number: str
+    stage: Stage
+
+    def __str__(self) -> str:
+        return f"stage {self.number} ({self.stage})"
+
+
+def steps_of(stages: Iterable[Stage], prefix: str = "") -> tuple[Step, ...]:
+    """Stages with their numbers."""
+    return tuple(Step(f"{prefix}{k + 1}", stage) for k, stage in enumerate(stages))
+
+
+def options_of(step: Step) -> tuple[tuple[Step, ...], ...]:
+    """The rows of a step that has alternatives."""
+    assert isinstance(step.stage, Alternatives), "only these have options"
+    return tuple(steps_of(row, f"{step.number}.{k + 1}.") for k, row in enumerate(step.stage.options))
+
+
+def check_program(steps: tuple[Step, ...], world: World) -> None:
+    """Refuse what can never be done, whatever is chosen.
+
+    Raises:
+        InputError: If something is attached twice or detached where it is not, or the robot has no gripper joints.
+        UnknownNameError: If there is no object, link or posture of a name.
+    """
+    _after(steps, {frozenset(item.name for item in world.scene.attached)}, world)
+
+
+def _after(steps: tuple[Step, ...], states: set[Held], world: World) -> set[Held]:
+    """What may be held after some steps; ``states``: what may be held before."""
+    for step in steps:
+        stage = step.stage
+        try:
+            if isinstance(stage, Alternatives):
+                states = set().union(*(_after(row, states, world) for row in options_of(step)))
+            elif isinstance(stage, Attach):
+                states = {_attached(stage, held, world) for held in states}
+            elif isinstance(stage, Detach):
+                states = {_detached(stage, held, world) for held in states}
+            elif isinstance(stage, Gripper):
+                with_gripper(world.robot, stage)
+            elif isinstance(stage, MoveTo):
+                _check_goal(stage, world)
+        except InputError as error:
+            if not str(error).startswith("stage "):
+                raise InputError(f"{step}: {error}") from None
+            raise
+    return states
+
+
+def _attached(stage: Attach, held: Held, world: World) -> Held:
+    if stage.object in held:
+        raise InputError(f"'{stage.object}' is held already; detach it first")
+    if stage.object not in world.scene.names:
+        raise UnknownNameError("obstacle", stage.object, world.scene.names)
+    links = world.robot.link_names
+    if stage.link not in links:
+        raise UnknownNameError(f"link of robot '{world.robot.name}'", stage.link, links)
+    for name in stage.allow:
+        if name not in links and name not in world.scene.names:
+            raise UnknownNameError("link or obstacle", name, (*links, *world.scene.names))
+    return held | {stage.object}
+
+
+def _detached(stage: Detach, held: Held, world: World) -> Held:
+    if stage.object not in held:
+        if stage.object not in world.scene.names:
+            raise UnknownNameError("attached object", stage.object, world.scene.names)
+        raise InputError(f"'{stage.object}' is not held here; attach it first")
+    return held - {stage.object}
+
+
+def _check_goal(stage: MoveTo, world: World) -> None:
+    if isinstance(stage.goal, str):
+        world.robot.posture(stage.goal)
+    elif not hasattr(stage.goal, "satisfied"):
+        world.robot.configuration(stage.goal, "goal")

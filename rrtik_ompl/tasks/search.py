@@ -1,0 +1,133 @@
+"""Search for choices with which a whole task works: the farthest branch first, of these the shortest; backtracking.
+
+Straight lines are followed at once, for they decide most; motions between postures are planned when all else fits.
+"""
+
+from __future__ import annotations
+
+import heapq
+import time
+from collections import Counter
+from itertools import count
+
+import numpy as np
+
+from rrtik_ompl.errors import ProblemError
+from rrtik_ompl.path import JointPath, proved_as_clear
+from rrtik_ompl.planning import plan
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.tasks.branches import Branch, Expander, again
+from rrtik_ompl.tasks.program import Step
+from rrtik_ompl.world.kept_clearance import CLEARANCE
+
+FIRST_SECONDS = 0.25  # for a motion between postures; four times as much in each further round
+GROWTH = 4.0
+ROUNDS = 8
+NAMED = 6  # stages whose failures a reason names
+MOST_WORDS = 160  # letters of one failure
+
+
+class TaskSearch:
+    """One search.
+
+    Args:
+        deadline: Of ``time.monotonic``.
+        seed: Of everything random.
+    """
+
+    def __init__(self, deadline: float, seed: int) -> None:
+        self._deadline, self._seed, self._out_of_time = deadline, seed, False
+        self._expander = Expander(np.random.default_rng(seed), seed)
+        self._open: list[tuple[int, float, int, Branch]] = []  # a heap: what is popped is the smallest
+        self._numbers = count()
+        self._ways: dict[int, JointPath] = {}  # of motions between postures, by their branches
+        self._blocked: set[int] = set()  # motions that were not found in this round
+        self._late: list[Branch] = []  # what hangs on these
+
+    def run(self, start: Branch) -> list[tuple[Branch, JointPath]] | None:
+        """Branches that are motions, from the start on, with their paths; None if no choices work."""
+        self._push(start)
+        for effort in range(ROUNDS):
+            found = self._round(effort)
+            if found is not None or self._out_of_time:
+                return found
+            waiting, self._late = self._late, []
+            self._blocked.clear()
+            failed = [branch for branch, _, _ in self._expander.failures] if effort == 0 else []
+            for branch in (*waiting, *failed):
+                self._push(again(branch, effort + 1))
+            for branch in self._expander.more():
+                self._push(branch)
+            if not self._open:
+                return None
+        return None
+
+    def reason(self) -> str:
+        """Why nothing was found: what failed, the farthest stage first, and how often."""
+        failures = self._expander.failures
+        texts: dict[str, tuple[Step, Counter[str]]] = {}
+        for _, step, text in failures:
+            texts.setdefault(step.number, (step, Counter()))[1][text] += 1
+        order = sorted(texts.values(), key=lambda item: [int(n) for n in item[0].number.split(".")], reverse=True)
+        parts = []
+        for step, reasons in order[:NAMED]:
+            (text, _), times = reasons.most_common(1)[0], reasons.total()
+            short = text if len(text) <= MOST_WORDS else text[:MOST_WORDS] + "..."
+            parts.append(f"{step} failed" + (f" {times} times, for instance: " if times > 1 else ": ") + short)
+        late = "out of time; " if self._out_of_time else ""
+        return late + "; ".join(parts or ["no choice was left"])
+
+    def _round(self, effort: int) -> list[tuple[Branch, JointPath]] | None:
+        while self._open:
+            if time.monotonic() > self._deadline:
+                self._out_of_time = True
+                return None
+            branch = heapq.heappop(self._open)[-1]
+            if any(id(link) in self._blocked for link in branch.chain()):
+                self._late.append(branch)
+            elif branch.rest:
+                for following in self._expander.after(branch):
+                    self._push(following)
+            else:
+                found = self._motions(branch, effort)
+                if found is not None:
+                    return found
+        return None
+
+    def _push(self, branch: Branch) -> None:
+        heapq.heappush(self._open, (-branch.done, branch.cost, next(self._numbers), branch))
+
+    def _motions(self, branch: Branch, effort: int) -> list[tuple[Branch, JointPath]] | None:
+        """The motions of a branch that has done everything, those between postures planned; None if one fails."""
+        found = []
+        for link in branch.chain():
+            if link.moves and id(link) not in self._ways and not self._plan(link, effort):
+                self._blocked.add(id(link))
+                self._late.append(branch)
+                return None
+            path = self._ways.get(id(link), link.path)
+            if path is not None:
+                found.append((link, path))
+        return found
+
+    def _plan(self, link: Branch, effort: int) -> bool:
+        """Find the way of a motion between postures."""
+        before, world = link.before, link.setting.world
+        assert before is not None, "it comes after another"
+        assert link.step is not None, "it has done one"
+        try:
+            problem = Problem(world, before.q, link.q, name=f"stage {link.step.number}")
+        except ProblemError as error:
+            self._expander.failures.append((before, link.step, str(error)))
+            return False
+        if world.motion_proven(before.q, link.q):
+            straight = JointPath.of(world.robot, np.stack([before.q, link.q]))
+            self._ways[id(link)] = proved_as_clear(straight, world, CLEARANCE)
+            return True
+        left = max(self._deadline - time.monotonic(), 1e-3)
+        made = plan(problem, seed=self._seed, seconds=min(FIRST_SECONDS * GROWTH**effort, left))
+        if made.path is None:
+            self._expander.failures.append((before, link.step, made.reason))
+            return False
+        self._ways[id(link)] = made.path
+        return True

@@ -1,0 +1,185 @@
+"""The stages of a task: what the arm does, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias, get_args
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import Vector, finite_array, frozen, not_negative
+from rrtik_ompl.choices import one_of
+from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.goal import Goal, PoseGoal
+from rrtik_ompl.poses import rigid
+
+LineFrame: TypeAlias = Literal["world", "tip"]
+GripperState: TypeAlias = Literal["open", "close"]
+NO_LENGTH = 1e-9  # [m]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MoveTo:
+    """Move to a goal by any way that is free.
+
+    Attributes:
+        goal: A goal, the name of a posture, a configuration, shape (dof,), or a pose of the tip as ``SE3`` or matrix.
+    """
+
+    goal: Any
+
+    def __post_init__(self) -> None:
+        goal = self.goal
+        if isinstance(goal, pin.SE3) or (not isinstance(goal, Goal | str) and np.ndim(goal) == 2):
+            goal = PoseGoal(rigid(goal, "goal of MoveTo"))
+        elif not isinstance(goal, Goal | str):
+            goal = frozen(finite_array(goal, (None,), "goal of MoveTo"))
+        object.__setattr__(self, "goal", goal)
+
+    def __str__(self) -> str:
+        return "MoveTo"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Straight:
+    """Move the tip in a straight line: by a shift, or to a pose.
+
+    Attributes:
+        by: Shift of the tip [m], shape (3,), its orientation kept.
+        to: Pose of the tip at the end, as :func:`rrtik_ompl.straight` takes it.
+        frame: Whose axes the shift is in: "world", or "tip" as it is at the beginning.
+    """
+
+    by: Vector | None = None
+    to: Any = None
+    frame: LineFrame = "world"
+
+    def __init__(
+        self, by: ArrayLike | None = None, to: ArrayLike | pin.SE3 | None = None, frame: LineFrame = "world"
+    ) -> None:
+        if (by is None) == (to is None):
+            raise InputError("Straight: give its end, by=[dx, dy, dz] or to=POSE, and only one of them")
+        shift = None if by is None else frozen(finite_array(by, (3,), "Straight: by"))
+        if shift is not None and np.linalg.norm(shift) < NO_LENGTH:
+            raise InputError("Straight: by=[0, 0, 0] leads nowhere; give a shift, or leave the stage out")
+        end = None if to is None else rigid(to, "Straight: to")
+        place_alone = to is not None and not isinstance(to, pin.SE3) and np.shape(to) == (3,)
+        object.__setattr__(self, "by", shift)
+        object.__setattr__(self, "to", frozen(end.translation) if end is not None and place_alone else end)
+        object.__setattr__(self, "frame", one_of(get_args(LineFrame), frame, "frame of Straight"))
+
+    def __str__(self) -> str:
+        return "Straight"
+
+    def goal(self, tip: pin.SE3) -> pin.SE3:
+        """The pose at the end for a pose of the tip at the beginning (SE3)."""
+        if self.by is not None:
+            shift = tip.rotation @ self.by if self.frame == "tip" else self.by
+            return pin.SE3(tip.rotation, tip.translation + shift)
+        return self.to if isinstance(self.to, pin.SE3) else pin.SE3(tip.rotation, np.array(self.to))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Attach:
+    """An obstacle moves with a link from now on.
+
+    Attributes:
+        object: Name of the obstacle.
+        link: That holds it.
+        allow: Links and obstacles that it may touch while it is held, beside that link.
+    """
+
+    object: str
+    link: str
+    allow: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        require(self.object, str, "object of Attach")
+        require(self.link, str, "link of Attach")
+        object.__setattr__(self, "allow", _names(self.allow, "allow of Attach"))
+
+    def __str__(self) -> str:
+        return f"Attach '{self.object}'"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Detach:
+    """What is held stays where it is from now on. ``object``: its name."""
+
+    object: str
+
+    def __post_init__(self) -> None:
+        require(self.object, str, "object of Detach")
+
+    def __str__(self) -> str:
+        return f"Detach '{self.object}'"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Gripper:
+    """Open or close the gripper; the fingers' own way is not checked.
+
+    Attributes:
+        state: "open" or "close".
+        width: How far apart the fingers are afterwards [m]; wide open or shut if None.
+    """
+
+    state: GripperState
+    width: float | None = None
+
+    def __post_init__(self) -> None:
+        one_of(get_args(GripperState), self.state, "state of a gripper")
+        if self.width is not None:
+            not_negative(self.width, "width of Gripper")
+
+    def __str__(self) -> str:
+        return f"Gripper '{self.state}'"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Alternatives:
+    """Any of several rows of stages."""
+
+    options: tuple[tuple[Stage, ...], ...]
+
+    def __init__(self, options: Iterable[Iterable[Stage]]) -> None:
+        rows = tuple(_row(option) for option in options) if isinstance(options, Iterable) else ()
+        if not rows or not all(rows):
+            raise InputError("Alternatives: needs lists of stages, none of them empty: Alternatives([[...], [...]])")
+        object.__setattr__(self, "options", rows)
+
+    def __str__(self) -> str:
+        return f"Alternatives ({len(self.options)})"
+
+
+Stage: TypeAlias = MoveTo | Straight | Attach | Detach | Gripper | Alternatives
+
+
+def checked_stages(stages: object, what: str) -> tuple[Stage, ...]:
+    """A row of stages.
+
+    Raises:
+        InputError: If it is empty, or something else is in it.
+    """
+    row = _row(stages)
+    if not row:
+        raise InputError(f"{what}: needs at least one stage, such as MoveTo(goal)")
+    return row
+
+
+def _row(stages: object) -> tuple[Stage, ...]:
+    if isinstance(stages, Stage) or not isinstance(stages, Sequence):
+        raise InputError(f"stages: expected a list of stages, got {type(stages).__name__}")
+    for stage in stages:
+        require(stage, Stage, "each stage of a task")
+    return tuple(stages)
+
+
+def _names(names: str | Iterable[str], what: str) -> tuple[str, ...]:
+    row = (names,) if isinstance(names, str) else tuple(names)
+    for name in row:
+        require(name, str, f"each name of {what}")
+    return row

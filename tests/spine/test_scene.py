@@ -1,0 +1,45 @@
+"""Scenes made from scenes."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.errors import InputError, UnknownNameError
+
+BALL = rrtik.Obstacle("ball", rrtik.Sphere(0.1), [0.5, 0.0, 0.5])
+BOX = rrtik.Obstacle("box", rrtik.Box([0.1, 0.1, 0.1]), [0.5, 0.5, 0.5])
+SCENE = rrtik.Scene([BALL, BOX], allowed_collisions=[("ball", "wrist")])
+
+
+def test_obstacles_come_and_go_and_the_scene_stays_as_it_was():
+    more = SCENE.with_(rrtik.Obstacle("post", rrtik.Sphere(0.2)))
+    assert more.names == ("ball", "box", "post")
+    assert more.without("box", "post").names == ("ball",)
+    assert more.without("box").allowed_collisions == (("ball", "wrist"),)
+    assert more.without("ball").allowed_collisions == ()
+    assert SCENE.names == ("ball", "box")
+
+
+def test_an_obstacle_is_held_and_let_go():
+    held = SCENE.attaching("ball", "gripper", allow=["box", "wrist"], pose=[0.0, 0.0, 0.1])
+    assert [o.name for o in held.obstacles] == ["box"]
+    (item,) = held.attached
+    assert (item.name, item.link, item.allow, item.shape) == ("ball", "gripper", ("wrist",), BALL.shape)
+    assert np.allclose(item.pose.translation, [0.0, 0.0, 0.1])
+    assert held.allowed_collisions == (("ball", "box"),)
+    free = held.detaching("ball", pin.SE3(np.eye(3), np.array([1.0, 0.0, 0.0])))
+    assert free.attached == ()
+    assert np.allclose(free.obstacle("ball").pose.translation, [1.0, 0.0, 0.0])
+    assert free.allowed_collisions == ()
+
+
+def test_what_is_not_there_or_there_twice_is_refused():
+    with pytest.raises(UnknownNameError, match="no obstacle or attached object 'bal'"):
+        SCENE.without("bal")
+    with pytest.raises(UnknownNameError, match="no obstacle 'cup'"):
+        SCENE.attaching("cup", "gripper")
+    with pytest.raises(UnknownNameError, match="no attached object 'ball'"):
+        SCENE.detaching("ball", [0.0, 0.0, 0.0])
+    with pytest.raises(InputError, match="used 2 times"):
+        SCENE.with_(BALL)

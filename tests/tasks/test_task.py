@@ -1,0 +1,213 @@
+"""Tasks: whole sequences that work, in worlds that hold what the arm holds; what fails is named."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import rrtik_ompl as rrtik
+from rrtik_ompl import Alternatives, Attach, Detach, Gripper, MoveTo, Straight, Task
+from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError
+
+DOWN = np.diag([1.0, -1.0, -1.0])
+CUP = np.array([0.5, 0.2, 0.252])  # [m] its middle, 2 mm above the table
+UP = [0.0, 0.0, 0.12]
+
+
+def hand(x, y, z, yaw=0.0):
+    """A pose of the Panda's tip that points down."""
+    return pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, yaw) @ DOWN, np.array([x, y, z]))
+
+
+def above(pose):
+    return pin.SE3(pose.rotation, pose.translation + np.array(UP))
+
+
+def grasp(yaw, lift=0.02):
+    at = hand(CUP[0], CUP[1], CUP[2] + lift, yaw)
+    return [MoveTo(above(at)), Straight(to=at), Attach("cup", "panda_hand"), Gripper("close", width=0.05)]
+
+
+def place(x, y):
+    at = hand(x, y, CUP[2] + 0.02)
+    return [MoveTo(above(at)), Straight(to=at), Detach("cup"), Gripper("open"), Straight(by=UP)]
+
+
+@pytest.fixture(scope="module")
+def kitchen():
+    """A Panda with open fingers before a table with a cup on it and a wall across."""
+    robot = rrtik.load_robot("panda")
+    robot = rrtik.load_robot("panda", locked=robot.gripper.posture("open"))
+    table = rrtik.Obstacle("table", rrtik.Box([0.6, 1.0, 0.04]), [0.5, 0.0, 0.18])
+    cup = rrtik.Obstacle("cup", rrtik.Box([0.05, 0.05, 0.1]), CUP)
+    wall = rrtik.Obstacle("wall", rrtik.Box([0.3, 0.02, 0.3]), [0.5, 0.0, 0.35])
+    return rrtik.World(robot, rrtik.Scene([table, cup, wall]))
+
+
+@pytest.fixture(scope="module")
+def carried(kitchen):
+    """The plan of pick and place with three grasps, the first in the palm's way, and two places, the first too far."""
+    stages = [Alternatives([grasp(0.3, lift=-0.01), grasp(0.0), grasp(np.pi / 2)]), Straight(by=UP)]
+    return Task([*stages, Alternatives([place(0.5, -1.2), place(0.5, -0.2)])]).plan(kitchen, "ready", seed=1)
+
+
+@pytest.mark.kernels
+def test_pick_and_place_chooses_what_works(carried):
+    assert carried.found, carried.reason
+    assert carried.chosen[0] in (1, 2)
+    assert carried.chosen[1] == 1
+    assert [str(stage) for stage in carried.stages] == [
+        "MoveTo",
+        "Straight",
+        "Straight",
+        "MoveTo",
+        "Straight",
+        "Straight",
+    ]
+
+
+@pytest.mark.kernels
+def test_each_motion_begins_where_the_one_before_ends_and_is_free_in_its_own_world(carried, kitchen):
+    assert np.array_equal(carried.paths[0].start, kitchen.robot.posture("ready"))
+    for before, after in zip(carried.paths[:-1], carried.paths[1:], strict=True):
+        assert np.abs(before.end - after.start).max() <= 1e-12
+    for path, world in zip(carried.paths, carried.worlds, strict=True):
+        assert path.violations(world) == ()
+        assert world.valid_batch(path.resample(0.01).waypoints).all()
+
+
+@pytest.mark.kernels
+def test_what_is_held_moves_with_the_hand_and_stays_where_it_is_let_go(carried):
+    held = [[item.name for item in world.scene.attached] for world in carried.worlds]
+    assert held == [[], [], ["cup"], ["cup"], ["cup"], []]
+    lift, last = carried.worlds[2], carried.worlds[5]
+    item = lift.scene.attached[0]
+    at_first = lift.robot.fk(carried.paths[2].start, item.link) * item.pose
+    assert np.allclose(at_first.translation, CUP, atol=2e-4)
+    put = last.scene.obstacle("cup").pose
+    assert np.allclose(put.translation, [0.5, -0.2, CUP[2]], atol=2e-3)
+    fingers = [world.robot.source["locked"]["panda_finger_joint1"] for world in carried.worlds]
+    assert fingers == [0.04, 0.04, 0.025, 0.025, 0.025, 0.04]
+
+
+@pytest.mark.kernels
+def test_the_same_seed_gives_the_same_plan(kitchen):
+    task = Task([*grasp(0.0), Straight(by=UP)])
+    first, second = (task.plan(kitchen, "ready", seed=4) for _ in range(2))
+    assert len(first.paths) == len(second.paths) == 3
+    for one, other in zip(first.paths, second.paths, strict=True):
+        assert np.array_equal(one.waypoints, other.waypoints)
+
+
+@pytest.mark.kernels
+def test_a_goal_with_several_configurations_is_chosen_so_that_what_follows_works(titan):
+    """Of the configurations at a pose most cannot go on along the line; backtracking finds one that can."""
+    world, rng, tried = rrtik.World(titan), np.random.default_rng(7), 0
+    while tried < 3:
+        begin = titan.fk(rng.uniform(*titan.finite_range()))
+        branches = rrtik.solve_ik(titan, rrtik.PoseGoal(begin), all=True, world=world, near=np.zeros(6)).solutions
+        shift = rng.normal(0.0, 0.2, 3)
+        goal = pin.SE3(begin.rotation, begin.translation + shift)
+        ends = [rrtik.straight(world, q, goal).fraction for q in branches]
+        if len(ends) < 2 or ends[0] == 1.0 or max(ends) < 1.0:  # the nearest one fails
+            continue
+        plan = Task([MoveTo(begin), Straight(by=shift)]).plan(world, np.zeros(6), seed=1)
+        assert plan.found, plan.reason
+        tried += 1
+
+
+@pytest.mark.kernels
+def test_a_failure_names_the_stage_and_the_reason_of_each_alternative(kitchen):
+    task = Task([Alternatives([grasp(0.0, lift=-0.02), [MoveTo(hand(3.0, 0.0, 0.5))]]), Straight(by=UP)])
+    plan = task.plan(kitchen, "ready", seconds=5.0, seed=1)
+    assert not plan.found
+    assert (plan.paths, plan.worlds, plan.stages) == ((), (), ())
+    assert "stage 1.1.2 (Straight)" in plan.reason
+    assert "'cup'" in plan.reason
+    assert "stage 1.2.1 (MoveTo)" in plan.reason
+    assert "is it in reach?" in plan.reason
+    assert "\n" not in plan.reason
+
+
+@pytest.mark.kernels
+def test_time_is_kept_and_said(kitchen):
+    plan = Task(grasp(0.0)).plan(kitchen, "ready", seconds=1e-9)
+    assert not plan.found
+    assert plan.reason.startswith("out of time")
+
+
+@pytest.mark.parametrize(
+    ("stages", "words"),
+    [
+        (
+            [Attach("cup", "panda_hand"), Attach("cup", "panda_hand")],
+            r"stage 2 \(Attach 'cup'\): 'cup' is held already",
+        ),
+        ([Detach("cup")], r"stage 1 \(Detach 'cup'\): 'cup' is not held here"),
+        ([Alternatives([[MoveTo("ready")], [Detach("wall")]])], r"stage 1.2.1 \(Detach 'wall'\)"),
+        ([Alternatives([[Attach("cup", "panda_hand")], [MoveTo("ready")]]), Detach("cup")], "stage 2"),
+        ([Attach("mug", "panda_hand")], "no obstacle 'mug'"),
+        ([Attach("cup", "hand")], "no link of robot 'panda' 'hand'"),
+        ([Attach("cup", "panda_hand", allow=("desk",))], "no link or obstacle 'desk'"),
+        ([Gripper("close", width=0.2)], "opens from 0 to 0.08 m"),
+        ([MoveTo("nowhere")], r"stage 1 \(MoveTo\): no posture"),
+        ([MoveTo([0.0, 1.0])], r"stage 1 \(MoveTo\): goal: robot 'panda' has 7 joints"),
+    ],
+)
+def test_what_can_never_be_done_is_refused_before_the_search(kitchen, stages, words):
+    with pytest.raises(InputError, match=words) as caught:
+        Task(stages).plan(kitchen, "ready")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_robot_without_gripper_joints_and_a_start_in_collision(titan):
+    world = rrtik.World(titan)
+    with pytest.raises(InputError, match="has no gripper joints"):
+        Task([Gripper("open")]).plan(world, "ready")
+    block = rrtik.Scene([rrtik.Obstacle("block", rrtik.Sphere(0.2), titan.fk(titan.posture("ready")))])
+    with pytest.raises(ProblemError, match="block"):
+        Task([MoveTo("zero")]).plan(world.with_scene(block), "ready")
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Straight(), "give its end"),
+        (lambda: Straight(by=UP, to=UP), "only one"),
+        (lambda: Straight(by=[0.0, 0.0, 0.0]), "leads nowhere"),
+        (lambda: Straight(by=UP, frame="hand"), "frame of Straight"),
+        (lambda: Gripper("shut"), "state of a gripper"),
+        (lambda: Gripper("close", width=-0.1), "width"),
+        (lambda: Alternatives([]), "none of them empty"),
+        (lambda: Alternatives([[]]), "none of them empty"),
+        (lambda: Task([]), "at least one stage"),
+        (lambda: Task([MoveTo("ready"), "open"]), "each stage of a task"),
+        (lambda: Task(MoveTo("ready")), "expected a list of stages"),
+        (lambda: Attach("cup", 3), "link of Attach"),
+        (lambda: MoveTo(np.diag([1.0, 1.0, -1.0, 1.0])), "mirrors"),
+    ],
+)
+def test_stages_that_are_none_are_refused_in_a_line(make, words):
+    with pytest.raises(InputError, match=words) as caught:
+        make()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_shift_in_the_tips_axes_and_in_the_worlds():
+    tip = pin.SE3(DOWN, np.array([0.1, 0.2, 0.3]))
+    assert np.allclose(Straight(by=UP, frame="tip").goal(tip).translation, [0.1, 0.2, 0.18])
+    assert np.allclose(Straight(by=UP).goal(tip).translation, [0.1, 0.2, 0.42])
+    to = Straight(to=[0.5, 0.0, 0.0]).goal(tip)
+    assert np.allclose(to.translation, [0.5, 0.0, 0.0])
+    assert np.allclose(to.rotation, DOWN)
+
+
+def test_fingers_close_on_a_width():
+    gripper = rrtik.load_robot("panda").gripper
+    assert gripper.posture("open") == {"panda_finger_joint1": 0.04}
+    assert gripper.posture("closed") == gripper.posture("close") == {"panda_finger_joint1": 0.0}
+    robot = rrtik.load_robot("panda", locked=gripper.close_on(0.05))
+    q = robot.posture("ready")
+    left, right = (robot.fk(q, f"panda_{side}finger").translation for side in ("left", "right"))
+    assert np.linalg.norm(left - right) == pytest.approx(0.05)
+    with pytest.raises(UnknownNameError, match="state of a gripper"):
+        gripper.posture("ajar")
