@@ -16,7 +16,7 @@ from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.ik.held_tables import HeldTables, held_tables
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_ompl.world.holding_world import HoldingWorld
-from rrtik_ompl.world.motion_queries import has_kernels, is_conservative
+from rrtik_ompl.world.motion_queries import has_kernels, is_conservative, turning_joints
 from rrtik_planners.fast_rrt_connect import python_rules, search_in_python
 from rrtik_planners.one_joint_options import iteration_limit
 
@@ -74,7 +74,9 @@ class CBiRRT(SafePlanner):
         elif has_kernels(world, KERNELS):
             motions, tables = world.motions, held_tables(world.robot, HeldRegions(()))
         if motions is None or tables is None:
-            rules = python_rules(self.bounds(), self.range, None, self.max_iterations)
+            rules = python_rules(
+                self.bounds(), self.range, None, self.max_iterations, turning=turning_joints(self._world)
+            )
             return search_in_python(starts, goals, rules, checker, ptc, self.rng)
         return self._in_kernels(starts, goals, checker, ptc, motions, tables)
 

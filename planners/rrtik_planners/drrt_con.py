@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix, Vector, positive
+from rrtik_ompl.arrays import Mask, Matrix, Vector, positive
 from rrtik_ompl.fast.search.connect_layout import KERNELS
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
 from rrtik_ompl.fast.search.motions.motion_table import NO_LIMIT
@@ -15,7 +15,7 @@ from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, Se
 from rrtik_ompl.replanning.connecting import KERNELS as LIBRARIES
 from rrtik_ompl.replanning.connecting import KernelConnect, PythonConnect
 from rrtik_ompl.replanning.drrt_con import DrrtCon, points_along
-from rrtik_ompl.world.motion_queries import has_kernels, is_conservative
+from rrtik_ompl.world.motion_queries import has_kernels, is_conservative, turning_joints
 
 
 class DRRTCon(SafePlanner):
@@ -64,11 +64,28 @@ class DRRTCon(SafePlanner):
         reused = core is not None and core.path is not None and self._from_kept(core, starts, goals, checker, ptc)
         if core is None or not reused:
             fresh = self._new()
-            found = any(not ptc() and fresh.begin(start, goals, checker, ptc) for start in starts)
-            if core is None or found:  # a path that is blocked now is of more use to the next call than none
+            if (
+                fresh.begin(starts, goals, checker, ptc) or core is None
+            ):  # a path that is blocked now is of more use to the next call than none
                 core = self._core = fresh
+        path = self._asked(core, checker, ptc)
         statistics = {"iterations": core.connect.samples, "repairs": core.repairs, "reused": int(reused)}
-        return SearchResult(core.path if core.free else None, statistics)
+        return SearchResult(path, statistics)
+
+    def _asked(self, core: DrrtCon, checker: MotionChecker, ptc: Stop) -> Matrix | None:
+        """A path whose edges, made by cuts and joins, were asked as a whole; None if it is blocked.
+
+        A checker that looks at single configurations may refuse an edge whose parts it has found free.
+        """
+        while core.free and core.path is not None:
+            path = core.path
+            refused = ~checker.motion_valid_batch(path[:-1], path[1:])
+            if not refused.any():
+                return path
+            core.path = _with_points(path, refused, 0.5 * core.max_edge)
+            if ptc() or not (core.check_path(checker) or core.repair(checker, ptc)):
+                return None
+        return None
 
     def _from_kept(self, core: DrrtCon, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> bool:
         """Whether the kept path could be made to lead from a start to a goal."""
@@ -81,11 +98,20 @@ class DRRTCon(SafePlanner):
 
     def _new(self) -> DrrtCon:
         lower, upper = self.bounds()
-        max_edge, _ = connect_lengths(lower, upper, self.range, None)
+        max_edge, _ = connect_lengths(lower, upper, self.range, None, turning=turning_joints(self._world))
         seed, world = int(self.rng.integers(2**63)), self._world
         if is_conservative(world) and has_kernels(world, *LIBRARIES):
             return DrrtCon(KernelConnect(world, lower, upper, max_edge, seed, NO_LIMIT), max_edge)
         return DrrtCon(PythonConnect(lower, upper, max_edge, seed, NO_LIMIT), max_edge)
+
+
+def _with_points(path: Matrix, edges: Mask, step: float) -> Matrix:
+    """A path with further points on some of its edges, at most ``step`` apart and at least one on each."""
+    pieces = [path[:1]]
+    for a, b, refused in zip(path[:-1], path[1:], edges, strict=True):
+        length = float(np.linalg.norm(b - a))
+        pieces.append(points_along(np.array([a, b]), min(step, 0.5 * length))[1:] if refused else b[None])
+    return np.vstack(pieces)
 
 
 def _nearest_place(path: Matrix, starts: Matrix, step: float) -> tuple[Vector, int]:

@@ -15,7 +15,7 @@ from rrtik_ompl.fast.search.connect_layout import KERNELS
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_ompl.search.rrt_connect import ConnectRules, RrtConnect, straight_path
-from rrtik_ompl.world.motion_queries import KernelWorld, has_kernels, is_conservative
+from rrtik_ompl.world.motion_queries import KernelWorld, has_kernels, is_conservative, turning_joints
 from rrtik_planners.one_joint_options import iteration_limit
 
 
@@ -64,7 +64,7 @@ class FastRRTConnect(SafePlanner):
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         world = self._world
         if not has_kernels(world, KERNELS):
-            rules = python_rules(self.bounds(), *self._lengths, self.max_iterations)
+            rules = python_rules(self.bounds(), *self._lengths, self.max_iterations, turning=turning_joints(world))
             return search_in_python(starts, goals, rules, checker, ptc, self.rng)
         with self._kernels(world) as kernels:
             path = kernels.solve(
@@ -100,17 +100,22 @@ class FastRRTConnect(SafePlanner):
         return kept_search(world.motions, key, lambda: self._made(world, lower, upper))
 
     def _made(self, world: KernelWorld, lower: Vector, upper: Vector) -> ConnectSearch:
-        range_, domain = connect_lengths(lower, upper, *self._lengths)
+        range_, domain = connect_lengths(lower, upper, *self._lengths, turning=turning_joints(world))
         lower, upper = np.maximum(lower, world.robot.lower), np.minimum(upper, world.robot.upper)  # unknown to kernels
         return ConnectSearch(world.motions, lower, upper, range_=range_, domain=domain)
 
 
 def python_rules(
-    bounds: tuple[Vector, Vector], range_: float | None, domain: float | None, max_iterations: int | None
+    bounds: tuple[Vector, Vector],
+    range_: float | None,
+    domain: float | None,
+    max_iterations: int | None,
+    *,
+    turning: Mask | None,
 ) -> ConnectRules:
-    """How the trees grow in Python; see `FastRRTConnect` for the arguments."""
+    """How the trees grow in Python; see `FastRRTConnect` and `connect_lengths` for the arguments."""
     lower, upper = bounds
-    lengths = connect_lengths(lower, upper, range_, domain)
+    lengths = connect_lengths(lower, upper, range_, domain, turning=turning)
     return ConnectRules(lower, upper, *lengths, balanced=True, max_iterations=max_iterations)
 
 

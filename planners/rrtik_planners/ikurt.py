@@ -10,11 +10,13 @@ from ompl import base as ob
 from rrtik_ompl.arrays import Matrix, positive, whole_number
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import Goal
-from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
+from rrtik_ompl.ik.ikurt.metric import JOINT_RADIUS, ConfigurationMetric, TipMetric
 from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.world import World
 from rrtik_planners.tip_seeker import TipSeeker, misses
+
+STEP, STRIDE = 0.15, 0.6  # [rad]
 
 
 class IKURT(TipSeeker):
@@ -38,8 +40,8 @@ class IKURT(TipSeeker):
         goal: Goal | None = None,
         jacobian: bool = True,
         metres_per_radian: float | None = None,
-        step: float = 0.15,
-        stride: float = 0.6,
+        step: float | None = None,
+        stride: float | None = None,
         most_vertices: int = 10_000,
     ) -> None:
         """Make a planner.
@@ -53,8 +55,8 @@ class IKURT(TipSeeker):
             jacobian: Look for goal configurations by Levenberg-Marquardt from the vertices; they are met to 1e-9 of
                 the reach. If False the tree alone gets there, to the tolerances of the goal.
             metres_per_radian: Weight of the angle in the metric; if None a full turn counts as much as the reach.
-            step: First step of CONNECT [rad].
-            stride: Longest step of the exploration [rad].
+            step: First step of CONNECT [unit of the space]; if None 0.15 rad, or 1 % of a space that is not an arm's.
+            stride: Longest step of the exploration [unit of the space]; if None 0.6 rad, or 4 %.
             most_vertices: With more the tree is dropped and another one begun.
 
         Raises:
@@ -64,14 +66,18 @@ class IKURT(TipSeeker):
         most_vertices = whole_number(most_vertices, "most_vertices:", least=1)
         if not isinstance(jacobian, bool):
             raise InputError(f"jacobian: expected true or false, got {jacobian!r}")
-        self.options = Options(positive(step, "step"), positive(stride, "stride"), jacobian, most_vertices)
+        self.step = None if step is None else positive(step, "step")
+        self.stride = None if stride is None else positive(stride, "stride")
+        self.jacobian, self.most_vertices = jacobian, most_vertices
         self.metres_per_radian = None if metres_per_radian is None else positive(metres_per_radian, "metres_per_radian")
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
-        metric = self._metric(goals)
+        metric, radian = self._metric(goals), self.radian()
+        step, stride = self.step or STEP * radian, self.stride or STRIDE * radian
+        options = Options(step, stride, self.jacobian, self.most_vertices)
         validity = IkurtValidity(checker.valid_batch, checker.motion_valid_batch, ptc)
-        search = BatchedSearch(metric, self.options, *self.bounds(), validity, self.rng, starts)
+        search = BatchedSearch(metric, options, *self.bounds(), validity, self.rng, starts)
         path = search.run()
         counts = {"connects": search.connects, "restarts": search.restarts, "vertices": search.vertices}
         result = self.result(metric, search.tree, path, counts, checker)
@@ -82,7 +88,7 @@ class IKURT(TipSeeker):
     def _metric(self, goals: Matrix) -> TipMetric | ConfigurationMetric:
         if isinstance(self._world, World) and self.goal is not None:
             return TipMetric(self._world.robot, self.targets(), metres_per_radian=self.metres_per_radian)
-        return ConfigurationMetric(goals)
+        return ConfigurationMetric(goals, JOINT_RADIUS * self.radian())
 
     def _why(self, metric: TipMetric, search: BatchedSearch) -> str:
         """Why the goal was not reached, as far as the search can tell."""

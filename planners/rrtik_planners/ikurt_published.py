@@ -8,12 +8,13 @@ from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix, positive
 from rrtik_ompl.goal import Goal
-from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric, reach
+from rrtik_ompl.ik.ikurt.metric import JOINT_RADIUS, ConfigurationMetric, TipMetric, reach
 from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.world import World
 from rrtik_planners.tip_seeker import TipSeeker, misses
 
+STEP = 0.15  # [rad]
 THRESHOLD_ANGLE = 0.5  # [rad] in the metric of poses
 THRESHOLD_REACH = 0.13  # of the reach, for positions
 
@@ -32,7 +33,7 @@ class IKURTPublished(TipSeeker):
         seed: int | None = None,
         goal: Goal | None = None,
         mu: float | None = None,
-        step: float = 0.15,
+        step: float | None = None,
         threshold: float | None = None,
         accuracy: float | None = None,
     ) -> None:
@@ -45,8 +46,9 @@ class IKURTPublished(TipSeeker):
             goal: As there.
             mu: Weight of the distance in the metric of poses [1/m]; if None the distance at the start counts as much
                 as the largest angle.
-            step: Growth step delta0 [rad].
-            threshold: Distance in the metric at which the step begins to shrink; 0.5 rad, or 13 % of the reach.
+            step: Growth step delta0 [unit of the space]; if None 0.15 rad, or 1 % of a space that is not an arm's.
+            threshold: Distance in the metric at which the step begins to shrink; if None 0.5 rad, or 13 % of the
+                reach, or 4 % of a space that is not an arm's.
             accuracy: Distance in the metric at which the goal counts as reached, the published min_threshold; if None
                 as the tolerances of the goal demand.
 
@@ -54,7 +56,7 @@ class IKURTPublished(TipSeeker):
             InputError: If an option is out of range or the space is of another kind.
         """
         super().__init__(si, "IKURTPublished", world=world, seed=seed, goal=goal)
-        self.step = positive(step, "step")
+        self.step = None if step is None else positive(step, "step")
         self.mu = None if mu is None else positive(mu, "mu")
         self.threshold = None if threshold is None else positive(threshold, "threshold")
         self.accuracy = None if accuracy is None else positive(accuracy, "accuracy")
@@ -62,12 +64,13 @@ class IKURTPublished(TipSeeker):
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`; only the first start is used, as published."""
         start = starts[0]
-        metric: TipMetric | ConfigurationMetric = ConfigurationMetric(goals)
-        threshold = THRESHOLD_ANGLE
+        radian = self.radian()
+        metric: TipMetric | ConfigurationMetric = ConfigurationMetric(goals, JOINT_RADIUS * radian)
+        threshold = THRESHOLD_ANGLE * radian
         if isinstance(self._world, World) and self.goal is not None:
             metric = TipMetric.published(self._world.robot, self.targets(), start, self.mu)
             threshold = THRESHOLD_ANGLE if metric.metres_per_radian else THRESHOLD_REACH * reach(self._world.robot)
-        steps = Steps(self.step, self.threshold or threshold, self.accuracy or metric.radius)
+        steps = Steps(self.step or STEP * radian, self.threshold or threshold, self.accuracy or metric.radius)
         search = PublishedSearch(metric, steps, *self.bounds(), checker.motion_valid, ptc, self.rng, start)
         vertex = search.run()
         counts = {"connects": search.connects, "vertices": search.tree.size}

@@ -5,28 +5,32 @@ Each clause solves a small problem with plain OMPL and a Python validity checker
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from ompl import base as ob
-from ompl import geometric as og
 from ompl import tools as ot
 
-from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import PlannerError
+from rrtik_ompl.ompl_bridge.contract_problems import (
+    GOAL,
+    SECONDS,
+    START,
+    Clause,
+    Factory,
+    attempt,
+    outside_bar,
+    require,
+    require_status,
+    small_problem,
+    solution_rows,
+    solved,
+)
+from rrtik_ompl.ompl_bridge.contract_spaces import SPACES
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.transitions import single_joint
 
-Factory = Callable[..., ob.Planner]  # factory(si) and factory(si, seed=...) make a planner
-Clause = Callable[[Factory], None]
-
-DOF = 3
-SECONDS = 10.0  # [s] for problems that take milliseconds
 SHORT = 0.2  # [s] for problems without a solution
-START, GOAL = (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0)
 INSIDE_OBSTACLE, OUTSIDE_BOUNDS = (0.0, 0.0, 0.0), (9.0, 0.0, 0.0)
 
 
@@ -45,85 +49,41 @@ def check_planner(factory: Factory, *, single_joint_moves: bool = False) -> None
         clause(factory)
 
 
-def small_problem(
-    valid: Callable[[ob.State], bool] | None = None,
-    starts: Iterable[ArrayLike] = (START,),
-    goals: Iterable[ArrayLike] = (GOAL,),
-) -> og.SimpleSetup:
-    """A SimpleSetup in three dimensions with an upright bar as the obstacle, and a Python validity checker.
-
-    Args:
-        valid: Replaces the validity checker.
-        starts: Configurations, shape (3,) each.
-        goals: Configurations, shape (3,) each.
-    """
-    space, bounds = ob.RealVectorStateSpace(DOF), ob.RealVectorBounds(DOF)
-    bounds.setLow(-2.0)
-    bounds.setHigh(2.0)
-    space.setBounds(bounds)
-    setup = og.SimpleSetup(space)
-    setup.setStateValidityChecker(valid or outside_bar)
-    si = setup.getSpaceInformation()
-    io, state, goal = StateIO(si), si.allocState(), ob.GoalStates(si)
-    for start in starts:
-        io.write(state, np.asarray(start, dtype=np.float64))
-        setup.addStartState(state)
-    for end in goals:
-        io.write(state, np.asarray(end, dtype=np.float64))
-        goal.addState(state)
-    setup.setGoal(goal)
-    return setup
-
-
-def outside_bar(state: ob.State) -> bool:
-    """The validity checker of :func:`small_problem`: outside a bar with the third axis as its axis."""
-    return bool(abs(state[0]) > 0.5 or abs(state[1]) > 0.5)
-
-
-def solution_rows(setup: og.SimpleSetup) -> Matrix | None:
-    """The path that a SimpleSetup holds, shape (k, n), or None."""
-    path = setup.getProblemDefinition().getSolutionPath()
-    if path is None:
-        return None
-    io = StateIO(setup.getSpaceInformation())
-    return np.array([io.read(path.getState(i)) for i in range(path.getStateCount())])
-
-
 def solves_and_ends_exactly(factory: Factory) -> None:
     """A plain SimpleSetup is solved: EXACT_SOLUTION, from the start to the goal to the bit, every edge free."""
-    setup, rows, _ = _solved(factory)
-    _require(np.array_equal(rows[0], START) and np.array_equal(rows[-1], GOAL), "the path does not end exactly", rows)
+    setup, rows, _ = solved(factory)
+    require(np.array_equal(rows[0], START) and np.array_equal(rows[-1], GOAL), "the path does not end exactly", rows)
     si = setup.getSpaceInformation()
     io, a, b = StateIO(si), si.allocState(), si.allocState()
     for one, two in pairwise(rows):
         io.write(a, one)
         io.write(b, two)
-        _require(bool(si.checkMotion(a, b)), "an edge of the path is not free", (one, two))
+        require(bool(si.checkMotion(a, b)), "an edge of the path is not free", (one, two))
 
 
 def moves_one_joint_at_a_time(factory: Factory) -> None:
     """Every edge moves exactly one coordinate (C-RDT family only)."""
     for seed in range(20):
-        _, rows, _ = _solved(factory, seed=seed)
-        _require(single_joint(rows), "an edge moves several coordinates or none", rows)
+        _, rows, _ = solved(factory, seed=seed)
+        require(single_joint(rows), "an edge moves several coordinates or none", rows)
 
 
 def solves_again(factory: Factory) -> None:
     """The same planner solves again, with and without clear() in between."""
-    setup, _, _ = _solved(factory)
+    setup, _, _ = solved(factory)
     for clear in (False, True, False, True):
         if clear:
             setup.clear()
-        _require_status(setup.solve(SECONDS), "Exact solution", "a repeated solve")
+        require_status(setup.solve(SECONDS), "Exact solution", "a repeated solve")
         rows = solution_rows(setup)
-        _require(rows is not None and np.array_equal(rows[-1], GOAL), "a repeated solve lost the goal", rows)
+        require(rows is not None and np.array_equal(rows[-1], GOAL), "a repeated solve lost the goal", rows)
 
 
 def repeats_with_the_same_seed(factory: Factory) -> None:
     """Two planners made with the same seed find the same path; another seed finds another one."""
-    paths = [_solved(factory, seed=seed)[1] for seed in (7, 7, 8, 9, 10)]
-    _require(np.array_equal(paths[0], paths[1]), "the same seed gives another path", paths[:2])
-    _require(any(not np.array_equal(paths[0], p) for p in paths[2:]), "the seed has no effect", paths[0])
+    paths = [solved(factory, seed=seed)[1] for seed in (7, 7, 8, 9, 10)]
+    require(np.array_equal(paths[0], paths[1]), "the same seed gives another path", paths[:2])
+    require(any(not np.array_equal(paths[0], p) for p in paths[2:]), "the seed has no effect", paths[0])
 
 
 def takes_seconds(factory: Factory) -> None:
@@ -133,8 +93,8 @@ def takes_seconds(factory: Factory) -> None:
     setup.setPlanner(planner)
     setup.setup()
     status = planner.solve(SHORT)
-    _require(str(status) in ("Timeout", "Approximate solution"), "a problem without solution", status)
-    _require(planner.error is None, "running out of time is no error", planner.error)
+    require(str(status) in ("Timeout", "Approximate solution"), "a problem without solution", status)
+    require(planner.error is None, "running out of time is no error", planner.error)
 
 
 def refuses_bad_starts_and_goals(factory: Factory) -> None:
@@ -142,21 +102,21 @@ def refuses_bad_starts_and_goals(factory: Factory) -> None:
     for bad in (INSIDE_OBSTACLE, OUTSIDE_BOUNDS):
         for place, wanted in (("starts", "Invalid start"), ("goals", "Invalid goal")):
             ends = {"starts": (START,), "goals": (GOAL,), place: (bad,)}
-            setup, status, planner = _attempt(factory, starts=ends["starts"], goals=ends["goals"])
-            _require_status(status, wanted, f"{place} at {bad}")
-            _require(bool(planner.error), f"no reason is given for {wanted.lower()}", planner.error)
-            _require(not setup.haveSolutionPath(), "there is a path all the same", bad)
+            setup, status, planner = attempt(factory, starts=ends["starts"], goals=ends["goals"])
+            require_status(status, wanted, f"{place} at {bad}")
+            require(bool(planner.error), f"no reason is given for {wanted.lower()}", planner.error)
+            require(not setup.haveSolutionPath(), "there is a path all the same", bad)
 
 
 def takes_several_starts_and_goals(factory: Factory) -> None:
     """Of several starts and goals, invalid ones are passed over and a path joins two of the others."""
     starts = (INSIDE_OBSTACLE, START, (-1.5, 0.0, 0.0))
     goals = (INSIDE_OBSTACLE, OUTSIDE_BOUNDS, GOAL, (1.5, 0.0, 0.0))
-    setup, status, _ = _attempt(factory, starts=starts, goals=goals)
-    _require_status(status, "Exact solution", "several starts and goals")
+    setup, status, _ = attempt(factory, starts=starts, goals=goals)
+    require_status(status, "Exact solution", "several starts and goals")
     rows = solution_rows(setup)
     ends = None if rows is None else (tuple(rows[0].tolist()), tuple(rows[-1].tolist()))
-    _require(ends is not None and ends[0] in starts[1:] and ends[1] in goals[2:], "the path has other ends", ends)
+    require(ends is not None and ends[0] in starts[1:] and ends[1] in goals[2:], "the path has other ends", ends)
 
 
 def survives_a_broken_checker(factory: Factory) -> None:
@@ -169,13 +129,13 @@ def survives_a_broken_checker(factory: Factory) -> None:
             raise ValueError("the checker broke")
         return outside_bar(state)
 
-    setup, status, planner = _attempt(factory, valid=valid)
-    _require_status(status, "Crash", "an exception in the validity checker")
-    _require("ValueError: the checker broke" in (planner.error or ""), "the error is not kept", planner.error)
+    setup, status, planner = attempt(factory, valid=valid)
+    require_status(status, "Crash", "an exception in the validity checker")
+    require("ValueError: the checker broke" in (planner.error or ""), "the error is not kept", planner.error)
     broken[0] = False
     setup.clear()
-    _require_status(setup.solve(SECONDS), "Exact solution", "the solve after a crash")
-    _require(planner.error is None, "the error outlived its solve", planner.error)
+    require_status(setup.solve(SECONDS), "Exact solution", "the solve after a crash")
+    require(planner.error is None, "the error outlived its solve", planner.error)
 
 
 def lets_interrupts_pass(factory: Factory) -> None:
@@ -190,7 +150,7 @@ def lets_interrupts_pass(factory: Factory) -> None:
             return outside_bar(state)
 
         try:
-            _, status, _ = _attempt(factory, valid=valid)
+            _, status, _ = attempt(factory, valid=valid)
         except interrupt:
             continue
         raise PlannerError(f"check_planner: {interrupt.__name__} did not leave solve; it returned {status}")
@@ -198,10 +158,10 @@ def lets_interrupts_pass(factory: Factory) -> None:
 
 def reports_plain_numbers(factory: Factory) -> None:
     """``statistics`` holds plain ints and floats after a solve."""
-    _, _, planner = _solved(factory)
+    _, _, planner = solved(factory)
     statistics = planner.statistics
     plain = all(isinstance(k, str) and type(v) in (int, float) for k, v in statistics.items())
-    _require(bool(statistics) and plain, "statistics must be a dict of plain ints and floats", statistics)
+    require(bool(statistics) and plain, "statistics must be a dict of plain ints and floats", statistics)
 
 
 def runs_in_benchmark(factory: Factory) -> None:
@@ -213,7 +173,7 @@ def runs_in_benchmark(factory: Factory) -> None:
     benchmark.benchmark(ot.Request(SECONDS, 4096.0, 2, 0.05, False, False, False))
     planners = benchmark.getRecordedExperimentData().planners
     solved = [run["solved BOOLEAN"] for planner in planners for run in planner.runs]
-    _require(solved == ["1"] * 4, "not every benchmark run is solved", solved)
+    require(solved == ["1"] * 4, "not every benchmark run is solved", solved)
 
 
 CONTRACT: tuple[Clause, ...] = (
@@ -227,36 +187,9 @@ CONTRACT: tuple[Clause, ...] = (
     lets_interrupts_pass,
     reports_plain_numbers,
     runs_in_benchmark,
+    *SPACES,
 )
-
-
-def _attempt(factory: Factory, *, seed: int = 1, **problem: Any) -> tuple[og.SimpleSetup, ob.PlannerStatus, ob.Planner]:
-    """A solve of the small problem: the setup, the status, the planner."""
-    setup = small_problem(**problem)
-    planner = factory(setup.getSpaceInformation(), seed=seed)
-    setup.setPlanner(planner)
-    return setup, setup.solve(SECONDS), planner
-
-
-def _solved(factory: Factory, *, seed: int = 1) -> tuple[og.SimpleSetup, Matrix, ob.Planner]:
-    """A solve that must succeed: the setup, the path, the planner."""
-    setup, status, planner = _attempt(factory, seed=seed)
-    _require_status(status, "Exact solution", "the small problem")
-    rows = solution_rows(setup)
-    if rows is None:
-        raise PlannerError("check_planner: EXACT_SOLUTION without a path")
-    return setup, rows, planner
 
 
 def _behind_wall(state: ob.State) -> bool:
     return bool(abs(state[0]) > 0.5)
-
-
-def _require_status(status: ob.PlannerStatus, wanted: str, what: str) -> None:
-    if str(status) != wanted:
-        raise PlannerError(f"check_planner: {what}: expected the status '{wanted}', got '{status}'")
-
-
-def _require(condition: bool, what: str, found: object) -> None:
-    if not condition:
-        raise PlannerError(f"check_planner: {what}: {found}")

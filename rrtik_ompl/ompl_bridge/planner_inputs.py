@@ -59,6 +59,8 @@ def _goals(inputs: ob.PlannerInputStates, io: StateIO, goal: ob.Goal, stop: Stop
     lazy = isinstance(goal, ob.GoalLazySamples)
     rows: list[Vector] = []
     sampled = 0
+    if stop():
+        raise IllPosed(ob.PlannerStatus.TIMEOUT, "the time was up before a goal configuration was asked for")
     while (sampled < limit or not rows) and not stop():
         if inputs.haveMoreGoalStates():
             sampled += 1

@@ -63,9 +63,12 @@ def other_planner(
 
     Raises:
         UnknownNameError: If it has no option of a name.
-        InputError: If it refuses an option.
+        InputError: If it cannot be made, or refuses an option.
     """
-    planner = factory(si)
+    try:
+        planner = factory(si)
+    except TypeError as error:
+        raise InputError(f"planner {name}: {_why_not_made(factory, error)}") from None
     require(planner, ob.Planner, f"what planner '{name}' makes of a SpaceInformation")
     try:
         for key, value in options.items():
@@ -77,6 +80,13 @@ def other_planner(
             planner.setup()
         raise
     return planner
+
+
+def _why_not_made(factory: PlannerFactory, error: TypeError) -> str:
+    """Why a planner cannot be made from a SpaceInformation, in one line."""
+    if ".control" in str(getattr(factory, "__module__", "")):
+        return "it plans with controls, which the configurations of an arm have none of; use one of ompl.geometric"
+    return f"it cannot be made from an ompl.base.SpaceInformation: {str(error).splitlines()[0]}"
 
 
 def _check_names(factory: PlannerFactory, name: str, keys: Iterable[str]) -> None:

@@ -123,11 +123,15 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         """
         return True
 
-    def solve(self, ptc: ob.PlannerTerminationCondition | float) -> ob.PlannerStatus:
+    def solve(
+        self, ptc: ob.PlannerTerminationCondition | Callable[[], object] | float, interval: float = 0.0
+    ) -> ob.PlannerStatus:
         """Solve the problem of the problem definition; called by OMPL.
 
         Args:
-            ptc: ``PlannerTerminationCondition`` or a time in seconds.
+            ptc: ``PlannerTerminationCondition``, a function that is true when it is time to stop, or a time in seconds.
+            interval: Of OMPL's form with a function, how often a thread of OMPL would call it. Not used: the search
+                itself calls it, for an exception in that thread would end the process.
 
         Returns:
             ``ompl.base.PlannerStatus``.
@@ -183,7 +187,10 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         try:
             found = search()
         except IllPosed as refused:
-            self.error = refused.reason
+            if refused.status == ob.PlannerStatus.TIMEOUT:
+                self.reason = refused.reason
+            else:
+                self.error = refused.reason
             return refused.status, None
         except Exception as error:
             self.failure, self.error = failure_of(error), explained(error)
@@ -201,7 +208,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         known: tuple[Vector, Vector] = self._known_bounds[1]
         return known
 
-    def _in_ompl(self, ptc: ob.PlannerTerminationCondition) -> SearchResult:
+    def _in_ompl(self, ptc: Stop) -> SearchResult:
         """Search between the starts and goals of the problem definition, and hand the path to it."""
         si, pdef = self.getSpaceInformation(), self.getProblemDefinition()
         if pdef is None:
@@ -265,9 +272,10 @@ def _parameters(planner: Any) -> Mapping[str, Any]:
     return MappingProxyType({each.name: each.default for each in parameters})
 
 
-def _condition(ptc: ob.PlannerTerminationCondition | float) -> ob.PlannerTerminationCondition:
+def _condition(ptc: ob.PlannerTerminationCondition | Callable[[], object] | float) -> Stop:
     """A termination condition from what OMPL or a person hands to solve."""
-    return ob.timedPlannerTerminationCondition(float(ptc)) if isinstance(ptc, (int, float)) else ptc
+    condition: Stop = ob.timedPlannerTerminationCondition(float(ptc)) if isinstance(ptc, (int, float)) else ptc
+    return condition
 
 
 def _seed(seed: int | None) -> int:

@@ -24,6 +24,8 @@ def real_vector_space(si: ob.SpaceInformation) -> ob.RealVectorStateSpace:
     space = si.getStateSpace()
     if not isinstance(space, ob.RealVectorStateSpace):
         raise InputError(f"planner: needs a RealVectorStateSpace (one value per joint), got a {type(space).__name__}")
+    if space.getDimension() == 0:
+        raise InputError("planner: needs a space of at least one coordinate, got none")
     return space
 
 

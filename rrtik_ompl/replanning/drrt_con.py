@@ -61,12 +61,23 @@ class DrrtCon:
         """One that samples in the box from lower to upper, shape (n,)."""
         return cls(PythonConnect(lower, upper, max_edge, seed), max_edge, post=post)
 
-    def begin(self, start: Vector, goals: Matrix, motions: MotionQueries, stop: Stop = no_stop) -> bool:
-        """Look for a first path from ``start`` to one of ``goals``, shape (g, n); whether there is one."""
-        usable = motions.valid_batch(np.vstack([start, goals]))
-        if not usable[0] or not usable[1:].any():
+    def begin(self, start: Matrix | Vector, goals: Matrix, motions: MotionQueries, stop: Stop = no_stop) -> bool:
+        """Look for a first path; whether there is one.
+
+        Args:
+            start: Where it may begin, shape (n,), or several of these, shape (s, n), at once.
+            goals: Where it may end, shape (g, n).
+            motions: Checks motions.
+            stop: True ends the search.
+        """
+        starts = np.atleast_2d(start)
+        usable = motions.valid_batch(np.vstack([starts, goals]))
+        first, last = starts[usable[: len(starts)]], goals[usable[len(starts) :]]
+        if len(first) == 0 or len(last) == 0:
             return False
-        found = self.connect(start[None], goals[usable[1:]], motions, stop, chain=False)
+        found = self.connect(first, last, motions, stop, chain=False)
+        if found is not None:  # the other starts do not lead to the one where it begins
+            found = Joined(found.path[found.begin :], 0, found.end - found.begin)
         return self._take(found, motions)
 
     def check_path(self, motions: MotionQueries) -> bool:

@@ -111,7 +111,7 @@ class ReplanSettings:
             InputError: If ``max_edge`` is far too small for the robot's range.
         """
         lower, upper = (np.clip(ends, -TAU, TAU) for ends in (robot.lower, robot.upper))
-        usual, _ = connect_lengths(lower, upper, None, None)
+        usual, _ = connect_lengths(lower, upper, None, None, turning=np.ones(robot.dof, dtype=bool))
         if self.max_edge is None:
             return usual
         if self.max_edge < MIN_EDGE_SHARE * usual:

@@ -113,6 +113,12 @@ def is_conservative(world: object) -> bool:
     return bool(getattr(world, "accuracy", "exact") == "conservative")
 
 
+def turning_joints(world: object) -> Mask | None:
+    """Which joints of a world's arm turn, shape (n,); None for a stand-in without an arm, or no world."""
+    robot = getattr(world, "robot", None)
+    return ~robot.prismatic if isinstance(robot, Robot) else None
+
+
 def no_stop() -> bool:
     """It is never time to stop."""
     return False

@@ -13,7 +13,9 @@ from ompl import base as ob
 
 from rrtik_ompl.errors import PlannerError
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult, check_planner
-from rrtik_ompl.ompl_bridge.contract import CONTRACT, Clause, moves_one_joint_at_a_time, small_problem, solution_rows
+from rrtik_ompl.ompl_bridge.contract import CONTRACT, moves_one_joint_at_a_time
+from rrtik_ompl.ompl_bridge.contract_problems import Clause, small_problem, solution_rows
+from rrtik_ompl.ompl_bridge.contract_spaces import takes_starts_that_lead_nowhere
 from rrtik_planners import CRDT, IKURT, MBRRT, BiCRDT, CBiRRT, DRRTCon, FastRRTConnect, FewestMoves, IKURTPublished
 
 PLANNERS = (BiCRDT, CBiRRT, CRDT, DRRTCon, FastRRTConnect, FewestMoves, IKURT, IKURTPublished, MBRRT)
@@ -26,8 +28,15 @@ SOAK_GROWTH_MB = 2.0
 pytestmark = pytest.mark.usefixtures("quiet_ompl")
 
 
-@pytest.mark.parametrize("clause", CONTRACT, ids=lambda c: c.__name__)
-@pytest.mark.parametrize("planner", PLANNERS, ids=lambda p: p.__name__)
+KEPT = [
+    (planner, clause)
+    for planner in PLANNERS
+    for clause in CONTRACT
+    if not (planner is IKURTPublished and clause is takes_starts_that_lead_nowhere)  # it takes the first, by its paper
+]
+
+
+@pytest.mark.parametrize(("planner", "clause"), KEPT, ids=lambda each: each.__name__)
 def test_planner_keeps_the_contract(planner: Any, clause: Clause) -> None:
     clause(planner)
 
@@ -68,13 +77,18 @@ def run_strictly(code: str) -> subprocess.CompletedProcess[str]:
 
 CHECK_ALL = """
 from ompl import util as ou
-from rrtik_ompl.ompl_bridge import check_planner
+from rrtik_ompl.ompl_bridge.contract import CONTRACT, moves_one_joint_at_a_time
+from rrtik_ompl.ompl_bridge.contract_spaces import SPACES
 from rrtik_planners import CRDT, IKURT, MBRRT, BiCRDT, CBiRRT, DRRTCon, FastRRTConnect, FewestMoves, IKURTPublished
 ou.setLogLevel(ou.LogLevel.LOG_NONE)
 def main():
     for _ in range(5):
         for planner in (BiCRDT, CBiRRT, CRDT, FastRRTConnect, FewestMoves, IKURT, IKURTPublished, MBRRT):
-            check_planner(planner, single_joint_moves=planner in (BiCRDT, CRDT, FewestMoves, MBRRT))
+            for clause in CONTRACT:
+                if clause not in SPACES:
+                    clause(planner)
+            if planner in (BiCRDT, CRDT, FewestMoves, MBRRT):
+                moves_one_joint_at_a_time(planner)
     print("kept")
 main()
 """
@@ -89,7 +103,7 @@ def test_contract_holds_with_a_memory_that_shows_misuse() -> None:
 SOAK_ALL = f"""
 import os
 from ompl import util as ou
-from rrtik_ompl.ompl_bridge.contract import small_problem, solution_rows
+from rrtik_ompl.ompl_bridge.contract_problems import small_problem, solution_rows
 from rrtik_planners import BiCRDT
 ou.setLogLevel(ou.LogLevel.LOG_NONE)
 def resident_mb():
@@ -127,7 +141,7 @@ def test_ten_thousand_solves_leave_the_memory_flat() -> None:
 def test_the_seed_of_ompl_fixes_a_planner_without_a_seed() -> None:
     code = (
         "from ompl import util as ou; ou.setLogLevel(ou.LogLevel.LOG_NONE); ou.RNG.setSeed({seed})\n"
-        "from rrtik_ompl.ompl_bridge.contract import small_problem, solution_rows\n"
+        "from rrtik_ompl.ompl_bridge.contract_problems import small_problem, solution_rows\n"
         "from rrtik_planners import BiCRDT\n"
         "def main():\n"
         "    s = small_problem(); s.setPlanner(BiCRDT(s.getSpaceInformation())); s.solve(5.0)\n"

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from ompl import base as ob
+from ompl import control as oc
 
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
@@ -194,6 +195,8 @@ def test_a_continuous_joint_goes_the_short_way_round():
     ("arguments", "message"),
     [
         ({"planner": "rrt_conect"}, "no planner 'rrt_conect'; have"),
+        ({"planner": oc.RRT}, "plans with controls"),
+        ({"planner": lambda: None}, "cannot be made from"),
         ({"seconds": 0}, "seconds: must be greater than 0"),
         ({"seconds": float("nan")}, "seconds"),
         ({"seconds": "long"}, "seconds"),

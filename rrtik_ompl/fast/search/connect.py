@@ -69,7 +69,7 @@ class ConnectSearch:
         if dof == 0 or (box[0] > box[1]).any():
             raise InputError(f"bounds: expected {dof} upper ones, none below its lower one, and at least one")
         motions.require_covered(*box)
-        self.range, self.domain = connect_lengths(*box, range_, domain)
+        self.range, self.domain = connect_lengths(*box, range_, domain, turning=np.ones(dof, dtype=bool))
         joints = 0 if motions.identity else motions.joints
         self._trees = [tree_table(dof, joints, FIRST_CAPACITY) for _ in range(2)]
         numbers = np.array([self.range, self.domain, connect_layout.UNBOUNDED_SPREAD])

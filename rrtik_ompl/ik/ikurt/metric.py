@@ -110,10 +110,11 @@ class ConfigurationMetric:
 
     Args:
         goals: Shape (k, n).
+        radius: See :class:`Metric`.
     """
 
-    def __init__(self, goals: Matrix) -> None:
-        self.goals, self.evaluations, self.radius = goals, 0, JOINT_RADIUS
+    def __init__(self, goals: Matrix, radius: float = JOINT_RADIUS) -> None:
+        self.goals, self.evaluations, self.radius = goals, 0, radius
 
     def distance(self, Q: Matrix) -> Vector:
         """See :class:`Metric`."""

@@ -24,13 +24,13 @@ from rrtik_ompl.ik.ikurt.tree import IkurtTree
 DIRECTIONS = 16  # that CONNECT tries at once
 PATIENCE, FALL = 8, 0.8  # CONNECT goes on as long as so many rounds bring the distance down to this share,
 SLOW_FALL = 0.97  # or to this one where there is no other way to the goal
-GROWN, SHRUNK, SHORTEST = 1.5, 0.7, 1e-4  # of CONNECT's step after a success and a miss, and its smallest [rad]
+GROWN, SHRUNK, SHORTEST = 1.5, 0.7, 7e-4  # of CONNECT's step after a success and a miss; its least share of the first
 CHECKED = 4  # of the better directions, nearest to the goal first, whose motions are checked together
 NEARER = 0.5  # a new descent from the way of CONNECT when the distance has fallen to this share
 MAX_EXPLORATIONS = 256  # batches of exploration between two CONNECTs; one before the first, then always twice as many,
 MAX_EXPLORATIONS_WITH_CONNECT = 4  # but no more than these as long as CONNECT alone can reach the goal
 SAMPLES = 24  # of one batch of exploration
-PIECES = (0.2, 0.5, 1.0)  # shares of the exploration's step, checked one after the other as long as they are free
+PIECES = (0.2, 0.5, 1.0)  # shares of the exploration's step, tried one after the other as long as they are free
 TOWARDS_OTHER = 0.5  # share of the samples that are the newest vertices of the other tree
 DESCENTS = 2  # from vertices of a batch of exploration,
 SCOUTS = 22  # and from samples anywhere, for other goal configurations
@@ -43,8 +43,8 @@ class Options:
     """How the search works.
 
     Attributes:
-        step: First step of CONNECT [rad].
-        stride: Longest step of the exploration [rad].
+        step: First step of CONNECT [unit of the space].
+        stride: Longest step of the exploration [unit of the space].
         jacobian: Whether descents by the Jacobian look for goal configurations.
         most_vertices: With more the tree is dropped and another one begun; known goal configurations stay.
     """
@@ -138,13 +138,14 @@ class BatchedSearch:
         """From one vertex down the metric; the path to the goal, or None at the end of the patience."""
         self.connects += 1
         vertex, step = first, self._options.step
+        shortest = SHORTEST * step
         path = self._finish(np.array([vertex]))
         tried_at = before = self.tree.distance[vertex]
         for number in count(1):
             if path is not None or self._validity.stop():
                 return path
             lower = self._downhill(vertex, step)
-            step = max(step * (SHRUNK if lower is None else GROWN), SHORTEST)
+            step = max(step * (SHRUNK if lower is None else GROWN), shortest)
             vertex = vertex if lower is None else lower
             away = self.tree.distance[vertex]
             if away <= self._metric.radius:
@@ -196,13 +197,14 @@ class BatchedSearch:
         drawn = min(int(TOWARDS_OTHER * SAMPLES), len(self._newest)) if self.back.size else 0
         samples[:drawn] = self._newest[:drawn]
         near = tree.nearest(samples)
-        ends, away = tree.q[near], samples - tree.q[near]
+        roots = tree.q[near]
+        ends, away = roots.copy(), samples - roots
         length = np.linalg.norm(away, axis=1)
         step = away * np.minimum(1.0, self._options.stride / np.maximum(length, 1e-12))[:, None]
         going, moved = np.flatnonzero(length > 0.0), np.zeros(SAMPLES, dtype=bool)
         for piece in PIECES:
-            further = tree.q[near[going]] + piece * step[going]
-            free = self._validity.motions_free(ends[going], further)
+            further = roots[going] + piece * step[going]
+            free = self._validity.motions_free(roots[going], further)  # from the vertex on: an edge is asked as a whole
             going = going[free]
             ends[going], moved[going] = further[free], True
         return tree.add(ends[moved], near[moved], self._metric.distance(ends[moved]))
