@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 from types import UnionType
-from typing import NoReturn, get_args
+from typing import Any, NoReturn, get_args
+
+
+def _restored(kind: type[RrtikError], args: tuple[Any, ...], attributes: dict[str, Any]) -> RrtikError:
+    """The error that came from another process."""
+    error = kind.__new__(kind, *args)
+    error.args = args
+    vars(error).update(attributes)
+    return error
 
 
 def printable(text: str) -> str:
@@ -25,6 +33,9 @@ class RrtikError(Exception):
 
     def __init__(self, message: str) -> None:
         super().__init__(printable(" ".join(str(message).split())))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (type(self), self.args, vars(self))  # whatever the constructor wants
 
 
 class InputError(RrtikError):

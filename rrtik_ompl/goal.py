@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Vector, finite_array, frozen, positive
 from rrtik_ompl.choices import FrameAxis
+from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.poses import rigid, rotation_angles
 from rrtik_ompl.robot import Robot
@@ -47,6 +48,8 @@ class JointGoal:
     q: Vector
     tolerance: float = JOINT_TOLERANCE
 
+    __reduce__ = as_value
+
     def __init__(self, q: ArrayLike, tolerance: float = JOINT_TOLERANCE) -> None:
         object.__setattr__(self, "q", frozen(finite_array(q, (None,), "goal joints")))
         object.__setattr__(self, "tolerance", positive(tolerance, "goal tolerance"))
@@ -67,6 +70,8 @@ class PositionGoal:
 
     position: Vector
     tolerance: float = 1e-3
+
+    __reduce__ = as_value
 
     def __init__(self, position: ArrayLike, tolerance: float = 1e-3) -> None:
         object.__setattr__(self, "position", frozen(finite_array(position, (3,), "goal position")))
@@ -95,6 +100,8 @@ class PoseGoal(WithinTolerances):
     T_world_tip: Any
     position_tolerance: float = 1e-3
     orientation_tolerance: float = 1e-2
+
+    __reduce__ = as_value
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_world_tip", rigid(self.T_world_tip, "goal pose"))
@@ -125,6 +132,8 @@ class GoalSet:
     free_rotation_axis: FrameAxis | None = None
     box: Vector = field(default_factory=lambda: NO_BOX)
     parts: tuple[GoalPart, ...] = ()
+
+    __reduce__ = as_value
 
     def __init__(
         self, members: Iterable[GoalPart], free_rotation_axis: FrameAxis | None = None, box: ArrayLike = NO_BOX

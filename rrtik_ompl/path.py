@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import LARGEST, Mask, Matrix, Vector, finite_array, frozen, positive
+from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError, in_file, name_of, require
 from rrtik_ompl.files.tables import FORMATS, dumps, loads
 from rrtik_ompl.files.text import known_ending, read_text, write_text
@@ -77,6 +78,8 @@ class JointPath:
     continuous: Mask
     proof: Proof | None
 
+    __reduce__ = as_value
+
     def __init__(
         self,
         waypoints: ArrayLike,
@@ -88,15 +91,13 @@ class JointPath:
         rows = finite_array(waypoints, (None, None), "path waypoints")
         if rows.size == 0:
             raise InputError("path waypoints: a path needs at least one configuration of at least one joint")
-        if np.abs(rows).max() > MAX_VALUE:
-            raise InputError(
-                f"path waypoints: found {np.abs(rows).max():g}, more than {MAX_VALUE:g} rad or m; check units"
-            )
+        if (most := np.abs(rows).max()) > MAX_VALUE:
+            raise InputError(f"path waypoints: found {most:g}, more than {MAX_VALUE:g} rad or m; check units")
         count = rows.shape[1]
         joint_names = (f"joint{k + 1}" for k in range(count)) if joint_names is None else joint_names
         names = tuple(name_of(name, "a joint of a path") for name in joint_names)
-        kinds = (prismatic, continuous)
-        sliding, endless = (np.zeros(count, dtype=bool) if k is None else np.asarray(k, dtype=bool) for k in kinds)
+        given = (np.zeros(count) if kind is None else kind for kind in (prismatic, continuous))
+        sliding, endless = (np.asarray(kind, dtype=bool) for kind in given)
         if not len(names) == count == sliding.size == endless.size:
             raise InputError(f"path: waypoints have {count} columns, but {len(names)} joint names were given")
         object.__setattr__(self, "waypoints", frozen(rows))
@@ -131,14 +132,12 @@ class JointPath:
     @property
     def start(self) -> Vector:
         """First waypoint, shape (n,)."""
-        first: Vector = self.waypoints[0]
-        return first
+        return np.asarray(self.waypoints[0])
 
     @property
     def end(self) -> Vector:
         """Last waypoint, shape (n,)."""
-        last: Vector = self.waypoints[-1]
-        return last
+        return np.asarray(self.waypoints[-1])
 
     @property
     def length(self) -> float:

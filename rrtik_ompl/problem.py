@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import TAU, Vector, frozen
 from rrtik_ompl.choices import Accuracy
 from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
-from rrtik_ompl.copies import shallow_copy
+from rrtik_ompl.copies import as_value, shallow_copy
 from rrtik_ompl.errors import InputError, ProblemError, Renamed, require
 from rrtik_ompl.goal import Goal, JointGoal, parts_of
 from rrtik_ompl.robot import Robot
@@ -80,7 +80,7 @@ class Problem:
             raise InputError("goal region: frame and from_start are for path constraints; a goal is of the tip")
         self.goal: Goal = wanted
 
-    __copy__ = shallow_copy
+    __copy__, __reduce__ = shallow_copy, as_value
 
     def __repr__(self) -> str:
         return f"Problem('{self.name}', {self.world}, to a {type(self.goal).__name__})"

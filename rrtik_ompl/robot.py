@@ -14,6 +14,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
+from rrtik_ompl.copies import as_value, itself
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.poses import cross_products, joint_motions
 from rrtik_ompl.units import shown_unit
@@ -41,6 +42,8 @@ class Chain:
     prismatic: Mask
     gain: Matrix
     offset: Vector
+
+    __reduce__ = as_value
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,6 +90,8 @@ class Robot:
     gripper: Any = None
     planar: bool = False
     source: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+
+    __deepcopy__ = itself
 
     def __repr__(self) -> str:
         return f"Robot('{self.name}', {self.dof} joints: {', '.join(self.joint_names)}; tip '{self.tip}')"
@@ -138,8 +143,7 @@ class Robot:
     def within_limits(self, Q: ArrayLike, tolerance: float = LIMIT_TOLERANCE) -> Mask:
         """Which of the configurations Q, shape (m, dof), lie inside the limits. Shape (m,)."""
         rows, (lower, upper) = self._rows(Q), _widened_limits(self, tolerance)
-        fits: Mask = np.logical_and.reduce((rows >= lower) & (upper >= rows), axis=1)
-        return fits
+        return np.asarray(np.logical_and.reduce((rows >= lower) & (upper >= rows), axis=1))
 
     def finite_range(self) -> tuple[Vector, Vector]:
         """Bounds to draw configurations in, shapes (dof,): the limits, half a turn (or 3.14 m) where there is none."""
@@ -170,8 +174,7 @@ class Robot:
 
     def joint_values(self, Q: ArrayLike) -> Matrix:
         """Values of every joint of the chain, mimic joints resolved. Q: shape (m, dof) or (dof,); (m, joints)."""
-        values: Matrix = self._rows(Q) @ self.chain.gain.T + self.chain.offset
-        return values
+        return np.asarray(self._rows(Q) @ self.chain.gain.T + self.chain.offset)
 
     def pinocchio_configuration(self, Q: ArrayLike) -> Matrix:
         """Pinocchio's vectors for Q, (m, dof) or (dof,): with mimic joints and (cos, sin) of endless ones; (m, nq)."""
@@ -205,8 +208,7 @@ class Robot:
         if not 0 < len(rows) <= FEW:
             target = self.model.frames[frame]
             frames = self.joint_frames(rows) if joint_frames is None else joint_frames
-            placed: NDArray[np.float64] = frames[:, target.parentJoint] @ target.placement.homogeneous
-            return placed
+            return np.asarray(frames[:, target.parentJoint] @ target.placement.homogeneous)
         data, poses = _data_of(self, get_ident()), np.empty((len(rows), 4, 4))
         for k, full in enumerate(self.pinocchio_configuration(rows)):
             pin.forwardKinematics(self.model, data, full)
@@ -223,8 +225,7 @@ class Robot:
         jacobian = pin.computeFrameJacobian(
             self.model, self.model.createData(), full, self._frame_id(frame), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         )
-        product: Matrix = np.reshape(jacobian, (6, -1)) @ self.chain.gain  # for one joint it comes as a vector
-        return product
+        return np.asarray(np.reshape(jacobian, (6, -1)) @ self.chain.gain)  # for one joint it comes as a vector
 
     def jacobian_batch(self, Q: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
         """Geometric Jacobians of a batch, as :meth:`jacobian`, for Q of shape (m, dof). Shape (m, 6, dof)."""
@@ -248,8 +249,7 @@ class Robot:
                 columns[:, :3, joint] = cross_products(axis, point - frames[:, joint + 1, :3, 3])
                 columns[:, 3:, joint] = axis
             joint = int(self.chain.parent[joint])
-        product: NDArray[np.float64] = columns @ self.chain.gain
-        return poses, product
+        return poses, np.asarray(columns @ self.chain.gain)
 
     def _rows(self, Q: ArrayLike) -> Matrix:
         """One configuration or several as rows, shape (m, dof)."""

@@ -12,6 +12,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import LARGEST, Vector, bounded_array, finite_array, finite_number, frozen
+from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError, UnknownNameError, name_of, require
 from rrtik_ompl.poses import rigid
 from rrtik_ompl.shapes import SHAPES, Shape
@@ -22,6 +23,8 @@ class ConstantVelocity:
     """A straight motion: position at time t is the obstacle's pose shifted by ``velocity * t`` [m/s, world axes]."""
 
     velocity: Vector
+
+    __reduce__ = as_value
 
     def __init__(self, velocity: ArrayLike) -> None:
         object.__setattr__(self, "velocity", frozen(bounded_array(velocity, (3,), "motion velocity")))
@@ -48,6 +51,8 @@ class TimedPoses:
 
     times: Vector
     poses: tuple[pin.SE3, ...]
+
+    __reduce__ = as_value
 
     def __init__(self, times: ArrayLike, poses: Iterable[pin.SE3]) -> None:
         stamps = finite_array(times, (None,), "motion times")

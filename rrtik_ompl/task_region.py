@@ -16,6 +16,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector, finite_array, frozen, positive
+from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.poses import rigid, rotation_angles, rpy_matrices, unit_vector
 from rrtik_ompl.robot import Robot
@@ -73,6 +74,8 @@ class TaskRegion(WithinTolerances):
     orientation_tolerance: float = 1e-2
     frame: str | None = None
     from_start: bool = False
+
+    __reduce__ = as_value
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_world_w", rigid(self.T_world_w, "goal region: T_world_w"))

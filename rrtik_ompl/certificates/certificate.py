@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, finite_array, finite_number, frozen, not_negative
+from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError, in_file
 from rrtik_ompl.files.tables import json_object
 from rrtik_ompl.files.text import known_ending, read_text, write_text
@@ -47,6 +48,8 @@ class MotionEntries:
     intervals: NDArray[np.int64]
     normals: Matrix
 
+    __reduce__ = as_value
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Certificate:
@@ -70,6 +73,8 @@ class Certificate:
     waypoints: Matrix
     motions: tuple[MotionEntries, ...]
     version: int = VERSION
+
+    __reduce__ = as_value
 
     @property
     def entries(self) -> int:

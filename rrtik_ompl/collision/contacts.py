@@ -15,6 +15,7 @@ from rrtik_ompl.arrays import Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.margins import kept_apart, request
 from rrtik_ompl.collision.solids import is_mesh
+from rrtik_ompl.copies import as_value
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,6 +35,8 @@ class Contact:
     point_first: Vector
     point_second: Vector
     margin: float = 0.0
+
+    __reduce__ = as_value
 
     @property
     def clearance(self) -> float:

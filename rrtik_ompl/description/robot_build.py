@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.arrays import LARGEST, TAU, Vector, bounded_array, frozen
+from rrtik_ompl.description import robot_pickle as robot_pickle  # teaches pickle to take robots
 from rrtik_ompl.description.robot_source import BasePose
 from rrtik_ompl.description.robot_source import base_pose as checked_base
 from rrtik_ompl.description.tree import Joint, Tree

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Vector, frozen
+from rrtik_ompl.copies import as_value
 from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form
 from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
 
@@ -37,6 +38,8 @@ class SingularityReport:
     active: tuple[str, ...]
     at_limits: tuple[str, ...]
     rank_inside_limits: int
+
+    __reduce__ = as_value
 
 
 def singularity_report(robot: Robot, q: ArrayLike, *, tolerance: float = RANK_TOLERANCE) -> SingularityReport:

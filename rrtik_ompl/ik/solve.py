@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen, not_negative
 from rrtik_ompl.choices import IkMethod, one_of
+from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import (
     PositionGoal,
@@ -61,6 +62,8 @@ class IkResult:
     iterations: int
     method: IkMethod
     seconds: float
+
+    __reduce__ = as_value
 
     @property
     def found(self) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rrtik_ompl.choices import ProofMode
+from rrtik_ompl.copies import as_value
 from rrtik_ompl.path import JointPath
 
 
@@ -54,6 +55,8 @@ class Plan:
     planner: str
     seed: int
     statistics: Mapping[str, int | float]
+
+    __reduce__ = as_value
 
     @property
     def proven(self) -> bool | None:

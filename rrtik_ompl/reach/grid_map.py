@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
+from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import known_ending, read_bytes, write_bytes, write_text
 
@@ -40,6 +41,8 @@ class ReachMap:
     values: Grid
     samples: int
     base: Vector
+
+    __reduce__ = as_value
 
     @property
     def reached(self) -> NDArray[np.bool_]:

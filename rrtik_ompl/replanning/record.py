@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, finite_number, not_negative, positive, whole_number
 from rrtik_ompl.choices import RunOutcome, TickEvent, one_of
+from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError, in_file, require
 from rrtik_ompl.files.tables import json_object
 from rrtik_ompl.files.text import read_text, write_text
@@ -55,6 +56,8 @@ class Tick:
     checked: int = 0
     reason: str = ""
     proven: bool | None = None
+
+    __reduce__ = as_value
 
 
 @dataclass(slots=True, eq=False)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, finite_array, frozen
 from rrtik_ompl.collision.extent import farthest
+from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.poses import rigid
 from rrtik_ompl.scene import Obstacle, Scene
@@ -39,6 +40,8 @@ class SeenObject:
     covariance: Matrix
     sighting: Sighting | None
     sigmas: float = SIGMAS
+
+    __reduce__ = as_value
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sigmas", checked_sigmas(self.sigmas))

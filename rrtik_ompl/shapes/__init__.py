@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import TAU, Matrix, Vector, bounded_array, frozen, length
+from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.shapes.half_space import HalfSpace
 from rrtik_ompl.shapes.mesh import Mesh
@@ -48,6 +49,8 @@ class Box(Shape):
     moveit = ("size",)
 
     size: Vector
+
+    __reduce__ = as_value
 
     def __init__(self, size: ArrayLike) -> None:
         sides = bounded_array(size, (3,), "box size")

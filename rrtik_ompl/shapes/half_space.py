@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Vector, bounded_array, finite_number, frozen
+from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.shapes.shape import Measure, Shape
 from rrtik_ompl.shapes.surfaces import Triangles
@@ -26,6 +27,8 @@ class HalfSpace(Shape):
 
     normal: Vector
     offset: float
+
+    __reduce__ = as_value
 
     def __init__(self, normal: ArrayLike, offset: float = 0.0) -> None:
         direction = bounded_array(normal, (3,), "half-space normal")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix, bounded_array, finite_array, frozen, positive
+from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.shapes.shape import Shape
 from rrtik_ompl.shapes.surfaces import Triangles
@@ -32,6 +33,8 @@ class Mesh(Shape):
     source: str = ""
     scale: float = 1.0
     open_edges: int = field(default=0)
+
+    __reduce__ = as_value
 
     def __init__(self, vertices: ArrayLike, triangles: ArrayLike, source: str = "", scale: float = 1.0) -> None:
         what = f"mesh {source}" if source else "mesh"

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Matrix, bounded_array, frozen, length
+from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.shapes.polygons import check_simple, without_repeats
 from rrtik_ompl.shapes.shape import Measure, Shape
@@ -33,6 +34,8 @@ class Prism(Shape):
 
     polygon: Matrix
     height: float
+
+    __reduce__ = as_value
 
     def __init__(self, polygon: ArrayLike, height: float = 1.0) -> None:
         vertices = without_repeats(bounded_array(polygon, (None, 2), "polygon"))

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
+from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.robot import Robot
 
@@ -34,6 +35,8 @@ class RateLimits:
     velocity: Vector
     acceleration: Vector
     jerk: Vector
+
+    __reduce__ = as_value
 
     def __init__(self, velocity: ArrayLike, acceleration: ArrayLike, jerk: ArrayLike = np.inf) -> None:
         """Take limits, one number per joint; one number alone is for all joints.

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
+from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.files.text import known_ending, write_text
 from rrtik_ompl.path import JointPath
@@ -69,6 +70,8 @@ class Trajectory:
     joint_names: tuple[str, ...]
     prismatic: Mask
     robot_name: str = ""
+
+    __reduce__ = as_value
 
     def __init__(
         self,

@@ -28,6 +28,7 @@ from rrtik_ompl.world.exact_checks import ExactChecker, one_way
 from rrtik_ompl.world.proof import Gap as Gap
 from rrtik_ompl.world.proof import Proof as Proof
 from rrtik_ompl.world.proof import Prover
+from rrtik_ompl.world.rebuild import reduce_world
 
 MOTION_RESOLUTION = 0.01  # [m]
 ACCURACIES: tuple[Accuracy, ...] = get_args(Accuracy)
@@ -91,13 +92,13 @@ class World:
         self.self_margin = own = not_negative(self_margin, "self_margin")
         self.bodies = link_bodies(robot, own) + scene_bodies(robot, self.scene.at(0.0), own)
         self.weights = displacement_weights(robot, [b for b in self.bodies if b.kind != "obstacle"])
-        pairs = colliding_pairs(robot, self.scene, self.bodies)
+        self.pairs = pairs = colliding_pairs(robot, self.scene, self.bodies)
         moving, standing = by_motion(self.bodies, pairs)
-        self.pairs = pairs
         self.accuracy = one_of(ACCURACIES, accuracy, "accuracy")
         self._certificate = cache(partial(Certificate, robot, self.bodies, pairs))
         self._motions: dict[bool, FastMotions] = {}
         self._proven_clearance: float | None = None
+        self._room = 0.0  # kept on top of the margins of obstacles
         self._checks = ExactChecker(robot, self.bodies, moving, conservative=accuracy == "conservative")
         self._always_colliding = fixed_contact(robot, self.bodies, standing) is not None
         self.prover = Prover(robot, self.bodies, moving, always_colliding=self._always_colliding)
@@ -143,7 +144,7 @@ class World:
         return other
 
     refined = Renamed("with_resolution")
-    __copy__ = shallow_copy
+    __copy__, __reduce__ = shallow_copy, reduce_world
 
     def with_clearance(self, clearance: float) -> World:
         """The same world for searches that leave room: its checks keep a distance [m] on top of obstacles' margins.
@@ -157,7 +158,7 @@ class World:
             return self
         other = copy.copy(self)
         wide = tuple(replace(b, margin=b.margin + wider) if b.kind == "obstacle" else b for b in self.bodies)
-        other._checks, other._motions = self._checks.with_bodies(wide), {}
+        other._checks, other._motions, other._room = self._checks.with_bodies(wide), {}, wider
         return other
 
     def proving(self, clearance: float = 0.0) -> World:
@@ -255,8 +256,7 @@ class World:
         """A line that says why q is not valid: the joint outside its limit, or the pair in collision; "" if it is."""
         if fault := self.robot.limit_fault(row := self._rows(q, 1)[0]):
             return fault
-        touching = self.contacts(row)
-        if not touching:
+        if not (touching := self.contacts(row)):
             return ""
         return f"{touching[0]}" + (f" (and {more} more pair{'s' * (more > 1)})" if (more := len(touching) - 1) else "")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -59,6 +60,9 @@ class HoldingWorld(World):
         vars(self).update(vars(world))
         self.constraints = constraints
         self.prover = self._holding = HoldingProver(world.prover, constraints)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.unheld, self.constraints)
 
     @property
     def fast(self) -> FastWorld | None:

@@ -108,7 +108,7 @@ class MovingWorld:
         for name, metres in (inflation or {}).items():
             if name not in self._known:
                 raise UnknownNameError("obstacle", name, self._known, where="inflation")
-            not_negative(metres, f"inflation of '{name}' [m]")
+            not_negative(metres, f"inflation: that of '{name}'")
         for k, body in enumerate(self._bodies):
             if body.kind == "obstacle":
                 pose, margin = places[min(self._copy[k], len(places) - 1)][body.name]

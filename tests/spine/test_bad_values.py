@@ -49,7 +49,7 @@ CASES = {
     "escape in a name": (lambda: rrtik.Obstacle("a\x1b]0;b\x07", rrtik.Sphere(1)), r"a\\x1b\]0;b\\x07"),
     "half a letter in a name": (lambda: rrtik.JointPath([[0.0]], ["\ud800"]), r"\\ud800"),
     "number as a name": (lambda: rrtik.JointPath([[0.0]], [3]), "name of a joint of a path"),
-    "inflation of NaN": (lambda: inflated(NAN), "inflation of 'far'"),
+    "inflation of NaN": (lambda: inflated(NAN), "inflation: that of 'far'"),
     "inflation without end": (lambda: inflated(np.inf), "inflation"),
 } | {
     f"option of {name}": (

@@ -68,7 +68,7 @@ def test_a_moved_scene_must_have_the_same_obstacles():
     with pytest.raises(InputError, match="no obstacle 'c'"):
         moving.move(moving.scene, inflation={"c": 0.1})
     for room in (-0.1, float("nan")):
-        with pytest.raises(InputError, match="'a' must be 0 metres or more"):
+        with pytest.raises(InputError, match="inflation: that of 'a'"):
             moving.move(moving.scene, inflation={"a": room})
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
+from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError
 
 ORIGIN = np.zeros(3)
@@ -30,6 +31,8 @@ class Camera:
     distortion: Vector
     width: int
     height: int
+
+    __reduce__ = as_value
 
     def __init__(self, matrix: ArrayLike, width: int, height: int, distortion: ArrayLike = (0.0,) * 5) -> None:
         """Check and copy the intrinsics.

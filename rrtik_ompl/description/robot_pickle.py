@@ -1,0 +1,93 @@
+"""Robots for other processes: a compact form of their geometry, and one object for the same robot wherever it arrives.
+
+Importing this module teaches pickle (and what builds on it: multiprocessing, joblib, Dask) to take robots.
+"""
+
+from __future__ import annotations
+
+import copyreg
+import hashlib
+import pickle
+import threading
+from collections import OrderedDict
+from dataclasses import fields
+from functools import lru_cache
+from typing import Any
+
+import pinocchio as pin
+
+from rrtik_ompl.collision.solids import bvh, is_mesh, mesh_arrays
+from rrtik_ompl.copies import packed, unpacked
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.robot import Robot
+
+MOST_ROBOTS = 16  # that arrived and are kept, so that the next copy of one is the same object
+_known: OrderedDict[bytes, Robot] = OrderedDict()
+_lock = threading.Lock()
+
+
+def reduce_robot(robot: Robot) -> tuple[Any, ...]:
+    """What pickle keeps of a robot.
+
+    Raises:
+        InputError: If its own inverse kinematics cannot be pickled.
+    """
+    data = _bytes_of(robot)
+    _remember(hashlib.sha256(data).digest(), robot)
+    return robot_from_bytes, (data,)
+
+
+def robot_from_bytes(data: bytes) -> Robot:
+    """The robot that :func:`reduce_robot` took apart; the same object for the same bytes, so that tables are shared."""
+    key = hashlib.sha256(data).digest()
+    with _lock:
+        if key in _known:
+            return _known[key]
+    state: dict[str, Any] = {name: unpacked(value) for name, value in pickle.loads(data).items()}
+    state |= {name: _geometry(state[name]) for name in ("collision", "visual")}
+    return _remember(key, Robot(**state))
+
+
+def _remember(key: bytes, robot: Robot) -> Robot:
+    with _lock:
+        robot = _known.setdefault(key, robot)
+        _known.move_to_end(key)
+        if len(_known) > MOST_ROBOTS:
+            _known.popitem(last=False)
+    return robot
+
+
+@lru_cache(maxsize=2)  # many problems of one robot are sent one after the other
+def _bytes_of(robot: Robot) -> bytes:
+    state = {field.name: packed(getattr(robot, field.name)) for field in fields(robot)}
+    state |= {name: _items(state[name]) for name in ("collision", "visual")}
+    try:
+        return pickle.dumps(state, protocol=5)
+    except (pickle.PicklingError, TypeError, AttributeError) as error:
+        raise InputError(
+            f"robot '{robot.name}' cannot be sent to another process: {error}; define its closed_form in a module"
+        ) from None
+
+
+def _items(geometry: Any) -> list[tuple[Any, ...]]:
+    """A geometry model as plain values: meshes as arrays, for coal's own text of a hierarchy is ten times as long."""
+    return [
+        (item.name, item.parentJoint, item.parentFrame, item.placement, *_shape(item.geometry), item.meshPath,
+         item.meshScale, item.overrideMaterial, item.meshColor)
+        for item in geometry.geometryObjects
+    ]  # fmt: skip
+
+
+def _shape(geometry: Any) -> tuple[Any, Any]:
+    return mesh_arrays(geometry) if is_mesh(geometry) else (geometry, None)
+
+
+def _geometry(items: list[tuple[Any, ...]]) -> Any:
+    model = pin.GeometryModel()
+    for name, joint, frame, placement, shape, triangles, *look in items:
+        geometry = shape if triangles is None else bvh(shape, triangles)
+        model.addGeometryObject(pin.GeometryObject(name, joint, frame, placement, geometry, *look))
+    return model
+
+
+copyreg.pickle(Robot, reduce_robot)
