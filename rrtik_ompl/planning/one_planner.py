@@ -12,7 +12,6 @@ from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, planners_with, traits_of
-from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning.outcome import Plan, Request
 from rrtik_ompl.planning.search import Search
 from rrtik_ompl.problem import Problem
@@ -47,11 +46,7 @@ def run_planner(problem: Problem, name: str, factory: PlannerFactory, request: R
         request.proof,
         request.clearance,
     )
-    if _nothing_to_do(problem):  # some planners return a detour, others crash
-        still = JointPath.of(problem.robot, problem.start[None])
-        path: JointPath | None = still if request.proof == "off" else still.proved(problem.world)
-    else:
-        path = search.run()
+    path = search.still() if _nothing_to_do(problem) else search.run()  # some planners would find a detour
     elapsed, reason = time.perf_counter() - begin - search.counting, search.reason
     if path is None and elapsed >= request.seconds:
         attempts = search.totals["attempts"]

@@ -20,7 +20,7 @@ from rrtik_ompl.problem import Problem, densely_checked
 
 SHORTEST = 1e-3  # [s] that an attempt gets at least
 ROUNDS = 6  # attempts to find a proven path, once there is one that is checked in steps
-IN_KERNELS = 3  # of them, without proofs while searching, for planners that run in kernels
+IN_KERNELS = 5  # of them, without proofs while searching, for planners that run in kernels
 MOVE_RULES = ("frozen_joints", "last_joints", "smallest_move")  # options of planners, see MoveRules
 SEPARATED = 2  # attempts with further goal configurations, once none that is known can be reached
 ANYTIME_SHARE = 0.8  # of the time, for the first attempt of an anytime planner, which keeps a clearance
@@ -93,6 +93,12 @@ class Search:
         self.reason = "" if self._check.best is not None else self._check.reason or self._goals.reason
         return self._check.best
 
+    def still(self) -> JointPath | None:
+        """The path that stays at the start, or None and a reason."""
+        self.reason = self._check.impossible()
+        path = JointPath.of(self._problem.robot, self._problem.start[None])
+        return None if self.reason else path.proved(self._problem.world) if self._check.proves else path
+
     def _done(self) -> bool:
         """Whether there is no time left, or nothing better to be expected."""
         enough = self._check.best is not None and self._check.open > ROUNDS
@@ -133,10 +139,11 @@ class Search:
     def _path(self, number: int, aims: Matrix) -> JointPath | None:
         """Of an attempt with exact checks, with room to spare as soon as a path was not proven."""
         if self._leaves_room(number):
-            strict = self._strict_problem(not self._traits.kernels or self._strict_attempts >= IN_KERNELS)
+            proving = not self._traits.kernels or self._strict_attempts >= IN_KERNELS
+            strict = self._strict_problem(proving)
             roomy = aims[strict.world.valid_batch(aims)]
             if len(roomy) or self._aimless:
-                return self._strict_path(strict, number, roomy)
+                return self._strict_path(strict, number, roomy, base=2 if proving else 4)
         effort = 2**number if self._traits.supports_iteration_limit and self._others(number) else None
         dense = self._traits.anytime or self._check.rejected
         asked = densely_checked(self._problem) if dense else self._problem
@@ -159,10 +166,10 @@ class Search:
         turn = self._check.open > 0 and (self._traits.anytime or number % 2 == 1 or self._strict_attempts == 0)
         return self._check.proves and not self._traits.leaves_room and (first or turn)
 
-    def _strict_path(self, strict: Problem, number: int, aims: Matrix) -> JointPath | None:
-        """Of an attempt with room to spare."""
+    def _strict_path(self, strict: Problem, number: int, aims: Matrix, base: int) -> JointPath | None:
+        """Of an attempt with room to spare, each with ``base`` times the effort of the one before."""
         self._strict_attempts += 1
-        effort = 2**self._strict_attempts if self._traits.supports_iteration_limit else None
+        effort = base**self._strict_attempts if self._traits.supports_iteration_limit else None
         share = ANYTIME_SHARE if self._traits.anytime else self._share(number)
         return self._accepted(self._attempt(strict, number, aims, share * self._left(), effort))
 

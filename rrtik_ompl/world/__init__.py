@@ -212,16 +212,17 @@ class World:
         """Prove the straight motions between waypoints, shape (k, dof), free for their whole length; after [16].
 
         Args:
-            waypoints: See above.
+            waypoints: See above; a single one counts as a motion that stands still.
             clearance: To be kept from every obstacle on top of its margin [m].
             slack: To be kept between all bodies on top of that [m]: how far a point may leave the straight motions.
             seconds: When to stop; what was not looked at by then is not proven.
 
         Raises:
-            InputError: If waypoints are not finite rows of ``dof`` numbers, or a distance is negative or infinite.
+            InputError: If there are no waypoints, one is no finite row of ``dof`` numbers, or a number is out of range.
         """
         kept, spare = not_negative(clearance, "clearance"), not_negative(slack, "slack")
-        return self.prover.route(self._rows(waypoints, 2), clearance=kept, slack=spare, seconds=seconds)
+        limit, rows = None if seconds is None else positive(seconds, "seconds"), self._rows(waypoints, 2)
+        return self.prover.route(rows, clearance=kept, slack=spare, seconds=limit)
 
     def steps(self, a: ArrayLike, b: ArrayLike, resolution: float | None = None) -> int:
         """Number of steps in which a motion is checked: the bound on the arm's displacement over the resolution."""

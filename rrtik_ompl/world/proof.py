@@ -17,6 +17,7 @@ import numpy as np
 from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.digests import world_digest
+from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.proof.layout import WAYS, ProofTable
 from rrtik_ompl.fast.proof.log import ProofLog, logged
 from rrtik_ompl.fast.proof.packing import ProofPairs, proof_pairs
@@ -102,15 +103,21 @@ class Prover:
         """Prove the motions between waypoints, shape (k, dof).
 
         Args:
-            rows: The waypoints.
+            rows: The waypoints; a single one counts as a motion that stands still.
             clearance: To be kept from obstacles beside their margins [m].
             slack: To be kept between all bodies beside that [m].
             seconds: When to stop; None for never. What was not looked at by then is not proven.
+
+        Raises:
+            InputError: If there are no waypoints.
         """
+        if len(rows) == 0:
+            raise InputError("waypoints of a proof: expected one configuration or more")
+        rows = np.vstack([rows, rows]) if len(rows) == 1 else rows
         values, count = self._joint_values(rows), len(rows) - 1
         sound = self._sound(rows, values)
         between = None if sound is None else sound[:-1] & sound[1:]
-        gaps = self._gaps(values, values[1:], between, (clearance, slack), seconds) if count else []
+        gaps = self._gaps(values, values[1:], between, (clearance, slack), seconds)
         return Proof(count, clearance, tuple(gaps), self._digest)
 
     def logged(self, rows: Matrix, *, clearance: float = 0.0) -> list[ProofLog] | None:

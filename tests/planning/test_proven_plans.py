@@ -69,6 +69,32 @@ def test_a_preference_gives_way_where_no_path_keeps_it(planner):
     assert not world.prove(found.path.waypoints, clearance=0.0005).proven
 
 
+@pytest.mark.kernels
+@pytest.mark.parametrize("planner", ["bicrdt", "fastrrtconnect"])
+def test_a_foil_is_not_stepped_over_by_searches_that_leave_room(planner):
+    """A wall of 0.1 mm with a gap in it, in the way of a disc of 0.2 mm: steps of 25 mm pass it nearly everywhere."""
+    robot = rrtik.load_robot("point2d", radius=1e-4, bounds=[[0, 10], [0, 10]])
+    walls = [Obstacle(f"foil{k}", Box([1e-4, 4.5, 2.0]), pose([5.0, y, 0.0])) for k, y in enumerate((2.25, 7.75))]
+    world = rrtik.World(robot, Scene(tuple(walls)), motion_resolution=0.05)
+    for seed in range(5):
+        found = plan(rrtik.Problem(world, [2.0, 2.0], [8.0, 2.0]), planner, seed=seed)
+        assert found.proven
+        assert found.path.proof.clearance == CLEARANCE
+        assert found.statistics["attempts"] == 1
+
+
+def test_a_start_that_is_the_goal_is_proven_too_where_that_is_required():
+    """Two links of which the convex pieces overlap, although these are 0.6 mm apart."""
+    world = rrtik.World(rrtik.load_robot("ur5_gripper"))
+    q = [2.99820436, 0.13753074, -2.84219388, 0.50035832, 2.51445328, -2.51352683]
+    problem = rrtik.Problem(world, q, q)
+    assert not world.motion_proven(q, q)
+    assert plan(problem, "bicrdt", seed=0).proven is False
+    required = plan(problem, "bicrdt", seed=0, proof="required")
+    assert not required.found
+    assert "start" in required.reason
+
+
 def test_ends_that_have_less_are_content_with_less():
     world = disc_world((5.0, 2.0, 0.2, 4.0))
     ends = np.array([[4.9 - 0.3 - 0.0003, 2.0], [8.0, 2.0]])  # 0.3 mm beside the wall

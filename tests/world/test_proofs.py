@@ -144,7 +144,11 @@ def test_a_still_motion_and_the_limits():
     world, q = World(robot), robot.posture("default")
     assert world.motion_proven(q, q)
     assert not world.motion_proven(q, robot.upper + 0.1)
-    assert world.prove([q]).proven  # no motion at all
+    assert world.prove([q]).proven  # it stands still
+    colliding = np.array([0.0, 1.7, 0.0, -3.0, 0.0, 0.1, 0.0])
+    assert not world.valid(colliding)
+    assert not world.prove([colliding]).proven
+    assert not rrtik.JointPath.of(robot, [colliding]).proved(world).proven
     assert not world.prove([q, robot.upper + 0.1]).proven
 
 
@@ -176,6 +180,11 @@ def test_a_proof_of_bad_numbers_is_refused_by_name():
             world.prove([q, q], clearance=clearance)
     with pytest.raises(InputError):
         world.prove([q, q * np.nan])
+    with pytest.raises(InputError, match="waypoints of a proof"):
+        world.prove(np.zeros((0, 7)))
+    for seconds in (0.0, -1.0, np.nan, "soon"):
+        with pytest.raises(InputError, match="seconds"):
+            world.prove([q, q], seconds=seconds)
 
 
 def test_bodies_of_several_parts_are_not_proven_apart_from_a_half_space_that_they_touch():

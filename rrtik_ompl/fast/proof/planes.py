@@ -27,6 +27,7 @@ from rrtik_ompl.fast.simd.compiled import inlined, kernel
 MOST_STEPS = 20
 CONVERGED = 1e-7  # [m]
 SHORTEST = 1e-9  # [m] of a vector that has a direction
+UPRIGHT = 1e-12  # sine of the angle to a disc's axis, below which the disc has no height
 LOWEST = -1e18
 
 
@@ -46,7 +47,7 @@ def farthest(table: ProofTable, solid: int, seen: int, place: int, way: Any) -> 
         axis = sizes_at(table, solid, layout.DISC_AXIS)
         across = minus(own, scaled(axis, dot(axis, own)))
         length = sqrt(dot(across, across))
-        if length > SHORTEST:
+        if length > UPRIGHT:
             p = minus(p, scaled(across, -radius / length))
     return carried(seen, place, p)
 
