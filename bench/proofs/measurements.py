@@ -34,6 +34,8 @@ from rrtik_ompl.world import World
 PLATE, NEEDLE = 1e-4, 2e-4  # [m] thickness, radius
 PLANNERS = ("fastrrtconnect", "bicrdt", "RRTConnect")
 FEWEST = 10.0  # [s] for fewest-moves
+BRIEF = 1e-6  # share of a motion
+TURNS = 5
 THIN = 6  # obstacles added to a generated scene
 
 
@@ -147,23 +149,31 @@ def _free_when_fine(world: World, a: Vector, b: Vector) -> bool:
 
 
 def _thin_at(robot: Robot, bodies: list[Body], a: Vector, b: Vector, rng: np.random.Generator) -> Obstacle | None:
-    """A needle or an edge of a plate that a corner of a link touches somewhere on a motion, with its very end."""
+    """A needle or a plate that a corner of a link brushes across, between two looks of a check in steps."""
     body = bodies[int(rng.integers(len(bodies)))]
     corners = _corners(body.geometry)
     if corners is None:
         return None
-    frame = pin.SE3(robot.joint_frames((a + rng.uniform(0.2, 0.8) * (b - a))[None])[0, body.joint]) * body.placement
-    points = corners @ frame.rotation.T + frame.translation
-    away = rng.normal(size=3)
-    away /= np.linalg.norm(away)
-    end = points[(points @ away).argmax()]
-    across = np.linalg.svd(away[None])[2][1:]
-    turn = np.column_stack([across[0], away, across[1]])
-    turn[:, 0] *= np.sign(np.linalg.det(turn))
+    count = max(World(robot).steps(a, b), 1)
+    share = (rng.integers(count) + 0.5) / count  # halfway between two looks
+    before, now, after = (_points(robot, body, corners, a + (share + h) * (b - a)) for h in (-BRIEF, 0.0, BRIEF))
+    ways, away = after - before, rng.normal(size=3)
+    for _ in range(TURNS):  # until the farthest corner moves across the way to it
+        corner = int((now @ away).argmax())
+        way = ways[corner] / max(float(np.linalg.norm(ways[corner])), 1e-12)
+        away = away - (away @ way) * way
+        away /= np.linalg.norm(away)
+    corner = int((now @ away).argmax())
+    turn = np.column_stack([way, away, np.cross(way, away)])
     depth = rng.uniform(2e-5, 3e-4)
     if rng.random() < 0.5:
-        return Obstacle("needle", Cylinder(NEEDLE, 0.2), pin.SE3(turn, end + (NEEDLE - depth) * away))
-    return Obstacle("plate", Box([0.1, 0.02, PLATE]), pin.SE3(turn, end + (0.01 - depth) * away))
+        return Obstacle("needle", Cylinder(NEEDLE, 0.2), pin.SE3(turn, now[corner] + (NEEDLE - depth) * away))
+    return Obstacle("plate", Box([PLATE, 0.02, 0.1]), pin.SE3(turn, now[corner] + (0.01 - depth) * away))
+
+
+def _points(robot: Robot, body: Body, corners: Matrix, q: Vector) -> Matrix:
+    frame = pin.SE3(robot.joint_frames(q[None])[0, body.joint]) * body.placement
+    return np.asarray(corners @ frame.rotation.T + frame.translation)
 
 
 def _corners(geometry: coal.CollisionGeometry) -> NDArray[np.float64] | None:

@@ -78,12 +78,12 @@ class Acceptance:
         if self._leaves_room:
             return [Form(dense, dense.world, 1.0)]
         found = []
+        wider = 0.0 if self._room is None else min(self._room.searched, self._room.kept + SPARE)
         if self._room is not None and self._samples:
-            roomy = dense.world.with_clearance(self._room.searched)
+            roomy = dense.world.with_clearance(wider)
             found = [self._sampled(dense, roomy, 0.7), self._sampled(dense, roomy.proving(self._room.kept), self._last)]
         elif self._room is not None:
-            kept = min(self._room.searched, self._room.kept + SPARE)
-            found = [Form(dense, proven_motions(dense.world, kept, self.input.waypoints), self._last)]
+            found = [Form(dense, proven_motions(dense.world, wider, self.input.waypoints), self._last)]
         if not self._input_keeps:
             found.append(Form(dense, dense.world, 1.0))
         return found
