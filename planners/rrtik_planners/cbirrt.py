@@ -9,10 +9,11 @@ from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix, Vector, positive
 from rrtik_ompl.constraints.held_regions import HeldRegions
+from rrtik_ompl.constraints.walls import separation
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.search.constrained.layout import KERNELS
 from rrtik_ompl.fast.search.constrained.search import ConstrainedSearch
-from rrtik_ompl.fast.search.motions.motion_table import FastMotions
+from rrtik_ompl.fast.search.motions.motion_table import NO_LIMIT, FastMotions
 from rrtik_ompl.ik.held_tables import HeldTables, held_tables
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_ompl.world.holding_world import HoldingWorld
@@ -20,9 +21,7 @@ from rrtik_ompl.world.motion_queries import has_kernels, is_conservative, turnin
 from rrtik_planners.fast_rrt_connect import python_rules, search_in_python
 from rrtik_planners.one_joint_options import iteration_limit
 
-PLAIN_SAMPLES = 500  # before it is asked whether the constraints alone separate start and goal
-EXPLORED = 6000  # samples of that question
-SATURATED = 1500  # samples in which no tree came to where it was not, until it counts as grown out
+PLAIN_SAMPLES = 200  # before it is asked whether the constraints alone separate start and goal
 
 
 class CBiRRT(SafePlanner):
@@ -30,8 +29,8 @@ class CBiRRT(SafePlanner):
 
     In a world with path constraints it keeps them, by the bound of
     :class:`rrtik_ompl.constraints.held_regions.HeldRegions`; in any other it is an RRT-Connect. If no path is found
-    after a while, the trees grow without obstacles: where they can grow no more and do not meet, start and goal lie on
-    different components of what the constraints allow, and the reason says so.
+    after a while, it looks for a proof that the constraints alone keep start and goal apart
+    (:mod:`rrtik_ompl.constraints.walls`), and ends with that reason.
     """
 
     kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
@@ -92,39 +91,16 @@ class CBiRRT(SafePlanner):
         lower, upper = self._box(motions)
         search = ConstrainedSearch(motions, tables.address, lower, upper, range_=self.range)
         ask = None if is_conservative(self._world) else checker.motion_valid_batch
-        limit = np.inf if self.max_iterations is None else self.max_iterations
-        seed = self.rng.bit_generator.random_raw
-        first = int(min(limit, PLAIN_SAMPLES))
-        path = search.solve(starts, goals, seed(), ask=ask, stop=ptc, max_iterations=first)
+        limit = NO_LIMIT if self.max_iterations is None else self.max_iterations
+        seed, first = self.rng.bit_generator.random_raw(), min(limit, PLAIN_SAMPLES)
+        path = search.solve(starts, goals, seed, ask=ask, stop=ptc, max_iterations=first)
+        reason = "" if path is not None or first == limit or ptc() else _separation(self._world, starts, goals)
+        if path is None and not reason and first < limit:
+            path = search.go_on(limit, ask=ask, stop=ptc)
         counts = search.statistics()
-        if path is None and first == PLAIN_SAMPLES and not ptc():
-            reason = self._separated(search, starts, goals, ptc) if tables.regions else ""
-            if reason:
-                return SearchResult(None, {**counts, "separated": 1}, reason=reason)
-            rest = None if self.max_iterations is None else self.max_iterations - first
-            path = search.solve(starts, goals, seed(), ask=ask, stop=ptc, max_iterations=rest)
-            counts = {key: value + counts[key] for key, value in search.statistics().items()}
         checker.checked_motions += int(counts["motions"])
-        return SearchResult(path, {**counts, "edges": counts["vertices"] - len(starts) - len(goals)})
-
-    def _separated(self, search: ConstrainedSearch, starts: Matrix, goals: Matrix, ptc: Stop) -> str:
-        """Why the constraints and limits alone keep start and goal apart, in a line; "" where that is not seen."""
-        state = self.rng.bit_generator.random_raw()
-
-        def done() -> bool:
-            return bool(ptc()) or search.stale > SATURATED
-
-        found = search.solve(starts, goals, state, stop=done, max_iterations=EXPLORED, unchecked=True)
-        if found is not None or search.stale <= SATURATED:
-            return ""
-        near, far = search.sizes
-        away = np.abs(goals[0] - starts[0])
-        joint = int(away.argmax())
-        return (
-            f"start and goal lie on different components of what the path constraints allow: {near} and {far} "
-            f"configurations grown from them without obstacles do not meet, and none is new in {SATURATED} samples; "
-            f"joint {joint + 1} differs most, by {away[joint]:.3g}: take another branch of inverse kinematics"
-        )
+        counts |= {"edges": counts["vertices"] - len(starts) - len(goals)} | ({"separated": 1} if reason else {})
+        return SearchResult(path, counts, reason=reason)
 
     def _box(self, motions: FastMotions) -> tuple[Vector, Vector]:
         lower, upper = self.bounds()
@@ -132,3 +108,11 @@ class CBiRRT(SafePlanner):
             robot = self._world.robot
             return np.maximum(lower, robot.lower), np.minimum(upper, robot.upper)
         return lower, upper
+
+
+def _separation(world: object, starts: Matrix, goals: Matrix) -> str:
+    """Why the path constraints of a world keep all starts and goals apart, in a line; "" where that is not proven."""
+    if not isinstance(world, HoldingWorld):
+        return ""
+    said = [separation(world.constraints, start, goals) for start in starts]
+    return said[0] if all(said) else ""

@@ -41,9 +41,19 @@ class HeldRegions:
 
     def motions_held(self, A: Matrix, B: Matrix) -> Mask:
         """Which straight motions A[k] -> B[k], shapes (m, dof), keep all regions, shape (m,)."""
-        mask = self.held(A) & self.held(B)
+        mask = np.ones(len(A), dtype=bool)
         for region in self.regions:
-            mask[mask] = _keeps(region, A[mask], B[mask])
+            both = region.measures(np.concatenate([A[mask], B[mask]])).reshape(2, -1, 2)
+            mask[mask] = _keeps(region, A[mask], B[mask], both.max(axis=0))
+        return mask
+
+    def route_held(self, rows: Matrix) -> Mask:
+        """Which motions between waypoints, shape (k, dof), keep all regions, shape (k - 1,)."""
+        mask = np.ones(max(len(rows) - 1, 0), dtype=bool)
+        for region in self.regions:
+            measures = region.measures(rows)
+            worst = np.maximum(measures[:-1], measures[1:])
+            mask[mask] = _keeps(region, rows[:-1][mask], rows[1:][mask], worst[mask])
         return mask
 
     def explain(self, q: Vector) -> str:
@@ -95,19 +105,25 @@ def _placed(robot: Robot, scene: Scene, region: TaskRegion, label: str, start: V
     return held_region(robot, scene, region, label)
 
 
-def _keeps(region: HeldRegion, A: Matrix, B: Matrix) -> Mask:
-    """Which motions keep one region: halved until the bound on each part is small enough, or one end is outside."""
+def _keeps(region: HeldRegion, A: Matrix, B: Matrix, ends: Matrix) -> Mask:
+    """Which motions keep one region: halved until the bound on each part is small enough, or an end of one is outside.
+
+    ``ends``: the larger measures of both ends, shape (m, 2).
+    """
     deviations, most = region.deviations(A, B), region.limits(slack=True)
-    kept, open_ = np.zeros(len(A), dtype=bool), np.arange(len(A))
-    for level in range(HALVINGS + 1):
+    stored: Mask = np.logical_and.reduce(ends <= region.limits(slack=False) + ROUNDING, axis=1)
+    near: Mask = np.logical_and.reduce(ends + deviations <= most, axis=1)
+    kept = stored & near
+    open_ = np.flatnonzero(stored & ~kept)
+    for level in range(1, HALVINGS + 1):
+        if len(open_) == 0:
+            break
         parts = 2**level
         rows = _nodes(A[open_], B[open_], parts)
         worst = region.measures(rows.reshape(-1, A.shape[1])).reshape(len(open_), parts + 1, 2).max(axis=1)
         done = (worst + deviations[open_] / parts**2 <= most).all(axis=1)
         kept[open_[done]] = True
         open_ = open_[~done & (worst <= most).all(axis=1)]
-        if len(open_) == 0:
-            break
     return kept
 
 

@@ -18,6 +18,7 @@ from rrtik_ompl.goal import (
     parts_of,
     tip_errors,
 )
+from rrtik_ompl.ik.held_goals import held_at_goal
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.methods import METHODS, leaves_a_curve
 from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric_ik
@@ -95,6 +96,8 @@ class GoalSearch:
         if self.exhausted or isinstance(goal, JointGoal):
             return False
         found = self._round(goal)
+        if self._problem.constraints:
+            found = held_at_goal(self._problem, goal, found, self._rng)
         self._rounds += 1
         free = found[world.valid_batch(found)]
         free = free[world.certify(free)]
@@ -113,6 +116,8 @@ class GoalSearch:
             why = self._problem.world.explain(self._found[0])
             return f"{len(self._found)} configurations reach the goal, all in collision: for instance {why}"
         rounds = f"{self._rounds} round{'s' * (self._rounds != 1)}"
+        if self._problem.constraints:
+            return f"no configuration was found in {rounds} that is at the goal and keeps the path constraints"
         return f"inverse kinematics found no configuration at the goal in {rounds}; {_miss(self._problem, goal)}"
 
     def _round(self, goal: TipGoal) -> Matrix:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix
@@ -47,7 +49,6 @@ class HeldTables:
                 layout.ERROR: np.zeros(ik_layout.TWIST_NUMBERS),
                 layout.WEIGHTS: np.zeros(ik_layout.TWIST_NUMBERS),
                 layout.NODE: np.zeros(dof),
-                layout.MEASURES: np.zeros(2 * len(addresses)),
             }
         )
         self.address = self.held.address
@@ -69,9 +70,15 @@ def held_tables(robot: Robot, constraints: HeldRegions) -> HeldTables | None:
     """The tables of path constraints; None where there are no kernels, or a joint hangs on several numbers of q."""
     if library(layout.KERNELS) is None:
         return None
-    limbs = [limb_table(robot, frame_columns(robot, each.joint, each.T_joint_d)) for each in constraints.regions]
+    limbs = [_limb_of(robot, each.joint, each.T_joint_d.tobytes()) for each in constraints.regions]
     known = [limb for limb in limbs if limb is not None]
     return HeldTables(robot, constraints, known) if len(known) == len(limbs) else None
+
+
+@lru_cache(maxsize=64)
+def _limb_of(robot: Robot, joint: int, placement: bytes) -> Table | None:
+    """The joints that move a frame, given by its pose in that of a joint."""
+    return limb_table(robot, frame_columns(robot, joint, np.frombuffer(placement).reshape(4, 4)))
 
 
 def _region_tables(region: HeldRegion, limb: Table) -> tuple[Table, Table]:

@@ -21,6 +21,7 @@ from rrtik_ompl.ompl_bridge.simplify import simplified
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.shortening.acceptance import Acceptance
+from rrtik_ompl.shortening.along_constraints import along_constraints
 from rrtik_ompl.shortening.best import best_in_time
 from rrtik_ompl.shortening.corners import snap_corners
 from rrtik_ompl.shortening.fewest_moves import fewest_moves
@@ -91,6 +92,8 @@ METHODS: Mapping[ShorteningMethod, Method] = MappingProxyType(
         "auto": Method(lambda route, task, _: best_in_time(route, task), chooses=True),
     }
 )
+_HELD = Method(along_constraints, can_keep_moves=False, samples=True)  # in place of these, under path constraints
+_CUTS = ("auto", "random", "shortcut")
 _SINGLE_JOINT = METHODS["fewest-moves"], METHODS["axis-rounds"]  # in whose place "auto" is asked for single-joint moves
 
 
@@ -134,6 +137,8 @@ def shorten(
         stop: Called from time to time; True ends the work, and the best so far is returned.
         clearance: What the new motions keep from every obstacle on top of its margin [m]. None: 1 mm, or what the ends
             of the path have; with "fewest-moves" 1 cm where that costs no move.
+
+    Under path constraints "auto", "random" and "shortcut" walk along them from one place of the path to another.
 
     Returns:
         A path with the same ends, and with its proof. If the input is proven free so is the result, with the clearance
@@ -221,6 +226,12 @@ def _parts(route: Matrix, rules: MoveRules | None) -> tuple[Matrix, Matrix]:
     return route[: rules.head(route)], route[rules.head(route) :]
 
 
+def _method(name: ShorteningMethod, problem: Problem, one_joint: bool) -> Method:
+    """The method of a name, or what takes its place under path constraints."""
+    chosen = METHODS[one_of(METHODS, name, "shortening method")]
+    return _HELD if problem.constraints and name in _CUTS and not one_joint else chosen
+
+
 def _checked(
     path: JointPath,
     problem: Problem,
@@ -233,7 +244,7 @@ def _checked(
 ) -> Method:
     """The method, if the request makes sense."""
     require(problem, Problem, "problem of a path to shorten")
-    chosen = METHODS[one_of(METHODS, method, "shortening method")]
+    chosen = _method(method, problem, one_joint)
     if seconds is not None:
         positive(seconds, "seconds")
     if checks is not None and whole_number(checks, "checks") < 1:

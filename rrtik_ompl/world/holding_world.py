@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
 from rrtik_ompl.fast import FastWorld
+from rrtik_ompl.fast.proof.packing import ProofPairs
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions, motions_of
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.world import Gap, Proof, World
@@ -34,7 +35,7 @@ class HoldingProver(Prover):
         """Prove the motions between waypoints, shape (k, dof), free and held; see :meth:`Prover.route`."""
         proof = super().route(rows, clearance=clearance, slack=slack, seconds=seconds)
         known = {gap.motion for gap in proof.unproven}
-        left = np.flatnonzero(~self._constraints.motions_held(rows[:-1], rows[1:]))
+        left = np.flatnonzero(~self._constraints.route_held(rows))
         gaps = [Gap(k, float("nan"), self._constraints.why(rows[k], rows[k + 1]), "") for k in left.tolist()]
         fresh = (gap for gap in gaps if gap.motion not in known)
         return replace(proof, unproven=tuple(sorted((*proof.unproven, *fresh), key=lambda gap: gap.motion)))
@@ -44,6 +45,9 @@ class HoldingProver(Prover):
         mask = super().proven(starts, ends, clearance=clearance)
         mask[mask] = self._constraints.motions_held(starts[mask], ends[mask])
         return mask
+
+    def _packed_for(self, clearance: float, slack: float) -> ProofPairs:
+        return self.free._packed_for(clearance, slack)
 
 
 class HoldingWorld(World):

@@ -86,7 +86,7 @@ def route_violations(world: World, rows: Matrix, resolution: float) -> tuple[Vio
 def _not_held(world: HoldingWorld, rows: Matrix) -> list[Violation]:
     """The motions that do not keep the path constraints."""
     constraints = world.constraints
-    left = np.flatnonzero(~constraints.motions_held(rows[:-1], rows[1:]))
+    left = np.flatnonzero(~constraints.route_held(rows))
     ends = [rows[k] if constraints.explain(rows[k]) else rows[k + 1] for k in left]
     return [
         Violation(int(k), frozen(q), constraints.why(rows[k], rows[k + 1])) for k, q in zip(left, ends, strict=True)

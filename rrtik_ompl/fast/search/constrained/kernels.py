@@ -37,12 +37,11 @@ from rrtik_ompl.fast.search.tree_kernels import (
     clear_tree,
     cut_branch,
     live_of,
-    parent_of,
     radius_of,
     row_of,
     size_of,
 )
-from rrtik_ompl.fast.search.tree_layout import CERTAIN, NO_PARENT, TreeTable
+from rrtik_ompl.fast.search.tree_layout import CERTAIN, NO_PARENT
 from rrtik_ompl.fast.simd.access import count_up
 from rrtik_ompl.fast.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field, set_int
@@ -72,23 +71,12 @@ def draw(search: ConstrainedTable) -> None:
 
 
 @kernel
-def note_growth(search: ConstrainedTable, tree: TreeTable, near: int, last: int) -> None:
-    """Count how many samples ago a tree has come to where it was not."""
-    if last != near:
-        vertex = parent_of(tree, last)
-        moved = distance(dof_of(motions_of(search)), row_of(tree, vertex), row_of(tree, last))
-        if moved > number_of(search, layout.FRESH) or vertex != near:
-            set_field(search, layout.STALE, 0)
-
-
-@kernel
 def meet(search: ConstrainedTable, side: int, vertex: int) -> int:
     """Walk from the other tree to a vertex of this one; returns the status."""
     other, dof = 1 - side, dof_of(motions_of(search))
     copy_row(dof, row_of(tree_of(search, side), vertex), aim_in(search))
     near = nearest_to(search, other, aim_in(search))
     last, reached = walk(search, other, near, True)
-    note_growth(search, tree_of(search, other), near, last)
     if not reached:
         return layout.RUNNING
     set_field(search, layout.START_MEETING + side, vertex)
@@ -104,7 +92,6 @@ def advance(search: ConstrainedTable) -> int:
         count_up(search, layout.STRAIGHT_TRIED)
         return meet(search, 1, goal)
     count_up(search, layout.ITERATIONS)
-    count_up(search, layout.STALE)
     side = 1 - field(search, layout.GROWER)
     if live_of(tree_of(search, side)) > live_of(tree_of(search, 1 - side)):
         side = 1 - side
@@ -114,7 +101,6 @@ def advance(search: ConstrainedTable) -> int:
     if distance(dof_of(motions_of(search)), row_of(tree, near), aim_in(search)) > radius_of(tree, near):
         return layout.RUNNING
     last, _ = walk(search, side, near, False)
-    note_growth(search, tree, near, last)
     return meet(search, side, last)
 
 
@@ -164,7 +150,7 @@ def solve(search: ConstrainedTable, starts: int, goals: int, seed: int, budget: 
 
     OUTSIDE less k: root number k is not in the box, goals counted after the starts.
     """
-    for place in (layout.ITERATIONS, layout.CHECKED, layout.STRAIGHT_TRIED, layout.GROWER, layout.STALE):
+    for place in (layout.ITERATIONS, layout.CHECKED, layout.STRAIGHT_TRIED, layout.GROWER):
         set_field(search, place, 0)
     set_field(search, layout.GOAL_COUNT, goals)
     set_field(search, layout.RANDOM, seed)
@@ -194,6 +180,7 @@ def connect(search: ConstrainedTable) -> int:
     """
     dof = dof_of(motions_of(search))
     set_number(search, layout.STEP, number_of(search, layout.LONGEST))
+    set_field(search, layout.CHECKED, 0)
     if plant_roots(search, 0, field(search, layout.START_ROWS), 1) >= 0:
         return 0
     copy_row(dof, field(search, layout.GOAL_ROWS), aim_in(search))

@@ -18,7 +18,7 @@ ConstrainedTable = NewType("ConstrainedTable", int)
 # scratch memory: COLUMNS, 6 numbers for each coordinate, SQUARE matrix, CHANGE of the coordinates, ERROR and WEIGHTS of
 # a residual, NODE: a configuration, MEASURES: of the ends of a motion, two numbers for each region
 COUNT, REGIONS, HELD_DOF, HELD_LOWER, HELD_UPPER, HELD_NUMBERS, COLUMNS, SQUARE, CHANGE, ERROR, WEIGHTS = range(11)
-NODE, MEASURES = 11, 12
+NODE = 11
 PER_METRE, PER_RADIAN, DAMPING, LARGEST_STEP = range(4)  # the numbers
 
 # Region: the joints that move its frame (LIMB) and memory for their frames (CALL), as of rrtik_ompl.fast.ik.ik_layout;
@@ -37,15 +37,14 @@ MOTIONS, START_TREE, GOAL_TREE, HELD, LOWER, UPPER, NUMBERS, INVERSE_BASES = ran
 # ... its rules. RESOLVE: 1 if undecided motions are inserted, to be asked for · LIMIT: of the samples · UNCHECKED: 1
 # to leave collisions out ...
 RESOLVE, LIMIT, UNCHECKED, START_ROWS, GOAL_ROWS = range(8, 13)
-# ... its state. ROW and AIM: configurations · MEETINGS: the vertices at which the trees meet · STALE: samples since a
-# tree has grown · STRAIGHT_TRIED: goals that were walked to straight away ...
-GROWER, ROW, ROW_VALUES, AIM, QUERY, POINT, RANDOM, START_MEETING, GOAL_MEETING, STALE, STRAIGHT_TRIED = range(13, 24)
+# ... its state. ROW and AIM: configurations · MEETINGS: the vertices at which the trees meet · STRAIGHT_TRIED: goals
+# that were walked to straight away ...
+GROWER, ROW, ROW_VALUES, AIM, QUERY, POINT, RANDOM, START_MEETING, GOAL_MEETING, STRAIGHT_TRIED = range(13, 23)
 # ... and counts. CHECKED: motions.
-ITERATIONS, CHECKED, GOAL_COUNT, FIELD_COUNT = range(24, 28)
+ITERATIONS, CHECKED, GOAL_COUNT, FIELD_COUNT = range(23, 27)
 
-# The numbers [unit of the configurations]: LONGEST and SHORTEST step, STEP in use, DOMAIN as of RRT-Connect, FRESH:
-# what is nearer to a vertex is no growth
-LONGEST, SHORTEST, STEP, DOMAIN, FRESH = range(5)
+# The numbers [unit of the configurations]: LONGEST and SHORTEST step, STEP in use, DOMAIN as of RRT-Connect
+LONGEST, SHORTEST, STEP, DOMAIN = range(4)
 
 SOLVED, EXHAUSTED, RUNNING, FULL = range(4)  # status
 OUTSIDE = -1  # status that a root is not in the box; less its number

@@ -25,7 +25,6 @@ FIRST_CAPACITY = 128 * WIDTH  # vertices
 FIRST_BUDGET, MAX_BUDGET = 4, 1 << 14  # samples in one call of the kernel
 CALL_SECONDS = 1e-3  # what a call should take
 SHORTEST_STEP = 0.01  # [unit of the box]
-FRESH = 0.05  # [unit of the box]
 
 
 class ConstrainedSearch:
@@ -54,7 +53,7 @@ class ConstrainedSearch:
         longest, domain = connect_lengths(lower, upper, range_, None)
         joints = 0 if motions.identity else motions.joints
         self._trees = [tree_table(self._dof, joints, FIRST_CAPACITY) for _ in range(2)]
-        numbers = np.array([longest, min(SHORTEST_STEP, longest), longest, domain, FRESH])
+        numbers = np.array([longest, min(SHORTEST_STEP, longest), longest, domain])
         self._search = _search_table(motions, self._trees, held, (lower, upper), numbers)
         fields: Any = self._search.header
         self._fields = memoryview(fields)
@@ -96,11 +95,23 @@ class ConstrainedSearch:
         self._fields[layout.LIMIT] = NO_LIMIT if max_iterations is None else max_iterations
         self._questions = self._rejected = 0
         counts, number = (len(starts), len(goals)), int(seed) & (2**63 - 1)
-        status, budget = self._kernels.solve(self._search.address, *counts, number, FIRST_BUDGET), FIRST_BUDGET
+        status = self._kernels.solve(self._search.address, *counts, number, FIRST_BUDGET)
         if status <= layout.OUTSIDE:
             root = layout.OUTSIDE - status
             what = f"start {root}" if root < counts[0] else f"goal {root - counts[0]}"
             raise InputError(f"search: {what} is not in the box of configurations")
+        return self._finished(status, ask, stop)
+
+    def go_on(
+        self, max_iterations: int | None, *, ask: MotionsFree | None = None, stop: Callable[[], object] | None = None
+    ) -> Matrix | None:
+        """Search on, up to so many samples altogether; see :meth:`solve`."""
+        self._fields[layout.LIMIT] = NO_LIMIT if max_iterations is None else max_iterations
+        return self._finished(layout.RUNNING, ask, stop)
+
+    def _finished(self, status: int, ask: MotionsFree | None, stop: Callable[[], object] | None) -> Matrix | None:
+        """Call the kernel again and again until there is a path, or no more samples or time; the path."""
+        budget = FIRST_BUDGET
         while status != layout.EXHAUSTED:
             if status == layout.SOLVED:
                 path = self._settled(ask)
@@ -131,11 +142,6 @@ class ConstrainedSearch:
             return rows if count else None
         open_ = np.flatnonzero(self._trees[0][tree_layout.STATES][:count] == tree_layout.OPEN)
         return rows if len(open_) == 0 or ask(rows[open_ - 1], rows[open_]).all() else None
-
-    @property
-    def stale(self) -> int:
-        """For how many samples no tree has come to where it was not."""
-        return self._fields[layout.STALE]
 
     @property
     def sizes(self) -> tuple[int, int]:

@@ -1,0 +1,188 @@
+"""Values that a joint cannot take while a region is held: what lies on both sides of one cannot be connected.
+
+The orientation of a frame depends on the turning joints alone, and consecutive joints with parallel axes count as one.
+With one joint held at a value, the others' angles are divided into boxes; in a box the frame turns by no more than the
+sum of the half sides away from where it is at the middle, so that a box may be seen to hold nothing of the region. If
+that is seen of all boxes, the value is a wall. A path that keeps the region cannot pass it: this is a proof.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector
+from rrtik_ompl.constraints.held_region import SLACK_ANGLE, HeldRegion, Turning
+from rrtik_ompl.constraints.held_regions import HeldRegions
+
+GRID = np.radians(15.0)  # between two values of a joint that are tried
+PARALLEL = 1e-9  # sine of an angle between axes
+MOST_ANGLES = 3  # that are divided into boxes
+MOST_BOXES = 200_000  # at a time
+ROUNDING = 1e-6  # [rad]
+Rotations = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """Consecutive joints that turn about parallel axes: a fixed rotation, then one about an axis."""
+
+    before: Rotations
+    axis: Vector
+    joints: tuple[int, ...]  # rows of the chain
+    signs: tuple[float, ...]  # -1 where a joint's axis points the other way
+
+
+def separation(constraints: HeldRegions, start: Vector, goals: Matrix) -> str:
+    """Why a start, shape (dof,), cannot be connected with any goal, shape (g, dof), in a line; "" if that is not seen.
+
+    What is said is proven; where nothing is said they may still be apart.
+    """
+    said = ""
+    for goal in goals:
+        line = next((line for region in constraints.regions if (line := _between(region, start, goal))), "")
+        if not line:
+            return ""
+        said = said or line
+    return said
+
+
+def _between(region: HeldRegion, start: Vector, goal: Vector) -> str:
+    """The line about a wall of one region between two configurations."""
+    if region.turning not in (Turning.AXIS, Turning.BALL) or region.joint == 0:
+        return ""
+    turns, end = _turns(region)
+    for place, turn in enumerate(turns):
+        first, last = (_angle_of(region, turn, q) for q in (start, goal))
+        low, high = min(first, last), max(first, last)
+        values = GRID * np.arange(np.floor(low / GRID) + 1, np.ceil(high / GRID))
+        values = values[np.unique(np.round((values % TAU) / GRID) % round(TAU / GRID), return_index=True)[1]]
+        walls = values[_blocked(region, turns, end, place, values)]
+        if len(walls):
+            return (
+                f"{region.label} keeps start and goal apart: {_named(region, turn)} {np.degrees(first):.1f} degrees at "
+                f"the start and {np.degrees(last):.1f} at the goal, and cannot pass {np.degrees(walls[0]):.1f} while "
+                f"frame '{region.frame}' is kept; take a goal of the same branch"
+            )
+    return ""
+
+
+def _angle_of(region: HeldRegion, turn: Turn, q: Vector) -> float:
+    """The angle of a turn at a configuration, shape (dof,) [rad]."""
+    rows = list(turn.joints)
+    return float(np.array(turn.signs) @ region.robot.joint_values(q)[0, rows])
+
+
+def _named(region: HeldRegion, turn: Turn) -> str:
+    """The joints of a turn, and the verb that follows."""
+    gains = np.array(turn.signs) @ region.robot.chain.gain[list(turn.joints)]
+    moving = [(region.robot.joint_names[k], gains[k]) for k in np.flatnonzero(gains)]
+    if len(moving) == 1:
+        return f"joint '{moving[0][0]}' is at"
+    total = " ".join(f"{'+' if gain > 0.0 else '-'} '{name}'" for name, gain in moving)
+    return f"the sum of joints {total.removeprefix('+ ')} is"
+
+
+def _turns(region: HeldRegion) -> tuple[list[Turn], Rotations]:
+    """The turns from the base to the frame that matter for the orientation, and the fixed rotation after the last."""
+    chain, row, rows = region.robot.chain, region.joint - 1, list[int]()
+    while row >= 0:
+        rows.insert(0, row)
+        row = int(chain.parent[row])
+    turns, after = list[Turn](), np.eye(3)
+    for row in rows:
+        after = after @ chain.placement[row][:3, :3]
+        if chain.prismatic[row]:
+            continue
+        axis = after @ chain.axis[row]
+        if turns and np.linalg.norm(np.cross(turns[-1].axis, axis)) < PARALLEL:
+            last, sign = turns[-1], 1.0 if turns[-1].axis @ axis > 0.0 else -1.0
+            turns[-1] = Turn(last.before, last.axis, (*last.joints, row), (*last.signs, sign))
+        else:
+            turns.append(Turn(after, chain.axis[row], (row,), (1.0,)))
+            after = np.eye(3)
+    end = after @ region.T_joint_d[:3, :3]
+    if region.turning == Turning.AXIS:
+        turns, end = _without_idle_turns(region, turns, end)
+    return turns, end
+
+
+def _without_idle_turns(region: HeldRegion, turns: list[Turn], end: Rotations) -> tuple[list[Turn], Rotations]:
+    """The turns without a last one about the axis that is kept, and a first one about where it has to point."""
+    if turns and np.linalg.norm(np.cross(turns[-1].axis, end[:, 2])) < PARALLEL:
+        end = turns[-1].before @ end
+        turns = turns[:-1]
+    direction = region.T_world_w[:3, :3] @ region.direction
+    if turns and np.linalg.norm(np.cross(turns[0].before @ turns[0].axis, direction)) < PARALLEL:
+        first = turns[0].before
+        turns = turns[1:]
+        if turns:
+            turns[0] = replace(turns[0], before=first @ turns[0].before)
+        else:
+            end = first @ end
+    return turns, end
+
+
+def _blocked(region: HeldRegion, turns: list[Turn], end: Rotations, place: int, values: Vector) -> Mask:
+    """Which values of the joint of one turn are walls, shape (k,)."""
+    others = [number for number in range(len(turns)) if number != place]
+    blocked = np.zeros(len(values), dtype=bool)
+    if len(others) > MOST_ANGLES or len(values) == 0:
+        return blocked
+    spans = np.array([_span(region, turns[number]) for number in others]).reshape(-1, 2)
+    middles, halves = np.tile(spans.mean(axis=1), (len(values), 1)), 0.5 * (spans[:, 1] - spans[:, 0])
+    owners, passed = np.arange(len(values)), np.zeros(len(values), dtype=bool)
+    limit = region.region.orientation_tolerance + SLACK_ANGLE + ROUNDING
+    corners = np.array(np.meshgrid(*[[-0.5, 0.5]] * len(others))).reshape(len(others), -1).T
+    while len(owners) and len(owners) < MOST_BOXES:
+        angles = np.insert(middles, place, values[owners], axis=1)
+        away = _angles(region, turns, end, angles)
+        passed[owners[away <= limit]] = True
+        left = (away - halves.sum() <= limit) & ~passed[owners]
+        owners, middles = owners[left], middles[left]
+        middles = (middles[:, None] + corners * halves).reshape(-1, len(others))
+        owners, halves = np.repeat(owners, len(corners)), 0.5 * halves
+    if len(owners) == 0:
+        blocked = ~passed
+    return blocked
+
+
+def _span(region: HeldRegion, turn: Turn) -> tuple[float, float]:
+    """All angles that a turn may have: a whole turn, or less if the limits of a single joint say so."""
+    chain, robot, row = region.robot.chain, region.robot, turn.joints[0]
+    moving = np.flatnonzero(chain.gain[row])
+    if (
+        len(turn.joints) == 1
+        and len(moving) == 1
+        and np.isfinite([robot.lower[moving[0]], robot.upper[moving[0]]]).all()
+    ):
+        k = int(moving[0])
+        low, high = sorted(chain.gain[row, k] * np.array([robot.lower[k], robot.upper[k]]) + chain.offset[row])
+        if high - low < TAU:
+            return float(low), float(high)
+    return -np.pi, np.pi
+
+
+def _angles(region: HeldRegion, turns: list[Turn], end: Rotations, angles: Matrix) -> Vector:
+    """How far the frame is from what is kept [rad] for angles of all turns, shape (m, turns): (m,)."""
+    R = np.broadcast_to(region.T_w_world[:3, :3], (len(angles), 3, 3))
+    for turn, values in zip(turns, angles.T, strict=True):
+        R = R @ turn.before @ _rotations(turn.axis, values)
+    R = R @ end
+    if region.turning == Turning.AXIS:
+        cosines = R[:, :, 2] @ region.direction
+    else:
+        cosines = 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0)
+    away: Vector = np.arccos(np.clip(cosines, -1.0, 1.0))
+    return away
+
+
+def _rotations(axis: Vector, values: Vector) -> Rotations:
+    """Rotations about a unit axis, shape (m, 3, 3)."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    sine, cosine = np.sin(values)[:, None, None], np.cos(values)[:, None, None]
+    made: Rotations = np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
+    return made

@@ -1,0 +1,56 @@
+"""Proofs that a path constraint keeps configurations apart: right where something is said, and said where it is so."""
+
+import numpy as np
+import pytest
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.constraints.held_regions import held_regions
+from rrtik_ompl.constraints.residuals import projected_rows
+from rrtik_ompl.constraints.walls import separation
+from rrtik_ompl.fast.search.constrained.search import ConstrainedSearch
+from rrtik_ompl.ik.held_tables import held_tables
+from rrtik_ompl.scene import Scene
+
+DOWN = np.array([0.0, -1.5, 1.5, -1.5, -0.5 * np.pi, 0.0])  # the tool of a UR5 points down
+
+
+def test_the_wrist_of_a_ur5_cannot_flip_while_its_tool_points_down():
+    robot = rrtik.load_robot("ur5")
+    held = held_regions(robot, Scene(), [rrtik.upright(robot)], DOWN)
+    turned = DOWN + np.pi * np.eye(6)[0]
+    other = rrtik.solve_ik(robot, rrtik.PoseGoal(robot.fk(DOWN)), all=True).solutions
+    flipped = other[np.sin(other[:, 4]) > 0.5]
+    assert separation(held, DOWN, turned[None]) == ""
+    assert len(flipped) > 0
+    said = separation(held, DOWN, flipped)
+    assert "keeps start and goal apart" in said
+    assert separation(held, DOWN, np.vstack([flipped, turned])) == ""  # one of the goals is enough
+
+
+def test_a_joint_that_stays_far_from_its_wall_does_not_keep_apart():
+    robot = rrtik.load_robot("ur5")
+    held = held_regions(robot, Scene(), [rrtik.upright(robot)], DOWN)
+    swung = DOWN + np.array([0.3, 0.2, -0.2, 0.0, 0.0, 2.0])
+    assert separation(held, DOWN, swung[None]) == ""
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize(
+    ("name", "kind"), [("ur5", "axis"), ("ur5", "ball"), ("titan4", "axis"), ("titan4", "ball"), ("puma560", "axis")]
+)
+def test_nothing_is_said_to_be_apart_that_trees_can_connect(name, kind):
+    robot, seen = rrtik.load_robot(name), 0
+    world, rng, box = rrtik.World(robot), np.random.default_rng(21), robot.finite_range()
+    for seed in range(8):
+        q = rng.uniform(*box)
+        region = rrtik.upright(robot) if kind == "axis" else rrtik.orientation_of(robot.fk(q), 3.0)
+        held = held_regions(robot, Scene(), [region], q)
+        rows, there = projected_rows(robot, held, rng.uniform(*box, (8, robot.dof)))
+        tables = held_tables(robot, held)
+        search = ConstrainedSearch(world.motions, tables.address, *box)
+        for goal in rows[there & held.held(rows)][:2]:
+            if separation(held, q, goal[None]):
+                seen += 1
+                ends = q[None], goal[None]
+                assert search.solve(*ends, seed, max_iterations=250, unchecked=True) is None
+    assert seen > 0
