@@ -26,6 +26,11 @@ if TYPE_CHECKING:
     from rrtik_ompl.errors import RrtikError as RrtikError
     from rrtik_ompl.errors import UnknownNameError as UnknownNameError
     from rrtik_ompl.files.mesh import load_mesh as load_mesh
+    from rrtik_ompl.following.follower import Followed as Followed
+    from rrtik_ompl.following.follower import Follower as Follower
+    from rrtik_ompl.following.links import RobotLink as RobotLink
+    from rrtik_ompl.following.links import SimulatedLink as SimulatedLink
+    from rrtik_ompl.following.servo import Servo as Servo
     from rrtik_ompl.goal import GoalSet as GoalSet
     from rrtik_ompl.goal import JointGoal as JointGoal
     from rrtik_ompl.goal import PoseGoal as PoseGoal
@@ -101,6 +106,9 @@ else:
         "benchmark.batch": ("plan_batch",),
         "constraints.shorthands": ("inside", "on_line", "on_plane", "orientation_of", "upright"),
         "errors": ("InputError", "PlannerError", "ProblemError", "RrtikError", "UnknownNameError"),
+        "following.follower": ("Followed", "Follower"),
+        "following.links": ("RobotLink", "SimulatedLink"),
+        "following.servo": ("Servo",),
         "goal": ("GoalSet", "JointGoal", "PoseGoal", "PositionGoal"),
         "ik.batch": ("IkBatch", "solve_ik_batch"),
         "ik.solve": ("IkResult", "list_ik_methods", "solve_ik"),

@@ -63,6 +63,7 @@ class SimulatedArm:
         self._q = robot.configuration(start, "start")
         self._rates = joint_rates(robot, rates)
         self._goal: tuple[int, float] | None = None
+        self._course: Vector | None = None
 
     def read(self) -> Vector:
         """Joint values. Shape (dof,), rad or m."""
@@ -76,14 +77,25 @@ class SimulatedArm:
     def move(self, joint: int, target: float) -> None:
         """Send one joint to a value [rad or m], inside its limits."""
         low, high = float(self.robot.lower[joint]), float(self.robot.upper[joint])
-        self._goal = (joint, min(max(target, low), high))
+        self._goal, self._course = (joint, min(max(target, low), high)), None
+
+    def follow(self, q: ArrayLike) -> None:
+        """Send all joints to a configuration, each as fast as it goes; for set points that come one after the other.
+
+        Raises:
+            InputError: If it does not fit the robot.
+        """
+        self._goal, self._course = None, self.robot.clamp(self.robot.configuration(q, "set point"))
 
     def stop(self) -> None:
         """Stop at once."""
-        self._goal = None
+        self._goal = self._course = None
 
     def advance(self, seconds: float) -> None:
         """Advance the simulated time."""
+        if self._course is not None:
+            most = self._rates * seconds
+            self._q = self._q + np.clip(self._course - self._q, -most, most)
         if self._goal is None:
             return
         joint, target = self._goal

@@ -6,6 +6,7 @@ The protocol is one JSON object a line, UTF-8, at most 64 kB. Joints are in the 
 - ``{"do": "read"}`` is answered by ``{"q": [..]}``
 - ``{"do": "move", "joint": 2, "target": 0.5}`` sends one joint (counted from 0) on its way; a new move takes the place
   of the last; answered by ``{"q": [..]}``
+- ``{"do": "follow", "q": [..]}`` sends all joints to set points, for trajectories; answered by ``{"q": [..]}``
 - ``{"do": "stop"}`` stops at once; answered by ``{"q": [..]}``
 - a request that cannot be fulfilled is answered by ``{"error": "one line"}``
 
@@ -22,6 +23,7 @@ import time
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.errors import InputError
@@ -112,6 +114,16 @@ class LineArm:
         if self.lost:
             raise InputError(self.lost)
         self._send_later({"do": "move", "joint": int(joint), "target": float(target)})
+
+    def follow(self, q: ArrayLike) -> None:
+        """Send all joints to a set point, shape (dof,) [rad or m].
+
+        Raises:
+            InputError: If the connection is lost, or it does not fit the robot.
+        """
+        if self.lost:
+            raise InputError(self.lost)
+        self._send_later({"do": "follow", "q": self.robot.configuration(q, "set point").tolist()})
 
     def stop(self) -> None:
         """Stop at once; without connection the server does so itself."""
@@ -233,6 +245,11 @@ class LineServer:
             if not good or not abs(target) < 1e6:  # type: ignore[arg-type]
                 return f"move needs a joint from 0 to {self.arm.robot.dof - 1} and a finite target"
             self.arm.move(int(joint), float(target))  # type: ignore[arg-type]
+        elif what == "follow":
+            try:
+                self.arm.follow(request.get("q"))  # type: ignore[arg-type]
+            except InputError as error:
+                return str(error)
         elif what != "read":
-            return "do must be read, move or stop"
+            return "do must be read, move or stop, or follow"
         return ""

@@ -1,0 +1,152 @@
+"""Trajectories followed: on their path, within limits whatever is asked, at rest when told."""
+
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.following.follower import Follower
+from rrtik_ompl.following.links import SimulatedLink
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.pilot.devices.arm import SimulatedArm
+from rrtik_ompl.pilot.devices.line_arm import LineArm, LineServer
+from rrtik_ompl.pilot.devices.links import ArmLink
+from rrtik_ompl.trajectory import RateLimits, time_parameterize
+from rrtik_ompl.world import World
+
+TICK = 2e-3
+ROBOT = load_robot("planar3")
+LIMITS = RateLimits([1.0, 1.5, 1.0], [3.0, 3.0, 4.0], [30.0, 30.0, 40.0])
+PATH = JointPath.of(ROBOT, [[0.0, 0.0, 0.0], [1.0, 0.8, -0.3], [1.5, -0.5, 0.5]])
+MOTION = time_parameterize(PATH, LIMITS, blend=0.3, world=World(ROBOT))
+
+
+def follower_at(start=PATH.start, **options):
+    link = SimulatedLink(ROBOT, start)
+    return Follower(MOTION, link, limits=LIMITS, **options), link
+
+
+def assert_within_limits(rows):
+    for power, limit in ((1, LIMITS.velocity), (2, LIMITS.acceleration), (3, LIMITS.jerk)):
+        rates = np.abs(np.diff(rows, power, axis=0)) / TICK**power
+        assert (rates <= limit * 1.01 + 1e-6).all(), power
+
+
+def test_without_disturbance_the_set_points_are_the_trajectory():
+    follower, link = follower_at()
+    while not follower.ended:
+        follower.step(TICK)
+    clock, rows = np.array([t for t, _ in link.sent]), np.array([q for _, q in link.sent])
+    assert np.allclose(rows, MOTION(clock).positions, atol=1e-12)
+    assert follower.result.arrived
+    assert follower.result.seconds == pytest.approx(MOTION.duration, abs=2 * TICK)
+    assert (link.positions() == PATH.end).all()
+
+
+asks = st.lists(st.tuples(st.floats(0.02, 1.5), st.sampled_from(["pause", "resume", 0.2, 0.6, 1.0])), max_size=6)
+
+
+@settings(max_examples=10)
+@given(asks)
+def test_pauses_and_paces_keep_the_limits_and_the_path(asked):
+    follower, link = follower_at()
+    moments = np.cumsum([wait for wait, _ in asked])
+    queue = list(zip(moments, (what for _, what in asked), strict=True))
+    places = []
+    for k in range(30_000):
+        while queue and k * TICK >= queue[0][0]:
+            what = queue.pop(0)[1]
+            if isinstance(what, str):
+                getattr(follower, what)()
+            else:
+                follower.pace(what)
+        if not queue and k * TICK > 1.5 + (moments[-1] if len(moments) else 0.0):
+            follower.resume()
+        follower.step(TICK)
+        places.append(follower.place)
+        if follower.ended:
+            break
+    assert follower.result.arrived
+    rows = np.array([PATH.start] * 3 + [q for _, q in link.sent] + [PATH.end] * 3)
+    assert_within_limits(rows[:-4])
+    assert np.allclose(rows[3:-3], MOTION(places).positions, atol=1e-12)
+    assert (np.diff(places) >= -1e-12).all()
+
+
+@pytest.mark.parametrize("moment", [0.05, 0.4, 0.9, 1.4])
+def test_a_stop_comes_to_rest_on_the_path_within_limits(moment):
+    follower, link = follower_at()
+    while follower.result.seconds < moment:
+        follower.step(TICK)
+    follower.stop("a hand in the way")
+    before = follower.result.seconds
+    while not follower.ended:
+        follower.step(TICK)
+    rows = np.array([q for _, q in link.sent])
+    assert_within_limits(rows)
+    assert follower.result.seconds - before <= 1.0
+    if not follower.result.arrived:
+        assert follower.result.reason == "a hand in the way"
+        assert np.abs(rows[-1] - rows[-2]).max() <= 1e-6
+
+
+def test_run_keeps_time_and_stops_an_arm_that_does_not_follow():
+    now = [0.0]
+
+    def sleep(seconds):
+        now[0] += max(seconds, 1e-4)
+
+    follower, _ = follower_at()
+    assert follower.run(clock=lambda: now[0], sleep=sleep).arrived
+    assert now[0] == pytest.approx(MOTION.duration, abs=0.03)
+
+    class Stuck(SimulatedLink):
+        def command(self, q, t):
+            pass
+
+    stuck = Follower(MOTION, Stuck(ROBOT, PATH.start), limits=LIMITS)
+    found = stuck.run(clock=lambda: now[0], sleep=sleep)
+    assert not found.arrived
+    assert "joint" in found.reason
+    assert "\n" not in found.reason
+
+
+def test_what_cannot_be_followed_is_refused_in_one_line():
+    with pytest.raises(InputError, match="move the arm there first") as caught:
+        follower_at(start=[1.0, 0.0, 0.0])
+    assert "\n" not in str(caught.value)
+    other = load_robot("planar6")
+    with pytest.raises(InputError, match="another robot"):
+        Follower(MOTION, SimulatedLink(other, np.zeros(6)))
+    with pytest.raises(InputError, match="trajectory to follow"):
+        Follower(PATH, SimulatedLink(ROBOT, PATH.start))
+    for rate in (0.0, np.nan):
+        with pytest.raises(InputError, match="rate"):
+            follower_at(rate=rate)
+    follower, _ = follower_at()
+    for pace in (0.0, 1.5, np.nan, "fast"):
+        with pytest.raises(InputError, match="pace"):
+            follower.pace(pace)
+
+
+def test_the_arms_of_the_pilot_follow_too():
+    arm = SimulatedArm(ROBOT, PATH.start, rates=[5.0] * 3)
+    follower = Follower(MOTION, ArmLink(arm), limits=LIMITS)
+    while not follower.ended:
+        follower.step(0.01)
+        arm.advance(0.01)
+    assert np.allclose(arm.read(), PATH.end, atol=1e-9)
+    with LineServer(SimulatedArm(ROBOT, PATH.end, rates=[5.0] * 3)) as server:
+        client = LineArm(ROBOT, "127.0.0.1", server.port)
+        link = ArmLink(client)
+        link.command(PATH.end + 0.01, 0.0)
+        for _ in range(100):
+            if np.abs(link.positions() - PATH.end - 0.01).max() < 1e-9:
+                break
+            time.sleep(0.05)
+        assert np.allclose(server.arm.read(), PATH.end + 0.01)
+        client.close()
