@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rrtik_ompl.cli.terminal import progress, say
+from rrtik_ompl.cli.terminal import note, progress, say
 from rrtik_ompl.errors import InputError
 
 if TYPE_CHECKING:
@@ -36,6 +37,8 @@ def pilot(
     port: Annotated[int, typer.Option(help="Of the page; 0 takes a free one.", min=0, max=65535)] = 0,
     host: Annotated[str, typer.Option(help="Address for other machines; needs --token.")] = "127.0.0.1",
     token: Annotated[str, typer.Option(help="Secret word for --host, at least 16 letters.")] = "",
+    certificate: Annotated[Path | None, typer.Option(help="Serve the page by TLS with this certificate (PEM).")] = None,
+    key: Annotated[Path | None, typer.Option(help="Private key of the certificate, if it is not in its file.")] = None,
     sigmas: Annotated[
         float, typer.Option(help="Margin of seen objects: this many standard deviations; 0: none.")
     ] = 3.0,
@@ -57,7 +60,7 @@ def pilot(
 
     source = next((each for each in (camera, video, images) if each is not None), None)
     options = SessionOptions(problem, source, scenario, camera_file, map_file, record, replay, arm, seed, sigmas)
-    server = PilotServer(port, host, token, f"rrtik pilot · {problem}")
+    server = PilotServer(port, host, token, f"rrtik pilot · {problem}", certificate=certificate, key=key)
     with progress("preparing"):
         opened = open_session(options)
     try:
@@ -70,6 +73,7 @@ def pilot(
 
 
 def _serve(server: PilotServer, opened: OpenSession, *, watch_only: bool, browser: bool) -> None:
+    from rrtik_ompl.pilot.devices.watchdog import Watchdog
     from rrtik_ompl.pilot.run import Loop
 
     with server:
@@ -78,7 +82,9 @@ def _serve(server: PilotServer, opened: OpenSession, *, watch_only: bool, browse
             import webbrowser
 
             webbrowser.open(server.url)
-        try:
-            Loop(opened.engine, server, watch_only=watch_only).run()
-        except KeyboardInterrupt:
-            return
+        loop = Loop(opened.engine, server, watch_only=watch_only)
+        reports = {"the page's server": lambda: server.reported, "the session": lambda: loop.reported, **opened.reports}
+        watched = Watchdog(opened.engine.session.arm, reports, tell=note)
+        with suppress(KeyboardInterrupt), watched as watchdog:
+            loop.fault = lambda: watchdog.fault
+            loop.run()

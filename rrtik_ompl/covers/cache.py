@@ -20,7 +20,7 @@ from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.collision.shape_table import sizes_of
 from rrtik_ompl.collision.solids import is_mesh, mesh_arrays
 from rrtik_ompl.covers.shipped import shipped_cover
-from rrtik_ompl.files.cache import cache_folder, write_whole
+from rrtik_ompl.files.cache import cache_folder, nobody_else_s, write_whole
 from rrtik_ompl.files.notice import COVERING, tell_once
 
 LAYOUT = 1
@@ -100,7 +100,7 @@ def _cached(geometry: coal.CollisionGeometry, parameters: str, make: Callable[[]
     if key is not None and (shipped := shipped_cover(key)) is not None:
         return shipped
     file = None if folder is None or key is None else folder / f"{key}.npz"
-    found = None if file is None or key is None else _read(file, key)
+    found = _read(file, key) if file is not None and key is not None and nobody_else_s(file) else None
     if found is None:
         if needs_long(geometry):
             tell_once(COVERING)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.messages import quoted
 
 NUMBERS = ("joint", "target", "change", "level")  # arguments of commands; all others are words
 MAX_NUMBER, MAX_WORD_LENGTH = 1e6, 100  # a number, and a word, that a command may hold
@@ -21,7 +22,7 @@ def number(value: object, name: str) -> float:
     """
     plain = value.item() if isinstance(value, np.number) else value
     if isinstance(plain, bool) or not isinstance(plain, int | float) or not -MAX_NUMBER <= plain <= MAX_NUMBER:
-        raise InputError(f"{name} must be a finite number, got {str(value)[:MAX_WORD_LENGTH]!r}")
+        raise InputError(f"{name} must be a finite number, got {quoted(value)!r}")
     return float(plain)
 
 
@@ -42,5 +43,5 @@ def _value(place: str, word: str, value: object) -> float | str:
     if word in NUMBERS:
         return number(value, place)
     if not isinstance(value, str) or len(value) > MAX_WORD_LENGTH:
-        raise InputError(f"{place} must be a word, got {str(value)[:MAX_WORD_LENGTH]!r}")
+        raise InputError(f"{place} must be a word, got {quoted(value)!r}")
     return value

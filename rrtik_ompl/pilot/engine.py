@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.pilot.arguments import MAX_WORD_LENGTH, number
+from rrtik_ompl.files.messages import quoted
+from rrtik_ompl.pilot.arguments import number
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.camera_feed import ENDED
 from rrtik_ompl.pilot.devices.perception import Perception
@@ -51,7 +52,7 @@ class Engine:
         """
         self._advance(time)
         arguments = dict(command)
-        name = str(arguments.pop("name", ""))
+        name = quoted(arguments.pop("name", ""))
         if name not in VIEW_COMMANDS:
             self.session.command(name, time, **arguments)
             return
@@ -105,7 +106,7 @@ class Engine:
         elif name == "zoom":
             self.outside.zoom(number(given["factor"], "factor"))
         elif name == "preset":
-            view = str(given["view"])[:MAX_WORD_LENGTH]
+            view = quoted(given["view"])
             if view not in PRESETS:
                 raise UnknownNameError("view", view, PRESETS)
             self.outside.preset(view)

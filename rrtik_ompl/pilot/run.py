@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import queue
 import time as clock
+from collections.abc import Callable
 from typing import Any
 
 import cv2
 
+from rrtik_ompl.files.messages import quoted
 from rrtik_ompl.pilot.engine import VIEW_COMMANDS, Engine
 from rrtik_ompl.pilot.web.server import PilotServer
 from rrtik_ompl.world.motion_queries import Stop, no_stop
@@ -17,7 +19,12 @@ CAMERA, OUTSIDE = "C", "O"
 
 
 class Loop:
-    """Runs in the thread that made the engine."""
+    """Runs in the thread that made the engine.
+
+    Attributes:
+        reported: When it was last at the begin of a step, by ``time.monotonic()``.
+        fault: Says why the arm was stopped by a watchdog; "" if it was not.
+    """
 
     def __init__(self, engine: Engine, server: PilotServer, *, watch_only: bool = False) -> None:
         """Take both.
@@ -32,6 +39,8 @@ class Loop:
         self._begin = clock.monotonic()
         self._paused_at: float | None = None
         self._audience, self._outside_too = 0, False
+        self.reported = self._begin
+        self.fault: Callable[[], str] = str
 
     @property
     def time(self) -> float:
@@ -49,7 +58,9 @@ class Loop:
 
     def _step(self) -> None:
         engine, server = self._engine, self._server
+        self.reported = clock.monotonic()
         engine.update(self.time)
+        engine.session.message = self.fault() or engine.session.message
         self._show_state()
         self._execute_all()
         audience, self._audience = self._audience, len(server.clients)
@@ -80,13 +91,18 @@ class Loop:
         except queue.Empty:
             return
         sequence = command.pop("seq", None)
-        self._execute(command)
+        try:
+            self._execute(command)
+        except Exception as error:  # nothing that a page sends ends the session
+            self._engine.session.arm.stop()
+            what = f"'{quoted(command.get('name'))}' broke: {quoted(error) or type(error).__name__}"
+            self._engine.session.message = f"{what}; the arm was stopped"
         if isinstance(sequence, int) and not isinstance(sequence, bool):
             self._answered[client] = sequence
         self._show_state()
 
     def _execute(self, command: dict[str, Any]) -> None:
-        name = command.get("name")
+        name = quoted(command.get("name"))
         if not self._watch_only or name in VIEW_COMMANDS:
             self._engine.execute(command, self.time)
         elif name == "pause":

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from rrtik_ompl.pilot.devices.line_arm import LineArm
 from rrtik_ompl.pilot.devices.perception import LivePerception, SimulatedSource
 from rrtik_ompl.pilot.devices.simulated_vehicle import SimulatedVehicle, find_vehicle, load_vehicle
 from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
+from rrtik_ompl.pilot.devices.watchdog import Report
 from rrtik_ompl.pilot.engine import Engine
 from rrtik_ompl.pilot.record import Record
 from rrtik_ompl.pilot.replay import RecordedArm, RecordedPerception, entries_for, start_of
@@ -52,10 +53,11 @@ class SessionOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OpenSession:
-    """A session with everything that it holds open."""
+    """A session with everything that it holds open, and when the threads of arm and camera reported last."""
 
     engine: Engine
     closing: tuple[Callable[[], None], ...]
+    reports: Mapping[str, Report] = field(default_factory=dict)
 
     def close(self) -> None:
         """Stop the arm, and release arm, camera and record."""
@@ -79,10 +81,11 @@ def open_session(options: SessionOptions) -> OpenSession:
     record.write("begin", 0.0, problem=problem.name, seed=options.seed, q=arm.read().tolist())
     session = Session(problem, arm, record=record, seed=options.seed)
     simulated = arm if isinstance(arm, SimulatedArm) else None
-    closing = [perception.close, record.close]
+    closing, reports = [perception.close, record.close], perception.reports()
     if isinstance(arm, LineArm):
         closing.insert(0, arm.close)
-    return OpenSession(Engine(session, perception, simulated=simulated), tuple(closing))
+        reports["the line to the arm"] = lambda: arm.reported
+    return OpenSession(Engine(session, perception, simulated=simulated), tuple(closing), reports)
 
 
 def _perception(options: SessionOptions, problem: Problem, arm: Arm) -> LivePerception:

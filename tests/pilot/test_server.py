@@ -1,9 +1,13 @@
 """Who may reach the page, who is the pilot, and that a slow page holds nobody up."""
 
 import asyncio
+import gc
 import http.client
 import json
 import socket
+import ssl
+import struct
+import time
 from functools import partial
 
 import pytest
@@ -14,7 +18,10 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.pilot.run import Loop
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.pilot.web.clients import Client, Clients, Lane
+from rrtik_ompl.pilot.web.exposure import all_addresses
 from rrtik_ompl.pilot.web.server import MAX_MESSAGE_BYTES, MAX_QUEUED_COMMANDS, PilotServer
+from rrtik_tests import tls
+from rrtik_tests.waiting import until
 
 TOKEN = "a-secret-of-many-letters"
 
@@ -196,7 +203,8 @@ def test_a_pilot_that_returns_too_late_watches(server):
 
 def test_what_makes_no_sense_is_left_out_and_a_flood_is_cut(server):
     page = Page(server)
-    for text in ("{", "[1]", '"stop"', "1e999", "\x00"):
+    deep = '{"name": "nudge", "change": ' + "[" * 975 + "]" * 975 + "}"  # read, it is too deep to be shown
+    for text in ("{", "[1]", '"stop"', "1e999", "\x00", deep, "[" * 16_000):
         page.say_raw(text)
     for _ in range(MAX_QUEUED_COMMANDS + 50):
         page.say(name="stop")
@@ -263,15 +271,103 @@ def test_a_command_makes_the_round_and_what_is_nonsense_ends_nothing():
                 {"name": ["stop"]},
                 {"name": "grasp", "type": {"a": 1}, "level": 1},
                 {},
+                {"name": "nudge", "change": [[[]]]},
                 {"name": "select", "joint": 3},
             ]
         ):
             page.say(seq=count, **words)
         rounds = iter(range(40))
         loop.run(lambda: next(rounds, None) is None)
-        state = page.hear_until(lambda m: isinstance(m, dict) and m.get("answered") == {"1": 10})
+        state = page.hear_until(lambda m: isinstance(m, dict) and m.get("answered") == {"1": 11})
         assert state["selected"] == 3
         assert "selected" in state["message"]
         assert len(state["lamps"]) == 6
         assert page.hear_until(lambda m: isinstance(m, bytes))[9:11] == b"\xff\xd8"
     opened.close()
+
+
+@pytest.mark.parametrize("host", ["0", "0.0", "0x0", "00.0.0.0", "0.0.0.0", "", "::", "0::0", "::0", "::ffff:0.0.0.0"])
+def test_no_spelling_of_all_addresses_is_taken(host):
+    with pytest.raises(InputError, match="name the one address"):
+        PilotServer(0, host, TOKEN)
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "127.1"])
+def test_one_address_is_no_spelling_of_all(host):
+    assert not all_addresses(host)
+    assert PilotServer(0, host, TOKEN).port > 0
+
+
+def test_a_command_that_breaks_stops_the_arm_and_says_so(monkeypatch):
+    opened = open_session(SessionOptions("titan4_sdu"))
+    monkeypatch.setattr(opened.engine, "execute", lambda command, time: 1 / 0)
+    arm = opened.engine.session.arm
+    arm.move(0, 0.5)
+    with PilotServer() as server:
+        loop = Loop(opened.engine, server)
+        server.commands.put((1, {"name": "nudge", "change": 0.1}))
+        loop.run(lambda: server.commands.empty())
+    assert arm.moving is None
+    assert opened.engine.session.message == "'nudge' broke: division by zero; the arm was stopped"
+
+
+def test_what_a_watchdog_says_is_shown():
+    opened = open_session(SessionOptions("titan4_sdu"))
+    with PilotServer() as server:
+        loop = Loop(opened.engine, server)
+        loop.fault = lambda: "one: no report for 3 s; the arm was stopped"
+        page = Page(server)
+        rounds = iter(range(3))
+        loop.run(lambda: next(rounds, None) is None)
+        page.hear_until(lambda m: isinstance(m, dict) and "no report" in m.get("message", ""))
+        before, begin = server.reported, time.monotonic()
+        until(lambda: server.reported > before)
+        assert server.reported >= begin
+
+
+def test_a_page_that_is_closed_abruptly_is_no_news(server, caplog):
+    page = Page(server)
+    page.role()
+    stream = page._socket.protocol.stream.socket
+    stream.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    stream.close()  # with a reset
+    for number in range(50):
+        server.show_frame("C", float(number), b"x" * 100_000)
+    until(lambda: len(server.clients) == 0)
+    gc.collect()
+    assert [record.message for record in caplog.records] == []
+
+
+def test_the_page_is_served_by_tls_with_ones_own_certificate(tmp_path):
+    (tmp_path / "c.pem").write_text(tls.CERTIFICATE)
+    (tmp_path / "k.pem").write_text(tls.KEY)
+    trusting = ssl.create_default_context(cafile=str(tmp_path / "c.pem"))
+    with PilotServer(token=TOKEN, certificate=tmp_path / "c.pem", key=tmp_path / "k.pem") as server:
+        assert server.url.startswith("https://127.0.0.1:")
+        for origin, status in ((f"https://127.0.0.1:{server.port}", 200), (f"http://127.0.0.1:{server.port}", 403)):
+            connection = http.client.HTTPSConnection("127.0.0.1", server.port, timeout=10, context=trusting)
+            connection.request("GET", f"/?token={TOKEN}", headers={"Origin": origin})
+            assert connection.getresponse().status == status
+            connection.close()
+        plain = http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)
+        plain.request("GET", f"/?token={TOKEN}")
+        with pytest.raises((OSError, http.client.HTTPException)):
+            plain.getresponse()
+
+
+BAD_CERTIFICATES = {
+    "no file": (lambda folder: {"certificate": folder / "none.pem"}, "No such file"),
+    "no certificate": (lambda folder: {"certificate": folder / "text.pem"}, "no certificate with its key"),
+    "no key": (lambda folder: {"certificate": folder / "c.pem"}, "no certificate with its key"),
+    "a key alone": (lambda folder: {"key": folder / "k.pem"}, "needs the --certificate"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_CERTIFICATES)
+def test_a_certificate_of_no_use_is_refused_in_one_line(tmp_path, case):
+    for name, text in (("c.pem", tls.CERTIFICATE), ("k.pem", tls.KEY), ("text.pem", "words")):
+        (tmp_path / name).write_text(text)
+    given, message = BAD_CERTIFICATES[case]
+    with pytest.raises(InputError, match=message) as caught:
+        PilotServer(**given(tmp_path))
+    assert "\n" not in str(caught.value)

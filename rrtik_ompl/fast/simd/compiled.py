@@ -7,8 +7,10 @@ another version of this package finds nothing stale.
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, TypeVar
 
 from numba import njit
@@ -17,6 +19,7 @@ from numba.core.sigutils import normalize_signature
 
 from rrtik_ompl.fast.simd.code_files import PACKAGE, sources_digest
 from rrtik_ompl.fast.simd.processor import WIDTH
+from rrtik_ompl.files.cache import nobody_else_s
 
 __all__ = ["WIDTH", "entries", "entry", "inlined", "kernel"]
 
@@ -33,6 +36,9 @@ class _ForgivingCache(FunctionCache):  # type: ignore[misc]
     """
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
+        # beside the sources, where the umask of many systems lets the user's own group write
+        if not nobody_else_s(Path(self._cache_file._index_path), among=stat.S_IWOTH):
+            return None  # a pickle that somebody else may have written
         try:
             found = super().load_overload(sig, target_context)
             return found if found is None or found.signature.args == normalize_signature(sig)[0] else None

@@ -29,7 +29,7 @@ from rrtik_ompl.fast.simd.code_files import (
 )
 from rrtik_ompl.fast.simd.processor import target_machine
 from rrtik_ompl.fast.simd.targets import UnknownMachineError, target_of, this_target
-from rrtik_ompl.files.cache import cache_folder
+from rrtik_ompl.files.cache import cache_folder, nobody_else_s
 from rrtik_ompl.files.notice import COMPILING, tell_once
 
 
@@ -108,7 +108,7 @@ def _file(name: str) -> Path | None:
 def _kept(name: str) -> Library | None:
     """The library from the user's cache, if it is there."""
     file = _file(name)
-    code = None if file is None else read_code(file, machine_key(name))
+    code = read_code(file, machine_key(name)) if file is not None and nobody_else_s(file) else None
     if code is None:
         return None
     try:

@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Protocol
 
+import numpy as np
+
 from rrtik_ompl.errors import RrtikError
 from rrtik_ompl.sensing.cameras.pictures import CameraLostError, Picture
 
@@ -29,7 +31,12 @@ class PictureSource(Protocol):
 
 
 class Feed:
-    """The newest picture of a camera, a video or a folder; older ones are dropped."""
+    """The newest picture of a camera, a video or a folder; older ones are dropped.
+
+    Attributes:
+        reported: When its thread reported last, by ``time.monotonic()``; inf if it may be silent: pictures of a record,
+            and after the last one.
+    """
 
     def __init__(self, open_pictures: Callable[[], Iterator[Picture]], *, paced: bool = False) -> None:
         """Begin to read.
@@ -45,6 +52,7 @@ class Feed:
         pictures = open_pictures()
         self._newest: Picture | None = next(pictures, None)
         self._lost = ""
+        self.reported = np.inf if paced else time.monotonic()
         self._lock, self._ended = threading.Lock(), threading.Event()
         self._thread = threading.Thread(target=self._read, args=(pictures,), daemon=True)
         self._thread.start()
@@ -69,9 +77,11 @@ class Feed:
     def _read(self, pictures: Iterator[Picture]) -> None:
         while not self._ended.is_set():
             self._lose(self._read_until_lost(pictures))
+            self._report()
             if self._paced or self._ended.wait(RETRY_SECONDS):
+                self.reported = np.inf
                 return
-            pictures = self._open()
+            pictures = self._opened()
 
     def _read_until_lost(self, pictures: Iterator[Picture]) -> str:
         """Hand out pictures until there are no more; returns why."""
@@ -82,9 +92,20 @@ class Feed:
                     break
                 with self._lock:
                     self._newest, self._lost = picture, ""
+                self._report()
         except RrtikError as error:
             return str(error)
+        except Exception as error:  # of a library or a driver: the thread goes on, and says so
+            return f"the camera broke: {str(error) or type(error).__name__}"
         return ENDED
+
+    def _opened(self) -> Iterator[Picture]:
+        """The source once more; what is wrong with it comes with the first picture."""
+        yield from self._open()
+
+    def _report(self) -> None:
+        if not self._paced:
+            self.reported = time.monotonic()
 
     def _lose(self, reason: str) -> None:
         with self._lock:

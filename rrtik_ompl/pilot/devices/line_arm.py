@@ -11,7 +11,8 @@ The protocol is one JSON object a line, UTF-8, at most 64 kB. Joints are in the 
 - a request that cannot be fulfilled is answered by ``{"error": "one line"}``
 
 The client requests the joints about 30 times a second. A server stops the arm when its client has gone, or has sent
-nothing for half a second.
+no whole request for half a second; a client counts the line as lost when no whole answer comes in that time, or one
+that is none: too long, too deep, joints that the arm cannot have.
 """
 
 from __future__ import annotations
@@ -20,19 +21,22 @@ import json
 import socket
 import threading
 import time
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.arrays import LARGEST, Vector
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.messages import message_in, quoted
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.robot import Robot
 
 PROTOCOL, VERSION = "rrtik-arm", 1
 POLL_SECONDS = 1.0 / 30.0  # between two requests for the joints
-TIMEOUT_SECONDS = 0.5  # for an answer
+TIMEOUT_SECONDS = 0.5  # for a whole answer
+LIMIT_SLACK = 0.2  # [rad] or [m]; an arm may have passed a limit by as much
 RETRY_SECONDS = 1.0
 MAX_LINE_BYTES = 64 * 1024
 
@@ -56,17 +60,17 @@ class Line:
         Raises:
             OSError: If the connection ends, nothing comes in time, or what comes is none.
         """
+        end = time.monotonic() + TIMEOUT_SECONDS
         while b"\n" not in self._rest:
+            self._socket.settimeout(max(end - time.monotonic(), 1e-3))  # one deadline, however the bytes trickle in
             more = self._socket.recv(4096)
             self._rest += more
             if not more or len(self._rest) > MAX_LINE_BYTES:
                 raise ConnectionError("the other side has closed the connection" if not more else "an endless line")
         line, _, self._rest = self._rest.partition(b"\n")
-        try:
-            found = json.loads(line)
-        except ValueError:
-            found = None
-        if not isinstance(found, dict):
+        self._socket.settimeout(TIMEOUT_SECONDS)
+        found = message_in(line)
+        if found is None:
             raise ConnectionError("the other side does not send JSON lines")
         return found
 
@@ -76,7 +80,13 @@ class Line:
 
 
 class LineArm:
-    """An arm that a server offers. When the connection is lost it keeps the last known joints, and tries again."""
+    """An arm that a server offers. When the connection is lost it keeps the last known joints, and tries again.
+
+    Attributes:
+        robot: The robot that the arm is.
+        lost: Why the connection is lost; "" if it is not.
+        reported: When its thread reported last, by ``time.monotonic()``.
+    """
 
     def __init__(self, robot: Robot, host: str, port: int) -> None:
         """Connect.
@@ -90,6 +100,7 @@ class LineArm:
             InputError: If there is no server, or it offers another arm.
         """
         self.robot, self._address, self.lost = robot, (host, port), ""
+        self.reported = time.monotonic()
         self._request: dict[str, Any] | None = None
         self._lock, self._ended, self._wake = threading.Lock(), threading.Event(), threading.Event()
         try:
@@ -143,23 +154,33 @@ class LineArm:
 
     def _connect(self) -> Line:
         line = Line(socket.create_connection(self._address, timeout=TIMEOUT_SECONDS))
-        greeting = line.receive()
+        try:
+            self._check(line.receive())
+        except OSError:
+            line.close()
+            raise
+        return line
+
+    def _check(self, greeting: dict[str, Any]) -> None:
         if greeting.get("protocol") != PROTOCOL or greeting.get("version") != VERSION:
             raise ConnectionError(f"the other side does not greet as {PROTOCOL} {VERSION}")
         if greeting.get("joints") != list(self.robot.joint_names):
-            raise ConnectionError(f"it has the joints {greeting.get('joints')}, not those of '{self.robot.name}'")
-        return line
+            joints = quoted(greeting.get("joints"))
+            raise ConnectionError(f"it has the joints {joints}, not those of '{self.robot.name}'")
 
     def _exchange(self, message: dict[str, Any]) -> Vector:
         """Send a message and receive the joint values."""
         self._line.send(**message)
         answer = self._line.receive()
         if "error" in answer:
-            raise ConnectionError(str(answer["error"]))
+            raise ConnectionError(quoted(answer["error"]))
         try:
-            return self.robot.configuration(np.asarray(answer["q"], dtype=float), "q")
-        except (KeyError, TypeError, ValueError, InputError) as error:
+            q = self.robot.configuration(answer.get("q", ()), "q")
+        except InputError as error:
             raise ConnectionError(f"an answer without the joints: {error}") from None
+        if not (self.robot.within_limits(q, LIMIT_SLACK)[0] and np.abs(q).max() <= LARGEST):
+            raise ConnectionError(f"an answer with joints that the arm cannot have: {self.robot.limit_fault(q)}")
+        return q
 
     def _communicate(self) -> None:
         """Request the joints and send moves, until the end; connect again when the connection is lost."""
@@ -174,10 +195,11 @@ class LineArm:
                 q = self._exchange(message)
                 with self._lock:
                     self._q, self.lost = q, ""
-            except OSError as error:
+            except Exception as error:  # nothing that comes over the line ends this thread
                 self._line.close()
                 self.lost = f"the connection to the arm is lost: {error}; the joints are the last known ones"
                 self._ended.wait(RETRY_SECONDS)
+            self.reported = time.monotonic()
             if self._ended.is_set() and self._request is None:
                 return
 
@@ -217,11 +239,9 @@ class LineServer:
             except TimeoutError:
                 continue
             line = Line(connection)
-            try:
+            with suppress(Exception):  # the client has gone, is silent, or sends what is no request
                 line.send(protocol=PROTOCOL, version=VERSION, joints=list(self.arm.robot.joint_names))
                 self._answer(line)
-            except OSError:
-                pass  # the client has gone, or is silent
             self.arm.stop()
             line.close()
 

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.errors import RrtikError
 from rrtik_ompl.pilot.devices.arm import Arm
-from rrtik_ompl.pilot.devices.camera_feed import PictureSource
+from rrtik_ompl.pilot.devices.camera_feed import Feed, PictureSource
 from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
+from rrtik_ompl.pilot.devices.watchdog import Report
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pictures import Picture
@@ -78,6 +79,11 @@ class LivePerception:
     def close(self) -> None:
         """Release the camera."""
         self._source.close()
+
+    def reports(self) -> dict[str, Report]:
+        """When the thread of the camera reported last, by name; nothing if it has none."""
+        source = self._source
+        return {"the camera": lambda: source.reported} if isinstance(source, Feed) else {}
 
     def _why_nothing(self, view: View, time: float, known: bool) -> str:
         """Why no object has a pose. The search for unknown markers is slow: only while no object was ever seen."""

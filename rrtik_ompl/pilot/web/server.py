@@ -18,6 +18,7 @@ import logging
 import queue
 import struct
 import threading
+import time as clock
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -30,7 +31,9 @@ import tornado.websocket
 from tornado.httputil import HTTPServerRequest
 
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.messages import message_in
 from rrtik_ompl.pilot.web.clients import Client, Clients, Message
+from rrtik_ompl.pilot.web.exposure import all_addresses, tls_context
 
 LOOPBACK = "127.0.0.1"
 PAGE = Path(__file__).parent / "page"
@@ -40,6 +43,7 @@ MIN_TOKEN_LENGTH = 16
 MAX_NAME_LENGTH = 40
 GOING_AWAY, FAREWELL_SECONDS = 1001, 0.1  # code of a WebSocket that is closed, and time for it to arrive
 PING_SECONDS, PONG_SECONDS = 5.0, 5.0
+REPORT_SECONDS = 0.25
 NO_TOKEN = "the token is missing or wrong: open the address as rrtik pilot printed it"
 WRONG_ORIGIN = "requested under another name, or from another page: open the address as rrtik pilot printed it"
 POLICY = (
@@ -56,9 +60,19 @@ class PilotServer:
 
     Attributes:
         commands: Of the pilot's page, as pairs of the page's number and the command.
+        reported: When its thread reported last, by ``time.monotonic()``.
     """
 
-    def __init__(self, port: int = 0, host: str = LOOPBACK, token: str = "", title: str = "") -> None:
+    def __init__(
+        self,
+        port: int = 0,
+        host: str = LOOPBACK,
+        token: str = "",
+        title: str = "",
+        *,
+        certificate: Path | None = None,
+        key: Path | None = None,
+    ) -> None:
         """Take a port.
 
         Args:
@@ -66,12 +80,16 @@ class PilotServer:
             host: Address of this machine under which pages may reach it.
             token: Secret that a page has to give; needed for any address but this machine's own.
             title: Of the page.
+            certificate: Of this machine (PEM, with those that vouch for it); the page is then served by TLS.
+            key: Its private key (PEM); in the file of the certificate if None.
 
         Raises:
-            InputError: If the port or the address cannot be used, or the token is missing or short.
+            InputError: If the port, the address or the certificate cannot be used, or the token is missing or short.
         """
         self.host, self.token, self.title = host, token, title
         self._check_token()
+        self._tls = tls_context(certificate, key)
+        self.reported = clock.monotonic()
         try:
             self._sockets = tornado.netutil.bind_sockets(port, host)
         except (OSError, OverflowError, UnicodeError) as error:
@@ -88,7 +106,7 @@ class PilotServer:
     @property
     def url(self) -> str:
         """Where a browser finds the page; with the token, if there is one."""
-        return f"http://{self._name}:{self.port}/" + (f"?token={self.token}" if self.token else "")
+        return f"{self._scheme}://{self._name}:{self.port}/" + (f"?token={self.token}" if self.token else "")
 
     def __enter__(self) -> PilotServer:
         self._thread.start()
@@ -112,7 +130,7 @@ class PilotServer:
         """Whether a request names this server, and comes from its own page or from none."""
         hosts = {f"{name}:{self.port}" for name in (self._name, *(("localhost",) if self.host == LOOPBACK else ()))}
         host, origin = request.headers.get("Host"), request.headers.get("Origin")
-        return host in hosts and (origin is None or origin == f"http://{host}")
+        return host in hosts and (origin is None or origin == f"{self._scheme}://{host}")
 
     def knows_token(self, word: str) -> bool:
         """Whether a word is the token; takes the same time however much of it is right."""
@@ -120,11 +138,8 @@ class PilotServer:
 
     def receive(self, client: Client, text: str) -> None:
         """Process a message of a page: an acknowledgement, a change of its role, or a command."""
-        try:
-            said = json.loads(text)
-        except ValueError:
-            return
-        if not isinstance(said, dict):
+        said = message_in(text)
+        if said is None:
             return
         if "shown" in said:
             (client.frames if said["shown"] == "frame" else client.states).arrived()
@@ -142,10 +157,14 @@ class PilotServer:
             self.commands.put((client.number, said))
 
     def _check_token(self) -> None:
-        if self.host in ("", "0.0.0.0", "::"):
+        if all_addresses(self.host):
             raise InputError(f"--host '{self.host}': name the one address under which pages shall reach this machine")
         if self.host != LOOPBACK and len(self.token) < MIN_TOKEN_LENGTH:
             raise InputError(f"--host {self.host} needs --token with a secret of at least {MIN_TOKEN_LENGTH} letters")
+
+    @property
+    def _scheme(self) -> str:
+        return "http" if self._tls is None else "https"
 
     @property
     def _name(self) -> str:
@@ -158,6 +177,10 @@ class PilotServer:
         for each in self.open_sockets:
             each.close(GOING_AWAY)
         self._loop.call_later(FAREWELL_SECONDS, self._loop.stop)
+
+    def _report(self) -> None:
+        self.reported = clock.monotonic()
+        self._loop.call_later(REPORT_SECONDS, self._report)
 
     def _call(self, act: Callable[[], None]) -> None:
         if len(self.clients):
@@ -174,12 +197,18 @@ class PilotServer:
             websocket_ping_interval=PING_SECONDS,
             websocket_ping_timeout=PONG_SECONDS,
         )
-        http = tornado.httpserver.HTTPServer(application, max_body_size=MAX_MESSAGE_BYTES)
+        http = tornado.httpserver.HTTPServer(application, max_body_size=MAX_MESSAGE_BYTES, ssl_options=self._tls)
         http.add_sockets(self._sockets)
+        self._report()
         self._loop.run_forever()
         http.stop()
         self._loop.run_until_complete(http.close_all_connections())
         self._loop.close()
+
+
+def _forget(sent: asyncio.Future[None]) -> None:
+    if not sent.cancelled():
+        sent.exception()
 
 
 class _Guarded(tornado.web.RequestHandler):
@@ -250,4 +279,5 @@ class _SocketHandler(_Guarded, tornado.websocket.WebSocketHandler):
 
     def _send(self, message: Message) -> None:
         with suppress(tornado.websocket.WebSocketClosedError):  # `on_close` follows
-            self.write_message(message, binary=isinstance(message, bytes))
+            sent = self.write_message(message, binary=isinstance(message, bytes))
+            asyncio.ensure_future(sent).add_done_callback(_forget)  # a page that was closed abruptly is no news
