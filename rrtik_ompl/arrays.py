@@ -14,6 +14,7 @@ Matrix: TypeAlias = NDArray[np.float64]  # shape (m, n)
 Mask: TypeAlias = NDArray[np.bool_]  # shape (m,)
 
 TAU = 2.0 * np.pi  # [rad] a full turn
+MOST_ROWS = 1_000_000  # waypoints of a path, times of a motion
 LARGEST = 1e6  # [m] or [rad]; numbers beyond are a slip of the pen, and the kernels' float32 cannot hold them
 
 

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import LARGEST, Mask, Matrix, Vector, finite_array, frozen, positive
+from rrtik_ompl.arrays import LARGEST, MOST_ROWS, Mask, Matrix, Vector, finite_array, frozen, positive
 from rrtik_ompl.copies import as_value
-from rrtik_ompl.errors import InputError, in_file, name_of, require
+from rrtik_ompl.errors import InputError, at_most, in_file, name_of, require
 from rrtik_ompl.files.tables import FORMATS, dumps, loads
 from rrtik_ompl.files.text import known_ending, read_text, write_text
 from rrtik_ompl.robot import Robot
@@ -91,6 +91,7 @@ class JointPath:
         rows = finite_array(waypoints, (None, None), "path waypoints")
         if rows.size == 0:
             raise InputError("path waypoints: a path needs at least one configuration of at least one joint")
+        at_most(len(rows), MOST_ROWS, "path waypoints")
         if (most := np.abs(rows).max()) > MAX_VALUE:
             raise InputError(f"path waypoints: found {most:g}, more than {MAX_VALUE:g} rad or m; check units")
         count = rows.shape[1]

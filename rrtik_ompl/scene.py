@@ -13,9 +13,11 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import LARGEST, Vector, bounded_array, finite_array, finite_number, frozen
 from rrtik_ompl.copies import as_value
-from rrtik_ompl.errors import InputError, UnknownNameError, name_of, require
+from rrtik_ompl.errors import InputError, UnknownNameError, at_most, name_of, require
 from rrtik_ompl.poses import rigid
 from rrtik_ompl.shapes import SHAPES, Shape
+
+MOST_SOLIDS = 10_000  # of a scene, obstacles and attached objects together
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,6 +154,7 @@ class Scene:
     def __post_init__(self) -> None:
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
         object.__setattr__(self, "attached", tuple(self.attached))
+        at_most(len(self.obstacles) + len(self.attached), MOST_SOLIDS, "obstacles of a scene", "join some in a mesh")
         for obstacle in self.obstacles:
             require(obstacle, Obstacle, "each obstacle of a scene")
         for held in self.attached:

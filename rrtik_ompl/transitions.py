@@ -11,8 +11,8 @@ from math import factorial, radians
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector, finite_array
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.arrays import MOST_ROWS, Matrix, Vector, finite_array
+from rrtik_ompl.errors import InputError, at_most
 
 SAME = radians(1e-6)  # [rad] or [m]; a joint that changes by no more than this has not moved
 
@@ -130,8 +130,12 @@ def part_counts(rows: Matrix, step: float) -> Vector:
     """Into how many parts to cut each edge of a polyline, shape (k, n), so that none is longer than ``step``.
 
     A part may be longer by rounding. An edge without length has none (-0.0). Shape (k - 1,).
+
+    Raises:
+        InputError: If there would be more parts than a path may have waypoints.
     """
     counts: Vector = np.ceil(np.linalg.norm(np.diff(rows, axis=0), axis=1) / step - 1e-9)
+    at_most(float(counts.sum()), MOST_ROWS, "waypoints of a path in such small steps")
     return counts
 
 

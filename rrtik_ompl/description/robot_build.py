@@ -163,22 +163,22 @@ def _held_values(
 
 
 def _chain(model: pin.Model, actuated: tuple[str, ...], ties: Mapping[str, Mimic]) -> Chain:
-    count = model.njoints - 1
+    count, place = model.njoints - 1, {name: number for number, name in enumerate(actuated)}
     axis, prismatic = np.zeros((count, 3)), np.zeros(count, dtype=bool)
     gain, offset = np.zeros((count, len(actuated))), np.zeros(count)
-    data = model.createData()
     neutral = pin.neutral(model)
+    names, joints = list(model.names)[1:], model.joints
     for k in range(count):
-        model.joints[k + 1].calc(data.joints[k + 1], neutral)
-        subspace = np.asarray(data.joints[k + 1].S).reshape(-1)  # (linear; angular)
+        own = joints[k + 1].createData()  # of this joint alone: all joints' data are looked up by copying them
+        joints[k + 1].calc(own, neutral)
+        subspace = np.asarray(own.S).reshape(-1)  # (linear; angular)
         prismatic[k] = np.linalg.norm(subspace[:3]) > 0.5
         axis[k] = subspace[:3] if prismatic[k] else subspace[3:]
-        joint = model.names[k + 1]
-        tie = ties.get(joint)
+        tie = ties.get(names[k])
         if tie is None:
-            gain[k, actuated.index(joint)] = 1.0
+            gain[k, place[names[k]]] = 1.0
         else:
-            gain[k, actuated.index(tie.source)], offset[k] = tie.multiplier, tie.offset
+            gain[k, place[tie.source]], offset[k] = tie.multiplier, tie.offset
     return Chain(
         parent=frozen([model.parents[k + 1] - 1 for k in range(count)], np.int64),
         placement=frozen([model.jointPlacements[k + 1].homogeneous for k in range(count)]),

@@ -17,10 +17,11 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Vector, bounded_array, frozen
-from rrtik_ompl.errors import InputError, UnknownNameError, name_of
+from rrtik_ompl.errors import InputError, UnknownNameError, at_most, name_of
 from rrtik_ompl.poses import rigid
 from rrtik_ompl.shapes import Shape
 
+MOST_JOINTS = 1001  # those of an arm, and the one that fixes its tip
 KINDS = ("revolute", "continuous", "prismatic", "fixed")
 
 
@@ -121,6 +122,7 @@ class Tree:
     joints: tuple[Joint, ...]
 
     def __init__(self, where: str, links: Sequence[Link], joints: Sequence[Joint]) -> None:
+        at_most(len(joints), MOST_JOINTS, f"{where}: joints")
         object.__setattr__(self, "where", where)
         object.__setattr__(self, "links", tuple(links))
         object.__setattr__(self, "joints", tuple(joints))

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector, frozen, positive, whole_number
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.errors import InputError, UnknownNameError, at_most
 from rrtik_ompl.reach.grid_map import ReachMap
 from rrtik_ompl.reach.measures import MEASURES
 from rrtik_ompl.robot import Robot
@@ -22,6 +22,7 @@ BLOCK = 20_000  # postures at a time
 TURNS = 16  # of the first joint for each of them: the whole arm turns as one body, which needs no kinematics
 CELLS = 18  # of the grid across the farthest reach, if no size is given
 MAX_CELLS = 4_000_000
+MOST_SAMPLES = 1_000_000_000  # some minutes of a processor
 PROBE = 4096  # postures that determine how large the grid must be
 BELOW = 1e-3  # of a cell: the layer of a planar arm ends so far above the arm, which is seen from above
 PROBE_MARGIN = 1.1  # how much larger than what the probe reached
@@ -62,6 +63,7 @@ def reach_map(
     if axis not in ("x", "y", "z"):
         raise InputError(f"axis must be x, y or z, got {axis!r}")
     count = whole_number(samples, "samples", 1)
+    at_most(count, MOST_SAMPLES, "samples")
     rng = np.random.default_rng(whole_number(seed, "seed"))
     base = robot.fk_batch(np.zeros((1, robot.dof)), robot.link_names[0])[0, :3, 3]
     corner, size, shape = _grid(robot, base, cell)

@@ -10,9 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix, bounded_array, finite_array, frozen, positive
 from rrtik_ompl.copies import as_value
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, at_most
 from rrtik_ompl.shapes.shape import Shape
 from rrtik_ompl.shapes.surfaces import Triangles
+
+MOST_TRIANGLES = 5_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,6 +44,7 @@ class Mesh(Shape):
         faces = np.asarray(triangles)
         if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
             raise InputError(f"{what}: needs at least one triangle (three vertex numbers each); export it triangulated")
+        at_most(len(faces), MOST_TRIANGLES, f"{what}: triangles", "simplify it")
         numbers = finite_array(faces, (None, 3), f"{what}: triangles")
         if (odd := numbers[numbers != np.floor(numbers)]).size:
             raise InputError(f"{what}: vertex numbers of triangles must be whole, got {odd[0]:g}")

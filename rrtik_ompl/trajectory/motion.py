@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
+from rrtik_ompl.arrays import MOST_ROWS, Mask, Matrix, Vector, finite_array, frozen, positive
 from rrtik_ompl.copies import as_value
-from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.errors import InputError, at_most, require
 from rrtik_ompl.files.text import known_ending, write_text
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.trajectory.chords import CHORD_SLACK, chords_of
@@ -235,6 +235,7 @@ class Trajectory:
             InputError: If the rate is no number greater than 0.
         """
         step = 1.0 / positive(rate, "control rate of a trajectory")
+        at_most(self.duration / step, MOST_ROWS, "times of a trajectory at that rate")
         clock = np.append(np.arange(0.0, self.duration - 1e-9 * step, step), self.duration)
         return clock, self(clock)
 
