@@ -1,0 +1,1 @@
+"""Timed motions: limits, durations beside toppra and ruckig, torques, the steered tip."""

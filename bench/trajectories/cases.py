@@ -1,0 +1,103 @@
+"""The paths that are timed: MotionBenchMaker paths, lines of the tip, single-joint moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from rrtik_ompl import RateLimits, load_robot, plan, solve_ik_trajectory
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.world import World
+
+ARMS = ("panda", "ur5")
+JERK_SHARE = 10.0  # times the acceleration a second, where no jerk limit is published
+LINE_POINTS = (27, 60, 100, 200, 500)
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A path, its world and limits of its arm."""
+
+    kind: str
+    arm: str
+    path: JointPath
+    world: World
+    limits: RateLimits
+
+    @property
+    def without_jerk(self) -> RateLimits:
+        """The limits, but for the jerk."""
+        return RateLimits(self.limits.velocity, self.limits.acceleration)
+
+
+@cache
+def limits_of(arm: str) -> RateLimits:
+    """Published limits of the Panda; of the UR5 velocities of its URDF, else defaults, with the jerk of this report."""
+    found = RateLimits.of(load_robot(arm))
+    if arm == "panda":
+        return found
+    return RateLimits(found.velocity, found.acceleration, JERK_SHARE * found.acceleration)
+
+
+def planned(folder: Path, per_family: int) -> Iterator[Case]:
+    """Paths of ``plan()`` for MotionBenchMaker problems, so many of each family and arm."""
+    for arm in ARMS:
+        home = folder / f"mbm_{arm}"
+        for family in sorted((home / "problems").iterdir()):
+            files = sorted(family.glob("scene*.yaml"))
+            for file in files[:: max(1, len(files) // per_family)][:per_family]:
+                problem = load_motion_bench_maker(file, robot=home / f"{arm}.urdf")
+                found = plan(problem, seed=1, seconds=5.0)
+                if found.path is not None:
+                    yield Case("planned", arm, found.path, problem.world, limits_of(arm))
+
+
+def lines(count: int) -> Iterator[Case]:
+    """Straight lines of the tip, of 27 to 500 points, from random postures."""
+    rng, made = np.random.default_rng(11), 0
+    worlds = {arm: World(load_robot(arm)) for arm in ARMS}
+    while made < count:
+        arm = ARMS[made % 2]
+        robot, world = worlds[arm].robot, worlds[arm]
+        low, high = robot.finite_range()
+        start = rng.uniform(0.7 * low + 0.3 * high, 0.3 * low + 0.7 * high)
+        rows = _line(robot, start, rng, LINE_POINTS[made // 2 % len(LINE_POINTS)])
+        if rows is not None and not JointPath.of(robot, rows).violations(world):
+            made += 1
+            yield Case("line of the tip", arm, JointPath.of(robot, rows), world, limits_of(arm))
+
+
+def _line(robot: Robot, start: Matrix, rng: np.random.Generator, points: int) -> Matrix | None:
+    poses = np.repeat(robot.fk_batch(start[None]), points, axis=0)
+    way = rng.normal(size=3)
+    poses[:, :3, 3] += np.linspace(0.0, rng.uniform(0.1, 0.3), points)[:, None] * way / np.linalg.norm(way)
+    found = solve_ik_trajectory(robot, poses, near=start, position_tolerance=1e-6, orientation_tolerance=1e-5)
+    return found.q if found.found and not found.jumps else None
+
+
+def single_joint_moves(count: int) -> Iterator[Case]:
+    """Three to ten moves of one joint each."""
+    rng = np.random.default_rng(12)
+    worlds = {arm: World(load_robot(arm)) for arm in ARMS}
+    made = 0
+    while made < count:
+        arm = ARMS[made % 2]
+        world = worlds[arm]
+        robot = world.robot
+        low, high = robot.finite_range()
+        rows = [rng.uniform(0.6 * low + 0.4 * high, 0.4 * low + 0.6 * high)]
+        for _ in range(int(rng.integers(3, 11))):
+            joint = int(rng.integers(robot.dof))
+            rows.append(rows[-1].copy())
+            rows[-1][joint] = rng.uniform(0.7 * low[joint] + 0.3 * high[joint], 0.3 * low[joint] + 0.7 * high[joint])
+        path = JointPath.of(robot, np.array(rows))
+        if not path.violations(world):
+            made += 1
+            yield Case("single-joint moves", arm, path, world, limits_of(arm))
