@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -65,17 +65,18 @@ class Problem:
         self.world = world
         self.name = name
         self.planner = planner
-        self.start: Vector = frozen(usable_configuration(world, start, "start"))
+        wanted = goal if isinstance(goal, Goal) else JointGoal(goal)
+        joints = {"goal": wanted.q} if isinstance(wanted, JointGoal) else {}
+        ends = usable_configurations(world, {"start": start, **joints})
+        self.start: Vector = frozen(ends["start"])
         held = held_regions(world.robot, world.scene, constraints, self.start)
         self.constraints = tuple(each.region for each in held.regions)
         if held.regions:
             self.world = world = HoldingWorld(world, held)
             _keep(held, self.start, "start")
-        wanted = goal if isinstance(goal, Goal) else JointGoal(goal)
         if isinstance(wanted, JointGoal):
-            q = usable_configuration(world, wanted.q, "goal")
-            _keep(held, q, "goal")
-            wanted = JointGoal(_nearest_turn(world, self.start, q), wanted.tolerance)
+            _keep(held, ends["goal"], "goal")
+            wanted = JointGoal(_nearest_turn(world, self.start, ends["goal"]), wanted.tolerance)
         elif any(part.frame or part.from_start for part in parts_of(wanted) if isinstance(part, TaskRegion)):
             raise InputError("goal region: frame and from_start are for path constraints; a goal is of the tip")
         self.goal: Goal = wanted
@@ -116,29 +117,37 @@ def densely_checked(problem: Problem) -> Problem:
     return problem.with_resolution(verification_resolution(problem.world))
 
 
-def usable_configuration(world: World, values: ArrayLike, what: str) -> Vector:
-    """A configuration given by a user that can be a start or a goal: finite, inside the limits, free. Shape (dof,).
+def usable_configurations(world: World, ends: Mapping[str, ArrayLike]) -> dict[str, Vector]:
+    """Configurations given by a user that can be start and goal, by what they are: finite, inside the limits, free.
 
     Raises:
-        ProblemError: If it is in collision, within an obstacle's margin or outside the limits.
-        InputError: If it has the wrong number of joints or is not finite.
+        ProblemError: If one is in collision, within an obstacle's margin or outside the limits.
+        InputError: If one has the wrong number of joints or is not finite.
     """
-    robot = world.robot
-    q = robot.configuration(values, what)
-    fault = robot.limit_fault(q)
-    if fault:
-        raise ProblemError(f"{what}: {fault}", part=what)
-    q = robot.onto_limits(q)
+    robot, found = world.robot, {}
+    for what, values in ends.items():
+        q = robot.configuration(values, what)
+        if fault := robot.limit_fault(q):
+            raise ProblemError(f"{what}: {fault}", part=what)
+        found[what] = robot.onto_limits(q)
+    rows = np.array(list(found.values()))
     world = world.unheld if isinstance(world, HoldingWorld) else world
-    # both opinions must agree, for the path through q will be certified by the second one
-    if not world.valid(q) or not world.certify(q[None])[0]:
-        touching = world.contacts(q)
-        pairs = [(c.first, c.second) for c in touching]
-        if touching and all(c.distance > 0.0 for c in touching):
-            remedy = "move it or lower the margin" + (", or allow the pair" if world.self_margin else "")
-            raise ProblemError(f"{what} is too near: {world.explain(q)}; {remedy}", pairs, part=what)
-        raise ProblemError(f"{what} is in collision: {world.explain(q)}; move it or allow the pair", pairs, part=what)
-    return q
+    # both opinions must agree, for the path through them will be certified by the second one
+    for opinion in (world.valid_batch, world.certify):
+        for (what, q), free in zip(found.items(), opinion(rows).tolist(), strict=True):
+            if not free:
+                raise _in_the_way(world, q, what)
+    return found
+
+
+def _in_the_way(world: World, q: Vector, what: str) -> ProblemError:
+    """Says what a start or a goal touches, or is too near to."""
+    touching = world.contacts(q)
+    pairs = [(c.first, c.second) for c in touching]
+    if touching and all(c.distance > 0.0 for c in touching):
+        remedy = "move it or lower the margin" + (", or allow the pair" if world.self_margin else "")
+        return ProblemError(f"{what} is too near: {world.explain(q)}; {remedy}", pairs, part=what)
+    return ProblemError(f"{what} is in collision: {world.explain(q)}; move it or allow the pair", pairs, part=what)
 
 
 def _keep(held: HeldRegions, q: Vector, what: str) -> None:

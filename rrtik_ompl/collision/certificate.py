@@ -24,6 +24,7 @@ from rrtik_ompl.robot import Robot
 
 MAX_PAIR_CHECKS = 1 << 16  # runs of rows times pairs checked together, to bound memory
 RUNS = (64, 16, 4, 1)  # rows that are checked together
+FEW = 16  # rows that are checked one by one: mostly they do not follow a path
 
 Numbers: TypeAlias = NDArray[np.int64]
 
@@ -58,11 +59,12 @@ class Certificate:
         come nearer within the run of rows, they are apart in all of it. What is left open is checked in shorter runs.
         """
         found: list[tuple[int, ...]] = [()] * len(Q)
-        together = RUNS[0] * max(1, MAX_PAIR_CHECKS // max(1, len(self._pairs)))
+        runs = RUNS if len(Q) > FEW else RUNS[-1:]
+        together = runs[0] * max(1, MAX_PAIR_CHECKS // max(1, len(self._pairs)))
         for start in range(0, len(Q), together):
-            begins = np.arange(start, min(start + together, len(Q)), RUNS[0])
+            begins = np.arange(start, min(start + together, len(Q)), runs[0])
             run, pair = (k.ravel() for k in np.indices((len(begins), len(self._pairs))))
-            for size, shorter in zip(RUNS, (*RUNS[1:], 0), strict=True):
+            for size, shorter in zip(runs, (*runs[1:], 0), strict=True):
                 open_ = self._open(Q, begins, size, run, pair, found)
                 if not open_.any():
                     break

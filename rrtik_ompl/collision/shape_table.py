@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
@@ -180,13 +180,33 @@ class Piece:
 
 
 def pieces(shape: Shape) -> tuple[Piece, ...]:
-    """Coal geometries whose union is the shape.
+    """Coal geometries whose union is the shape; shapes of the same measures have the same ones.
 
     Raises:
         InputError: If a part of it is too flat, too small or too large to check.
     """
-    if type(shape) not in _BY_SHAPE:
-        raise TypeError(f"no coal geometry for {type(shape).__name__}")
+    kind = type(shape)
+    if kind not in _BY_SHAPE:
+        raise TypeError(f"no coal geometry for {kind.__name__}")
+    numbers = tuple(np.asarray(getattr(shape, measure.name)).tobytes() for measure in kind.measures)
+    return _kept_pieces(_Measured(kind, numbers, shape)) if numbers else _pieces(shape)
+
+
+@dataclass(frozen=True, slots=True)
+class _Measured:
+    """A shape as a key: equal to others of its kind and measures."""
+
+    kind: type[Shape]
+    numbers: tuple[bytes, ...]
+    shape: Shape = field(compare=False)
+
+
+@lru_cache(maxsize=4096)
+def _kept_pieces(key: _Measured) -> tuple[Piece, ...]:
+    return _pieces(key.shape)
+
+
+def _pieces(shape: Shape) -> tuple[Piece, ...]:
     identity = pin.SE3.Identity()
     return tuple(Piece(measured(solid), identity) for solid in _BY_SHAPE[type(shape)].solids(shape))
 

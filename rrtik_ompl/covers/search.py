@@ -129,13 +129,15 @@ def _cover(needs: Needs, limit: int, wanted: float | None) -> NDArray[np.int64]:
 
 def _greedy(holds: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Rows that together hold every column, the one that adds most first."""
-    left = np.ones(holds.shape[1], dtype=np.float32)
-    weights = holds.astype(np.float32)
-    chosen = []
+    left, chosen = np.ones(holds.shape[1], dtype=bool), []
+    columns = np.array(holds.T, dtype=np.float32, order="C")
+    gains = columns.sum(axis=0)  # whole numbers, exact
     while left.any():
-        row = int((weights @ left).argmax())
+        row = int(gains.argmax())
         chosen.append(row)
-        left[holds[row]] = 0.0
+        added = np.flatnonzero(left & holds[row])
+        left[added] = False
+        gains -= columns[added].sum(axis=0)
     return np.array(chosen)
 
 

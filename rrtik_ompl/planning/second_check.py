@@ -130,11 +130,13 @@ class SecondCheck:
         if self._ruled or self._problem.constraints:
             return None
         rng, single = np.random.default_rng(seed), self._traits.one_joint
-        repaired = with_detours(world, rows, clearance=room.kept, rng=rng, one_joint=single)
-        if repaired is None:
+        known = None if leaves_room else first.proof
+        repaired = with_detours(world, rows, clearance=room.kept, rng=rng, one_joint=single, proof=known)
+        mended = None if repaired is None else path.with_waypoints(repaired).proved(world, clearance=room.kept)
+        if mended is None or not mended.proven:
             return None
         self.reason = ""
-        return path.with_waypoints(repaired).proved(world, clearance=room.kept)
+        return mended
 
     def _checked(self, path: JointPath) -> JointPath | None:
         """The path if no proof is wanted and the check in steps agrees; else it may become the best one."""

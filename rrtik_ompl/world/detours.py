@@ -6,12 +6,13 @@ In a path that moves one joint at a time another joint moves out of the way befo
 from __future__ import annotations
 
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.transitions import route_length
-from rrtik_ompl.world import World
+from rrtik_ompl.world import Proof, World
 
 SIZES = (0.01, 0.03, 0.1, 0.3)  # of a detour, shares of the stretch's length
 POINTS = 12  # of each size
@@ -21,7 +22,13 @@ MOST_REPAIRS = 24  # of a route
 
 
 def with_detours(
-    world: World, rows: Matrix, *, clearance: float, rng: np.random.Generator, one_joint: bool = False
+    world: World,
+    rows: Matrix,
+    *,
+    clearance: float,
+    rng: np.random.Generator,
+    one_joint: bool = False,
+    proof: Proof | None = None,
 ) -> Matrix | None:
     """A route, shape (k, dof), with detours in the place of what is not proven; None if one of them is not found.
 
@@ -31,36 +38,45 @@ def with_detours(
         clearance: To be kept from obstacles beside their margins [m].
         rng: Of the points that are tried.
         one_joint: Whether each motion moves one joint alone, and has to.
+        proof: What is proven of the route with this clearance, if that is known.
 
     Returns:
-        A proven route with the same ends, shape (m, dof); the given one if it is proven.
+        A route of proven motions with the same ends, shape (m, dof); the given one if it is proven.
     """
+    known = world.prove(rows, clearance=clearance) if proof is None else proof
+    open_ = [gap.motion for gap in known.unproven]
     for _ in range(MOST_REPAIRS):
-        open_ = world.prove(rows, clearance=clearance).unproven
         if not open_:
             return rows
-        motion = open_[0].motion
         if one_joint:
-            repaired = _sidestepped(world, rows, motion, clearance)
+            found = _sidestepped(world, rows, open_[0], clearance)
         else:
-            repaired = _repaired(world, rows, motion, clearance, rng)
-        if repaired is None:
+            found = _repaired(world, rows, open_[0], clearance, rng)
+        if found is None:
             return None
-        rows = repaired
+        grown = len(found.rows) - len(rows)
+        rows, open_ = found.rows, [motion + grown for motion in open_ if motion >= found.last]
     return None
 
 
-def _repaired(world: World, rows: Matrix, motion: int, clearance: float, rng: np.random.Generator) -> Matrix | None:
+class Repair(NamedTuple):
+    """A route with a detour in it, and which waypoint of the one before it leads back to."""
+
+    rows: Matrix
+    last: int
+
+
+def _repaired(world: World, rows: Matrix, motion: int, clearance: float, rng: np.random.Generator) -> Repair | None:
     """The route with a detour around one of its motions, or around a stretch with that in the middle."""
     for more in range(WIDER):
         first, last = max(motion - more, 0), min(motion + 1 + more, len(rows) - 1)
         via = _via(world, rows[first : last + 1], clearance, rng)
         if via is not None:
-            return np.vstack([rows[: first + 1], via, rows[last:]])
+            return Repair(np.vstack([rows[: first + 1], via, rows[last:]]), last)
     return None
 
 
-def _sidestepped(world: World, rows: Matrix, motion: int, clearance: float) -> Matrix | None:
+def _sidestepped(world: World, rows: Matrix, motion: int, clearance: float) -> Repair | None:
     """The route with one of its moves made beside its place: another joint moves away before and back afterwards."""
     a, b = rows[motion], rows[motion + 1]
     others = np.flatnonzero(a == b)
@@ -74,7 +90,7 @@ def _sidestepped(world: World, rows: Matrix, motion: int, clearance: float) -> M
     steps = steps[proven(b + steps, b + 0.0 * steps)]  # and back to it
     if len(steps) == 0:
         return None
-    return np.vstack([rows[: motion + 1], a + steps[0], b + steps[0], rows[motion + 1 :]])
+    return Repair(np.vstack([rows[: motion + 1], a + steps[0], b + steps[0], rows[motion + 1 :]]), motion + 1)
 
 
 def _via(world: World, stretch: Matrix, clearance: float, rng: np.random.Generator) -> Matrix | None:

@@ -74,6 +74,15 @@ def test_the_surface_is_within_radius_and_disc_of_the_core(shape):
     assert np.allclose(shape.surface().vertices.max(axis=0), reach, atol=1e-9)
 
 
+@primitives
+def test_shapes_of_the_same_measures_share_their_geometry(shape):
+    measured = {measure.name: getattr(shape, measure.name) for measure in type(shape).measures}
+    assert pieces(type(shape)(**measured))[0].geometry is pieces(shape)[0].geometry
+    other = type(shape)(**{name: 2.0 * value for name, value in measured.items()})
+    assert pieces(other)[0].geometry is not pieces(shape)[0].geometry
+    assert same_shape(shape_of(pieces(other)[0].geometry), other)
+
+
 def test_a_core_is_read_only():
     core = core_of(pieces(PRIMITIVES[0])[0].geometry)
     with pytest.raises(ValueError, match="read-only"):

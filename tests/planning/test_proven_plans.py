@@ -174,6 +174,9 @@ def test_detours_lead_around_what_is_not_proven():
         assert world.prove(rows, clearance=0.001).proven
         same = with_detours(world, np.array([a, b]), clearance=0.001, rng=np.random.default_rng(0))
         assert (same == rows).all()
+        known = world.prove(np.array([a, b]), clearance=0.001)
+        told = with_detours(world, np.array([a, b]), clearance=0.001, rng=np.random.default_rng(0), proof=known)
+        assert (told == rows).all()
     assert mended >= 5
 
 

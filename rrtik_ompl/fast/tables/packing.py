@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Vector
 from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.body_arrays import body_arrays
 from rrtik_ompl.fast.tables.layout import PAIR_INTS, PAIR_ONE, PAIR_OTHER, PAIRS
 from rrtik_ompl.fast.tables.memory import Table
 from rrtik_ompl.fast.tables.primitive_tables import Primitives, joined, primitive_table
@@ -194,7 +195,7 @@ class PlacedPrimitives:
 
 def standing_solids(bodies: Sequence[Body], standing: Sequence[int], solids: Sequence[Solids]) -> Table:
     """Solids of what stands still, each with its margin around it."""
-    poses = np.array([bodies[k].placement.homogeneous for k in standing]).reshape(-1, 4, 4)
+    poses = body_arrays(bodies).placements[standing]
     placed = placed_bodies([solids[k] for k in standing], poses, margins=[bodies[k].margin for k in standing])
     return solid_table([(0, [each]) for each in placed])
 
