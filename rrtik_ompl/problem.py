@@ -117,6 +117,11 @@ def densely_checked(problem: Problem) -> Problem:
     return problem.with_resolution(verification_resolution(problem.world))
 
 
+def usable_configuration(world: World, values: ArrayLike, what: str) -> Vector:
+    """One of :func:`usable_configurations`, shape (dof,)."""
+    return usable_configurations(world, {what: values})[what]
+
+
 def usable_configurations(world: World, ends: Mapping[str, ArrayLike]) -> dict[str, Vector]:
     """Configurations given by a user that can be start and goal, by what they are: finite, inside the limits, free.
 

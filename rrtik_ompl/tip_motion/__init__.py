@@ -16,7 +16,7 @@ from rrtik_ompl.goal import PoseGoal
 from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.poses import rigid
-from rrtik_ompl.problem import usable_configurations
+from rrtik_ompl.problem import usable_configuration
 from rrtik_ompl.tip_motion.attempts import Way, farthest, path_of
 from rrtik_ompl.tip_motion.rails import Rail, arc_rail, screw_rail, straight_rail
 from rrtik_ompl.tip_motion.values import Tolerance
@@ -211,7 +211,7 @@ def begin_configurations(world: World, q: ArrayLike | str | pin.SE3, seed: int) 
     if isinstance(q, str):
         q = robot.posture(q)
     if not isinstance(q, pin.SE3) and np.ndim(q) < 2:
-        return usable_configurations(world, {"start": q})["start"][None]
+        return usable_configuration(world, q, "start")[None]
     found = solve_ik(robot, PoseGoal(rigid(q, "start")), all=True, world=world, seed=seed)
     if not found.found:
         raise InputError(f"start: no configuration of robot '{robot.name}' is at this pose: {found.detail}")
