@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from rrtik_ompl.fast.checks.kinematics import forward_kinematics
+from rrtik_ompl.fast.checks.kinematics import first_frames, forward_kinematics
+from rrtik_ompl.fast.checks.likely_kernels import likely_collision
 from rrtik_ompl.fast.checks.narrow_phase import narrow_phase
 from rrtik_ompl.fast.checks.obstacle_kernels import ALL_LANES, kinds_known
 from rrtik_ompl.fast.checks.self_kernels import self_collision
-from rrtik_ompl.fast.checks.sphere_kernels import prepare, recheck_last_hit, scene_collision
+from rrtik_ompl.fast.checks.sphere_kernels import prepare, scene_collision
+from rrtik_ompl.fast.checks.watch_kernels import joints_left, watch_motion
 from rrtik_ompl.fast.simd.compiled import WIDTH, entry, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import (
     bits,
@@ -30,63 +32,85 @@ from rrtik_ompl.fast.tables.accessors import (
     arm_of,
     body_count_of,
     inner_balls_of,
-    inner_last_of,
+    inner_likely_of,
     inner_primitives_of,
     joint_count_of,
     joint_row,
     outer_balls_of,
-    outer_last_of,
+    outer_likely_of,
     outer_primitives_of,
     pair_count_of,
     scratch_of,
     standing_count_of,
     values_of,
     waiting_of,
+    watch_of,
 )
 from rrtik_ompl.fast.tables.layout import (
     COLLIDING,
     FREE,
     NO_MARKS,
+    NO_WATCH,
     UNDECIDED,
     UNSOUND,
     BallTable,
     IntArray,
     JointValues,
-    LastHit,
+    LikelyBalls,
     PrimitiveTable,
+    Watch,
     WorldTable,
 )
 
 
 @kernel
 def in_collision(
-    world: WorldTable, balls: BallTable, primitives: PrimitiveTable, wanted: int, last: LastHit, one: bool
+    world: WorldTable,
+    balls: BallTable,
+    primitives: PrimitiveTable,
+    wanted: int,
+    likely: LikelyBalls,
+    one: bool,
+    watch: Watch,
+    joints: int,
 ) -> Any:
-    """Lanes among ``wanted`` in which these balls meet these primitives or each other; just one lane if ``one``."""
+    """Lanes among ``wanted`` in which these balls meet these primitives or each other; just one lane if ``one``.
+
+    What is watched no more may be carried by other joints than the first ``joints``.
+    """
     scratch = scratch_of(world)
-    if one:
-        found = recheck_last_hit(balls, primitives, scratch, wanted, last)
-        if found != 0:
-            return found
-    prepare(balls, scratch)
-    found = scene_collision(balls, primitives, scratch, wanted, NO_MARKS, one, last)
-    if found != wanted and not (one and found != 0):
-        found |= self_collision(balls, scratch, wanted & ~found, NO_MARKS, one)
+    prepare(balls, scratch, joints)
+    found = scene_collision(balls, primitives, scratch, wanted, NO_MARKS, one, likely, watch)
+    if found == 0:
+        return self_collision(balls, scratch, wanted, NO_MARKS, one, watch)
+    if found != wanted and not one:
+        found |= self_collision(balls, scratch, wanted & ~found, NO_MARKS, one, NO_WATCH)
     return found
 
 
 @inlined
-def outer_collision(world: WorldTable, wanted: int, one: bool) -> Any:
+def outer_collision(world: WorldTable, wanted: int, one: bool, watch: Watch, joints: int) -> Any:
     """Lanes that the outer balls cannot prove free, for the frames in the scratch memory."""
-    last = outer_last_of(scratch_of(world))
-    return in_collision(world, outer_balls_of(world), outer_primitives_of(world), wanted, last, one)
+    likely = outer_likely_of(scratch_of(world))
+    return in_collision(world, outer_balls_of(world), outer_primitives_of(world), wanted, likely, one, watch, joints)
 
 
 @inlined
 def inner_collision(world: WorldTable, wanted: int, one: bool) -> Any:
     """Lanes that the inner balls prove colliding, for the frames in the scratch memory."""
-    last = inner_last_of(scratch_of(world))
-    return in_collision(world, inner_balls_of(world), inner_primitives_of(world), wanted, last, one)
+    likely = inner_likely_of(scratch_of(world))
+    balls, primitives, joints = inner_balls_of(world), inner_primitives_of(world), joint_count_of(arm_of(world))
+    return in_collision(world, balls, primitives, wanted, likely, one, NO_WATCH, joints)
+
+
+@kernel
+def likely_in_collision(world: WorldTable, wanted: int, inner: bool) -> int:
+    """Lanes in which an outer or inner ball that met something lately does so again; 0 says nothing."""
+    scratch = scratch_of(world)
+    balls, primitives, likely = outer_balls_of(world), outer_primitives_of(world), outer_likely_of(scratch)
+    if inner:
+        balls, primitives, likely = inner_balls_of(world), inner_primitives_of(world), inner_likely_of(scratch)
+    return likely_collision(balls, primitives, scratch, wanted, likely)
 
 
 @inlined
@@ -128,13 +152,13 @@ def classify(world: WorldTable, rows: JointValues, count: int, answers: IntArray
     Rows that are not proven free wait until there are enough of them to fill all lanes of a second check. Returns
     ``count``, or UNSOUND.
     """
-    queue, waiting = waiting_of(scratch_of(world)), 0
+    queue, waiting, joints = waiting_of(scratch_of(world)), 0, joint_count_of(arm_of(world))
     for start in range(0, count, WIDTH):
         filled = min(WIDTH, count - start)
         for lane in range(WIDTH):
             load_row(world, rows, start + min(lane, filled - 1), lane)
         forward_kinematics(arm_of(world), scratch_of(world))
-        doubtful = outer_collision(world, ALL_LANES >> (WIDTH - filled), filled < 0)
+        doubtful = outer_collision(world, ALL_LANES >> (WIDTH - filled), filled < 0, NO_WATCH, joints)
         for lane in range(filled):
             open_ = (doubtful >> lane) & 1
             set_int(answers, start + lane, open_)
@@ -149,31 +173,50 @@ def classify(world: WorldTable, rows: JointValues, count: int, answers: IntArray
     return sound_count(world, count)
 
 
+@inlined
+def place(world: WorldTable, start: JointValues, end: JointValues, share: Any, joints: int) -> None:
+    """Frames of the first joints at some shares, in wide lanes, of a motion between two rows of joint values."""
+    scratch = scratch_of(world)
+    for joint in range(joints):
+        value = (1.0 - share) * double_at(start, joint) + share * double_at(end, joint)
+        set_wide_lanes(values_of(scratch), joint, value)
+    first_frames(arm_of(world), scratch, joints)
+
+
 @kernel
 def check_part(
     world: WorldTable, start: JointValues, end: JointValues, last: int, first: int, count: int, resolve: bool
 ) -> int:
     """Check ``count`` configurations of a motion between two rows of joint values: those at k / last, k = first, ...
 
-    The lanes are spread over the whole part, so that a collision anywhere shows early. Without ``resolve`` the outer
-    balls alone decide.
+    The lanes are spread over the whole part, so that a collision anywhere shows early; what keeps its distance in the
+    first block, which lies in the middle between others, is watched no more. Without ``resolve`` the outer balls alone
+    decide.
     """
     scratch, joints = scratch_of(world), joint_count_of(arm_of(world))
-    inner, inside, values = inner_balls_of(world), inner_primitives_of(world), values_of(scratch)
     blocks = (count + WIDTH - 1) // WIDTH
     every = bits(lane_numbers() >= 0.0)  # a number: for a constant numba would compile all that is called apart
-    answer = FREE
-    for block in range(blocks):
+    answer, middle, watch, left = FREE, blocks // 2, NO_WATCH, joints
+    for number in range(blocks):
+        block = middle if number == 0 else number - 1 if number <= middle else number
         places = smaller(lane_numbers() * float(blocks) + float(block), float(count - 1)) + float(first)
         share = places / float(last)
-        for joint in range(joints):
-            set_wide_lanes(values, joint, (1.0 - share) * double_at(start, joint) + share * double_at(end, joint))
-        forward_kinematics(arm_of(world), scratch)
-        if resolve and recheck_last_hit(inner, inside, scratch, every, inner_last_of(scratch)) != 0:
-            answer = COLLIDING
-            break
-        doubtful = outer_collision(world, every, not resolve)
+        place(world, start, end, share, left)
+        if number == 0:
+            if likely_in_collision(world, every, resolve) != 0:
+                answer = COLLIDING if resolve else UNDECIDED
+                break
+            if blocks > 1:
+                watch = watch_of(scratch)
+                watch_motion(world, start, end, float(middle) / float(last))
+        doubtful = outer_collision(world, every, not resolve, watch, left)
+        if doubtful != 0 and left < joints:
+            place(world, start, end, share, joints)
+        if number == 0 and blocks > 1:
+            left = joints_left(world)
         if doubtful == 0:
+            if left == 0:
+                break
             continue
         if not resolve:
             answer = UNDECIDED

@@ -68,6 +68,7 @@ from rrtik_ompl.fast.tables.accessors import (
     group_count_of,
     groups_of,
     heads_of,
+    joint_count_of,
     one_body_of,
     one_group_of,
     other_body_of,
@@ -275,7 +276,7 @@ def measure(
             set_int(which, lane, -1)
         set_lanes(best, 0, spread(UNBOUNDED_DISTANCE))
         forward_kinematics(arm_of(world), scratch)
-        prepare(balls, scratch)
+        prepare(balls, scratch, joint_count_of(arm_of(world)))
         measure_self(balls, scratch, probe, crossing)
         measure_scene(balls, primitives, scratch, probe)
         for lane in range(filled):

@@ -20,7 +20,7 @@ from rrtik_ompl.fast.checks.clearance import Clearance, rounded
 from rrtik_ompl.fast.checks.inputs import LARGEST_ANGLE, STROKE, checked_step_counts, joint_limits
 from rrtik_ompl.fast.checks.reference import ReferenceChecks
 from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.fast.tables.layout import INNER_LAST, MARKS, OUTER_PRIMITIVES, STANDING_SOLIDS, UNDECIDED
+from rrtik_ompl.fast.tables.layout import MARKS, OUTER_PRIMITIVES, STANDING_SOLIDS, UNDECIDED
 from rrtik_ompl.fast.tables.memory import Table, table
 from rrtik_ompl.fast.tables.packing import (
     ArmTables,
@@ -105,10 +105,10 @@ class FastWorld:
         self._moved = False
         self.address = 0
         if self._kernels is not None:
-            self._scratch = scratch_table(self._arm.arm, self._arm.balls, self._primitives)
+            self._scratch = scratch_table(self._arm.arm, self._arm.balls, self._arm.bounds, self._primitives)
             self._solids = standing_solids(bodies, standing, solids)
-            arm = self._arm
-            tables = (arm.arm, *arm.balls, *self._primitives, self._scratch, arm.solids, self._solids, arm.wider_solids)
+            arm, own = self._arm, (self._scratch, self._arm.solids, self._solids)
+            tables = (arm.arm, *arm.balls, *self._primitives, *own, arm.wider_solids, arm.bounds)
             self._world = table({k: t.address for k, t in enumerate(tables)})
             self.address = self._world.address
             self._marks = self._scratch[MARKS]
@@ -136,11 +136,11 @@ class FastWorld:
             if first:  # the solids stand where nothing is any more; that none is known holds wherever bodies go
                 self._solids = standing_solids(bodies, self._standing, [NO_SOLIDS] * len(bodies))
                 self._world.header[STANDING_SOLIDS] = self._solids.address
-            self._scratch[INNER_LAST][:] = -1  # what met last is there no more
 
     def intact(self) -> bool:
         """Whether no kernel has written beyond its own memory; tests check it after each call."""
-        tables = [self._arm.arm, *self._arm.balls, *self._primitives, self._arm.solids, self._arm.wider_solids]
+        arm = self._arm
+        tables = [arm.arm, *arm.balls, *self._primitives, arm.solids, arm.wider_solids, arm.bounds]
         if self._kernels is not None:
             tables += [self._scratch, self._solids, self._world]
         return all(each.intact() for each in tables) and (self._probe is None or self._probe.intact())

@@ -1,7 +1,8 @@
 """Forward kinematics in kernels: frames of all joints for ``WIDTH`` configurations at a time, one to a SIMD lane.
 
-Joint values stay in float64 until they are reduced to an eighth of a turn, so that neither large angles nor long
-motions cost precision; frames are float32.
+Joint values stay in float64 until they are reduced to half a turn, so that neither large angles nor long motions cost
+precision; frames are float32. A placement that turns about x alone, as in tables of Denavit and Hartenberg [33], costs
+less than others; the tables of the arm have such ones where they can.
 """
 
 from __future__ import annotations
@@ -12,80 +13,83 @@ import numpy as np
 
 from rrtik_ompl.fast.checks.obstacle_kernels import along
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
-from rrtik_ompl.fast.simd.lanes import (
-    absolute,
-    choose,
-    floor,
-    int_at,
-    nearest,
-    single,
-    wide_lanes_at,
-)
+from rrtik_ompl.fast.simd.lanes import double_at, int_at, nearest, single, spread, wide_lanes_at
 from rrtik_ompl.fast.tables.accessors import (
     first_row_of,
     frame_at,
     frames_of,
     joint_count_of,
+    joint_kinds_of,
     origin_at,
     origin_of,
     parents_of,
+    phases_of,
     placement_of,
     rotation_row,
     second_row_of,
     set_origin,
     set_rotation_row,
-    sliding_of,
     third_row_of,
     values_of,
 )
 from rrtik_ompl.fast.tables.layout import (
+    ALIGNED_TURN,
+    FIRST_TURN,
+    TURN,
     ArmTable,
     Frame,
     Placement,
     ScratchTable,
 )
 
-QUARTERS_PER_RADIAN = 2.0 / np.pi
-QUARTER_HIGH = 1.5707963267948966  # pi / 2 in two parts: the second is what float64 cannot hold of it
-QUARTER_LOW = 6.123233995736766e-17
+HALF_TURNS_PER_RADIAN = 1.0 / np.pi
+HALF_TURN = np.pi
 
-# Polynomials in z = x^2 for |x| <= pi / 4, fitted to the smallest greatest error [45]:
-# sin x = x + x z S(z), error 1.8e-9; cos x = 1 - z / 2 + z^2 C(z), error 1e-10.
-SINE = (np.float32(-0.16666651), np.float32(0.00833198), np.float32(-0.00019496))
-COSINE = (np.float32(4.16666469e-02), np.float32(-1.38873672e-03), np.float32(2.44384155e-05))
-HALF, ONE, TWO, ONE_AND_HALF = (np.float32(x) for x in (0.5, 1.0, 2.0, 1.5))
+# Polynomials in z = x^2 for |x| <= pi / 2, fitted to the smallest greatest error [45]:
+# sin x = x + x z S(z), error 4.7e-9; cos x = 1 - z / 2 + z^2 C(z), error 4.0e-10.
+SINE = tuple(np.float32(x) for x in (-0.166666571, 8.33301729e-03, -1.98066152e-04, 2.60005473e-06))
+COSINE = tuple(np.float32(x) for x in (4.16666558e-02, -1.38885692e-03, 2.47693042e-05, -2.61938150e-07))
+HALF, ONE, EIGHT = (np.float32(x) for x in (0.5, 1.0, 8.0))
 
 
 @inlined
 def sine_and_cosine(angle: Any) -> Any:
     """Sine and cosine of wide lanes as lanes, within 1.5e-7 for angles up to 1e8 [rad]."""
-    quarters = nearest(angle * QUARTERS_PER_RADIAN)
-    x = single((angle - quarters * QUARTER_HIGH) - quarters * QUARTER_LOW)
-    quarter = single(quarters - floor(quarters * 0.25) * 4.0)  # 0, 1, 2 or 3
-    z = x * x
-    sine = x + x * z * (SINE[0] + z * (SINE[1] + z * SINE[2]))
-    cosine = (ONE - HALF * z) + z * z * (COSINE[0] + z * (COSINE[1] + z * COSINE[2]))
-    odd = absolute(absolute(quarter - TWO) - ONE) < HALF
-    turned_sine, turned_cosine = choose(odd, cosine, sine), choose(odd, sine, cosine)
-    return (
-        choose(quarter > ONE_AND_HALF, -turned_sine, turned_sine),
-        choose(absolute(quarter - ONE_AND_HALF) < ONE, -turned_cosine, turned_cosine),
-    )
+    whole = nearest(angle * HALF_TURNS_PER_RADIAN)
+    halved = 0.5 * whole
+    x, odd = single(angle - whole * HALF_TURN), single(halved - nearest(halved))  # odd: 1/2 after a half turn, or 0
+    sign, z = ONE - EIGHT * odd * odd, x * x
+    sine = x + x * z * (SINE[0] + z * (SINE[1] + z * (SINE[2] + z * SINE[3])))
+    cosine = (ONE - HALF * z) + z * z * (COSINE[0] + z * (COSINE[1] + z * (COSINE[2] + z * COSINE[3])))
+    return sign * sine, sign * cosine
 
 
 @kernel
 def forward_kinematics(arm: ArmTable, scratch: ScratchTable) -> None:
-    """Frames of all joints from the joint values in the scratch memory (the world's own frame is there already)."""
-    parents, sliding = parents_of(arm), sliding_of(arm)
+    """Frames of all joints from the joint values in the scratch memory."""
+    first_frames(arm, scratch, joint_count_of(arm))
+
+
+@kernel
+def first_frames(arm: ArmTable, scratch: ScratchTable, count: int) -> None:
+    """Frames of the first joints; their parents are among them, and the world's own frame is there already."""
+    parents, kinds, phases = parents_of(arm), joint_kinds_of(arm), phases_of(arm)
     values, frames = values_of(scratch), frames_of(scratch)
-    for joint in range(joint_count_of(arm)):
+    for joint in range(count):
         parent, frame = frame_at(frames, int_at(parents, joint)), frame_at(frames, joint + 1)
-        fixed = placement_of(arm, joint)
+        fixed, kind = placement_of(arm, joint), int_at(kinds, joint)
         value = wide_lanes_at(values, joint)
-        if int_at(sliding, joint) != 0:
-            slide(parent, frame, fixed, single(value))
+        if kind == ALIGNED_TURN:
+            sine, cosine = sine_and_cosine(value + double_at(phases, joint))
+            turn_aligned(parent, frame, fixed, sine, cosine)
+        elif kind == FIRST_TURN:
+            sine, cosine = sine_and_cosine(value)
+            turn_first(frame, fixed, sine, cosine)
+        elif kind == TURN:
+            sine, cosine = sine_and_cosine(value)
+            turn(parent, frame, fixed, sine, cosine)
         else:
-            turn(parent, frame, fixed, value)
+            slide(parent, frame, fixed, single(value))
 
 
 @inlined
@@ -100,14 +104,41 @@ def slide(parent: Frame, frame: Frame, fixed: Placement, value: Any) -> None:
 
 
 @inlined
-def turn(parent: Frame, frame: Frame, fixed: Placement, value: Any) -> None:
+def turn(parent: Frame, frame: Frame, fixed: Placement, sine: Any, cosine: Any) -> None:
     """Frame of a turning joint: about its own z."""
-    sine, cosine = sine_and_cosine(value)
     for row in range(3):
         a, b, c = rotation_row(parent, row)
         x, y, z = rotated(fixed, a, b, c)
         set_rotation_row(frame, row, x * cosine + y * sine, y * cosine - x * sine, z)
         set_origin(frame, row, origin_at(parent, row) + along(origin_of(fixed), a, b, c))
+
+
+@inlined
+def turn_aligned(parent: Frame, frame: Frame, fixed: Placement, sine: Any, cosine: Any) -> None:
+    """The same where the placement turns about x alone."""
+    tilted_cosine, tilted_sine = second_row_of(fixed)[1], third_row_of(fixed)[1]
+    for row in range(3):
+        x, b, c = rotation_row(parent, row)
+        y, z = b * tilted_cosine + c * tilted_sine, c * tilted_cosine - b * tilted_sine
+        set_rotation_row(frame, row, x * cosine + y * sine, y * cosine - x * sine, z)
+        set_origin(frame, row, origin_at(parent, row) + along(origin_of(fixed), x, b, c))
+
+
+@inlined
+def turn_first(frame: Frame, fixed: Placement, sine: Any, cosine: Any) -> None:
+    """The same where the parent is the world."""
+    first, second, third, origin = first_row_of(fixed), second_row_of(fixed), third_row_of(fixed), origin_of(fixed)
+    set_turned_row(frame, 0, first, origin[0], sine, cosine)
+    set_turned_row(frame, 1, second, origin[1], sine, cosine)
+    set_turned_row(frame, 2, third, origin[2], sine, cosine)
+
+
+@inlined
+def set_turned_row(frame: Frame, row: int, fixed: Any, origin: float, sine: Any, cosine: Any) -> None:
+    """Set a row of a frame to that of a placement, turned about z."""
+    x, y = fixed[0], fixed[1]
+    set_rotation_row(frame, row, x * cosine + y * sine, y * cosine - x * sine, spread(fixed[2]))
+    set_origin(frame, row, spread(origin))
 
 
 @inlined

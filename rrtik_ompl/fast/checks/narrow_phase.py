@@ -27,6 +27,7 @@ from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import first_bit, float_at, int_at, lowest, set_int
 from rrtik_ompl.fast.tables import layout
 from rrtik_ompl.fast.tables.accessors import (
+    arm_of,
     axis_of,
     body_count_of,
     bound_centre_of,
@@ -45,6 +46,7 @@ from rrtik_ompl.fast.tables.accessors import (
     frames_of,
     inner_primitives_of,
     is_inside,
+    joint_count_of,
     kind_of_solid,
     marks_of,
     marks_row,
@@ -53,7 +55,7 @@ from rrtik_ompl.fast.tables.accessors import (
     one_body_of,
     other_body_of,
     outer_balls_of,
-    outer_last_of,
+    outer_likely_of,
     outer_primitives_of,
     own_of,
     pair_at,
@@ -72,6 +74,7 @@ from rrtik_ompl.fast.tables.accessors import (
 from rrtik_ompl.fast.tables.layout import (
     COLLIDING,
     FREE,
+    NO_WATCH,
     UNDECIDED,
     Frame,
     PrimitiveTable,
@@ -210,14 +213,14 @@ def mark(world: WorldTable, wanted: int) -> int:
     The numbers of moving and standing bodies come first, then those of the pairs of moving bodies.
     """
     scratch, balls, primitives = scratch_of(world), outer_balls_of(world), outer_primitives_of(world)
-    prepare(balls, scratch)
+    prepare(balls, scratch, joint_count_of(arm_of(world)))
     marks = marks_of(scratch)
     crossing = body_count_of(balls) * standing_count_of(primitives)
     total = crossing + pair_count_of(balls)
     for k in range(total):
         set_int(marks, k, 0)
-    scene_collision(balls, primitives, scratch, wanted, marks, wanted < 0, outer_last_of(scratch))
-    self_collision(balls, scratch, wanted, marks_row(marks, crossing, 1), wanted < 0)
+    scene_collision(balls, primitives, scratch, wanted, marks, wanted < 0, outer_likely_of(scratch), NO_WATCH)
+    self_collision(balls, scratch, wanted, marks_row(marks, crossing, 1), wanted < 0, NO_WATCH)
     return total
 
 

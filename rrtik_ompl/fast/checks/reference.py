@@ -24,11 +24,11 @@ def frames(arm: Table, values: Matrix) -> NDArray[np.float64]:
     turns, origins = fixed[:, layout.ROTATION : layout.ROTATION + 9], fixed[:, layout.ORIGIN : layout.ORIGIN + 3]
     found = np.zeros((len(values), len(fixed) + 1, 3, 4))
     found[:, 0, :, :3] = np.eye(3)
-    for joint, (parent, sliding) in enumerate(zip(arm[layout.PARENTS], arm[layout.SLIDING], strict=True)):
+    for joint, (parent, kind) in enumerate(zip(arm[layout.PARENTS], arm[layout.JOINT_KINDS], strict=True)):
         above = found[:, parent]
         rotation = above[:, :, :3] @ turns[joint].reshape(3, 3)
         origin = above[:, :, 3] + above[:, :, :3] @ origins[joint]
-        value = values[:, joint, None]
+        value, sliding = values[:, joint, None] + arm[layout.PHASES][joint], kind == layout.SLIDE
         x, y, z = rotation[:, :, 0], rotation[:, :, 1], rotation[:, :, 2]
         sine, cosine = np.sin(value), np.cos(value)
         turned = (x, y) if sliding else (x * cosine + y * sine, y * cosine - x * sine)

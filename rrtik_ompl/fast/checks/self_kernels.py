@@ -9,6 +9,7 @@ from typing import Any
 
 from rrtik_ompl.fast.checks.obstacle_kernels import squared
 from rrtik_ompl.fast.checks.sphere_kernels import place_cluster, placed_centre
+from rrtik_ompl.fast.checks.watch_kernels import ZERO, set_clear, slack_at
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
 from rrtik_ompl.fast.simd.lanes import bits, int_at, set_int
 from rrtik_ompl.fast.tables.accessors import (
@@ -30,6 +31,7 @@ from rrtik_ompl.fast.tables.accessors import (
     frames_of,
     group_balls_of,
     group_centres_of,
+    group_count_of,
     one_body_of,
     one_group_of,
     other_body_of,
@@ -43,7 +45,7 @@ from rrtik_ompl.fast.tables.accessors import (
     self_margin_of,
     stored_centre,
 )
-from rrtik_ompl.fast.tables.layout import NO_MARKS, BallTable, Marks, ScratchTable
+from rrtik_ompl.fast.tables.layout import NO_MARKS, BallTable, Marks, ScratchTable, Watch
 
 
 @inlined
@@ -53,40 +55,47 @@ def within(x: Any, y: Any, z: Any, centre: Any, reach: float) -> Any:
 
 
 @kernel
-def clusters_meet(balls: BallTable, scratch: ScratchTable, first: int, second: int, wanted: int) -> int:
-    """Lanes in which a ball of one cluster meets a ball of another; all here meet that do not keep the margin."""
+def clusters_meet(balls: BallTable, scratch: ScratchTable, first: int, second: int, wanted: int, slack: float) -> Any:
+    """Lanes in which a ball of one cluster meets one of another; all here meet that do not keep the margin.
+
+    Also in which they do, or would if they were wider by ``slack``.
+    """
     place_cluster(balls, scratch, first)
     place_cluster(balls, scratch, second)
     centres, all_balls = centres_of(scratch), balls_of(balls)
     around, frames = cluster_balls_of(balls), frames_of(scratch)
     mine, others = cluster_of(balls, first), cluster_of(balls, second)
     hull = placed_centre(frame_at(frames, frame_of_cluster(others)), around, second)
-    meeting, kept = 0, self_margin_of(balls)
+    meeting, near, kept = 0, 0, self_margin_of(balls)
     for ball in range(first_ball_of(mine), end_ball_of(mine)):
         x, y, z = stored_centre(centres, ball)
         radius = radius_at(all_balls, ball) + kept
-        if within(x, y, z, hull, radius + radius_at(around, second)) & wanted & ~meeting == 0:
+        if within(x, y, z, hull, radius + radius_at(around, second) + slack) & wanted & ~meeting == 0:
             continue
         for other in range(first_ball_of(others), end_ball_of(others)):
-            meeting |= within(x, y, z, stored_centre(centres, other), radius + radius_at(all_balls, other)) & wanted
+            centre, reach = stored_centre(centres, other), radius + radius_at(all_balls, other)
+            wide = within(x, y, z, centre, reach + slack) & wanted
+            if wide != 0:
+                near |= wide
+                meeting |= within(x, y, z, centre, reach) & wanted
         if meeting == wanted:
             break
-    return meeting
+    return meeting, near
 
 
 @kernel
-def bodies_meet(balls: BallTable, scratch: ScratchTable, first: int, second: int, wanted: int) -> int:
-    """Lanes in which a ball of one body meets a ball of another."""
+def bodies_meet(balls: BallTable, scratch: ScratchTable, first: int, second: int, wanted: int, slack: float) -> Any:
+    """Lanes in which a ball of one body meets one of another; whether balls around them, by ``slack`` wider, do."""
     frames, one, two = frames_of(scratch), body_of(balls, first), body_of(balls, second)
     around, hulls = cluster_balls_of(balls), body_balls_of(balls)
     first_frame, second_frame = frame_at(frames, frame_of_body(one)), frame_at(frames, frame_of_body(two))
-    kept = self_margin_of(balls)
+    kept = self_margin_of(balls) + slack
     hull, radius = placed_centre(second_frame, hulls, second), radius_at(hulls, second) + kept
     x, y, z = placed_centre(first_frame, hulls, first)
     close = within(x, y, z, hull, radius + radius_at(hulls, first)) & wanted
-    meeting = 0
+    meeting, near_by = 0, False
     if close == 0:
-        return meeting
+        return meeting, near_by
     for mine in range(first_cluster_of_body(one), end_cluster_of_body(one)):
         x, y, z = placed_centre(first_frame, around, mine)
         extent = radius_at(around, mine)
@@ -97,26 +106,34 @@ def bodies_meet(balls: BallTable, scratch: ScratchTable, first: int, second: int
             centre = placed_centre(second_frame, around, other)
             both = within(x, y, z, centre, extent + radius_at(around, other) + kept) & near & ~meeting
             if both != 0:
-                meeting |= clusters_meet(balls, scratch, mine, other, both)
+                found, wide = clusters_meet(balls, scratch, mine, other, both, slack)
+                meeting |= found
+                near_by = near_by or wide != 0
         if meeting == close:
             break
-    return meeting
+    return meeting, near_by
 
 
 @kernel
-def self_collision(balls: BallTable, scratch: ScratchTable, wanted: int, marks: Marks, one: bool) -> int:
+def self_collision(balls: BallTable, scratch: ScratchTable, wanted: int, marks: Marks, one: bool, watch: Watch) -> int:
     """Lanes among ``wanted`` in which two bodies of the arm meet; if ``one`` is enough, not all of them.
 
-    Unless ``NO_MARKS``, ``marks`` are one number for each pair, which collects the lanes.
+    Unless ``NO_MARKS``, ``marks`` are one number for each pair, which collects the lanes. ``watch``: see
+    :mod:`rrtik_ompl.fast.checks.watch_kernels`.
     """
     groups, pairs = pair_groups_of(balls), pairs_of(balls)
     around, centres = group_balls_of(balls), group_centres_of(scratch)
-    meeting, kept = 0, self_margin_of(balls)
+    meeting, kept, watched = 0, self_margin_of(balls), group_count_of(balls)
     for number in range(pair_group_count_of(balls)):
+        slack = slack_at(watch, watched + number)
+        if slack < ZERO:
+            continue
+        if slack > ZERO:
+            set_clear(watch, watched + number, meeting == 0)
         group = pair_group_at(groups, number)
         first, second = one_group_of(group), other_group_of(group)
         x, y, z = stored_centre(centres, first)
-        reach = radius_at(around, first) + radius_at(around, second) + kept
+        reach = radius_at(around, first) + radius_at(around, second) + kept + slack
         close = within(x, y, z, stored_centre(centres, second), reach) & wanted
         if marks == NO_MARKS:
             close &= ~meeting
@@ -124,8 +141,10 @@ def self_collision(balls: BallTable, scratch: ScratchTable, wanted: int, marks: 
             continue
         for k in range(first_pair_of(group), end_pair_of(group)):
             pair = pair_at(pairs, k)
-            found = bodies_meet(balls, scratch, one_body_of(pair), other_body_of(pair), close)
+            found, near = bodies_meet(balls, scratch, one_body_of(pair), other_body_of(pair), close, slack)
             meeting |= found
+            if near and slack > ZERO:
+                set_clear(watch, watched + number, False)
             if marks != NO_MARKS and found != 0:
                 set_int(marks, k, int_at(marks, k) | found)
         if marks == NO_MARKS and (meeting == wanted or (one and meeting != 0)):

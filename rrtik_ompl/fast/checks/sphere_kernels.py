@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from rrtik_ompl.fast.checks.obstacle_kernels import meets_primitives, primitives_in_reach
+from rrtik_ompl.fast.checks.watch_kernels import ZERO, set_clear, slack_at
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
 from rrtik_ompl.fast.simd.lanes import int_at, set_int
 from rrtik_ompl.fast.tables.accessors import (
@@ -40,10 +41,8 @@ from rrtik_ompl.fast.tables.accessors import (
     group_count_of,
     groups_of,
     heads_of,
-    last_ball_of,
-    last_frame_of,
-    last_primitive_list,
-    last_primitive_of,
+    likely_at,
+    likely_number_of,
     marks_row,
     met_of,
     near_of,
@@ -51,23 +50,26 @@ from rrtik_ompl.fast.tables.accessors import (
     placed_flags_of,
     primitive_count_of,
     radius_at,
-    remember_hit,
     rotation_row,
+    set_likely,
     standing_body_at,
     standing_count_of,
     store_centre,
     stored_centre,
 )
 from rrtik_ompl.fast.tables.layout import (
+    LIKELY_COUNT,
     NO_MARKS,
+    NO_WATCH,
     BallArray,
     BallTable,
     Frame,
-    LastHit,
+    LikelyBalls,
     Marks,
     PrimitiveList,
     PrimitiveTable,
     ScratchTable,
+    Watch,
 )
 
 
@@ -102,11 +104,14 @@ def checked_primitives(
 
 
 @kernel
-def prepare(balls: BallTable, scratch: ScratchTable) -> None:
-    """Place the groups' centres and forget the balls' centres of the last block."""
+def prepare(balls: BallTable, scratch: ScratchTable, joints: int) -> None:
+    """Place the centres of the groups that the first joints carry, and forget the balls' centres of the last block."""
     frames, groups = frames_of(scratch), groups_of(balls)
     for group in range(group_count_of(balls)):
-        frame = frame_at(frames, frame_of_group(group_at(groups, group)))
+        carrier = frame_of_group(group_at(groups, group))
+        if carrier > joints:
+            continue
+        frame = frame_at(frames, carrier)
         x, y, z = placed_centre(frame, group_balls_of(balls), group)
         store_centre(group_centres_of(scratch), group, x, y, z)
     flags = placed_flags_of(scratch)
@@ -129,6 +134,15 @@ def place_cluster(balls: BallTable, scratch: ScratchTable, number: int) -> None:
 
 
 @kernel
+def remember(likely: LikelyBalls, number: int, frame: int, body: int) -> None:
+    """Note a ball that met something, in the last place, unless it is in the list."""
+    for k in range(LIKELY_COUNT):
+        if likely_number_of(likely_at(likely, k)) == number:
+            return
+    set_likely(likely_at(likely, LIKELY_COUNT - 1), number, frame, body)
+
+
+@kernel
 def cluster_meets(
     balls: BallTable,
     primitives: PrimitiveTable,
@@ -138,36 +152,45 @@ def cluster_meets(
     wanted: int,
     marks: Marks,
     one: bool,
-    last: LastHit,
-) -> int:
-    """Lanes in which a ball of a cluster meets one of the first ``count`` primitives found; see ``scene_collision``."""
+    likely: LikelyBalls,
+    slack: float,
+) -> Any:
+    """Lanes in which a ball of a cluster meets one of the first ``count`` primitives found; see ``scene_collision``.
+
+    Also whether one of them, wider by ``slack``, does.
+    """
     cluster = cluster_of(balls, number)
     body, frame = body_of_cluster(cluster), frame_at(frames_of(scratch), frame_of_cluster(cluster))
     near, met = near_of(scratch), met_of(scratch)
     count = checked_primitives(primitives, body, found_of(scratch), count, near)
     if count == 0:
-        return 0
+        return 0, False
     around = cluster_balls_of(balls)
     x, y, z = placed_centre(frame, around, number)
-    radius = radius_at(around, number)
+    radius = radius_at(around, number) + slack
     close, count = meets_primitives(primitives, x, y, z, radius, True, wanted, near, count, near, NO_MARKS)
     if close == 0:
-        return 0
+        return 0, False
     place_cluster(balls, scratch, number)
     centres, all_balls = centres_of(scratch), balls_of(balls)
     own_marks = NO_MARKS if marks == NO_MARKS else marks_row(marks, standing_count_of(primitives), body)
-    meeting = 0
+    meeting, near_by = 0, False
     for ball in range(first_ball_of(cluster), end_ball_of(cluster)):
         x, y, z = stored_centre(centres, ball)
         still = close if marks != NO_MARKS else close & ~meeting
         radius = radius_at(all_balls, ball)
+        if slack > ZERO:
+            found, _ = meets_primitives(primitives, x, y, z, radius + slack, True, still, near, count, met, NO_MARKS)
+            if found == 0:
+                continue
+            near_by = True
         found, _ = meets_primitives(primitives, x, y, z, radius, False, still, near, count, met, own_marks)
         if found != 0:
             meeting |= found
-            remember_hit(last, ball, frame_of_cluster(cluster), int_at(met, 0))
+            remember(likely, ball, frame_of_cluster(cluster), body)
         if marks == NO_MARKS and (meeting == close or (one and meeting != 0)):
             break
-    return meeting
+    return meeting, near_by
 
 
 @kernel
@@ -178,20 +201,27 @@ def scene_collision(
     wanted: int,
     marks: Marks,
     one: bool,
-    last: LastHit,
-) -> int:
+    likely: LikelyBalls,
+    watch: Watch,
+) -> Any:
     """Lanes among ``wanted`` in which the arm meets a primitive; if ``one`` is enough, not all of them.
 
-    What met is written to ``last``. Unless ``NO_MARKS``, ``marks`` are one number for each moving and standing body,
-    which collects the lanes in which the two meet.
+    The balls that met are noted in ``likely``. Unless ``NO_MARKS``, ``marks`` are one number for each moving and
+    standing body, which collects the lanes in which the two meet. ``watch``: see
+    :mod:`rrtik_ompl.fast.checks.watch_kernels`.
     """
-    if primitive_count_of(primitives) == 0:
+    if primitive_count_of(primitives) == 0 and watch == NO_WATCH:
         return 0
     groups, around, found = groups_of(balls), group_balls_of(balls), found_of(scratch)
     meeting = 0
     for number in range(group_count_of(balls)):
+        slack = slack_at(watch, number)
+        if slack < ZERO:
+            continue
+        if slack > ZERO:
+            set_clear(watch, number, meeting == 0)
         x, y, z = stored_centre(group_centres_of(scratch), number)
-        radius = radius_at(around, number)
+        radius = radius_at(around, number) + slack
         still = wanted if marks != NO_MARKS else wanted & ~meeting
         count = primitives_in_reach(primitives, x, y, z, radius, found)
         if count == 0:
@@ -202,23 +232,12 @@ def scene_collision(
         group = group_at(groups, number)
         for cluster in range(first_cluster_of_group(group), end_cluster_of_group(group)):
             left = close if marks != NO_MARKS else close & ~meeting
-            meeting |= cluster_meets(balls, primitives, scratch, cluster, count, left, marks, one, last)
+            lanes, near = cluster_meets(balls, primitives, scratch, cluster, count, left, marks, one, likely, slack)
+            meeting |= lanes
+            if near:
+                set_clear(watch, number, False)
             if one and meeting != 0 and marks == NO_MARKS:
                 return meeting
         if meeting == wanted and marks == NO_MARKS:
             break
     return meeting
-
-
-@kernel
-def recheck_last_hit(
-    balls: BallTable, primitives: PrimitiveTable, scratch: ScratchTable, wanted: int, last: LastHit
-) -> int:
-    """Lanes among ``wanted`` in which the ball and the primitive meet that met last: often the quickest answer."""
-    if last_primitive_of(last) < 0:
-        return 0
-    ball, all_balls = last_ball_of(last), balls_of(balls)
-    x, y, z = placed_centre(frame_at(frames_of(scratch), last_frame_of(last)), all_balls, ball)
-    radius, source = radius_at(all_balls, ball), last_primitive_list(last)
-    found, _ = meets_primitives(primitives, x, y, z, radius, False, wanted, source, 1, met_of(scratch), NO_MARKS)
-    return int(found)

@@ -19,7 +19,7 @@ from rrtik_ompl.fast.search.tree_memory import grow, tree_table
 from rrtik_ompl.fast.simd.halton import inverse_bases
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.simd.processor import WIDTH
-from rrtik_ompl.fast.tables.memory import Table, aligned, is_intact, table
+from rrtik_ompl.fast.tables.memory import Table, aligned, is_intact, table, whole_lanes
 
 PATIENCE = 8  # rejected paths until undecided motions are asked for at once
 FIRST_CAPACITY = 64 * WIDTH  # vertices
@@ -235,11 +235,13 @@ def _search_table(motions: FastMotions, trees: list[Table], box: tuple[Vector, V
     fields: dict[int, int | NDArray[Any]] = dict.fromkeys(range(connect_layout.FIELD_COUNT), 0)
     fields |= {connect_layout.MOTIONS: motions.address}
     fields |= {connect_layout.START_TREE + side: tree.address for side, tree in enumerate(trees)}
-    fields |= {connect_layout.LOWER: box[0], connect_layout.UPPER: box[1], connect_layout.NUMBERS: numbers}
-    fields |= {connect_layout.INVERSE_BASES: np.array(inverse_bases(dof))}
-    fields |= {place: np.zeros(dof) for place in (connect_layout.ROW, connect_layout.POINT, connect_layout.CENTRE)}
+    lanes: dict[int, NDArray[Any]] = {connect_layout.LOWER: box[0], connect_layout.UPPER: box[1]}
+    lanes |= {connect_layout.INVERSE_BASES: np.array(inverse_bases(dof))}
+    lanes |= {place: np.zeros(dof) for place in (connect_layout.ROW, connect_layout.POINT, connect_layout.CENTRE)}
+    lanes |= {connect_layout.QUERY: np.zeros(dof, dtype=np.float32)}
+    fields |= {place: whole_lanes(row) for place, row in lanes.items()}
+    fields |= {connect_layout.NUMBERS: numbers}
     fields |= {connect_layout.ROW_VALUES: np.zeros(motions.joints)}
-    fields |= {connect_layout.QUERY: np.zeros(dof, dtype=np.float32)}
     fields |= {place: np.zeros(asked * dof) for place in _QUESTIONS}
     whole = (connect_layout.QUESTION_SIDES, connect_layout.QUESTION_VERTICES, connect_layout.ANSWERS)
     fields |= {place: np.zeros(asked, dtype=np.int32) for place in whole}

@@ -19,11 +19,30 @@ from rrtik_ompl.fast.search.motions.motion_kernels import (
 )
 from rrtik_ompl.fast.search.motions.motion_layout import MotionTable
 from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row, distance
-from rrtik_ompl.fast.search.tree_kernels import live_of, nearest_vertex, radius_of, row_of, values_of
+from rrtik_ompl.fast.search.tree_kernels import (
+    live_of,
+    nearest_and_square,
+    nearest_vertex,
+    radius_of,
+    row_of,
+    values_of,
+)
 from rrtik_ompl.fast.search.tree_layout import TreeTable
 from rrtik_ompl.fast.simd.access import count_up, field_reader
-from rrtik_ompl.fast.simd.compiled import inlined, kernel
-from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field, set_float
+from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
+from rrtik_ompl.fast.simd.lanes import (
+    double_at,
+    field,
+    larger,
+    set_double,
+    set_field,
+    set_float,
+    set_lanes,
+    set_wide_lanes,
+    single,
+    smaller,
+    wide_lanes_at,
+)
 from rrtik_ompl.fast.simd.random_kernels import next_point
 from rrtik_ompl.fast.tables.layout import JointValues
 
@@ -154,16 +173,18 @@ def aim_straight(search: ConnectTable) -> bool:
 
 @kernel
 def place_sample(search: ConnectTable) -> None:
-    """Set ROW to where POINT, a point of the unit box, lies in the box of samples; the next box is larger."""
+    """Set ROW and QUERY to where POINT, of the unit box, lies in the box of samples; the next box is larger."""
     spread = number_of(search, connect_layout.SPREAD)
-    for k in range(dof_in(search)):
-        middle = double_at(field(search, connect_layout.CENTRE), k)
-        low = max(double_at(field(search, connect_layout.LOWER), k), middle - spread)
-        high = min(double_at(field(search, connect_layout.UPPER), k), middle + spread)
-        share = double_at(field(search, connect_layout.POINT), k)
-        set_double(candidate_row_of(search), k, low + (high - low) * share)
-    larger = min(SAMPLE_BOX_GROWTH * spread, connect_layout.UNBOUNDED_SPREAD)
-    set_double(field(search, connect_layout.NUMBERS), connect_layout.SPREAD, larger)
+    for block in range((dof_in(search) + WIDTH - 1) // WIDTH):
+        middle = wide_lanes_at(field(search, connect_layout.CENTRE), block)
+        low = larger(wide_lanes_at(field(search, connect_layout.LOWER), block), middle - spread)
+        high = smaller(wide_lanes_at(field(search, connect_layout.UPPER), block), middle + spread)
+        share = wide_lanes_at(field(search, connect_layout.POINT), block)
+        sample = low + (high - low) * share
+        set_wide_lanes(candidate_row_of(search), block, sample)
+        set_lanes(field(search, connect_layout.QUERY), block, single(sample))
+    wider = min(SAMPLE_BOX_GROWTH * spread, connect_layout.UNBOUNDED_SPREAD)
+    set_double(field(search, connect_layout.NUMBERS), connect_layout.SPREAD, wider)
 
 
 @kernel
@@ -178,10 +199,13 @@ def aim_at_sample(search: ConnectTable) -> bool:
     point, bases = field(search, connect_layout.POINT), field(search, connect_layout.INVERSE_BASES)
     next_point(search, connect_layout.RANDOM, point, bases, dof)
     place_sample(search)
-    tree, near = tree_of(search, side), nearest_to(search, side, row)
+    tree = tree_of(search, side)
+    near, square = nearest_and_square(tree, field(search, connect_layout.QUERY))
+    if np.sqrt(square) > radius_of(tree, near):
+        return False
     begin = row_of(tree, near)
     length = distance(dof, begin, row)
-    if length > radius_of(tree, near) or length == 0.0:
+    if length == 0.0:
         return False
     steer(search, begin, row, length)
     set_candidate(search, side, near, 0)

@@ -14,7 +14,7 @@ import numpy as np
 from rrtik_ompl.fast.search import tree_layout
 from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row, row_at
 from rrtik_ompl.fast.search.tree_layout import CUT, TreeTable
-from rrtik_ompl.fast.simd.access import field_reader
+from rrtik_ompl.fast.simd.access import field_reader, lane_at
 from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import (
     bits,
@@ -110,6 +110,13 @@ def lane_place(dof: int, vertex: int, coordinate: int) -> Any:
 @kernel
 def nearest_vertex(tree: TreeTable, query: int) -> Any:
     """The vertex nearest to ``DOF`` floats; of several the first one."""
+    vertex, _ = nearest_and_square(tree, query)
+    return vertex
+
+
+@kernel
+def nearest_and_square(tree: TreeTable, query: int) -> Any:
+    """The same, and the square of its distance."""
     dof, points = dof_of(tree), points_of(tree)
     least, place = spread(UNBOUNDED_SQUARE), spread(ZERO)
     for block in range((size_of(tree) + WIDTH - 1) // WIDTH):
@@ -120,9 +127,13 @@ def nearest_vertex(tree: TreeTable, query: int) -> Any:
         closer = total < least
         least = choose(closer, total, least)
         place = choose(closer, spread(np.float32(block)), place)
-    winners = least <= lowest(least)
+    square = lowest(least)
+    winners = least <= square
+    lane = first_bit(bits(winners))
+    if bits(winners) == 1 << lane:
+        return int(lane_at(place, lane)) * WIDTH + lane, square
     block = lowest(choose(winners, place, spread(UNBOUNDED_BLOCK)))
-    return int(block) * WIDTH + first_bit(bits(winners & (place <= block)))
+    return int(block) * WIDTH + first_bit(bits(winners & (place <= block))), square
 
 
 @kernel

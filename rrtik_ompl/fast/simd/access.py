@@ -14,7 +14,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from rrtik_ompl.fast.simd.compiled import inlined
-from rrtik_ompl.fast.simd.lanes import DOUBLE, INDEX, SINGLE, WHOLE, field, pointer, set_field
+from rrtik_ompl.fast.simd.lanes import DOUBLE, INDEX, LANES, SINGLE, WHOLE, field, pointer, set_field
 from rrtik_ompl.fast.tables.layout import DOUBLE_BYTES, INT_BYTES
 
 _FIELD_BYTES = 8
@@ -141,3 +141,10 @@ double_row = _row_reader(DOUBLE_BYTES)  # the same of float64
 def count_up(table: int, place: int) -> None:
     """Add 1 to a field."""
     set_field(table, place, field(table, place) + 1)
+
+
+def _emit_lane(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.extract_element(*args)
+
+
+lane_at = intrinsic(lambda typingctx, lanes, number: (types.float32(LANES, types.int64), _emit_lane))  # of lanes

@@ -6,8 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.fast.simd.compiled import kernel
-from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field
+from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
+from rrtik_ompl.fast.simd.lanes import (
+    bits,
+    choose,
+    double_at,
+    field,
+    larger,
+    set_double,
+    set_field,
+    set_wide_lanes,
+    wide_lanes_at,
+)
 
 # Constants of splitmix64 [46], without signs: LLVM may assume that a signed number never overflows.
 GOLDEN, FIRST_FACTOR, SECOND_FACTOR = (
@@ -28,22 +38,20 @@ def next_share(table: int, place: int) -> float:
     return float(np.int64((mixed ^ (mixed >> SHIFT_31)) >> SHIFT_11)) * SHARE_OF_BIT
 
 
-@kernel
-def next_in_base(x: float, inverse: float) -> float:
-    """The successor of x in the van der Corput sequence of base 1 / inverse: 1 is added to its first digit.
+@inlined
+def next_in_bases(x: Any, inverse: Any) -> Any:
+    """The successors of x in the van der Corput sequences of bases 1 / inverse, in wide lanes.
 
-    The carry runs towards the later digits. The successor is that of [47]; from a random first point it is a randomised
-    Halton sequence [48].
+    To each, 1 is added at its first digit, and the carry runs towards the later digits. The successor is that of [47];
+    from a random first point it is a randomised Halton sequence [48].
     """
-    rest = max(1.0 - x - LEAST_REST, LEAST_REST)  # less, as x is rounded
-    if inverse < rest:
-        return x + inverse
-    digit = inverse
-    previous = digit
-    while digit >= rest:
-        previous = digit
-        digit *= inverse
-    return max(x + previous + digit - 1.0, 0.0)
+    rest = larger((1.0 - x) - LEAST_REST, LEAST_REST)  # less, as x is rounded
+    previous, digit = inverse, inverse
+    first = carry = digit >= rest
+    while bits(carry) != 0:
+        previous, digit = choose(carry, digit, previous), choose(carry, digit * inverse, digit)
+        carry = digit >= rest
+    return choose(first, larger(((x + previous) + digit) - 1.0, 0.0), x + inverse)
 
 
 @kernel
@@ -56,11 +64,14 @@ def start_points(table: int, place: int, points: int, count: int) -> int:
 
 @kernel
 def next_point(table: int, place: int, points: int, inverses: int, count: int) -> int:
-    """Replace a point by the next one: of the Halton sequence, or uniformly random where the inverse base is 0."""
-    for k in range(count):
-        inverse = double_at(inverses, k)
-        if inverse > 0.0:
-            set_double(points, k, next_in_base(double_at(points, k), inverse))
-        else:
-            set_double(points, k, next_share(table, place))
+    """Replace a point by the next one: of the Halton sequence, or uniformly random where the inverse bases are 0.
+
+    Both arrays have room for whole lanes.
+    """
+    if double_at(inverses, 0) > 0.0:
+        for block in range((count + WIDTH - 1) // WIDTH):
+            x = next_in_bases(wide_lanes_at(points, block), wide_lanes_at(inverses, block))
+            set_wide_lanes(points, block, x)
+    else:
+        start_points(table, place, points, count)
     return count

@@ -18,7 +18,6 @@ from rrtik_ompl.fast.simd.access import (
     int_column,
     int_reader,
     member_reader,
-    part_reader,
     record_reader,
     vector_reader,
 )
@@ -44,10 +43,13 @@ moving_solids_of: Callable[[layout.WorldTable], layout.SolidTable] = field_reade
 standing_solids_of: Callable[[layout.WorldTable], layout.SolidTable] = field_reader(layout.STANDING_SOLIDS)
 wider_solids_of: Callable[[layout.WorldTable], layout.SolidTable] = field_reader(layout.WIDER_SOLIDS)
 
+bounds_of: Callable[[layout.WorldTable], layout.BoundTable] = field_reader(layout.MOTION_BOUNDS)
+
 # Arm
 joint_count_of: Callable[[layout.ArmTable], int] = field_reader(layout.JOINT_COUNT)
 parents_of: Callable[[layout.ArmTable], layout.IntArray] = field_reader(layout.PARENTS)
-sliding_of: Callable[[layout.ArmTable], layout.IntArray] = field_reader(layout.SLIDING)
+joint_kinds_of: Callable[[layout.ArmTable], layout.IntArray] = field_reader(layout.JOINT_KINDS)
+phases_of: Callable[[layout.ArmTable], layout.DoubleArray] = field_reader(layout.PHASES)
 placement_of: Callable[[layout.ArmTable, int], layout.Placement] = member_reader(
     layout.PLACEMENTS, FLOAT_BYTES * layout.POSE_NUMBERS
 )
@@ -102,6 +104,10 @@ pairs_of: Callable[[layout.BallTable], layout.PairArray] = field_reader(layout.P
 pair_at: Callable[[layout.PairArray, int], layout.Pair] = record_reader(INT_BYTES * layout.PAIR_INTS)
 one_body_of: Callable[[layout.Pair], int] = int_reader(layout.PAIR_ONE)
 other_body_of: Callable[[layout.Pair], int] = int_reader(layout.PAIR_OTHER)
+
+# Bounds of motions
+bound_blocks_of: Callable[[layout.BoundTable], int] = field_reader(layout.BOUND_BLOCKS)
+bound_rows_of: Callable[[layout.BoundTable], layout.LaneArray] = field_reader(layout.BOUNDS)
 
 # Primitives: what stands still
 primitive_count_of: Callable[[layout.PrimitiveTable], int] = field_reader(layout.PRIMITIVE_COUNT)
@@ -165,13 +171,14 @@ near_of: Callable[[layout.ScratchTable], layout.PrimitiveList] = field_reader(la
 met_of: Callable[[layout.ScratchTable], layout.PrimitiveList] = field_reader(layout.MET)
 marks_of: Callable[[layout.ScratchTable], layout.Marks] = field_reader(layout.MARKS)
 waiting_of: Callable[[layout.ScratchTable], layout.IntArray] = field_reader(layout.WAITING)
-outer_last_of: Callable[[layout.ScratchTable], layout.LastHit] = field_reader(layout.OUTER_LAST)
-inner_last_of: Callable[[layout.ScratchTable], layout.LastHit] = field_reader(layout.INNER_LAST)
+outer_likely_of: Callable[[layout.ScratchTable], layout.LikelyBalls] = field_reader(layout.OUTER_LIKELY)
+inner_likely_of: Callable[[layout.ScratchTable], layout.LikelyBalls] = field_reader(layout.INNER_LIKELY)
+watch_of: Callable[[layout.ScratchTable], layout.Watch] = field_reader(layout.WATCH)
 note_of: Callable[[layout.ScratchTable], layout.LaneArray] = field_reader(layout.NOTE)
-last_ball_of: Callable[[layout.LastHit], int] = int_reader(layout.LAST_BALL)
-last_frame_of: Callable[[layout.LastHit], int] = int_reader(layout.LAST_FRAME)
-last_primitive_of: Callable[[layout.LastHit], int] = int_reader(layout.LAST_PRIMITIVE)
-last_primitive_list: Callable[[layout.LastHit], layout.PrimitiveList] = part_reader(INT_BYTES * layout.LAST_PRIMITIVE)
+likely_at: Callable[[layout.LikelyBalls, int], layout.LikelyBall] = record_reader(INT_BYTES * layout.LIKELY_INTS)
+likely_number_of: Callable[[layout.LikelyBall], int] = int_reader(layout.LIKELY_NUMBER)
+likely_frame_of: Callable[[layout.LikelyBall], int] = int_reader(layout.LIKELY_FRAME)
+likely_body_of: Callable[[layout.LikelyBall], int] = int_reader(layout.LIKELY_BODY)
 
 # Probe
 best_of: Callable[[layout.ProbeTable], layout.LaneArray] = field_reader(layout.BEST)
@@ -243,8 +250,8 @@ def corner_block(corners: layout.CornerArray, block: int) -> Vector:
 
 
 @inlined
-def remember_hit(last: layout.LastHit, ball: int, frame: int, primitive: int) -> None:
-    """Note what met last."""
-    set_int(last, layout.LAST_BALL, ball)
-    set_int(last, layout.LAST_FRAME, frame)
-    set_int(last, layout.LAST_PRIMITIVE, primitive)
+def set_likely(likely: layout.LikelyBall, number: int, frame: int, body: int) -> None:
+    """Put a ball at a place of a list of likely ones."""
+    set_int(likely, layout.LIKELY_NUMBER, number)
+    set_int(likely, layout.LIKELY_FRAME, frame)
+    set_int(likely, layout.LIKELY_BODY, body)

@@ -26,6 +26,7 @@ PrimitiveTable = NewType("PrimitiveTable", int)
 SolidTable = NewType("SolidTable", int)
 ScratchTable = NewType("ScratchTable", int)
 ProbeTable = NewType("ProbeTable", int)
+BoundTable = NewType("BoundTable", int)
 
 # Addresses of arrays, by what they hold.
 IntArray = NewType("IntArray", int)
@@ -45,6 +46,8 @@ CornerArray = NewType("CornerArray", int)
 PrimitiveList = NewType("PrimitiveList", int)  # numbers of primitives, int32
 Marks = NewType("Marks", int)  # for each pair of bodies the lanes in which it is in doubt, int32
 NO_MARKS = Marks(0)
+Watch = NewType("Watch", int)  # for each group, then each pair of groups, of outer balls one float
+NO_WATCH = Watch(0)
 
 # Addresses of records.
 Placement = NewType("Placement", int)
@@ -60,15 +63,19 @@ Plane = NewType("Plane", int)
 Span = NewType("Span", int)
 Solid = NewType("Solid", int)
 SolidSizes = NewType("SolidSizes", int)
-LastHit = NewType("LastHit", int)
+LikelyBalls = NewType("LikelyBalls", int)
+LikelyBall = NewType("LikelyBall", int)
 
 # World: addresses of the tables that a check needs.
 ARM, OUTER, INNER, OUTER_PRIMITIVES, INNER_PRIMITIVES, SCRATCH, MOVING_SOLIDS, STANDING_SOLIDS = range(8)
 WIDER_SOLIDS = 8  # the moving solids, each with the margin around it that the arm keeps from itself
+MOTION_BOUNDS = 9
 
-# Arm. PARENTS: frame that carries each joint · SLIDING: whether a joint slides · PLACEMENTS: of each joint in its
-# parent's frame
-JOINT_COUNT, PARENTS, SLIDING, PLACEMENTS = range(4)
+# Arm. PARENTS: frame that carries each joint · JOINT_KINDS · PLACEMENTS: of each joint in its parent's frame ·
+# PHASES: what is added to each value
+JOINT_COUNT, PARENTS, JOINT_KINDS, PLACEMENTS, PHASES = range(5)
+# Kinds of joints. FIRST_TURN: its parent is the world. ALIGNED_TURN: its placement turns about x alone.
+TURN, SLIDE, FIRST_TURN, ALIGNED_TURN = range(4)
 # Placement (of floats) and frame (of lanes): the rotation row by row, then the origin.
 AXES = 3  # numbers of a point, rows of a rotation
 POSE_NUMBERS = 12
@@ -97,6 +104,10 @@ PAIR_GROUP_ONE, PAIR_GROUP_OTHER, PAIR_GROUP_FIRST, PAIR_GROUP_END = range(4)
 # Pair (ints): numbers of two bodies.
 PAIR_INTS = 2
 PAIR_ONE, PAIR_OTHER = range(2)
+
+# Bounds of what is watched: BOUND_BLOCKS of lanes in a row of BOUNDS. The first row has the last frame that it needs.
+# The second one is added to the sum of the others, one for each joint, times what the joints move.
+BOUND_BLOCKS, BOUNDS = range(2)
 
 # Primitives: what stands still. BOXES: BOX_RUNS of PADDED_COUNT floats · NUMBERS: the heads · PRIMITIVES: the
 # shapes · CHECKED: one int for each moving and standing body, 0 to ignore that pair ·
@@ -140,13 +151,16 @@ DISC, AXIS, ROUND, SLACK, BOUND_CENTRE, BOUND_RADIUS = 0, 1, 4, 5, 6, 9
 
 # Scratch memory. VALUES: wide lanes of joint values · FRAMES · GROUP_CENTRES, CENTRES: of balls · PLACED: flags of the
 # clusters whose balls are placed · FOUND, NEAR, MET: lists of primitives · MARKS: see above, moving and standing bodies
-# first · WAITING: configurations that wait for a second check · OUTER_LAST, INNER_LAST: what met last · NOTE: lanes
-VALUES, FRAMES, GROUP_CENTRES, CENTRES, PLACED, FOUND, NEAR, MET, MARKS, WAITING, OUTER_LAST, INNER_LAST, NOTE = range(
-    13
-)
-# What met last (ints): ball, its frame, primitive (-1: nothing yet).
-LAST_INTS = 3
-LAST_BALL, LAST_FRAME, LAST_PRIMITIVE = range(3)
+# first · WAITING: configurations that wait for a second check · OUTER_LIKELY, INNER_LIKELY: balls that met something
+# lately · NOTE: lanes · WATCH: see below
+VALUES, FRAMES, GROUP_CENTRES, CENTRES, PLACED, FOUND, NEAR, MET, MARKS, WAITING = range(10)
+OUTER_LIKELY, INNER_LIKELY, NOTE, WATCH = range(10, 14)
+# Watch (floats): by how much [m] bounds are widened for the configurations of a motion that are yet to be checked;
+# CLEAR if nothing can be met at any of them.
+CLEAR = -1.0
+# Likely ball (ints): its number (-1: none yet), its frame, its body. There are so many, the likeliest first.
+LIKELY_INTS, LIKELY_COUNT = 3, 3
+LIKELY_NUMBER, LIKELY_FRAME, LIKELY_BODY = range(3)
 
 # Probe, for distances. BEST: lanes of the smallest distance so far · WHICH: ints of the pair that has it · GAPS: lanes
 # of distances of listed primitives

@@ -18,6 +18,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.fast.tables.layout import ALIGNMENT
 
 Header: TypeAlias = NDArray[np.int64]
@@ -162,3 +163,8 @@ class PlannedTable:
     def intact(self) -> bool:
         """Whether nothing has been written beyond an array or the fields."""
         return bool((self._words[self._plan.guards] == GUARD_WORD).all())
+
+
+def whole_lanes(row: NDArray[Any]) -> NDArray[Any]:
+    """A row with zeros behind it, so that kernels can read it ``WIDTH`` numbers at a time."""
+    return np.append(row, np.zeros(-len(row) % WIDTH, dtype=row.dtype))

@@ -13,6 +13,7 @@ from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.body_arrays import body_arrays
 from rrtik_ompl.fast.tables.layout import PAIR_INTS, PAIR_ONE, PAIR_OTHER, PAIRS
 from rrtik_ompl.fast.tables.memory import Table
+from rrtik_ompl.fast.tables.motion_bounds import bounds_table
 from rrtik_ompl.fast.tables.primitive_tables import Primitives, joined, primitive_table
 from rrtik_ompl.fast.tables.robot_tables import (
     MovingBody,
@@ -42,6 +43,7 @@ class ArmTables:
     margin: float
     arm: Table
     balls: tuple[Table, Table]
+    bounds: Table
     solids: Table
     wider_solids: Table
 
@@ -117,6 +119,7 @@ def arm_tables(
     ]
     kept = max((body.margin for body in carried), default=0.0)  # one for all of them
     balls = (ball_table(packed, own, inner=False, kept=kept), ball_table(packed, own, inner=True, kept=kept))
+    bounds = bounds_table(chain, balls[0], limits, margin)
     turns = axis_turns(chain)
     poses = np.zeros((len(carried), 4, 4))
     for pose, body in zip(poses, carried, strict=True):  # in the turned frames of their joints
@@ -125,7 +128,8 @@ def arm_tables(
     frames = [bodies[members[0]].joint for members in moving]
     single = _solids(solids_of, poses, frames, sizes, kept=0.0, slack=margin)
     wider = single if kept == 0.0 else _solids(solids_of, poses, frames, sizes, kept=kept, slack=margin)
-    return ArmTables(carried, sizes, covers, solids_of, own, limits, margin, arm_table(chain), balls, single, wider)
+    joints = arm_table(chain)
+    return ArmTables(carried, sizes, covers, solids_of, own, limits, margin, joints, balls, bounds, single, wider)
 
 
 def _solids(

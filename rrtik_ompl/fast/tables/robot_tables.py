@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.fast.tables.layout import (
+    ALIGNED_TURN,
     BALL_FLOATS,
     BALLS,
     BODIES,
@@ -34,6 +35,7 @@ from rrtik_ompl.fast.tables.layout import (
     CLUSTER_FRAME,
     CLUSTER_INTS,
     CLUSTERS,
+    FIRST_TURN,
     GROUP_BALLS,
     GROUP_COUNT,
     GROUP_END,
@@ -42,6 +44,7 @@ from rrtik_ompl.fast.tables.layout import (
     GROUP_INTS,
     GROUPS,
     JOINT_COUNT,
+    JOINT_KINDS,
     ORIGIN,
     PAIR_COUNT,
     PAIR_GROUP_COUNT,
@@ -56,11 +59,13 @@ from rrtik_ompl.fast.tables.layout import (
     PAIR_OTHER,
     PAIRS,
     PARENTS,
+    PHASES,
     PLACEMENTS,
     POSE_NUMBERS,
     ROTATION,
     SELF_MARGIN,
-    SLIDING,
+    SLIDE,
+    TURN,
 )
 from rrtik_ompl.fast.tables.memory import Table, table, whole_records
 from rrtik_ompl.robot import Chain
@@ -69,6 +74,9 @@ Spheres: TypeAlias = NDArray[np.float64]  # shape (n, 4): centre and radius [m]
 
 CLUSTER_SIZE = 8  # balls in the smallest neighbourhood, at most
 UNBOUNDED_RADIUS = 1e6  # [m] radius of the ball that stands for a body without end
+
+PARALLEL = 1e-6  # sine of the angle between two axes below which they count as parallel
+ALIGNED = 1e-12  # of a placement's rotation: by how much its axis may be off
 
 SMALLEST_MARGIN = 2e-5  # [m]
 MARGIN_PER_LEVER = 1e-6  # a joint's rotation in float32 errs by less than this angle [rad]
@@ -86,29 +94,49 @@ class MovingBody:
 
 def arm_table(chain: Chain) -> Table:
     """The joints of a tree."""
-    turns = axis_turns(chain)
-    placements = np.empty((len(chain.parent), POSE_NUMBERS))
-    for row, parent in enumerate(chain.parent):
+    turns, parents = axis_turns(chain), chain.parent.tolist()
+    placements, phases = np.empty((len(parents), POSE_NUMBERS)), np.zeros(len(parents))
+    kinds = [
+        SLIDE if slides else TURN if parent >= 0 else FIRST_TURN
+        for slides, parent in zip(chain.prismatic, parents, strict=True)
+    ]
+    for row, parent in enumerate(parents):
         back = turns[parent].T if parent >= 0 else np.eye(3)
-        placements[row, ROTATION : ROTATION + 9] = (back @ chain.placement[row][:3, :3] @ turns[row]).ravel()
+        rotation = back @ chain.placement[row][:3, :3] @ turns[row]
+        if kinds[row] == TURN and abs(rotation[0, 2]) < ALIGNED:
+            kinds[row], phases[row] = ALIGNED_TURN, np.arctan2(-rotation[0, 1], rotation[0, 0])
+            cosine, sine = rotation[2, 2], -rotation[1, 2]
+            rotation = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
+        placements[row, ROTATION : ROTATION + 9] = rotation.ravel()
         placements[row, ORIGIN : ORIGIN + 3] = back @ chain.placement[row][:3, 3]
     return table(
         {
-            JOINT_COUNT: len(chain.parent),
+            JOINT_COUNT: len(parents),
             PARENTS: chain.parent.astype(np.int32) + np.int32(1),
-            SLIDING: chain.prismatic.astype(np.int32),
+            JOINT_KINDS: np.array(kinds, dtype=np.int32),
             PLACEMENTS: placements.astype(np.float32),
+            PHASES: phases,
         }
     )
 
 
 @lru_cache(maxsize=64)
 def axis_turns(chain: Chain) -> NDArray[np.float64]:
-    """For each joint a rotation that takes z to the joint's axis, shape (n, 3, 3)."""
+    """For each joint a rotation that takes z to the joint's axis, shape (n, 3, 3).
+
+    Its x is square to the axis of the first joint behind it, too, so that the placement of that one turns about x and z
+    alone, as in the tables of Denavit and Hartenberg [33].
+    """
     turns = np.empty((len(chain.parent), 3, 3))
+    parents = chain.parent.tolist()
     for row, axis in enumerate(chain.axis):
-        helper = np.eye(3)[np.argmin(np.abs(axis))]
-        x = np.cross(helper, axis) / np.linalg.norm(np.cross(helper, axis))
+        behind = parents.index(row) if row in parents else None
+        square = np.zeros(3)
+        if behind is not None:
+            square = np.cross(axis, chain.placement[behind][:3, :3] @ chain.axis[behind])
+        if np.linalg.norm(square) < PARALLEL:
+            square = np.cross(np.eye(3)[np.argmin(np.abs(axis))], axis)
+        x = square / np.linalg.norm(square)
         turns[row] = np.column_stack([x, np.cross(axis, x), axis])
     return frozen(turns)
 

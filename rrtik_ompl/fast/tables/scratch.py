@@ -9,7 +9,7 @@ from rrtik_ompl.fast.tables import layout
 from rrtik_ompl.fast.tables.memory import Table, table
 
 
-def scratch_table(arm: Table, balls: tuple[Table, ...], primitives: tuple[Table, ...]) -> Table:
+def scratch_table(arm: Table, balls: tuple[Table, ...], bounds: Table, primitives: tuple[Table, ...]) -> Table:
     """Memory for one thread that checks with these tables; the frame of the world is in place."""
 
     def most(tables: tuple[Table, ...], place: int) -> int:
@@ -31,9 +31,10 @@ def scratch_table(arm: Table, balls: tuple[Table, ...], primitives: tuple[Table,
             layout.NEAR: numbers,
             layout.MET: numbers,
             layout.WAITING: np.zeros(WIDTH, dtype=np.int32),
-            layout.OUTER_LAST: np.full(layout.LAST_INTS, -1, dtype=np.int32),
-            layout.INNER_LAST: np.full(layout.LAST_INTS, -1, dtype=np.int32),
+            layout.OUTER_LIKELY: np.full((layout.LIKELY_COUNT, layout.LIKELY_INTS), -1, dtype=np.int32),
+            layout.INNER_LIKELY: np.full((layout.LIKELY_COUNT, layout.LIKELY_INTS), -1, dtype=np.int32),
             layout.NOTE: np.zeros(WIDTH, dtype=np.float32),
+            layout.WATCH: np.zeros(int(bounds.header[layout.BOUND_BLOCKS]) * WIDTH, dtype=np.float32),
             layout.MARKS: np.zeros(crossing + most(balls, layout.PAIR_COUNT), dtype=np.int32),
         }
     )

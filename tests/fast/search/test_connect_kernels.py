@@ -11,7 +11,7 @@ from rrtik_ompl.fast.search.tree_memory import grow, tree_table
 from rrtik_ompl.fast.simd.compiled import WIDTH, entry
 from rrtik_ompl.fast.simd.halton import inverse_bases
 from rrtik_ompl.fast.simd.random_kernels import next_point, next_share, start_points
-from rrtik_ompl.fast.tables.memory import table
+from rrtik_ompl.fast.tables.memory import aligned, table, whole_lanes
 
 pytestmark = pytest.mark.kernels
 
@@ -128,14 +128,17 @@ def test_a_second_share_in_one_kernel_is_the_next_of_the_stream():
 
 
 def points(dimensions, count, start=None, seed=3):
-    random, point = table({0: seed}), np.array(start if start is not None else np.zeros(dimensions))
-    bases = np.array(inverse_bases(dimensions))
+    random, point = (
+        table({0: seed}),
+        aligned(whole_lanes(np.array(start if start is not None else np.zeros(dimensions)))),
+    )
+    bases = aligned(whole_lanes(np.array(inverse_bases(dimensions))))
     if start is None:
         start_points(random.address, 0, point.ctypes.data, dimensions)
     rows = np.empty((count, dimensions))
     for row in rows:
         next_point(random.address, 0, point.ctypes.data, bases.ctypes.data, dimensions)
-        row[:] = point
+        row[:] = point[:dimensions]
     return rows
 
 

@@ -26,14 +26,14 @@ from rrtik_ompl.fast.ik.ik_kinematics import measure
 from rrtik_ompl.fast.ik.ik_layout import Aim, CallTable, Pose
 from rrtik_ompl.fast.tables.accessors import first_ball_of, radius_at
 from rrtik_ompl.fast.tables.layout import (
-    NO_MARKS, ArmTable, BallArray, BallTable, CentreArray, Cluster, Group, JointValues, LastHit, PrimitiveTable,
-    ProbeTable, ScratchTable, WorldTable,
+    NO_MARKS, NO_WATCH, ArmTable, BallArray, BallTable, CentreArray, Cluster, Group, JointValues, LikelyBalls,
+    PrimitiveTable, ProbeTable, ScratchTable, WorldTable,
 )
 
 
 def right(
     world: WorldTable, arm: ArmTable, balls: BallTable, primitives: PrimitiveTable, scratch: ScratchTable,
-    last: LastHit, values: JointValues, probe: ProbeTable, cluster: Cluster, array: BallArray, aim: Aim,
+    likely: LikelyBalls, values: JointValues, probe: ProbeTable, cluster: Cluster, array: BallArray, aim: Aim,
     call: CallTable, motions: MotionTable, connect: ConnectTable, tree: TreeTable, row: Configuration,
     crdt: CrdtTable, crdt_tree: CrdtTreeTable,
 ) -> None:
@@ -43,7 +43,7 @@ def right(
     parent_of(tree, 0)
     add_free_edges(crdt, crdt_tree)
     forward_kinematics(arm, scratch)
-    scene_collision(balls, primitives, scratch, 1, NO_MARKS, True, last)
+    scene_collision(balls, primitives, scratch, 1, NO_MARKS, True, likely, NO_WATCH)
     check_edge(world, values, values, 3, False)
     measure_scene(balls, primitives, scratch, probe)
     first_ball_of(cluster)
@@ -53,7 +53,7 @@ def right(
 
 def swapped(
     world: WorldTable, arm: ArmTable, balls: BallTable, primitives: PrimitiveTable, scratch: ScratchTable,
-    last: LastHit, values: JointValues, probe: ProbeTable, group: Group, centres: CentreArray, pose: Pose,
+    likely: LikelyBalls, values: JointValues, probe: ProbeTable, group: Group, centres: CentreArray, pose: Pose,
     call: CallTable, motions: MotionTable, connect: ConnectTable, tree: TreeTable, row: Configuration,
     crdt: CrdtTable, crdt_tree: CrdtTreeTable,
 ) -> None:
@@ -64,7 +64,7 @@ def swapped(
     parent_of(crdt_tree, 0)
     add_free_edges(crdt, tree)
     forward_kinematics(scratch, arm)
-    scene_collision(primitives, balls, scratch, 1, NO_MARKS, True, last)
+    scene_collision(primitives, balls, scratch, 1, NO_MARKS, True, likely, NO_WATCH)
     check_edge(values, world, values, 3, False)
     measure_scene(balls, primitives, probe, scratch)
     first_ball_of(group)

@@ -19,7 +19,7 @@ from rrtik_ompl.fast.search.tree_memory import grow, tree_table
 from rrtik_ompl.fast.simd.halton import inverse_bases
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.simd.processor import WIDTH
-from rrtik_ompl.fast.tables.memory import Table, aligned, is_intact, table
+from rrtik_ompl.fast.tables.memory import Table, aligned, is_intact, table, whole_lanes
 
 FIRST_CAPACITY = 128 * WIDTH  # vertices
 FIRST_BUDGET, MAX_BUDGET = 4, 1 << 14  # samples in one call of the kernel
@@ -213,8 +213,8 @@ def _search_table(
     fields |= {layout.MOTIONS: motions.address, layout.HELD: held, layout.NUMBERS: numbers}
     fields |= {layout.START_TREE + side: tree.address for side, tree in enumerate(trees)}
     fields |= {layout.LOWER: np.asarray(box[0]), layout.UPPER: np.asarray(box[1])}
-    fields |= {layout.INVERSE_BASES: np.array(inverse_bases(dof))}
-    fields |= {place: np.zeros(dof) for place in (layout.ROW, layout.AIM, layout.POINT)}
+    fields |= {layout.INVERSE_BASES: whole_lanes(np.array(inverse_bases(dof)))}
+    fields |= {place: whole_lanes(np.zeros(dof)) for place in (layout.ROW, layout.AIM, layout.POINT)}
     fields |= {layout.ROW_VALUES: np.zeros(motions.joints), layout.QUERY: np.zeros(dof, dtype=np.float32)}
     made = table(fields)
     if motions.identity:

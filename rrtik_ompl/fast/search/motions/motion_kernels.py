@@ -14,7 +14,7 @@ import numpy as np
 from rrtik_ompl.fast.checks.check_kernels import check_edge, check_part
 from rrtik_ompl.fast.search.motions import motion_layout
 from rrtik_ompl.fast.search.motions.motion_layout import STEP_TOLERANCE, MotionTable
-from rrtik_ompl.fast.search.motions.row_kernels import Configuration, distance
+from rrtik_ompl.fast.search.motions.row_kernels import Configuration
 from rrtik_ompl.fast.simd.access import field_reader
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, set_double
@@ -59,13 +59,15 @@ def whole_steps(steps: float) -> Any:
 def step_count(motions: MotionTable, start: Configuration, end: Configuration) -> Any:
     """Number of steps in which a motion is checked; :func:`rrtik_ompl.fast.search.motions.motion_table.step_counts`."""
     dof, weights, numbers = dof_of(motions), weights_of(motions), numbers_of(motions)
-    travel = 0.0
+    travel, square = 0.0, 0.0
     for k in range(dof):
-        travel += double_at(weights, k) * abs(double_at(end, k) - double_at(start, k))
+        gap = double_at(end, k) - double_at(start, k)
+        travel += double_at(weights, k) * abs(gap)
+        square += gap * gap
     steps = travel / double_at(numbers, motion_layout.RESOLUTION)
     per_unit = double_at(numbers, motion_layout.STEPS_PER_UNIT)
     if per_unit > 0.0:
-        steps = max(steps, per_unit * distance(dof, start, end))
+        steps = max(steps, per_unit * np.sqrt(square))
     return whole_steps(steps)
 
 
