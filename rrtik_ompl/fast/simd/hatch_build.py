@@ -32,7 +32,7 @@ class KernelBitcode(BuildHookInterface):  # type: ignore[misc]
 
     def dependencies(self) -> list[str]:
         """What the build environment needs besides hatch."""
-        return [] if SETTING == WITHOUT else ["numba>=0.68.1"]
+        return [] if SETTING == WITHOUT else ["numba>=0.62.1"]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile before the wheel is packed.

@@ -14,6 +14,7 @@ from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError
 
 ORIGIN = np.zeros(3)
+UNDISTORT: Any = getattr(cv2, "undistortPointsIter", cv2.undistortPoints)  # OpenCV 5 made one function of two
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +64,7 @@ class Camera:
         if not self.distortion.any():
             return (rows - self.matrix[:2, 2]) / np.diag(self.matrix)[:2]
         stop = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 60, 1e-12)
-        found: Any = cv2.undistortPoints(rows[:, None], self.matrix, self.distortion, criteria=stop)
+        found: Any = UNDISTORT(rows[:, None], self.matrix, self.distortion, R=None, P=None, criteria=stop)
         return np.asarray(found, dtype=np.float64)[:, 0]
 
     def jacobian(self, points: ArrayLike, translation: ArrayLike) -> Matrix:

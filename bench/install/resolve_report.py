@@ -1,0 +1,132 @@
+"""Whether a resolver finds all that the wheel needs, for machines other than this one.
+
+Usage: ``pip install uv``, then ``python bench/install/resolve_report.py [--out bench/reports/resolve.md]``; a minute.
+
+uv resolves for a named platform and version of Python, wheels alone, without installing anything. The page tells of the
+day on which it was made.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import date
+from email.parser import Parser
+from pathlib import Path
+from zipfile import ZipFile
+
+from bench.install.wheels import ROOT, built_wheel
+from bench.shared.pages import add_out
+from rrtik_bench.report.machine import package_version
+from rrtik_bench.report.page import Report
+
+PYTHONS = ("3.10", "3.11", "3.12", "3.13")
+NEXT_PYTHON = "3.14"
+FLOOR = ROOT / "tests" / "constraints" / "floor.txt"
+FLOOR_PYTHON = "3.10"  # that of the floor job: older versions have no wheels for the newest Python
+SHOWN = ("ompl", "pin", "coal", "numba", "llvmlite", "numpy", "scipy", "opencv-python-headless")
+
+
+PLATFORMS = {
+    "macOS 15, Apple's ARM": "aarch64-apple-darwin",
+    "Linux with glibc 2.28, AArch64": "aarch64-manylinux_2_28",
+    "Linux with glibc 2.28, x86-64": "x86_64-manylinux_2_28",
+    "macOS 15, Intel": "x86_64-apple-darwin",
+    "Windows, x86-64": "x86_64-pc-windows-msvc",
+}
+WANTED = tuple(PLATFORMS)[:3]  # the others are shown, not asked for
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What uv found.
+
+    Attributes:
+        versions: By name of the package; empty if nothing fits.
+        reason: Why nothing fits, in uv's words.
+    """
+
+    versions: dict[str, str]
+    reason: str = ""
+
+    @property
+    def shown(self) -> str:
+        """For a cell of a table."""
+        return f"yes, {len(self.versions)}" if self.versions else f"no: {self.reason}"
+
+
+def resolved(asked: Iterable[str], platform: str, python: str, *options: str) -> Answer:
+    """Versions of all packages that some requirements lead to."""
+    command = [sys.executable, "-m", "uv", "pip", "compile", "--quiet", "--no-header", "--no-annotate"]
+    command += ["--only-binary", ":all:", "--python-platform", platform, "--python-version", python, *options, "-"]
+    environment = {**os.environ, "MACOSX_DEPLOYMENT_TARGET": "15.0"}
+    lines = "\n".join(asked)
+    done = subprocess.run(command, input=lines, env=environment, capture_output=True, text=True, check=False)
+    if done.returncode:
+        hints = [line.strip() for line in done.stderr.replace("\n  ", " ").splitlines() if "hint" in line]
+        return Answer({}, " ".join((hints or done.stderr.splitlines() or ["uv failed"])[0].split()))
+    pairs = (line.partition("==") for line in done.stdout.splitlines())
+    return Answer({name: version for name, _, version in pairs if version})
+
+
+def requirements(wheel: Path) -> list[str]:
+    """What a wheel requires, without extras."""
+    with ZipFile(wheel) as archive:
+        (name,) = [name for name in archive.namelist() if name.endswith(".dist-info/METADATA")]
+        said = Parser().parsestr(archive.read(name).decode()).get_all("Requires-Dist", [])
+    return [line for line in said if "extra ==" not in line]
+
+
+def report(wheel: Path) -> Report:
+    """The page."""
+    page = Report("What the wheel needs, resolved for other machines", "python bench/install/resolve_report.py")
+    page.intro = f"{date.today()}, {package_version('uv')}, wheels alone."
+    itself = [f"rrtik-ompl @ {wheel.as_uri()}"]
+    answers = {
+        (platform, python): resolved(itself, name, python)
+        for platform, name in PLATFORMS.items()
+        for python in PYTHONS
+        if platform in WANTED or python == PYTHONS[-1]
+    }
+    asked = [(platform, python) for platform in WANTED for python in PYTHONS]
+    good = sum(bool(answers[key].versions) for key in asked)
+    held = good == len(asked)
+    page.bar("the wheel's dependencies, three platforms, Python 3.10 to 3.13", "all resolve", f"{good} of 12", held)
+    floors = {name: resolved(itself, PLATFORMS[name], FLOOR_PYTHON, "--constraint", str(FLOOR)) for name in WANTED}
+    good = sum(bool(answer.versions) for answer in floors.values())
+    page.bar("the lowest versions together, Python 3.10", "resolve on all three", f"{good} of 3", good == 3)
+    rows = [
+        [name, *(answers[name, python].shown if (name, python) in answers else "" for python in PYTHONS)]
+        for name in PLATFORMS
+    ]
+    page.table("Whether all is found, and how many packages that is", ("platform", *PYTHONS), rows)
+    columns = [(name, python) for name in WANTED for python in (PYTHONS[0], PYTHONS[-1])]
+    versions = [[name, *(answers[key].versions.get(name, "") for key in columns)] for name in SHOWN]
+    page.table("Versions", ("package", *(f"{name}, {python}" for name, python in columns)), versions)
+    text = f"`{FLOOR.relative_to(ROOT)}` as constraints."
+    page.table(
+        f"The floor, Python {FLOOR_PYTHON}", ("platform", ""), [(k, v.shown) for k, v in floors.items()], text=text
+    )
+    needed = requirements(wheel)
+    later = [(name, resolved(needed, PLATFORMS[name], NEXT_PYTHON).shown) for name in WANTED]
+    text = "The dependencies alone; `requires-python` is raised when they resolve."
+    page.table(f"Python {NEXT_PYTHON}", ("platform", ""), later, text=text)
+    return page
+
+
+def main() -> int:
+    """Write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    add_out(parser, "resolve.md")
+    out = parser.parse_args().out
+    with tempfile.TemporaryDirectory() as folder:
+        return report(built_wheel(Path(folder), kernels=False)).finish(out)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,110 @@
+"""What is said in several places about installing agrees: versions, platforms, links, dependencies."""
+
+import re
+from itertools import chain
+
+import pytest
+import yaml
+
+import rrtik_ompl
+from rrtik_tests.places import ROOT
+
+PROJECT = (ROOT / "pyproject.toml").read_text()
+README = (ROOT / "README.md").read_text()
+WORKFLOWS = {file.stem: file.read_text() for file in (ROOT / ".github" / "workflows").glob("*.yml")}
+RECIPE = yaml.safe_load((ROOT / "recipe" / "recipe.yaml").read_text())
+CONDA_NAMES = {
+    "pin": "pinocchio-python",
+    "coal": "coal-python",
+    "example-robot-data": "example-robot-data-loaders",
+    "opencv-python-headless": "py-opencv",
+    "meshcat": "meshcat-python",
+    "matplotlib": "matplotlib-base",
+    "PyYAML": "pyyaml",
+}
+
+
+def bounds():
+    """Lower bounds of the package's dependencies, by name."""
+    section = PROJECT.split("\ndependencies = [", 1)[1].split("]", 1)[0]
+    return dict(re.findall(r'"([\w-]+)>=([\w.]+)', section))
+
+
+def floor():
+    """Versions of the floor job, by name."""
+    return dict(re.findall(r"^([\w-]+)==(\S+)$", (ROOT / "tests" / "constraints" / "floor.txt").read_text(), re.M))
+
+
+def pythons():
+    """The versions of Python that classifiers name."""
+    return re.findall(r'"Programming Language :: Python :: (3\.\d+)"', PROJECT)
+
+
+def test_the_floor_job_has_the_lowest_versions_that_are_admitted():
+    assert len(bounds()) > 10
+    assert bounds().items() <= floor().items()
+
+
+def test_the_hook_that_makes_kernels_takes_the_same_numba():
+    hook = (ROOT / "rrtik_ompl" / "fast" / "simd" / "hatch_build.py").read_text()
+    assert f'"numba>={bounds()["numba"]}"' in hook
+
+
+def test_versions_of_python_agree():
+    low, high = re.search(r'requires-python = ">=(3\.\d+),<(3\.\d+)"', PROJECT).groups()
+    minors = [int(version.split(".")[1]) for version in pythons()]
+    assert minors == [*range(int(low.split(".")[1]), int(high.split(".")[1]))]
+    assert f'target-version = "py{low.replace(".", "")}"' in PROJECT
+    matrix = yaml.safe_load(WORKFLOWS["release"])["jobs"]["install"]["strategy"]["matrix"]
+    assert matrix["python"] == [pythons()[0], pythons()[-1]]
+    assert f"Python {pythons()[0]} to {pythons()[-1]}" in README
+
+
+def test_the_wheel_is_installed_on_four_kinds_of_runner_before_it_is_published():
+    jobs = yaml.safe_load(WORKFLOWS["release"])["jobs"]
+    runners = {*jobs["install"]["strategy"]["matrix"]["runner"], jobs["conda"]["runs-on"]}
+    assert len(runners) == 4
+    assert {"install", "conda"} <= set(jobs["publish"]["needs"])
+    assert "ref_type == 'tag'" in jobs["publish"]["if"]
+
+
+@pytest.mark.parametrize("name", sorted(WORKFLOWS))
+def test_the_files_that_a_workflow_names_are_there(name):
+    jobs = yaml.safe_load(WORKFLOWS[name])["jobs"].values()
+    steps = chain.from_iterable(job["steps"] for job in jobs)
+    text = " ".join(str(step.get("run", "")) + str(step.get("env", "")) for step in steps)
+    named = set(re.findall(r"(?:tests|bench|recipe|rrtik_ompl|\.ci)/[\w./]+", text))
+    assert [path for path in named if not (ROOT / path).exists()] == []
+    assert not re.findall(r"(?<![\w.}/])/(?:tmp|work|home|opt|usr)/", WORKFLOWS[name])
+
+
+def test_the_release_runs_the_first_command_of_the_readme():
+    (pattern,) = re.findall(r"sed -n 's/(\S.*)/\\1/p' README\.md", WORKFLOWS["release"])
+    expression = pattern.replace("\\(", "(").replace("\\)", ")").replace("\\/", "/")
+    (command,) = [match for line in README.splitlines() for match in re.findall(f"^{expression}$", line)]
+    assert command.startswith(".venv/bin/rrtik plan titan4_sdu ")
+
+
+def test_pictures_of_the_readme_have_addresses_that_work_anywhere_and_lead_to_files_here():
+    pictures = re.findall(r"!\[[^\]]*\]\(([^)]+)\)", README)
+    address = "https://raw.githubusercontent.com/rrtik-ompl/rrtik-ompl/main/"
+    assert pictures
+    assert all(picture.startswith(address) for picture in pictures)
+    assert all((ROOT / picture.removeprefix(address)).is_file() for picture in pictures)
+
+
+def test_no_link_of_the_page_on_the_package_index_leads_nowhere():
+    pattern, replacement = re.search(r"^pattern = '(.*)'\nreplacement = '(.*)'$", PROJECT, re.M).groups()
+    page = re.sub(pattern, replacement, README)
+    links = re.findall(r"\]\(([^)]+)\)", page)
+    assert all(link.startswith(("https://", "#")) for link in links)
+    assert sum("/blob/" in link for link in links) > 10
+
+
+def test_the_conda_recipe_asks_for_the_same():
+    assert RECIPE["context"]["version"] == rrtik_ompl.__version__
+    asked = dict(re.fullmatch(r"(\S+) >=(\S+)", item).groups() for item in RECIPE["requirements"]["run"][1:])
+    assert set(asked) == {CONDA_NAMES.get(name, name) for name in bounds()}
+    for name, version in bounds().items():
+        assert version.startswith(asked[CONDA_NAMES.get(name, name)])
+    assert RECIPE["requirements"]["run"][0].endswith(f",<3.{int(pythons()[-1].split('.')[1]) + 1}")
