@@ -88,6 +88,10 @@ if TYPE_CHECKING:
     from rrtik_ompl.tasks import Straight as Straight
     from rrtik_ompl.tasks import Task as Task
     from rrtik_ompl.tasks import TaskPlan as TaskPlan
+    from rrtik_ompl.tasks.plan_file import load_task_plan as load_task_plan
+    from rrtik_ompl.tasks.plan_file import save_task_plan as save_task_plan
+    from rrtik_ompl.tasks.task_file import list_tasks as list_tasks
+    from rrtik_ompl.tasks.task_file import load_task as load_task
     from rrtik_ompl.tip_motion import StraightResult as StraightResult
     from rrtik_ompl.tip_motion import arc as arc
     from rrtik_ompl.tip_motion import linear as linear
@@ -133,6 +137,8 @@ else:
         "shortening": ("MoveRules", "shorten"),
         "task_region": ("TaskRegion",),
         "tasks": ("Alternatives", "Attach", "Detach", "Gripper", "MoveTo", "Straight", "Task", "TaskPlan"),
+        "tasks.plan_file": ("load_task_plan", "save_task_plan"),
+        "tasks.task_file": ("list_tasks", "load_task"),
         "tip_motion": ("StraightResult", "arc", "linear", "screw", "straight"),
         "trajectory": ("RateLimits", "Trajectory", "load_trajectory", "motion_report", "time_parameterize"),
         "viewer": ("view",),

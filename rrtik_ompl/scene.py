@@ -213,7 +213,7 @@ class Scene:
     def attaching(
         self, name: str, link: str, allow: Iterable[str] = (), *, pose: ArrayLike | pin.SE3 | None = None
     ) -> Scene:
-        """The scene in which an obstacle has become an attached object.
+        """The scene in which an obstacle has become an attached object; pairs that may touch still may.
 
         Args:
             name: Of the obstacle.
@@ -229,12 +229,12 @@ class Scene:
         held = AttachedObject(name, link, taken.shape, pin.SE3.Identity() if pose is None else pose)
         beside = {o.name for o in rest.obstacles} | {a.name for a in rest.attached}
         names = tuple(allow)
-        pairs = (*rest.allowed_collisions, *((name, other) for other in names if other in beside))
+        pairs = (*self.allowed_collisions, *((name, other) for other in names if other in beside))
         links = tuple(other for other in names if other not in beside)
         return Scene(rest.obstacles, (*rest.attached, replace(held, allow=links)), pairs)
 
     def detaching(self, name: str, pose: ArrayLike | pin.SE3) -> Scene:
-        """The scene in which an attached object has become an obstacle at T_world_object.
+        """The scene in which an attached object is an obstacle at T_world_object; pairs that may touch still may.
 
         Raises:
             UnknownNameError: If there is no attached object of that name.
@@ -243,7 +243,8 @@ class Scene:
         held = {a.name: a for a in self.attached}
         if name not in held:
             raise UnknownNameError("attached object", name, held)
-        return self.without(name).with_(Obstacle(name, held[name].shape, pose))
+        free = self.without(name).with_(Obstacle(name, held[name].shape, pose))
+        return replace(free, allowed_collisions=self.allowed_collisions)
 
     def at(self, time: float) -> Scene:
         """The scene with ``time`` [s] as its time 0: moving obstacles are where their motion puts them, and go on.

@@ -22,6 +22,7 @@ from rrtik_ompl.cli.plan import plan
 from rrtik_ompl.cli.reach import reach
 from rrtik_ompl.cli.replan import replan_scenario
 from rrtik_ompl.cli.reproduce import reproduce
+from rrtik_ompl.cli.task import straight, task
 from rrtik_ompl.cli.terminal import drop_output, note, prepare_streams, say, warn
 from rrtik_ompl.errors import RrtikError
 from rrtik_ompl.files import notice
@@ -51,6 +52,7 @@ class Kind(str, Enum):
     problems = "problems"
     ik = "ik"
     suites = "suites"
+    tasks = "tasks"
 
 
 def _print_version(asked: bool) -> None:
@@ -90,7 +92,7 @@ def check(
     world = question.world
     route = None if path is None else load_path(path, world.robot)
     if route is not None and proof is not None:
-        from rrtik_ompl.cli.proofs import certified
+        from rrtik_ompl.cli.plan_report import certified
 
         line, holds = certified(question, route, proof)
         say(line)
@@ -147,6 +149,7 @@ def list_names(kind: Annotated[Kind | None, typer.Argument(help="All kinds if le
     """List what is there by name."""
     from rrtik_ompl import list_ik_methods, list_planners, list_problems, list_robots
     from rrtik_ompl.catalog import list_suites
+    from rrtik_ompl.tasks.task_file import list_tasks
 
     sources = {
         Kind.robots: list_robots,
@@ -154,6 +157,7 @@ def list_names(kind: Annotated[Kind | None, typer.Argument(help="All kinds if le
         Kind.problems: list_problems,
         Kind.ik: list_ik_methods,
         Kind.suites: list_suites,
+        Kind.tasks: list_tasks,
     }
     for each in Kind if kind is None else (kind,):
         if kind is None:
@@ -195,6 +199,8 @@ def warmup() -> int:
 
 COMMANDS: dict[str, Callable[..., int]] = {
     "plan": plan,
+    "straight": straight,
+    "task": task,
     "check": check,
     "show": show,
     "moves": list_moves,

@@ -126,7 +126,7 @@ def _write(problem: Any, path: Any, raw: Any, out: Path | None, html: Path | Non
             view(problem, path, html=html, before=None if path is raw else raw)
     if certificate is None:
         return ""
-    from rrtik_ompl.cli.proofs import write_certificate
+    from rrtik_ompl.cli.plan_report import write_certificate
 
     return write_certificate(problem, path, certificate)
 

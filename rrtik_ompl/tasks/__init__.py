@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -73,8 +74,8 @@ class Task:
 
     stages: tuple[Stage, ...]
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "stages", checked_stages(self.stages, "task"))
+    def __init__(self, stages: Sequence[Stage]) -> None:
+        object.__setattr__(self, "stages", checked_stages(stages, "task"))
 
     def plan(self, world: World, start: ArrayLike | str, *, seconds: float = SECONDS, seed: int = 0) -> TaskPlan:
         """Choose alternatives and configurations such that the whole task works, and plan its motions.

@@ -17,6 +17,7 @@ from rrtik_ompl.files.text import write_text
 
 if TYPE_CHECKING:
     from rrtik_ompl.replanning.record import ReplanRun
+    from rrtik_ompl.tasks import TaskPlan
     from rrtik_ompl.viewer.drawing.marks import Mark
     from rrtik_ompl.viewer.subject import Showable, ShownPath
 
@@ -25,7 +26,7 @@ __all__ = ["view"]
 
 def view(
     shown: Showable,
-    path: ShownPath | None = None,
+    path: ShownPath | TaskPlan | None = None,
     *,
     before: ShownPath | None = None,
     ghosts: ArrayLike | None = None,
@@ -41,7 +42,7 @@ def view(
     Args:
         shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
         path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m]; nothing moves if None. A ``Trajectory`` plays
-            in real time.
+            in real time, a ``TaskPlan`` (with the first of its worlds) motion by motion, with what is carried.
         before: Another path to compare with, such as the one that ``path`` was shortened from: the trail of its tip
             is drawn too.
         ghosts: Configurations at which the arm is drawn like tinted glass, shape (k, dof), such as the solutions of

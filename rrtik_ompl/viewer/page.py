@@ -16,10 +16,12 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.replanning.record import ReplanRun
+from rrtik_ompl.tasks import TaskPlan
 from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.story import story_of
 from rrtik_ompl.viewer.subject import Showable, ShownPath, Subject, subject_of, subject_of_run
+from rrtik_ompl.viewer.task_story import run_of
 
 # The page may run its own script and nothing else: no request leaves the machine that shows it.
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
@@ -28,7 +30,7 @@ SCRIPTS = ("kinematics.js", "stage.js", "panel.js", "replay.js", "clearance.js",
 
 def page(
     shown: Showable,
-    path: ShownPath | None = None,
+    path: ShownPath | TaskPlan | None = None,
     *,
     before: ShownPath | None = None,
     ghosts: ArrayLike | None = None,
@@ -42,7 +44,7 @@ def page(
 
     Args:
         shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
-        path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m].
+        path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m]; a ``TaskPlan`` with the first of its worlds.
         before: Another path, to compare with; the trail of its tip is drawn too.
         ghosts: Configurations, shape (k, dof), drawn like tinted glass.
         marks: Further bodies.
@@ -52,6 +54,8 @@ def page(
     Raises:
         InputError: If that cannot be shown.
     """
+    if isinstance(path, TaskPlan):
+        run, path = run_of(path), None
     subject = subject_of(shown, path, before, ghosts, tuple(marks)) if run is None else subject_of_run(shown, run)
     recording, frame = draw(subject)
     heading = _title(subject) if title is None else title

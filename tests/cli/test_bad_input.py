@@ -353,7 +353,7 @@ API = {
     "scene of shapes": (lambda: rrtik.Scene([Sphere(1)]), ["each obstacle", "Obstacle", "Sphere"]),
     "three names that may touch": (lambda: rrtik.Scene([], [], [("a", "b", "c")]), ["allowed_collisions", "pairs"]),
     "obstacle of text": (lambda: rrtik.Obstacle("a", "box"), ["shape of 'a'", "Sphere or Cylinder", "str"]),
-    "obstacle at a point": (lambda: rrtik.Obstacle("a", Sphere(1), [1, 2, 3]), ["pose of 'a'", "SE3", "poses.pose"]),
+    "obstacle at no place": (lambda: rrtik.Obstacle("a", Sphere(1), [1, 2]), ["pose of 'a'", "SE3", "not 2 numbers"]),
     "obstacle without name": (lambda: rrtik.Obstacle(None, Sphere(1)), ["name", "str", "NoneType"]),
     "motion of numbers": (lambda: rrtik.Obstacle("a", Sphere(1), motion=[1, 0, 0]), ["motion of 'a'", "TimedPoses"]),
     "path checked in a robot": (lambda: rrtik.JointPath([[0, 0, 0]]).violations(robot()), ["world", "Robot"]),

@@ -72,6 +72,21 @@ def test_the_python_example_runs_from_top_to_bottom(page, tmp_path, monkeypatch)
     assert Path("view.html").stat().st_size > 100_000
 
 
+@pytest.mark.kernels
+def test_the_examples_of_tasks_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for example in blocks("tasks", "python"):
+        exec(compile(example, "tasks", "exec"), names)
+    assert [names[each].fraction for each in ("lift", "over", "round_")] == [1.0, 1.0, 1.0]
+    assert 0.0 < names["far"].fraction < 1.0
+    assert names["plan"].chosen[1] == 1
+    assert Path("task.html").stat().st_size > 100_000
+    (file,) = blocks("tasks", "yaml")
+    Path("task.yaml").write_text(file)
+    assert run(["task", "task.yaml"]) == 0
+
+
 HEADINGS = ["A robot", "A planner", "A shape", "A joint type", "A kernel", "An inverse kinematics method"]
 HEADINGS += ["A shortening method"]
 

@@ -27,11 +27,11 @@ def test_an_obstacle_is_held_and_let_go():
     (item,) = held.attached
     assert (item.name, item.link, item.allow, item.shape) == ("ball", "gripper", ("wrist",), BALL.shape)
     assert np.allclose(item.pose.translation, [0.0, 0.0, 0.1])
-    assert held.allowed_collisions == (("ball", "box"),)
+    assert held.allowed_collisions == (("ball", "wrist"), ("ball", "box"))
     free = held.detaching("ball", pin.SE3(np.eye(3), np.array([1.0, 0.0, 0.0])))
     assert free.attached == ()
     assert np.allclose(free.obstacle("ball").pose.translation, [1.0, 0.0, 0.0])
-    assert free.allowed_collisions == ()
+    assert free.allowed_collisions == held.allowed_collisions
 
 
 def test_what_is_not_there_or_there_twice_is_refused():

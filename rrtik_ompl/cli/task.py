@@ -1,0 +1,119 @@
+"""The commands `rrtik straight` and `rrtik task`: lines of the tip, and sequences of stages."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from rrtik_ompl.cli.terminal import progress, say
+from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
+from rrtik_ompl.files.text import check_target
+
+Three = tuple[float, float, float]
+
+
+def straight(
+    problem: Annotated[str, typer.Argument(help="A shipped problem or a YAML file: its robot, scene and start.")],
+    by: Annotated[Three | None, typer.Option(help="Shift of the tip in the world [m].")] = None,
+    to: Annotated[Three | None, typer.Option(help="Position of the tip at the end [m].")] = None,
+    rpy_deg: Annotated[
+        Three | None, typer.Option(help="Its roll, pitch, yaw at the end [deg]; as at the start if left out.")
+    ] = None,
+    through: Annotated[Three | None, typer.Option(help="On the circle through this point [m].")] = None,
+    deviation: Annotated[float, typer.Option(help="Of the tip from the line at most [m].")] = 1e-4,
+    clearance: Annotated[float, typer.Option(help="To be kept from obstacles beside their margins [m].")] = 0.0,
+    out: Annotated[Path | None, typer.Option(help="Save the path: .json, .csv or .txt (OMPL matrix).")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
+) -> int:
+    """Move the tip in a straight line or an arc.
+
+    It begins at the start of the problem. Exit code 1 if it does not come to the end; what it reached is written all
+    the same.
+    """
+    if (by is None) == (to is None):
+        raise typer.BadParameter("give the end of the line: '--by DX DY DZ' or '--to X Y Z', and only one of them.")
+    check_target(out, PATH_FORMATS)
+    check_target(html, (".html", ".htm"))
+    from rrtik_ompl import arc, load_problem
+    from rrtik_ompl import straight as follow
+    from rrtik_ompl.poses import pose_from_rpy
+
+    question = load_problem(problem)
+    tip = question.robot.fk(question.start)
+    place = tip.translation + np.array(by) if by is not None else np.array(to)
+    goal: Any = place if rpy_deg is None else pose_from_rpy(place, np.radians(rpy_deg))
+    kept: dict[str, Any] = {"deviation": deviation, "clearance": clearance}
+    with progress(f"following a line in {question.name}"):
+        if through is None:
+            made = follow(question.world, question.start, goal, **kept)
+        else:
+            made = arc(question.world, question.start, goal, through, **kept)
+    written: list[Path] = []
+    if made.path is not None and out is not None:
+        made.path.save(out)
+        written.append(out)
+    if made.path is not None and html is not None:
+        from rrtik_ompl.viewer import view
+
+        view(question.world, made.path, html=html, title=f"{question.name}: {100.0 * made.fraction:.4g} % of the line")
+        written.append(html)
+    waypoints = 0 if made.path is None else len(made.path.waypoints)
+    if as_json:
+        print(json.dumps({"fraction": made.fraction, "reason": made.reason, "waypoints": waypoints}))
+    else:
+        why = f": {made.reason}" if made.reason else f", {waypoints} waypoints, proven free"
+        say(f"{question.name}: {100.0 * made.fraction:.4g} % of the line{why}")
+        say(*(f"wrote {file}" for file in written))
+    return 0 if made.fraction == 1.0 else 1
+
+
+def task(
+    task: Annotated[str, typer.Argument(help="A shipped task (see: rrtik list tasks) or a YAML file with task:.")],
+    seconds: Annotated[float, typer.Option(help="Time limit [s].")] = 10.0,
+    seed: Annotated[int, typer.Option(help="The same seed gives the same plan.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="Save all motions with their worlds: .json.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a page that plays the whole task.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
+) -> int:
+    """Plan a task: pick and place and other sequences of stages.
+
+    Exit code 1 if no choice of alternatives and configurations works.
+    """
+    check_target(out, (".json",))
+    check_target(html, (".html", ".htm"))
+    from rrtik_ompl.tasks.plan_file import save_task_plan
+    from rrtik_ompl.tasks.task_file import load_task
+
+    loaded = load_task(task)
+    with progress(f"planning {loaded.name}"):
+        plan = loaded.task.plan(loaded.world, loaded.start, seconds=seconds, seed=seed)
+    if plan.found and out is not None:
+        save_task_plan(plan, out)
+    if plan.found and html is not None:
+        from rrtik_ompl.viewer import view
+
+        with progress("drawing"):
+            view(loaded.world, plan, html=html, title=f"{loaded.name}: {len(plan.paths)} motions")
+    if as_json:
+        kept = {"found": plan.found, "reason": plan.reason, "chosen": list(plan.chosen), "seed": seed}
+        motions = [
+            {"stage": str(s), "waypoints": len(p.waypoints)} for s, p in zip(plan.stages, plan.paths, strict=True)
+        ]
+        print(json.dumps({**kept, "motions": motions}))
+        return 0 if plan.found else 1
+    if not plan.found:
+        say(f"{loaded.name}: not found: {plan.reason}")
+        return 1
+    chosen = f", alternatives {', '.join(str(k + 1) for k in plan.chosen)}" if plan.chosen else ""
+    say(f"{loaded.name}: {len(plan.paths)} motions{chosen}")
+    for number, (stage, path, world) in enumerate(zip(plan.stages, plan.paths, plan.worlds, strict=True)):
+        held = ", ".join(item.name for item in world.scene.attached)
+        proven = "proven free" if path.proven else "checked in steps"
+        say(f"  {number + 1} {stage}: {len(path.waypoints)} waypoints, {proven}" + (f", holds {held}" if held else ""))
+    say(*(f"wrote {file}" for file in (out, html) if file is not None))
+    return 0

@@ -1,0 +1,111 @@
+"""The plan of a task in one file (JSON): every motion with its stage, its waypoints, its robot and its scene."""
+
+from __future__ import annotations
+
+import json
+import os
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from rrtik_ompl.arrays import finite_array
+from rrtik_ompl.catalog import robot_from_entry
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.sections import Name, NotNegative, Numbers, Positive, Section, Version, parse
+from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
+from rrtik_ompl.files.text import file_name, known_ending, write_text
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.problem_files.robot import RobotEntry, robot_data
+from rrtik_ompl.problem_files.scene import SceneEntry, scene_data
+from rrtik_ompl.tasks import TaskPlan
+from rrtik_ompl.tasks.task_file import StageEntry, stage_data
+from rrtik_ompl.world import FINEST_RESOLUTION, World
+
+KIND: Literal["task_plan"] = "task_plan"
+
+
+class MotionEntry(Section):
+    """One motion: what it does, where it leads, and the world that it is in."""
+
+    stage: StageEntry
+    robot: RobotEntry
+    scene: SceneEntry = Field(default=SceneEntry())
+    waypoints: Annotated[list[Numbers], Field(min_length=1)]
+
+
+class TaskPlanFile(Section):
+    """The plan of a task."""
+
+    version: Version
+    kind: Literal["task_plan"]
+    joint_names: list[Name]
+    chosen: list[int] = Field(default=[])
+    motion_resolution: Positive = Field(ge=FINEST_RESOLUTION)
+    self_margin: NotNegative = 0.0
+    motions: Annotated[list[MotionEntry], Field(min_length=1)]
+
+
+def save_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
+    """Write the plan of a task to a .json file, whole or not at all.
+
+    Raises:
+        InputError: If it has no motion, the ending is another one, or the file cannot be written.
+    """
+    known_ending(file, (".json",), "task plan")
+    if not plan.paths:
+        raise InputError("task plan: it has no motion to save" + (f": {plan.reason}" if plan.reason else ""))
+    folder = file_name(file).parent
+    motions = [
+        {
+            "stage": stage_data(stage),
+            "robot": robot_data(world.robot.source, folder),
+            "scene": scene_data(world.scene, folder),
+            "waypoints": path.waypoints.tolist(),
+        }
+        for path, world, stage in zip(plan.paths, plan.worlds, plan.stages, strict=True)
+    ]
+    first = plan.worlds[0]
+    document = {
+        "version": 1,
+        "kind": KIND,
+        "joint_names": list(first.robot.joint_names),
+        "chosen": list(plan.chosen),
+        "motion_resolution": first.motion_resolution,
+        "self_margin": first.self_margin,
+        "motions": motions,
+    }
+    write_text(file, json.dumps(document, allow_nan=False))
+
+
+def load_task_plan(file: str | os.PathLike[str]) -> TaskPlan:
+    """Read a plan that :func:`save_task_plan` has written; its motions have no proofs.
+
+    Raises:
+        InputError: If the file is missing, malformed, or its parts do not fit each other.
+    """
+    document = read_yaml(file_name(file))
+    entry = parse(document, TaskPlanFile)
+    worlds: list[World] = []
+    paths: list[JointPath] = []
+    for number in range(len(entry.motions)):
+        world, path = _motion(document, entry, number)
+        if paths and np.abs(paths[-1].end - path.start).max() > 1e-9:
+            raise document.error(("motions", number), "begins elsewhere than the motion before ends")
+        worlds.append(world)
+        paths.append(path)
+    stages = tuple(motion.stage.build(world.robot) for motion, world in zip(entry.motions, worlds, strict=True))
+    return TaskPlan(True, tuple(paths), tuple(worlds), stages, tuple(entry.chosen), "")
+
+
+def _motion(document: YamlDocument, entry: TaskPlanFile, number: int) -> tuple[World, JointPath]:
+    motion, data = entry.motions[number], document.data["motions"][number]
+    with document.at(("motions", number, "robot")):
+        robot = robot_from_entry(data["robot"], document.path.parent)
+        if robot.joint_names != tuple(entry.joint_names):
+            raise InputError(f"robot '{robot.name}' has other joints than the plan's: {', '.join(entry.joint_names)}")
+    scene = motion.scene.build(document, ("motions", number, "scene"))
+    with document.at(("motions", number, "scene")):
+        world = World(robot, scene, motion_resolution=entry.motion_resolution, self_margin=entry.self_margin)
+    with document.at(("motions", number, "waypoints")):
+        return world, JointPath.of(robot, finite_array(motion.waypoints, (None, robot.dof), "waypoints"))

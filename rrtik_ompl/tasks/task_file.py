@@ -1,0 +1,227 @@
+"""Task files (YAML, ``version: 1``): robot, scene, start and the stages of a task <-> `Task`."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeAlias
+
+import numpy as np
+from pydantic import Field, Tag, model_validator
+
+from rrtik_ompl.arrays import Vector
+from rrtik_ompl.catalog import problem_folders, robot_from_entry
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.files.sections import (
+    Name,
+    NotNegative,
+    Positive,
+    Section,
+    Vector3,
+    Version,
+    exactly_one,
+    parse,
+    tag,
+    told_apart_by,
+)
+from rrtik_ompl.files.strict_yaml import read_yaml
+from rrtik_ompl.files.text import file_name
+from rrtik_ompl.goal import Goal
+from rrtik_ompl.problem_files.goal import GoalSection, Posture, StartSection, build_goal, goal_data
+from rrtik_ompl.problem_files.robot import RobotEntry
+from rrtik_ompl.problem_files.scene import PoseEntry, SceneEntry, pose_data
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.tasks import Task
+from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, Gripper, MoveTo, Stage, Straight
+from rrtik_ompl.world import FINEST_RESOLUTION, MOTION_RESOLUTION, World
+
+FOLDER = "tasks"  # of shipped tasks, below each folder of problems
+
+
+class MoveToEntry(Section):
+    """Move to a goal by any way that is free."""
+
+    move_to: GoalSection
+
+    def build(self, robot: Robot) -> MoveTo:
+        """The stage."""
+        return MoveTo(self.move_to.posture if isinstance(self.move_to, Posture) else build_goal(self.move_to, robot))
+
+
+class LineEntry(Section):
+    """Where a straight line ends."""
+
+    by: Vector3 | None = Field(None, description="shift of the tip [m], its orientation kept")
+    to: PoseEntry | None = Field(None, description="pose of the tip")
+    frame: Literal["world", "tip"] = Field("world", description="whose axes the shift is in")
+
+    @model_validator(mode="after")
+    def _one_end(self) -> LineEntry:
+        exactly_one(self, ("by", "to"), "a straight line")
+        return self
+
+
+class StraightEntry(Section):
+    """Move the tip in a straight line."""
+
+    straight: LineEntry
+
+    def build(self, robot: Robot) -> Straight:
+        """The stage."""
+        del robot
+        line = self.straight
+        return Straight(line.by, None if line.to is None else line.to.build(), line.frame)
+
+
+class HoldEntry(Section):
+    """An obstacle, the link that holds it, and what it may touch."""
+
+    object: Name
+    link: Name
+    allow: list[Name] = Field(default=[], description="links and obstacles that it may touch while it is held")
+
+
+class AttachEntry(Section):
+    """An obstacle moves with a link from now on."""
+
+    attach: HoldEntry
+
+    def build(self, robot: Robot) -> Attach:
+        """The stage."""
+        del robot
+        return Attach(self.attach.object, self.attach.link, tuple(self.attach.allow))
+
+
+class DetachEntry(Section):
+    """What is held stays where it is from now on."""
+
+    detach: Name
+
+    def build(self, robot: Robot) -> Detach:
+        """The stage."""
+        del robot
+        return Detach(self.detach)
+
+
+class GripperEntry(Section):
+    """Open or close the gripper."""
+
+    gripper: Literal["open", "close"]
+    width: NotNegative | None = Field(None, description="how far apart the fingers are afterwards [m]")
+
+    def build(self, robot: Robot) -> Gripper:
+        """The stage."""
+        del robot
+        return Gripper(self.gripper, self.width)
+
+
+class AlternativesEntry(Section):
+    """Any of several rows of stages."""
+
+    alternatives: Annotated[list[Annotated[list[StageEntry], Field(min_length=1)]], Field(min_length=1)]
+
+    def build(self, robot: Robot) -> Alternatives:
+        """The stage."""
+        return Alternatives([[stage.build(robot) for stage in row] for row in self.alternatives])
+
+
+StageEntry: TypeAlias = Annotated[
+    Annotated[MoveToEntry, Tag(tag("move_to"))]
+    | Annotated[StraightEntry, Tag(tag("straight"))]
+    | Annotated[AttachEntry, Tag(tag("attach"))]
+    | Annotated[DetachEntry, Tag(tag("detach"))]
+    | Annotated[GripperEntry, Tag(tag("gripper"))]
+    | Annotated[AlternativesEntry, Tag(tag("alternatives"))],
+    told_apart_by("move_to", "straight", "attach", "detach", "gripper", "alternatives", what="a stage"),
+]
+AlternativesEntry.model_rebuild()
+
+
+class TaskFile(Section):
+    """A task. Lengths in metres; angles in radians, in degrees where a key ends in _deg."""
+
+    version: Version
+    robot: RobotEntry
+    scene: SceneEntry = Field(default=SceneEntry())
+    start: StartSection
+    task: Annotated[list[StageEntry], Field(min_length=1)]
+    motion_resolution: Positive = Field(MOTION_RESOLUTION, ge=FINEST_RESOLUTION, description="[m]")
+    self_margin: NotNegative = Field(0.0, description="[m]")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoadedTask:
+    """What a task file says: the world at the beginning, the start, shape (dof,), the task, and the file's name."""
+
+    world: World
+    start: Vector
+    task: Task
+    name: str
+
+
+def list_tasks() -> tuple[str, ...]:
+    """Names of the tasks that packages ship."""
+    return tuple(sorted(_shipped()))
+
+
+def load_task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
+    """Load a shipped task by name, or a task file.
+
+    Raises:
+        UnknownNameError: If it is a bare word, and no name.
+        InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
+    """
+    path = file_name(name_or_file)
+    if isinstance(name_or_file, str) and not path.suffix and len(path.parts) == 1:
+        shipped = _shipped()
+        if name_or_file not in shipped:
+            raise UnknownNameError("task", name_or_file, shipped)
+        path = shipped[name_or_file]
+    document = read_yaml(path)
+    if isinstance(document.data, dict) and "task" not in document.data and "goal" in document.data:
+        raise InputError(f"{path}: a problem, not a task: it has a goal and no stages; use rrtik plan {path.name}")
+    entry = parse(document, TaskFile)
+    with document.at(("robot",)):
+        robot = robot_from_entry(document.data["robot"], document.path.parent)
+    scene = entry.scene.build(document)
+    with document.at(("scene",)):
+        world = World(robot, scene, motion_resolution=entry.motion_resolution, self_margin=entry.self_margin)
+    with document.at(("start",)):
+        start = entry.start.configuration(robot)
+    with document.at(("task",)):
+        task = Task([stage.build(robot) for stage in entry.task])
+    return LoadedTask(world, start, task, path.stem)
+
+
+def stage_data(stage: Stage) -> dict[str, Any]:
+    """What a task file says about a stage.
+
+    Raises:
+        InputError: If the format has no words for its goal.
+    """
+    if isinstance(stage, Alternatives):
+        return {"alternatives": [[stage_data(each) for each in row] for row in stage.options]}
+    if isinstance(stage, MoveTo):
+        return {"move_to": _goal_data(stage.goal)}
+    if isinstance(stage, Straight):
+        if stage.by is not None:
+            return {"straight": {"by": stage.by.tolist(), "frame": stage.frame}}
+        if isinstance(stage.to, np.ndarray):
+            raise InputError("Straight: a task file cannot say to=[x, y, z]; give a pose, or by=[dx, dy, dz]")
+        return {"straight": {"to": pose_data(stage.to)}}
+    if isinstance(stage, Attach):
+        return {"attach": {"object": stage.object, "link": stage.link, "allow": list(stage.allow)}}
+    if isinstance(stage, Detach):
+        return {"detach": stage.object}
+    return {"gripper": stage.state} | ({} if stage.width is None else {"width": stage.width})
+
+
+def _goal_data(goal: Goal | Vector | str) -> dict[str, Any]:
+    if isinstance(goal, str):
+        return {"posture": goal}
+    return {"joints": goal.tolist()} if isinstance(goal, np.ndarray) else goal_data(goal)
+
+
+def _shipped() -> dict[str, Path]:
+    return {file.stem: file for folder in problem_folders() for file in sorted((folder / FOLDER).glob("*.yaml"))}

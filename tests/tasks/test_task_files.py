@@ -1,0 +1,150 @@
+"""Task files, plans in files, the commands and the page."""
+
+import json
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.cli.app import run
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.tasks.task_file import stage_data
+from rrtik_ompl.viewer.task_story import run_of
+
+SMALL = """\
+version: 1
+robot: ur5
+scene:
+  obstacles:
+    - {name: part, box: [0.05, 0.05, 0.05], pose: {xyz: [0.45, 0.11, 0.25]}}
+  allowed_collisions: [[ee_link, part], [wrist_3_link, part]]
+start: {joints: [0.0, -1.6, 1.8, -0.2, 1.6, 0.0]}
+task:
+  - straight: {by: [0, 0, 0.05]}
+  - attach: {object: part, link: ee_link, allow: [forearm_link]}
+  - alternatives:
+      - - move_to: {position: [5.0, 0.0, 0.0]}
+      - - move_to: {joints: [0.5, -1.6, 1.8, -0.2, 1.6, 0.0]}
+        - straight: {by: [0, 0, 0.05], frame: tip}
+  - detach: part
+  - move_to: {posture: up}
+"""
+
+
+@pytest.fixture
+def small(tmp_path):
+    file = tmp_path / "small.yaml"
+    file.write_text(SMALL)
+    return file
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("name", rrtik.list_tasks())
+def test_every_shipped_task_has_a_plan_that_is_free_all_along(name):
+    loaded = rrtik.load_task(name)
+    plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
+    assert plan.found, plan.reason
+    for path, world in zip(plan.paths, plan.worlds, strict=True):
+        assert path.proven
+        assert path.violations(world) == ()
+
+
+@pytest.mark.kernels
+def test_the_drawers_tool_touches_nothing_on_its_way_out_of_half_a_millimetre_of_play():
+    loaded = rrtik.load_task("titan4_drawer")
+    plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
+    world, path = plan.worlds[2], plan.paths[2]
+    clearances = [world.clearance(q) for q in path.resample(0.01).waypoints]
+    assert 2e-4 < min(clearances) < 5.1e-4
+
+
+@pytest.mark.kernels
+def test_a_plan_comes_back_from_its_file_as_it_was(small, tmp_path):
+    loaded = rrtik.load_task(small)
+    plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
+    assert plan.found, plan.reason
+    rrtik.save_task_plan(plan, tmp_path / "plan.json")
+    again = rrtik.load_task_plan(tmp_path / "plan.json")
+    assert again.chosen == plan.chosen == (1,)
+    assert [stage_data(stage) for stage in again.stages] == [stage_data(stage) for stage in plan.stages]
+    for one, other in zip(plan.paths, again.paths, strict=True):
+        assert np.array_equal(one.waypoints, other.waypoints)
+    for one, other, path in zip(plan.worlds, again.worlds, plan.paths, strict=True):
+        assert one.scene.names == other.scene.names
+        assert [a.link for a in one.scene.attached] == [a.link for a in other.scene.attached]
+        assert path.violations(other) == ()
+
+
+@pytest.mark.kernels
+def test_the_commands_write_what_they_say(small, tmp_path, capsys):
+    out, html = tmp_path / "plan.json", tmp_path / "plan.html"
+    assert run(["task", str(small), "--seed", "1", "--out", str(out), "--html", str(html)]) == 0
+    said = capsys.readouterr().out
+    assert "small: 4 motions, alternatives 2" in said
+    assert "holds part" in said
+    assert json.loads(out.read_text())["kind"] == "task_plan"
+    assert "motion 2 of 4: MoveTo" in html.read_text()
+    assert run(["straight", "titan4_sdu", "--by", "0", "0", "0.02", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["fraction"] == 1.0
+    assert run(["straight", "titan4_sdu", "--by", "1", "0", "0", "--out", str(tmp_path / "part.json")]) == 1
+    said = capsys.readouterr().out
+    assert "contact" in said or "limit" in said or "singular" in said
+    assert len(rrtik.load_path(tmp_path / "part.json").waypoints) > 1
+    assert run(["list", "tasks"]) == 0
+    assert "panda_pick_place" in capsys.readouterr().out
+
+
+@pytest.mark.kernels
+def test_the_page_carries_the_object_with_the_hand(small):
+    loaded = rrtik.load_task(small)
+    plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
+    ticks = run_of(plan).ticks
+    second = [tick for tick in ticks if tick.reason.startswith("motion 2")]
+    robot, held = plan.worlds[1].robot, plan.worlds[1].scene.attached[0]
+    for tick in second[:: len(second) // 4]:
+        assert np.allclose(tick.poses["part"][:3], (robot.fk(tick.q, held.link) * held.pose).translation)
+    still = [tick.poses["part"] for tick in ticks if tick.reason.startswith("motion 4")]
+    assert np.allclose(still, still[0])
+    assert max(np.abs(b.q - a.q).max() for a, b in pairwise(ticks)) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("attach: {object: part,", "attach: {object: cup,", "no obstacle 'cup'"),
+        ("detach: part", "detach: [part]", "detach"),
+        ("by: [0, 0, 0.05], frame: tip", "frame: tip", "needs exactly one of by, to"),
+        ("by: [0, 0, 0.05], frame: tip", "by: [0, 0, 0], frame: tip", "leads nowhere"),
+        ("posture: up", "posture: down", "posture"),
+        ("  - detach: part\n", "  - drop: part\n", "a stage needs one of the keys"),
+        ("position: [5.0", "place: [5.0", "goal needs one of the keys"),
+        ("task:", "stages:", "stages"),
+    ],
+)
+def test_a_bad_file_is_refused_with_file_and_line(small, capsys, old, new, words):
+    small.write_text(SMALL.replace(old, new))
+    assert run(["task", str(small)]) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert "Traceback" not in said
+
+
+def test_what_is_no_task_and_what_is_no_plan(tmp_path, small, capsys):
+    with pytest.raises(UnknownNameError, match="no task 'panda_pick'"):
+        rrtik.load_task("panda_pick")
+    problem = tmp_path / "problem.yaml"
+    problem.write_text("version: 1\nrobot: ur5\nstart: {posture: up}\ngoal: {posture: up}\n")
+    with pytest.raises(InputError, match="a problem, not a task"):
+        rrtik.load_task(problem)
+    failed = rrtik.TaskPlan(False, (), (), (), (), "stage 1 failed")
+    with pytest.raises(InputError, match="stage 1 failed"):
+        rrtik.save_task_plan(failed, tmp_path / "plan.json")
+    with pytest.raises(InputError, match="no motion"):
+        run_of(failed)
+    broken = tmp_path / "broken.json"
+    broken.write_text('{"version": 1, "kind": "task_plan", "motions": []}')
+    with pytest.raises(InputError, match=r"broken\.json"):
+        rrtik.load_task_plan(broken)
+    assert run(["straight", "titan4_sdu"]) == 2
+    assert "only one of them" in capsys.readouterr().err
