@@ -1,0 +1,1 @@
+"""Straight lines of the tip and tasks, measured."""
