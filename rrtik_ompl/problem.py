@@ -39,8 +39,8 @@ class Problem:
 
     Args:
         world: Robot and scene.
-        start: Configuration, shape (dof,), rad or m.
-        goal: A goal, or a configuration.
+        start: Configuration, shape (dof,), rad or m, or the name of a posture.
+        goal: A goal, a configuration, or the name of a posture.
         name: For messages and files.
         planner: Name of one of :func:`rrtik_ompl.list_planners`; it is looked up when it is used.
 
@@ -48,13 +48,14 @@ class Problem:
         ProblemError: If start or goal is in collision, within an obstacle's margin, outside the limits or outside the
             region of a constraint; pair, margin, joint, limit, or constraint and amount are named.
         InputError: If start or goal has the wrong number of joints or is not finite.
+        UnknownNameError: If there is no posture of a name.
     """
 
     def __init__(
         self,
         world: World,
-        start: ArrayLike,
-        goal: Goal | ArrayLike,
+        start: ArrayLike | str,
+        goal: Goal | ArrayLike | str,
         *,
         name: str = "problem",
         planner: str | None = None,
@@ -65,6 +66,8 @@ class Problem:
         self.world = world
         self.name = name
         self.planner = planner
+        start = world.robot.posture(start) if isinstance(start, str) else start
+        goal = world.robot.posture(goal) if isinstance(goal, str) else goal
         wanted = goal if isinstance(goal, Goal) else JointGoal(goal)
         joints = {"goal": wanted.q} if isinstance(wanted, JointGoal) else {}
         ends = usable_configurations(world, {"start": start, **joints})

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import InputError, ProblemError
+from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError
 from rrtik_ompl.goal import GoalSet, JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
@@ -138,3 +138,11 @@ def test_a_goal_pose_that_is_no_rigid_pose_is_refused(matrix):
 def test_a_region_takes_no_goal_in_joint_values():
     with pytest.raises(InputError, match="pose or position"):
         GoalSet([JointGoal([0.0, 0.0])])
+
+
+def test_start_and_goal_may_be_named_postures(titan):
+    problem = Problem(World(titan), "stowed", "ready")
+    assert np.array_equal(problem.start, titan.posture("stowed"))
+    assert np.array_equal(problem.goal.q, titan.posture("ready"))
+    with pytest.raises(UnknownNameError, match="no posture of robot 'titan4' 'redy'"):
+        Problem(World(titan), "stowed", "redy")
