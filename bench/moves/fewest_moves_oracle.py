@@ -13,6 +13,7 @@ from time import perf_counter
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 import rrtik_ompl as rrtik
 from bench.shared.pages import add_out
@@ -23,7 +24,7 @@ from rrtik_bench.shortening.plane_arms import PlaneArm, PlaneGrid
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box, Sphere
-from rrtik_ompl.transitions import lower_bound, transitions
+from rrtik_ompl.transitions import lower_bound, single_joint, transitions
 from rrtik_ompl.world import World
 from rrtik_planners import FewestMoves
 from rrtik_robots.planar import planar
@@ -41,18 +42,27 @@ HOW = (
     "each line of the grid the angles at which something begins or ceases to collide are the roots of quadratic "
     "equations, so its motions are exact, without steps. The goal is drawn from what the grid reaches, each number of "
     "moves as likely as any other; a quarter of the goals differ from the start in one joint. Start and goal keep "
-    "10 mm. The paths of the planner are judged by the same geometry. A path with fewer moves than the oracle's uses "
-    "values between those of the grid."
+    "10 mm. The paths of the planner are judged by the same geometry. The oracle is exact for paths that keep to the "
+    "values of its grid; a path with fewer moves, free by the same geometry, shows that the fewest need others. So the "
+    "oracle is asked again with the values of the planner's path added to its grid (refined): it then knows the paths "
+    "of both, and its count is what the planner has to have."
 )
 
 
 @dataclass(frozen=True)
 class Case:
-    """An arm among obstacles, the problem of it, and how many moves the oracle needs."""
+    """An arm among obstacles, the problem of it, the values of the oracle's grid, and how many moves it needs."""
 
     arm: PlaneArm
     problem: Problem
+    values: list[NDArray[np.float64]]
     moves: int
+
+    def refined(self, route: NDArray[np.float64]) -> int:
+        """How many moves the oracle needs with the values of a route, shape (k, n), on its grid too."""
+        values = [np.union1d(own, more) for own, more in zip(self.values, route.T, strict=True)]
+        grid = PlaneGrid(self.arm, values)
+        return int(grid.moves_from(self.problem.start)[grid.index(goal_joints(self.problem))])
 
 
 @dataclass(frozen=True)
@@ -63,6 +73,7 @@ class Outcome:
     links: int
     differing: int
     oracle: int
+    refined: int
     moves: int
     bound: int
     free: bool
@@ -73,7 +84,10 @@ class Outcome:
         """A row of a table."""
         path = "none" if self.moves == NONE else str(self.moves)
         seconds = f"{self.seconds:.2f}"
-        return [str(x) for x in (self.case, self.links, self.differing, self.oracle, path, self.bound, seconds)]
+        return [
+            str(x)
+            for x in (self.case, self.links, self.differing, self.oracle, self.refined, path, self.bound, seconds)
+        ]
 
 
 def drawn_arm(rng: np.random.Generator, links: int) -> PlaneArm:
@@ -130,7 +144,7 @@ def drawn_case(number: int) -> Case:
                 most = int(rng.choice(levels))
                 spots = np.argwhere(wanted & (moves == most))
                 goal = np.array([v[k] for v, k in zip(values, spots[rng.integers(len(spots))], strict=True)])
-                return Case(arm, Problem(world_of(arm), start, goal), most)
+                return Case(arm, Problem(world_of(arm), start, goal), values, most)
 
 
 def outcome(number: int) -> Outcome:
@@ -146,9 +160,10 @@ def outcome(number: int) -> Outcome:
         links=len(goal),
         differing=lower_bound(case.problem.start, goal),
         oracle=case.moves,
+        refined=case.moves if route is None else case.refined(route),
         moves=NONE if route is None else transitions(route),
         bound=int(plan.statistics.get("lower_bound", 0)),
-        free=route is None or case.arm.free(route),
+        free=route is None or (single_joint(route) and case.arm.free(route)),
         seconds=seconds,
     )
 
@@ -157,12 +172,15 @@ def page(found: list[Outcome], jobs: int) -> Report:
     """What was found."""
     command = "python bench/moves/fewest_moves_oracle.py"
     report = Report("Fewest moves beside an exact oracle", command, processes(jobs))
-    worse = [one for one in found if one.moves > one.oracle]
-    equal = 1.0 - len(worse) / len(found)
+    worse = [one for one in found if one.moves > min(one.oracle, one.refined)]
+    equal = 1.0 - sum(one.moves > one.oracle for one in found) / len(found)
     text = f"{100 * equal:.1f} % of {len(found)}"
     report.bar("no more moves than the oracle", ">= 99 %", text, equal >= 0.99)
-    high = [one for one in found if one.bound > one.oracle]
-    report.bar("lower bounds above the oracle's moves", "0", str(len(high)), not high)
+    same = sum(one.moves == one.refined for one in found) / len(found)
+    text = f"{100 * same:.1f} % of {len(found)}"
+    report.bar("as many moves as the refined oracle", ">= 99 %", text, same >= 0.99)
+    high = [one for one in found if one.bound > one.refined]
+    report.bar("lower bounds above the refined oracle's moves", "0", str(len(high)), not high)
     hit = [one for one in found if not one.free]
     report.bar("paths that collide by exact geometry", "0", str(len(hit)), not hit)
     rows = []
@@ -192,7 +210,7 @@ def page(found: list[Outcome], jobs: int) -> Report:
         "time, median / most [s]",
     ]
     report.table("Moves of the planner beside those of the oracle", head, rows)
-    head = ["case", "links", "joints that differ", "oracle", "planner", "bound", "time [s]"]
+    head = ["case", "links", "joints that differ", "oracle", "refined", "planner", "bound", "time [s]"]
     report.table("Cases in which the planner has more moves", head, [one.line for one in worse])
     report.note("How", HOW)
     return report
