@@ -99,6 +99,7 @@ def time_path(
 
     from rrtik_ompl import RateLimits, load_problem, plot_joints, time_parameterize
     from rrtik_ompl.cli import plan_report as report
+    from rrtik_ompl.trajectory.limits import default_words
     from rrtik_ompl.units import DEGREE
 
     task = load_problem(problem)
@@ -126,7 +127,10 @@ def time_path(
     if as_json:
         print(json.dumps(report.timing_document(task, found, limits)))
     else:
-        say(f"{task.name}: {found.duration:.3f} s", report.peaks_table(found, limits))
+        defaults = default_words(robot, [name for name, row in given.items() if row is not None])
+        say(
+            f"{task.name}: {found.duration:.3f} s", report.peaks_table(found, limits), *([defaults] if defaults else [])
+        )
         say(*(f"wrote {file}" for file in (out, plot) if file is not None))
     return 0
 

@@ -20,6 +20,7 @@ from rrtik_ompl.world import World
 METHODS = ("scaled", "clipped")
 LEAST_SINGULAR = 0.05  # of the Jacobian [m or 1]; below it rates are damped
 STEP = 1e-3  # [rad] or [m] of difference quotients; distances come in single precision
+HARDLY = 0.03  # [rad] or [m] that joints may move until the slope of the volume is found anew
 SHARES = np.array([0.5, 0.25, 0.1])  # of a step, the first that is proven free is taken
 REACTION_SECONDS = 0.1  # in which a joint comes to rest before its limit
 
@@ -84,6 +85,7 @@ class Servo:
         low, high = self._robot.lower, self._robot.upper
         self._middle = np.where(np.isfinite(low + high), 0.5 * (low + high), np.nan)
         self._ramp = np.eye(self._robot.dof) * STEP
+        self._slope: tuple[Vector, Vector] | None = None  # of the volume, and where
 
     def step(self, q: ArrayLike, twist: ArrayLike, dt: float) -> Vector:
         """Joint rates, shape (dof,) [rad/s or m/s], to be held for a time step.
@@ -127,9 +129,15 @@ class Servo:
             return None
         wish = np.nan_to_num(centring * (self._middle - q), nan=0.0)
         if volume > 0.0:
-            here = self._volume(q)
-            wish = wish + volume * (np.array([self._volume(q + step) for step in self._ramp]) - here) / STEP
+            wish = wish + volume * self._volume_slope(q)
         return wish
+
+    def _volume_slope(self, q: Vector) -> Vector:
+        """How the volume grows with each joint, shape (dof,); kept while the arm has hardly moved."""
+        if self._slope is None or np.abs(q - self._slope[0]).max() > HARDLY:
+            slope = (np.array([self._volume(q + step) for step in self._ramp]) - self._volume(q)) / STEP
+            self._slope = (q.copy(), slope)
+        return self._slope[1]
 
     def _volume(self, q: Vector) -> float:
         jacobian = self._jacobian(q)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -114,6 +115,22 @@ class RateLimits:
             shares.append((jerk[limited] / self.jerk[limited]).max(initial=0.0))
         factors = [float(share) ** (1.0 / power) for power, share in enumerate(shares, start=1)]
         return 1.0 if max(shares) <= 1.0 else max(factors) * ROUNDING_MARGIN
+
+
+def default_words(robot: Robot, given: Collection[str] = ()) -> str:
+    """A line that says which limits of a robot are defaults; "" if none is, those ``given`` by name aside."""
+    rules = {
+        "velocity": f"{DEFAULT_TURN_RATE:g} rad/s or {DEFAULT_SLIDE_RATE:g} m/s",
+        "acceleration": f"full speed after {RAMP_SECONDS:g} s",
+        "jerk": f"full acceleration after {ONSET_SECONDS:g} s",
+    }
+    said = []
+    for name, rule in rules.items():
+        unknown = ~np.isfinite(getattr(robot, name))
+        if name not in given and unknown.any():
+            which = "all joints" if unknown.all() else ", ".join(np.array(robot.joint_names)[unknown])
+            said.append(f"{name} of {which} ({rule})")
+    return f"limits by default, not stated by '{robot.name}': {'; '.join(said)}" if said else ""
 
 
 def _row(values: ArrayLike, name: str) -> Vector:

@@ -143,10 +143,10 @@ def _near(curve: Curve, grid: Vector, bends: Matrix, window: float) -> Bounds:
 
 
 def _slowed(spline: Spline, more: DynamicLimits) -> Spline:
-    """The spline, slowed until it keeps the limits of the tip and of torques at its knots."""
+    """The spline, slowed until it keeps the limits of the tip and of torques at its knots and between them."""
     n = more.robot.dof
     for _ in range(MAX_SLOWINGS):
-        factor = more.slowing(*(rows[:, :n] for rows in spline.knots()))
+        factor = more.slowing(*(rows[:, :n] for rows in spline.states()))
         if factor == 1.0:
             break
         spline = spline.slowed(factor)

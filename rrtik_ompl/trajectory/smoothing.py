@@ -45,6 +45,17 @@ class Spline:
         bends = after - 2.0 * here + before
         return here + bends / 6.0, (after - before) / (2.0 * self.step), bends / self.step**2
 
+    def states(self) -> tuple[Matrix, Matrix, Matrix]:
+        """As :meth:`knots`, then the same in the middle between each two knots, shape (2 m - 5, n) each."""
+        first, second, third, fourth = (self.controls[k : len(self.controls) - 3 + k] for k in range(4))
+        between = (
+            (first + 23.0 * (second + third) + fourth) / 48.0,
+            (fourth - first + 5.0 * (third - second)) / (8.0 * self.step),
+            (first - second - third + fourth) / (2.0 * self.step**2),
+        )
+        found = [np.vstack(pair) for pair in zip(self.knots(), between, strict=True)]
+        return found[0], found[1], found[2]
+
     def slowed(self, factor: float) -> Spline:
         """The same, ``factor`` times as long."""
         return Spline(self.controls, self.step * factor)

@@ -14,6 +14,7 @@ from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning import plan
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.trajectory import RateLimits, Trajectory, load_trajectory, time_parameterize
+from rrtik_ompl.trajectory.limits import default_words
 from rrtik_ompl.world import World
 
 ON_PATH = 1e-9  # [rad]
@@ -312,6 +313,9 @@ def test_the_limits_of_a_robot_are_taken_and_the_rest_is_a_documented_default():
     assert found.acceleration.tolist() == [3.0] * 3
     assert found.jerk.tolist() == [30.0] * 3
     assert RateLimits.of(planar, share=0.5).velocity.tolist() == [0.25] * 3
+    assert default_words(load_robot("panda")) == ""
+    assert "acceleration of all joints (full speed after 0.5 s)" in default_words(load_robot("ur5"))
+    assert "acceleration of" not in default_words(load_robot("ur5"), ["acceleration"])
     for share in (0.0, 1.5, np.nan):
         with pytest.raises(InputError, match="share"):
             RateLimits.of(planar, share=share)
