@@ -69,6 +69,18 @@ def _has_shape(array: NDArray[np.float64], shape: tuple[int | None, ...]) -> boo
     return array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape, strict=True))
 
 
+def number_rows(values: ArrayLike, what: str) -> NDArray[np.float64]:
+    """Numbers given by a user as rows, one row or several; neither their number nor that they are finite is checked.
+
+    Raises:
+        InputError: If they are not numbers.
+    """
+    try:
+        return np.array(values, dtype=np.float64, ndmin=2, copy=None)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{what}: expected numbers, got {_short(values)}") from error
+
+
 def finite_number(value: ArrayLike, what: str) -> float:
     """A number given by a user.
 

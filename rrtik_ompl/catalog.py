@@ -212,7 +212,7 @@ def _recipe(name: str | os.PathLike[str]) -> _Recipe:
         return _Recipe("dh", str(path.resolve()), lambda **given: robot_from_dh_file(path, **given), DH_OPTIONS)
     if suffix in (".urdf", ".xml"):
         return _Recipe("urdf", str(path.resolve()), lambda **given: robot_from_urdf(path, **given), URDF_OPTIONS)
-    if path.parent != Path() or path.exists():
+    if path.parent != Path() or os.path.exists(path):  # which takes a name of any length
         raise InputError(f"{text}: not a robot file; expected a URDF (.urdf) or a DH table (.yaml)")
     raise UnknownNameError("robot", text, list_robots())
 

@@ -61,6 +61,6 @@ def one_of(names: Iterable[Name], name: str, kind: str) -> Name:
     """
     known = tuple(names)
     for each in known:
-        if each == name:
+        if isinstance(name, str) and each == name:
             return each
     raise UnknownNameError(kind, str(name), known)

@@ -122,6 +122,17 @@ def at_most(count: float, limit: float, what: str, remedy: str = "") -> None:
         raise InputError(f"{what}: {count:.0f} are more than the {limit:.0f} that are allowed{hint}")
 
 
+def listed(values: object, what: str) -> tuple[Any, ...]:
+    """The members of a list, or of anything else that has members, but of a text.
+
+    Raises:
+        InputError: If it has none.
+    """
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise InputError(f"{what} must be a list, got {type(values).__name__}")
+    return tuple(values)
+
+
 class MeshWarning(UserWarning):
     """A mesh is missing or cannot be the solid that its author probably meant, but work can go on."""
 

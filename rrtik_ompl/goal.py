@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.arrays import Mask, Vector, finite_array, frozen, positive
 from rrtik_ompl.choices import FrameAxis
 from rrtik_ompl.copies import as_value
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.poses import rigid, rotation_angles
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.task_region import TaskRegion, WithinTolerances
@@ -79,6 +79,7 @@ class PositionGoal:
 
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
         """Distance of the tip from the point for each row of Q, shape (m,) [m]."""
+        require(robot, Robot, "robot of a goal")
         tips = robot.fk_batch(np.atleast_2d(Q))[:, :3, 3]
         distances: Vector = np.linalg.norm(tips - self.position, axis=1)
         return distances
@@ -110,6 +111,7 @@ class PoseGoal(WithinTolerances):
 
     def errors(self, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
         """Position error [m] and rotation angle [rad] of each row of Q, shapes (m,)."""
+        require(robot, Robot, "robot of a goal")
         tips = robot.fk_batch(np.atleast_2d(Q))
         return pose_errors(tips, self.T_world_tip)
 

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, number_rows
 from rrtik_ompl.copies import as_value, itself
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.poses import cross_products, joint_motions
@@ -253,12 +253,13 @@ class Robot:
 
     def _rows(self, Q: ArrayLike) -> Matrix:
         """One configuration or several as rows, shape (m, dof)."""
-        rows = np.array(Q, dtype=np.float64, ndmin=2, copy=None)
+        rows = number_rows(Q, f"configurations of robot '{self.name}'")
         if rows.ndim != 2 or rows.shape[1] != self.dof:
             raise InputError(f"configurations of robot '{self.name}': expected shape (m, {self.dof}), got {rows.shape}")
         return rows
 
     def _frame_id(self, frame: str | None) -> int:
+        require(frame, str | None, f"frame of robot '{self.name}'")
         return _frame_number(self, self.tip if frame is None else frame)
 
 
@@ -274,7 +275,6 @@ def _link_names(robot: Robot) -> tuple[str, ...]:
 
 @lru_cache(maxsize=256)
 def _frame_number(robot: Robot, name: str) -> int:
-    require(name, str, f"frame of robot '{robot.name}'")
     if not robot.model.existFrame(name):
         raise UnknownNameError(f"frame of robot '{robot.name}'", name, (f.name for f in robot.model.frames))
     return int(robot.model.getFrameId(name))

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import LARGEST, Vector, bounded_array, finite_array, finite_number, frozen
 from rrtik_ompl.copies import as_value
-from rrtik_ompl.errors import InputError, UnknownNameError, at_most, name_of, require
+from rrtik_ompl.errors import InputError, UnknownNameError, at_most, listed, name_of, require
 from rrtik_ompl.poses import rigid
 from rrtik_ompl.shapes import SHAPES, Shape
 
@@ -58,7 +58,9 @@ class TimedPoses:
 
     def __init__(self, times: ArrayLike, poses: Iterable[pin.SE3]) -> None:
         stamps = finite_array(times, (None,), "motion times")
-        stations = tuple(rigid(pose, f"motion: pose {k}") for k, pose in enumerate(poses, start=1))
+        stations = tuple(
+            rigid(pose, f"motion: pose {k}") for k, pose in enumerate(listed(poses, "poses of a motion"), start=1)
+        )
         if len(stamps) == 0 or len(stamps) != len(stations):
             raise InputError(
                 f"motion needs as many times as poses, at least one; got {len(stamps)} and {len(stations)}"
@@ -152,14 +154,16 @@ class Scene:
     allowed_collisions: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "obstacles", tuple(self.obstacles))
-        object.__setattr__(self, "attached", tuple(self.attached))
+        object.__setattr__(self, "obstacles", listed(self.obstacles, "obstacles of a scene"))
+        object.__setattr__(self, "attached", listed(self.attached, "attached objects of a scene"))
         at_most(len(self.obstacles) + len(self.attached), MOST_SOLIDS, "obstacles of a scene", "join some in a mesh")
         for obstacle in self.obstacles:
             require(obstacle, Obstacle, "each obstacle of a scene")
         for held in self.attached:
             require(held, AttachedObject, "each attached object of a scene")
-        pairs = tuple(tuple(map(str, pair)) for pair in self.allowed_collisions)
+        pairs = tuple(
+            tuple(map(str, pair)) for pair in listed(self.allowed_collisions, "allowed_collisions of a scene")
+        )
         if any(len(pair) != 2 for pair in pairs):
             raise InputError(f"allowed_collisions of a scene must be pairs of names, got {list(pairs)}")
         object.__setattr__(self, "allowed_collisions", pairs)
