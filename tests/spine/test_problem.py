@@ -66,7 +66,7 @@ def test_a_value_just_too_far_outside_is_told_with_digits_enough(world):
     assert rows[0, 1] == start[1]
 
 
-@pytest.mark.parametrize("bad", [[0.0] * 5, [np.nan] * 6, "stowed", [[0.0] * 6]])
+@pytest.mark.parametrize("bad", [[0.0] * 5, [np.nan] * 6, 3.0, [[0.0] * 6]])
 def test_what_is_no_configuration_is_refused(world, bad):
     with pytest.raises(InputError, match="start"):
         Problem(world, bad, FREE)
