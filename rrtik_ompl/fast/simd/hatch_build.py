@@ -21,7 +21,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 SETTING = os.environ.get("RRTIK_KERNELS", "")
 WITHOUT, REQUIRED = "0", "1"
 WIDTHS = ("8", "16")
-PATIENCE = 1800.0  # [s]
+PATIENCE = None if SETTING == REQUIRED else 1800.0  # [s]; a wheel that must have all kernels waits for them
 PORTABLE = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}  # nothing that only this processor can do
 
 
