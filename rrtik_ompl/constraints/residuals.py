@@ -69,7 +69,7 @@ def residual(robot: Robot, region: HeldRegion, Q: Matrix) -> tuple[Matrix, NDArr
     """
     D, measures = region.displacements(Q), region.measures(Q)
     moves = measures > KEPT_SHARE * region.limits(slack=False)
-    J = _twists(robot, region, Q)
+    J = twists(robot, region, Q)
     away = D[:, :3, 3] - np.clip(D[:, :3, 3], *region.region.bounds[:3].T)
     share = 1.0 - AIMED_SHARE * region.region.position_tolerance / np.where(moves[:, 0], measures[:, 0], 1.0)
     held = (moves[:, :1] & (away != 0.0)) / reach_of(robot)
@@ -79,7 +79,7 @@ def residual(robot: Robot, region: HeldRegion, Q: Matrix) -> tuple[Matrix, NDArr
     return error, np.concatenate([J[:, :3], felt], axis=1) * weights[:, :, None]
 
 
-def _twists(robot: Robot, region: HeldRegion, Q: Matrix) -> NDArray[np.float64]:
+def twists(robot: Robot, region: HeldRegion, Q: Matrix) -> NDArray[np.float64]:
     """Geometric Jacobians of the displacement, in the axes of the region, shape (m, 6, dof)."""
     poses, J = robot.fk_jacobian_batch(Q, region.link)
     origin = (region.T_world_w @ region.displacements(Q))[:, :3, 3]
@@ -103,7 +103,7 @@ def _turn(
         away -= TAU * np.round(away / TAU)
         away[np.abs(away) < SMALL] = 0.0
         share = 1.0 - aimed / np.where(measure > 0.0, measure, 1.0)
-        return -away * share[:, None], _rates(R) @ J, (away != 0.0).astype(np.float64)
+        return -away * share[:, None], rates(R) @ J, (away != 0.0).astype(np.float64)
     if region.turning == Turning.AXIS:
         z = R[:, :, 2]
         axis, cosine = cross_products(z, np.tile(region.direction, (len(z), 1))), z @ region.direction
@@ -117,7 +117,7 @@ def _turn(
     return axis * (np.arctan2(sine, cosine) - aimed)[:, None], J, ones
 
 
-def _rates(R: NDArray[np.float64]) -> NDArray[np.float64]:
+def rates(R: NDArray[np.float64]) -> NDArray[np.float64]:
     """What angular velocities make of roll, pitch and yaw, shape (m, 3, 3)."""
     a, b = R[:, 0, 0], R[:, 1, 0]
     level = np.maximum(np.hypot(a, b), STEEPEST)

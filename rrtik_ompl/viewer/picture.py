@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.goal import Goal, JointGoal, as_task_region, parts_of
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.viewer.drawing.constraint_picture import draw_constraints
 from rrtik_ompl.viewer.drawing.framing import Frame, frame_around
 from rrtik_ompl.viewer.drawing.marks import draw_marks
 from rrtik_ompl.viewer.drawing.meshes import thickened
@@ -42,6 +43,7 @@ def draw(subject: Subject) -> tuple[Recording, Frame]:
     else:
         frame = _draw_robot(vis, robot, subject)
         draw_goal(vis, subject.goal, frame)
+        draw_constraints(vis, subject.held, subject.waypoints[0], frame)
         if len(subject.waypoints) > 1:
             doubtful = () if subject.curve is None else subject.curve.unproven
             beads = subject.run is None and subject.times is None

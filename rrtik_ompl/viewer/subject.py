@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
+from rrtik_ompl.constraints.held_region import HeldRegion
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import Goal, JointGoal
 from rrtik_ompl.path import JointPath
@@ -19,6 +20,7 @@ from rrtik_ompl.trajectory import Trajectory
 from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.world import World
 from rrtik_ompl.world.clearance_curve import ClearanceCurve, clearance_along
+from rrtik_ompl.world.holding_world import HoldingWorld
 
 
 class HasWorld(Protocol):
@@ -46,6 +48,7 @@ class Subject:
         run: The run whose ticks the waypoints are, or None.
         curve: How far the path stays from obstacles, or None if that is not known.
         times: When the waypoints of a timed motion are reached [s], shape (k,), or None.
+        held: Regions of path constraints.
     """
 
     name: str
@@ -60,6 +63,7 @@ class Subject:
     run: ReplanRun | None = None
     curve: ClearanceCurve | None = None
     times: Vector | None = None
+    held: tuple[HeldRegion, ...] = ()
 
     @property
     def start(self) -> Vector | None:
@@ -137,7 +141,7 @@ def subject_of(
         if not isinstance(getattr(world, "robot", None), Robot) or not isinstance(getattr(world, "scene", None), Scene):
             raise InputError(f"view: cannot show a {type(shown).__name__}; give a problem, world, robot or scene")
         robot, scene = world.robot, world.scene
-    goal = getattr(shown, "goal", None)
+    goal, held = getattr(shown, "goal", None), _held(getattr(shown, "world", shown))
     named = getattr(shown, "name", "problem")
     name = robot.name if named == "problem" else str(named)
     tinted = None if ghosts is None else _waypoints(robot, ghosts)
@@ -146,10 +150,17 @@ def subject_of(
         times, path = _timed(robot, path)
         rows = _waypoints(robot, path)
         curve = _curve(getattr(shown, "world", shown), rows)
-        return Subject(name, robot, scene, goal, rows, True, earlier, tinted, marks, curve=curve, times=times)
+        return Subject(
+            name, robot, scene, goal, rows, True, earlier, tinted, marks, curve=curve, times=times, held=held
+        )
     start = getattr(shown, "start", None)
     posture = robot.clamp(np.zeros(robot.dof)) if start is None else robot.configuration(start, "start")
-    return Subject(name, robot, scene, goal, frozen(posture[None]), False, None, tinted, marks)
+    return Subject(name, robot, scene, goal, frozen(posture[None]), False, None, tinted, marks, held=held)
+
+
+def _held(world: object) -> tuple[HeldRegion, ...]:
+    """The regions of path constraints that a world holds."""
+    return world.constraints.regions if isinstance(world, HoldingWorld) else ()
 
 
 def subject_of_run(problem: Showable, run: ReplanRun) -> Subject:

@@ -10,10 +10,12 @@ import pytest
 import umsgpack
 from scipy.spatial import ConvexHull
 
+from rrtik_ompl.constraints.shorthands import on_plane, upright
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal
 from rrtik_ompl.poses import pose
+from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, Shape, Sphere
@@ -25,6 +27,7 @@ from rrtik_ompl.viewer.drawing.viewpoint import behind, overview
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.subject import subject_of
+from rrtik_ompl.world import World
 from rrtik_tests.crane import TETRAHEDRON, URDF, WAYPOINTS, problem, story
 
 
@@ -162,3 +165,12 @@ def test_a_way_before_without_one_after_is_refused(crane: Robot) -> None:
         page(crane, before=WAYPOINTS)
     with pytest.raises(InputError, match="3 joints"):
         page(crane, WAYPOINTS, before=WAYPOINTS[:, :2])
+
+
+def test_regions_of_path_constraints_are_drawn(crane: Robot) -> None:
+    start = WAYPOINTS[0]
+    level = on_plane(crane.fk(start).translation, [0.0, 0.0, 1.0])
+    held = Problem(World(crane), start, start, constraints=[upright(crane, tolerance_deg=10.0), level])
+    window, _ = draw(subject_of(held))
+    assert {"/meshcat/constraints/0/axis", "/meshcat/constraints/1/place"} <= set(window.paths)
+    assert "/meshcat/constraints/0/place" not in window.paths

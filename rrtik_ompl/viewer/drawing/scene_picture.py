@@ -45,7 +45,7 @@ def obstacle_look(obstacle: Obstacle, frame: Frame) -> tuple[Look, Matrix]:
 def _draw_obstacle(node: Node, obstacle: Obstacle, frame: Frame) -> None:
     look, placement = obstacle_look(obstacle, frame)
     opacity = 1.0 if obstacle.shape.bounded else 0.2
-    node.set_object(look.geometry, _material(palette.OBSTACLE, opacity))
+    node.set_object(look.geometry, look_material(palette.OBSTACLE, opacity))
     node.set_transform(obstacle.pose.homogeneous @ placement)
     _draw_margin(node["margin"], obstacle, placement)
 
@@ -54,7 +54,7 @@ def _draw_margin(node: Node, obstacle: Obstacle, placement: Matrix) -> None:
     """Draw what lies within an obstacle's margin under its node, which has ``placement`` in the obstacle's frame."""
     look = look_of_margin(obstacle.shape, obstacle.margin) if obstacle.margin else None
     if look is not None:
-        node.set_object(look.geometry, _material(palette.OBSTACLE, opacity=0.2))
+        node.set_object(look.geometry, look_material(palette.OBSTACLE, opacity=0.2))
         node.set_transform(np.linalg.solve(placement, look.placement))
 
 
@@ -62,7 +62,7 @@ def _draw_motion(node: Node, obstacle: Obstacle, motion: Motion, frame: Frame) -
     times = LATER_SECONDS if isinstance(motion, ConstantVelocity) else tuple(motion.times[motion.times > 0.0])
     look = look_of_shape(obstacle.shape)
     for k, time in enumerate(times):
-        node[f"at {k}"].set_object(look.geometry, _material(palette.OBSTACLE, opacity=0.2))
+        node[f"at {k}"].set_object(look.geometry, look_material(palette.OBSTACLE, opacity=0.2))
         node[f"at {k}"].set_transform(motion.pose_at(obstacle.pose, time).homogeneous @ look.placement)
     stations = np.array([motion.pose_at(obstacle.pose, time).translation for time in np.linspace(0.0, times[-1], 40)])
     draw_tube(node["way"], stations, 0.003 * frame.arm, palette.OBSTACLE)
@@ -80,7 +80,7 @@ def draw_goal(vis: Node, goal: Goal | None, frame: Frame) -> None:
             _draw_region(node, part, frame)
         else:
             look = look_of_shape(Sphere(max(part.tolerance, 0.012 * frame.arm)))
-            node["point"].set_object(look.geometry, _material(palette.GOAL))
+            node["point"].set_object(look.geometry, look_material(palette.GOAL))
             node["point"].set_transform(pin.SE3(np.eye(3), np.array(part.position)).homogeneous)
 
 
@@ -89,7 +89,7 @@ def _draw_region(node: Node, region: TaskRegion, frame: Frame) -> None:
     low, high = region.bounds.T
     if (low < high)[:3].any():
         look = look_of_shape(Box(np.maximum((high - low)[:3], 0.002 * frame.arm)))
-        node["region"].set_object(look.geometry, _material(palette.GOAL, opacity=0.3))
+        node["region"].set_object(look.geometry, look_material(palette.GOAL, opacity=0.3))
         middle = pin.SE3(np.eye(3), 0.5 * (low + high)[:3] + region.T_w_tip.translation)
         node["region"].set_transform((region.T_world_w * middle).homogeneous)
     for k, pose in enumerate(goal_frames(region)):
@@ -117,8 +117,9 @@ def draw_triad(node: Node, pose: pin.SE3, length: float) -> None:
 def draw_tube(node: Node, points: Matrix, radius: float, color: str) -> None:
     """Draw a line through points, shape (k, 3), as a tube, because WebGL draws lines one pixel wide."""
     look = look_of_triangles(*tube(points, radius))
-    node.set_object(look.geometry, _material(color))
+    node.set_object(look.geometry, look_material(color))
 
 
-def _material(color: str, opacity: float = 1.0) -> Material:
+def look_material(color: str, opacity: float = 1.0) -> Material:
+    """A dull surface of a colour, seen through if its opacity is below 1."""
     return Material(color=palette.number(color), opacity=opacity, shininess=10, hides=opacity == 1.0)

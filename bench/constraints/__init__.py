@@ -1,0 +1,1 @@
+"""Path constraints on generated problems, judged densely by Pinocchio and coal alone."""

@@ -1,0 +1,72 @@
+"""Path constraints as OMPL's Constraint: derivatives, satisfaction and OMPL's own projection."""
+
+import numpy as np
+import pytest
+from ompl import base as ob
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.constraints.equations import equation_count, equations
+from rrtik_ompl.constraints.held_regions import held_regions
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.ompl_bridge.region_constraint import RegionConstraint
+from rrtik_ompl.scene import Scene
+
+START = np.array([0.3, -1.2, 1.4, -0.4, 0.6, 0.2])
+
+
+def problem_with(*regions):
+    robot = rrtik.load_robot("ur5_limited")
+    return rrtik.Problem(rrtik.World(robot), START, START, constraints=regions)
+
+
+def cases():
+    robot = rrtik.load_robot("ur5_limited")
+    T = robot.fk(START)
+    return {
+        "upright": rrtik.upright(robot, "x"),
+        "orientation": rrtik.orientation_of(T, 4.0),
+        "ranges": rrtik.orientation_of(T, [1.0, 2.0, 3.0]),
+        "plane": rrtik.on_plane(T.translation, [0.0, 0.6, 0.8]),
+        "line": rrtik.on_line(T.translation, [0.0, 1.0, 0.0]),
+    }
+
+
+@pytest.mark.parametrize("kind", cases())
+def test_derivatives_are_those_of_differences(kind):
+    robot = rrtik.load_robot("ur5_limited")
+    held = held_regions(robot, Scene(), [cases()[kind]], START)
+    for q in START + np.random.default_rng(1).normal(0.0, 0.3, (20, 6)):
+        values, J = equations(robot, held, q)
+        assert values.shape == (equation_count(held),)
+        steps = 1e-6 * np.eye(6)
+        ends = [(equations(robot, held, q + s)[0] - equations(robot, held, q - s)[0]) / 2e-6 for s in steps]
+        np.testing.assert_allclose(J, np.array(ends).T, atol=1e-6 * np.abs(J).max())
+
+
+@pytest.mark.parametrize("kind", cases())
+def test_ompl_projects_onto_the_region(kind):
+    problem = problem_with(cases()[kind])
+    constraint = RegionConstraint(problem)
+    assert constraint.isSatisfied(START)
+    done = 0
+    for q in START + np.random.default_rng(2).normal(0.0, 0.2, (20, 6)):
+        x = np.array(q)
+        if constraint.project(x):
+            done += 1
+            assert problem.world.constraints.held(x[None])[0]
+    assert done >= 15
+
+
+def test_it_makes_a_projected_space():
+    constraint = RegionConstraint(problem_with(cases()["plane"]))
+    ambient, bounds = ob.RealVectorStateSpace(6), ob.RealVectorBounds(6)
+    bounds.setLow(-3.0)
+    bounds.setHigh(3.0)
+    ambient.setBounds(bounds)
+    space = ob.ProjectedStateSpace(ambient, constraint)
+    assert space.getManifoldDimension() == 5
+
+
+def test_a_problem_without_constraints_is_refused():
+    with pytest.raises(InputError, match="no path constraints"):
+        RegionConstraint(problem_with())
