@@ -171,7 +171,8 @@ def test_a_worker_s_world_gives_the_same_answers(form, pool):
     world = FORMS[form](rrtik.World(planar(), rrtik.Scene([near])))
     Q = np.random.default_rng(1).uniform(planar().lower, planar().upper, (200, 3))
     here, there = asked(world, Q), pool.apply_async(asked, (world, Q)).get(timeout=120)
-    assert all(np.array_equal(a, b) for a, b in zip(here, there, strict=True))
+    assert all(np.array_equal(a, b) for a, b in zip(here[:-1], there[:-1], strict=True))
+    assert there[-1] == pytest.approx(here[-1], abs=1e-9)  # coal's distances depend on those computed before, by 1e-11
     assert 0 < here[0].sum() < len(Q)
 
 
