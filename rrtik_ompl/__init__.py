@@ -43,7 +43,10 @@ if TYPE_CHECKING:
     from rrtik_ompl.ik.trajectory import IkTrajectory as IkTrajectory
     from rrtik_ompl.ik.trajectory import solve_ik_trajectory as solve_ik_trajectory
     from rrtik_ompl.moves.staircase import one_joint_moves as one_joint_moves
+    from rrtik_ompl.ompl_bridge import objectives as objectives
     from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler as GoalSampler
+    from rrtik_ompl.ompl_bridge.simple_setup import simple_setup as simple_setup
+    from rrtik_ompl.ompl_bridge.simple_setup import space_information as space_information
     from rrtik_ompl.path import JointPath as JointPath
     from rrtik_ompl.path import load_path as load_path
     from rrtik_ompl.planning import Plan as Plan
@@ -117,7 +120,9 @@ else:
         "ik.batch": ("IkBatch", "solve_ik_batch"),
         "ik.solve": ("IkResult", "list_ik_methods", "solve_ik"),
         "ik.trajectory": ("IkTrajectory", "solve_ik_trajectory"),
+        "ompl_bridge": ("objectives",),
         "ompl_bridge.goal_sampler": ("GoalSampler",),
+        "ompl_bridge.simple_setup": ("simple_setup", "space_information"),
         "files.mesh": ("load_mesh",),
         "moves.staircase": ("one_joint_moves",),
         "path": ("JointPath", "load_path"),

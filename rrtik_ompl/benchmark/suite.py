@@ -31,6 +31,7 @@ from rrtik_ompl.files.sections import parse
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.generated_problems import FAMILIES
+from rrtik_ompl.ompl_bridge.planner_files import is_planner_file, label_of, planner_in_folder
 from rrtik_ompl.ompl_bridge.planner_names import options_of
 from rrtik_ompl.ompl_bridge.planner_traits import unbound_planners
 
@@ -137,15 +138,16 @@ def _sources(
 def _entrant(document: YamlDocument, place: Location, item: str | PlannerGroup, shorten: str) -> Entrant:
     group = PlannerGroup.model_validate({"name": item}) if isinstance(item, str) else item
     at = place if isinstance(item, str) else (*place, "name")
+    name = planner_in_folder(group.name, document.path.parent) if is_planner_file(group.name) else group.name
     with document.at(at):
-        options = _options(group.name)
+        options = _options(name)
     for key in group.parameters:
         with document.at((*place, "parameters", key)):
             if key not in options:
                 raise UnknownNameError(f"parameter of planner {group.name}", key, options)
     with document.at((*place, "shorten") if group.shorten else ("shorten",)):
         method = one_of(SHORTENINGS, group.shorten or shorten, "shortening method")
-    return Entrant(group.label or group.name, group.name, dict(group.parameters), method)
+    return Entrant(group.label or label_of(group.name), name, dict(group.parameters), method)
 
 
 def _options(name: str) -> tuple[str, ...]:

@@ -1,5 +1,6 @@
 """The one package where arrays become OMPL states and back: validity, motions, ownership rules, base of planners."""
 
+from rrtik_ompl.ompl_bridge import objectives
 from rrtik_ompl.ompl_bridge.contract import check_planner
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker
@@ -19,5 +20,6 @@ __all__ = [
     "Stop",
     "WorldChecker",
     "check_planner",
+    "objectives",
     "space_bounds",
 ]

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from rrtik_ompl import catalog
 from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.ompl_bridge.planner_files import is_planner_file, planner_of_file
 from rrtik_ompl.ompl_bridge.planner_options import planner_options
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, ompl_planners
 
@@ -46,9 +47,14 @@ def options_of(name: str) -> tuple[str, ...]:
 def find_planner(name: str) -> PlannerFactory:
     """The planner class of a name, in upper or lower case; MoveIt's way of writing OMPL's names is understood too.
 
+    ``file.py:Class`` is a class in anybody's file, which is run for that.
+
     Raises:
+        InputError: If there is no such file, or it cannot be run.
         UnknownNameError: If there is none, as of "auto"; carries all names.
     """
+    if is_planner_file(name):
+        return planner_of_file(name)
     bare = name.removeprefix(_OMPL_PREFIX).removesuffix(_MOVEIT_SUFFIX).lower()
     wheel = {key.lower(): value for key, value in ompl_planners().items()}
     if bare in wheel:

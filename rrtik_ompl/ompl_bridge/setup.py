@@ -100,7 +100,7 @@ def planning_bounds(problem: Problem, goals: Matrix) -> tuple[Vector, Vector]:
 
 def space_information(problem: Problem, goals: Matrix, validity: ValidityCallback) -> ob.SpaceInformation:
     """A set-up ``ompl.base.SpaceInformation`` of a RealVectorStateSpace whose checks are the world's."""
-    si = _bounded(*planning_bounds(problem, goals))
+    si = bounded_space(*planning_bounds(problem, goals))
     states = StateIO(si)
     si.setStateValidityChecker(lambda state: validity.valid(states.read(state)))
     si.setMotionValidator(_Motions(si, validity, StateIO(si)))
@@ -113,7 +113,7 @@ def unchecked_space(lower: Vector, upper: Vector) -> ob.SpaceInformation:
 
     OMPL checks each start and goal that it hands out, and a call of Python costs more than some searches.
     """
-    si = _bounded(lower, upper)
+    si = bounded_space(lower, upper)
     si.setStateValidityChecker(ob.AllValidStateValidityChecker(si))
     si.setup()
     return si
@@ -132,7 +132,7 @@ def _kept_space(lower: bytes, upper: bytes) -> ob.SpaceInformation:
 atexit.register(_kept_space.cache_clear)  # the bindings complain of objects that outlive the interpreter
 
 
-def _bounded(lower: Vector, upper: Vector) -> ob.SpaceInformation:
+def bounded_space(lower: Vector, upper: Vector) -> ob.SpaceInformation:
     """A SpaceInformation whose space has bounds, shapes (n,)."""
     space = ob.RealVectorStateSpace(len(lower))
     bounds = ob.RealVectorBounds(len(lower))

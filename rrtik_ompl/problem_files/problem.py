@@ -146,9 +146,12 @@ def problem_path(name_or_file: FilePath) -> Path:
 def _planner(document: YamlDocument, name: str | None) -> str | None:
     """The name of a planner, if there is such a planner."""
     if name is not None and name.lower() not in list_planners():
-        from rrtik_ompl.ompl_bridge.planner_names import options_of  # loads OMPL, which few files need
+        from rrtik_ompl.ompl_bridge.planner_files import is_planner_file  # loads OMPL, which few files need
+        from rrtik_ompl.ompl_bridge.planner_names import options_of
 
         with document.at(("planner",)):
+            if is_planner_file(name):
+                raise InputError(f"'{name}': a problem file runs no code; give it with --planner")
             options_of(name)
     return name
 

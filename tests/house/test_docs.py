@@ -87,6 +87,14 @@ def test_the_examples_of_tasks_run(tmp_path, monkeypatch):
     assert run(["task", "task.yaml"]) == 0
 
 
+def test_the_examples_of_own_ompl_code_run_in_their_order(tmp_path, monkeypatch, quiet_ompl):
+    monkeypatch.chdir(tmp_path)
+    for example in blocks("own_ompl_code", "python"):
+        exec(compile(example, "own_ompl_code", "exec"), {})
+    assert "OneStop" in (tmp_path / "one_stop.py").read_text()
+    assert "mine" in (tmp_path / "results" / "summary.md").read_text()
+
+
 HEADINGS = ["A robot", "A planner", "A shape", "A joint type", "A kernel", "An inverse kinematics method"]
 HEADINGS += ["A shortening method"]
 

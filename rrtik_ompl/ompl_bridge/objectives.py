@@ -1,0 +1,120 @@
+"""What a path costs, as objectives of OMPL: for RRT*, BIT* and the other planners that improve a path.
+
+OMPL's PRM and PRMstar ask an objective in a second thread, which waits for the interpreter for ever: they can take
+:func:`path_length` alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from ompl import base as ob
+
+from rrtik_ompl.arrays import Vector, positive
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.ompl_bridge.states import StateIO
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.world import World
+
+STEPS = 8  # parts of a motion over which a cost is summed up
+NEAREST = 1e-3  # [m] clearances below this cost no more
+STILL = 1e-9  # [unit of the space] a joint that moves less does not move
+
+
+def path_length(si: ob.SpaceInformation) -> ob.OptimizationObjective:
+    """The length of a path in joint space [rad; m]: OMPL's own objective.
+
+    Example:
+        >>> import rrtik_ompl as rrtik
+        >>> si = rrtik.space_information(rrtik.World(rrtik.load_robot("titan4")))
+        >>> objective = rrtik.objectives.path_length(si)
+    """
+    return ob.PathLengthOptimizationObjective(si)
+
+
+def clearance(si: ob.SpaceInformation, world: World, *, weight: float = 0.05) -> ob.OptimizationObjective:
+    """The length of a path in joint space, longer where the arm is near to something.
+
+    Each piece counts ``1 + weight / clearance`` times its length.
+
+    Args:
+        si: Of `space_information()`, or another one over the arm's joints.
+        world: Knows the clearance.
+        weight: The clearance at which a piece counts double [m].
+
+    Raises:
+        InputError: If the weight is not a number above 0, or world or space do not fit.
+    """
+    return _Clearance(si, world, positive(weight, "weight"))
+
+
+def single_joint_moves(si: ob.SpaceInformation) -> ob.OptimizationObjective:
+    """How many joints move, added up over the motions of a path.
+
+    It tells paths of single-joint moves from each other. In a tree of straight motions nearly every motion moves every
+    joint, so that planners of such trees make little of it.
+    """
+    return _Moves(si)
+
+
+def tip_travel(si: ob.SpaceInformation, robot: Robot, *, frame: str | None = None) -> ob.OptimizationObjective:
+    """How far the tip goes [m].
+
+    Args:
+        si: Of `space_information()`, or another one over the arm's joints.
+        robot: The arm.
+        frame: A frame of the arm in place of its tip.
+
+    Raises:
+        InputError: If the robot does not fit the space.
+    """
+    return _TipTravel(si, robot, frame)
+
+
+class _Objective(ob.OptimizationObjective):  # type: ignore[misc]  # OMPL has no types
+    """Base class: the cost of a motion is :meth:`cost`; states cost nothing."""
+
+    def __init__(self, si: ob.SpaceInformation, dof: int | None = None) -> None:
+        super().__init__(si)
+        self._states = StateIO(si)
+        if dof is not None and dof != self._states.dof:
+            raise InputError(f"objective: the space has {self._states.dof} coordinates, the robot {dof} joints")
+
+    def stateCost(self, _: ob.State) -> ob.Cost:
+        """Nothing; called by OMPL."""
+        return ob.Cost(0.0)
+
+    def motionCost(self, first: ob.State, second: ob.State) -> ob.Cost:
+        """The cost of the motion between two states; called by OMPL."""
+        return ob.Cost(self.cost(self._states.read(first), self._states.read(second)))
+
+    def cost(self, a: Vector, b: Vector) -> float:
+        """Of the straight motion from a to b, shapes (n,)."""
+        raise NotImplementedError
+
+
+class _Clearance(_Objective):
+    def __init__(self, si: ob.SpaceInformation, world: World, weight: float) -> None:
+        super().__init__(si, world.robot.dof)
+        self._world, self._weight = world, weight
+
+    def cost(self, a: Vector, b: Vector) -> float:
+        middles = a + (np.arange(STEPS)[:, None] + 0.5) / STEPS * (b - a)
+        room = [max(self._world.clearance(q), NEAREST) for q in middles]
+        return float(np.linalg.norm(b - a) * np.mean(1.0 + self._weight / np.array(room)))
+
+
+class _Moves(_Objective):
+    def cost(self, a: Vector, b: Vector) -> float:
+        return float(np.count_nonzero(np.abs(b - a) > STILL))
+
+
+class _TipTravel(_Objective):
+    def __init__(self, si: ob.SpaceInformation, robot: Robot, frame: str | None) -> None:
+        super().__init__(si, robot.dof)
+        self._robot, self._frame = robot, frame
+        robot.fk_batch(np.zeros((1, robot.dof)), frame)  # refuses an unknown frame here, not inside OMPL
+
+    def cost(self, a: Vector, b: Vector) -> float:
+        rows = a + np.linspace(0.0, 1.0, STEPS + 1)[:, None] * (b - a)
+        places = self._robot.fk_batch(rows, self._frame)[:, :3, 3]
+        return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())

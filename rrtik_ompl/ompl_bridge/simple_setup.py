@@ -1,0 +1,152 @@
+"""A world or a problem in anybody's own OMPL code: a SpaceInformation, a SimpleSetup."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from ompl import base as ob
+from ompl import geometric as og
+
+from rrtik_ompl.arrays import Vector
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
+from rrtik_ompl.ompl_bridge.setup import bounded_space, planning_bounds
+from rrtik_ompl.ompl_bridge.states import StateIO
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.world import World
+
+FAR = 1e3  # [m] the clearance that OMPL is told where nothing can collide; its reports cannot hold an infinite one
+
+TIP_PROJECTION = "tip"  # name of a projection of the space
+
+
+class WorldValidity(ob.StateValidityChecker):  # type: ignore[misc]  # OMPL has no types
+    """Validity and clearance of configurations by a world.
+
+    An exception must not pass through OMPL's second thread (PRM), which ends the process; a configuration that the
+    world refuses to judge is not valid.
+    """
+
+    def __init__(self, si: ob.SpaceInformation, world: World) -> None:
+        super().__init__(si)
+        self._world, self._states = world, StateIO(si)
+
+    def isValid(self, state: ob.State) -> bool:
+        """Whether a state is inside the limits and free; called by OMPL."""
+        q = self._states.read(state)
+        return bool(np.isfinite(q).all()) and self._world.valid(q)
+
+    def clearance(self, state: ob.State) -> float:
+        """Smallest signed distance of the arm from obstacles and from itself [m], less margins; called by OMPL."""
+        nearest = self._world.clearance(self._states.read(state))
+        return nearest if math.isfinite(nearest) else FAR
+
+
+class WorldMotions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no types
+    """Motions by a world. It must not hold the SpaceInformation, or neither is ever freed."""
+
+    def __init__(self, si: ob.SpaceInformation, world: World) -> None:
+        super().__init__(si)
+        self._world, self._states = world, StateIO(si)
+
+    def checkMotion(self, first: ob.State, second: ob.State, *_: object) -> bool:
+        """Whether the straight motion between two states is free; called by OMPL."""
+        return self._world.motion_valid(self._states.read(first), self._states.read(second))
+
+
+class TipProjection(ob.ProjectionEvaluator):  # type: ignore[misc]  # OMPL has no types
+    """A configuration as the position of the tip, for planners that keep a grid (KPIECE1 and its kin).
+
+    OMPL chooses the size of the cells from samples. It must not hold the space, which holds it, or neither is freed.
+    """
+
+    def __init__(self, space: ob.StateSpace, robot: Robot) -> None:
+        super().__init__(space)
+        self._robot = robot
+
+    def getDimension(self) -> int:
+        """Three; called by OMPL."""
+        return 3
+
+    def project(self, state: ob.State, projection: Vector) -> None:
+        """Write the position of the tip [m]; called by OMPL."""
+        projection[:] = self._robot.fk_batch([state[0 : self._robot.dof]])[0, :3, 3]
+
+
+def space_information(world_or_problem: World | Problem) -> ob.SpaceInformation:
+    """A set-up ``ompl.base.SpaceInformation`` over the joints of an arm, whose questions a world answers.
+
+    Its space is a RealVectorStateSpace within the joint limits [rad; m]; a joint without limits gets a turn on both
+    sides of the start of a problem, or half a turn on both sides of 0 for a world. States and motions are checked by
+    the world, exactly as in `plan()`; the validity checker knows the clearance, so that OMPL's reports of it are right.
+    Beside OMPL's own projection the space has "tip", the position of the tip.
+
+    Args:
+        world_or_problem: A `World`, or a `Problem`, whose world it is then.
+
+    Raises:
+        InputError: If it is neither, or a problem has path constraints.
+
+    Example:
+        >>> import rrtik_ompl as rrtik
+        >>> si = rrtik.space_information(rrtik.World(rrtik.load_robot("titan4")))
+        >>> si.getStateDimension()
+        6
+    """
+    if isinstance(world_or_problem, World):
+        return _information(world_or_problem, *world_or_problem.robot.finite_range())
+    if not isinstance(world_or_problem, Problem):
+        raise InputError(f"space_information: expected a World or a Problem, got {type(world_or_problem).__name__}")
+    if world_or_problem.constraints:
+        raise InputError("space_information: the problem has path constraints; OMPL needs a constrained space for them")
+    goal = world_or_problem.goal
+    ends = goal.q[None] if isinstance(goal, JointGoal) else world_or_problem.start[None]
+    return _information(world_or_problem.world, *planning_bounds(world_or_problem, ends))
+
+
+def simple_setup(problem: Problem, *, seed: int = 0) -> og.SimpleSetup:
+    """A problem as ``ompl.geometric.SimpleSetup``: space, checks, start and goal; only the planner is missing.
+
+    A goal in joint values is a GoalState, any other one a :class:`~rrtik_ompl.ompl_bridge.GoalSampler`; its docstring
+    says which planners of OMPL cannot take that.
+
+    Args:
+        problem: What is to be planned.
+        seed: Of the search for configurations at a goal of the tip.
+
+    Raises:
+        InputError: If it is no problem, or has path constraints.
+
+    Example:
+        >>> import rrtik_ompl as rrtik
+        >>> from ompl import geometric as og
+        >>> setup = rrtik.simple_setup(rrtik.load_problem("titan4_sdu"))
+        >>> setup.setPlanner(og.RRTConnect(setup.getSpaceInformation()))
+    """
+    if not isinstance(problem, Problem):
+        raise InputError(f"simple_setup: expected a Problem, got {type(problem).__name__}")
+    si = space_information(problem)
+    setup, states, state = og.SimpleSetup(si), StateIO(si), si.allocState()
+    states.write(state, problem.start)
+    setup.addStartState(state)
+    goal: ob.Goal
+    if isinstance(problem.goal, JointGoal):
+        goal = ob.GoalState(si)
+        states.write(state, problem.goal.q)
+        goal.setState(state)
+    else:
+        goal = GoalSampler(problem, si, seed=seed)
+    setup.setGoal(goal)
+    return setup
+
+
+def _information(world: World, lower: Vector, upper: Vector) -> ob.SpaceInformation:
+    si = bounded_space(lower, upper)
+    si.setStateValidityChecker(WorldValidity(si, world))
+    si.setMotionValidator(WorldMotions(si, world))
+    si.getStateSpace().registerProjection(TIP_PROJECTION, TipProjection(si.getStateSpace(), world.robot))
+    si.setup()
+    return si

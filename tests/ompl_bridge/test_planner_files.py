@@ -1,0 +1,70 @@
+"""Planners in anybody's files."""
+
+from __future__ import annotations
+
+import pytest
+
+from rrtik_ompl.benchmark import load_suite
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.ompl_bridge.planner_names import find_planner
+from rrtik_ompl.problem_files.problem import load_problem, save_problem
+
+CODE = """
+from rrtik_ompl.ompl_bridge import SafePlanner
+class Mine(SafePlanner):
+    def __init__(self, si, *, world=None, seed=None, width=1.0):
+        super().__init__(si, "Mine", world=world, seed=seed)
+number = 7
+"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text(CODE)
+    return path
+
+
+def test_a_class_in_a_file_is_a_planner_and_the_same_one_each_time(file):
+    assert find_planner(f"{file}:Mine") is find_planner(f"{file}:Mine")
+    assert find_planner(f"{file}:Mine").default_options() == {"width": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [("absent.py:Mine", "there is no file absent.py"), ("{file}:number", "number is not a class derived from")],
+)
+def test_what_is_no_planner_gets_one_line(file, name, message):
+    with pytest.raises(InputError, match=message):
+        find_planner(name.format(file=file))
+
+
+def test_a_wrong_class_lists_those_of_the_file(file):
+    with pytest.raises(UnknownNameError, match="Mine"):
+        find_planner(f"{file}:Mien")
+
+
+def test_a_file_that_cannot_be_run_gets_one_line(tmp_path):
+    (tmp_path / "broken.py").write_text("1 / 0")
+    with pytest.raises(InputError, match="cannot be run: ZeroDivisionError"):
+        find_planner(f"{tmp_path / 'broken.py'}:Mine")
+
+
+def test_a_suite_finds_the_file_beside_itself_and_calls_it_by_its_class(file):
+    suite = file.with_name("suite.yaml")
+    suite.write_text(
+        "version: 1\nproblems: [titan4_prisms]\nruns: 1\nseconds: 1\nmemory_mb: 1000\nseed: 1\n"
+        "planners: [{name: 'mine.py:Mine', parameters: {width: 2.0}}]\n"
+    )
+    (entrant,) = load_suite(suite).entrants
+    assert (entrant.label, entrant.name) == ("Mine", f"{file}:Mine")
+
+
+def test_a_problem_file_runs_no_code(file, tmp_path):
+    saved = tmp_path / "problem.yaml"
+    save_problem(load_problem("titan4_prisms"), saved)
+    text = saved.read_text()
+    lines = [line for line in text.splitlines() if not line.startswith("planner:")]
+    saved.write_text("\n".join([*lines, f"planner: '{file}:Mine'", ""]))
+    with pytest.raises(InputError, match="runs no code"):
+        load_problem(saved)

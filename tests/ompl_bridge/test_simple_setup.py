@@ -1,0 +1,132 @@
+"""Worlds and problems in anybody's own OMPL code."""
+
+from __future__ import annotations
+
+import gc
+import weakref
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from ompl import base as ob
+from ompl import geometric as og
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.ompl_bridge.states import StateIO
+
+pytestmark = pytest.mark.usefixtures("quiet_ompl")
+
+
+@pytest.fixture(scope="module")
+def problem():
+    return rrtik.load_problem("titan4_prisms")
+
+
+def state_of(si, q):
+    state = si.allocState()
+    StateIO(si).write(state, np.asarray(q, dtype=np.float64))
+    return state
+
+
+def test_states_motions_and_clearances_are_those_of_the_world(problem):
+    world, rng = problem.world, np.random.default_rng(0)
+    si = rrtik.space_information(world)
+    rows = rng.uniform(*world.robot.finite_range(), (60, world.robot.dof))
+    states = [state_of(si, q) for q in rows]
+    assert [si.isValid(s) for s in states] == world.valid_batch(rows).tolist()
+    motions = [si.checkMotion(a, b) for a, b in pairwise(states)]
+    assert motions == world.motion_valid_batch(rows[:-1], rows[1:]).tolist()
+    checker = si.getStateValidityChecker()
+    assert [checker.clearance(s) for s in states[:5]] == pytest.approx([world.clearance(q) for q in rows[:5]])
+
+
+def test_what_no_world_can_judge_is_not_valid(problem):
+    si = rrtik.space_information(problem)
+    assert not si.isValid(state_of(si, [np.nan] * 6))
+    assert not si.isValid(state_of(si, problem.world.robot.upper + 0.1))
+
+
+@pytest.mark.parametrize("make", [og.RRTConnect, og.KPIECE1])
+def test_a_simple_setup_is_solved_by_planners_of_ompl(problem, make):
+    setup = rrtik.simple_setup(problem)
+    planner = make(setup.getSpaceInformation())
+    if make is og.KPIECE1:
+        planner.setProjectionEvaluator("tip")
+    setup.setPlanner(planner)
+    assert setup.solve(20.0)
+    path = setup.getSolutionPath()
+    assert path.check()
+    rows = StateIO(setup.getSpaceInformation()).rows(path)
+    assert rows[0] == pytest.approx(problem.start)
+    assert path.clearance() > 0.0
+
+
+def test_a_goal_of_the_tip_is_sampled(problem):
+    T = problem.world.robot.fk(problem.goal.q)
+    setup = rrtik.simple_setup(rrtik.Problem(problem.world, problem.start, rrtik.PoseGoal(T)))
+    setup.setPlanner(og.RRTConnect(setup.getSpaceInformation()))
+    assert setup.solve(20.0)
+    rows = StateIO(setup.getSpaceInformation()).rows(setup.getSolutionPath())
+    error = pin.log6(T.actInv(problem.world.robot.fk(rows[-1]))).vector
+    assert np.abs(error).max() < 1e-3
+
+
+def test_nothing_is_kept_alive(problem):
+    def one():
+        setup = rrtik.simple_setup(problem)
+        setup.setPlanner(og.RRTConnect(setup.getSpaceInformation()))
+        setup.setup()
+        return weakref.ref(setup.getStateValidityChecker())
+
+    kept = [one() for _ in range(3)]
+    gc.collect()
+    assert [each() for each in kept] == [None] * 3
+
+
+def test_wrong_arguments_get_one_line(problem):
+    with pytest.raises(InputError, match="a World or a Problem, got str"):
+        rrtik.space_information("titan4")
+    with pytest.raises(InputError, match="expected a Problem, got World"):
+        rrtik.simple_setup(problem.world)
+    si = ob.SpaceInformation(ob.RealVectorStateSpace(3))
+    with pytest.raises(InputError, match="3 coordinates, the robot 6 joints"):
+        rrtik.objectives.tip_travel(si, problem.world.robot)
+    with pytest.raises(InputError, match="weight"):
+        rrtik.objectives.clearance(rrtik.space_information(problem), problem.world, weight=0.0)
+
+
+# --- objectives ---------------------------------------------------------------------------------------------------
+
+
+def cost(objective, si, rows):
+    states = [state_of(si, q) for q in rows]
+    return sum(objective.motionCost(a, b).value() for a, b in pairwise(states))
+
+
+def test_costs_of_a_path(problem):
+    world, si = problem.world, rrtik.space_information(problem)
+    rows = np.array([problem.start, problem.start, problem.start])
+    rows[1, 0] += 0.2
+    rows[2, :2] = rows[1, 0], rows[1, 1] + 0.1
+    assert cost(rrtik.objectives.path_length(si), si, rows) == pytest.approx(0.3)
+    assert cost(rrtik.objectives.single_joint_moves(si), si, rows) == 2.0
+    turn = rows[:2]
+    tip = world.robot.fk(turn[0]).translation
+    axis = world.robot.fk_batch(turn)[:, :3, 3]
+    chord = float(np.linalg.norm(axis[1] - axis[0]))
+    radius = chord / (2.0 * np.sin(0.1))  # joint 1 turns the tip by 0.2 rad on a circle
+    assert cost(rrtik.objectives.tip_travel(si, world.robot), si, turn) == pytest.approx(0.2 * radius, rel=1e-3)
+    assert radius == pytest.approx(np.hypot(*tip[:2]), rel=0.2)
+
+
+def test_pieces_near_obstacles_cost_more(problem):
+    world, si = problem.world, rrtik.space_information(problem)
+    objective = rrtik.objectives.clearance(si, world, weight=0.05)
+    rng = np.random.default_rng(1)
+    rows = world.robot.lower + rng.random((200, 6)) * (world.robot.upper - world.robot.lower)
+    rows = rows[world.valid_batch(rows)]
+    rooms = np.array([world.clearance(q) for q in rows])
+    per_length = [cost(objective, si, [q, q + 1e-6]) / (1e-6 * np.sqrt(6.0)) for q in rows]
+    assert per_length == pytest.approx(1.0 + 0.05 / np.maximum(rooms, 1e-3), rel=1e-2)
