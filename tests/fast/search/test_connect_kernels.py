@@ -174,11 +174,23 @@ def test_halton_points_cover_a_box_more_evenly_than_random_ones():
 
 def test_lengths_are_drawn_from_the_box_or_taken_as_given():
     lower, upper = np.full(7, -3.0), np.full(7, 3.0)
-    range_, domain = connect_lengths(lower, upper, None, None)
+    range_, domain = connect_lengths(lower, upper, None, None, turning=np.ones(7, dtype=bool))
     assert 0.5 < range_ < 2.0
     assert domain > range_
     assert connect_lengths(lower, upper, 0.3, 7.0) == (0.3, 7.0)
     assert connect_lengths(lower, lower, None, None)[0] > 0.0
+
+
+def test_a_range_is_a_share_of_the_box_but_a_joint_that_turns_counts_no_more_than_a_turn():
+    lower, upper = np.zeros(3), np.array([1.0, 2.0, 50.0])
+    for unit in (1e-3, 1e3):
+        plain = connect_lengths(unit * lower, unit * upper, None, None)
+        assert np.divide(plain, unit) == pytest.approx(connect_lengths(lower, upper, None, None))
+    turning = np.array([True, True, True])
+    wide, wider = (connect_lengths(lower, box, None, None, turning=turning)[0] for box in (upper, 2.0 * upper))
+    assert wide < wider < 2.0 * wide
+    sliding = connect_lengths(lower, upper, None, None, turning=np.array([True, True, False]))[0]
+    assert sliding == pytest.approx(0.08 * np.linalg.norm(upper))
 
 
 def test_a_domain_is_somewhat_narrower_than_two_random_configurations_are_apart():
