@@ -67,6 +67,10 @@ def plan(
         float | None,
         typer.Option(help="What the path keeps from obstacles [m]; 0.001, or what start and goal have, if left out."),
     ] = None,
+    improve: Annotated[
+        float,
+        typer.Option(help="How long the path may go on getting shorter once it was found [s], within --seconds."),
+    ] = 0.0,
     out: Annotated[Path | None, typer.Option(help="Save the path: .json, .csv or .txt (OMPL matrix).")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")] = None,
     certificate: Annotated[Path | None, typer.Option(help="Write what proves the path free: .json.")] = None,
@@ -90,6 +94,7 @@ def plan(
     question = load_problem(problem)
     with progress(f"planning {question.name} with {planner or question.planner or AUTO}"):
         limits: dict[str, Any] = {"seconds": seconds, "restarts": restarts, "proof": proof, "clearance": clearance}
+        limits["improve"] = improve
         found = find_path(question, planner, seed=seed, parameters=options, **limits)
     with progress("shortening"):
         rules = {name: value for name, value in options.items() if name in RULES}

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, get_args
 
 import numpy as np
 
-from rrtik_ompl.arrays import positive, whole_number
+from rrtik_ompl.arrays import not_negative, positive, whole_number
 from rrtik_ompl.choices import Accuracy, ProofMode, one_of
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto
 from rrtik_ompl.ompl_bridge.planner_names import list_planners as list_planners
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
+from rrtik_ompl.planning.improving import improved
 from rrtik_ompl.planning.one_planner import run_planner
 from rrtik_ompl.planning.outcome import Plan as Plan
 from rrtik_ompl.planning.outcome import Request
@@ -38,6 +40,7 @@ def plan(
     accuracy: Accuracy | None = None,
     proof: ProofMode = "preferred",
     clearance: float | None = None,
+    improve: float = 0.0,
 ) -> Plan:
     """Find a collision-free path from the start to the goal of a problem.
 
@@ -70,6 +73,11 @@ def plan(
             checked, and nothing is said of proofs.
         clearance: What the path keeps from every obstacle on top of its margin [m], if there is such a path. None:
             1 mm, or what start and goal have.
+        improve: How long the path may go on getting shorter after it was found [s], within ``seconds``: further plans
+            with other seeds, each shortened, of which the shortest is kept. It ends when sixty of them in a row gain
+            nothing, or the path is as short as can be. ``statistics["cost_over_time"]`` has the course, rows of
+            seconds and length, ``"length_bound"`` a length below which there is none. The clock decides how many plans
+            are tried, so paths of a seed may differ.
 
     Raises:
         UnknownNameError: If there is no planner or no accuracy of that name.
@@ -90,8 +98,16 @@ def plan(
     request = Request(limit, used, restarts, parameters or {}, proof, clearance)
     problem = problem if accuracy is None else problem.with_accuracy(accuracy)
     check_clearance(problem.world, clearance, fixed_ends(problem))
+    longer = not_negative(improve, "improve")
+    search = _search_of(problem, planner)
+    found = search(request)
+    return improved(problem, found, search, request, longer) if found.found and longer > 0.0 else found
+
+
+def _search_of(problem: Problem, planner: str | PlannerFactory) -> Callable[[Request], Plan]:
+    """What plans by a planner, given a request."""
     if not isinstance(planner, str):
-        return run_planner(problem, planner.__name__, planner, request)
+        return partial(run_planner, problem, planner.__name__, planner)
     if is_auto(planner):
-        return run_portfolio(problem, request)
-    return run_planner(problem, planner, find_planner(planner), request)
+        return partial(run_portfolio, problem)
+    return partial(run_planner, problem, planner, find_planner(planner))

@@ -45,7 +45,8 @@ class Plan:
         planner: Name of the planner; with "auto" of the one that found the path, or that tried last.
         seed: The seed that repeats this plan.
         statistics: Plain counts, added up over all attempts: attempts, rejected paths, and the planner's own. Those
-            that describe the path (``path_statistics`` of the planner's class) are the last attempt's.
+            that describe the path (``path_statistics`` of the planner's class) are the last attempt's. With
+            ``improve=`` also the course of the length.
     """
 
     found: bool
@@ -54,7 +55,7 @@ class Plan:
     seconds: float
     planner: str
     seed: int
-    statistics: Mapping[str, int | float]
+    statistics: Mapping[str, Any]
 
     __reduce__ = as_value
 

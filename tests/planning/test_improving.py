@@ -1,0 +1,95 @@
+"""Paths that go on getting shorter after they were found."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rrtik_ompl.cli.app import run
+from rrtik_ompl.errors import InputError, PlannerError
+from rrtik_ompl.planning import improving, plan
+from rrtik_ompl.planning.improving import improved
+from rrtik_ompl.planning.outcome import Request
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.problem_files.problem import load_problem
+
+LONG = 20.0  # [s] a limit that the tests do not come near to
+
+
+@pytest.fixture
+def few_rounds(monkeypatch):
+    monkeypatch.setattr(improving, "PATIENCE", 3)
+
+
+@pytest.mark.parametrize(("name", "planner"), [("titan4_prisms", "fastrrtconnect"), ("planar3_boxes", "RRTConnect")])
+def test_a_path_gets_shorter_and_stays_proven(few_rounds, name, planner):
+    problem = load_problem(name)
+    first = plan(problem, planner, seed=1)
+    better = plan(problem, planner, seed=1, seconds=LONG, improve=LONG)
+    assert better.path.length < first.path.length
+    assert better.proven
+    assert not better.path.violations(problem.world)
+    assert (better.path.waypoints[0] == problem.start).all()
+    assert problem.goal.satisfied(problem.world.robot, better.path.waypoints[-1:]).all()  # perhaps by other joint values
+
+
+def test_the_course_of_the_length_only_falls_and_ends_with_the_path(few_rounds):
+    problem = load_problem("titan4_prisms")
+    found = plan(problem, "fastrrtconnect", seed=3, seconds=LONG, improve=LONG)
+    course = np.array(found.statistics["cost_over_time"])
+    assert course.shape[1] == 2
+    assert (np.diff(course[:, 0]) >= 0.0).all()
+    assert (np.diff(course[:, 1]) < 0.0).all()
+    assert course[-1, 1] == found.path.length
+    bound = found.statistics["length_bound"]
+    assert bound == pytest.approx(np.linalg.norm(problem.goal.q - problem.start))
+    assert bound <= found.path.length
+
+
+def test_a_straight_motion_is_as_short_as_can_be_and_ends_the_work():
+    problem = load_problem("titan4_prisms")
+    near = Problem(problem.world, problem.start, problem.start + 1e-3)
+    found = plan(near, seed=1, improve=LONG)
+    assert found.statistics["improving_rounds"] == 0
+    assert found.path.length == pytest.approx(found.statistics["length_bound"])
+
+
+def test_single_joint_moves_stay_so_and_never_become_more(few_rounds):
+    problem = load_problem("planar3_boxes")
+    first = plan(problem, "bicrdt", seed=2)
+    better = plan(problem, "bicrdt", seed=2, seconds=LONG, improve=2.0)
+    assert better.path.one_joint_at_a_time
+    assert better.path.transitions <= first.path.transitions
+
+
+def test_planners_that_find_nothing_or_break_leave_the_first_path(few_rounds):
+    problem = load_problem("titan4_prisms")
+    first = plan(problem, "fastrrtconnect", seed=1)
+    request = Request(LONG, 1, 0, {}, "preferred", None)
+
+    def broken(_):
+        raise PlannerError("it broke")
+
+    kept = improved(problem, first, broken, request, LONG)
+    assert kept.found
+    assert kept.path.length <= first.path.length
+
+
+def test_no_round_begins_when_the_time_of_all_is_up():
+    problem = load_problem("titan4_prisms")
+    first = plan(problem, "fastrrtconnect", seed=1)
+    request = Request(first.seconds, 1, 0, {}, "preferred", None)
+    kept = improved(problem, first, lambda _: pytest.fail("a further plan"), request, LONG)
+    assert kept.path is first.path
+    assert kept.statistics["improving_rounds"] == 0
+
+
+@pytest.mark.parametrize("bad", [-1.0, float("nan"), "long"])
+def test_no_time_is_named(bad):
+    with pytest.raises(InputError, match="improve"):
+        plan(load_problem("titan4_prisms"), improve=bad)
+
+
+def test_the_command_takes_it(capsys):
+    assert run(["plan", "planar3_boxes", "--planner", "RRTConnect", "--improve", "0.2", "--json"]) == 0
+    assert '"cost_over_time"' in capsys.readouterr().out
