@@ -101,7 +101,10 @@ def space_information(world_or_problem: World | Problem) -> ob.SpaceInformation:
     if not isinstance(world_or_problem, Problem):
         raise InputError(f"space_information: expected a World or a Problem, got {type(world_or_problem).__name__}")
     if world_or_problem.constraints:
-        raise InputError("space_information: the problem has path constraints; OMPL needs a constrained space for them")
+        raise InputError(
+            "space_information: the problem has path constraints, which need a constrained space of OMPL's; "
+            "make one of RegionConstraint(problem), see docs/own_ompl_code.md"
+        )
     goal = world_or_problem.goal
     ends = goal.q[None] if isinstance(goal, JointGoal) else world_or_problem.start[None]
     return _information(world_or_problem.world, *planning_bounds(world_or_problem, ends))

@@ -90,6 +90,8 @@ def test_wrong_arguments_get_one_line(problem):
         rrtik.space_information("titan4")
     with pytest.raises(InputError, match="expected a Problem, got World"):
         rrtik.simple_setup(problem.world)
+    with pytest.raises(InputError, match=r"RegionConstraint\(problem\)"):
+        rrtik.simple_setup(rrtik.load_problem("ur5_upright"))
     si = ob.SpaceInformation(ob.RealVectorStateSpace(3))
     with pytest.raises(InputError, match="3 coordinates, the robot 6 joints"):
         rrtik.objectives.tip_travel(si, problem.world.robot)

@@ -30,7 +30,9 @@ def test_a_path_gets_shorter_and_stays_proven(few_rounds, name, planner):
     assert better.proven
     assert not better.path.violations(problem.world)
     assert (better.path.waypoints[0] == problem.start).all()
-    assert problem.goal.satisfied(problem.world.robot, better.path.waypoints[-1:]).all()  # perhaps by other joint values
+    assert problem.goal.satisfied(
+        problem.world.robot, better.path.waypoints[-1:]
+    ).all()  # perhaps by other joint values
 
 
 def test_the_course_of_the_length_only_falls_and_ends_with_the_path(few_rounds):
