@@ -56,7 +56,8 @@ class UnknownNameError(InputError):
 
     def __init__(self, kind: str, name: object, alternatives: Iterable[str], *, where: str = "") -> None:
         self.name = str(name)
-        self.alternatives = tuple(sorted(alternatives))
+        self.alternatives = tuple(sorted(map(str, listed(alternatives, "alternatives of a name"))))
+        require(where, str, "place of a name")
         near = get_close_matches(self.name, self.alternatives, n=1)
         hint = f"; did you mean '{near[0]}'?" if near else ""
         have = ", ".join(self.alternatives) or "none"
@@ -73,7 +74,7 @@ class ProblemError(RrtikError):
     """
 
     def __init__(self, message: str, contacts: Iterable[tuple[str, str]] = (), *, part: str = "start") -> None:
-        self.contacts, self.part = tuple(contacts), part
+        self.contacts, self.part = listed(contacts, "contacts of a problem"), part
         super().__init__(message)
 
 
@@ -119,7 +120,8 @@ def at_most(count: float, limit: float, what: str, remedy: str = "") -> None:
     """
     if count > limit:
         hint = f"; {remedy}" if remedy else ""
-        raise InputError(f"{what}: {count:.0f} are more than the {limit:.0f} that are allowed{hint}")
+        shown = count if isinstance(count, int) else f"{count:.0f}"
+        raise InputError(f"{what}: {shown} are more than the {limit:.0f} that are allowed{hint}")
 
 
 def listed(values: object, what: str) -> tuple[Any, ...]:

@@ -185,8 +185,7 @@ class JointPath:
 
     def resample(self, step: float) -> JointPath:
         """The same path with further waypoints, none farther than ``step`` [rad] from the next; all old ones stay."""
-        size = positive(step, "resample step")
-        counts = part_counts(self.waypoints, size)
+        counts = part_counts(self.waypoints, positive(step, "resample step"))
         return self.with_waypoints(subdivided(self.waypoints, counts)[0])
 
     def violations(self, world: World, *, resolution: float | None = None) -> tuple[Violation, ...]:
@@ -217,8 +216,9 @@ class JointPath:
         """The same path with what is proven of its motions, see :meth:`World.prove`.
 
         Raises:
-            InputError: If the path is another robot's, or the clearance is negative or infinite.
+            InputError: If the path is another robot's, there is no world, or the clearance is negative or infinite.
         """
+        require(world, World, "world of a path's proof")
         other = copy.copy(self)
         object.__setattr__(other, "proof", world.prove(self.waypoints, clearance=clearance, seconds=seconds))
         return other

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, number_rows
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, finite_number, number_rows
 from rrtik_ompl.copies import as_value, itself
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.poses import cross_products, joint_motions
@@ -107,7 +107,8 @@ class Robot:
         return _link_names(self)
 
     def link_of(self, geometry: Any) -> str:
-        """Name of the link of a geometry object."""
+        """Name of the link of a geometry object of Pinocchio, such as one of ``collision.geometryObjects``."""
+        require(geometry, pin.GeometryObject, "geometry of a link", "take it from robot.collision.geometryObjects")
         return str(self.model.frames[geometry.parentFrame].name)
 
     def configuration(self, values: ArrayLike, what: str = "configuration") -> Vector:
@@ -135,14 +136,14 @@ class Robot:
         Raises:
             UnknownNameError: If there is no posture of that name.
         """
-        try:
-            return self.postures[name]
-        except KeyError:
-            raise UnknownNameError(f"posture of robot '{self.name}'", name, self.postures) from None
+        require(name, str, f"posture of robot '{self.name}'")
+        if name not in self.postures:
+            raise UnknownNameError(f"posture of robot '{self.name}'", name, self.postures)
+        return self.postures[name]
 
     def within_limits(self, Q: ArrayLike, tolerance: float = LIMIT_TOLERANCE) -> Mask:
         """Which of the configurations Q, shape (m, dof), lie inside the limits. Shape (m,)."""
-        rows, (lower, upper) = self._rows(Q), _widened_limits(self, tolerance)
+        rows, (lower, upper) = self._rows(Q), _widened_limits(self, finite_number(tolerance, "tolerance of limits"))
         return np.asarray(np.logical_and.reduce((rows >= lower) & (upper >= rows), axis=1))
 
     def finite_range(self) -> tuple[Vector, Vector]:
@@ -153,24 +154,29 @@ class Robot:
 
     def limit_fault(self, q: Vector) -> str:
         """A line that names the first joint of q outside its limits, in degrees (m if it slides); "" if none is."""
-        outside = np.flatnonzero(self.onto_limits(q) != self.clamp(q))
-        if len(outside) == 0:
+        if not (outside := np.flatnonzero(self.onto_limits(q) != self.clamp(q))).size:
             return ""
+        if np.shape(q) != (self.dof,):
+            raise InputError(f"configuration of robot '{self.name}': expected shape ({self.dof},), got {np.shape(q)}")
         joint = int(outside[0])
         factor, unit = shown_unit(self.prismatic[joint])
         value, near, *ends = (factor * float(x[joint]) for x in (q, self.clamp(q), self.lower, self.upper))
-        digits = next(n for n in range(6, 18) if f"{value:.{n}g}" != f"{near:.{n}g}")  # enough to see the difference
+        shown = (n for n in range(6, 18) if f"{value:.{n}g}" != f"{near:.{n}g}")
+        digits = next(shown, 6)  # enough to see the difference; NaN has none
         limits = " .. ".join(f"{end:.{digits}g}" for end in ends)
         return f"joint '{self.joint_names[joint]}' is at {value:.{digits}g} {unit}, outside its limits {limits} {unit}"
 
     def onto_limits(self, Q: Matrix) -> Matrix:
         """Values up to ``LIMIT_TOLERANCE`` outside a limit moved onto it, all others as they are. Shape as given."""
-        lower, upper = _widened_limits(self, LIMIT_TOLERANCE)
-        return np.where((lower <= Q) & (upper >= Q), self.clamp(Q), Q)
+        clamped, (lower, upper) = self.clamp(Q), _widened_limits(self, LIMIT_TOLERANCE)
+        return np.where((lower <= Q) & (upper >= Q), clamped, Q)
 
     def clamp(self, q: Vector) -> Vector:
-        """Move values that lie up to any distance outside onto the limits. Shape as given."""
-        return np.asarray(np.minimum(np.maximum(q, self.lower), self.upper))
+        """Move values any distance outside onto the limits. Shape as given. InputError if they are no such numbers."""
+        try:
+            return np.asarray(np.minimum(np.maximum(q, self.lower), self.upper))
+        except (TypeError, ValueError):
+            raise InputError(f"values of robot '{self.name}': expected {self.dof} numbers, or rows of them") from None
 
     def joint_values(self, Q: ArrayLike) -> Matrix:
         """Values of every joint of the chain, mimic joints resolved. Q: shape (m, dof) or (dof,); (m, joints)."""
@@ -289,7 +295,6 @@ def _places_of(robot: Robot) -> tuple[NDArray[np.int64], ...]:
 
 
 @lru_cache(maxsize=64)
-def _data_of(robot: Robot, thread: int) -> Any:
+def _data_of(robot: Robot, _thread: int) -> Any:
     """Pinocchio's working memory for a robot, of one thread's own."""
-    del thread
     return robot.model.createData()

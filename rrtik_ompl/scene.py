@@ -141,6 +141,8 @@ class AttachedObject:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", _checked_solid(self.name, self.shape, self.pose))
+        require(self.link, str, f"link of '{self.name}'")
+        object.__setattr__(self, "allow", listed(self.allow, f"allow of '{self.name}'"))
         if not self.shape.bounded:
             raise InputError("a half-space cannot be attached to a link")
 
@@ -186,6 +188,7 @@ class Scene:
         Raises:
             UnknownNameError: If there is none.
         """
+        require(name, str, "name of an obstacle")
         for obstacle in self.obstacles:
             if obstacle.name == name:
                 return obstacle
@@ -206,6 +209,7 @@ class Scene:
             UnknownNameError: If there is none of that name.
         """
         for name in names:
+            require(name, str, "name of an obstacle or attached object")
             if name not in self.names:
                 raise UnknownNameError("obstacle or attached object", name, self.names)
         return Scene(
@@ -232,7 +236,9 @@ class Scene:
         taken, rest = self.obstacle(name), self.without(name)
         held = AttachedObject(name, link, taken.shape, pin.SE3.Identity() if pose is None else pose)
         beside = {o.name for o in rest.obstacles} | {a.name for a in rest.attached}
-        names = tuple(allow)
+        names = listed(allow, f"allow of '{name}'")
+        for other in names:
+            require(other, str, f"each name of allow of '{name}'")
         pairs = (*self.allowed_collisions, *((name, other) for other in names if other in beside))
         links = tuple(other for other in names if other not in beside)
         return Scene(rest.obstacles, (*rest.attached, replace(held, allow=links)), pairs)
@@ -244,6 +250,7 @@ class Scene:
             UnknownNameError: If there is no attached object of that name.
             InputError: If the pose is none.
         """
+        require(name, str, "name of an attached object")
         held = {a.name: a for a in self.attached}
         if name not in held:
             raise UnknownNameError("attached object", name, held)

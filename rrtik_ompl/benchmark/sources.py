@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from functools import lru_cache
@@ -72,7 +73,7 @@ def file_source(name: str, folder: Path) -> Source:
         find_problem(name)
         return Source("file", name, name, (name, None))  # which other machines keep in other folders
     file = (folder / path).resolve()
-    if not file.is_file():
+    if not os.path.isfile(file):
         raise InputError(f"no such problem file '{name}' as seen from {folder}; check the path")
     return Source("file", file.stem, file.stem, (str(file), None))
 

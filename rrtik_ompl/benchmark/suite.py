@@ -93,7 +93,7 @@ def load_suite(name_or_file: str | os.PathLike[str], *, folder: Path | None = No
         InputError: One line with file, line, key and remedy.
     """
     path = file_name(name_or_file)
-    if not path.suffix and len(path.parts) == 1 and not path.is_file():
+    if not path.suffix and len(path.parts) == 1 and not os.path.isfile(path):
         path = find_suite(str(name_or_file))
     document = read_yaml(path)
     entry = parse(document, SuiteFile)

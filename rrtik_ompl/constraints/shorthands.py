@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Matrix, finite_array, finite_number, positive
+from rrtik_ompl.arrays import Matrix, finite_array, number_rows, positive
 from rrtik_ompl.choices import FrameAxis
 from rrtik_ompl.constraints.held_region import ANYWHERE
 from rrtik_ompl.errors import InputError, require
@@ -40,6 +40,7 @@ def upright(robot: Robot, axis: FrameAxis = "z", *, tolerance_deg: float = 5.0, 
         >>> problem = rrtik.Problem(rrtik.World(robot), start, goal, constraints=[rrtik.upright(robot)])
     """
     require(robot, Robot, "robot of a path constraint", "use load_robot(name)")
+    require(axis, str, "upright: axis")
     if axis not in ("x", "y", "z"):
         raise InputError(f"upright: axis must be x, y or z, got {axis!r}")
     tolerance = positive(tolerance_deg, "upright: tolerance_deg")
@@ -116,16 +117,16 @@ def orientation_of(pose: Any, tolerances_deg: ArrayLike = 1.0, *, frame: str | N
     Example:
         >>> level = rrtik.orientation_of(robot.fk(start), 2.0)
     """
-    given = np.asarray(tolerances_deg, dtype=np.float64)
+    number_rows(tolerances_deg, "orientation_of: tolerances_deg")
     bounds = _anywhere()
     bounds[3:] = 0.0
     placed = rigid(pose, "orientation_of: pose")
-    if given.ndim == 0:
-        angle = positive(finite_number(given, "orientation_of: tolerances_deg"), "orientation_of: tolerances_deg")
+    if np.ndim(tolerances_deg) == 0:
+        angle = positive(tolerances_deg, "orientation_of: tolerances_deg")
         if angle > LARGEST_TILT_DEG:
             raise InputError(f"orientation_of: tolerances_deg must be {LARGEST_TILT_DEG:g} or less, got {angle:g}")
         return TaskRegion(placed, bounds, orientation_tolerance=np.radians(angle), frame=frame)
-    angles = finite_array(given, (3,), "orientation_of: tolerances_deg")
+    angles = finite_array(tolerances_deg, (3,), "orientation_of: tolerances_deg")
     if (angles < 0.0).any():
         raise InputError(f"orientation_of: tolerances_deg must not be negative, got {angles.tolist()}")
     bounds[3:] = np.radians(np.minimum(angles, 180.0))[:, None] * [-1.0, 1.0]

@@ -6,7 +6,8 @@ from typing import Protocol
 
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.arrays import Vector, finite_array, finite_number
+from rrtik_ompl.errors import require
 from rrtik_ompl.robot import Robot
 
 
@@ -31,8 +32,9 @@ class SimulatedLink:
         """Begin at a configuration, shape (dof,).
 
         Raises:
-            InputError: If it does not fit the robot.
+            InputError: If it does not fit the robot, or there is none.
         """
+        require(robot, Robot, "robot of a link", "use load_robot(name)")
         self._q = robot.configuration(start, "start")
         self.sent: list[tuple[float, Vector]] = []
 
@@ -41,6 +43,11 @@ class SimulatedLink:
         return self._q.copy()
 
     def command(self, q: Vector, t: float) -> None:
-        """Go to a set point at once."""
-        self._q = q.copy()
-        self.sent.append((t, self._q))
+        """Go to a set point at once.
+
+        Raises:
+            InputError: If it is no row of finite numbers, one for each joint, or the time is none.
+        """
+        place, time = finite_array(q, self._q.shape, "set point").copy(), finite_number(t, "time of a set point")
+        self._q = place
+        self.sent.append((time, place))

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector, finite_array
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.arrays import Matrix, Vector, finite_array, whole_number
+from rrtik_ompl.errors import InputError, UnknownNameError, at_most, listed
 from rrtik_ompl.transitions import merge_moves
+
+MOST_JOINTS = 1_000  # of an arm
 
 Joints = Sequence[int | str]
 PerJoint = float | Sequence[float]
@@ -46,7 +48,9 @@ class MoveRules:
         smallest_move: PerJoint = 0.0,
         dof: int | None = None,
     ) -> None:
-        dof = len(names) if dof is None else dof
+        names = listed(names, "names of joints")
+        dof = len(names) if dof is None else whole_number(dof, "dof")
+        at_most(dof, MOST_JOINTS, "dof")
         self.joint_costs = costs_of_joints(joint_costs, dof)
         self.frozen_joints = joint_numbers(frozen_joints, names, dof, "frozen_joints")
         self.last_joints = joint_numbers(last_joints, names, dof, "last_joints")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import sys
 from functools import lru_cache
 from pathlib import Path
@@ -42,7 +43,7 @@ def planner_of_file(name: str) -> PlannerFactory:
     """
     file, _, wanted = name.rpartition(":")
     path = Path(file)
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise InputError(f"planner '{name}': there is no file {file}")
     module = _module(path.resolve())
     found: Any = getattr(module, wanted, None)

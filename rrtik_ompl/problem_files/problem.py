@@ -138,7 +138,7 @@ def problem_path(name_or_file: FilePath) -> Path:
     try:
         return Path(find_problem(name_or_file))
     except UnknownNameError:
-        if path.is_file():
+        if os.path.isfile(path):
             return path
         raise
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import TAU, Matrix, Vector, bounded_array, frozen, length
+from rrtik_ompl.arrays import TAU, Matrix, Vector, bounded_array, frozen, length, not_negative, whole_number
 from rrtik_ompl.copies import as_value
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, at_most
 from rrtik_ompl.shapes.half_space import HalfSpace
 from rrtik_ompl.shapes.mesh import Mesh
 from rrtik_ompl.shapes.prism import Prism
@@ -36,6 +36,7 @@ __all__ = [
 
 SIDES = 32  # of a drawn cylinder
 SEGMENTS = 24  # of a drawn ball or capsule
+MOST_SEGMENTS = 2_000  # half a million vertices
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +73,7 @@ class Box(Shape):
         """The box with rounded edges that is larger by the margin [m] on all sides."""
         turn = np.concatenate([np.linspace(0.0, 0.5 * np.pi, 7) + 0.5 * np.pi * k for k in range(4)])
         corners = np.repeat(0.5 * self.size[:2] * [[1, 1], [-1, 1], [-1, -1], [1, -1]], 7, axis=0)
-        return rounded(corners, turn, float(self.size[2]), margin)
+        return rounded(corners, turn, float(self.size[2]), not_negative(margin, "margin"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,11 +99,11 @@ class Sphere(Shape):
 
     def surface(self, segments: int = SEGMENTS) -> Triangles:
         """Rings of so many segments from pole to pole."""
-        return round_ended(self.radius, 0.0, segments)
+        return round_ended(self.radius, 0.0, _segments(segments))
 
     def grown(self, margin: float) -> Sphere:
         """The ball of a larger radius."""
-        return Sphere(self.radius + margin)
+        return Sphere(self.radius + not_negative(margin, "margin"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +134,7 @@ class Cylinder(Shape):
     def grown(self, margin: float) -> Triangles:
         """The cylinder with rounded edges that is larger by the margin [m] on all sides."""
         turn, circle = _circle(48)
-        return rounded(self.radius * circle, turn, self.length, margin)
+        return rounded(self.radius * circle, turn, self.length, not_negative(margin, "margin"))
 
     def capped(self) -> Capsule:
         """The cylinder with half a ball on either end."""
@@ -163,11 +164,18 @@ class Capsule(Shape):
 
     def surface(self, segments: int = SEGMENTS) -> Triangles:
         """Rings of so many segments from pole to pole."""
-        return round_ended(self.radius, self.length, segments)
+        return round_ended(self.radius, self.length, _segments(segments))
 
     def grown(self, margin: float) -> Capsule:
         """The capsule of a larger radius."""
-        return Capsule(self.radius + margin, self.length)
+        return Capsule(self.radius + not_negative(margin, "margin"), self.length)
+
+
+def _segments(given: int) -> int:
+    """The number of segments of a drawn ball, if a quarter of it is a ring or more."""
+    segments = whole_number(given, "segments", least=4)
+    at_most(segments, MOST_SEGMENTS, "segments")
+    return segments
 
 
 def _circle(sides: int) -> tuple[Vector, Matrix]:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Matrix, bounded_array, finite_array, frozen, positive
+from rrtik_ompl.arrays import Matrix, bounded_array, finite_array, frozen, number_rows, positive
 from rrtik_ompl.copies import as_value
-from rrtik_ompl.errors import InputError, at_most
+from rrtik_ompl.errors import InputError, at_most, require
 from rrtik_ompl.shapes.shape import Shape
 from rrtik_ompl.shapes.surfaces import Triangles
 
@@ -39,13 +39,14 @@ class Mesh(Shape):
     __reduce__ = as_value
 
     def __init__(self, vertices: ArrayLike, triangles: ArrayLike, source: str = "", scale: float = 1.0) -> None:
+        require(source, str, "source of a mesh")
         what = f"mesh {source}" if source else "mesh"
         points = bounded_array(vertices, (None, 3), f"{what}: vertices")
-        faces = np.asarray(triangles)
-        if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
+        rows = number_rows(triangles, f"{what}: triangles")
+        if np.ndim(triangles) != 2 or rows.shape[1] != 3 or len(rows) == 0:
             raise InputError(f"{what}: needs at least one triangle (three vertex numbers each); export it triangulated")
-        at_most(len(faces), MOST_TRIANGLES, f"{what}: triangles", "simplify it")
-        numbers = finite_array(faces, (None, 3), f"{what}: triangles")
+        at_most(len(rows), MOST_TRIANGLES, f"{what}: triangles", "simplify it")
+        numbers = finite_array(rows, (None, 3), f"{what}: triangles")
         if (odd := numbers[numbers != np.floor(numbers)]).size:
             raise InputError(f"{what}: vertex numbers of triangles must be whole, got {odd[0]:g}")
         faces = numbers.astype(np.int64)

@@ -69,7 +69,11 @@ class Shape(ABC):
         """
 
     def grown(self, margin: float) -> Shape | Triangles | None:
-        """All that is within a margin [m] of it, as a shape or as a surface; None if neither is at hand."""
+        """All that is within a margin [m] of it, as a shape or as a surface; None if neither is at hand.
+
+        Raises:
+            InputError: If the margin is negative, or no finite number.
+        """
         del margin
         return None
 

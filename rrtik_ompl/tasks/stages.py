@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Vector, finite_array, frozen, not_negative
 from rrtik_ompl.choices import one_of
-from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.errors import InputError, listed, require
 from rrtik_ompl.goal import Goal, PoseGoal
 from rrtik_ompl.poses import rigid
 
@@ -179,7 +179,7 @@ def _row(stages: object) -> tuple[Stage, ...]:
 
 
 def _names(names: str | Iterable[str], what: str) -> tuple[str, ...]:
-    row = (names,) if isinstance(names, str) else tuple(names)
+    row = (names,) if isinstance(names, str) else listed(names, what)
     for name in row:
         require(name, str, f"each name of {what}")
     return row
