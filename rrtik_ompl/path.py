@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import LARGEST, MOST_ROWS, Mask, Matrix, Vector, finite_array, frozen, positive
+from rrtik_ompl.arrays import LARGEST, MOST_ROWS, Mask, Matrix, Vector, finite_array, frozen, number_rows, positive
 from rrtik_ompl.copies import as_value
-from rrtik_ompl.errors import InputError, at_most, in_file, name_of, require
+from rrtik_ompl.errors import InputError, at_most, in_file, listed, name_of, require
 from rrtik_ompl.files.tables import FORMATS, dumps, loads
 from rrtik_ompl.files.text import known_ending, read_text, write_text
 from rrtik_ompl.robot import Robot
@@ -96,9 +96,9 @@ class JointPath:
             raise InputError(f"path waypoints: found {most:g}, more than {MAX_VALUE:g} rad or m; check units")
         count = rows.shape[1]
         joint_names = (f"joint{k + 1}" for k in range(count)) if joint_names is None else joint_names
-        names = tuple(name_of(name, "a joint of a path") for name in joint_names)
-        given = (np.zeros(count) if kind is None else kind for kind in (prismatic, continuous))
-        sliding, endless = (np.asarray(kind, dtype=bool) for kind in given)
+        names = tuple(name_of(name, "a joint of a path") for name in listed(joint_names, "joint names of a path"))
+        given = (np.zeros(count) if mask is None else mask for mask in (prismatic, continuous))
+        sliding, endless = (number_rows(mask, "mask of a path's joints").reshape(-1).astype(bool) for mask in given)
         if not len(names) == count == sliding.size == endless.size:
             raise InputError(f"path: waypoints have {count} columns, but {len(names)} joint names were given")
         object.__setattr__(self, "waypoints", frozen(rows))

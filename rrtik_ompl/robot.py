@@ -175,7 +175,7 @@ class Robot:
         """Move values any distance outside onto the limits. Shape as given. InputError if they are no such numbers."""
         try:
             return np.asarray(np.minimum(np.maximum(q, self.lower), self.upper))
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise InputError(f"values of robot '{self.name}': expected {self.dof} numbers, or rows of them") from None
 
     def joint_values(self, Q: ArrayLike) -> Matrix:

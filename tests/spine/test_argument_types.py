@@ -13,7 +13,7 @@ SCENE = rrtik.Scene([FAR])
 PATH = rrtik.JointPath.of(ROBOT, [[0, 0, 0], [0.5, 0, 0]])
 SOLIDS = {"sphere": rrtik.Sphere(0.1), "capsule": rrtik.Capsule(0.1, 1), "box": rrtik.Box([1, 1, 1])}
 SOLIDS |= {"cylinder": rrtik.Cylinder(0.1, 1)}
-ODD = [None, "a", b"x", {"a": 1}, object(), len, np.zeros((2, 4)), [[1], [1, 2]], rrtik.Sphere(0.1)]
+ODD = [None, "a", b"x", {"a": 1}, object(), len, np.zeros((2, 4)), [[1], [1, 2]], rrtik.Sphere(0.1), 10**400]
 
 
 def refused(call, *args, **options):
@@ -105,6 +105,8 @@ def test_rules_are_of_named_joints(names, options, what):
         (lambda odd: rrtik.Mesh(np.eye(3), [[0, 1, 2]], odd), "source of a mesh"),
         (lambda odd: rrtik.Mesh(np.eye(3), odd), "triangles"),
         (lambda odd: ROBOT.within_limits([0, 0, 0], odd), "tolerance"),
+        (lambda odd: rrtik.JointPath([[0, 0]], prismatic=odd), "path"),
+        (lambda odd: rrtik.JointPath([[0, 0]], continuous=odd), "path"),
     ],
 )
 @pytest.mark.parametrize("odd", [np.zeros((2, 4)), [[1], [1, 2]], {"a": 1}], ids=lambda odd: type(odd).__name__)
@@ -120,6 +122,7 @@ def test_other_arguments_are_named(call, what, odd):
         lambda odd: SCENE.attaching("far", "tip", odd),
         lambda odd: UnknownNameError("link", "a", odd),
         lambda odd: ProblemError("a", odd),
+        lambda odd: rrtik.JointPath([[0, 0]], odd) if odd is not None else rrtik.Scene(odd),
         lambda odd: rrtik.AttachedObject("a", "tip", rrtik.Sphere(1), allow=odd),
     ],
 )
