@@ -131,10 +131,13 @@ def _blocked(region: HeldRegion, turns: list[Turn], end: Rotations, place: int, 
     blocked = np.zeros(len(values), dtype=bool)
     if len(others) > MOST_ANGLES or len(values) == 0:
         return blocked
-    spans = np.array([_span(region, turns[number]) for number in others]).reshape(-1, 2)
+    limit = region.region.orientation_tolerance + SLACK_ANGLE + ROUNDING
+    if not others:  # one turn alone, as of an arm in a plane: there is nothing to divide
+        blocked |= _angles(region, turns, end, values[:, None]) > limit
+        return blocked
+    spans = np.array([_span(region, turns[number]) for number in others])
     middles, halves = np.tile(spans.mean(axis=1), (len(values), 1)), 0.5 * (spans[:, 1] - spans[:, 0])
     owners, passed = np.arange(len(values)), np.zeros(len(values), dtype=bool)
-    limit = region.region.orientation_tolerance + SLACK_ANGLE + ROUNDING
     corners = np.array(np.meshgrid(*[[-0.5, 0.5]] * len(others))).reshape(len(others), -1).T
     while len(owners) and len(owners) < MOST_BOXES:
         angles = np.insert(middles, place, values[owners], axis=1)

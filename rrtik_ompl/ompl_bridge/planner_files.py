@@ -69,7 +69,7 @@ def _module(path: Path) -> ModuleType:
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         del sys.modules[name]
         raise InputError(f"planner in {path}: the file cannot be run: {type(error).__name__}: {error}") from error
     return module

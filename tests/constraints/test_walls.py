@@ -54,3 +54,14 @@ def test_nothing_is_said_to_be_apart_that_trees_can_connect(name, kind):
                 ends = q[None], goal[None]
                 assert search.solve(*ends, seed, max_iterations=250, unchecked=True) is None
     assert seen > 0
+
+
+def test_the_sum_of_the_joints_of_an_arm_in_a_plane_cannot_turn_while_its_orientation_is_kept():
+    robot = rrtik.load_robot("planar10")
+    start = np.tile([0.3, -0.3], 5)
+    turned, swung = start + 0.2 * np.pi, start + np.tile([0.4, -0.4], 5)
+    for region in (rrtik.upright(robot, "x"), rrtik.orientation_of(robot.fk(start), 2.0)):
+        held = held_regions(robot, Scene(), [region], start)
+        assert held.held(np.vstack([turned, swung])).all()
+        assert "keeps start and goal apart: the sum of joints 'joint1'" in separation(held, start, turned[None])
+        assert separation(held, start, swung[None]) == ""

@@ -44,9 +44,10 @@ def test_a_wrong_class_lists_those_of_the_file(file):
         find_planner(f"{file}:Mien")
 
 
-def test_a_file_that_cannot_be_run_gets_one_line(tmp_path):
-    (tmp_path / "broken.py").write_text("1 / 0")
-    with pytest.raises(InputError, match="cannot be run: ZeroDivisionError"):
+@pytest.mark.parametrize(("text", "said"), [("1 / 0", "ZeroDivisionError"), ("raise SystemExit(7)", "SystemExit: 7")])
+def test_a_file_that_cannot_be_run_gets_one_line(tmp_path, text, said):
+    (tmp_path / "broken.py").write_text(text)
+    with pytest.raises(InputError, match=f"cannot be run: {said}"):
         find_planner(f"{tmp_path / 'broken.py'}:Mine")
 
 
