@@ -186,6 +186,19 @@ def test_a_watchdog_outlives_an_arm_that_breaks():
         until(lambda: told)
 
 
+def test_a_watchdog_outlives_a_terminal_that_has_gone():
+    def tell(_):
+        raise BrokenPipeError("no reader")
+
+    arm, last = SimulatedArm(ROBOT, START), {"one": 0.0, "two": np.inf}
+    reports = {name: lambda name=name: last[name] for name in last}
+    with Watchdog(arm, reports, patience=0.1, tell=tell) as watchdog:
+        until(lambda: watchdog.fault)
+        arm.move(0, 0.5)
+        last["two"] = 0.0
+        until(lambda: arm.moving is None)
+
+
 def picture():
     return Picture(np.zeros((4, 4, 3), dtype=np.uint8), "a", 0.0)
 

@@ -64,5 +64,6 @@ class Watchdog:
             self.fault = f"{', '.join(sorted(silent))}: no report for {self._patience:g} s; the arm was stopped"
             self.fault = self.fault if silent else ""
             if self._tell is not None and silent - known:
-                self._tell(self.fault)
+                with suppress(Exception):  # a terminal that has gone must not end the watch
+                    self._tell(self.fault)
             known = silent
