@@ -7,6 +7,7 @@ inside it. Positions count in tolerances of the position, orientations in (sines
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
@@ -59,6 +60,9 @@ def _of_region(robot: Robot, region: HeldRegion, q: Matrix) -> tuple[Vector, Mat
             lean = lean * (2.0 / max(float(np.linalg.norm(lean)), 1e-9) - 1.0)
         values.append(lean / tolerance)
         derivatives.append(np.cross(R[:, 2], sides) @ J[3:] / tolerance)
+    elif region.turning == Turning.BALL and np.trace(R) < 1.0:  # behind: the sine of a half turn is 0 again
+        values.append(pin.log3(R) / tolerance)
+        derivatives.append(pin.Jlog3(R) @ R.T @ J[3:] / tolerance)
     elif region.turning == Turning.BALL:
         values.append(0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / tolerance)
         derivatives.append(0.5 * (np.trace(R) * np.eye(3) - R) @ J[3:] / tolerance)

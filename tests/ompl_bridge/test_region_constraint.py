@@ -70,3 +70,15 @@ def test_it_makes_a_projected_space():
 def test_a_problem_without_constraints_is_refused():
     with pytest.raises(InputError, match="no path constraints"):
         RegionConstraint(problem_with())
+
+
+@pytest.mark.parametrize("turn", [1.7, 3.0, np.pi, -3.0])
+def test_an_orientation_that_is_turned_round_does_not_satisfy_the_equations(turn):
+    robot, kept = rrtik.load_robot("ur5"), np.array([0.0, -1.5, 1.5, -1.5, -0.5 * np.pi, 0.0])
+    held = held_regions(robot, Scene(), [rrtik.orientation_of(robot.fk(kept), 2.0)], kept)
+    q, step = kept + turn * np.eye(6)[5], 1e-6 * np.array([1.0, 2.0, -1.0, 3.0, 2.0, -2.0])
+    assert not held.held(q[None])[0]
+    assert np.linalg.norm(equations(robot, held, q)[0]) > 1.0
+    if abs(turn) < 3.1:  # the axis of a half turn has no derivative
+        change = equations(robot, held, q + step)[0] - equations(robot, held, q - step)[0]
+        np.testing.assert_allclose(change, 2.0 * equations(robot, held, q)[1] @ step, rtol=1e-4, atol=1e-7)
