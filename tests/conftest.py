@@ -1,6 +1,7 @@
 """What several tests share: the published lists of moves, small meshes, OMPL without its log."""
 
 import os
+import signal
 
 import numpy as np
 import pytest
@@ -15,6 +16,10 @@ from rrtik_tests.bent_meshes import bent_meshes_of
 # Machines differ and are shared: no example may fail for being slow, and an unattended run repeats the same examples.
 settings.register_profile("rrtik", deadline=None, derandomize=bool(os.environ.get("CI")))
 settings.load_profile("rrtik")
+
+# A shell ignores SIGINT in what it starts in the background, and children inherit that; tests of Ctrl-C send it.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 BOTTOM_AND_SIDES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6)]

@@ -18,6 +18,7 @@ from rrtik_ompl.trajectory import RateLimits, Trajectory
 LOOKS = 80  # along a change of pace
 LENGTHS = np.geomspace(0.03, 3.0, 12)  # [s] of a change of pace
 DELAYS = np.concatenate([[0.0], np.geomspace(0.03, 1.0, 9)])  # [s] until it begins
+BESIDE = 1e-5  # [s] from a knot
 SLACK = 1.0 + 1e-9
 TRIALS = sorted(((float(d), float(n)) for d in DELAYS for n in LENGTHS), key=sum)
 
@@ -51,9 +52,24 @@ def keeps_limits(change: Change, motion: Trajectory, place: float, limits: RateL
     pace = change.pace(clock)
     if pace.min() < -1e-9 or pace.max() > SLACK:
         return False
+    return _kept_at(clock, change, motion, place, limits) and _kept_at(
+        _with_knots(clock, change, motion, place), change, motion, place, limits
+    )
+
+
+def _kept_at(clock: Vector, change: Change, motion: Trajectory, place: float, limits: RateLimits) -> bool:
+    """Whether the limits are kept at some times since the beginning of a change, shape (k,)."""
     rises = change.pace.deriv()
     places = place + change.pace.integ()(clock)
-    return _within(motion, places, (pace, rises(clock), rises.deriv()(clock)), limits)
+    return _within(motion, places, (change.pace(clock), rises(clock), rises.deriv()(clock)), limits)
+
+
+def _with_knots(clock: Vector, change: Change, motion: Trajectory, place: float) -> Vector:
+    """Times with those just before and after each knot that is passed, where the motion's jerk jumps."""
+    places = place + change.pace.integ()(clock)
+    knots = motion.times[(motion.times > places[0]) & (motion.times < places[-1])]
+    at = np.interp(knots, places, clock)
+    return np.clip(np.concatenate([clock, at - BESIDE, at + BESIDE]), 0.0, change.length)
 
 
 class Pace:

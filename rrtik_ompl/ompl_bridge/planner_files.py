@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import inspect
 import os
 import sys
 from functools import lru_cache
@@ -48,7 +49,7 @@ def planner_of_file(name: str) -> PlannerFactory:
     module = _module(path.resolve())
     found: Any = getattr(module, wanted, None)
     if found is None:
-        own = [key for key, value in vars(module).items() if _is_planner(value) and value.__module__ == module.__name__]
+        own = [key for key, value in vars(module).items() if _is_planner(value) and inspect.getmodule(value) is module]
         raise UnknownNameError(f"planner in {file}", wanted, own)
     if not _is_planner(found):
         raise InputError(f"planner '{name}': {wanted} is not a class derived from ompl.base.Planner")

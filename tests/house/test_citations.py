@@ -12,7 +12,7 @@ from rrtik_tests.places import ROOT
 FOLDERS = ("rrtik_ompl", "planners", "robots", "bench")
 KINDS = (".py", ".md", ".yaml")
 NEAR = 80  # characters of text around a name in which its number stands
-NOT_USED = {14, 18}  # entries that say of themselves that nothing is taken from them yet
+NOT_USED = {14}  # the entry that says of itself that nothing is taken from it yet
 FINDERS = {ROOT / "bench" / "house.py"}  # it names words to find them
 
 _PLACE = r"(?:, (?:ch\.|app\.|tables?|figures?|sections?|algorithms?|equations?|EXTEND)[^][;]*)?"

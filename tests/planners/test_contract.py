@@ -14,8 +14,8 @@ from ompl import base as ob
 from rrtik_ompl.errors import PlannerError
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult, check_planner
 from rrtik_ompl.ompl_bridge.contract import CONTRACT, moves_one_joint_at_a_time
-from rrtik_ompl.ompl_bridge.contract_problems import Clause, small_problem, solution_rows
-from rrtik_ompl.ompl_bridge.contract_spaces import takes_starts_that_lead_nowhere
+from rrtik_ompl.ompl_bridge.contract.problems import Clause, small_problem, solution_rows
+from rrtik_ompl.ompl_bridge.contract.spaces import takes_starts_that_lead_nowhere
 from rrtik_planners import CRDT, IKURT, MBRRT, BiCRDT, CBiRRT, DRRTCon, FastRRTConnect, FewestMoves, IKURTPublished
 
 PLANNERS = (BiCRDT, CBiRRT, CRDT, DRRTCon, FastRRTConnect, FewestMoves, IKURT, IKURTPublished, MBRRT)
@@ -78,7 +78,7 @@ def run_strictly(code: str) -> subprocess.CompletedProcess[str]:
 CHECK_ALL = """
 from ompl import util as ou
 from rrtik_ompl.ompl_bridge.contract import CONTRACT, moves_one_joint_at_a_time
-from rrtik_ompl.ompl_bridge.contract_spaces import SPACES
+from rrtik_ompl.ompl_bridge.contract.spaces import SPACES
 from rrtik_planners import CRDT, IKURT, MBRRT, BiCRDT, CBiRRT, DRRTCon, FastRRTConnect, FewestMoves, IKURTPublished
 ou.setLogLevel(ou.LogLevel.LOG_NONE)
 def main():
@@ -103,7 +103,7 @@ def test_contract_holds_with_a_memory_that_shows_misuse() -> None:
 SOAK_ALL = f"""
 import os
 from ompl import util as ou
-from rrtik_ompl.ompl_bridge.contract_problems import small_problem, solution_rows
+from rrtik_ompl.ompl_bridge.contract.problems import small_problem, solution_rows
 from rrtik_planners import BiCRDT
 ou.setLogLevel(ou.LogLevel.LOG_NONE)
 def resident_mb():
@@ -141,7 +141,7 @@ def test_ten_thousand_solves_leave_the_memory_flat() -> None:
 def test_the_seed_of_ompl_fixes_a_planner_without_a_seed() -> None:
     code = (
         "from ompl import util as ou; ou.setLogLevel(ou.LogLevel.LOG_NONE); ou.RNG.setSeed({seed})\n"
-        "from rrtik_ompl.ompl_bridge.contract_problems import small_problem, solution_rows\n"
+        "from rrtik_ompl.ompl_bridge.contract.problems import small_problem, solution_rows\n"
         "from rrtik_planners import BiCRDT\n"
         "def main():\n"
         "    s = small_problem(); s.setPlanner(BiCRDT(s.getSpaceInformation())); s.solve(5.0)\n"

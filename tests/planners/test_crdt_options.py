@@ -10,7 +10,7 @@ import pytest
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.ompl_bridge.attempt import attempt
-from rrtik_ompl.ompl_bridge.contract_problems import small_problem
+from rrtik_ompl.ompl_bridge.contract.problems import small_problem
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.transitions import merge_moves, single_joint
 from rrtik_planners import CRDT, BiCRDT

@@ -183,6 +183,25 @@ def place(world: WorldTable, start: JointValues, end: JointValues, share: Any, j
     first_frames(arm_of(world), scratch, joints)
 
 
+@inlined
+def block_of(number: int, middle: int) -> int:
+    """Which block of a motion is checked after so many others: the one in the middle first, then from the start on."""
+    if number == 0:
+        return middle
+    return number - 1 if number <= middle else number
+
+
+@kernel
+def resolved_block(world: WorldTable, doubtful: int, one: bool) -> int:
+    """What inner balls and solids say of lanes that outer balls leave in doubt: the worst answer; ``one`` is enough."""
+    if inner_collision(world, doubtful, one) != 0:
+        return COLLIDING
+    open_, overlapping = narrow_phase(world, doubtful)
+    if overlapping != 0:
+        return COLLIDING
+    return UNDECIDED if open_ != 0 else FREE
+
+
 @kernel
 def check_part(
     world: WorldTable, start: JointValues, end: JointValues, last: int, first: int, count: int, resolve: bool
@@ -198,7 +217,7 @@ def check_part(
     every = bits(lane_numbers() >= 0.0)  # a number: for a constant numba would compile all that is called apart
     answer, middle, watch, left = FREE, blocks // 2, NO_WATCH, joints
     for number in range(blocks):
-        block = middle if number == 0 else number - 1 if number <= middle else number
+        block = block_of(number, middle)
         places = smaller(lane_numbers() * float(blocks) + float(block), float(count - 1)) + float(first)
         share = places / float(last)
         place(world, start, end, share, left)
@@ -221,15 +240,11 @@ def check_part(
         if not resolve:
             answer = UNDECIDED
             break
-        if inner_collision(world, doubtful, resolve) != 0:
-            answer = COLLIDING
+        resolved = resolved_block(world, doubtful, resolve)
+        if resolved != FREE:
+            answer = resolved
+        if resolved == COLLIDING:
             break
-        open_, overlapping = narrow_phase(world, doubtful)
-        if overlapping != 0:
-            answer = COLLIDING
-            break
-        if open_ != 0:
-            answer = UNDECIDED
     return answer
 
 

@@ -193,6 +193,12 @@ def cluster_meets(
     return meeting, near_by
 
 
+@inlined
+def open_lanes(lanes: int, meeting: int, marks: Marks) -> int:
+    """Lanes that are still asked for: all of them where each pair is marked, else those that meet nothing yet."""
+    return lanes if marks != NO_MARKS else lanes & ~meeting
+
+
 @kernel
 def scene_collision(
     balls: BallTable,
@@ -222,7 +228,7 @@ def scene_collision(
             set_clear(watch, number, meeting == 0)
         x, y, z = stored_centre(group_centres_of(scratch), number)
         radius = radius_at(around, number) + slack
-        still = wanted if marks != NO_MARKS else wanted & ~meeting
+        still = open_lanes(wanted, meeting, marks)
         count = primitives_in_reach(primitives, x, y, z, radius, found)
         if count == 0:
             continue
@@ -231,7 +237,7 @@ def scene_collision(
             continue
         group = group_at(groups, number)
         for cluster in range(first_cluster_of_group(group), end_cluster_of_group(group)):
-            left = close if marks != NO_MARKS else close & ~meeting
+            left = open_lanes(close, meeting, marks)
             lanes, near = cluster_meets(balls, primitives, scratch, cluster, count, left, marks, one, likely, slack)
             meeting |= lanes
             if near:

@@ -18,7 +18,7 @@ from rrtik_ompl.ik.ikurt.metric import TipMetric, reach
 from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
 from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
 from rrtik_ompl.ik.ikurt.tree import FIRST_ROOM, IkurtTree
-from rrtik_ompl.ompl_bridge.contract_problems import small_problem
+from rrtik_ompl.ompl_bridge.contract.problems import small_problem
 from rrtik_ompl.poses import pose
 from rrtik_ompl.shapes import Sphere
 from rrtik_planners import IKURT, IKURTPublished

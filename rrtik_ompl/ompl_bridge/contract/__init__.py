@@ -12,7 +12,7 @@ from ompl import base as ob
 from ompl import tools as ot
 
 from rrtik_ompl.errors import PlannerError
-from rrtik_ompl.ompl_bridge.contract_problems import (
+from rrtik_ompl.ompl_bridge.contract.problems import (
     GOAL,
     SECONDS,
     START,
@@ -26,7 +26,7 @@ from rrtik_ompl.ompl_bridge.contract_problems import (
     solution_rows,
     solved,
 )
-from rrtik_ompl.ompl_bridge.contract_spaces import SPACES
+from rrtik_ompl.ompl_bridge.contract.spaces import SPACES
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.transitions import single_joint
 

@@ -10,7 +10,7 @@ import time
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.ompl_bridge.contract_problems import (
+from rrtik_ompl.ompl_bridge.contract.problems import (
     START,
     Clause,
     Factory,
