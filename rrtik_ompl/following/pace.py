@@ -69,7 +69,8 @@ def _with_knots(clock: Vector, change: Change, motion: Trajectory, place: float)
     places = place + change.pace.integ()(clock)
     knots = motion.times[(motion.times > places[0]) & (motion.times < places[-1])]
     at = np.interp(knots, places, clock)
-    return np.clip(np.concatenate([clock, at - BESIDE, at + BESIDE]), 0.0, change.length)
+    looks: Vector = np.clip(np.concatenate([clock, at - BESIDE, at + BESIDE]), 0.0, change.length)
+    return looks
 
 
 class Pace:

@@ -76,8 +76,8 @@ def plan(
         improve: How long the path may go on getting shorter after it was found [s], within ``seconds``: further plans
             with other seeds, each shortened, of which the shortest is kept. It ends when sixty of them in a row gain
             nothing, or the path is as short as can be. ``statistics["cost_over_time"]`` has the course, rows of
-            seconds and length, ``"length_bound"`` a length below which there is none. The clock decides how many plans
-            are tried, so paths of a seed may differ.
+            seconds and length, ``"length_bound"`` a length below which there is none. Ctrl-C ends it, and the best path
+            so far is returned. The clock decides how many plans are tried, so paths of a seed may differ.
 
     Raises:
         UnknownNameError: If there is no planner or no accuracy of that name.

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
@@ -38,40 +39,67 @@ def improved(problem: Problem, first: Plan, again: Callable[[Request], Plan], re
     Returns:
         The first plan with the shortest path, which is proven if the first one is. Its statistics have
         ``cost_over_time``, rows of seconds since the beginning and the length then [rad; m], ``improving_rounds``, and
-        ``length_bound`` where the goal is in joint values: no path is shorter.
+        ``length_bound`` where the goal is in joint values: no path is shorter. Ctrl-C ends the work, not the plan.
     """
-    assert first.path is not None
-    begin = time.perf_counter()
-    end = min(seconds, request.seconds - first.seconds)
-    one_joint = None if first.path.one_joint_at_a_time else False
-    best, bound = first.path, _bound(problem)
-    course, rounds, idle = [(first.seconds, best.length)], 0, 0
-    seeds = np.random.default_rng([request.seed, 1])
-    candidate: JointPath | None = best
-    while True:
-        left = end - (time.perf_counter() - begin)
-        if left < LEAST_SECONDS:
-            break
-        if candidate is not None:
-            limits: dict[str, Any] = {"seconds": left, "clearance": request.clearance}
-            candidate = shorten(candidate, problem, one_joint=one_joint, seed=request.seed + rounds, **limits)
-            if _better(candidate, best, first.path):
-                fewer = first.path.one_joint_at_a_time and candidate.transitions < best.transitions
-                idle = 0 if fewer or candidate.length < best.length * (1.0 - GAIN) else idle
-                best = candidate
-                course.append((first.seconds + time.perf_counter() - begin, best.length))
-        if idle > PATIENCE or best.length <= bound * (1.0 + GAIN):
-            break
-        left = end - (time.perf_counter() - begin)
-        if left < LEAST_SECONDS:
-            break
-        rounds, idle = rounds + 1, idle + 1
-        candidate = _found(again, replace(request, seconds=left, seed=int(seeds.integers(2**31))))
-    spent = first.seconds + time.perf_counter() - begin
-    known = {"length_bound": bound} if bound > 0.0 else {}
-    statistics = {**first.statistics, **known, "improving_rounds": rounds, "cost_over_time": tuple(course)}
-    path = best.with_waypoints(best.waypoints) if request.proof == "off" else best
-    return replace(first, path=path, seconds=spent, statistics=MappingProxyType(statistics))
+    work = _Work(problem, first, again, request, min(seconds, request.seconds - first.seconds))
+    with suppress(KeyboardInterrupt):  # what was found by then is the answer
+        work.run()
+    bound = {"length_bound": work.bound} if work.bound > 0.0 else {}
+    course = {"improving_rounds": work.rounds, "cost_over_time": tuple(work.course)}
+    path = work.best.with_waypoints(work.best.waypoints) if request.proof == "off" else work.best
+    statistics = MappingProxyType({**first.statistics, **bound, **course})
+    return replace(first, path=path, seconds=work.clock(), statistics=statistics)
+
+
+class _Work:
+    """The rounds of plans and shortenings; ``best`` and ``course`` hold at any moment."""
+
+    def __init__(
+        self, problem: Problem, first: Plan, again: Callable[[Request], Plan], request: Request, seconds: float
+    ) -> None:
+        assert first.path is not None
+        self._problem, self._first, self._again, self._request = problem, first, again, request
+        self._begin, self._seconds = time.perf_counter(), seconds
+        self.best, self.bound, self.rounds = first.path, _bound(problem), 0
+        self.course = [(first.seconds, first.path.length)]
+        self._idle = 0
+
+    def clock(self) -> float:
+        """Time since the first plan was begun [s]."""
+        return self._first.seconds + time.perf_counter() - self._begin
+
+    def run(self) -> None:
+        """Go on until the time is up, nothing is gained any more, or the path is as short as can be."""
+        seeds = np.random.default_rng([self._request.seed, 1])
+        candidate: JointPath | None = self.best
+        while (left := self._left()) > LEAST_SECONDS:
+            if candidate is not None:
+                self._take(self._shortened(candidate, left))
+            left = self._left()
+            if self._idle > PATIENCE or left <= LEAST_SECONDS or self.best.length <= self.bound * (1.0 + GAIN):
+                return
+            self.rounds, self._idle = self.rounds + 1, self._idle + 1
+            candidate = _found(self._again, replace(self._request, seconds=left, seed=int(seeds.integers(2**31))))
+
+    def _left(self) -> float:
+        return self._seconds - (time.perf_counter() - self._begin)
+
+    def _shortened(self, path: JointPath, seconds: float) -> JointPath:
+        one_joint = None if self.best.one_joint_at_a_time else False
+        limits: dict[str, Any] = {"seconds": seconds, "clearance": self._request.clearance}
+        return shorten(path, self._problem, one_joint=one_joint, seed=self._request.seed + self.rounds, **limits)
+
+    def _take(self, candidate: JointPath) -> None:
+        """Keep a path if it is the best."""
+        first, best = self._first.path, self.best
+        assert first is not None
+        if not _better(candidate, best, first):
+            return
+        fewer = best.one_joint_at_a_time and candidate.transitions < best.transitions
+        if fewer or candidate.length < best.length * (1.0 - GAIN):
+            self._idle = 0
+        self.best = candidate
+        self.course.append((self.clock(), candidate.length))
 
 
 def _bound(problem: Problem) -> float:

@@ -77,6 +77,23 @@ def test_planners_that_find_nothing_or_break_leave_the_first_path(few_rounds):
     assert kept.path.length <= first.path.length
 
 
+def test_ctrl_c_ends_the_work_and_keeps_the_best_path():
+    problem = load_problem("titan4_prisms")
+    first = plan(problem, "fastrrtconnect", seed=1)
+    asked = []
+
+    def interrupted(request):
+        asked.append(request)
+        if len(asked) == 3:
+            raise KeyboardInterrupt
+        return plan(problem, "fastrrtconnect", seed=request.seed)
+
+    kept = improved(problem, first, interrupted, Request(LONG, 1, 0, {}, "preferred", None), LONG)
+    assert kept.statistics["improving_rounds"] == 3
+    assert kept.path.length < first.path.length
+    assert kept.path.length == kept.statistics["cost_over_time"][-1][1]
+
+
 def test_no_round_begins_when_the_time_of_all_is_up():
     problem = load_problem("titan4_prisms")
     first = plan(problem, "fastrrtconnect", seed=1)
