@@ -20,6 +20,7 @@ import tempfile
 import traceback
 import warnings
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -32,7 +33,7 @@ from rrtik_ompl.files.messages import message_in
 
 BATCH = 200  # calls of a child
 FILE_SHARE = 0.3  # of the calls
-MEMORY_BYTES = 6 << 30
+MEMORY_BYTES = 4 << 30  # that the calls of a child may take beside what its parent has
 SECONDS = 30  # of a call
 LEFT_OUT = {"view", "plan_batch", "replan", "GoalSampler"}  # a server, processes, minutes; an object of OMPL
 URDF = """<robot name="arm"><link name="base"/><link name="hand"><collision><geometry><sphere radius="0.1"/></geometry>
@@ -189,9 +190,17 @@ def outcome(seed: int, folder: Path) -> str | None:
     return None
 
 
+def _address_space() -> int:
+    """Bytes of address space that this process has; 0 where /proc does not tell."""
+    with suppress(OSError):
+        return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
+    return 0
+
+
 def _child(first: int, count: int, folder: Path, write: int) -> None:
     """Make calls; one line of JSON each to a pipe."""
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    most = _address_space() + MEMORY_BYTES
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     warnings.simplefilter("ignore")
     faulthandler.disable()
