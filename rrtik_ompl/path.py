@@ -33,8 +33,6 @@ from rrtik_ompl.world.kept_clearance import CLEARANCE
 from rrtik_ompl.world.route_check import VERIFICATION_DENSITY as VERIFICATION_DENSITY
 from rrtik_ompl.world.route_check import Violation, route_violations, verification_resolution
 
-MAX_VALUE = LARGEST  # of a joint [rad or m]
-
 
 class Move(NamedTuple):
     """One joint moves, all others rest.
@@ -92,8 +90,8 @@ class JointPath:
         if rows.size == 0:
             raise InputError("path waypoints: a path needs at least one configuration of at least one joint")
         at_most(len(rows), MOST_ROWS, "path waypoints")
-        if (most := np.abs(rows).max()) > MAX_VALUE:
-            raise InputError(f"path waypoints: found {most:g}, more than {MAX_VALUE:g} rad or m; check units")
+        if (most := np.abs(rows).max()) > LARGEST:
+            raise InputError(f"path waypoints: found {most:g}, more than {LARGEST:g} rad or m; check units")
         count = rows.shape[1]
         joint_names = (f"joint{k + 1}" for k in range(count)) if joint_names is None else joint_names
         names = tuple(name_of(name, "a joint of a path") for name in listed(joint_names, "joint names of a path"))

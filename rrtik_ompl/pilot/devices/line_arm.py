@@ -262,7 +262,7 @@ class LineServer:
             self.arm.stop()
         elif what == "move":
             good = isinstance(joint, int) and 0 <= joint < self.arm.robot.dof and isinstance(target, int | float)
-            if not good or not abs(target) < 1e6:  # type: ignore[arg-type]
+            if not good or not abs(target) < LARGEST:  # type: ignore[arg-type]
                 return f"move needs a joint from 0 to {self.arm.robot.dof - 1} and a finite target"
             self.arm.move(int(joint), float(target))  # type: ignore[arg-type]
         elif what == "follow":
