@@ -235,7 +235,7 @@ class Scene:
         """
         taken, rest = self.obstacle(name), self.without(name)
         held = AttachedObject(name, link, taken.shape, pin.SE3.Identity() if pose is None else pose)
-        beside = {o.name for o in rest.obstacles} | {a.name for a in rest.attached}
+        beside = set(rest.names)
         names = listed(allow, f"allow of '{name}'")
         for other in names:
             require(other, str, f"each name of allow of '{name}'")
