@@ -58,8 +58,8 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
     try:
         data = text.encode("utf-8")
     except UnicodeEncodeError as error:
-        found = text[error.start].encode("unicode_escape").decode("ascii")
-        raise InputError(f"{path}: cannot be written: a name in it holds {found}, half a letter; rename it") from None
+        half = text[error.start]  # which the error spells out
+        raise InputError(f"{path}: cannot be written: a name in it holds {half}, half a letter; rename it") from None
     write_bytes(path, data)
 
 
