@@ -48,8 +48,10 @@ def base_pose(value: BasePose, what: str = "base_pose") -> pin.SE3 | None:
     Raises:
         InputError: If it is neither, or a key or number in it makes no sense.
     """
-    if value is None or isinstance(value, pin.SE3):
-        return None if value is None else rigid(value, what)
+    if value is None:
+        return None
+    if isinstance(value, pin.SE3):
+        return rigid(value, what)
     if not isinstance(value, Mapping):
         raise InputError(f"{what}: expected a pinocchio.SE3 or {{xyz: [x, y, z], quat_xyzw: [x, y, z, w]}}")
     for key in value:
