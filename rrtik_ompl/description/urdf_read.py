@@ -196,10 +196,7 @@ class _Reader:
         child = attribute(element.find("child"), "child", "link", where)
         axis_element = element.find("axis")
         axis = [1.0, 0.0, 0.0] if axis_element is None else numbers(axis_element, "xyz", 3, (1.0, 0.0, 0.0), where)
-        limit = element.find("limit")
-        lower, upper, velocity = _limit(limit, kind, where)
-        effort = numbers(limit, "effort", 1, (0.0,), where)[0] if limit is not None and kind != "fixed" else 0.0
-        bounds = {"lower": lower, "upper": upper, "velocity": velocity, "effort": effort if effort > 0.0 else np.inf}
+        bounds = _limits(element.find("limit"), kind, where)
         with located(self.where):
             axis = [1.0, 0.0, 0.0] if kind == "fixed" else axis
             origin = _origin(element, where)
@@ -220,25 +217,27 @@ def _measured(element: Element, measure: Measure, where: str) -> float | list[fl
     return numbers(element, measure.name, 1, None, where)[0]
 
 
-def _limit(limit: Element | None, kind: str, where: str) -> tuple[float, float, float]:
-    """Lower, upper and velocity limit; infinite where the kind of joint has none."""
+def _limits(limit: Element | None, kind: str, where: str) -> dict[str, float]:
+    """Limits of position, velocity and effort; infinite where the kind of joint has none, or the file says none."""
     bounded = kind in ("revolute", "prismatic")
-    if limit is None:
-        if bounded:
-            raise InputError(
-                f'{where}: a {kind} joint needs <limit lower=".." upper=".." velocity=".." effort=".."/>; add it'
-                + (', or make the type "continuous"' if kind == "revolute" else "")
-            )
-        return -np.inf, np.inf, np.inf
-    velocity = numbers(limit, "velocity", 1, (0.0,), where)[0] if kind != "fixed" else 0.0
+    bounds = {"lower": -np.inf, "upper": np.inf, "velocity": np.inf, "effort": np.inf}
+    if limit is None and bounded:
+        raise InputError(
+            f'{where}: a {kind} joint needs <limit lower=".." upper=".." velocity=".." effort=".."/>; add it'
+            + (', or make the type "continuous"' if kind == "revolute" else "")
+        )
+    if limit is None or kind == "fixed":
+        return bounds
+    velocity = numbers(limit, "velocity", 1, (0.0,), where)[0]
     if velocity < 0.0:
         raise InputError(f"{where}: velocity limit {velocity:g} is negative; give its size")
-    if not bounded:
-        return -np.inf, np.inf, velocity or np.inf
-    lower, upper = (numbers(limit, key, 1, (0.0,), where)[0] for key in ("lower", "upper"))
-    if lower > upper:
-        raise InputError(f"{where}: lower limit {lower:g} is above upper limit {upper:g}; swap them")
-    return lower, upper, velocity or np.inf
+    if bounded:
+        lower, upper = (numbers(limit, key, 1, (0.0,), where)[0] for key in ("lower", "upper"))
+        if lower > upper:
+            raise InputError(f"{where}: lower limit {lower:g} is above upper limit {upper:g}; swap them")
+        bounds |= {"lower": lower, "upper": upper}
+    effort = numbers(limit, "effort", 1, (0.0,), where)[0]
+    return bounds | {"velocity": velocity or np.inf, "effort": effort if effort > 0.0 else np.inf}
 
 
 def _origin(element: Element, where: str) -> pin.SE3:
