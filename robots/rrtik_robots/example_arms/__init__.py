@@ -100,13 +100,6 @@ def _numbered(prefix: str, count: int, first: int = 1) -> tuple[str, ...]:
 _UR = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint")
 _SO = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
 _BAXTER = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
-_PANDA = _numbered("panda_joint", 7)
-_PANDA_ACCELERATION = (15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0)
-_PANDA_JERK = (7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0)
-_PANDA_HAND = GripperJoints(("panda_finger_joint1",), (0.04,), (0.0,), 0.08)  # the other finger follows
-_PANDA_READY = {
-    "ready": (0.0, -0.7853981633974483, 0.0, -2.356194490192345, 0.0, 1.5707963267948966, 0.7853981633974483)
-}
 _UR_SRDF = "ur_description/srdf/ur5_joint_limited_robot.srdf"  # link names are the same for all three sizes
 _UR_UP = {"up": (0.0, -1.5707963267948966, 0.0, -1.5707963267948966, 0.0, 0.0)}
 
@@ -114,24 +107,16 @@ panda = ExampleArm(
     "panda",
     "panda_description/urdf/panda.urdf",
     "panda_hand_tcp",
-    _PANDA,
+    _numbered("panda_joint", 7),
     "panda_description/srdf/panda.srdf",
-    acceleration=_PANDA_ACCELERATION,
-    jerk=_PANDA_JERK,
-    postures=_PANDA_READY,
-    gripper=_PANDA_HAND,
+    acceleration=(15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0),
+    jerk=(7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0),
+    postures={
+        "ready": (0.0, -0.7853981633974483, 0.0, -2.356194490192345, 0.0, 1.5707963267948966, 0.7853981633974483)
+    },
+    gripper=GripperJoints(("panda_finger_joint1",), (0.04,), (0.0,), 0.08),  # the other finger follows
 )
-panda_primitives = ExampleArm(
-    "panda_primitives",
-    "panda_description/urdf/panda_collision.urdf",
-    "panda_hand_tcp",
-    _PANDA,
-    "panda_description/srdf/panda.srdf",
-    acceleration=_PANDA_ACCELERATION,
-    jerk=_PANDA_JERK,
-    postures=_PANDA_READY,
-    gripper=_PANDA_HAND,
-)
+panda_primitives = replace(panda, name="panda_primitives", urdf="panda_description/urdf/panda_collision.urdf")
 ur3 = ExampleArm("ur3", "ur_description/urdf/ur3_robot.urdf", "tool0", _UR, _UR_SRDF, postures=_UR_UP)
 ur5 = ExampleArm("ur5", "ur_description/urdf/ur5_robot.urdf", "tool0", _UR, _UR_SRDF, postures=_UR_UP)
 ur10 = ExampleArm("ur10", "ur_description/urdf/ur10_robot.urdf", "tool0", _UR, _UR_SRDF, postures=_UR_UP)
