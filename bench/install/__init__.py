@@ -1,1 +1,1 @@
-"""Installing: what resolvers say for other machines, wheels made for a measurement."""
+"""Installing: what resolvers say for other machines."""

@@ -20,13 +20,13 @@ from email.parser import Parser
 from pathlib import Path
 from zipfile import ZipFile
 
-from bench.install.wheels import ROOT, built_wheel
 from bench.shared.pages import add_out
 from rrtik_bench.report.machine import package_version
 from rrtik_bench.report.page import Report
 
 PYTHONS = ("3.10", "3.11", "3.12", "3.13")
 NEXT_PYTHON = "3.14"
+ROOT = Path(__file__).resolve().parents[2]
 FLOOR = ROOT / "tests" / "constraints" / "floor.txt"
 FLOOR_PYTHON = "3.10"  # that of the floor job: older versions have no wheels for the newest Python
 SHOWN = ("ompl", "pin", "coal", "numba", "llvmlite", "numpy", "scipy", "opencv-python-headless")
@@ -72,6 +72,15 @@ def resolved(asked: Iterable[str], platform: str, python: str, *options: str) ->
         return Answer({}, " ".join((hints or done.stderr.splitlines() or ["uv failed"])[0].split()))
     pairs = (line.partition("==") for line in done.stdout.splitlines())
     return Answer({name: version for name, _, version in pairs if version})
+
+
+def built_wheel(folder: Path) -> Path:
+    """Make the wheel of this checkout in a folder, without kernels: they change nothing of what it needs."""
+    command = [sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "--quiet", "--no-deps"]
+    command += ["--wheel-dir", str(folder), str(ROOT)]
+    subprocess.run(command, check=True, env={**os.environ, "RRTIK_KERNELS": "0"})
+    (wheel,) = folder.glob("rrtik_ompl-*.whl")
+    return wheel
 
 
 def requirements(wheel: Path) -> list[str]:
@@ -125,7 +134,7 @@ def main() -> int:
     add_out(parser, "resolve.md")
     out = parser.parse_args().out
     with tempfile.TemporaryDirectory() as folder:
-        return report(built_wheel(Path(folder), kernels=False)).finish(out)
+        return report(built_wheel(Path(folder))).finish(out)
 
 
 if __name__ == "__main__":
