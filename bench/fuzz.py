@@ -57,7 +57,7 @@ FILES: dict[str, tuple[str, Callable[[Path], object]]] = {
     "arm.urdf": (URDF, rrtik.load_robot),
     "dh.yaml": (
         "version: 1\nname: arm\ndh: {convention: standard, rows: [{a: 1, limits_deg: [-90, 90]}]}\n",
-        lambda path: rrtik.load_robot(path),
+        rrtik.load_robot,
     ),
     "path.json": ('{"version": 1, "joint_names": ["a", "b"], "waypoints": [[0, 0], [0.5, 0]]}', rrtik.load_path),
     "path.csv": ("a,b\n0,0\n1,0.5\n", rrtik.load_path),
