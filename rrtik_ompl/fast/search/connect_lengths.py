@@ -16,7 +16,7 @@ MIN_RANGE = 1e-9  # [unit of the box] where lower and upper bounds coincide
 
 
 def connect_lengths(
-    lower: Vector, upper: Vector, range_: float | None, domain: float | None, *, turning: Mask | None = None
+    lower: Vector, upper: Vector, range_: float | None, domain: float | None, *, turning: Mask | None
 ) -> tuple[float, float]:
     """Range and domain in use: as given, or else a share of the box of configurations, whatever its unit.
 

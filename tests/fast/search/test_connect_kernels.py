@@ -177,15 +177,15 @@ def test_lengths_are_drawn_from_the_box_or_taken_as_given():
     range_, domain = connect_lengths(lower, upper, None, None, turning=np.ones(7, dtype=bool))
     assert 0.5 < range_ < 2.0
     assert domain > range_
-    assert connect_lengths(lower, upper, 0.3, 7.0) == (0.3, 7.0)
-    assert connect_lengths(lower, lower, None, None)[0] > 0.0
+    assert connect_lengths(lower, upper, 0.3, 7.0, turning=None) == (0.3, 7.0)
+    assert connect_lengths(lower, lower, None, None, turning=None)[0] > 0.0
 
 
 def test_a_range_is_a_share_of_the_box_but_a_joint_that_turns_counts_no_more_than_a_turn():
     lower, upper = np.zeros(3), np.array([1.0, 2.0, 50.0])
     for unit in (1e-3, 1e3):
-        plain = connect_lengths(unit * lower, unit * upper, None, None)
-        assert np.divide(plain, unit) == pytest.approx(connect_lengths(lower, upper, None, None))
+        plain = connect_lengths(unit * lower, unit * upper, None, None, turning=None)
+        assert np.divide(plain, unit) == pytest.approx(connect_lengths(lower, upper, None, None, turning=None))
     turning = np.array([True, True, True])
     wide, wider = (connect_lengths(lower, box, None, None, turning=turning)[0] for box in (upper, 2.0 * upper))
     assert wide < wider < 2.0 * wide
@@ -197,16 +197,18 @@ def test_a_domain_is_somewhat_narrower_than_two_random_configurations_are_apart(
     rng, upper = np.random.default_rng(0), np.array([1.0, 4.0 * np.pi, 12.0])
     pairs = rng.uniform(0.0, upper, (2, 20000, 3))
     apart = np.sqrt(np.mean(np.sum((pairs[0] - pairs[1]) ** 2, axis=1)))
-    assert connect_lengths(np.zeros(3), upper, None, None)[1] == pytest.approx(0.8 * apart, rel=0.02)
-    assert connect_lengths(np.zeros(3), upper, 30.0, None)[1] == 30.0  # a range reaches no farther than its domain
+    assert connect_lengths(np.zeros(3), upper, None, None, turning=None)[1] == pytest.approx(0.8 * apart, rel=0.02)
+    assert (
+        connect_lengths(np.zeros(3), upper, 30.0, None, turning=None)[1] == 30.0
+    )  # a range reaches no farther than its domain
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])
 def test_lengths_that_are_none_are_refused(bad):
     with pytest.raises(InputError, match="range"):
-        connect_lengths(np.zeros(2), np.ones(2), bad, None)
+        connect_lengths(np.zeros(2), np.ones(2), bad, None, turning=None)
     with pytest.raises(InputError, match="domain"):
-        connect_lengths(np.zeros(2), np.ones(2), None, bad)
+        connect_lengths(np.zeros(2), np.ones(2), None, bad, turning=None)
 
 
 def test_a_share_is_below_one_even_where_all_bits_are_set():

@@ -50,7 +50,7 @@ class ConstrainedSearch:
             raise InputError("search in kernels: there are none; install numba")
         motions.require_covered(lower, upper)
         self._kernels, self._motions, self._dof = kernels, motions, motions.dof
-        longest, domain = connect_lengths(lower, upper, range_, None)
+        longest, domain = connect_lengths(lower, upper, range_, None, turning=np.ones(motions.dof, dtype=bool))
         joints = 0 if motions.identity else motions.joints
         self._trees = [tree_table(self._dof, joints, FIRST_CAPACITY) for _ in range(2)]
         numbers = np.array([longest, min(SHORTEST_STEP, longest), longest, domain])
