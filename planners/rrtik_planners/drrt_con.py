@@ -64,9 +64,8 @@ class DRRTCon(SafePlanner):
         reused = core is not None and core.path is not None and self._from_kept(core, starts, goals, checker, ptc)
         if core is None or not reused:
             fresh = self._new()
-            if (
-                fresh.begin(starts, goals, checker, ptc) or core is None
-            ):  # a path that is blocked now is of more use to the next call than none
+            found = fresh.begin(starts, goals, checker, ptc)
+            if core is None or found:  # a path that is blocked now is of more use to the next call than none
                 core = self._core = fresh
         path = self._asked(core, checker, ptc)
         statistics = {"iterations": core.connect.samples, "repairs": core.repairs, "reused": int(reused)}

@@ -61,6 +61,7 @@ class _Work:
         self._problem, self._first, self._again, self._request = problem, first, again, request
         self._begin, self._seconds = time.perf_counter(), seconds
         self.best, self.bound, self.rounds = first.path, _bound(problem), 0
+        self._one_joint, self._proven = first.path.one_joint_at_a_time, first.path.proven
         self.course = [(first.seconds, first.path.length)]
         self._idle = 0
 
@@ -85,40 +86,31 @@ class _Work:
         return self._seconds - (time.perf_counter() - self._begin)
 
     def _shortened(self, path: JointPath, seconds: float) -> JointPath:
-        one_joint = None if self.best.one_joint_at_a_time else False
+        one_joint = None if self._one_joint else False
         limits: dict[str, Any] = {"seconds": seconds, "clearance": self._request.clearance}
         return shorten(path, self._problem, one_joint=one_joint, seed=self._request.seed + self.rounds, **limits)
 
     def _take(self, candidate: JointPath) -> None:
-        """Keep a path if it is the best."""
-        first, best = self._first.path, self.best
-        assert first is not None
-        if not _better(candidate, best, first):
+        """Keep a path if it is the best: proven and of single-joint moves if the first one is."""
+        moves, length = self._cost(self.best)
+        if self._one_joint and not candidate.one_joint_at_a_time:
             return
-        fewer = best.one_joint_at_a_time and candidate.transitions < best.transitions
-        if fewer or candidate.length < best.length * (1.0 - GAIN):
+        if self._cost(candidate) >= (moves, length) or (self._proven and not candidate.proven):
+            return
+        if self._cost(candidate) < (moves, length * (1.0 - GAIN)):
             self._idle = 0
         self.best = candidate
         self.course.append((self.clock(), candidate.length))
+
+    def _cost(self, path: JointPath) -> tuple[int, float]:
+        """What is to be small: the length, of single-joint moves their number first."""
+        return (path.transitions if self._one_joint else 0), path.length
 
 
 def _bound(problem: Problem) -> float:
     """What no path can be shorter than: the straight motion to a goal in joint values; 0 for any other goal."""
     goal = problem.goal
     return float(np.linalg.norm(goal.q - problem.start)) if isinstance(goal, JointGoal) else 0.0
-
-
-def _better(candidate: JointPath, best: JointPath, first: JointPath) -> bool:
-    """Whether a path is shorter, and proven if the first one is; of single-joint moves fewer count first."""
-    if first.one_joint_at_a_time:
-        if not candidate.one_joint_at_a_time or candidate.transitions > best.transitions:
-            return False
-        if candidate.transitions == best.transitions and candidate.length >= best.length:
-            return False
-    elif candidate.length >= best.length:
-        return False
-    proven = first.proof is not None and first.proof.proven
-    return not proven or (candidate.proof is not None and candidate.proof.proven)
 
 
 def _found(again: Callable[[Request], Plan], request: Request) -> JointPath | None:
