@@ -15,6 +15,7 @@ from rrtik_ompl.arrays import TAU, Matrix, Vector, frozen
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.world import World
+from rrtik_ompl.world.motion_queries import MotionFree
 
 
 @dataclass(slots=True, eq=False)
@@ -75,16 +76,16 @@ class ValidityCallback:
             return False
 
 
-class _Motions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no types
-    """Motions checked by the world. It must not hold the SpaceInformation, or neither is ever freed."""
+class CheckedMotions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no types
+    """Motions checked by a world. It must not hold the SpaceInformation, or neither is ever freed."""
 
-    def __init__(self, si: ob.SpaceInformation, validity: ValidityCallback, states: StateIO) -> None:
+    def __init__(self, si: ob.SpaceInformation, motion_valid: MotionFree) -> None:
         super().__init__(si)
-        self._validity, self._states = validity, states
+        self._motion_valid, self._states = motion_valid, StateIO(si)
 
     def checkMotion(self, first: ob.State, second: ob.State, *_: object) -> bool:
         """Whether the motion between two states is free."""
-        return self._validity.motion_valid(self._states.read(first), self._states.read(second))
+        return self._motion_valid(self._states.read(first), self._states.read(second))
 
 
 def planning_bounds(problem: Problem, goals: Matrix) -> tuple[Vector, Vector]:
@@ -103,7 +104,7 @@ def space_information(problem: Problem, goals: Matrix, validity: ValidityCallbac
     si = bounded_space(*planning_bounds(problem, goals))
     states = StateIO(si)
     si.setStateValidityChecker(lambda state: validity.valid(states.read(state)))
-    si.setMotionValidator(_Motions(si, validity, StateIO(si)))
+    si.setMotionValidator(CheckedMotions(si, validity.motion_valid))
     si.setup()
     return si
 

@@ -12,7 +12,7 @@ from rrtik_ompl.arrays import Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
-from rrtik_ompl.ompl_bridge.setup import bounded_space, planning_bounds
+from rrtik_ompl.ompl_bridge.setup import CheckedMotions, bounded_space, planning_bounds
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
@@ -43,18 +43,6 @@ class WorldValidity(ob.StateValidityChecker):  # type: ignore[misc]  # OMPL has 
         """Smallest signed distance of the arm from obstacles and from itself [m], less margins; called by OMPL."""
         nearest = self._world.clearance(self._states.read(state))
         return nearest if math.isfinite(nearest) else FAR
-
-
-class WorldMotions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no types
-    """Motions by a world. It must not hold the SpaceInformation, or neither is ever freed."""
-
-    def __init__(self, si: ob.SpaceInformation, world: World) -> None:
-        super().__init__(si)
-        self._world, self._states = world, StateIO(si)
-
-    def checkMotion(self, first: ob.State, second: ob.State, *_: object) -> bool:
-        """Whether the straight motion between two states is free; called by OMPL."""
-        return self._world.motion_valid(self._states.read(first), self._states.read(second))
 
 
 class TipProjection(ob.ProjectionEvaluator):  # type: ignore[misc]  # OMPL has no types
@@ -149,7 +137,7 @@ def simple_setup(problem: Problem, *, seed: int = 0) -> og.SimpleSetup:
 def _information(world: World, lower: Vector, upper: Vector) -> ob.SpaceInformation:
     si = bounded_space(lower, upper)
     si.setStateValidityChecker(WorldValidity(si, world))
-    si.setMotionValidator(WorldMotions(si, world))
+    si.setMotionValidator(CheckedMotions(si, world.motion_valid))
     si.getStateSpace().registerProjection(TIP_PROJECTION, TipProjection(si.getStateSpace(), world.robot))
     si.setup()
     return si

@@ -20,6 +20,7 @@ from rrtik_ompl.ompl_bridge.contract.problems import (
     Factory,
     attempt,
     outside_bar,
+    outside_wall,
     require,
     require_status,
     small_problem,
@@ -88,7 +89,7 @@ def repeats_with_the_same_seed(factory: Factory) -> None:
 
 def takes_seconds(factory: Factory) -> None:
     """``planner.solve(0.2)`` called from Python takes a number, and time that runs out is not an error."""
-    setup = small_problem(_behind_wall)
+    setup = small_problem(outside_wall)
     planner = factory(setup.getSpaceInformation())
     setup.setPlanner(planner)
     setup.setup()
@@ -189,7 +190,3 @@ CONTRACT: tuple[Clause, ...] = (
     runs_in_benchmark,
     *SPACES,
 )
-
-
-def _behind_wall(state: ob.State) -> bool:
-    return bool(abs(state[0]) > 0.5)

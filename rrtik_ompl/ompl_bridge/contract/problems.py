@@ -77,6 +77,11 @@ def outside_bar(state: ob.State) -> bool:
     return bool(abs(state[0]) > 0.5 or abs(state[1]) > 0.5)
 
 
+def outside_wall(state: ob.State) -> bool:
+    """A validity checker for :func:`small_problem` with a wall that no path leads round, between START and GOAL."""
+    return bool(abs(state[0]) > 0.5)
+
+
 def solution_rows(setup: og.SimpleSetup) -> Matrix | None:
     """The path that a SimpleSetup holds, shape (k, n), or None."""
     path = setup.getProblemDefinition().getSolutionPath()

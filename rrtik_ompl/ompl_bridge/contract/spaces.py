@@ -15,6 +15,7 @@ from rrtik_ompl.ompl_bridge.contract.problems import (
     Clause,
     Factory,
     box_problem,
+    outside_wall,
     require,
     require_status,
     small_problem,
@@ -79,7 +80,7 @@ def works_in_any_dimension(factory: Factory) -> None:
 def takes_starts_that_lead_nowhere(factory: Factory) -> None:
     """A start that is shut in does not keep a planner from one that sees the goal, whichever comes first."""
     for starts in ((START, (1.5, 1.5, 1.5)), ((1.5, 1.5, 1.5), START)):
-        setup = small_problem(_behind_wall, starts=starts)
+        setup = small_problem(outside_wall, starts=starts)
         setup.setPlanner(factory(setup.getSpaceInformation(), seed=1))
         require_status(str(setup.solve(SECONDS)), "Exact solution", "several starts, one of them shut in")
         require(bool(setup.getSolutionPath().check()), "several starts: the path is not valid", starts)
@@ -109,7 +110,3 @@ SPACES: tuple[Clause, ...] = (
 def _between_discs(state: ob.State) -> bool:
     x, y = (3.0 * state[0]) % 1.0 - 0.5, (3.0 * state[1]) % 1.0 - 0.5
     return bool(x * x + y * y > 0.09)
-
-
-def _behind_wall(state: ob.State) -> bool:
-    return bool(abs(state[0]) >= 0.3)
