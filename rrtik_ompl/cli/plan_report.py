@@ -9,9 +9,6 @@ import numpy as np
 from rich import box
 from rich.table import Table
 
-from rrtik_ompl.certificates.certificate import load_certificate
-from rrtik_ompl.certificates.verify import verify
-from rrtik_ompl.certificates.write import certificate_of
 from rrtik_ompl.goal import JointGoal, PositionGoal
 from rrtik_ompl.moves.text import COLUMNS, moves_document
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, is_auto
@@ -174,6 +171,8 @@ def write_certificate(problem: Problem, path: JointPath, file: Path) -> str:
     Raises:
         InputError: If the file cannot be written.
     """
+    from rrtik_ompl.certificates.write import certificate_of
+
     world = problem.world
     kept = path.proof.clearance if path.proof is not None and path.proven else 0.0
     found = certificate_of(world, path, kept)
@@ -190,6 +189,9 @@ def certified(problem: Problem, path: JointPath, proof: Path) -> tuple[str, bool
     Raises:
         InputError: If the file is missing or is no certificate.
     """
+    from rrtik_ompl.certificates.certificate import load_certificate
+    from rrtik_ompl.certificates.verify import verify
+
     found = load_certificate(proof)
     fault = verify(found, problem.world, path.waypoints)
     if not fault and abs(path.start - problem.start).max() > 1e-6:

@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 
 from rrtik_ompl.cli.terminal import progress, say
@@ -39,6 +38,8 @@ def straight(
         raise typer.BadParameter("give the end of the line: '--by DX DY DZ' or '--to X Y Z', and only one of them.")
     check_target(out, PATH_FORMATS)
     check_target(html, (".html", ".htm"))
+    import numpy as np
+
     from rrtik_ompl import arc, load_problem
     from rrtik_ompl import straight as follow
     from rrtik_ompl.poses import pose_from_rpy
