@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -102,7 +102,7 @@ class Expander:
         try:
             if isinstance(stage, Alternatives):
                 for number, row in enumerate(options_of(step)):
-                    yield from self.after(_with(branch, rest=(*row, *rest), chosen=(*branch.chosen, number)))
+                    yield from self.after(replace(branch, rest=(*row, *rest), chosen=(*branch.chosen, number)))
             elif isinstance(stage, MoveTo):
                 yield from self._aims(branch, step, stage.goal)
             elif isinstance(stage, Straight):
@@ -164,22 +164,7 @@ def way_of(robot: Robot, a: Vector, b: Vector) -> float:
 
 def again(branch: Branch, effort: int) -> Branch:
     """The same branch, to be tried with more effort."""
-    return _with(branch, rest=branch.rest, chosen=branch.chosen, effort=effort)
-
-
-def _with(branch: Branch, *, rest: tuple[Step, ...], chosen: tuple[int, ...], effort: int | None = None) -> Branch:
-    return Branch(
-        branch.setting,
-        branch.q,
-        rest,
-        branch.before,
-        branch.step,
-        branch.path,
-        branch.done,
-        branch.cost,
-        chosen,
-        branch.effort if effort is None else effort,
-    )
+    return replace(branch, effort=effort)
 
 
 def _next(branch: Branch, step: Step, setting: Setting, q: Vector, path: JointPath | None = None) -> Branch:
