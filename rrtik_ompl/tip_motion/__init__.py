@@ -88,7 +88,7 @@ def straight(
     def rails(begin: pin.SE3) -> list[Rail]:
         return [straight_rail(begin, _goal(T_world_goal, begin, "T_world_goal"))]
 
-    return _moved(world, q, rails, _settings(deviation, turn_deviation, clearance, seed))
+    return _moved(world, q, rails, deviation, turn_deviation, clearance, seed)
 
 
 def arc(
@@ -123,7 +123,7 @@ def arc(
     def rails(begin: pin.SE3) -> list[Rail]:
         return [arc_rail(begin, _goal(T_world_goal, begin, "T_world_goal"), through)]
 
-    return _moved(world, q, rails, _settings(deviation, turn_deviation, clearance, seed))
+    return _moved(world, q, rails, deviation, turn_deviation, clearance, seed)
 
 
 def screw(
@@ -158,7 +158,7 @@ def screw(
     def rails(begin: pin.SE3) -> list[Rail]:
         return [screw_rail(begin, _goal(T_world_goal, begin, "T_world_goal"), turns)]
 
-    return _moved(world, q, rails, _settings(deviation, turn_deviation, clearance, seed))
+    return _moved(world, q, rails, deviation, turn_deviation, clearance, seed)
 
 
 def linear(
@@ -196,40 +196,7 @@ def linear(
             raise InputError("poses: a motion of the tip needs at least one pose to go to")
         return [straight_rail(a, b) for a, b in pairwise(stations)]
 
-    return _moved(world, q, rails, _settings(deviation, turn_deviation, clearance, seed))
-
-
-def begin_configurations(world: World, q: ArrayLike | str | pin.SE3, seed: int) -> Matrix:
-    """Configurations from which a motion of the tip may begin, shape (k, dof): the one given, or those of a pose.
-
-    Raises:
-        ProblemError: If it is in collision or outside the limits.
-        InputError: If no configuration is at the pose, or q is neither.
-        UnknownNameError: If there is no posture of that name.
-    """
-    robot = world.robot
-    if isinstance(q, str):
-        q = robot.posture(q)
-    if not isinstance(q, pin.SE3) and np.ndim(q) < 2:
-        return usable_configuration(world, q, "start")[None]
-    found = solve_ik(robot, PoseGoal(rigid(q, "start")), all=True, world=world, seed=seed)
-    if not found.found:
-        raise InputError(f"start: no configuration of robot '{robot.name}' is at this pose: {found.detail}")
-    return found.solutions[:BRANCHES]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Settings:
-    tolerance: Tolerance
-    clearance: float
-    seed: int
-
-
-def _settings(deviation: float, turn_deviation: float, clearance: float, seed: int) -> _Settings:
-    tolerance = Tolerance(positive(deviation, "deviation"), positive(turn_deviation, "turn_deviation"))
-    if tolerance.turn > 1.0:
-        raise InputError(f"turn_deviation must be 1 rad at most, got {tolerance.turn:g}; is it in radians?")
-    return _Settings(tolerance, not_negative(clearance, "clearance"), whole_number(seed, "seed"))
+    return _moved(world, q, rails, deviation, turn_deviation, clearance, seed)
 
 
 def _goal(value: ArrayLike | pin.SE3, begin: pin.SE3, what: str) -> pin.SE3:
@@ -241,14 +208,44 @@ def _goal(value: ArrayLike | pin.SE3, begin: pin.SE3, what: str) -> pin.SE3:
 
 
 def _moved(
-    world: World, q: ArrayLike | str | pin.SE3, rails: Callable[[pin.SE3], list[Rail]], settings: _Settings
+    world: World,
+    q: ArrayLike | str | pin.SE3,
+    rails: Callable[[pin.SE3], list[Rail]],
+    deviation: float,
+    turn_deviation: float,
+    clearance: float,
+    seed: int,
 ) -> StraightResult:
     """Follow the rails that begin where the tip is."""
+    tolerance = Tolerance(positive(deviation, "deviation"), positive(turn_deviation, "turn_deviation"))
+    if tolerance.turn > 1.0:
+        raise InputError(f"turn_deviation must be 1 rad at most, got {tolerance.turn:g}; is it in radians?")
+    room, number = not_negative(clearance, "clearance"), whole_number(seed, "seed")
     require(world, World, "world", "use World(robot, scene)")
-    starts = begin_configurations(world, q, settings.seed)
-    begin = rigid(q, "start") if isinstance(q, pin.SE3) or np.ndim(q) == 2 else world.robot.fk(starts[0])
-    way = Way(tuple(rails(begin)), settings.tolerance, settings.clearance)
+    begin, starts = _begin(world, q, number)
+    way = Way(tuple(rails(begin)), tolerance, room)
     if way.measures(world.robot).sum() <= NO_LENGTH:
         raise InputError("the tip is at the goal already: there is no line to follow")
-    made = farthest(world, way, starts, settings.seed)
+    made = farthest(world, way, starts, number)
     return StraightResult(path_of(world, made), made.fraction, made.reason)
+
+
+def _begin(world: World, q: ArrayLike | str | pin.SE3, seed: int) -> tuple[pin.SE3, Matrix]:
+    """Where the tip begins (SE3), and configurations from which it may, shape (k, dof): that given, or those of a pose.
+
+    Raises:
+        ProblemError: If it is in collision or outside the limits.
+        InputError: If no configuration is at the pose, or q is neither.
+        UnknownNameError: If there is no posture of that name.
+    """
+    robot = world.robot
+    if isinstance(q, str):
+        q = robot.posture(q)
+    if not isinstance(q, pin.SE3) and np.ndim(q) < 2:
+        start = usable_configuration(world, q, "start")
+        return robot.fk(start), start[None]
+    begin = rigid(q, "start")
+    found = solve_ik(robot, PoseGoal(begin), all=True, world=world, seed=seed)
+    if not found.found:
+        raise InputError(f"start: no configuration of robot '{robot.name}' is at this pose: {found.detail}")
+    return begin, found.solutions[:BRANCHES]
