@@ -70,7 +70,7 @@ def farthest(world: World, way: Way, starts: Matrix, seed: int) -> Attempt:
                 best = made
             if made.fraction == 1.0:
                 break
-        if best is not None and best.fraction == 1.0 and len(starts) > 1 and redundant(world.robot):
+        if best is not None and best.fraction == 1.0 and redundant(world.robot):
             break
     assert best is not None, "there is at least one start"
     return best

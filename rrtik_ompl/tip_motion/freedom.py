@@ -41,8 +41,8 @@ def redundant(robot: Robot) -> bool:
 def centred(robot: Robot) -> Leaning:
     """Away from the limits, where the rail leaves that free [60]."""
     bounded = np.isfinite(robot.lower) & np.isfinite(robot.upper)
-    middle = np.where(bounded, 0.5 * (np.where(bounded, robot.lower, 0.0) + np.where(bounded, robot.upper, 0.0)), 0.0)
+    low, high = robot.finite_range()
     pull = np.zeros(robot.dof)
     if redundant(robot):
         pull[list(moving_the_tip(robot))] = CENTRING
-    return Leaning(frozen(middle), frozen(np.where(bounded, pull, 0.0)))
+    return Leaning(frozen(0.5 * (low + high)), frozen(np.where(bounded, pull, 0.0)))

@@ -23,13 +23,14 @@ def why_stopped(robot: Robot, rail: Rail, followed: Followed) -> str:
     if len(followed.rows) >= MOST_ROWS:
         return f"the line takes more than {MOST_ROWS} configurations: allow more deviation"
     q, scale = followed.rows[-1], np.repeat([1.0, metres_per_radian(robot)], 3)
-    jacobian, twist = robot.jacobian(q) * scale[:, None], rail.twist(float(followed.shares[-1])) * scale
+    plain = robot.jacobian(q)
+    jacobian, twist = plain * scale[:, None], rail.twist(float(followed.shares[-1])) * scale
     held = np.zeros(robot.dof, dtype=bool)
     while (pushed := _pushed(robot, q, jacobian, twist, held)).any():
         held |= pushed
     if held.any():
         return _limits(robot, q, held)
-    values = np.linalg.svd(robot.jacobian(q), compute_uv=False)
+    values = np.linalg.svd(plain, compute_uv=False)
     missed = twist - jacobian @ (np.linalg.pinv(jacobian, CUT_OFF) @ twist)
     if np.linalg.norm(missed) > LOST * np.linalg.norm(twist) and len(values) < 6:
         return f"{robot.dof} joints cannot move the tip like this"
