@@ -49,7 +49,7 @@ def packed_rail(robot: Robot, rail: Rail, q: Vector, tolerance: Tolerance, leani
     table[rail_layout.PULL][:] = leaning.pull
     settings = table[rail_layout.SETTINGS]
     settings[rail_layout.DEVIATION], settings[rail_layout.CHORD] = tolerance.deviation, tolerance.chord
-    settings[rail_layout.SMALLEST], settings[rail_layout.NEXT_STEP] = SMALLEST_STEP, FIRST_STEP
+    settings[rail_layout.SMALLEST], settings[rail_layout.FIRST_STEP] = SMALLEST_STEP, FIRST_STEP
     settings[rail_layout.HOMING], settings[rail_layout.MOMENTUM] = float(leaning.homing), float(not redundant(robot))
     return table
 

@@ -12,7 +12,7 @@ from rrtik_ompl.fast.ik import rail_layout
 from rrtik_ompl.fast.ik.ik_layout import Configuration, Doubles, Pose
 from rrtik_ompl.fast.simd.access import double_reader, double_vector_reader, field_reader
 from rrtik_ompl.fast.simd.compiled import inlined
-from rrtik_ompl.fast.simd.lanes import double_at, set_double, set_field
+from rrtik_ompl.fast.simd.lanes import double_at, set_field
 
 # Table
 rail_of: Callable[[rail_layout.RailTable], rail_layout.Rail] = field_reader(rail_layout.RAIL)
@@ -48,12 +48,6 @@ def setting(table: rail_layout.RailTable, place: int) -> float:
     """One of the settings."""
     value: float = double_at(settings_of(table), place)
     return value
-
-
-@inlined
-def set_next_step(table: rail_layout.RailTable, share: float) -> None:
-    """Keep the next step for who goes on."""
-    set_double(settings_of(table), rail_layout.NEXT_STEP, share)
 
 
 @inlined

@@ -45,7 +45,6 @@ from rrtik_ompl.fast.ik.rail_accessors import (
     reference_of,
     row_count_of,
     rows_of,
-    set_next_step,
     set_row_count,
     setting,
     shares_of,
@@ -211,7 +210,7 @@ def advance(limb: LimbTable, call: CallTable, table: RailTable, row: int, share:
 @entry
 def follow(limb: LimbTable, call: CallTable, table: RailTable) -> int:
     """Follow the rail from the last row as far as possible; 1 at its end, 2 if there is no room left, 0 elsewhere."""
-    share = setting(table, rail_layout.NEXT_STEP)
+    share = setting(table, rail_layout.FIRST_STEP)
     smallest = setting(table, rail_layout.SMALLEST)
     while True:
         row = row_count_of(table) - 1
@@ -226,4 +225,3 @@ def follow(limb: LimbTable, call: CallTable, table: RailTable) -> int:
         share = tried * min(max(change, SMALLEST_SHRINKING), LARGEST_GROWTH)
         if share < smallest:
             return 0
-        set_next_step(table, share)

@@ -27,9 +27,9 @@ RAIL_NUMBERS = POSE_NUMBERS + 15
 # below · scratch memory: TRIAL and MIDDLE configurations
 RAIL, CAPACITY, COUNT, Q, SHARES, LEVERS, REFERENCE, PULL, SETTINGS, TRIAL, MIDDLE = range(11)
 # DEVIATION [m] and CHORD (2 sin(angle / 2)) of the tip from the rail at most, on the straight motions too; SMALLEST and
-# NEXT step, shares of the rail; HOMING: 1 to be drawn so that the reference is reached at the end; MOMENTUM: 1 to begin
-# each step with what the one before did
-DEVIATION, CHORD, SMALLEST, NEXT_STEP, HOMING, MOMENTUM = range(6)
+# FIRST step, shares of the rail; HOMING: 1 to be drawn so that the reference is reached at the end; MOMENTUM: 1 to
+# begin each step with what the one before did
+DEVIATION, CHORD, SMALLEST, FIRST_STEP, HOMING, MOMENTUM = range(6)
 SETTING_COUNT = 6
 
 # The method, for the kernels and for their reference implementation.
