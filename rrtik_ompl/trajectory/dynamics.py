@@ -19,7 +19,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.timing.reference import Rows
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.trajectory.curve import Samples
-from rrtik_ompl.trajectory.fastest import Bounds
+from rrtik_ompl.trajectory.fastest import MOST, Bounds
 
 DIRECTIONS = 12  # of the tip's acceleration that are bounded; the polygon loses 0.9 % of the circle
 ANGLES = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
@@ -163,7 +163,7 @@ class DynamicLimits:
         second = np.outer(straight, np.cos(ANGLES)) + np.outer(aside, np.sin(ANGLES))
         most = np.full_like(first, INSIDE * self.tip_acceleration)
         cap = self.tip_acceleration / np.maximum(np.where(size < LEAST_SPEED, aside, 0.0), 1e-200)
-        return Bounds(Rows(first, second, -most, most), np.minimum(cap, 1e200))
+        return Bounds(Rows(first, second, -most, most), np.minimum(cap, MOST))
 
     def _torque_rows(self, unit: Measured, along: Matrix) -> Bounds:
         high, low = self.torque - unit.holding, -self.torque - unit.holding
@@ -176,7 +176,7 @@ class DynamicLimits:
             )
         used = np.isfinite(self.torque)
         rows = Rows(*(part[:, used] for part in (along, unit.torques - unit.holding, low, high)))
-        return Bounds(rows, np.full(len(along), 1e200))
+        return Bounds(rows, np.full(len(along), MOST))
 
 
 def _torques(robot: Robot, torque: ArrayLike | bool) -> Vector:

@@ -12,6 +12,7 @@ import yaml
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import write_bytes
 
+FIELDS = ("positions", "velocities", "accelerations")  # of a point; the last one may be left out
 NANOSECONDS = 1_000_000_000
 _SCHEMA = {
     "type": "object",
@@ -29,11 +30,10 @@ def joint_trajectory(names: Sequence[str], columns: Sequence[list[Any]]) -> dict
         names: Of the joints.
         columns: Times, positions and velocities, one entry each per point; accelerations if there are four.
     """
-    keys = ("positions", "velocities", "accelerations")
     points = []
     for time, *values in zip(*columns, strict=True):
         whole, rest = divmod(round(time * NANOSECONDS), NANOSECONDS)
-        points.append(dict(zip(keys, values, strict=False)) | {"time_from_start": {"sec": whole, "nanosec": rest}})
+        points.append(dict(zip(FIELDS, values, strict=False)) | {"time_from_start": {"sec": whole, "nanosec": rest}})
     stamp = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
     return {"header": stamp, "joint_names": list(names), "points": points}
 

@@ -15,7 +15,6 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.trajectory.limits import ROUNDING_MARGIN, RateLimits
-from rrtik_ompl.trajectory.pieces import Pieces
 
 MOST_PIECES = 1250  # of a curve, about
 MOST_STEPS = 16  # of the widest window
@@ -68,11 +67,6 @@ class Spline:
             rows = rows[:, 1:] - rows[:, :-1]
             found.append(np.maximum(rows.max(axis=1), -rows.min(axis=1)) / self.step**power)
         return found[0], found[1], found[2]
-
-    def pieces(self) -> Pieces:
-        """The spline as cubics one after the other."""
-        positions, velocities, accelerations = (rows[:-1] for rows in self.knots())
-        return Pieces(np.full(len(positions), self.step), positions, velocities, accelerations)
 
 
 def widest_window(limits: RateLimits) -> float:

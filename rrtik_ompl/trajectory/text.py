@@ -10,11 +10,10 @@ from typing import Any
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.tables import json_object, table_rows
-from rrtik_ompl.trajectory.messages import from_yaml, joint_trajectory, to_yaml
+from rrtik_ompl.trajectory.messages import FIELDS, from_yaml, joint_trajectory, to_yaml
 
 FORMATS = (".json", ".csv", ".yaml")
 KIND = "joint_trajectory"
-FIELDS = ("positions", "velocities", "accelerations")
 _DURATION = (("sec", "secs"), ("nanosec", "nsecs"))
 
 
