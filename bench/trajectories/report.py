@@ -24,6 +24,7 @@ from rrtik_ompl import RateLimits, motion_report, time_parameterize
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.trajectory import Trajectory
 from rrtik_ompl.trajectory.blending import blended
+from rrtik_ompl.trajectory.corners import vertices
 
 BLEND = 0.2  # [rad] of the large table
 BLENDS = (0.05, 0.1, 0.2, 0.4)  # of the proofs
@@ -168,7 +169,9 @@ def times(report: Report) -> None:
 
 
 def _timed(path: JointPath, limits: RateLimits) -> Trajectory | None:
-    return blended(path, limits, 0.1, np.inf, lambda motion, off_path: np.zeros(0, dtype=np.int64))
+    return blended(
+        path, vertices(path.waypoints), limits, 0.1, np.inf, lambda motion, off_path: np.zeros(0, dtype=np.int64)
+    )
 
 
 def least(work: Callable[[], object]) -> float:

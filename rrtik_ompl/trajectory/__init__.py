@@ -102,7 +102,8 @@ def time_parameterize(
         raise InputError("a path with rounded corners leaves the checked one: pass world=problem.world, to check it")
     require(world, World, "world of a path with rounded corners")
     check_route_clearance(world, clearance, path.waypoints)
-    return blended(path, bounds, reach, stopping.duration, fault_finder(path, world, clearance), more) or stopping
+    faults = fault_finder(path, world, clearance)
+    return blended(path, corners, bounds, reach, stopping.duration, faults, more) or stopping
 
 
 def _corners(path: JointPath) -> Matrix:

@@ -27,14 +27,17 @@ Faults = Callable[[Trajectory, Mask], NDArray[np.int64]]  # pieces that are not 
 
 def blended(
     path: JointPath,
+    corners: Matrix,
     limits: RateLimits,
     blend: float,
     slowest: float,
     faults: Faults,
     more: DynamicLimits | None = None,
 ) -> Trajectory | None:
-    """The motion through rounded corners; None where no such motion is faster than ``slowest`` [s], or none is free."""
-    corners = vertices(path.waypoints)
+    """The motion along a path with these vertices, shape (k, n), that rounds them.
+
+    None where no such motion is faster than ``slowest`` [s], or none is free.
+    """
     rows = vertices(corners[spaced(corners, MERGED_SHARE * blend)])
     along = np.concatenate([np.zeros(1), np.cumsum(np.linalg.norm(np.diff(rows, axis=0), axis=1))])
     radii, room = first_radii(rows, blend), (DEVIATION_SHARE - MERGED_SHARE) * blend
