@@ -18,6 +18,7 @@ from rrtik_ompl.tip_motion.freedom import centred, redundant
 from rrtik_ompl.tip_motion.rails import Rail
 from rrtik_ompl.tip_motion.reasons import why_blocked, why_stopped
 from rrtik_ompl.tip_motion.values import SMALLEST_STEP, Leaning, Tolerance
+from rrtik_ompl.transitions import route_length
 from rrtik_ompl.world import Proof, World
 
 HALVINGS = 14  # of a motion that is not proven, to find how far it is
@@ -54,7 +55,7 @@ class Attempt:
     @property
     def length(self) -> float:
         """Of the joints' way [rad, metres counted alike]."""
-        return float(np.linalg.norm(np.diff(self.rows, axis=0), axis=1).sum())
+        return route_length(self.rows)
 
 
 def farthest(world: World, way: Way, starts: Matrix, seed: int) -> Attempt:
