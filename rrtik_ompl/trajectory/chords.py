@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Vector
+from rrtik_ompl.trajectory.cubics import even_parts
 from rrtik_ompl.world import Proof
 
 CHORD_SLACK = 1e-4  # [m] by which two bodies together may leave their places on the chords
@@ -47,5 +48,4 @@ def chords_of(durations: Vector, pushes: Vector) -> Chords:
         pushes: Largest acceleration of any point of the arm during each of them [m/s^2], shape (m,).
     """
     counts = np.maximum(np.ceil(durations * np.sqrt(0.25 * pushes / CHORD_SLACK)), 1.0).astype(np.int64)
-    shares = np.concatenate([np.arange(n) / n for n in counts])
-    return Chords(counts, np.repeat(np.arange(len(counts)), counts), shares)
+    return Chords(counts, *even_parts(counts))

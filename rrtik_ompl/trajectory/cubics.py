@@ -1,8 +1,9 @@
-"""Cubics between knots: what follows from times, positions, velocities and accelerations."""
+"""Cubics between knots: what follows from times, positions, velocities and accelerations; pieces in even parts."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 
@@ -28,3 +29,10 @@ def hermite_accelerations(times: Vector, positions: Matrix, velocities: Matrix) 
     mean, first, last = np.diff(positions, axis=0) / h, velocities[:-1], velocities[1:]
     begin, end = (6.0 * mean - 4.0 * first - 2.0 * last) / h, (2.0 * first + 4.0 * last - 6.0 * mean) / h
     return np.vstack([begin, end[-1:]])
+
+
+def even_parts(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], Vector]:
+    """Pieces cut into so many parts each: of each part its piece, and the share of that where it begins, shape (k,)."""
+    pieces = np.repeat(np.arange(len(counts)), counts)
+    first = np.cumsum(counts) - counts
+    return pieces, (np.arange(len(pieces)) - first[pieces]) / counts[pieces]

@@ -18,6 +18,7 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.tables.memory import table
 from rrtik_ompl.fast.timing import layout, reference
+from rrtik_ompl.trajectory.cubics import even_parts
 
 LEAST_STEPS = 150  # of the grid along a whole curve
 STEPS_PER_RADIUS = 12  # of the grid within a rounded corner
@@ -138,6 +139,5 @@ class Curve:
         steps = np.where(np.isinf(tightest), widths / STEPS_PER_LINE, tightest / STEPS_PER_RADIUS)
         steps = np.minimum(steps, self.length / LEAST_STEPS)
         counts = np.maximum(np.ceil(widths / steps), 1.0).astype(np.int64)
-        first = np.repeat(np.cumsum(counts) - counts, counts)
-        shares = (np.arange(counts.sum()) - first) / np.repeat(counts, counts)
-        return np.append(np.repeat(knots[:-1], counts) + shares * np.repeat(widths, counts), self.length)
+        pieces, shares = even_parts(counts)
+        return np.append(knots[pieces] + shares * widths[pieces], self.length)

@@ -16,7 +16,7 @@ from rrtik_ompl.errors import InputError, at_most, require
 from rrtik_ompl.files.text import known_ending, write_text
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.trajectory.chords import CHORD_SLACK, chords_of
-from rrtik_ompl.trajectory.cubics import ends_of, hermite_accelerations, jerks_of
+from rrtik_ompl.trajectory.cubics import ends_of, even_parts, hermite_accelerations, jerks_of
 from rrtik_ompl.trajectory.messages import write_mcap
 from rrtik_ompl.trajectory.text import FORMATS, dumps
 from rrtik_ompl.units import joint_units
@@ -288,11 +288,9 @@ def bad_moments(motion: Trajectory, world: World) -> Vector:
     h, peak = np.diff(motion.times), np.abs(motion.velocities)
     speed = np.maximum(peak[1:], peak[:-1]) + h[:, None] * np.abs(motion.jerks * h[:, None]) / 8.0
     counts = np.ceil(h * (speed @ world.weights) * VERIFICATION_DENSITY / world.motion_resolution).astype(np.int64) + 1
-    pieces = np.append(np.repeat(np.arange(len(h)), counts), len(h) - 1)
-    first = np.repeat(np.cumsum(counts) - counts, counts)
-    shares = (np.arange(counts.sum()) - first) / np.repeat(counts, counts)
-    clock = np.append(motion.times[pieces[:-1]] + shares * h[pieces[:-1]], motion.duration)
+    pieces, shares = even_parts(counts)
+    clock = np.append(motion.times[pieces] + shares * h[pieces], motion.duration)
     bad = np.flatnonzero(~world.certify(motion(clock).positions))
-    _, where = np.unique(pieces[bad], return_index=True)
+    _, where = np.unique(np.append(pieces, len(h) - 1)[bad], return_index=True)
     found: Vector = clock[bad[where]]
     return found
