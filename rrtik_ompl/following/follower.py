@@ -9,7 +9,7 @@ from threading import Lock
 
 import numpy as np
 
-from rrtik_ompl.arrays import finite_number, positive
+from rrtik_ompl.arrays import Vector, finite_number, positive
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.following.links import RobotLink
 from rrtik_ompl.following.pace import Pace
@@ -83,7 +83,7 @@ class Follower:
         self._wanted, self._paused, self._stopping, self._reason = 1.0, False, False, ""
         self._pace, self._again = Pace(), 0.0
         self._ended = False
-        self._check(trajectory.positions[0], "the trajectory begins elsewhere")
+        self._check_begin(trajectory.positions[0])
 
     @property
     def ended(self) -> bool:
@@ -154,10 +154,8 @@ class Follower:
                 sleep(max(0.0, before + self._step - clock()))
                 told = self._motion(self._pace.place).positions
                 now = clock()
-                apart = np.abs(self._link.positions() - told)
-                if not (apart <= self._tolerance).all():
-                    name = self._motion.joint_names[int(np.nan_to_num(apart, nan=np.inf).argmax())]
-                    self.stop(f"joint '{name}' is {apart.max():.3g} away from where it was told to be")
+                if away := self._away(self._link.positions(), told):
+                    self.stop(f"{away} away from where it was told to be")
                 self.step(max(now - before, 1e-6))
                 before = now
             except KeyboardInterrupt:
@@ -173,14 +171,20 @@ class Follower:
         pace.advance(seconds)
         pace.place = min(pace.place, self._motion.duration)
 
-    def _check(self, told: np.ndarray, what: str) -> None:
+    def _check_begin(self, told: Vector) -> None:
         here = np.asarray(self._link.positions(), dtype=np.float64)
         if here.shape != told.shape:
             raise InputError(f"the arm has {here.size} joints, the trajectory moves {told.size}: it is another robot's")
+        if away := self._away(here, told):
+            raise InputError(f"the trajectory begins elsewhere: {away} rad or m away; move the arm there first")
+
+    def _away(self, here: Vector, told: Vector) -> str:
+        """Which joint is farthest from where it was told to be, and how far; "" if all are near enough."""
         apart = np.abs(here - told)
-        if not (apart <= self._tolerance).all():
-            name = self._motion.joint_names[int(np.nan_to_num(apart, nan=np.inf).argmax())]
-            raise InputError(f"{what}: joint '{name}' is {apart.max():.3g} rad or m away; move the arm there first")
+        if (apart <= self._tolerance).all():
+            return ""
+        name = self._motion.joint_names[int(np.nan_to_num(apart, nan=np.inf).argmax())]
+        return f"joint '{name}' is {apart.max():.3g}"
 
 
 def _peaks(motion: Trajectory) -> RateLimits:
