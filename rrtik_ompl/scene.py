@@ -254,8 +254,8 @@ class Scene:
         held = {a.name: a for a in self.attached}
         if name not in held:
             raise UnknownNameError("attached object", name, held)
-        free = self.without(name).with_(Obstacle(name, held[name].shape, pose))
-        return replace(free, allowed_collisions=self.allowed_collisions)
+        free = Obstacle(name, held.pop(name).shape, pose)
+        return Scene((*self.obstacles, free), tuple(held.values()), self.allowed_collisions)
 
     def at(self, time: float) -> Scene:
         """The scene with ``time`` [s] as its time 0: moving obstacles are where their motion puts them, and go on.
