@@ -121,6 +121,12 @@ def unit_vector(values: ArrayLike, what: str) -> Vector:
     return vector / length
 
 
+def turned_z(direction: Vector) -> NDArray[np.float64]:
+    """The shortest rotation that takes z to a unit vector, shape (3,): (3, 3)."""
+    rotation: NDArray[np.float64] = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), direction).matrix()
+    return rotation
+
+
 def rotation_angles(rotations: NDArray[np.float64]) -> Vector:
     """Angle of rotations, shape (m, 3, 3): atan2(|R - R^T| / (2 sqrt 2), (tr R - 1) / 2), accurate near 0 and pi."""
     skew = (rotations - rotations.transpose(0, 2, 1)).reshape(len(rotations), 9)

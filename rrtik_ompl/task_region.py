@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector, finite_array, frozen, positive
 from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.poses import rigid, rotation_angles, rpy_matrices, unit_vector
+from rrtik_ompl.poses import rigid, rotation_angles, rpy_matrices, turned_z, unit_vector
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.tip_distance import metres_per_radian
 
@@ -117,8 +117,7 @@ class TaskRegion(WithinTolerances):
         tip = rigid(T_world_tip, "goal region: T_world_tip")
         direction = unit_vector(axis, "goal region: axis")
         point = tip.translation if through is None else finite_array(through, (3,), "goal region: through")
-        R = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), direction).matrix()
-        T_world_w = pin.SE3(R, np.array(point))
+        T_world_w = pin.SE3(turned_z(direction), np.array(point))
         bounds = np.zeros((6, 2))
         bounds[2], bounds[5] = _range(slide, "goal region: slide"), _range(turn, "goal region: turn")
         return cls(T_world_w, bounds, T_world_w.actInv(tip), position_tolerance, orientation_tolerance)

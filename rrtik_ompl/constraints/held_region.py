@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import TAU, Matrix, Vector
 from rrtik_ompl.collision.motion_bound import joint_weights
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.poses import rpy_matrices
+from rrtik_ompl.poses import rpy_matrices, turned_z
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.task_region import TaskRegion, into_range, roll_pitch_yaw
@@ -77,6 +77,11 @@ class HeldRegion:
         """Frame of the region, shape (4, 4)."""
         placed: NDArray[np.float64] = self.region.T_world_w.homogeneous
         return placed
+
+    @property
+    def rows(self) -> list[int]:
+        """Rows of the chain's joints that move the frame, base first."""
+        return _rows_to(self.robot, self.joint)
 
     @property
     def frame(self) -> str:
@@ -166,7 +171,8 @@ def held_region(robot: Robot, scene: Scene, region: TaskRegion, label: str) -> H
     carried = [(joint, T_joint_d[:3, 3], 0.0)]
     somewhere = bool((np.abs(region.bounds[:3]) < ANYWHERE).any())
     levers = joint_weights(robot, carried) if joint and somewhere else np.zeros(len(robot.chain.parent))
-    turns = (_carries(robot, joint) & ~robot.chain.prismatic).astype(np.float64)
+    turns, rows = np.zeros(len(robot.chain.parent)), _rows_to(robot, joint)
+    turns[rows] = ~robot.chain.prismatic[rows]
     T_w_world = region.T_world_w.inverse().homogeneous
     return HeldRegion(robot, region, label, link, joint, T_joint_d, T_w_world, turning, before, levers, turns)
 
@@ -182,12 +188,13 @@ def frame_place(robot: Robot, scene: Scene, frame: str | None, label: str) -> tu
     return name, int(target.parentJoint), target.placement * (pin.SE3.Identity() if held is None else held.pose)
 
 
-def _carries(robot: Robot, joint: int) -> NDArray[np.bool_]:
-    """Which joints of the chain move a joint's frame."""
-    carries, row = np.zeros(len(robot.chain.parent), dtype=bool), joint - 1
+def _rows_to(robot: Robot, joint: int) -> list[int]:
+    """Rows of the chain from the base to a joint, given by its number; none to the world, 0."""
+    rows, row = list[int](), joint - 1
     while row >= 0:
-        carries[row], row = True, int(robot.chain.parent[row])
-    return carries
+        rows.insert(0, row)
+        row = int(robot.chain.parent[row])
+    return rows
 
 
 def _turning(region: TaskRegion, label: str) -> tuple[Turning, Vector, NDArray[np.float64]]:
@@ -203,8 +210,7 @@ def _turning(region: TaskRegion, label: str) -> tuple[Turning, Vector, NDArray[n
         k = int(np.flatnonzero(full)[0])
         x, y, z = (rpy_matrices((np.where(full, 0.0, low) * unit)[None])[0] for unit in np.eye(3))
         before, after = ((z @ y, np.eye(3)), (z, x), (np.eye(3), y @ x))[k]
-        R = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), np.eye(3)[k]).matrix()
-        return Turning.AXIS, before[:, k], after.T @ R
+        return Turning.AXIS, before[:, k], after.T @ turned_z(np.eye(3)[k])
     pitch = np.abs(region.bounds[4]).max()
     if pitch > LARGEST_PITCH:
         raise InputError(

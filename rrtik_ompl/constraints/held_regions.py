@@ -59,11 +59,11 @@ class HeldRegions:
     def explain(self, q: Vector) -> str:
         """A line that says which region a configuration, shape (dof,), is outside, and by how much; "" for none."""
         for region in self.regions:
-            metres, angle = region.outside(q)
-            measured = region.measures(q[None])[0] <= region.limits(slack=False) + ROUNDING
-            if not measured.all():
-                amounts = [f"{1e3 * metres:.3g} mm"] * (not measured[0])
-                amounts += [f"{np.degrees(angle):.3g} degrees"] * (not measured[1])
+            kept = region.measures(q[None])[0] <= region.limits(slack=False) + ROUNDING
+            if not kept.all():
+                metres, angle = region.outside(q)
+                amounts = [f"{1e3 * metres:.3g} mm"] * (not kept[0])
+                amounts += [f"{np.degrees(angle):.3g} degrees"] * (not kept[1])
                 return f"{region.label} (frame '{region.frame}'): {' and '.join(amounts)} outside"
         return ""
 

@@ -12,7 +12,7 @@ from rrtik_ompl.arrays import Matrix, finite_array, number_rows, positive
 from rrtik_ompl.choices import FrameAxis
 from rrtik_ompl.constraints.held_region import ANYWHERE
 from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.poses import rigid, unit_vector
+from rrtik_ompl.poses import rigid, turned_z, unit_vector
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.task_region import TaskRegion
 
@@ -43,19 +43,15 @@ def upright(robot: Robot, axis: FrameAxis = "z", *, tolerance_deg: float = 5.0, 
     require(axis, str, "upright: axis")
     if axis not in ("x", "y", "z"):
         raise InputError(f"upright: axis must be x, y or z, got {axis!r}")
-    tolerance = positive(tolerance_deg, "upright: tolerance_deg")
-    if tolerance > LARGEST_TILT_DEG:
-        raise InputError(f"upright: tolerance_deg must be {LARGEST_TILT_DEG:g} or less, got {tolerance:g}")
-    direction = np.eye(3)["xyz".index(axis)]
-    R = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), direction).matrix()
-    T_frame_w = pin.SE3(R, np.zeros(3))
+    tolerance = _tilt(tolerance_deg, "upright: tolerance_deg")
+    T_frame_w = pin.SE3(turned_z(np.eye(3)["xyz".index(axis)]), np.zeros(3))
     bounds = _anywhere()
     bounds[3:5] = 0.0
     return TaskRegion(
         T_frame_w,
         bounds,
         T_frame_w.inverse(),
-        orientation_tolerance=np.radians(tolerance),
+        orientation_tolerance=tolerance,
         frame=frame,
         from_start=True,
     )
@@ -78,7 +74,8 @@ def on_plane(point: ArrayLike, normal: ArrayLike, *, tolerance: float = 1e-3, fr
     """
     bounds = _anywhere()
     bounds[2] = 0.0
-    return TaskRegion(_placed(point, normal, "on_plane: normal"), bounds, position_tolerance=tolerance, frame=frame)
+    placed = _placed(point, normal, "on_plane", "normal")
+    return TaskRegion(placed, bounds, position_tolerance=tolerance, frame=frame)
 
 
 def on_line(point: ArrayLike, direction: ArrayLike, *, tolerance: float = 1e-3, frame: str | None = None) -> TaskRegion:
@@ -98,9 +95,8 @@ def on_line(point: ArrayLike, direction: ArrayLike, *, tolerance: float = 1e-3, 
     """
     bounds = _anywhere()
     bounds[:2] = 0.0
-    return TaskRegion(
-        _placed(point, direction, "on_line: direction"), bounds, position_tolerance=tolerance, frame=frame
-    )
+    placed = _placed(point, direction, "on_line", "direction")
+    return TaskRegion(placed, bounds, position_tolerance=tolerance, frame=frame)
 
 
 def orientation_of(pose: Any, tolerances_deg: ArrayLike = 1.0, *, frame: str | None = None) -> TaskRegion:
@@ -122,10 +118,8 @@ def orientation_of(pose: Any, tolerances_deg: ArrayLike = 1.0, *, frame: str | N
     bounds[3:] = 0.0
     placed = rigid(pose, "orientation_of: pose")
     if np.ndim(tolerances_deg) == 0:
-        angle = positive(tolerances_deg, "orientation_of: tolerances_deg")
-        if angle > LARGEST_TILT_DEG:
-            raise InputError(f"orientation_of: tolerances_deg must be {LARGEST_TILT_DEG:g} or less, got {angle:g}")
-        return TaskRegion(placed, bounds, orientation_tolerance=np.radians(angle), frame=frame)
+        tolerance = _tilt(tolerances_deg, "orientation_of: tolerances_deg")
+        return TaskRegion(placed, bounds, orientation_tolerance=tolerance, frame=frame)
     angles = finite_array(tolerances_deg, (3,), "orientation_of: tolerances_deg")
     if (angles < 0.0).any():
         raise InputError(f"orientation_of: tolerances_deg must not be negative, got {angles.tolist()}")
@@ -161,8 +155,15 @@ def _anywhere() -> Matrix:
     return np.outer([ANYWHERE] * 3 + [np.pi] * 3, [-1.0, 1.0])
 
 
-def _placed(point: ArrayLike, direction: ArrayLike, what: str) -> Any:
+def _tilt(degrees: Any, what: str) -> float:
+    """A largest angle [rad], given in degrees."""
+    tilt = positive(degrees, what)
+    if tilt > LARGEST_TILT_DEG:
+        raise InputError(f"{what} must be {LARGEST_TILT_DEG:g} or less, got {tilt:g}")
+    return float(np.radians(tilt))
+
+
+def _placed(point: ArrayLike, direction: ArrayLike, caller: str, what: str) -> Any:
     """A frame at a point, its z axis along a direction."""
-    axis = unit_vector(direction, what)
-    R = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), axis).matrix()
-    return pin.SE3(R, finite_array(point, (3,), what.split(":")[0] + ": point"))
+    R = turned_z(unit_vector(direction, f"{caller}: {what}"))
+    return pin.SE3(R, finite_array(point, (3,), f"{caller}: point"))

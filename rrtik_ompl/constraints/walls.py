@@ -87,12 +87,8 @@ def _named(region: HeldRegion, turn: Turn) -> str:
 
 def _turns(region: HeldRegion) -> tuple[list[Turn], Rotations]:
     """The turns from the base to the frame that matter for the orientation, and the fixed rotation after the last."""
-    chain, row, rows = region.robot.chain, region.joint - 1, list[int]()
-    while row >= 0:
-        rows.insert(0, row)
-        row = int(chain.parent[row])
-    turns, after = list[Turn](), np.eye(3)
-    for row in rows:
+    chain, turns, after = region.robot.chain, list[Turn](), np.eye(3)
+    for row in region.rows:
         after = after @ chain.placement[row][:3, :3]
         if chain.prismatic[row]:
             continue

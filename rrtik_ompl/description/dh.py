@@ -16,7 +16,7 @@ from rrtik_ompl.choices import DhConvention
 from rrtik_ompl.description.robot_build import JointLimits, build_robot
 from rrtik_ompl.description.tree import Joint, Link, Solid, Tree
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.poses import rigid
+from rrtik_ompl.poses import rigid, turned_z
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.shapes import Capsule
 
@@ -204,7 +204,7 @@ def _capsules(points: Sequence[Any], radius: float, colour: tuple[float, float, 
     for start, end in pairwise(points):
         length = float(np.linalg.norm(end - start))
         if length > 1e-9:
-            turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), (end - start) / length).matrix()
+            turn = turned_z((end - start) / length)
             solids.append(Solid(Capsule(radius, length), pin.SE3(turn, (start + end) / 2), colour))
     return tuple(solids)
 

@@ -109,11 +109,7 @@ def _region_tables(region: HeldRegion, limb: Table) -> tuple[Table, Table]:
 def _record(region: HeldRegion) -> Matrix:
     """The numbers of a region."""
     bounds, limits = region.region.bounds, region.limits(slack=False)
-    chain, row, levers = region.robot.chain, region.joint - 1, list[float]()
-    while row >= 0:
-        levers.insert(0, float(region.levers[row]))
-        row = int(chain.parent[row])
-    turn = region.region.orientation_tolerance
+    levers, turn = region.levers[region.rows], region.region.orientation_tolerance
     return record(
         layout.LEVERS + len(levers),
         {
@@ -126,7 +122,7 @@ def _record(region: HeldRegion) -> Matrix:
             layout.AIMED: AIMED_SHARE * np.array([region.region.position_tolerance, turn]),
             layout.MOST: region.limits(slack=True),
             layout.CURVATURE: region.curvature,
-            layout.LEVERS: np.array(levers),
+            layout.LEVERS: levers,
         },
     )
 

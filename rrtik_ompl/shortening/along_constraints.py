@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.fast.search.constrained.search import ConstrainedSearch
 from rrtik_ompl.ik.held_tables import held_tables
 from rrtik_ompl.problem import Problem
@@ -27,13 +27,13 @@ def along_constraints(route: Matrix, task: Task, problem: Problem) -> Matrix:
     The whole way is tried first. Where the world has no kernels the route stays as it is.
     """
     world = problem.world
-    if not isinstance(world, HoldingWorld) or world.free_motions is None:
+    if not isinstance(world, HoldingWorld) or (motions := world.free_motions) is None:
         return route
     tables = held_tables(world.robot, world.constraints)
     if tables is None:
         return route
     lower, upper = _box(world, route)
-    search = ConstrainedSearch(world.free_motions, tables.address, lower, upper)
+    search = ConstrainedSearch(motions, tables.address, lower, upper)
     ask = None if is_conservative(world) else world.motion_valid_batch
     rng, failures = np.random.default_rng(task.seed), 0
     pair = (0, len(route) - 1)
@@ -52,7 +52,7 @@ def along_constraints(route: Matrix, task: Task, problem: Problem) -> Matrix:
     return route
 
 
-def _box(world: HoldingWorld, route: Matrix) -> tuple[Matrix, Matrix]:
+def _box(world: HoldingWorld, route: Matrix) -> tuple[Vector, Vector]:
     """Finite bounds around a route, within the limits, shapes (n,)."""
     lower = np.maximum(world.robot.lower, route.min(axis=0) - np.pi)
     upper = np.minimum(world.robot.upper, route.max(axis=0) + np.pi)

@@ -158,19 +158,32 @@ def differentiate(
     u, v, w = held(call, aim, 0), held(call, aim, 1), held(call, aim, 2)
     chord, free = double_at(weights, ANGULAR), free_turn_of(aim)
     for joint in range(joint_count_of(limb)):
-        gain = double_at(gain_of(limb), joint)
-        x, y, z = gain * pose_entry(frame, 0, 2), gain * pose_entry(frame, 1, 2), gain * pose_entry(frame, 2, 2)
+        x, y, z = moved_axis(limb, frame, joint)
         column = column_at(columns, int_at(column_of(limb), joint))
         if int_at(sliding_of(limb), joint) != 0:
             add(column, LINEAR, u * x, v * y, w * z)
         else:
-            a = pose_origin(tip, 0) - pose_origin(frame, 0)
-            b = pose_origin(tip, 1) - pose_origin(frame, 1)
-            c = pose_origin(tip, 2) - pose_origin(frame, 2)
-            add(column, LINEAR, u * (y * c - z * b), v * (z * a - x * c), w * (x * b - y * a))
+            a, b, c = swept(frame, tip, x, y, z)
+            add(column, LINEAR, u * a, v * b, w * c)
             x, y, z = felt(free, tip, x, y, z)
             add(column, ANGULAR, chord * x, chord * y, chord * z)
         frame = next_pose(frame)
+
+
+@inlined
+def moved_axis(limb: ik_layout.LimbTable, frame: ik_layout.Pose, joint: int) -> Any:
+    """The axis of a joint's frame, as long as what one unit of q makes of the joint."""
+    gain = double_at(gain_of(limb), joint)
+    return gain * pose_entry(frame, 0, 2), gain * pose_entry(frame, 1, 2), gain * pose_entry(frame, 2, 2)
+
+
+@inlined
+def swept(frame: ik_layout.Pose, tip: ik_layout.Pose, x: float, y: float, z: float) -> Any:
+    """How the tip's origin moves while a joint's frame turns, with the angular velocity given."""
+    a = pose_origin(tip, 0) - pose_origin(frame, 0)
+    b = pose_origin(tip, 1) - pose_origin(frame, 1)
+    c = pose_origin(tip, 2) - pose_origin(frame, 2)
+    return y * c - z * b, z * a - x * c, x * b - y * a
 
 
 @inlined

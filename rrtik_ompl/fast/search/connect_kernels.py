@@ -41,6 +41,7 @@ The search runs in short calls of :func:`resume`. Nothing depends on how its wor
 from __future__ import annotations
 
 from rrtik_ompl.fast.search import connect_layout
+from rrtik_ompl.fast.search.box_kernels import copy_inside
 from rrtik_ompl.fast.search.connect_layout import ConnectTable
 from rrtik_ompl.fast.search.connect_motions import (
     aim_at_sample,
@@ -61,12 +62,9 @@ from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row, 
 from rrtik_ompl.fast.search.tree_kernels import add_vertex, clear_tree, is_full, parent_of, row_of
 from rrtik_ompl.fast.search.tree_layout import CERTAIN, NO_PARENT, OPEN, TreeTable
 from rrtik_ompl.fast.simd.compiled import entry, inlined, kernel
-from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field
+from rrtik_ompl.fast.simd.lanes import field, set_field
 from rrtik_ompl.fast.simd.random_kernels import next_share, start_points
 from rrtik_ompl.fast.tables.layout import FREE, UNDECIDED
-
-# [unit of the configurations] by which a start or goal may lie outside the box, as robots and spaces tolerate a little
-BOX_TOLERANCE = 1e-6
 
 
 @kernel
@@ -140,16 +138,9 @@ def search_on(search: ConnectTable, budget: int) -> int:
 @kernel
 def load_row(search: ConnectTable, source: Configuration) -> bool:
     """Set ROW to a configuration; False if that is outside the box."""
-    lower, upper, row = (
-        field(search, connect_layout.LOWER),
-        field(search, connect_layout.UPPER),
-        candidate_row_of(search),
-    )
-    for k in range(dof_in(search)):
-        value = double_at(source, k)
-        if not (value >= double_at(lower, k) - BOX_TOLERANCE and value <= double_at(upper, k) + BOX_TOLERANCE):
-            return False
-        set_double(row, k, value)
+    lower, upper = field(search, connect_layout.LOWER), field(search, connect_layout.UPPER)
+    if not copy_inside(dof_in(search), source, lower, upper, candidate_row_of(search)):
+        return False
     set_row_values(search)
     return True
 

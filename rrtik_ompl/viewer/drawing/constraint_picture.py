@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.constraints.held_region import ANYWHERE, HeldRegion, Turning
+from rrtik_ompl.poses import turned_z
 from rrtik_ompl.shapes import Box
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.framing import Frame
@@ -44,8 +45,7 @@ def draw_constraints(vis: Node, regions: Iterable[HeldRegion], start: Vector, fr
             length = CONE * frame.arm
             cone = _cone(length, length * np.tan(region.region.orientation_tolerance))
             node["axis"].set_object(look_of_triangles(*cone).geometry, look_material(palette.GOAL, 2.0 * OPACITY))
-            turned = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), region.direction).matrix()
-            node["axis"].set_transform(region.T_world_w @ pin.SE3(turned, D[:3, 3]).homogeneous)
+            node["axis"].set_transform(region.T_world_w @ pin.SE3(turned_z(region.direction), D[:3, 3]).homogeneous)
 
 
 def _seen(bounds: Matrix, near: Vector, frame: Frame) -> tuple[Vector, Vector]:

@@ -12,6 +12,7 @@ Source: CBiRRT2 [17, section 5]; the smaller tree grows [5]; dynamic domain [6].
 
 from __future__ import annotations
 
+from rrtik_ompl.fast.search.box_kernels import copy_inside
 from rrtik_ompl.fast.search.constrained import layout
 from rrtik_ompl.fast.search.constrained.layout import ConstrainedTable, HeldTable
 from rrtik_ompl.fast.search.constrained.projection_kernels import project
@@ -48,7 +49,6 @@ from rrtik_ompl.fast.simd.lanes import double_at, field, set_double, set_field, 
 from rrtik_ompl.fast.simd.random_kernels import next_point, next_share, start_points
 from rrtik_ompl.fast.tables.layout import IntArray
 
-BOX_TOLERANCE = 1e-6  # [unit of the configurations] by which a start or goal may lie outside the box
 MAX_STRAIGHT_WALKS = 16
 
 
@@ -121,13 +121,9 @@ def resume(search: ConstrainedTable, budget: int) -> int:
 @kernel
 def load_row(search: ConstrainedTable, source: Configuration) -> bool:
     """Set ROW to a configuration; False if that is outside the box."""
-    row = row_in(search)
-    for k in range(dof_of(motions_of(search))):
-        value = double_at(source, k)
-        low, high = double_at(field(search, layout.LOWER), k), double_at(field(search, layout.UPPER), k)
-        if not (value >= low - BOX_TOLERANCE and value <= high + BOX_TOLERANCE):
-            return False
-        set_double(row, k, value)
+    lower, upper = field(search, layout.LOWER), field(search, layout.UPPER)
+    if not copy_inside(dof_of(motions_of(search)), source, lower, upper, row_in(search)):
+        return False
     set_row_values(search)
     return True
 

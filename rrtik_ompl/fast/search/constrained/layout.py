@@ -16,7 +16,7 @@ ConstrainedTable = NewType("ConstrainedTable", int)
 
 # Held: COUNT addresses of regions in REGIONS · DOF, LOWER, UPPER: of the configurations · HELD_NUMBERS: see below ·
 # scratch memory: COLUMNS, 6 numbers for each coordinate, SQUARE matrix, CHANGE of the coordinates, ERROR and WEIGHTS of
-# a residual, NODE: a configuration, MEASURES: of the ends of a motion, two numbers for each region
+# a residual, NODE: a configuration
 COUNT, REGIONS, HELD_DOF, HELD_LOWER, HELD_UPPER, HELD_NUMBERS, COLUMNS, SQUARE, CHANGE, ERROR, WEIGHTS = range(11)
 NODE = 11
 PER_METRE, PER_RADIAN, DAMPING, LARGEST_STEP = range(4)  # the numbers

@@ -13,7 +13,6 @@ from rrtik_ompl.fast.ik.ik_accessors import (
     column_at,
     column_of,
     frames_of,
-    gain_of,
     joint_count_of,
     next_pose,
     pose_column,
@@ -21,7 +20,7 @@ from rrtik_ompl.fast.ik.ik_accessors import (
     pose_origin,
     sliding_of,
 )
-from rrtik_ompl.fast.ik.ik_kinematics import add, dot, move_tip
+from rrtik_ompl.fast.ik.ik_kinematics import add, felt, move_tip, moved_axis, swept
 from rrtik_ompl.fast.ik.ik_layout import (
     ANGULAR,
     LINEAR,
@@ -180,15 +179,15 @@ def set_turn_residual(held: HeldTable, region: RegionTable, tip: Pose) -> None:
     """Set the residual of the orientation and its weights, likewise."""
     turning, record, weight = turning_of(region), record_of(region), held_number(held, layout.PER_RADIAN)
     set_turn(held, 0.0, 0.0, 0.0, 0.0, 0.0)
-    if turn_measure(region, tip) <= double_at(record, layout.KEPT + 1):
+    measure = turn_measure(region, tip)
+    if measure <= double_at(record, layout.KEPT + 1):
         return
     aimed = double_at(record, layout.AIMED + 1)
     if turning == layout.RANGES:
-        total = turn_measure(region, tip)
         for k in range(3):
             away = angle_beyond(record, tip, k)
             set_double(weights_of(held), ANGULAR + k, weight if away != 0.0 else 0.0)
-            set_double(error_of(held), ANGULAR + k, -away * (1.0 - aimed / total) * weight)
+            set_double(error_of(held), ANGULAR + k, -away * (1.0 - aimed / measure) * weight)
         return
     x, y, z, cosine = sine_to_axis(record, tip) if turning == layout.AXIS else skew_part(tip)
     sine = math.sqrt(x * x + y * y + z * z)
@@ -203,9 +202,7 @@ def felt_turn(region: RegionTable, tip: Pose, x: float, y: float, z: float) -> A
     """What a turn of the frame changes of the orientation's residual."""
     turning = turning_of(region)
     if turning == layout.AXIS:
-        a, b, c = pose_column(tip, 2)
-        own = dot((a, b, c), x, y, z)
-        x, y, z = x - own * a, y - own * b, z - own * c
+        x, y, z = felt(2, tip, x, y, z)
     elif turning == layout.RANGES:
         a, b = pose_entry(tip, 0, 0), pose_entry(tip, 1, 0)
         level = max(math.sqrt(a * a + b * b), STEEPEST)
@@ -225,16 +222,13 @@ def set_columns(held: HeldTable, region: RegionTable, tip: Pose) -> None:
     u, v, w = double_at(weights, LINEAR), double_at(weights, LINEAR + 1), double_at(weights, LINEAR + 2)
     r, s, t = double_at(weights, ANGULAR), double_at(weights, ANGULAR + 1), double_at(weights, ANGULAR + 2)
     for joint in range(joint_count_of(limb)):
-        gain = double_at(gain_of(limb), joint)
-        x, y, z = gain * pose_entry(frame, 0, 2), gain * pose_entry(frame, 1, 2), gain * pose_entry(frame, 2, 2)
+        x, y, z = moved_axis(limb, frame, joint)
         column = column_at(columns, int_at(column_of(limb), joint))
         if int_at(sliding_of(limb), joint) != 0:
             add(column, LINEAR, u * x, v * y, w * z)
         else:
-            a = pose_origin(tip, 0) - pose_origin(frame, 0)
-            b = pose_origin(tip, 1) - pose_origin(frame, 1)
-            c = pose_origin(tip, 2) - pose_origin(frame, 2)
-            add(column, LINEAR, u * (y * c - z * b), v * (z * a - x * c), w * (x * b - y * a))
+            a, b, c = swept(frame, tip, x, y, z)
+            add(column, LINEAR, u * a, v * b, w * c)
             x, y, z = felt_turn(region, tip, x, y, z)
             add(column, ANGULAR, r * x, s * y, t * z)
         frame = next_pose(frame)
