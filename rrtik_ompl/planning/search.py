@@ -12,14 +12,15 @@ from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.choices import ProofMode
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ik.goal_configurations import GoalSearch
-from rrtik_ompl.ompl_bridge.attempt import Attempt, attempt
+from rrtik_ompl.ompl_bridge.attempt import EFFORT_MOTIONS, Attempt, attempt
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning.second_check import SecondCheck
 from rrtik_ompl.problem import Problem, densely_checked
 
 SHORTEST = 1e-3  # [s] that an attempt gets at least
-ROUNDS = 6  # attempts to find a proven path, once there is one that is checked in steps
+ROUNDS = 24  # attempts to find a proven path, once there is one that is checked in steps
+BRIEF_ROUNDS = 2  # attempts to find one that keeps the clearance, once there is a proven one that keeps less
 IN_KERNELS = 5  # of them, without proofs while searching, for planners that run in kernels
 MOVE_RULES = ("frozen_joints", "last_joints", "smallest_move")  # options of planners, see MoveRules
 SEPARATED = 2  # attempts with further goal configurations, once none that is known can be reached
@@ -70,6 +71,7 @@ class Search:
         self._check = SecondCheck(problem, name, proof, clearance, self._traits, ruled=ruled)
         self._strict: dict[bool, Problem] = {}  # by whether motions have to be proven
         self._strict_attempts = 0
+        self._spent = {True: 0, False: 0}  # by whether room was left: checked motions, and what an attempt costs beside
 
     def run(self) -> JointPath | None:
         """The path, or None and a reason."""
@@ -101,7 +103,8 @@ class Search:
 
     def _done(self) -> bool:
         """Whether there is no time left, or nothing better to be expected."""
-        enough = self._check.best is not None and self._check.open > ROUNDS
+        best = self._check.best
+        enough = best is not None and self._check.open > (BRIEF_ROUNDS if best.proven else ROUNDS)
         return self._left() <= 0.0 or self._check.settled or enough or self._separated()
 
     def _separated(self) -> bool:
@@ -149,7 +152,9 @@ class Search:
         asked = densely_checked(self._problem) if dense else self._problem
         checked = asked.world.accuracy == "exact"  # by the problem and by the search for goals
         seconds = self._share(number) * self._left()
-        return self._accepted(self._attempt(asked, number, aims, seconds, effort, checked=checked))
+        outcome = self._attempt(asked, number, aims, seconds, effort, checked=checked)
+        self._count(outcome, room=False)
+        return self._accepted(outcome)
 
     def _strict_problem(self, proving: bool) -> Problem:
         """See :meth:`SecondCheck.strict`; made once."""
@@ -158,12 +163,13 @@ class Search:
         return self._strict[proving]
 
     def _leaves_room(self, number: int) -> bool:
-        """Whether an attempt keeps more than the clearance: every second one, from the first unproven path on.
+        """Whether an attempt keeps more than the clearance: half of the effort, from the first unproven path on.
 
         The first one of an anytime planner does: an optimal path touches what it goes round.
         """
         first = self._traits.anytime and number == 0 and len(self._seeds) > 1
-        turn = self._check.open > 0 and (self._traits.anytime or number % 2 == 1 or self._strict_attempts == 0)
+        less = self._strict_attempts == 0 or self._spent[True] < self._spent[False]
+        turn = self._check.open > 0 and (self._traits.anytime or less)
         return self._check.proves and not self._traits.leaves_room and (first or turn)
 
     def _strict_path(self, strict: Problem, number: int, aims: Matrix, base: int) -> JointPath | None:
@@ -171,7 +177,12 @@ class Search:
         self._strict_attempts += 1
         effort = base**self._strict_attempts if self._traits.supports_iteration_limit else None
         share = ANYTIME_SHARE if self._traits.anytime else self._share(number)
-        return self._accepted(self._attempt(strict, number, aims, share * self._left(), effort))
+        outcome = self._attempt(strict, number, aims, share * self._left(), effort)
+        self._count(outcome, room=True)
+        return self._accepted(outcome)
+
+    def _count(self, outcome: Attempt, *, room: bool) -> None:
+        self._spent[room] += int(outcome.statistics.get("checked_motions", 0)) + EFFORT_MOTIONS
 
     def _share(self, number: int) -> float:
         """Of the time left, what an attempt gets: half for the short way round, before the long way is tried."""
