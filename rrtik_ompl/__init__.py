@@ -73,6 +73,8 @@ if TYPE_CHECKING:
     from rrtik_ompl.scene import Obstacle as Obstacle
     from rrtik_ompl.scene import Scene as Scene
     from rrtik_ompl.scene import TimedPoses as TimedPoses
+    from rrtik_ompl.search.roadmap import Roadmap as Roadmap
+    from rrtik_ompl.search.roadmap import load_roadmap as load_roadmap
     from rrtik_ompl.shapes import Box as Box
     from rrtik_ompl.shapes import Capsule as Capsule
     from rrtik_ompl.shapes import Cylinder as Cylinder
@@ -138,6 +140,7 @@ else:
         "replanning.scenario": ("Scenario", "load_scenario"),
         "scene": ("AttachedObject", "ConstantVelocity", "Obstacle", "Scene", "TimedPoses"),
         "problem_files.scene": ("load_scene", "save_scene"),
+        "search.roadmap": ("Roadmap", "load_roadmap"),
         "shapes": ("Box", "Capsule", "Cylinder", "HalfSpace", "Mesh", "Prism", "Sphere"),
         "shortening": ("MoveRules", "shorten"),
         "task_region": ("TaskRegion",),

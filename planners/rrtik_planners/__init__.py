@@ -15,8 +15,20 @@ if TYPE_CHECKING:
     from rrtik_planners.ikurt import IKURT as IKURT
     from rrtik_planners.ikurt_published import IKURTPublished as IKURTPublished
     from rrtik_planners.mbrrt import MBRRT as MBRRT
+    from rrtik_planners.roadmap import RoadmapPlanner as RoadmapPlanner
 
-__all__ = ["CRDT", "IKURT", "MBRRT", "BiCRDT", "CBiRRT", "DRRTCon", "FastRRTConnect", "FewestMoves", "IKURTPublished"]
+__all__ = [
+    "CRDT",
+    "IKURT",
+    "MBRRT",
+    "BiCRDT",
+    "CBiRRT",
+    "DRRTCon",
+    "FastRRTConnect",
+    "FewestMoves",
+    "IKURTPublished",
+    "RoadmapPlanner",
+]
 
 _MODULES = {
     "BiCRDT": "bicrdt",
@@ -28,6 +40,7 @@ _MODULES = {
     "IKURT": "ikurt",
     "IKURTPublished": "ikurt_published",
     "MBRRT": "mbrrt",
+    "RoadmapPlanner": "roadmap",
 }
 
 

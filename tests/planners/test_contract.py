@@ -16,9 +16,20 @@ from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult, check_planner
 from rrtik_ompl.ompl_bridge.contract import CONTRACT, moves_one_joint_at_a_time
 from rrtik_ompl.ompl_bridge.contract.problems import Clause, small_problem, solution_rows
 from rrtik_ompl.ompl_bridge.contract.spaces import takes_starts_that_lead_nowhere
-from rrtik_planners import CRDT, IKURT, MBRRT, BiCRDT, CBiRRT, DRRTCon, FastRRTConnect, FewestMoves, IKURTPublished
+from rrtik_planners import (
+    CRDT,
+    IKURT,
+    MBRRT,
+    BiCRDT,
+    CBiRRT,
+    DRRTCon,
+    FastRRTConnect,
+    FewestMoves,
+    IKURTPublished,
+    RoadmapPlanner,
+)
 
-PLANNERS = (BiCRDT, CBiRRT, CRDT, DRRTCon, FastRRTConnect, FewestMoves, IKURT, IKURTPublished, MBRRT)
+PLANNERS = (BiCRDT, CBiRRT, CRDT, DRRTCon, FastRRTConnect, FewestMoves, IKURT, IKURTPublished, MBRRT, RoadmapPlanner)
 SINGLE_JOINT = (BiCRDT, CRDT, FewestMoves, MBRRT)
 
 SOAK = 10_000
@@ -79,11 +90,13 @@ CHECK_ALL = """
 from ompl import util as ou
 from rrtik_ompl.ompl_bridge.contract import CONTRACT, moves_one_joint_at_a_time
 from rrtik_ompl.ompl_bridge.contract.spaces import SPACES
-from rrtik_planners import CRDT, IKURT, MBRRT, BiCRDT, CBiRRT, DRRTCon, FastRRTConnect, FewestMoves, IKURTPublished
+from rrtik_planners import CRDT, IKURT, MBRRT, BiCRDT, CBiRRT, FastRRTConnect, FewestMoves, IKURTPublished
+from rrtik_planners import RoadmapPlanner
 ou.setLogLevel(ou.LogLevel.LOG_NONE)
 def main():
     for _ in range(5):
-        for planner in (BiCRDT, CBiRRT, CRDT, FastRRTConnect, FewestMoves, IKURT, IKURTPublished, MBRRT):
+        for planner in (BiCRDT, CBiRRT, CRDT, FastRRTConnect, FewestMoves, IKURT, IKURTPublished, MBRRT,
+                        RoadmapPlanner):
             for clause in CONTRACT:
                 if clause not in SPACES:
                     clause(planner)

@@ -1,0 +1,131 @@
+"""Probabilistic roadmaps [63] whose motions are checked when a query comes to them [64]."""
+
+from __future__ import annotations
+
+import os
+from typing import ClassVar
+
+import numpy as np
+from ompl import base as ob
+
+from rrtik_ompl.arrays import Matrix, whole_number
+from rrtik_ompl.collision.digests import world_digest
+from rrtik_ompl.errors import InputError, PlannerError, require
+from rrtik_ompl.fast.search import connect_layout
+from rrtik_ompl.fast.search.roadmap.graph import KernelGraph
+from rrtik_ompl.fast.search.roadmap.layout import KERNELS
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
+from rrtik_ompl.search.roadmap import NEAR, Graph, Roadmap, load_roadmap
+from rrtik_ompl.search.roadmap_in_python import PythonGraph
+from rrtik_ompl.world import World
+from rrtik_ompl.world.motion_queries import has_kernels, is_conservative
+from rrtik_planners.fast_rrt_connect import FastRRTConnect
+
+FIRST_VERTICES = 100  # of a roadmap that is made for one query
+
+
+class RoadmapPlanner(SafePlanner):
+    """The shortest path on a roadmap; where it has none, one of RRT-Connect becomes part of it, as in [66].
+
+    With the option ``roadmap`` it is one that was made before, so that many queries in a world share it and what it
+    learns. Without, every solve makes a small one of its own.
+    """
+
+    kernels: ClassVar[tuple[str, ...]] = (KERNELS, connect_layout.KERNELS)
+
+    def __init__(
+        self,
+        si: ob.SpaceInformation,
+        *,
+        world: MotionQueries | None = None,
+        seed: int | None = None,
+        roadmap: Roadmap | str | os.PathLike[str] | None = None,
+        near: int = NEAR,
+    ) -> None:
+        """Make a planner.
+
+        Args:
+            si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
+            world: Checks configurations and motions instead of ``si``, if given.
+            seed: At least 0; drawn from OMPL's if None.
+            roadmap: A :class:`~rrtik_ompl.search.roadmap.Roadmap` of the world, or the file of one.
+            near: With how many of the vertices near it a new one is joined, if there is no ``roadmap``.
+
+        Raises:
+            InputError: If an option is out of range, the roadmap is of another world, or the space of another kind.
+        """
+        super().__init__(si, "RoadmapPlanner", world=world, seed=seed)
+        require(roadmap, Roadmap | str | os.PathLike | None, "roadmap", "use Roadmap(world), or the file of one")
+        self.near = whole_number(near, "near")
+        if not 1 <= self.near <= 100:
+            raise InputError(f"near must be from 1 to 100, got {near}")
+        self.roadmap = None if roadmap is None else _roadmap_in(world, roadmap)
+
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
+        """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
+        known = self.roadmap
+        graph = self._new_graph(checker, ptc) if known is None else known.graph
+        find, learn = (graph.route, graph.learn) if known is None else (known.route, known.learn)
+        before = graph.statistics()
+        path, asked = find(starts, goals, ptc), 0
+        if path is None and not ptc():
+            found, asked = self._connected(starts, goals, ptc)
+            if found is not None:
+                learn(found)
+                path = find(starts, goals, ptc)
+                path = found if path is None else path
+        counts = graph.statistics()
+        counts["motions"] -= before["motions"] if known is not None else 0
+        if isinstance(graph, KernelGraph):
+            checker.checked_motions += int(counts["motions"])
+        checker.checked_motions += asked
+        return SearchResult(None if path is None else _without_repeats(path), counts)
+
+    def _connected(self, starts: Matrix, goals: Matrix, ptc: Stop) -> tuple[Matrix | None, int]:
+        """A path of RRT-Connect, shape (k, n), or None; and how many motions that took."""
+        seed = int(self.rng.integers(2**31))
+        si, world = self.getSpaceInformation(), self._world
+        planner = FastRRTConnect(si, world=world, seed=seed)
+        _, rows = planner.solve_rows(starts, goals, self.bounds(), ptc, checked=True)
+        if planner.failure is not None:
+            raise PlannerError(planner.failure.summary)
+        return rows, int(planner.statistics["checked_motions"])
+
+    def _new_graph(self, checker: MotionChecker, ptc: Stop) -> Graph:
+        graph = self._empty_graph(checker)
+        graph.grow(FIRST_VERTICES, ptc)
+        return graph
+
+    def _empty_graph(self, checker: MotionChecker) -> Graph:
+        lower, upper = self.bounds()
+        seed, world = int(self.rng.integers(2**31)), self._world
+        if not has_kernels(world, KERNELS):
+            free, motion_free = checker.valid, checker.motion_valid
+            return PythonGraph(lower, upper, near=self.near, seed=seed, valid=free, motion_free=motion_free)
+        ask = None if is_conservative(world) else checker.motion_valid_batch
+        lower, upper = np.maximum(lower, world.robot.lower), np.minimum(upper, world.robot.upper)
+        return KernelGraph(world.motions, lower, upper, near=self.near, seed=seed, ask=ask)
+
+
+def _without_repeats(path: Matrix) -> Matrix:
+    """A path, shape (k, n), without rows that are as the one before, as where a start is a vertex or the goal."""
+    kept: Matrix = path[np.append(True, (path[1:] != path[:-1]).any(axis=1))]
+    return kept
+
+
+def _roadmap_in(world: MotionQueries | None, roadmap: Roadmap | str | os.PathLike[str]) -> Roadmap:
+    """A roadmap for a world, or for a form of it with a clearance or other steps, where all is checked again.
+
+    Raises:
+        InputError: If it is of another world, or its file cannot be used.
+    """
+    if not isinstance(world, World):
+        raise InputError("roadmap: it needs the world that it is of; use plan(), or give the planner world=")
+    if not isinstance(roadmap, Roadmap):
+        return load_roadmap(roadmap, world)
+    if roadmap.world is world:
+        return roadmap
+    one, other = (world_digest(each.robot, each.bodies, each.pairs) for each in (roadmap.world, world))
+    if one != other:
+        raise InputError("roadmap: it is of another world; use roadmap.moved_to(world), or make a new one")
+    return roadmap.moved_to(world)

@@ -1,0 +1,1 @@
+"""Roadmaps in kernels: free configurations joined by motions, which queries of one world share."""
