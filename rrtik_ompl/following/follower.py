@@ -9,7 +9,7 @@ from threading import Lock
 
 import numpy as np
 
-from rrtik_ompl.arrays import Vector, finite_number, positive
+from rrtik_ompl.arrays import Vector, finite_array, finite_number, positive
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.following.links import RobotLink
 from rrtik_ompl.following.pace import Pace
@@ -17,6 +17,9 @@ from rrtik_ompl.trajectory import RateLimits, Trajectory
 
 AGAIN_SECONDS = 0.02  # after which a change of pace is tried again that has kept no limits
 NEAR = 0.05  # [rad] or [m] by which an arm may be elsewhere than it was told, unless said otherwise
+MOST_PERIODS = 3.0  # of a step of run(), however late it is
+SLACK = 1e-6  # of a limit, by which a trajectory may exceed it
+AT_REST = 1e-6  # of a joint's largest velocity
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,15 +28,17 @@ class Followed:
 
     Attributes:
         arrived: Whether at the end of the trajectory.
-        reason: Why not; "" if it arrived.
+        reason: Why not; "" if it arrived. Where a stop came too late for a rest before the end, it says so.
         place: How far it came, of the trajectory's own time [s].
         seconds: How long it took [s].
+        late: By how much the motion was put off for set points that came late, on top of that [s].
     """
 
     arrived: bool
     reason: str
     place: float
     seconds: float
+    late: float = 0.0
 
 
 class Follower:
@@ -41,17 +46,18 @@ class Follower:
 
     The arm stays on the path of the trajectory, whatever its pace, so what was proven of it holds. ``pause``,
     ``resume``, ``stop`` and ``pace`` may be called from other threads; each takes effect within the limits, on the
-    trajectory: where it brakes at its limit already, a little later.
+    trajectory: where it brakes at its limit already, a little later; at the latest the arm rests where the motion ends.
 
     Args:
-        trajectory: The motion.
+        trajectory: The motion, from rest to rest.
         link: The arm.
-        limits: That changes of pace keep; None for the peaks of the trajectory itself.
+        limits: That changes of pace keep, and the trajectory itself; None for its peaks.
         rate: Set points a second.
         tolerance: By how much the arm may be elsewhere than it was told; then it is stopped [rad or m].
 
     Raises:
-        InputError: If the arm is not where the trajectory begins, has another number of joints, or an option is none.
+        InputError: If the trajectory exceeds the limits or is not at rest at its ends, if the arm is not where it
+            begins or has another number of joints, or if an option is none.
 
     Example:
         >>> import rrtik_ompl as rrtik
@@ -76,13 +82,18 @@ class Follower:
     ) -> None:
         require(trajectory, Trajectory, "trajectory to follow", "use time_parameterize(path, limits)")
         require(limits, RateLimits | None, "limits of a follower", "use RateLimits.of(robot)")
+        if isinstance(link, type) or not isinstance(link, RobotLink):
+            raise InputError(
+                "arm of a follower: it needs positions() and command(q, t), as SimulatedLink(robot, start) has them, "
+                f"got {repr(link)[:40]}"
+            )
         self._motion, self._link = trajectory, link
         self._step, self._tolerance = 1.0 / positive(rate, "rate of a follower"), positive(tolerance, "tolerance")
-        self._limits = _peaks(trajectory) if limits is None else limits.for_joints(len(trajectory.joint_names))
+        _check_rest(trajectory)
+        self._pace = Pace(trajectory, _kept_limits(trajectory, limits))
         self._lock = Lock()
         self._wanted, self._paused, self._stopping, self._reason = 1.0, False, False, ""
-        self._pace, self._again = Pace(), 0.0
-        self._ended = False
+        self._again, self._late, self._ended = 0.0, 0.0, False
         self._check_begin(trajectory.positions[0])
 
     @property
@@ -98,8 +109,13 @@ class Follower:
     @property
     def result(self) -> Followed:
         """How far it is, and how it ended."""
-        arrived = self._pace.place >= self._motion.duration
-        return Followed(arrived, "" if arrived else self._reason or "on its way", self._pace.place, self._pace.now)
+        pace, reason = self._pace, self._reason
+        arrived = pace.place >= self._motion.duration
+        if not arrived:
+            reason = reason or "on its way"
+        elif reason:
+            reason = f"{reason}: too late for a rest before the end"
+        return Followed(arrived, reason, pace.place, pace.now, self._late)
 
     def pause(self) -> None:
         """Come to rest on the trajectory, until ``resume``."""
@@ -144,6 +160,9 @@ class Follower:
     ) -> Followed:
         """Follow to the end, or to a stop; Ctrl-C stops within limits.
 
+        After a tick that came late the motion goes on where it was, a few periods at most further: it falls behind the
+        clock, and the arm is not told to jump.
+
         Args:
             clock: Tells the time [s].
             sleep: Waits for a time [s].
@@ -156,8 +175,10 @@ class Follower:
                 now = clock()
                 if away := self._away(self._link.positions(), told):
                     self.stop(f"{away} away from where it was told to be")
-                self.step(max(now - before, 1e-6))
-                before = now
+                passed, before = max(now - before, 1e-6), now
+                due = min(passed, MOST_PERIODS * self._step)
+                self._late += passed - due
+                self.step(due)
             except KeyboardInterrupt:
                 self.stop("interrupted")
         return self.result
@@ -166,13 +187,14 @@ class Follower:
         """Go on at the pace of the moment; decide on another pace if one is wanted."""
         target = 0.0 if self._paused or self._stopping else self._wanted
         pace = self._pace
-        if target != pace.end and pace.now >= self._again and not pace.turn_to(target, self._motion, self._limits):
+        if target != pace.end and pace.now >= self._again:
+            pace.turn_to(target)
             self._again = pace.now + AGAIN_SECONDS
         pace.advance(seconds)
         pace.place = min(pace.place, self._motion.duration)
 
     def _check_begin(self, told: Vector) -> None:
-        here = np.asarray(self._link.positions(), dtype=np.float64)
+        here = finite_array(self._link.positions(), (None,), "positions of the arm")
         if here.shape != told.shape:
             raise InputError(f"the arm has {here.size} joints, the trajectory moves {told.size}: it is another robot's")
         if away := self._away(here, told):
@@ -187,8 +209,37 @@ class Follower:
         return f"joint '{name}' is {apart.max():.3g}"
 
 
-def _peaks(motion: Trajectory) -> RateLimits:
-    """The peaks of a motion as limits; joints that stand still have those of the others."""
+def _check_rest(motion: Trajectory) -> None:
+    """Refuse a motion that begins or ends at speed: an arm at rest cannot follow it, and no change of pace ends it."""
+    ends = np.abs(motion.velocities[[0, -1]])
+    if (ends > AT_REST * motion.peaks().velocity).any():
+        end, joint = np.unravel_index(int(ends.argmax()), ends.shape)
+        place = ("start", "end")[int(end)]
+        raise InputError(
+            f"trajectory to follow: at its {place} joint '{motion.joint_names[int(joint)]}' moves at "
+            f"{ends[end, joint]:.3g} rad/s or m/s; it must begin and end at rest, as time_parameterize() has it"
+        )
+
+
+def _kept_limits(motion: Trajectory, limits: RateLimits | None) -> RateLimits:
+    """What changes of pace keep: the limits, or the peaks of the motion where there are none.
+
+    Raises:
+        InputError: If the motion exceeds them: no change of pace would keep them, and so none would ever be made.
+    """
     peaks = motion.peaks()
-    rows = (np.where(row > 0.0, row, row.max()) for row in peaks)
-    return RateLimits(*(np.maximum(row, 1e-9) for row in rows))
+    if limits is None:  # joints that stand still have the peaks of the others
+        return RateLimits(*(np.maximum(np.where(row > 0.0, row, row.max()), 1e-9) for row in peaks))
+    bounds = limits.for_joints(len(motion.joint_names))
+    for name, unit in (("velocity", ""), ("acceleration", "^2"), ("jerk", "^3")):
+        peak, bound = getattr(peaks, name), getattr(bounds, name)
+        over = peak > bound * (1.0 + SLACK)
+        if over.any():
+            joint = int(np.argmax(np.where(over, peak / bound, 0.0)))
+            raise InputError(
+                f"limits of a follower: joint '{motion.joint_names[joint]}' has a {name} of {peak[joint]:.4g} in the "
+                f"trajectory, its limit is {bound[joint]:.4g} rad/s{unit} or m/s{unit}; time the path anew with these "
+                "limits, or slow the trajectory down by slowed()"
+            )
+    rows = zip((bounds.velocity, bounds.acceleration, bounds.jerk), peaks, strict=True)
+    return RateLimits(*(np.maximum(bound, peak) for bound, peak in rows))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from numpy.typing import ArrayLike
 
@@ -11,6 +11,7 @@ from rrtik_ompl.errors import require
 from rrtik_ompl.robot import Robot
 
 
+@runtime_checkable
 class RobotLink(Protocol):
     """An arm that takes set points of its joints at a control rate."""
 

@@ -1,7 +1,8 @@
 """A tip that is steered by its velocity: joint rates for a twist, within limits, away from obstacles, proven free.
 
 The rates are those of damped least squares [22]; what they leave free serves a secondary task. Near obstacles the rate
-of approach falls with the distance (a velocity damper), and a step that cannot be proven free is made shorter.
+of approach falls with the distance (a velocity damper): the secondary task yields first, then all joints become slower
+together, so that the tip keeps its direction. A step that cannot be proven free is made shorter.
 """
 
 from __future__ import annotations
@@ -49,6 +50,7 @@ class Servo:
         manipulability: Secondary task: how fast the arm moves away from singular postures.
         near: Distance from which the arm approaches obstacles more slowly [m].
         kept: Distance that it does not go below [m].
+        slide: Whether the arm, instead of slowing down, gives way along obstacles: the tip leaves its direction then.
 
     Raises:
         InputError: If an option is none, or ``kept`` is not less than ``near``.
@@ -71,6 +73,7 @@ class Servo:
         manipulability: float = 0.0,
         near: float = 0.05,
         kept: float = 0.005,
+        slide: bool = False,
     ) -> None:
         require(world, World, "world of a servo")
         self._world, self._robot = world, world.robot
@@ -79,6 +82,8 @@ class Servo:
         self._near, self._kept = positive(near, "near"), not_negative(kept, "kept")
         if self._kept >= self._near:
             raise InputError(f"kept must be less than near, got {self._kept:g} and {self._near:g} m")
+        require(slide, bool, "slide")
+        self._slide = slide
         self._data = self._robot.model.createData()
         self._tip = self._robot.model.getFrameId(self._robot.tip)
         self._speed = np.where(np.isfinite(self._robot.velocity), self._robot.velocity, 1.0)
@@ -101,7 +106,7 @@ class Servo:
         here = finite_array(q, (self._robot.dof,), "configuration of a servo")
         wanted = finite_array(twist, (6,), "twist of a servo")
         seconds = positive(dt, "time step of a servo")
-        rates = self._apart(here, self._for_twist(here, wanted), seconds)
+        rates = self._apart(here, *self._for_twist(here, wanted), seconds)
         return self._proven(here, self._within_limits(here, rates, seconds), seconds)
 
     def _jacobian(self, q: Vector) -> Matrix:
@@ -111,23 +116,21 @@ class Servo:
         found: Matrix = full @ robot.chain.gain
         return found
 
-    def _for_twist(self, q: Vector, twist: Vector) -> Vector:
+    def _for_twist(self, q: Vector, twist: Vector) -> tuple[Vector, Vector]:
+        """Rates that move the tip, and those of the secondary tasks that leave it where it is, shape (dof,) each."""
         left, sizes, right = np.linalg.svd(self._jacobian(q), full_matrices=False)
         low = float(sizes[-1])
         damping = (1.0 - (low / LEAST_SINGULAR) ** 2) * LEAST_SINGULAR**2 if low < LEAST_SINGULAR else 0.0
         rates = right.T @ ((sizes / (sizes**2 + damping + 1e-18)) * (left.T @ twist))
         wish = self._wish(q)
-        if wish is not None:
-            rates = rates + wish - right.T @ (right @ wish)
-        found: Vector = rates
-        return found
+        return rates, wish - right.T @ (right @ wish)
 
-    def _wish(self, q: Vector) -> Vector | None:
+    def _wish(self, q: Vector) -> Vector:
         """Rates of the secondary tasks, shape (dof,)."""
         centring, volume = self._tasks.centring, self._tasks.manipulability
         if centring == 0.0 and volume == 0.0:
-            return None
-        wish = np.nan_to_num(centring * (self._middle - q), nan=0.0)
+            return np.zeros_like(q)
+        wish: Vector = np.nan_to_num(centring * (self._middle - q), nan=0.0)
         if volume > 0.0:
             wish = wish + volume * self._volume_slope(q)
         return wish
@@ -157,23 +160,29 @@ class Servo:
         scaled: Vector = rates * share
         return scaled
 
-    def _apart(self, q: Vector, rates: Vector, seconds: float) -> Vector:
+    def _apart(self, q: Vector, rates: Vector, wish: Vector, seconds: float) -> Vector:
         """Rates whose approach to the nearest body falls with the distance; the distance is a lower bound of it."""
-        fast = self._world.fast
-        if fast is None or not rates.any():
-            return rates
+        fast, whole = self._world.fast, rates + wish
+        if fast is None or not whole.any():
+            return whole
         rows = np.vstack([q, q + self._ramp])
         lower = fast.clearance(self._robot.joint_values(rows)).lower
         here = float(lower[0])
         if not here < self._near or not np.isfinite(lower).all():
-            return rates
-        slope = (lower[1:] - here) / STEP
-        approach, size = float(slope @ rates), float(slope @ slope)
-        room = max(here - self._kept, 0.0)
-        allowed = -min(room / (self._near - self._kept) * self._tip_speed(rates), 0.5 * room / seconds)
-        if approach >= allowed or size < 1e-12:
-            return rates
-        return rates + slope * ((allowed - approach) / size)
+            return whole
+        slope, share = (lower[1:] - here) / STEP, max(here - self._kept, 0.0) / (self._near - self._kept)
+        if slope @ wish < 0.0:  # the secondary task fades out in the outer half, and leaves the inner one to the tip
+            whole = rates + max(2.0 * share - 1.0, 0.0) * wish
+        allowed = -min(share * self._tip_speed(whole), 0.5 * max(here - self._kept, 0.0) / seconds)
+        approach = float(slope @ whole)
+        if approach >= allowed:
+            return whole
+        if self._slide:
+            whole = whole + slope * ((allowed - approach) / max(float(slope @ slope), 1e-12))
+        else:
+            whole = whole * (allowed / approach)
+        found: Vector = whole
+        return found
 
     def _tip_speed(self, rates: Vector) -> float:
         return float(np.abs(rates) @ self._world.weights)

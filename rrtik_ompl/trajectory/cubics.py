@@ -8,10 +8,13 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix, Vector
 
 
-def jerks_of(times: Vector, velocities: Matrix, accelerations: Matrix) -> Matrix:
-    """The jerk with which each piece comes to the velocity of the next knot, shape (m - 1, n)."""
-    h = np.diff(times)[:, None]
-    jerks: Matrix = 2.0 * (np.diff(velocities, axis=0) - h * accelerations[:-1]) / h**2
+def jerks_of(
+    times: Vector, velocities: Matrix, accelerations: Matrix, pieces: NDArray[np.int64] | None = None
+) -> Matrix:
+    """The jerk with which each piece, or some of them, comes to the velocity of the next knot, shape (m - 1, n)."""
+    first, last = (slice(None, -1), slice(1, None)) if pieces is None else (pieces, pieces + 1)
+    h = (times[last] - times[first])[:, None]
+    jerks: Matrix = 2.0 * (velocities[last] - velocities[first] - h * accelerations[first]) / h**2
     return jerks
 
 

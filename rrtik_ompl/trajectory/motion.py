@@ -129,12 +129,13 @@ class Trajectory:
         Raises:
             InputError: If a time is not finite.
         """
-        many = np.ndim(t) > 0
+        many = getattr(t, "ndim", int(np.iterable(t))) > 0
         wanted = finite_array(t, (None,) if many else (), "time of a trajectory")
         clock = np.clip(np.atleast_1d(wanted), 0.0, self.duration)
         piece = np.clip(np.searchsorted(self.times, clock, side="right") - 1, 0, len(self.times) - 2)
         x = (clock - self.times[piece])[:, None]
-        q, v, a, j = (rows[piece] for rows in (self.positions, self.velocities, self.accelerations, self.jerks))
+        q, v, a = (rows[piece] for rows in (self.positions, self.velocities, self.accelerations))
+        j = jerks_of(self.times, self.velocities, self.accelerations, piece)
         found = [q + x * (v + x * (a / 2.0 + x * j / 6.0)), v + x * (a + x * j / 2.0), a + x * j]
         found[0][clock == self.duration] = self.positions[-1]  # to the bit
         outside = np.atleast_1d(wanted) != clock
@@ -176,9 +177,11 @@ class Trajectory:
         """The same motion, ``factor`` times as long.
 
         Raises:
-            InputError: If the factor is not greater than 0.
+            InputError: If the factor is not from 1e-6 to 1e6.
         """
         k = positive(factor, "factor of a trajectory")
+        if not 1e-6 <= k <= 1e6:
+            raise InputError(f"factor of a trajectory: expected 1e-6 to 1e6, got {k:g}")
         rates = (self.velocities / k, self.accelerations / k**2)
         return Trajectory(self.times * k, self.positions, *rates, **self._names())
 

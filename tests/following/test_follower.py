@@ -15,7 +15,7 @@ from rrtik_ompl.path import JointPath
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.line_arm import LineArm, LineServer
 from rrtik_ompl.pilot.devices.links import ArmLink
-from rrtik_ompl.trajectory import RateLimits, time_parameterize
+from rrtik_ompl.trajectory import RateLimits, Trajectory, time_parameterize
 from rrtik_ompl.world import World
 
 TICK = 2e-3
@@ -116,6 +116,92 @@ def test_run_keeps_time_and_stops_an_arm_that_does_not_follow():
     assert "\n" not in found.reason
 
 
+def test_limits_that_the_trajectory_exceeds_are_refused():
+    """No change of pace would keep them, so a stop would never begin."""
+    for share, what in ((0.3, "velocity"), (1.0 - 1e-5, "velocity")):
+        low = RateLimits(share * LIMITS.velocity, LIMITS.acceleration, LIMITS.jerk)
+        with pytest.raises(InputError, match=f"joint '.*' has a {what} of .* its limit is .* slowed") as caught:
+            Follower(MOTION, SimulatedLink(ROBOT, PATH.start), limits=low)
+        assert "\n" not in str(caught.value)
+    jumping = time_parameterize(PATH, RateLimits(LIMITS.velocity, LIMITS.acceleration))
+    with pytest.raises(InputError, match="has a jerk of inf"):
+        Follower(jumping, SimulatedLink(ROBOT, PATH.start), limits=LIMITS)
+    peaks = MOTION.peaks()
+    link = SimulatedLink(ROBOT, PATH.start)
+    follower = Follower(MOTION, link, limits=RateLimits(*(row * (1.0 - 5e-7) for row in peaks)))  # as files round them
+    for _ in range(5):
+        follower.step(TICK)
+    follower.stop()
+    while not follower.ended:
+        follower.step(TICK)
+    assert not follower.result.arrived
+
+
+@pytest.mark.parametrize("limits", [None, RateLimits(1.0, 0.05, 0.5)])
+def test_an_arm_that_brakes_slowly_stops_and_goes_on_too(limits):
+    slow = RateLimits(1.0, 0.05, 0.5)  # 20 s to its full speed
+    path = JointPath(np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0]]))
+    motion = time_parameterize(path, slow)
+    for moment in (10.0, 25.0, 40.0):
+        link = PlainLink(path.start)
+        follower = Follower(motion, link, limits=limits)
+        while follower.result.seconds < moment:
+            follower.step(0.05)
+        follower.pause()
+        before = follower.result.seconds
+        while follower.result.seconds < before + 60.0:
+            follower.step(0.05)
+        assert follower.place < motion.duration
+        here = follower.place
+        follower.step(1.0)
+        assert follower.place == here
+        follower.resume()
+        while not follower.ended and follower.result.seconds < 1000.0:
+            follower.step(0.05)
+        assert follower.result.arrived
+
+
+class PlainLink:
+    """An arm of any number of joints that is where it is told to be."""
+
+    def __init__(self, q):
+        self.q = q
+
+    def positions(self):
+        return self.q
+
+    def command(self, q, t):
+        self.q = q
+
+
+def test_a_stop_that_comes_too_late_says_so():
+    follower, _ = follower_at()
+    while follower.place < MOTION.duration - 0.05:
+        follower.step(TICK)
+    follower.stop("a hand in the way")
+    while not follower.ended:
+        follower.step(TICK)
+    assert follower.result.arrived
+    assert follower.result.reason.startswith("a hand in the way: too late")
+
+
+def test_set_points_do_not_jump_after_a_tick_that_comes_late():
+    now, ticks, rate = [0.0], [0], 125.0
+
+    def sleep(seconds):
+        ticks[0] += 1
+        now[0] += 0.6 if ticks[0] in (40, 90) else max(seconds, 1e-4)
+
+    follower, link = follower_at(rate=rate)
+    found = follower.run(clock=lambda: now[0], sleep=sleep)
+    assert found.arrived
+    rows = np.array([PATH.start, *(q for _, q in link.sent)])
+    assert (np.abs(np.diff(rows, axis=0)) <= 3.0 / rate * LIMITS.velocity * (1.0 + 1e-9)).all()
+    assert found.late == pytest.approx(2 * (0.6 - 3.0 / rate), abs=0.02)
+    assert found.seconds == pytest.approx(MOTION.duration, abs=0.03)
+    assert now[0] == pytest.approx(found.seconds + found.late, abs=1e-9)
+
+
 def test_what_cannot_be_followed_is_refused_in_one_line():
     with pytest.raises(InputError, match="move the arm there first") as caught:
         follower_at(start=[1.0, 0.0, 0.0])
@@ -125,6 +211,15 @@ def test_what_cannot_be_followed_is_refused_in_one_line():
         Follower(MOTION, SimulatedLink(other, np.zeros(6)))
     with pytest.raises(InputError, match="trajectory to follow"):
         Follower(PATH, SimulatedLink(ROBOT, PATH.start))
+    for arm in (None, ROBOT, SimulatedLink):
+        with pytest.raises(InputError, match="arm of a follower"):
+            Follower(MOTION, arm)
+    for here in (None, "home", [[0.0] * 3], [np.nan] * 3):
+        with pytest.raises(InputError, match="positions of the arm"):
+            Follower(MOTION, PlainLink(here))
+    moving = Trajectory([0.0, 1.0], [[0.0] * 3, [0.1] * 3], [[0.1] * 3, [0.1] * 3])
+    with pytest.raises(InputError, match=r"at its start joint .* must begin and end at rest"):
+        Follower(moving, PlainLink(np.zeros(3)))
     for rate in (0.0, np.nan):
         with pytest.raises(InputError, match="rate"):
             follower_at(rate=rate)

@@ -77,6 +77,46 @@ def test_a_tip_that_is_sent_into_an_obstacle_slows_down_and_stays_apart(panda):
     assert speed(-0.2)[1] < -0.05  # it gets free again
 
 
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("tilt", [0.0, 0.3])
+def test_near_an_obstacle_the_tip_keeps_its_direction(panda, method, tilt):
+    turn = pin.utils.rotate("y", tilt)
+    wall = Obstacle("wall", Box([0.1, 2.0, 2.0]), pin.SE3(turn, np.array([0.75, 0.0, 0.6])))
+    world = World(panda, Scene([wall]))
+    servo, q = Servo(world, method, near=0.08), panda.posture("default")
+    before, slow = tip(panda, q)[:3, 3], 0.0
+    for _ in range(400):
+        rates = servo.step(q, [0.2, 0.0, 0.0, 0.0, 0.0, 0.0], DT)
+        slow = float(np.abs(rates).max())
+        q = q + DT * rates
+    way = tip(panda, q)[:3, 3] - before
+    assert world.clearance(q) < 0.02
+    assert slow < 1e-2
+    assert way[0] > 0.03
+    assert np.abs(way[1:]).max() < 0.02 * way[0]
+    sliding = Servo(world, method, near=0.08, slide=True)
+    for _ in range(100):
+        q = q + DT * sliding.step(q, [0.2, 0.0, 0.0, 0.0, 0.0, 0.0], DT)
+        assert world.valid(q)
+    gone = tip(panda, q)[:3, 3] - before - way
+    assert np.abs(gone[1:]).max() > 0.01
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_secondary_task_yields_to_obstacles_first(panda, axis, sign):
+    """Centring leads the elbow to a post; the tip goes on as it would without."""
+    q = panda.posture("default") + np.array([0.6, 0.3, -0.5, 0.2, 0.4, 0.0, 0.3])
+    post = Obstacle("post", Sphere(0.03), pin.SE3(np.eye(3), np.array([-0.052, 0.088, 0.667])))
+    world = World(panda, Scene([post]))
+    twist, servo = sign * 0.05 * np.eye(6)[axis], Servo(world, near=0.08, centring=2.0)
+    before = tip(panda, q)
+    for _ in range(60):
+        q = q + DT * servo.step(q, twist, DT)
+    assert world.clearance(q) < 0.06
+    assert np.allclose(tip(panda, q)[:3, 3] - before[:3, 3], 0.6 * twist[:3], atol=2e-3)
+
+
 def test_secondary_tasks_use_what_the_tip_leaves_free(panda):
     middle = 0.5 * (panda.lower + panda.upper)
     q = panda.posture("default") + np.array([0.6, 0.3, -0.5, 0.2, 0.4, 0.0, 0.3])
@@ -99,6 +139,17 @@ def test_secondary_tasks_use_what_the_tip_leaves_free(panda):
         (lambda w: Servo(w.robot), "world of a servo"),
         (lambda w: Servo(w, near=0.01, kept=0.02), "less than near"),
         (lambda w: Servo(w, centring=-1.0), "centring"),
+        (lambda w: Servo(w, centring=np.nan), "centring"),
+        (lambda w: Servo(w, near=None), "near"),
+        (lambda w: Servo(w, kept="a"), "kept"),
+        (lambda w: Servo(w, slide=1), "slide"),
+        (lambda w: Servo(None), "world of a servo"),
+        (lambda w: Servo(w, None), "method of a servo"),
+        (lambda w: Servo(w).step(None, np.zeros(6), 0.01), "configuration of a servo"),
+        (lambda w: Servo(w).step([], np.zeros(6), 0.01), "configuration of a servo"),
+        (lambda w: Servo(w).step(np.zeros(7), "up", 0.01), "twist"),
+        (lambda w: Servo(w).step(np.zeros(7), np.zeros(6), None), "time step"),
+        (lambda w: Servo(w).step(np.zeros(7), np.zeros(6), np.inf), "time step"),
         (lambda w: Servo(w).step(np.zeros(3), np.zeros(6), 0.01), "configuration of a servo"),
         (lambda w: Servo(w).step(np.zeros(7), np.zeros(3), 0.01), "twist"),
         (lambda w: Servo(w).step(np.zeros(7), np.full(6, np.nan), 0.01), "twist"),

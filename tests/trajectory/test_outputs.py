@@ -120,3 +120,9 @@ def test_a_timed_motion_is_played_in_real_time(tmp_path, robot, motion):
     assert np.allclose(story["waypoints"], motion(story["times"]).positions, atol=1e-6)
     with pytest.raises(InputError, match="planar3"):
         view(robot, Trajectory([0.0, 1.0], [[0.0], [0.0]], [[0.0], [0.0]]), html=file)
+
+
+@pytest.mark.parametrize("factor", [0.0, -1.0, np.nan, 1e300, 1e-300, "slow", None])
+def test_a_factor_that_is_none_is_refused(factor):
+    with pytest.raises(InputError, match="factor of a trajectory"):
+        Trajectory([0.0, 1.0], [[0.0], [1.0]], [[0.0], [0.0]]).slowed(factor)

@@ -294,7 +294,7 @@ def test_a_blend_needs_a_world():
         time_parameterize(JointPath([[0, 0], [1, 0], [1, 1]]), RateLimits(1.0, 1.0), blend=0.1)
 
 
-@pytest.mark.parametrize("t", [np.nan, [0.0, np.inf], "now"])
+@pytest.mark.parametrize("t", [np.nan, [0.0, np.inf], "now", [[1.0], [2.0, 3.0]], None])
 def test_a_time_that_is_none_is_refused(t):
     with pytest.raises(InputError, match="time of a trajectory"):
         time_parameterize(JointPath([[0.0], [1.0]]), RateLimits(1.0, 1.0))(t)
