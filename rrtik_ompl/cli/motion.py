@@ -91,6 +91,10 @@ def time_path(
     """
     check_target(out, TRAJECTORY_FORMATS)
     check_target(plot, PLOT_FORMATS)
+    if rate is not None and out is None:
+        raise InputError("--rate is that of the points in a file: give --out FILE too")
+    if payload > 0.0 and not torque:
+        raise InputError("--payload counts only for torques: give --torque too")
     texts = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
     given = {name: None if text is None else _rates(text, f"--{name}") for name, text in texts.items()}
     if not blend >= 0.0:

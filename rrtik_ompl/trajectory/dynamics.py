@@ -25,6 +25,7 @@ DIRECTIONS = 12  # of the tip's acceleration that are bounded; the polygon loses
 ANGLES = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
 INSIDE = float(np.cos(0.5 * np.pi / DIRECTIONS))
 LEAST_SPEED = 1e-12
+FASTEST_TIP, HARDEST_TIP = 20.0, 200.0  # [m/s], [m/s^2]: a larger limit is a slip of the pen, or in millimetres
 
 
 class Measured(NamedTuple):
@@ -91,8 +92,8 @@ class DynamicLimits:
             raise InputError("payload: it counts only for torques; give torque=True, or their limits")
         if not wanted and tip_speed is None and tip_acceleration is None:
             return None
-        speed = np.inf if tip_speed is None else positive(tip_speed, "tip_speed")
-        push = np.inf if tip_acceleration is None else positive(tip_acceleration, "tip_acceleration")
+        speed = _of_tip(tip_speed, "tip speed", "m/s", FASTEST_TIP)
+        push = _of_tip(tip_acceleration, "tip acceleration", "m/s^2", HARDEST_TIP)
         return cls(robot, speed, push, limits, _loaded(robot, mass))
 
     @property
@@ -179,6 +180,19 @@ class DynamicLimits:
         return Bounds(rows, np.full(len(along), MOST))
 
 
+def _of_tip(given: float | None, what: str, unit: str, most: float) -> float:
+    """A limit of the tip; inf if there is none."""
+    if given is None:
+        return np.inf
+    number = positive(given, what)
+    if number > most:
+        raise InputError(
+            f"{what}: {number:g} {unit} is beyond the {most:g} {unit} that an arm can reach; "
+            f"for {number:g} mm{unit[1:]} give {number / 1e3:g}"
+        )
+    return number
+
+
 def _torques(robot: Robot, torque: ArrayLike | bool) -> Vector:
     if sum(inertia.mass for inertia in robot.model.inertias) <= 0.0:
         raise InputError(f"torque limits: robot '{robot.name}' has no inertias; its description must give them")
@@ -186,7 +200,9 @@ def _torques(robot: Robot, torque: ArrayLike | bool) -> Vector:
         places = [robot.model.joints[robot.model.getJointId(name)].idx_v for name in robot.joint_names]
         own: Vector = np.array(robot.model.upperEffortLimit, dtype=np.float64)[places]
         if not np.isfinite(own).any():
-            raise InputError(f"torque limits: robot '{robot.name}' states no efforts; give torque=[...] in N m")
+            raise InputError(
+                f"torque limits: robot '{robot.name}' states no efforts; its URDF needs them, or give torque=[...]"
+            )
         return own
     given: Any = torque
     row = finite_array(given, () if np.ndim(given) == 0 else (robot.dof,), f"torque limits of robot '{robot.name}'")
