@@ -80,7 +80,7 @@ class PositionGoal:
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
         """Distance of the tip from the point for each row of Q, shape (m,) [m]."""
         require(robot, Robot, "robot of a goal")
-        tips = robot.fk_batch(np.atleast_2d(Q))[:, :3, 3]
+        tips = robot.fk_batch(Q)[:, :3, 3]
         distances: Vector = np.linalg.norm(tips - self.position, axis=1)
         return distances
 
@@ -112,7 +112,7 @@ class PoseGoal(WithinTolerances):
     def errors(self, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
         """Position error [m] and rotation angle [rad] of each row of Q, shapes (m,)."""
         require(robot, Robot, "robot of a goal")
-        tips = robot.fk_batch(np.atleast_2d(Q))
+        tips = robot.fk_batch(Q)
         return pose_errors(tips, self.T_world_tip)
 
 

@@ -152,6 +152,11 @@ def _in_the_way(world: World, q: Vector, what: str) -> ProblemError:
     """Says what a start or a goal touches, or is too near to."""
     touching = world.contacts(q)
     pairs = [(c.first, c.second) for c in touching]
+    still = {body.name for body in world.bodies if body.joint == 0}
+    fixed = [c for c in touching if {c.first, c.second} <= still]
+    if fixed:
+        remedy = "no joint moves either; move the obstacle or the base, or allow the pair"
+        return ProblemError(f"{what} is in collision: {fixed[0]}; {remedy}", pairs, part=what)
     if touching and all(c.distance > 0.0 for c in touching):
         remedy = "move it or lower the margin" + (", or allow the pair" if world.self_margin else "")
         return ProblemError(f"{what} is too near: {world.explain(q)}; {remedy}", pairs, part=what)

@@ -281,7 +281,7 @@ def _link_names(robot: Robot) -> tuple[str, ...]:
 
 @lru_cache(maxsize=256)
 def _frame_number(robot: Robot, name: str) -> int:
-    if not robot.model.existFrame(name):
+    if not name.isprintable() or not robot.model.existFrame(name):
         raise UnknownNameError(f"frame of robot '{robot.name}'", name, (f.name for f in robot.model.frames))
     return int(robot.model.getFrameId(name))
 

@@ -111,7 +111,7 @@ class Obstacle:
         shape: What it is.
         pose: T_world_obstacle.
         motion: Moves it over time, if given.
-        margin: Distance that the moving parts of the arm must keep to it [m].
+        margin: Distance that the moving parts of the arm must keep to it [m]; what no joint moves must only not touch.
     """
 
     name: str
@@ -141,8 +141,10 @@ class AttachedObject:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", _checked_solid(self.name, self.shape, self.pose))
-        require(self.link, str, f"link of '{self.name}'")
+        name_of(self.link, f"the link of '{self.name}'")
         object.__setattr__(self, "allow", listed(self.allow, f"allow of '{self.name}'"))
+        for name in self.allow:
+            name_of(name, f"what '{self.name}' may touch")
         if not self.shape.bounded:
             raise InputError("a half-space cannot be attached to a link")
 

@@ -15,9 +15,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector, finite_array, frozen, positive
+from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector, finite_array, frozen, number_rows, positive, whole_number
 from rrtik_ompl.copies import as_value
-from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.errors import InputError, name_of, require
 from rrtik_ompl.poses import rigid, rotation_angles, rpy_matrices, turned_z, unit_vector
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.tip_distance import metres_per_radian
@@ -87,6 +87,9 @@ class TaskRegion(WithinTolerances):
         for name in ("position_tolerance", "orientation_tolerance"):
             object.__setattr__(self, name, positive(getattr(self, name), f"goal region: {name}"))
         require(self.frame, str | None, "frame of a region", "name a link or an attached object")
+        if self.frame is not None:
+            name_of(self.frame, "the frame of a region")
+        require(self.from_start, bool, "from_start of a region")
 
     @classmethod
     def about_axis(
@@ -132,10 +135,13 @@ class TaskRegion(WithinTolerances):
         """The region of the world that a region ``from_start`` is, for a pose of its frame at the start."""
         if not self.from_start:
             return self
-        return replace(self, T_world_w=T_world_frame * self.T_world_w, from_start=False)
+        return replace(
+            self, T_world_w=rigid(T_world_frame, "frame of a region at the start") * self.T_world_w, from_start=False
+        )
 
     def poses(self, coordinates: Matrix) -> NDArray[np.float64]:
         """T_world_tip for displacements, shape (m, 6): (m, 4, 4)."""
+        coordinates = _rows(coordinates, (6,), "displacements in a region")
         D = np.tile(np.eye(4), (len(coordinates), 1, 1))
         D[:, :3, :3], D[:, :3, 3] = rpy_matrices(coordinates[:, 3:]), coordinates[:, :3]
         poses: NDArray[np.float64] = self.T_world_w.homogeneous @ D @ self.T_w_tip.homogeneous
@@ -143,6 +149,8 @@ class TaskRegion(WithinTolerances):
 
     def drawn(self, count: int, rng: np.random.Generator) -> Matrix:
         """Displacements drawn evenly from the bounds, shape (count, 6)."""
+        require(rng, np.random.Generator, "rng of a region", "use numpy.random.default_rng(seed)")
+        whole_number(count, "count of a region")
         return rng.uniform(self.bounds[:, 0], self.bounds[:, 1], (count, 6))
 
     def nearest(self, tips: NDArray[np.float64]) -> Matrix:
@@ -150,6 +158,7 @@ class TaskRegion(WithinTolerances):
 
         First the nearest orientation, then the nearest position.
         """
+        tips = _rows(tips, (4, 4), "poses of the tip")
         R_w, R_tip = self.T_world_w.rotation, self.T_w_tip.rotation
         angles = nearest_angles(R_w.T @ tips[:, :3, :3] @ R_tip.T, self.bounds[3:])
         place = (tips[:, :3, 3] - self.T_world_w.translation) @ R_w - rpy_matrices(angles) @ self.T_w_tip.translation
@@ -157,10 +166,19 @@ class TaskRegion(WithinTolerances):
 
     def errors(self, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
         """Distance [m] and angle [rad] of the tip from the nearest pose, for each row of Q, shapes (m,)."""
-        tips = robot.fk_batch(np.atleast_2d(Q))
+        require(robot, Robot, "robot of a goal")
+        tips = robot.fk_batch(Q)
         poses = self.poses(self.nearest(tips))
         position: Vector = np.linalg.norm(tips[:, :3, 3] - poses[:, :3, 3], axis=1)
         return position, rotation_angles(np.swapaxes(poses[:, :3, :3], 1, 2) @ tips[:, :3, :3])
+
+
+def _rows(values: ArrayLike, shape: tuple[int, ...], what: str) -> NDArray[np.float64]:
+    """Numbers of shape (m, *shape); those of a search need not be finite."""
+    rows = number_rows(values, what)
+    if rows.shape[1:] != shape:
+        raise InputError(f"{what}: expected shape (m, {', '.join(map(str, shape))}), got {rows.shape}")
+    return rows
 
 
 def _range(values: ArrayLike, what: str) -> Vector:

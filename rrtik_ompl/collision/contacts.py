@@ -45,6 +45,8 @@ class Contact:
 
     def __str__(self) -> str:
         pair = f"'{self.first}' and '{self.second}'"
+        if self.distance > self.margin:
+            return f"{pair} are {1e3 * self.distance:.4g} mm apart"
         if self.distance > 0.0:
             return f"{pair} are {1e3 * self.distance:.4g} mm apart, within the margin of {1e3 * self.margin:.4g} mm"
         known = np.isfinite(self.point_first).all()

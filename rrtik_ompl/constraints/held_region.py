@@ -181,7 +181,7 @@ def frame_place(robot: Robot, scene: Scene, frame: str | None, label: str) -> tu
     """The robot's frame that a frame is on, the joint that carries it, and its pose in the joint's frame."""
     held = next((each for each in scene.attached if each.name == frame), None)
     name = robot.tip if frame is None else frame if held is None else held.link
-    if not robot.model.existFrame(name):
+    if not name.isprintable() or not robot.model.existFrame(name):
         names = [*(each.name for each in robot.model.frames), *(each.name for each in scene.attached)]
         raise UnknownNameError(f"frame of {label}", name, names)
     target = robot.model.frames[robot.model.getFrameId(name)]

@@ -16,7 +16,7 @@ from rrtik_ompl.description.robot_source import BasePose
 from rrtik_ompl.description.robot_source import base_pose as checked_base
 from rrtik_ompl.description.tree import Joint, Tree
 from rrtik_ompl.description.tree_model import build_models
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.errors import InputError, UnknownNameError, name_of
 from rrtik_ompl.robot import Chain, Robot
 
 
@@ -95,7 +95,7 @@ def build_robot(
     held = _held_values(name, movable, actuated, ties, locked or {})
     model, collision, visual = build_models(tree.hold(held), checked_base(base_pose, f"robot '{name}': base_pose"))
     tip_name = _last_link(tree, actuated) if tip is None else tip
-    if not model.existFrame(tip_name):
+    if not name_of(tip_name, f"the tip of robot '{name}'") or not model.existFrame(tip_name):
         raise UnknownNameError(f"frame of robot '{name}' for the tip", tip_name, (f.name for f in model.frames))
     bounds = _limits(name, [movable[joint] for joint in actuated], limits or {})
     named = {

@@ -14,6 +14,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO
 
+from rrtik_ompl.files.notice import tell_once
+
 FOLDER_VARIABLE = "RRTIK_CACHE"  # another folder; empty: no cache
 
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
@@ -33,30 +35,45 @@ def cache_folder(kind: str) -> Path | None:
 
 
 def nobody_else_s(file: Path, *, among: int = OTHERS_WRITE) -> bool:
-    """Whether a file, and the folder that it lies in, belong to the user or root and nobody else can write to them.
+    """Whether a file, and all folders above it, belong to the user or root and nobody else can write to them.
 
-    What is executed, or decides what is free, is taken from no other file. False if there is none.
+    What is executed, or decides what is free, is taken from no other file: whoever may write to a folder may put other
+    folders and files in place of those in it. Above the file's own folder one like ``/tmp`` is good enough, where
+    everybody may write but nobody may move what is another's (the sticky bit). False if there is no such file. What
+    is refused is told once.
 
     Args:
         file: The file.
         among: Bits of a mode, none of which may be set.
     """
+    named = Path(os.path.abspath(file))
     try:
-        states = [os.stat(place) for place in (file, file.parent)]
-    except OSError:
+        places = {named, *named.parents, *(real := named.resolve(strict=True)).parents, real}
+        states = {place: os.lstat(place) for place in places}
+    except (OSError, RuntimeError):  # a loop of links
         return False
     if not hasattr(os, "geteuid"):  # Windows keeps a user's folders from others by itself
         return True
-    return all(state.st_uid in (os.geteuid(), 0) and not state.st_mode & among for state in states)
+    trusted = {os.geteuid(), 0, states[Path(named.anchor)].st_uid}
+    own = {named, named.parent, real, real.parent}
+    for place, state in states.items():
+        closed = stat.S_ISLNK(state.st_mode) or not state.st_mode & among  # a link's own mode means nothing
+        sticky = place not in own and bool(state.st_mode & stat.S_ISVTX)
+        if state.st_uid not in trusted or not (closed or sticky):
+            tell_once(f"nothing is taken from {named.parent}, for others can write to {place}; chmod go-w closes it")
+            return False
+    return True
 
 
 def write_whole(file: Path, write: Callable[[IO[bytes]], object]) -> None:
     """Let ``write`` fill a file that appears all at once or, where it cannot be written, not at all."""
     with contextlib.suppress(OSError):
+        new = [folder for folder in file.parents if not folder.exists()]
         file.parent.mkdir(parents=True, exist_ok=True)
-        mode = stat.S_IMODE(file.parent.stat().st_mode)
-        if mode & OTHERS_WRITE:  # by the umask of many systems
-            file.parent.chmod(mode & ~OTHERS_WRITE)
+        for folder in {file.parent, *new}:
+            mode = stat.S_IMODE(folder.stat().st_mode)
+            if mode & OTHERS_WRITE:  # by the umask of many systems
+                folder.chmod(mode & ~OTHERS_WRITE)
         handle, aside = tempfile.mkstemp(dir=file.parent, prefix=".writing-")
         try:
             with os.fdopen(handle, "wb") as stream:

@@ -57,7 +57,14 @@ class MoveRules:
         self.smallest_move = smallest_moves(smallest_move, dof)
 
     def kept_by(self, route: Matrix) -> bool:
-        """Whether a route of single-joint moves, shape (k, n), keeps to all of them."""
+        """Whether a route of single-joint moves, shape (k, n), keeps to all of them.
+
+        Raises:
+            InputError: If it is no route of n joints, or has no row.
+        """
+        route = finite_array(route, (None, len(self.joint_costs)), "route")
+        if len(route) == 0:
+            raise InputError("route: needs at least one row")
         ending = np.diff(route[self.head(route) - 1 :], axis=0)
         others = np.delete(ending, self.last_joints, axis=1)
         once = (np.count_nonzero(np.diff(merge_moves(route, tolerance=0.0), axis=0), axis=0) <= 1)[self.last_joints]

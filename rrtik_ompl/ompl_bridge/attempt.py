@@ -8,9 +8,11 @@ from __future__ import annotations
 import signal
 import threading
 import time
+import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +20,7 @@ from ompl import base as ob
 from ompl import util as ou
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.errors import PlannerError
+from rrtik_ompl.errors import PlannerError, RrtikError
 from rrtik_ompl.ompl_bridge.planner_options import is_safe, other_planner, safe_planner
 from rrtik_ompl.ompl_bridge.planner_traits import OMPL_TRAITS, PlannerFactory, traits_of
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
@@ -87,20 +89,19 @@ def attempt(
         validity = ValidityCallback(problem.world, most_motions=np.inf if effort is None else effort * EFFORT_MOTIONS)
         si = space_information(problem, goals, validity)
         definition = problem_definition(problem, goals, si)
-        planner = other_planner(factory, name, si, definition, parameters)
+        with _named(name):
+            planner = other_planner(factory, name, si, definition, parameters)
         validity.deadline = time.monotonic() + seconds
         condition = ob.timedPlannerTerminationCondition(seconds)
         validity.stop = condition.terminate
-        try:
+        with _named(name):
             planner.setProblemDefinition(definition)
             planner.setup()
             straight = _straight_motion(problem, goals) if traits.straight_first else None
             if straight is not None:
                 return Attempt(straight, "Exact solution", {})
             with interrupt_ends(condition):
-                status = planner.solve(condition)
-        except RuntimeError as error:  # what C++ throws
-            raise PlannerError(f"planner {name} broke: {error}") from None
+                status = _status(planner.solve(condition))
         _raise_failure(planner, name, status, validity.error)
         rows = exact_path(definition, si)
         if rows is None and validity.late and status in INVALID:  # only because all answers were no by then
@@ -123,8 +124,9 @@ def _on_arrays(
 ) -> Attempt:
     """Of a planner of ours, which needs of OMPL a space alone."""
     end, bounds = time.perf_counter() + seconds, planning_bounds(problem, goals)
-    planner = safe_planner(factory, name, shared_space(*bounds), problem, seed, options)
-    planner.setup()
+    with _named(name):
+        planner = safe_planner(factory, name, shared_space(*bounds), problem, seed, options)
+        planner.setup()
     straight = _straight_motion(problem, goals) if factory.straight_first else None
     if straight is not None:
         return Attempt(straight, "Exact solution", {})
@@ -133,6 +135,34 @@ def _on_arrays(
     )
     _raise_failure(planner, name, status, None)
     return Attempt(rows, str(status), dict(planner.statistics), planner.reason)
+
+
+def _status(answer: object) -> ob.PlannerStatus:
+    """What ``solve`` returned; one that is written in Python may return anything."""
+    if isinstance(answer, ob.PlannerStatus):
+        return answer
+    if isinstance(answer, ob.PlannerStatus.PlannerStatusType):
+        return ob.PlannerStatus(answer)
+    raise TypeError(f"its solve() must return an ompl.base.PlannerStatus, got {type(answer).__name__}")
+
+
+@contextmanager
+def _named(name: str) -> Iterator[None]:
+    """Whatever leaves the code of a planner, C++'s exceptions or those of a file of anybody, in one line with its name.
+
+    Raises:
+        PlannerError: If anything does but an error of ours and Ctrl-C.
+    """
+    try:
+        yield
+    except RrtikError:
+        raise
+    except (Exception, SystemExit) as error:
+        at = traceback.extract_tb(error.__traceback__)[-1]
+        error.__traceback__ = None  # its frames would keep OMPL's objects alive
+        said = str(error) if type(error) is RuntimeError else f"{type(error).__name__}: {error}".removesuffix(": ")
+        place = "" if at.filename == __file__ else f" ({Path(at.filename).name}, line {at.lineno})"
+        raise PlannerError(f"planner {name} broke: {said}{place}") from None
 
 
 def _raise_failure(planner: ob.Planner, name: str, status: ob.PlannerStatus, error: Exception | None) -> None:

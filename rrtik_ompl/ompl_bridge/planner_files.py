@@ -7,6 +7,7 @@ import inspect
 import os
 import sys
 from functools import lru_cache
+from hashlib import sha256
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -62,7 +63,7 @@ def _is_planner(value: object) -> bool:
 
 @lru_cache(maxsize=32)
 def _module(path: Path) -> ModuleType:
-    name = f"planner_file_{path.stem}"
+    name = f"planner_file_{path.stem}_{sha256(str(path).encode()).hexdigest()[:8]}"  # files of one name are several
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise InputError(f"planner in {path}: not a Python file")

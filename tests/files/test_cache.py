@@ -47,6 +47,43 @@ def test_what_another_user_owns_is_not_used(file, monkeypatch):
     assert nobody_else_s(file)  # root's
 
 
+def test_a_folder_above_that_others_can_write_to_is_enough_to_put_another_in_its_place(tmp_path):
+    made = tmp_path / "open" / "rrtik-ompl" / "kernels" / "a"
+    write_whole(made, lambda stream: stream.write(b"code"))
+    above = tmp_path / "open"
+    assert nobody_else_s(made)
+    for mode in (0o777, 0o775, 0o757):
+        above.chmod(mode)
+        assert not nobody_else_s(made)
+    above.chmod(0o1777)  # as /tmp: what is another's stays where it is
+    assert nobody_else_s(made)
+    made.parent.chmod(0o1777)  # but anybody may add files to the folder itself
+    assert not nobody_else_s(made)
+
+
+def test_the_folders_of_a_link_and_of_what_it_leads_to_both_count(tmp_path):
+    made = tmp_path / "real" / "kernels" / "a"
+    write_whole(made, lambda stream: stream.write(b"code"))
+    (tmp_path / "links").mkdir()
+    (tmp_path / "links" / "cache").symlink_to(tmp_path / "real")
+    linked = tmp_path / "links" / "cache" / "kernels" / "a"
+    assert nobody_else_s(linked)
+    for folder in (tmp_path / "links", tmp_path / "real"):
+        folder.chmod(0o777)
+        assert not nobody_else_s(linked)
+        folder.chmod(0o755)
+    assert nobody_else_s(linked)
+
+
+def test_all_folders_that_a_generous_umask_made_are_closed(tmp_path):
+    before = os.umask(0)
+    try:
+        write_whole(tmp_path / "home" / ".cache" / "rrtik-ompl" / "kernels" / "a", lambda stream: stream.write(b"code"))
+    finally:
+        os.umask(before)
+    assert nobody_else_s(tmp_path / "home" / ".cache" / "rrtik-ompl" / "kernels" / "a")
+
+
 def test_a_folder_of_a_generous_umask_is_closed_when_it_is_written_to(tmp_path):
     before = os.umask(0)
     try:

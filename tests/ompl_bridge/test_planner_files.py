@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+
 import pytest
 
 from rrtik_ompl.benchmark import load_suite
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.ompl_bridge.planner_names import find_planner
+from rrtik_ompl.planning import plan
 from rrtik_ompl.problem_files.problem import load_problem, save_problem
 
 CODE = """
@@ -49,6 +52,58 @@ def test_a_file_that_cannot_be_run_gets_one_line(tmp_path, text, said):
     (tmp_path / "broken.py").write_text(text)
     with pytest.raises(InputError, match=f"cannot be run: {said}"):
         find_planner(f"{tmp_path / 'broken.py'}:Mine")
+
+
+def test_two_files_of_one_name_are_two_planners(file, tmp_path):
+    other = tmp_path / "other" / file.name
+    other.parent.mkdir()
+    other.write_text(CODE.replace("width=1.0", "width=3.0"))
+    first, second = find_planner(f"{file}:Mine"), find_planner(f"{other}:Mine")
+    assert second.default_options() == {"width": 3.0}
+    for planner in (first, second):  # each is found again by the name that it says it has, as pickle does
+        assert sys.modules[planner.__module__].Mine is planner
+    with pytest.raises(UnknownNameError, match="Mine"):
+        find_planner(f"{file}:Mien")
+
+
+BROKEN = """
+from ompl import base as ob
+class Solve(ob.Planner):
+    def __init__(self, si):
+        super().__init__(si, "Solve")
+    def solve(self, ptc):
+        return {}["key"]
+class Exit(Solve):
+    def solve(self, ptc):
+        raise SystemExit(3)
+class Nothing(Solve):
+    def solve(self, ptc):
+        pass
+class Setup(Solve):
+    def setup(self):
+        raise ValueError("no")
+class Made(Solve):
+    def __init__(self, si):
+        super().__init__(si)
+        raise OSError("no")
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("Solve", r"planner Solve broke: KeyError: 'key' \(broken.py, line 7\)"),
+        ("Exit", r"planner Exit broke: SystemExit: 3 \(broken.py, line 10\)"),
+        ("Nothing", r"planner Nothing broke: TypeError: its solve\(\) must return .*PlannerStatus, got NoneType"),
+        ("Setup", r"planner Setup broke: ValueError: no \(broken.py, line 16\)"),
+        ("Made", r"planner Made broke: OSError: no \(broken.py, line 20\)"),
+    ],
+)
+def test_what_leaves_the_code_of_anybodys_planner_is_one_line(tmp_path, name, said):
+    (tmp_path / "broken.py").write_text(BROKEN)
+    problem = load_problem("titan4_prisms")
+    with pytest.raises(PlannerError, match=said):
+        plan(problem, f"{tmp_path / 'broken.py'}:{name}", seed=1)
 
 
 def test_a_suite_finds_the_file_beside_itself_and_calls_it_by_its_class(file):

@@ -5,6 +5,7 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError, RrtikError
+from rrtik_ompl.moves.rules import MoveRules
 from rrtik_ompl.world.moving_world import MovingWorld
 
 
@@ -24,6 +25,10 @@ def inflated(metres):
 
 def straight():
     return rrtik.JointPath.of(small().robot, [[0, 0, 0], [0.5, 0, 0]])
+
+
+def region(**options):
+    return rrtik.TaskRegion(rrtik.pose([1, 0, 0]), np.zeros((6, 2)), **options)
 
 
 NAN = float("nan")
@@ -49,6 +54,22 @@ CASES = {
     "escape in a name": (lambda: rrtik.Obstacle("a\x1b]0;b\x07", rrtik.Sphere(1)), r"a\\x1b\]0;b\\x07"),
     "half a letter in a name": (lambda: rrtik.JointPath([[0.0]], ["\ud800"]), r"\\ud800"),
     "number as a name": (lambda: rrtik.JointPath([[0.0]], [3]), "name of a joint of a path"),
+    "unequal rows as a pose": (lambda: rrtik.PoseGoal([[1, 2], [3]]), "goal pose: expected numbers"),
+    "unequal rows as an obstacle's pose": (lambda: rrtik.Obstacle("a", rrtik.Sphere(1), [[1], [2, 3]]), "pose of 'a'"),
+    "unequal rows as configurations": (lambda: region().errors(small().robot, [[0, 0, 0], [1]]), "expected numbers"),
+    "errors of no robot": (lambda: region().errors(None, [0, 0, 0]), "robot of a goal must be of type Robot"),
+    "distance of a goal to nothing": (lambda: region().distance(small().robot, None), "expected shape"),
+    "displacements that are none": (lambda: region().poses([1, 2]), "displacements in a region"),
+    "nearest to no pose": (lambda: region().nearest(np.eye(4)), "poses of the tip: expected shape"),
+    "draws of no generator": (lambda: region().drawn(3, 1), "rng of a region must be of type Generator"),
+    "half a letter in a frame": (lambda: region(frame="\ud800"), r"frame of a region: '\\ud800'"),
+    "half a letter in a frame asked for": (lambda: small().robot.fk([0, 0, 0], "\ud800"), r"no frame.*\\ud800"),
+    "half a letter in a tip": (lambda: rrtik.load_robot("ur5", tip="\ud800"), r"tip of robot 'ur5': '\\ud800'"),
+    "half a letter in a link": (lambda: rrtik.AttachedObject("a", "\ud800", rrtik.Sphere(1)), r"the link of 'a': "),
+    "from_start of a number": (lambda: region(from_start=2), "from_start of a region must be of type bool"),
+    "route of nothing": (lambda: MoveRules(["a"]).kept_by(None), "route: expected"),
+    "route of no row": (lambda: MoveRules(["a"]).kept_by(np.zeros((0, 1))), "route: needs at least one row"),
+    "route of other joints": (lambda: MoveRules(["a"]).kept_by([[0.0, 1.0]]), "route: expected an array of shape"),
     "inflation of NaN": (lambda: inflated(NAN), "inflation: that of 'far'"),
     "inflation without end": (lambda: inflated(np.inf), "inflation"),
 } | {

@@ -197,3 +197,33 @@ def test_an_obstacle_with_a_margin_that_makes_no_sense_is_refused(margin):
 def test_a_scene_in_time_keeps_its_margins():
     ball = Obstacle("ball", Sphere(0.1), motion=ConstantVelocity([1, 0, 0]), margin=0.2)
     assert Scene([ball]).at(2.0).obstacle("ball").margin == 0.2
+
+
+def on_a_table(name, top, **options):
+    """An arm upright whose base, the lowest 3 mm below 0 at most, is above a small table."""
+    robot = load_robot(name)
+    table = Obstacle("table", Box([0.2, 0.2, 0.1]), [0.0, 0.0, top - 0.05], **options)
+    return World(robot, Scene([table])), robot.posture({"ur5": "up", "panda": "ready"}[name])
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda"])
+def test_a_base_that_stands_within_a_margin_is_free_by_every_check_and_proof(name):
+    """Base plates stand on tables: no posture would give the arm more room, so that its base must only not touch."""
+    world, q = on_a_table(name, -0.005, margin=0.02)
+    nearest = world.closest(q)
+    assert nearest.first in ("base_link", "panda_link0")
+    assert nearest.margin == 0.0 < nearest.distance < 0.02
+    assert str(nearest).endswith("mm apart")  # within no margin
+    assert world.valid(q)
+    for opinion in (world.certify(q[None]), world.motions_proven(q[None], q[None]), free_by_coal(world, q[None])):
+        assert opinion.all()
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda"])
+def test_a_base_that_touches_is_said_to_be_nothing_that_a_posture_can_mend(name):
+    world, q = on_a_table(name, 0.01)
+    assert not world.valid(q)
+    with pytest.raises(
+        ProblemError, match=r"'table' overlap by .* mm; no joint moves either; move the obstacle or the"
+    ):
+        Problem(world, q, q)
