@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.constraints.shorthands import on_plane as on_plane
     from rrtik_ompl.constraints.shorthands import orientation_of as orientation_of
     from rrtik_ompl.constraints.shorthands import upright as upright
+    from rrtik_ompl.description.padding import padded as padded
     from rrtik_ompl.errors import InputError as InputError
     from rrtik_ompl.errors import PlannerError as PlannerError
     from rrtik_ompl.errors import ProblemError as ProblemError
@@ -113,6 +114,7 @@ else:
     _HOMES = {
         "catalog": ("list_problems", "list_robots", "load_robot"),
         "benchmark.batch": ("plan_batch",),
+        "description.padding": ("padded",),
         "constraints.shorthands": ("inside", "on_line", "on_plane", "orientation_of", "upright"),
         "errors": ("InputError", "PlannerError", "ProblemError", "RrtikError", "UnknownNameError"),
         "following.follower": ("Followed", "Follower"),

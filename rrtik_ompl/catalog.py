@@ -24,6 +24,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from rrtik_ompl.description.padding import padded
 from rrtik_ompl.description.robot_cache import RobotCache
 from rrtik_ompl.description.robot_source import base_pose, plain, source_entry
 from rrtik_ompl.description.urdf import URDF_OPTIONS, robot_from_urdf
@@ -39,7 +40,7 @@ RobotOption: TypeAlias = (
 FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh")
 FILE_KINDS = (".urdf", ".xml", ".yaml", ".yml")
 PARAMETRIC = ("planar", "point2d")  # robots that a problem file describes by a group of keys of their own
-MOUNTING = ("base_pose", "tip")  # keys that stand beside that group
+MOUNTING = ("base_pose", "tip", "padding")  # keys that stand beside that group
 
 
 def list_robots() -> tuple[str, ...]:
@@ -124,8 +125,9 @@ def load_robot(name: str | os.PathLike[str], **options: RobotOption) -> Robot:
 
     Args:
         name: A name from `list_robots`, or the path of a URDF (``.urdf``, ``.xml``) or of a DH table (``.yaml``).
-        **options: What the robot takes: any of them ``base_pose``, ``tip`` and ``locked`` where they apply; a URDF
-            ``srdf, group, joints, joint_limits, packages``; a shipped robot for instance ``limits="envelope"``.
+        **options: What the robot takes: any of them ``padding`` (see `rrtik_ompl.padded`), and ``base_pose``, ``tip``
+            and ``locked`` where they apply; a URDF ``srdf, group, joints, joint_limits, packages``; a shipped robot for
+            instance ``limits="envelope"``.
             ``base_pose`` is a ``pinocchio.SE3`` or ``{"xyz": [..], "quat_xyzw": [..]}``.
 
     Raises:
@@ -134,17 +136,17 @@ def load_robot(name: str | os.PathLike[str], **options: RobotOption) -> Robot:
     """
     recipe = _recipe(file_name(name) if not isinstance(name, str) else name)
     for option in options:
-        if option not in recipe.options:
-            raise InputError(
-                f"robot '{os.fspath(name)}' takes no option '{option}'; it takes {', '.join(recipe.options)}"
-            )
+        if option not in (*recipe.options, "padding"):
+            takes = ", ".join(sorted((*recipe.options, "padding")))
+            raise InputError(f"robot '{os.fspath(name)}' takes no option '{option}'; it takes {takes}")
     given = {key: _absolute(key, value) for key, value in options.items() if value is not None}
     if "base_pose" in given:
         given["base_pose"] = base_pose(given["base_pose"], f"robot '{os.fspath(name)}': base_pose")
     key = json.dumps([recipe.target, plain(given)], sort_keys=True, default=repr)
     cached = _cache.get(key)
     if cached is None:
-        robot = recipe.make(**given)
+        robot = recipe.make(**{option: value for option, value in given.items() if option != "padding"})
+        robot = padded(robot, given["padding"]) if "padding" in given else robot
         cached = _cache.put(key, replace(robot, source=recipe.source(given)), [recipe.target, *_paths(given)])
     return cached
 

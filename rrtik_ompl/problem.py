@@ -158,7 +158,9 @@ def _in_the_way(world: World, q: Vector, what: str) -> ProblemError:
         remedy = "no joint moves either; move the obstacle or the base, or allow the pair"
         return ProblemError(f"{what} is in collision: {fixed[0]}; {remedy}", pairs, part=what)
     if touching and all(c.distance > 0.0 for c in touching):
-        remedy = "move it or lower the margin" + (", or allow the pair" if world.self_margin else "")
+        thick = bool(world.robot.padding)
+        lower = "lower the margin" + (" or the padding" if thick else "")
+        remedy = f"move it or {lower}" + (", or allow the pair" if world.self_margin or thick else "")
         return ProblemError(f"{what} is too near: {world.explain(q)}; {remedy}", pairs, part=what)
     return ProblemError(f"{what} is in collision: {world.explain(q)}; move it or allow the pair", pairs, part=what)
 

@@ -34,6 +34,7 @@ class Body:
         kind: "link", "attached" or "obstacle".
         margin: Of an obstacle how far what moves must stay from it, of a link or attached object how far other ones
             must [m].
+        padding: How much thicker a link is than its geometry [m].
     """
 
     name: str
@@ -42,14 +43,16 @@ class Body:
     geometry: Any
     kind: str
     margin: float = 0.0
+    padding: float = 0.0
 
 
 @lru_cache(maxsize=16)
 def link_bodies(robot: Robot, margin: float = 0.0) -> tuple[Body, ...]:
-    """The robot's own bodies, with a margin [m]."""
+    """The robot's own bodies, with a margin [m] and their paddings."""
+    own = [(item, robot.link_of(item)) for item in robot.collision.geometryObjects]
     return tuple(
-        Body(robot.link_of(item), item.parentJoint, item.placement, solid, "link", margin)
-        for item, solid in zip(robot.collision.geometryObjects, robot_solids(robot), strict=True)
+        Body(link, item.parentJoint, item.placement, solid, "link", margin, robot.padding.get(link, 0.0))
+        for (item, link), solid in zip(own, robot_solids(robot), strict=True)
     )
 
 

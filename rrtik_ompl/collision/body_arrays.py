@@ -27,6 +27,7 @@ class BodyArrays:
             box about its origin.
         half_spaces, obstacles: Which are half-spaces and which obstacles, shape (n,) each.
         margins: What has to stay away from each [m], shape (n,).
+        paddings: How much thicker each is than its geometry [m], shape (n,).
     """
 
     joints: NDArray[np.int64]
@@ -36,12 +37,14 @@ class BodyArrays:
     half_spaces: Mask
     obstacles: Mask
     margins: Vector
+    paddings: Vector
 
     def kept_apart(self, pairs: NDArray[np.int64]) -> Vector:
         """How far the bodies of pairs, shape (k, 2), must stay apart [m]; see :func:`.margins.kept_apart`."""
         first, second = pairs.T
         standing = (self.joints[first] == 0) & (self.joints[second] == 0)
-        return np.where(standing, 0.0, self.margins[np.where(self.obstacles[second], second, first)])
+        kept = self.margins[np.where(self.obstacles[second], second, first)]
+        return np.where(standing, 0.0, kept + self.paddings[first] + self.paddings[second])
 
 
 def body_arrays(bodies: Sequence[Body]) -> BodyArrays:
@@ -63,4 +66,5 @@ def _body_arrays(bodies: tuple[Body, ...]) -> BodyArrays:
         half_spaces=half_spaces,
         obstacles=np.array([body.kind == "obstacle" for body in bodies], dtype=bool),
         margins=np.array([body.margin for body in bodies]),
+        paddings=np.array([body.padding for body in bodies]),
     )

@@ -50,6 +50,8 @@ def _bodies(bodies: Iterable[Body]) -> Iterable[bytes]:
         yield f"{body.kind} {body.name} {body.joint} {type(body.geometry).__name__}".encode()
         yield _numbers([body.margin, *np.array(body.placement.homogeneous).ravel(), *_swept(body.geometry)])
         yield from map(_numbers, _shape(body.geometry))
+        if body.padding:
+            yield _numbers(body.padding)
 
 
 def _shape(geometry: Any) -> Iterable[ArrayLike]:

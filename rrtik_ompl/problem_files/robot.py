@@ -30,6 +30,9 @@ class _Mounted(Section):
 
     base_pose: PoseEntry | None = Field(None, description="pose of the base in the world; identity if absent")
     tip: Name | None = Field(None, description="link or frame that goals refer to")
+    padding: NotNegative | dict[Name, NotNegative] | None = Field(
+        None, description="how much thicker links are than their geometry [m]: by name, or one number for all"
+    )
 
 
 class NamedRobot(_Mounted):

@@ -45,6 +45,8 @@ class MovedObstacles:
         self._corners: Matrix = packed.table[layout.CORNERS].reshape(-1, 3)[self._corner_places]
         sides = [(row, place[k]) for row, pair in enumerate(packed.bodies.tolist()) for k in pair if k in place]
         self._pairs: NDArray[np.int64] = np.array(sides, dtype=np.int64).reshape(-1, 2)
+        obstacles = np.array([bodies[k].margin for k in self._numbers])
+        self._paddings = packed.margins[self._pairs[:, 0]] - obstacles[self._pairs[:, 1]]  # of what moves
 
     def put(self, bodies: Sequence[Body], room: Sequence[float]) -> None:
         """Put the obstacles where they are now.
@@ -54,7 +56,7 @@ class MovedObstacles:
             room: For each body what is to be kept from it beside its margin [m]; read for obstacles.
         """
         packed, kept = self._packed, np.array([bodies[k].margin + room[k] for k in self._numbers])
-        packed.margins[self._pairs[:, 0]] = kept[self._pairs[:, 1]]
+        packed.margins[self._pairs[:, 0]] = kept[self._pairs[:, 1]] + self._paddings
         packed.kept = (float("nan"), packed.kept[1])  # so that margins are written anew
         changes = [bodies[k].placement * back for k, back in zip(self._numbers, self._back, strict=True)]
         turns = np.array([change.rotation for change in changes]).reshape(-1, 3, 3)

@@ -154,14 +154,14 @@ def proof_pairs(
 def _groups(
     bodies: Sequence[Body], parts: Sequence[Sequence[ConvexSolid]], pairs: Sequence[tuple[int, int]]
 ) -> list[tuple[Members, int]]:
-    """Bodies that one joint carries, two or more, each time with a body that stands still and is none's to touch."""
-    found: dict[tuple[int, int], list[int]] = {}
+    """Bodies of one joint with one padding, two or more, each with a body that stands still and is none's to touch."""
+    found: dict[tuple[int, float, int], list[int]] = {}
     convex = [all(solid.kind == IS_CONVEX for solid in own) for own in parts]
     for i, j in pairs:
         mover, still = (i, j) if bodies[j].joint == 0 else (j, i)
         if bodies[still].joint == 0 and convex[mover] and convex[still]:
-            found.setdefault((bodies[mover].joint, still), []).append(mover)
-    return [(tuple(members), still) for (_, still), members in found.items() if len(members) > 1]
+            found.setdefault((bodies[mover].joint, bodies[mover].padding, still), []).append(mover)
+    return [(tuple(members), still) for (_, _, still), members in found.items() if len(members) > 1]
 
 
 _NOTHING = ConvexSolid(np.zeros((1, 3)), inside=False, kind=-1)

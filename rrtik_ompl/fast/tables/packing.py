@@ -126,8 +126,9 @@ def arm_tables(
         pose[:] = body.placement.homogeneous
         pose[:3] = turns[body.joint - 1].T @ pose[:3]
     frames = [bodies[members[0]].joint for members in moving]
-    single = _solids(solids_of, poses, frames, sizes, kept=0.0, slack=margin)
-    wider = single if kept == 0.0 else _solids(solids_of, poses, frames, sizes, kept=kept, slack=margin)
+    thick = body_arrays(carried).paddings
+    single = _solids(solids_of, poses, frames, sizes, kept=thick, slack=margin)
+    wider = single if kept == 0.0 else _solids(solids_of, poses, frames, sizes, kept=thick + kept, slack=margin)
     joints = arm_table(chain)
     return ArmTables(carried, sizes, covers, solids_of, own, limits, margin, joints, balls, bounds, single, wider)
 
@@ -138,10 +139,10 @@ def _solids(
     frames: Sequence[int],
     sizes: Sequence[int],
     *,
-    kept: float,
+    kept: Vector,
     slack: float,
 ) -> Table:
-    """Table of the solids of bodies that joints carry, ``sizes`` bodies in each frame, grown by what they keep [m]."""
+    """Table of the solids of bodies that joints carry, ``sizes`` bodies in each frame, each grown by ``kept`` [m]."""
     parts = iter(placed_bodies(bodies, poses, margins=kept, slack=slack))
     return solid_table([(frame, [next(parts) for _ in range(size)]) for frame, size in zip(frames, sizes, strict=True)])
 
@@ -200,7 +201,8 @@ class PlacedPrimitives:
 def standing_solids(bodies: Sequence[Body], standing: Sequence[int], solids: Sequence[Solids]) -> Table:
     """Solids of what stands still, each with its margin around it."""
     poses = body_arrays(bodies).placements[standing]
-    placed = placed_bodies([solids[k] for k in standing], poses, margins=[bodies[k].margin for k in standing])
+    kept = [bodies[k].margin + bodies[k].padding for k in standing]
+    placed = placed_bodies([solids[k] for k in standing], poses, margins=kept)
     return solid_table([(0, [each]) for each in placed])
 
 
@@ -239,14 +241,14 @@ def _reach(body: Body, outer: Spheres) -> float:
     """Distance of the farthest point of a body's outer spheres from its joint's frame [m]."""
     spheres = usable_cover(body.geometry, outer)
     centres = spheres[:, :3] @ np.array(body.placement.rotation).T + np.array(body.placement.translation)
-    return float((np.linalg.norm(centres, axis=1) + spheres[:, 3]).max())
+    return float((np.linalg.norm(centres, axis=1) + spheres[:, 3]).max()) + body.padding
 
 
 def _same(first: Body, second: Body) -> bool:
-    """Whether two bodies are the same solid on the same joint, placed alike, with the same margin."""
+    """Whether two bodies are the same solid on the same joint, placed alike, with the same margin and padding."""
     return (
         first.joint == second.joint
-        and first.margin == second.margin
+        and (first.margin, first.padding) == (second.margin, second.padding)
         and first.geometry is second.geometry
         and np.array_equal(first.placement.homogeneous, second.placement.homogeneous)
     )

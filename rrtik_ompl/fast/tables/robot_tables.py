@@ -144,13 +144,13 @@ def axis_turns(chain: Chain) -> NDArray[np.float64]:
 def moving_body(chain: Chain, body: Body, outer: Spheres, inner: Spheres, margin: float) -> MovingBody:
     """A body's balls in the turned frame of its joint, the outer ones grown and the inner ones shrunk by ``margin``.
 
-    A body without outer cover is given its bounding ball.
+    Both are grown by the body's padding. A body without outer cover is given its bounding ball.
     """
     turn = axis_turns(chain)[body.joint - 1].T
     cover = usable_cover(body.geometry, outer)
     grown, shrunk = (_moved(body.placement, spheres, turn) for spheres in (cover, inner))
-    grown[:, 3] += margin
-    shrunk[:, 3] -= margin
+    grown[:, 3] += body.padding + margin
+    shrunk[:, 3] += body.padding - margin
     return MovingBody(body.joint, grown, shrunk[shrunk[:, 3] > 0.0])
 
 

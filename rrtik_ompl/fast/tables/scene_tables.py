@@ -64,9 +64,9 @@ def outer_primitives(
 ) -> Primitives:
     """Primitives whose union contains standing bodies: the formula of each that has one, the balls of its cover else.
 
-    They contain every point that is no farther from its body than its margin and ``inflation`` [m].
+    They contain every point that is no farther from its body than its margin, padding and ``inflation`` [m].
     """
-    beside = np.array([body.margin for body in bodies]) + (0.0 if inflation is None else np.asarray(inflation))
+    beside = _kept(bodies) + (0.0 if inflation is None else np.asarray(inflation))
     places = _by_formula(bodies)
     rest = [(k, usable_cover(bodies[k].geometry, covers[k])) for k in places.pop(None, ())]
     made = joined([*_exact(bodies, places, 1.0, beside), _balls(bodies, rest, 1.0, beside)])
@@ -81,7 +81,7 @@ def outer_primitives(
 
 def inner_primitives(bodies: Sequence[Body], inner: Sequence[Spheres]) -> Primitives:
     """Primitives that lie within the margins around standing bodies, or inside these."""
-    margins = np.array([body.margin for body in bodies])
+    margins = _kept(bodies)
     places = _by_formula(bodies)
     rounded = [k for kind in (BALL, CAPSULE, HALF_SPACE) for k in places.get(kind, ())]
     beside = np.zeros(len(bodies))
@@ -89,6 +89,11 @@ def inner_primitives(bodies: Sequence[Body], inner: Sequence[Spheres]) -> Primit
     rest = [(k, np.asarray(inner[k]).reshape(-1, 4)) for k in (*places.pop(None, ()), *places.get(CONVEX, ()))]
     made = joined([*_exact(bodies, places, -1.0, beside), _balls(bodies, rest, -1.0, margins)])
     return made.only(_fits(made))
+
+
+def _kept(bodies: Sequence[Body]) -> Vector:
+    """How far around standing bodies what moves must not be, beside its own padding [m]."""
+    return np.array([body.margin + body.padding for body in bodies])
 
 
 def _fits(primitives: Primitives) -> Mask:
