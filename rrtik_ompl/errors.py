@@ -139,6 +139,10 @@ class MeshWarning(UserWarning):
     """A mesh is missing or cannot be the solid that its author probably meant, but work can go on."""
 
 
+class TipWarning(UserWarning):
+    """Nobody has said where the tip of an arm is, and more than one link may be it."""
+
+
 class PathWarning(UserWarning):
     """What was asked for does not apply to a path, which stays as it is."""
 

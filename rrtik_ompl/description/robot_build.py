@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -16,7 +17,7 @@ from rrtik_ompl.description.robot_source import BasePose
 from rrtik_ompl.description.robot_source import base_pose as checked_base
 from rrtik_ompl.description.tree import Joint, Tree
 from rrtik_ompl.description.tree_model import build_models
-from rrtik_ompl.errors import InputError, UnknownNameError, name_of
+from rrtik_ompl.errors import InputError, TipWarning, UnknownNameError, name_of
 from rrtik_ompl.robot import Chain, Robot
 
 
@@ -94,8 +95,8 @@ def build_robot(
             )
     held = _held_values(name, movable, actuated, ties, locked or {})
     model, collision, visual = build_models(tree.hold(held), checked_base(base_pose, f"robot '{name}': base_pose"))
-    tip_name = _last_link(tree, actuated) if tip is None else tip
-    if not name_of(tip_name, f"the tip of robot '{name}'") or not model.existFrame(tip_name):
+    tip_name = _last_link(name, tree, actuated) if tip is None else name_of(tip, f"the tip of robot '{name}'")
+    if not model.existFrame(tip_name):
         raise UnknownNameError(f"frame of robot '{name}' for the tip", tip_name, (f.name for f in model.frames))
     bounds = _limits(name, [movable[joint] for joint in actuated], limits or {})
     named = {
@@ -230,8 +231,11 @@ def _turned_inside(q: Vector, bounds: Mapping[str, Any]) -> Vector:
     return q
 
 
-def _last_link(tree: Tree, actuated: tuple[str, ...]) -> str:
-    """The leaf with the most actuated joints above it; among equals the longest branch, then the last described."""
+def _last_link(name: str, tree: Tree, actuated: tuple[str, ...]) -> str:
+    """The leaf with the most actuated joints above it; among equals the longest branch, then the last described.
+
+    A warning says which it is where others move too.
+    """
     parents = {joint.parent for joint in tree.joints}
 
     def rank(leaf: str) -> tuple[int, int]:
@@ -239,4 +243,10 @@ def _last_link(tree: Tree, actuated: tuple[str, ...]) -> str:
         return sum(joint.name in actuated for joint in above), sum(joint.kind != "fixed" for joint in above)
 
     leaves = [link.name for link in tree.links if link.name not in parents]
-    return max(reversed(leaves), key=rank)
+    found = max(reversed(leaves), key=rank)
+    others = [leaf for leaf in leaves if leaf != found and rank(leaf)[0]]
+    if others:
+        some = ", ".join(others[:4]) + (", ..." if len(others) > 4 else "")
+        message = f"robot '{name}': the tip is taken to be '{found}'; tip= names another link, such as {some}"
+        warnings.warn(TipWarning(message), stacklevel=2)
+    return found

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.description.urdf import robot_from_urdf, robot_from_urdf_text
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, TipWarning
 from rrtik_robots.example_arms import data_folder
 
 
@@ -371,3 +371,20 @@ def test_a_missing_file_and_a_folder_are_named(tmp_path):
     for path in (tmp_path / "none.urdf", tmp_path):
         with pytest.raises(InputError, match=os.path.basename(path)):
             robot_from_urdf(path)
+
+
+FORK = (
+    "<joint name='left' type='fixed'><parent link='hand'/><child link='finger_l'/></joint>"
+    "<joint name='right' type='fixed'><parent link='hand'/><child link='finger_r'/></joint>"
+)
+FORKED = "".join(f"<link name='{name}'/>" for name in ("base", "upper", "hand", "finger_l", "finger_r"))
+
+
+def test_a_tip_that_is_guessed_among_several_is_said_once_with_the_remedy(recwarn):
+    text = arm(FORK, links=FORKED)
+    with pytest.warns(TipWarning, match=r"robot 'arm': the tip is taken to be 'finger_r'; tip= .* such as finger_l"):
+        assert robot_from_urdf_text(text).tip == "finger_r"
+    recwarn.clear()
+    robot_from_urdf_text(text, tip="finger_l")  # named
+    robot_from_urdf_text(arm())  # no other choice
+    assert not [each for each in recwarn if issubclass(each.category, TipWarning)]
