@@ -62,7 +62,7 @@ FILES: dict[str, tuple[str, Callable[[Path], object]]] = {
     "path.json": ('{"version": 1, "joint_names": ["a", "b"], "waypoints": [[0, 0], [0.5, 0]]}', rrtik.load_path),
     "path.csv": ("a,b\n0,0\n1,0.5\n", rrtik.load_path),
     "mesh.stl": (STL, rrtik.load_mesh),
-    "message": ('{"name": "nudge", "change": 0.1, "seq": 3}', lambda path: message_in(path.read_bytes())),
+    "message": ('{"name": "jog", "direction": 0.1, "press": 2, "seq": 3}', lambda path: message_in(path.read_bytes())),
 }
 BITS = (
     "nan",

@@ -15,6 +15,7 @@ from bench.pilot.routes import REACTION_SECONDS, REPLANNING, panel_routes, simul
 from bench.pilot.session import color_logic, preventive_checks, scripted_scenario
 from bench.shared.pages import add_out
 from rrtik_bench.report.page import Report
+from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED
 from rrtik_ompl.pilot.routes.route_search import MIN_ROBUSTNESS
 
 PUBLISHED = 1.08  # [s] of one route: search and shortening
@@ -25,11 +26,18 @@ def write_session(report: Report, part: int) -> None:
     modes, same = scripted_scenario()
     report.bar("scripted scenario without a page, all states", "visited", ", ".join(modes), len(modes) == 4)
     report.bar("its record, replayed", "same end", "same end" if same else "another end", same)
-    count = 1000 // part
-    wrong, colors = color_logic(count)
-    shares = ", ".join(f"{number} {color}" for color, number in colors.items())
-    text = f"{wrong} wrong of {sum(colors.values())} ({shares})"
-    report.bar(f"colours of {count} random object poses against exhaustive IK", "0 wrong", text, wrong == 0)
+    count = 500 // part
+    lit = color_logic(count)
+    shares = ", ".join(f"{number} {color}" for color, number in lit.colors.items())
+    text = f"{lit.wrong} wrong of {sum(lit.colors.values())} ({shares})"
+    report.bar(f"red lamps of {count} random object poses against exhaustive IK", "0 wrong", text, lit.wrong == 0)
+    text = f"{lit.planned[RED]} of {lit.colors[RED]}; {lit.planned[AMBER]} of {lit.colors[AMBER]} amber ones do"
+    report.bar("red lamps whose grasp a route leads to", "0", text, lit.planned[RED] == 0)
+    missing = lit.colors[GREEN] - lit.planned[GREEN]
+    report.bar("green lamps without a route", "0", f"{missing} of {lit.colors[GREEN]}", missing == 0)
+    text = f"{1e3 * lit.offset:.2f} mm, {np.degrees(lit.turn):.3f} deg the farthest"
+    near = lit.offset <= 5e-4 and np.degrees(lit.turn) <= 0.1
+    report.bar("end of a route from its grasp", "<= 0.5 mm, 0.1 deg", text, near)
     found = preventive_checks(100_000 // part)
     text = (
         f"{found.bad} ({found.accepted} of {found.commands} accepted; {found.judged} through check_move "

@@ -111,11 +111,11 @@ def _guided(seed: int, rates: Any, rng: np.random.Generator) -> tuple[float, flo
     It ends where the arm stands in something.
     """
     arm = SimulatedArm(ROBOT, PROBLEM.start, rates)
-    session = Session(PROBLEM, arm, seed=seed)
+    session = Session(PROBLEM, arm, seed=seed, past=True)
     session.command("plan", 0.0)
     session.command("accept", 0.0)
     seconds, touched, plans = 0.0, False, 0
-    for _ in range(200):
+    for press in range(200):
         if session.mode == "manoeuvre" and session.message == "all moves are done":
             break
         if "replan" in session.message:
@@ -124,17 +124,19 @@ def _guided(seed: int, rates: Any, rng: np.random.Generator) -> tuple[float, flo
             session.command("accept", seconds)
             if session.route is None:
                 break
-        session.command("next", seconds)
+        session.command("next", seconds, press=press)
         if arm.moving is None:
             continue
         before, after = arm.read(), session.desired.copy()
         joint = arm.moving
+        after[joint] = session.held.drive.goal
         after[joint] += rng.normal(0.0, OVERSHOOT)
         after = ROBOT.clamp(after)
         touched |= not WORLD.motion_valid(before, after)
         seconds += REACTION_SECONDS + abs(after[joint] - before[joint]) / rates[joint]
         arm.move(joint, float(after[joint]))
         arm.advance(1e3)
+        session.command("release", seconds)
         session.tick(seconds)
     return seconds, float(touched), float(plans)
 

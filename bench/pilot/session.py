@@ -11,8 +11,11 @@ import pinocchio as pin
 
 from bench.pilot.scene import NAME, PLACE, PROBLEM, ROBOT, VALVE, WORLD, seen_at
 from rrtik_ompl.ik.analytic.closed_form import solutions
+from rrtik_ompl.pilot.devices.arm import joint_rates
 from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED, lamps, stage_poses
 from rrtik_ompl.pilot.routes.manoeuvre import check_move
+from rrtik_ompl.pilot.routes.proposal import propose
+from rrtik_ompl.pilot.routes.route import Route
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.pilot.surroundings import Surroundings
 
@@ -38,43 +41,54 @@ def _drive(record: Path) -> tuple[Any, list[str]]:
         now += 0.1
         engine.execute(command, now)
         modes.append(session.mode)
-    arm: Any = session.arm
+    press = 0
     while session.mode == "following" and now < 600.0:
-        if arm.moving is None:
-            engine.execute({"name": "next"}, now)
-        now += 0.5
+        press += session.held.over  # a press makes one move
+        engine.execute({"name": "next", "press": press}, now)
+        now += 0.03
         engine.update(now)
     q = session.q
     opened.close()
     return q, list(dict.fromkeys(modes))
 
 
-def color_logic(count: int) -> tuple[int, dict[str, int]]:
-    """Every lamp of random object poses against all branches of the closed form: wrong ones, and how many of each."""
-    rng, wrong, colors = np.random.default_rng(0), 0, {GREEN: 0, AMBER: 0, RED: 0}
-    surroundings = Surroundings(WORLD)
+class Lamps(NamedTuple):
+    """Lamps of random object poses: how many of each colour, and of each how many lead to a route.
+
+    Attributes:
+        colors: How many of each.
+        planned: How many of each lead to a route.
+        wrong: Red ones of a grasp that has a branch inside the limits, and others of one that has none.
+        offset: Farthest end of a route from its grasp [m].
+        turn: Largest angle between them [rad].
+    """
+
+    colors: dict[str, int]
+    planned: dict[str, int]
+    wrong: int
+    offset: float
+    turn: float
+
+
+def color_logic(count: int) -> Lamps:
+    """Every lamp of random object poses against all branches of the closed form, and against the search for a route."""
+    rng, wrong, offset, turn = np.random.default_rng(0), 0, 0.0, 0.0
+    colors, planned = ({GREEN: 0, AMBER: 0, RED: 0} for _ in range(2))
+    surroundings, start = Surroundings(WORLD), np.array(PROBLEM.start)
     for _ in range(count):
-        turn = pin.exp3(rng.normal(0.0, 0.5, 3))
-        T = pin.SE3(turn @ PLACE.rotation, rng.uniform([0.9, -0.6, -0.2], [1.6, 0.8, 0.8]))
+        T = pin.SE3(pin.exp3(rng.normal(0.0, 0.5, 3)) @ PLACE.rotation, rng.uniform([0.9, -0.6, -0.2], [1.6, 0.8, 0.8]))
         surroundings.see([seen_at(T)])
-        world, holding = surroundings.world, surroundings.holding("valve")
-        for lamp in lamps(world, VALVE, T, PROBLEM.start, holding=holding):
-            stages = stage_poses(T, VALVE.grasp(lamp.type), lamp.level)
-            wrong += lamp.color != _exhaustive(stages, (world, holding, holding))
+        for lamp in lamps(surroundings.world, VALVE, T, start, holding=surroundings.holding("valve")):
+            grasp = stage_poses(T, VALVE.grasp(lamp.type), lamp.level)[1]
+            wrong += (lamp.color == RED) != (not solutions(ROBOT, grasp.homogeneous[None]).valid.any())
             colors[lamp.color] += 1
-    return wrong, colors
-
-
-def _exhaustive(stages: Any, worlds: Any) -> str:
-    color = GREEN
-    for stage, world in zip(stages, worlds, strict=True):
-        found = solutions(ROBOT, stage.homogeneous[None])
-        rows = [row for row in found.branches[0][found.valid[0]] if ROBOT.within_limits(row[None]).all()]
-        if not rows:
-            return RED
-        if not any(world.valid(row) for row in rows):
-            color = AMBER
-    return color
+            route = propose(PROBLEM, surroundings, "valve", lamp, start, joint_rates(ROBOT), seed=1)
+            if isinstance(route, Route):
+                planned[lamp.color] += 1
+                off = grasp.actInv(ROBOT.fk(route.path.end))
+                offset = max(offset, float(np.linalg.norm(off.translation)))
+                turn = max(turn, float(np.linalg.norm(pin.log3(off.rotation))))
+    return Lamps(colors, planned, wrong, offset, turn)
 
 
 class Preventive(NamedTuple):

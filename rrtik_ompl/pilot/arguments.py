@@ -10,7 +10,7 @@ import numpy as np
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.messages import quoted
 
-NUMBERS = ("joint", "target", "change", "level")  # arguments of commands; all others are words
+NUMBERS = ("joint", "target", "level", "direction", "share", "press")  # arguments of commands; all others are words
 MAX_NUMBER, MAX_WORD_LENGTH = 1e6, 100  # a number, and a word, that a command may hold
 
 

@@ -18,6 +18,7 @@ from rrtik_ompl.pilot.arguments import number
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.camera_feed import ENDED
 from rrtik_ompl.pilot.devices.perception import Perception
+from rrtik_ompl.pilot.interlock import PROPOSED
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.state import state_document
 from rrtik_ompl.pilot.views import PRESETS, CameraView, OutsideView
@@ -55,6 +56,7 @@ class Engine:
         name = quoted(arguments.pop("name", ""))
         if name not in VIEW_COMMANDS:
             self.session.command(name, time, **arguments)
+            self._return_to_now()
             return
         try:
             self._change_view(name, arguments)
@@ -91,11 +93,17 @@ class Engine:
         self._drawn = key
         return _jpeg(self.outside.draw())
 
+    def _return_to_now(self) -> None:
+        """A preview shows a route that is proposed; whatever comes after is shown as it is."""
+        if self.session.mode != PROPOSED or self.session.held.drive.active:
+            self.outside.share = None
+
     def _advance(self, time: float) -> None:
         if self._simulated is not None:
             self._simulated.advance(max(time - self._advanced, 0.0))
         self._advanced = max(time, self._advanced)
         self.session.tick(time)
+        self._return_to_now()
 
     def _change_view(self, name: str, given: dict[str, Any]) -> None:
         wanted = VIEW_COMMANDS[name]
@@ -112,6 +120,9 @@ class Engine:
             self.outside.preset(view)
         else:
             self.outside.share = None if given["share"] is None else number(given["share"], "share")
+            if self.session.mode != PROPOSED and given["share"] is not None:
+                self.outside.share = None
+                raise InputError("there is no route to preview: 'plan' proposes one")
 
 
 def _jpeg(picture: NDArray[np.uint8]) -> bytes:

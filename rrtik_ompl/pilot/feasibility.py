@@ -7,9 +7,13 @@ from collections.abc import Hashable
 import numpy as np
 
 from rrtik_ompl.arrays import Vector
+from rrtik_ompl.ik.analytic.closed_form import has_closed_form
 from rrtik_ompl.pilot.lamps import Lamp, diagnose, lamps
 from rrtik_ompl.pilot.routes.manoeuvre import JointRange, joint_range
 from rrtik_ompl.pilot.surroundings import Surroundings
+from rrtik_ompl.world import World
+
+PATIENT_SECONDS = 0.05  # for a pose, when a route is asked for
 
 
 class FeasibilityCache:
@@ -28,11 +32,28 @@ class FeasibilityCache:
         seen = None if target is None else around.named(target)
         if seen is None:
             return ()
-        key = (target, around.version)
+        key = (target, around.version, around.world_at(q, target).valid(q))
         if key != self._lamps[0]:
             holding = around.holding(seen.object.name)
             self._lamps = (key, lamps(around.world, seen.object, seen.T_base_object, q, holding=holding))
         return self._lamps[1]
+
+    def patient_lamp(self, target: str | None, choice: tuple[str, int] | None, q: Vector) -> Lamp | None:
+        """The lamp of a grasp; where the arm has no closed form and nothing was found, after a longer search."""
+        lamp = self._lamp(target, choice, q)
+        seen = None if target is None else self._surroundings.named(target)
+        if lamp is None or seen is None or len(lamp.grasps) or has_closed_form(self._surroundings.world.robot):
+            return lamp
+        around = self._surroundings
+        holding, key = around.holding(seen.object.name), self._lamps[0]
+        again = lamps(
+            around.world, seen.object, seen.T_base_object, q, holding=holding, seconds=PATIENT_SECONDS
+        )  # fmt: skip
+        self._lamps, self._fault = (key, again), ((), "")
+        return self._lamp(target, choice, q)
+
+    def _lamp(self, target: str | None, choice: tuple[str, int] | None, q: Vector) -> Lamp | None:
+        return next((lamp for lamp in self.lamps(target, q) if (lamp.type, lamp.level) == choice), None)
 
     def fault(self, target: str, lamp: Lamp, q: Vector) -> str:
         """What is wrong with a grasp: how far out of reach it is, or what would touch; "" if it can be made."""
@@ -40,17 +61,17 @@ class FeasibilityCache:
         seen = around.named(target)
         if seen is None or lamp.stage is None:
             return ""
-        key = (target, around.version, lamp.type, lamp.level)
+        key = (self._lamps[0], lamp.type, lamp.level)
         if key != self._fault[0]:
             worlds = around.world, around.holding(target)
             self._fault = (key, diagnose(lamp, seen.object, seen.T_base_object, q, *worlds))
         return self._fault[1]
 
-    def joint_range(self, q: Vector, joint: int) -> JointRange:
-        """The range of a joint now; it stays the same while that joint alone moves."""
-        key = (joint, np.delete(q, joint).tobytes(), self._surroundings.version)
+    def joint_range(self, world: World, q: Vector, joint: int) -> JointRange:
+        """The range of a joint in a world now; it stays the same while that joint alone moves."""
+        key = (joint, np.delete(q, joint).tobytes(), self._surroundings.version, id(world))
         kept = self._range[1]
         if kept is None or key != self._range[0] or not kept.low <= q[joint] <= kept.high:
-            kept = joint_range(self._surroundings.world, q, joint)
+            kept = joint_range(world, q, joint)
             self._range = (key, kept)
         return kept

@@ -1,7 +1,8 @@
 """A lamp for every grasp type and level of an object: can the arm get there, hold it and lift it?
 
-Green: approach, grasp and lift are in reach, inside the limits and free. Amber: in reach, but something is in the way.
-Red: out of reach. Source: [1, ch. 6]; here the whole sequence of approach, grasp and lift counts.
+Green: the grasp is in reach, inside the limits and free, the arm gets to it from before the object, and can lift it.
+Amber: the grasp is in reach, but something is in the way of it, of the approach or of the lift. Red: the grasp is out
+of reach: no route leads there. Source: [1, ch. 6]; here the whole sequence of approach, grasp and lift counts.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from rrtik_ompl.goal import PoseGoal, joint_difference
 from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.ik.batch import solve_ik_batch
 from rrtik_ompl.ik.solve import chosen_method, solve_ik
+from rrtik_ompl.pilot.routes.approach import approaches
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject
 from rrtik_ompl.world import World
@@ -45,6 +47,7 @@ class Lamp:
         stage: The stage that fails; None if green.
         reason: Which stage fails and why; "" if green.
         q: Configurations of approach, grasp and lift, NaN where there is none. Shape (3, dof).
+        grasps: All configurations of the grasp that are found, inside the limits and free. Shape (k, dof).
     """
 
     type: str
@@ -53,6 +56,7 @@ class Lamp:
     stage: Stage | None
     reason: str
     q: Matrix
+    grasps: Matrix
 
 
 def stage_poses(T_base_object: pin.SE3, grasp: GraspType, level: int) -> tuple[pin.SE3, pin.SE3, pin.SE3]:
@@ -65,7 +69,13 @@ def stage_poses(T_base_object: pin.SE3, grasp: GraspType, level: int) -> tuple[p
 
 
 def lamps(
-    world: World, thing: MarkedObject, T_base_object: pin.SE3, near: Vector, *, holding: World
+    world: World,
+    thing: MarkedObject,
+    T_base_object: pin.SE3,
+    near: Vector,
+    *,
+    holding: World,
+    seconds: float = NUMERIC_SECONDS,
 ) -> tuple[Lamp, ...]:
     """The lamps of all types and levels of an object where it is now.
 
@@ -73,24 +83,37 @@ def lamps(
         world: For the approach: everything that must not be touched, the object too.
         thing: What is to be grasped.
         T_base_object: Where it is.
-        near: Posture near which configurations are wanted, shape (dof,).
+        near: Where the arm is, shape (dof,); the nearest configurations are wanted.
         holding: For grasp and lift: the same world in which the gripper may touch the object.
+        seconds: For each pose, where the arm has no closed form [s].
     """
     names = [(grasp, level) for grasp in thing.grasps for level in range(len(grasp.levels))]
     if not names:
         return ()
     poses = np.array([[T.homogeneous for T in stage_poses(T_base_object, *name)] for name in names])
-    postures, why = _postures(world.robot, poses.reshape(-1, 4, 4), near)
+    postures, why = _postures(world.robot, poses.reshape(-1, 4, 4), near, seconds)
     shape = (len(names), len(STAGES), *postures.shape[1:])
-    free = _free(postures.reshape(shape), (world, holding, holding))
-    nearest = _nearest(world.robot, postures.reshape(shape), free, near)
-    found = []
+    postures = postures.reshape(shape)
+    free = _free(postures, (world, holding, holding))
+    nearest = _nearest(world.robot, postures, free, near)
+    found, stuck = [], not (world.valid(near) or holding.valid(near))
     for row, (grasp, level) in enumerate(names):
         reasons = why[row * len(STAGES) : (row + 1) * len(STAGES)]
-        color, stage, fault = _color(reasons, free[row].any(axis=1))
+        grasps = postures[row, 1][free[row, 1]]
+        clear = free[row].any(axis=1)
+        if clear[1] and not clear[0]:
+            clear[0] = _approached(world, holding, nearest[row, 1], stage_poses(T_base_object, grasp, level))
+        color, stage, fault = _color(reasons, clear)
+        if stuck and color == GREEN:
+            color, stage, fault = AMBER, STAGES[0], "the arm touches something where it is"
         reason = "" if stage is None else f"{stage}: {fault}"
-        found.append(Lamp(grasp.name, level, color, stage, reason, nearest[row]))
+        found.append(Lamp(grasp.name, level, color, stage, reason, nearest[row], grasps))
     return tuple(found)
+
+
+def _approached(world: World, holding: World, grasp: Vector, stages: tuple[pin.SE3, pin.SE3, pin.SE3]) -> bool:
+    """Whether a few joints lead to a grasp from about the pose before the object, as a route would."""
+    return bool(approaches(world, holding, grasp, stages, max_count=1))
 
 
 def diagnose(
@@ -114,14 +137,16 @@ def diagnose(
     return f"{lamp.stage}: {found.detail}" if found.detail else lamp.reason
 
 
-def _postures(robot: Robot, poses: NDArray[np.float64], near: Vector) -> tuple[NDArray[np.float64], list[str]]:
+def _postures(
+    robot: Robot, poses: NDArray[np.float64], near: Vector, seconds: float
+) -> tuple[NDArray[np.float64], list[str]]:
     """For each pose the postures inside the limits, NaN for the others, shape (m, b, dof); and why there is none."""
     if chosen_method(robot, (PoseGoal(poses[0]),), "auto") == "closed-form":
         found = solutions(robot, poses, near=near, check=False)
         postures = np.where(found.valid[..., None], found.branches, np.nan)
         reasons = np.where(found.real.any(axis=1), LIMITS, UNREACHABLE)
         return postures, np.where(found.valid.any(axis=1), "", reasons).tolist()
-    batch = solve_ik_batch(robot, poses, near=near, seconds=NUMERIC_SECONDS)
+    batch = solve_ik_batch(robot, poses, near=near, seconds=seconds)
     return np.array(batch.q[:, None]), list(batch.reasons)
 
 
@@ -147,9 +172,9 @@ def _nearest(robot: Robot, postures: NDArray[np.float64], free: NDArray[np.bool_
 
 def _color(reasons: list[str], clear: NDArray[np.bool_]) -> tuple[Color, Stage | None, str]:
     """Color, the first stage that fails and why; reasons why stages are out of reach, and which stages are free."""
-    failing = [k for k, reason in enumerate(reasons) if reason]
-    if failing:
-        return RED, STAGES[failing[0]], reasons[failing[0]]
-    if not clear.all():
-        return AMBER, STAGES[int(np.argmin(clear))], "something is in the way"
-    return GREEN, None, ""
+    if reasons[1]:
+        return RED, STAGES[1], reasons[1]
+    failing = next((k for k in (1, 0, 2) if not clear[k]), None)
+    if failing is None:
+        return GREEN, None, ""
+    return AMBER, STAGES[failing], reasons[failing] or "something is in the way"

@@ -13,30 +13,38 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Vector, frozen
 from rrtik_ompl.errors import InputError, RrtikError, UnknownNameError
-from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.pilot.arguments import MAX_WORD_LENGTH, fitting
 from rrtik_ompl.pilot.devices.arm import Arm, joint_rates
 from rrtik_ompl.pilot.feasibility import FeasibilityCache
-from rrtik_ompl.pilot.lamps import Lamp, stage_poses
+from rrtik_ompl.pilot.held import Held
+from rrtik_ompl.pilot.interlock import CHOOSING, FOLLOWING, MANOEUVRE, MOVING, PROPOSED, Knowledge, refusal
+from rrtik_ompl.pilot.lamps import Lamp
 from rrtik_ompl.pilot.record import Record
 from rrtik_ompl.pilot.routes.follower import Follower, Progress, path_fault
-from rrtik_ompl.pilot.routes.manoeuvre import JointRange, MoveCheck, check_move, escape_advice, free_until
+from rrtik_ompl.pilot.routes.manoeuvre import JointRange, escape_advice
 from rrtik_ompl.pilot.routes.no_route import NoRoute
-from rrtik_ompl.pilot.routes.route import Route, route_to, route_to_grasp
+from rrtik_ompl.pilot.routes.proposal import propose
+from rrtik_ompl.pilot.routes.route import Route
 from rrtik_ompl.pilot.surroundings import Surroundings
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.sensing.scene_from_view import SeenObject
-from rrtik_ompl.units import joint_unit, reading
+from rrtik_ompl.world import World
 
-MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING = "manoeuvre", "choosing", "proposed", "following"
-STALE_SECONDS = 0.5  # a picture older than that does not show the present
+BLOCKED = "the route is blocked now: {}; 'replan' finds another"
 
 
 class Session:
     """One pilot, one arm, one scene."""
 
     def __init__(
-        self, problem: Problem, arm: Arm, *, rates: ArrayLike | None = None, record: Record | None = None, seed: int = 0
+        self,
+        problem: Problem,
+        arm: Arm,
+        *,
+        rates: ArrayLike | None = None,
+        record: Record | None = None,
+        seed: int = 0,
+        past: bool = False,
     ) -> None:
         """Begin in manoeuvre.
 
@@ -46,30 +54,31 @@ class Session:
             rates: Of the joints, shape (dof,) [rad/s or m/s]; default ones if None.
             record: Where the session is recorded.
             seed: Of the random numbers: the same commands give the same routes.
+            past: Pictures are not of now, and the arm is a simulated one. Else nothing moves without a picture of now.
         """
         self.problem, self.robot, self.arm, self.seed = problem, problem.robot, arm, seed
         self.rates: Vector = joint_rates(self.robot, rates)
         self.surroundings = Surroundings(problem.world)
-        self.mode, self.selected = MANOEUVRE, 0
+        self.mode, self.selected, self.speed = MANOEUVRE, 0, 1.0
         self.target: str | None = None
         self.choice: tuple[str, int] | None = None
         self.route: Route | None = None
         self.follower: Follower | None = None
         self.progress: Progress | None = None
-        self.move_check: MoveCheck | None = None
         self.message = ""
         self.q: Vector = frozen(arm.read())
         self.desired: Vector = self.q
         self.time = 0.0
         self.picture_time = -np.inf
-        self._seen_at: dict[str, float] = {}
+        self.held = Held(self)
+        self._past, self._trouble, self._seen_at = past, "", dict[str, float]()
         self._record = record or Record(None)
         self._feasibility = FeasibilityCache(self.surroundings)
         self._commands: dict[str, Callable[..., str]] = {
-            "select": self._select, "move": self._move, "nudge": self._nudge, "stop": self._stop,
+            "select": self._select, "jog": self.held.jog, "move": self.held.move, "go": self.held.go,
+            "next": self.held.next, "release": self.held.release, "speed": self.held.set_speed, "stop": self._stop,
             "object": self._object, "grasp": self._grasp, "plan": self._plan, "accept": self._accept,
-            "reject": self._reject, "next": self._next, "back": self._back, "replan": self._plan,
-            "halt": self._halt,
+            "reject": self._reject, "back": self._back, "replan": self._plan, "halt": self._halt,
         }  # fmt: skip
 
     # --- input -------------------------------------------------------------------------------------------
@@ -83,48 +92,70 @@ class Session:
             if self.target is None:
                 targets = [o.object.name for o in objects if o.object.role == "target" and o.object.grasps]
                 self.target = targets[0] if targets else None
-            self._check_route()
+            self._check_motion()
 
     def tick(self, time: float) -> None:
-        """Read the arm and update its progress along the route."""
+        """Read the arm and update its progress along the route; stop it where the present is not known any more."""
         self.time = max(self.time, time)
         q = frozen(self.arm.read())
-        if self.arm.lost and self.arm.lost != self.message:
-            self.message = self.arm.lost
         if not np.array_equal(q, self.q):
             self._record.write("joints", time, q=q.tolist())
         self.q = q
+        self.held.expire(time)
+        self._watch()
         if self.follower is None or self.mode != FOLLOWING:
             return
         before, self.progress = self.follower.current, self.follower.update(q)
         if self.progress.advice == "lost":
-            self.arm.stop()
+            self._stand_still()
             self.message = f"off the route: {self.progress.fault}; 'replan' finds a new one from here"
-        elif self.progress.advice == "done":
+        elif self.progress.advice == "done" and not self.held.drive.active:
             self.mode, self.message = MANOEUVRE, "all moves are done"
         elif self.follower.current != before:
-            self._show_due(self.follower)
+            self.show_due(self.follower)
             self.message = f"move {self.follower.current} of {len(self.follower.moves)} is done; 'next' makes the next"
 
     def command(self, verb: str, time: float, /, **arguments: object) -> str:
         """Execute a command of the pilot; returns a line for a person, which is `message` from then on.
 
-        A command that cannot be executed in this mode says so and changes nothing.
+        A command that cannot be executed in this mode, or on what is known, says so and moves nothing. Those of
+        `MOVING` are held: they are repeated as long as the arm shall move. Any other command ends the motion.
         """
         self.time = max(self.time, time)
+        goes_on = self.held.goes_on(verb, arguments)
+        if goes_on and self.held.over:
+            return self.message  # of what ended the press
         try:
             if verb not in self._commands:
                 raise UnknownNameError("command", verb[:MAX_WORD_LENGTH], self._commands)
             act = self._commands[verb]
             given = fitting(act, verb, arguments)
-            self._record.write("command", time, name=verb, arguments=given)
+            if verb not in (*MOVING, "release"):
+                self.held.end()
+            refused = refusal(verb, self.mode, self.known)
+            if refused:
+                raise InputError(refused)
+            if not goes_on:
+                self._record.write("command", time, name=verb, arguments=given)
             self.message = act(**given)
         except RrtikError as error:
+            self.held.refuse(verb, arguments.get("press"))
             self.message = str(error)
-        self._record.write("answer", time, text=self.message, mode=self.mode)
+        if not goes_on:
+            self._record.write("answer", time, text=self.message, mode=self.mode)
         return self.message
 
     # --- output -------------------------------------------------------------------------------------------
+
+    @property
+    def known(self) -> Knowledge:
+        """What is known now of the arm and of the picture."""
+        return Knowledge(self.arm.lost, self.time - self.picture_time, self._past)
+
+    @property
+    def world(self) -> World:
+        """The world for moves by hand: the gripper may touch what it holds, as long as it does."""
+        return self.surroundings.world_at(self.q, self.target)
 
     def lamps(self) -> tuple[Lamp, ...]:
         """Lamps of the chosen object where it is and for where the arm is."""
@@ -141,7 +172,7 @@ class Session:
 
     def joint_range(self) -> JointRange:
         """The range in which the selected joint can be driven now."""
-        return self._feasibility.joint_range(self.q, self.selected)
+        return self._feasibility.joint_range(self.world, self.q, self.selected)
 
     def unseen(self, name: str) -> float:
         """For how long an object has not been in view, by the pictures taken since [s]."""
@@ -155,30 +186,12 @@ class Session:
         self.selected = int(joint)
         return f"{self.robot.joint_names[self.selected]} selected"
 
-    def _move(self, target: float) -> str:
-        if self.mode == FOLLOWING:
-            raise InputError("a route is being followed: 'next' makes its next move, 'stop' leaves it")
-        return self._send(self.selected, float(target))
-
-    def _nudge(self, change: float) -> str:
-        return self._move(self.q[self.selected] + float(change))
-
-    def _send(self, joint: int, target: float) -> str:
-        self.move_check = check_move(self.surroundings.world, self.q, joint, target)
-        if not self.move_check.allowed:
-            if not self.surroundings.world.valid(self.q):
-                return f"refused: {self.move_check.reason}"
-            reached = free_until(self.surroundings.world, self.q, joint, target)
-            value, unit = reading(reached, joint_unit(self.robot.prismatic[joint]))
-            return f"refused: {self.move_check.reason}; free until {value:.4g} {unit}"
-        desired = self.q.copy()
-        desired[joint] = target
-        self.desired = frozen(desired)
-        self.arm.move(joint, target)
-        return "; ".join(("moving " + self.robot.joint_names[joint], *self.move_check.warnings))
+    def _stand_still(self) -> None:
+        self.held.end()
+        self.arm.stop()
 
     def _stop(self) -> str:
-        self.arm.stop()
+        self._stand_still()
         self.desired = self.q
         if self.mode == FOLLOWING:
             self.mode = PROPOSED
@@ -187,108 +200,97 @@ class Session:
 
     def _halt(self) -> str:
         """Stop the arm, for no page has the pilot any more."""
-        self.arm.stop()
+        self._stop()
         return "the pilot has left; the arm stands still"
 
     def _object(self, name: str) -> str:
-        seen = self.surroundings.named(name)
-        if seen is None:
+        if self.surroundings.named(name) is None:
             raise UnknownNameError("object in view", name, [o.object.name for o in self.surroundings.seen])
         self.target, self.choice, self.mode = name, None, CHOOSING
         return f"{name} chosen; now a grasp"
 
     def _grasp(self, type: str, level: int) -> str:
-        if self.target is None:
-            raise InputError("no object is chosen; choose one that is in view")
-        seen = self.surroundings.named(self.target)
-        if seen is None:
-            raise InputError(f"{self.target} was not seen yet")
-        count = len(seen.object.grasp(type).levels)
-        if not 0 <= int(level) < count:
-            raise InputError(f"level must be 1 to {count}, got {int(level) + 1}")
+        self.surroundings.check_grasp(self.target, type, int(level))
         self.choice, self.mode = (type, int(level)), CHOOSING
         return f"{type} at level {int(level) + 1}: {self.fault() or 'can be reached'}"
 
     def _plan(self) -> str:
         self.arm.stop()
         self.q = frozen(self.arm.read())
-        found = self._route()
+        lamp = self._feasibility.patient_lamp(self.target, self.choice, self.q)
+        found = propose(self.problem, self.surroundings, self.target, lamp, self.q, self.rates, self.seed)
         if isinstance(found, NoRoute):
             self.route = self.follower = self.progress = None
             self.mode = CHOOSING if self.choice else MANOEUVRE
             otherwise = "choose another grasp" if self.choice else "drive the arm elsewhere, or choose an object"
-            return f"no route: {found}; {escape_advice(self.surroundings.world, self.q) or otherwise}"
+            return f"no route: {self.fault() or found}; {escape_advice(self.world, self.q) or otherwise}"
         self.route, self.mode = found, PROPOSED
         self.follower, self.progress = Follower(found.path, self.rates), None
         self.desired = frozen(found.path.end)
         return found.summary() + "; 'accept' or 'reject'"
 
-    def _route(self) -> Route | NoRoute:
-        seen = None if self.target is None or self.choice is None else self.surroundings.named(self.target)
-        if seen is None or self.choice is None:
-            goal = self.problem.goal
-            if not isinstance(goal, JointGoal):
-                return NoRoute("choose an object and a grasp first")
-            return route_to(self.surroundings.world, self.q, np.array(goal.q), self.rates, self.seed)
-        stages = stage_poses(seen.T_base_object, seen.object.grasp(self.choice[0]), self.choice[1])
-        lamp = self.lamp()
-        near = self.q if lamp is None or np.isnan(lamp.q[0]).any() else lamp.q[0]
-        holding = self.surroundings.holding(seen.object.name)
-        return route_to_grasp(self.surroundings.world, holding, self.q, stages, near, self.rates, self.seed)
-
     def _accept(self) -> str:
-        if self.route is None or self.follower is None or self.mode != PROPOSED:
+        if self.follower is None:
             raise InputError("there is no route to accept; 'plan' proposes one")
         progress = self.follower.update(self.q)
         if progress.advice == "lost":
             raise InputError(f"the arm is not where the route starts: {progress.fault}; 'replan' starts it from here")
+        self.refuse_if_blocked()
         self.mode, self.progress = FOLLOWING, progress
-        self._show_due(self.follower)
-        return "accepted; 'next' makes the next move"
+        self.show_due(self.follower)
+        return "accepted; hold 'next' to make the next move"
 
-    def _show_due(self, follower: Follower) -> None:
+    def show_due(self, follower: Follower) -> None:
         """Select the joint of the current move; its end is the desired value."""
         joint = follower.joint()
         if joint is not None:
             self.desired, self.selected = frozen(follower.target), joint
 
     def _reject(self) -> str:
+        self.arm.stop()
         self.route = self.follower = self.progress = None
         self.mode, self.desired = (CHOOSING if self.choice else MANOEUVRE), self.q
         return "rejected"
-
-    def _next(self) -> str:
-        if self.follower is None or self.mode != FOLLOWING:
-            raise InputError("no route is being followed; 'plan' and 'accept' one first")
-        self.progress = self.follower.update(self.q)
-        joint = self.follower.joint()
-        if self.progress.advice == "lost" or joint is None:
-            raise InputError(self.progress.fault or "all moves are done")
-        fault = self._fault_of_rest()
-        if fault:
-            raise InputError(f"the route is blocked now: {fault}; 'replan' finds another")
-        self._show_due(self.follower)
-        self.arm.move(joint, float(self.desired[joint]))
-        move = self.follower.moves[self.follower.current]
-        return f"move {self.follower.current + 1} of {len(self.follower.moves)}: {move.joint}"
 
     def _back(self) -> str:
         if self.follower is None:
             raise InputError("there is no route to go back on")
         self.arm.stop()
         back = self.follower.back(self.q)
-        self.follower, self.mode = Follower(back, self.rates), PROPOSED
-        self.progress = None
+        self.follower, self.mode, self.progress = Follower(back, self.rates), PROPOSED, None
         return f"the way back: {len(back.moves())} moves; 'accept' or 'reject'"
 
-    def _check_route(self) -> None:
-        """After a change of the scene: stop if the route that is followed or proposed is not free any more."""
+    # --- what ends a motion ---------------------------------------------------------------------------------------
+
+    def _watch(self) -> None:
+        """Stop when picture or arm are not known any more, and leave the route; say when they are known again."""
+        trouble, before = self.known.trouble, self._trouble
+        self._trouble = trouble
+        if trouble == before:
+            return
+        if not trouble:
+            self.message = "picture and arm are known again; the arm stands still" if before else self.message
+        elif self.mode == FOLLOWING or self.held.drive.active:
+            self._record.write("command", self.time, name="stop", arguments={})
+            self.message = f"{trouble}: {self._stop()}"
+        else:
+            self.message = trouble
+
+    def _check_motion(self) -> None:
+        """After a change of the scene: stop if what is driven, followed or proposed is not free any more."""
+        if self.mode != FOLLOWING and not self.held.still_free():
+            self.held.end()
+            self.message = "stopped: something has come into the way"
         if self.follower is None or self.mode not in (FOLLOWING, PROPOSED):
             return
-        fault = self._fault_of_rest()
-        if fault:
-            self.arm.stop()
-            self.message = f"the route is blocked now: {fault}; 'replan' finds another"
+        if fault := self._fault_of_rest():
+            self._stand_still()
+            self.message = BLOCKED.format(fault)
+
+    def refuse_if_blocked(self) -> None:
+        """Raise InputError if the rest of the route is not free any more."""
+        if fault := self._fault_of_rest():
+            raise InputError(BLOCKED.format(fault))
 
     def _fault_of_rest(self) -> str:
         if self.follower is None:

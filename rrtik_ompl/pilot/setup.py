@@ -75,11 +75,14 @@ def open_session(options: SessionOptions) -> OpenSession:
     problem = load_problem(options.problem)
     if options.replay is not None:
         return _replay(options, problem, options.replay)
+    if options.arm is not None and isinstance(options.source, Path):
+        raise InputError("--arm: an arm is moved by a camera's pictures, not by photographs or a film: leave one out")
     arm: Arm = SimulatedArm(problem.robot, problem.start) if options.arm is None else _line_arm(problem, options.arm)
     perception = _perception(options, problem, arm)
     record = Record(options.record)
     record.write("begin", 0.0, problem=problem.name, seed=options.seed, q=arm.read().tolist())
-    session = Session(problem, arm, record=record, seed=options.seed)
+    past = isinstance(options.source, Path)
+    session = Session(problem, arm, record=record, seed=options.seed, past=past)
     simulated = arm if isinstance(arm, SimulatedArm) else None
     closing, reports = [perception.close, record.close], perception.reports()
     if isinstance(arm, LineArm):
@@ -150,4 +153,4 @@ def _replay(options: SessionOptions, problem: Problem, file: Path) -> OpenSessio
     start, seed = start_of(entries, problem.start)
     arm = RecordedArm(problem.robot, start)
     perception = RecordedPerception(entries, arm, _simulated(vehicle, problem))
-    return OpenSession(Engine(Session(problem, arm, seed=seed), perception), (perception.close,))
+    return OpenSession(Engine(Session(problem, arm, seed=seed, past=True), perception), (perception.close,))

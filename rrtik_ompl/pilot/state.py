@@ -8,7 +8,8 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.moves.text import spoken_moves
-from rrtik_ompl.pilot.session import STALE_SECONDS, Session
+from rrtik_ompl.pilot.interlock import STALE_SECONDS
+from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.units import joint_unit, reading
 
@@ -34,6 +35,9 @@ def state_document(session: Session) -> dict[str, Any]:
         "range": _joint_range(session),
         "aim": _aim(session),
         "arm_lost": session.arm.lost,
+        "trouble": session.known.trouble,
+        "speed": session.held.speed,
+        "driving": session.held.drive.active,
     }
 
 

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from rrtik_ompl.arrays import Vector
+from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.sensing.problem_from_view import scene_with
 from rrtik_ompl.sensing.scene_from_view import SeenObject
@@ -42,6 +44,21 @@ class Surroundings:
         """An object as it was seen last, None if it was never seen."""
         return self._seen.get(name)
 
+    def check_grasp(self, name: str | None, type: str, level: int) -> None:
+        """Check that an object was seen and has a grasp.
+
+        Raises:
+            InputError: If it was not, or it has no such type or level.
+        """
+        if name is None:
+            raise InputError("no object is chosen; choose one that is in view")
+        seen = self.named(name)
+        if seen is None:
+            raise InputError(f"{name} was not seen yet")
+        count = len(seen.object.grasp(type).levels)
+        if not 0 <= level < count:
+            raise InputError(f"level must be 1 to {count}, got {level + 1}")
+
     def places(self) -> list[dict[str, Any]]:
         """The objects seen now or earlier as plain values, for a record.
 
@@ -67,6 +84,16 @@ class Surroundings:
             pairs = [(link, solid) for link in gripper_links(self.world.robot) for solid in solids]
             self._holding[name] = self._with(pairs)
         return self._holding[name]
+
+    def world_at(self, q: Vector, target: str | None) -> World:
+        """The world for an arm at q, shape (dof,): its gripper may touch the target if that alone is what it touches.
+
+        It got there by a route to a grasp, for no other motion may end in contact.
+        """
+        if target is None or target not in self._seen or self.world.valid(q):
+            return self.world
+        holding = self.holding(target)
+        return holding if holding.valid(q) else self.world
 
     def _moved(self, new: SeenObject) -> bool:
         old = self._seen.get(new.object.name)

@@ -15,12 +15,15 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.overlay.augment import Augmenter, Ghost
 from rrtik_ompl.overlay.virtual_camera import background, orbit_pose, pinhole_camera
+from rrtik_ompl.pilot.interlock import FOLLOWING, PROPOSED
 from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED
-from rrtik_ompl.pilot.session import FOLLOWING, PROPOSED, Session
+from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.sensing.cameras.camera import Camera
 
 LAMP_COLORS = {GREEN: "#1b9e3a", AMBER: "#e6a100", RED: "#c62828"}
 NEXT_MOVE = "#56b4e9"
+VIRTUAL_ARM, VIRTUAL_OPACITY = "#e4ebf5", 0.6  # of the arm drawn over a picture: not to be taken for the real one
+SKY = 0.22  # brightness of the outside view's background, which lies beside a dark page
 TRAIL_POINTS = 60  # points of a trail
 OUTSIDE_TRIANGLES = 8_000
 PRESETS = {"side": (90.0, 10.0), "top": (-90.0, 89.0), "behind": (180.0, 25.0), "corner": (125.0, 30.0)}  # degrees
@@ -46,11 +49,11 @@ class CameraView:
                 over it, only its planned motion.
         """
         session = self._session
-        real = [solid for seen in session.surroundings.seen for solid in seen.solids()]
+        real = session.surroundings.world.scene.obstacles  # what is known hides the drawn arm, seen or given
         drawn = self._arm.draw(
             picture, T_base_camera, None if arm_in_picture else session.q,
             ghosts=ghosts(session), real=real, trail=trail(session),
-            frames=[session.robot.fk(session.q), *_chosen(session)],
+            frames=[session.robot.fk(session.q), *_chosen(session)], opacity=VIRTUAL_OPACITY, color=VIRTUAL_ARM,
         )  # fmt: skip
         self._depth_aids(drawn, T_base_camera)
         return drawn
@@ -81,7 +84,7 @@ class OutsideView:
         """Begin with the view from a corner."""
         self._session, self._camera = session, pinhole_camera(width, height)
         self._arm = Augmenter(session.robot, self._camera, OUTSIDE_TRIANGLES)
-        self._sky = background(self._camera)
+        self._sky = np.rint(SKY * background(self._camera)).astype(np.uint8)
         reach = float(np.linalg.norm(session.robot.fk(session.q).translation))
         self.centre: Vector = np.array([0.6 * reach, 0.0, 0.0])
         self.distance, self.azimuth, self.elevation = 1.9 * max(reach, 0.3), *np.radians(PRESETS["corner"])

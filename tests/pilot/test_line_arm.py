@@ -37,20 +37,24 @@ def test_a_lost_line_is_said_keeps_the_joints_stops_the_arm_and_comes_back():
     server = LineServer(SimulatedArm(ROBOT, START))
     with server:
         arm = LineArm(ROBOT, "127.0.0.1", server.port)
-        session = Session(PROBLEM, arm)
-        session.command("move", 0.0, target=float(START[0]) + 0.3)
-        until(lambda: server.arm.moving == 0)
+        session = Session(PROBLEM, arm, past=True)
+        until(
+            lambda: "driving" in session.command("jog", 0.0, direction=1.0, press=1) and server.arm.read()[0] > START[0]
+        )
     assert server.arm.moving is None
     until(lambda: arm.lost)
     session.tick(1.0)
     kept = session.q.copy()
     assert "connection to the arm is lost" in session.message
-    assert "lost" in session.command("move", 1.1, target=float(START[0]))
+    for verb, arguments in (("jog", {"direction": 1.0, "press": 2}), ("move", {"target": 0.1}), ("plan", {})):
+        assert "refused: the connection to the arm is lost" in session.command(verb, 1.1, **arguments)
     session.tick(1.2)
     assert session.q == pytest.approx(kept)
     with LineServer(SimulatedArm(ROBOT, START), server.port):
         until(lambda: not arm.lost)
         until(lambda: np.allclose(arm.read(), START))
+        session.tick(1.3)
+        assert "known again" in session.message
         arm.close()
 
 

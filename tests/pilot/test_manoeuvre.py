@@ -10,7 +10,7 @@ from rrtik_ompl.pilot.routes.manoeuvre import check_move, escape_move, free_unti
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.world import World
-from rrtik_tests.pilot_session import PROBLEM, ROBOT, WORLD
+from rrtik_tests.pilot_session import PROBLEM, ROBOT, WORLD, hold
 
 
 @pytest.mark.slow
@@ -108,10 +108,9 @@ def test_an_arm_that_touches_something_may_go_out_of_it_and_no_deeper():
     deeper = check_move(WORLD, q, 2, q[2] - np.radians(1.0))
     assert not deeper.allowed
     assert "does not get it free" in deeper.reason
-    made = Session(PROBLEM, SimulatedArm(ROBOT, q), seed=1)
+    made = Session(PROBLEM, SimulatedArm(ROBOT, q), seed=1, past=True)
     assert f"{ROBOT.joint_names[joint]} to" in made.command("plan", 0.0)
     made.command("select", 0.1, joint=joint)
     assert "out of contact" in made.command("move", 0.2, target=target)
-    made.arm.advance(10.0)
-    made.tick(1.0)
-    assert "moves" in made.command("plan", 1.1)
+    now = hold(made, made.arm, "go", 0.3, lambda: abs(made.q[joint] - target) < 1e-6, press=1)
+    assert "moves" in made.command("plan", now)

@@ -1,133 +1,12 @@
 """The page in a browser, driven by keys alone: from the first picture to the grasp, and when things go wrong."""
 
-import asyncio
-import base64
 import json
-import shutil
-import subprocess
-import threading
-import time
-import urllib.request
-from functools import partial
-from pathlib import Path
 
 import pytest
-import tornado.websocket
 
-from rrtik_ompl.pilot.run import Loop
-from rrtik_ompl.pilot.setup import SessionOptions, open_session
-from rrtik_ompl.pilot.web.server import PilotServer
+from rrtik_ompl.pilot.setup import SessionOptions
 from rrtik_ompl.sensing.cameras.pictures import CameraLostError
-
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-OPTIONS = ("--headless=new", "--no-sandbox", "--hide-scrollbars", "--remote-debugging-port=0", "--disable-gpu")
-WIDTH, HEIGHT = 1280, 720
-
-
-class Browser:
-    """A headless Chromium, told what to do through its debugging port."""
-
-    def __init__(self, folder):
-        self._process = subprocess.Popen(
-            [CHROMIUM, *OPTIONS, f"--user-data-dir={folder}", "about:blank"],
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-        port_file = Path(folder) / "DevToolsActivePort"
-        waited = self._until(lambda: port_file.exists() and port_file.read_text().strip(), 60.0)
-        self._port = int(waited.split()[0])
-        self._loop, self._count, self._socket = asyncio.new_event_loop(), 0, None
-
-    @staticmethod
-    def _until(look, seconds):
-        end = time.monotonic() + seconds
-        while not (found := look()):
-            assert time.monotonic() < end, "waited in vain"
-            time.sleep(0.03)
-        return found
-
-    def open(self, url):
-        request = urllib.request.Request(f"http://127.0.0.1:{self._port}/json/new?about:blank", method="PUT")
-        page = json.loads(urllib.request.urlopen(request).read())["webSocketDebuggerUrl"]
-        connect = partial(tornado.websocket.websocket_connect, page, max_message_size=1 << 26)
-        self._socket = self._loop.run_until_complete(self._await(connect))
-        self.call("Emulation.setDeviceMetricsOverride", width=WIDTH, height=HEIGHT, deviceScaleFactor=1, mobile=False)
-        self.call("Page.navigate", url=url)
-
-    @staticmethod
-    async def _await(thing):
-        return await thing()
-
-    def call(self, method, **parameters):
-        self._count += 1
-        self._socket.write_message(json.dumps({"id": self._count, "method": method, "params": parameters}))
-        while True:
-            answer = json.loads(self._loop.run_until_complete(self._await(self._socket.read_message)))
-            if answer.get("id") == self._count:
-                assert "error" not in answer, answer
-                return answer["result"]
-
-    def ask(self, script):
-        found = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
-        assert "exceptionDetails" not in found, found
-        return found["result"].get("value")
-
-    def wait(self, script, seconds=30.0):
-        try:
-            return self._until(lambda: self.ask(f"document.readyState === 'complete' && ({script})"), seconds)
-        except AssertionError:
-            raise AssertionError(f"{script}: waited in vain; message: {self.text('message')}") from None
-
-    def text(self, name):
-        return self.ask(f"document.getElementById('{name}').textContent")
-
-    def press(self, key):
-        code = ord(key.upper()) if len(key) == 1 and key.isalnum() else {" ": 32, "Enter": 13, "Escape": 27}.get(key, 0)
-        words = {"key": key, "windowsVirtualKeyCode": code}
-        self.call("Input.dispatchKeyEvent", type="keyDown", **words)
-        self.call("Input.dispatchKeyEvent", type="keyUp", **words)
-
-    def screenshot(self, file):
-        Path(file).write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))
-
-    def close(self):
-        self._process.terminate()
-        self._process.wait(timeout=30)
-        self._loop.close()
-
-
-class Running:
-    """A session with its server, in a thread of its own."""
-
-    def __init__(self, wanted):
-        self._wanted, self._ended, self._ready = wanted, threading.Event(), threading.Event()
-        self.opened = None
-        self._thread = threading.Thread(target=self._run, daemon=True)
-
-    def _run(self):
-        self.opened = open_session(self._wanted)
-        with PilotServer(title="test") as server:
-            self.server = server
-            self._ready.set()
-            Loop(self.opened.engine, server, watch_only=self._wanted.replay is not None).run(self._ended.is_set)
-        self.opened.close()
-
-    def __enter__(self):
-        self._thread.start()
-        assert self._ready.wait(60)
-        return self
-
-    def __exit__(self, *_):
-        self._ended.set()
-        self._thread.join(30)
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    if CHROMIUM is None:
-        pytest.skip("no chromium on PATH: pages cannot be looked at")
-    made = Browser(tmp_path_factory.mktemp("chromium"))
-    yield made
-    made.close()
+from rrtik_tests.browser import HEIGHT, WIDTH, Running
 
 
 def choose(browser, color):
@@ -181,8 +60,9 @@ def test_from_start_to_grasp_by_keys_alone(browser, tmp_path):
         tip = browser.ask("state.aim.distance")
         assert tip < 0.03
         browser.press("ArrowUp")
-        browser.press("ArrowRight")
-        browser.wait("/moving|refused/.test(state.message)")
+        browser.key_down("ArrowRight")
+        browser.wait("/driving|refused|end of the range/.test(state.message)")
+        browser.key_up("ArrowRight")
         type_a_value(browser, running)
     kinds = [json.loads(line)["kind"] for line in record.read_text().splitlines()]
     assert kinds[0] == "begin"
@@ -201,24 +81,30 @@ def type_a_value(browser, running):
     browser.press("m")
     browser.call("Input.insertText", text="-20")
     browser.press("Enter")
-    browser.wait("Math.abs(state.joints[4].value + 20) < 0.01")
+    browser.wait("state.message.includes('hold Enter')")
+    assert abs(browser.ask("state.joints[4].value") - browser.ask("state.joints[4].desired")) > 1.0
+    browser.key_down("Enter")
+    browser.wait("Math.abs(state.joints[4].value + 20) < 0.03")
+    browser.key_up("Enter")
     browser.press("1")
     browser.wait("state.selected === 0")
 
 
 def follow(browser, running):
-    """Press N for every move and wait until the arm, which is made fast, has made it."""
-    arm = running.opened.engine.session.arm
-    arm._rates[:] = 3.0
+    """Hold N for one move after the other until the arm, which is made fast, has made all of them."""
+    running.opened.engine.session.rates.flags.writeable = True
+    running.opened.engine.session.rates[:] = running.opened.engine.session.arm._rates[:] = 3.0
     for _ in range(40):
-        browser.press("n")
-        browser.wait("state.mode !== 'following' || /accepted|move \\d/.test(state.message)")
-        before = browser.ask(
-            "state.mode === 'following' ? state.route.moves.findIndex(m => m.status === 'current') : -1"
-        )
-        if before < 0:
+        if browser.ask("state.mode") != "following":
             return
-        browser.wait(f"state.mode !== 'following' || state.route.moves[{before}].status === 'done'", 20.0)
+        now = browser.ask("state.route.moves.findIndex(m => m.status === 'current')")
+        browser.key_down("n")
+        browser.wait(
+            f"state.mode !== 'following' || (state.route.moves[{now}].status === 'done' && !state.driving)", 20.0
+        )
+        browser.key_up("n")
+        browser.wait("!state.driving")
+        browser.wait("state.mode !== 'following' || state.route.moves.some(m => m.status === 'current')")
     raise AssertionError("too many moves")
 
 

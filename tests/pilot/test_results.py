@@ -35,9 +35,9 @@ def test_a_grasp_out_of_reach_is_no_route_with_a_stage():
     rates, start = joint_rates(PROBLEM.robot), np.array(PROBLEM.start)
     found = route_to_grasp(PROBLEM.world, PROBLEM.world, start, stages, start, rates, 1)
     assert isinstance(found, NoRoute)
-    assert found.stage == "the grasp"
+    assert found.stage == "the pose before the object"
     assert found.reason
-    assert str(found) == f"the grasp: {found.reason}"
+    assert str(found) == f"the pose before the object: {found.reason}"
 
 
 @pytest.mark.parametrize(("stage", "text"), [("", "blocked"), ("the grasp", "the grasp: blocked")])

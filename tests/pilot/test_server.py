@@ -201,17 +201,35 @@ def test_a_pilot_that_returns_too_late_watches(server):
     assert Page(server, "one").role() == "watching"
 
 
+def test_everybody_may_stop_the_arm_and_nothing_else(server):
+    pilot, watching = Page(server, "one"), Page(server, "two")
+    assert (pilot.role(), watching.role()) == ("pilot", "watching")
+    watching.say(name="plan")
+    watching.hear_until(lambda m: isinstance(m, dict) and m["kind"] == "refused")
+    assert server.commands.empty()
+    watching.say(name="stop", seq=1)
+    watching.say(name="take")
+    watching.hear_until(lambda m: isinstance(m, dict) and m["kind"] == "refused")
+    assert server.commands.get()[1]["name"] == "stop"
+
+
 def test_what_makes_no_sense_is_left_out_and_a_flood_is_cut(server):
     page = Page(server)
-    deep = '{"name": "nudge", "change": ' + "[" * 975 + "]" * 975 + "}"  # read, it is too deep to be shown
+    deep = '{"name": "jog", "direction": ' + "[" * 975 + "]" * 975 + "}"  # read, it is too deep to be shown
     for text in ("{", "[1]", '"stop"', "1e999", "\x00", deep, "[" * 16_000):
         page.say_raw(text)
     for _ in range(MAX_QUEUED_COMMANDS + 50):
-        page.say(name="stop")
+        page.say(name="plan")
     page.say(name="take")
     page.role()
     page.role()
     assert server.commands.qsize() == MAX_QUEUED_COMMANDS
+    for _ in range(2):  # a stop is not cut: it takes the place of all that waits
+        page.say(name="stop", seq=7)
+    page.say(name="take")
+    page.role()
+    assert server.commands.qsize() == 1
+    assert server.commands.get()[1] == {"name": "stop", "seq": 7}
     page.say_raw("x" * (MAX_MESSAGE_BYTES + 1))
     with pytest.raises((ConnectionError, tornado.websocket.WebSocketClosedError)):
         page.hear()
@@ -271,7 +289,7 @@ def test_a_command_makes_the_round_and_what_is_nonsense_ends_nothing():
                 {"name": ["stop"]},
                 {"name": "grasp", "type": {"a": 1}, "level": 1},
                 {},
-                {"name": "nudge", "change": [[[]]]},
+                {"name": "jog", "direction": [[[]]], "press": 1},
                 {"name": "select", "joint": 3},
             ]
         ):
@@ -305,10 +323,10 @@ def test_a_command_that_breaks_stops_the_arm_and_says_so(monkeypatch):
     arm.move(0, 0.5)
     with PilotServer() as server:
         loop = Loop(opened.engine, server)
-        server.commands.put((1, {"name": "nudge", "change": 0.1}))
+        server.commands.put((1, {"name": "jog", "direction": 0.1}))
         loop.run(lambda: server.commands.empty())
     assert arm.moving is None
-    assert opened.engine.session.message == "'nudge' broke: division by zero; the arm was stopped"
+    assert opened.engine.session.message == "'jog' broke: division by zero; the arm was stopped"
 
 
 def test_what_a_watchdog_says_is_shown():

@@ -206,10 +206,18 @@ def test_a_record_is_played_again_to_the_same_end(tmp_path):
     engine = opened.engine
     engine.update(0.0)
     for number, command in enumerate(
-        [{"name": "grasp", "type": "aslant", "level": 2}, {"name": "plan"}, {"name": "accept"}, {"name": "next"}]
+        [
+            {"name": "grasp", "type": "aslant", "level": 2},
+            {"name": "plan"},
+            {"name": "accept"},
+            {"name": "next", "press": 1},
+        ]
     ):
         engine.execute(command, 0.1 + 0.1 * number)
-    engine.update(1.5)
+    for number in range(30):
+        engine.update(0.5 + number / 30)
+        engine.execute({"name": "next", "press": 1}, 0.5 + number / 30)
+    assert engine.session.q[engine.session.selected] != engine.session.problem.start[engine.session.selected]
     route, q = engine.session.route, engine.session.q
     opened.close()
     again = open_session(SessionOptions("titan4_sdu", replay=file)).engine

@@ -197,7 +197,8 @@ class LineArm:
                     self._q, self.lost = q, ""
             except Exception as error:  # nothing that comes over the line ends this thread
                 self._line.close()
-                self.lost = f"the connection to the arm is lost: {error}; the joints are the last known ones"
+                why = getattr(error, "strerror", None) or error
+                self.lost = f"the connection to the arm is lost: {why}; the joints are the last known ones"
                 self._ended.wait(RETRY_SECONDS)
             self.reported = time.monotonic()
             if self._ended.is_set() and self._request is None:

@@ -100,5 +100,5 @@ def _touching(world: World, rows: Matrix, small: Vector) -> Vector:
     """Tenths of small errors that make a configuration touch something. Shape (m,)."""
     errors = np.random.default_rng(0).uniform(-small, small, (ERROR_SAMPLES, len(small)))
     tried = world.robot.clamp((rows[:, None] + errors).reshape(-1, len(small)))
-    tenths: Vector = np.rint(10.0 * (1.0 - world.valid_batch(tried).reshape(len(rows), -1).mean(axis=1)))
+    tenths: Vector = np.rint(10.0 * (1.0 - world.valid_batch(tried).reshape(len(rows), ERROR_SAMPLES).mean(axis=1)))
     return tenths

@@ -124,6 +124,29 @@ def free_until(world: World, q: Vector, joint: int, target: float) -> float:
     return float(start[joint] + low * (end[joint] - start[joint]))
 
 
+def move_refusal(world: World, q: Vector, joint: int, target: float, check: MoveCheck) -> str:
+    """Why a move is refused, in one line, and how far the joint is free."""
+    if not world.valid(q):
+        return f"refused: {check.reason}"
+    value, unit = reading(free_until(world, q, joint, target), joint_unit(world.robot.prismatic[joint]))
+    return f"refused: {check.reason}; free until {value:.4g} {unit}"
+
+
+def way_out(world: World, q: Vector, joint: int, sign: float) -> float:
+    """Where a joint that is driven one way gets an arm that touches something free [rad or m].
+
+    Raises:
+        InputError: If it does not.
+    """
+    small, check = float(slack(JointPath.of(world.robot, q[None]))[joint]), None
+    for far in ESCAPE_STEPS:
+        target = float(q[joint]) + sign * far * small
+        check = check_move(world, q, joint, target)
+        if check.allowed:
+            return target
+    raise InputError("refused" if check is None else f"refused: {check.reason}")
+
+
 def joint_range(world: World, q: Vector, joint: int) -> JointRange:
     """How far a joint can be driven; nowhere if the arm touches something, a full turn if it is endless and free."""
     robot, here = world.robot, float(q[joint])

@@ -25,6 +25,7 @@ from rrtik_ompl.transitions import SAME
 from rrtik_ompl.world import World
 
 CLEARANCE_SAMPLES = 100  # along a route
+END_OFFSET, END_TURN = 2e-4, np.deg2rad(0.04)  # [m], [rad] of the tip from its grasp, at the end of a route
 MAX_BEGINNINGS = 6  # configurations in front of the object that are tried
 
 
@@ -74,7 +75,7 @@ def route_to_grasp(
     holding: World,
     q: Vector,
     stages: tuple[pin.SE3, pin.SE3, pin.SE3],
-    near: Vector,
+    grasp: Vector,
     rates: Vector,
     seed: int,
 ) -> Route | NoRoute:
@@ -85,25 +86,21 @@ def route_to_grasp(
         holding: In which the gripper may touch the object, for the second.
         q: Where the arm is, shape (dof,).
         stages: ``T_base_tip`` of approach, grasp and lift.
-        near: Configuration near which the grasp is wanted, shape (dof,).
+        grasp: The configuration at which the route ends, free in ``holding``, shape (dof,).
         rates: Of the joints, shape (dof,).
         seed: Of the random numbers.
     """
     try:
-        tails = _tails(world, holding, q, stages, near, seed)
+        tails = _tails(world, holding, stages, _without_tiny_moves(holding, grasp, q), seed)
     except ProblemError as error:
         return NoRoute(str(error))
     return tails if isinstance(tails, NoRoute) else _route(world, holding, q, tails, rates, seed)
 
 
 def _tails(
-    world: World, holding: World, q: Vector, stages: tuple[pin.SE3, pin.SE3, pin.SE3], near: Vector, seed: int
+    world: World, holding: World, stages: tuple[pin.SE3, pin.SE3, pin.SE3], grasp: Vector, seed: int
 ) -> Sequence[Tail] | NoRoute:
     """The last parts of routes to a grasp: few moves from about the pose before it, or else some from exactly there."""
-    at = solve_ik_batch(world.robot, [stages[1].homogeneous], near=near, world=holding, seed=seed)
-    if not at.found[0]:
-        return NoRoute(at.details[0] or at.reasons[0] or "not to be reached", "the grasp")
-    grasp = _with_near_joints_kept(holding, at.q[0], q)
     short = approaches(world, holding, grasp, stages, MAX_BEGINNINGS)
     if short:
         return short
@@ -114,11 +111,23 @@ def _tails(
     return NoRoute(str(last), "from before the object to it") if isinstance(last, NoRoute) else [[last]]
 
 
-def _with_near_joints_kept(world: World, goal: Vector, q: Vector) -> Vector:
-    """A goal whose joints that are near enough already need not move, if that is free; else nearly so.
+def _without_tiny_moves(world: World, goal: Vector, q: Vector) -> Vector:
+    """A goal whose joints that are there already need not move, as long as the tip ends where it should."""
+    robot, kept = world.robot, goal
+    wanted = robot.fk(goal)
+    for joint in np.argsort(np.abs(goal - q)):
+        tried = kept.copy()
+        tried[joint] = q[joint]
+        off = wanted.actInv(robot.fk(tried))
+        turned = float(np.linalg.norm(pin.log3(off.rotation)))
+        if np.linalg.norm(off.translation) > END_OFFSET or turned > END_TURN or not world.valid(tried):
+            break
+        kept = tried
+    return kept
 
-    Near enough is the tolerance of following; inverse kinematics leaves rounding errors.
-    """
+
+def _with_near_joints_kept(world: World, goal: Vector, q: Vector) -> Vector:
+    """A goal of joints whose near ones need not move, if that is free; near enough is the tolerance of following."""
     small = slack(JointPath.of(world.robot, q[None]))
     loose, exact = (np.where(np.abs(goal - q) <= near, q, goal) for near in (small, SAME))
     return loose if world.valid(loose) else exact

@@ -50,7 +50,7 @@ POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-SCRIPTS = ("keys.js", "link.js", "pilot.js")
+SCRIPTS = ("hold.js", "keys.js", "link.js", "pilot.js", "gamepad.js")
 FILES = {"/": ("index.html", "text/html"), "/pilot.css": ("pilot.css", "text/css")}
 FILES |= {f"/{name}": (name, "text/javascript") for name in SCRIPTS}
 
@@ -147,6 +147,8 @@ class PilotServer:
             refused = self.clients.take_over(client)
             if refused:
                 client.send_json(kind="refused", text=refused)
+        elif said.get("name") == "stop":
+            self._stop(client, said)
         elif client is not self.clients.pilot:
             client.send_json(
                 kind="refused", text="you are watching: T takes over when the pilot has left or handed over"
@@ -155,6 +157,13 @@ class PilotServer:
             self.clients.hand_over(client)
         elif self.commands.qsize() < MAX_QUEUED_COMMANDS:
             self.commands.put((client.number, said))
+
+    def _stop(self, client: Client, said: dict[str, Any]) -> None:
+        """Anybody may stop the arm; what was commanded before and still waits is left out."""
+        with suppress(queue.Empty):
+            while True:
+                self.commands.get_nowait()
+        self.commands.put((client.number, {"name": "stop", "seq": said.get("seq")}))
 
     def _check_token(self) -> None:
         if all_addresses(self.host):

@@ -36,3 +36,34 @@ def session(record=None):
     made = Session(PROBLEM, arm, record=record, seed=1)
     made.see([seen_at(PLACE)], 0.0)
     return made, arm
+
+
+def hold(made, arm, verb, time, until, *, seconds=60.0, step=0.03, **arguments):
+    """Hold a command, as a pressed key does, with pictures coming; returns when it was released [s]."""
+    end = time + seconds
+    while not until() and time < end:
+        made.command(verb, time, **arguments)
+        arm.advance(step)
+        time += step
+        made.see([], time)
+        made.tick(time)
+    made.command("release", time)
+    made.tick(time)
+    return time
+
+
+def follow(made, arm, time, most=60):
+    """Hold "next" for one move after the other until the list is done; returns when that was [s]."""
+    for press in range(most):
+        if made.mode != "following":
+            return time
+        due = made.follower.current
+        time = hold(
+            made, arm, "next", time, lambda now=due: made.mode != "following" or not still(made, now), press=press
+        )
+    raise AssertionError("too many moves")
+
+
+def still(made, due):
+    """Whether the move that was due is still being made."""
+    return made.held.drive.active or made.follower.current == due

@@ -1,20 +1,22 @@
 // Every key with what it does. The help overlay is made of this list, so that it never says anything else.
+// A key with a fifth entry acts while it is held; the entry gives the command.
 "use strict";
 
 const KEYS = [
-  ["Space", [" "], "stop at once", () => send("stop")],
+  ["Space", [" "], "stop at once (every page may)", () => stopNow()],
   ["1 … 9", [..."123456789"], "select a joint", (key) => selectJoint(Number(key) - 1)],
   ["↑ ↓", ["ArrowUp", "ArrowDown"], "previous, next joint", (key) => neighbourJoint(key === "ArrowUp" ? -1 : 1)],
-  ["← →", ["ArrowLeft", "ArrowRight"], "drive the joint by a step", (key) => nudge(key === "ArrowLeft" ? -1 : 1)],
-  ["M", ["m"], "type a value for the joint, Enter drives there", () => byId("value").select()],
-  [", .", [",", "."], "smaller, larger step", (key) => changeStep(key === "," ? -1 : 1)],
+  ["← →", ["ArrowLeft", "ArrowRight"], "hold: drive the joint", null, (key) => ["jog", { direction: key === "ArrowLeft" ? -1 : 1 }]],
+  ["M", ["m"], "type a value for the joint", () => byId("value").select()],
+  ["Enter", ["Enter"], "hold: drive the joint to that value", null, () => ["go", {}]],
+  [", .", [",", "."], "slower, faster", (key) => changeSpeed(key === "," ? -1 : 1)],
   ["O", ["o"], "next object", () => nextObject()],
   ["G", ["g"], "next grasp type", () => chooseGrasp(1, 0)],
   ["L", ["l"], "next grasp level", () => chooseGrasp(0, 1)],
   ["P", ["p"], "plan a route", () => send("plan")],
   ["A", ["a"], "accept the route", () => send("accept")],
   ["R", ["r"], "reject the route", () => send("reject")],
-  ["N", ["n"], "make the next move", () => send("next")],
+  ["N", ["n"], "hold: make the next move", null, () => ["next", {}]],
   ["B", ["b"], "plan the way back", () => send("back")],
   ["Y", ["y"], "plan anew from where the arm is", () => send("replan")],
   ["X", ["x"], "play the route in the outside view", () => togglePlay()],
@@ -29,10 +31,12 @@ const KEYS = [
   ["Z", ["z"], "pause a record", () => send("pause")],
   ["?", ["?"], "these keys", () => openHelp()],
 ];
-const ACTIONS = new Map(KEYS.flatMap(([, keys, , act]) => keys.map((key) => [key, act])));
+const ACTIONS = new Map(KEYS.flatMap(([, keys, , act]) => (act ? keys : []).map((key) => [key, act])));
+const HELD = new Map(KEYS.filter((entry) => entry[4]).flatMap(([, keys, , , make]) => keys.map((key) => [key, make])));
+const LOOKING = new Set(["v", "+", "=", "-", "x", "[", "]", "PageUp", "PageDown", "0", "?"]);  // while a key is held
 const TURNS = { ArrowLeft: [-0.12, 0], ArrowRight: [0.12, 0], ArrowUp: [0, 0.08], ArrowDown: [0, -0.08] };
 const SCRUBBING = new Set(["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"]);
-const REPEATED = new Set(["ArrowLeft", "ArrowRight", "[", "]", "+", "=", "-"]);
+const REPEATED = new Set(["[", "]", "+", "=", "-"]);
 
 function openHelp() { document.getElementById("help").showModal(); }
 
@@ -46,14 +50,25 @@ function onKey(event) {
   if (event.key !== " " && needsKey(event.target, event.key)) return;
   const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
   const turn = event.shiftKey && TURNS[key];
+  if (!turn && HELD.has(key) && !event.target.matches("button")) {
+    event.preventDefault();
+    if (!event.repeat) hold(key, () => HELD.get(key)(key));
+    return;
+  }
   const act = turn ? () => send("turn", { right: turn[0], up: turn[1] }) : ACTIONS.get(key);
   if (!act || (event.repeat && !turn && !REPEATED.has(key))) return;
   event.preventDefault();
+  if (!turn && !LOOKING.has(key)) letGo();
   act(key);
 }
 
+function stopNow() { letGo(); send("stop"); }
+
 addEventListener("keydown", onKey);
-addEventListener("keyup", (event) => { if (event.key === " ") event.preventDefault(); });
+addEventListener("keyup", (event) => {
+  if (event.key === " ") event.preventDefault();
+  letGo(event.key.length === 1 ? event.key.toLowerCase() : event.key);
+});
 document.getElementById("key_list").replaceChildren(...KEYS.map(([shown, , what]) => {
   const line = document.createElement("div"), key = document.createElement("kbd");
   key.textContent = shown;

@@ -1,13 +1,13 @@
 // What is shown, and what the buttons do. All state is the server's; the page keeps only what it looks at.
 "use strict";
 
-const STEPS = [0.2, 1, 2, 5, 10, 20];  // degrees, or 5 mm for one
+const SPEEDS = [0.05, 0.1, 0.25, 0.5, 1];  // shares of the joints' rates
 const PRESETS = ["corner", "side", "top", "behind"];
 const COLOR_WORDS = { green: "reach", amber: "blocked", red: "no reach" };
-const MM_PER_DEGREE = 2, NEAR_LIMIT = 0.04, MARK = 0.006, UNSEEN_S = 1, HOLD_MS = 3000;
+const NEAR_LIMIT = 0.04, MARK = 0.006, UNSEEN_S = 1, HOLD_MS = 3000;
 const WORRYING = /refused|no route|must|cannot|not where|off the route|blocked|lost|takes|first|there is no|narrow|left;|outside|collision|away from the goal/;
-const FIRST_WORDS = "Choose a grasp with G and L, then plan with P. Or choose a joint with 1 … 9 and drive it with ← →.";
-let state = null, role = { role: "watching", free: false, pages: 1 }, step = 3, preset = 0, receivedAt = 0, playing = null;
+const FIRST_WORDS = "Choose a grasp with G and L, then plan with P. Or choose a joint with 1 … 9 and hold ← or → to drive it.";
+let state = null, role = { role: "watching", free: false, pages: 1 }, preset = 0, receivedAt = 0, playing = null;
 let previousAlert = "", heldUntil = 0;
 
 const byId = (id) => document.getElementById(id);
@@ -25,13 +25,10 @@ const fixed = (value, digits = 1) => value.toFixed(digits).replace("-", "\u2212"
 const inRadians = (value, unit) => unit === "m" ? value : value * Math.PI / 180;
 function selectJoint(number) { if (state && number < state.joints.length) send("select", { joint: number }); }
 function neighbourJoint(by) { selectJoint((state.selected + by + state.joints.length) % state.joints.length); }
-function stepOf(unit) { return unit === "m" ? STEPS[step] * MM_PER_DEGREE / 1000 : STEPS[step]; }
-function nudge(sign) {
-  if (!state) return;
-  const unit = state.joints[state.selected].unit;
-  send("nudge", { change: sign * inRadians(stepOf(unit), unit) });
+function changeSpeed(by) {
+  const now = SPEEDS.findIndex((speed) => speed >= state.speed - 1e-6);
+  send("speed", { share: SPEEDS[Math.min(Math.max(now + by, 0), SPEEDS.length - 1)] });
 }
-function changeStep(by) { step = Math.min(Math.max(step + by, 0), STEPS.length - 1); showJoints(); }
 function nextObject() {
   const names = state.objects.filter((each) => each.graspable).map((each) => each.name);
   if (names.length) send("object", { name: names[(names.indexOf(state.target) + 1) % names.length] });
@@ -89,6 +86,7 @@ function showRole(said) {
 }
 
 function onDisconnected() {
+  letGo();
   const chip = byId("role");
   chip.className = "chip bad";
   set(chip, "Not connected · trying again");
@@ -103,6 +101,7 @@ function showState(said) {
     item.dataset.mode === said.mode ? item.setAttribute("aria-current", "step") : item.removeAttribute("aria-current");
   if (newMessage || performance.now() > heldUntil) say(inWords(said.message) || FIRST_WORDS, WORRYING.test(said.message), 0);
   showJoints(); showTarget(); showLamps(); showRoute(); showAim(); showButtons(); showPreview(); showAge();
+  if (said.mode !== "proposed" && playing) pausePlay();
   if (newRoute && role.role === "pilot" && !said.replay && !playing) togglePlay();
 }
 
@@ -124,13 +123,14 @@ function showAge() {
   const past = state.replay || state.pictures_ended;  // photographs and films end: no reason for alarm
   const stale = !past && (age === null || age > STALE_S);
   document.body.classList.toggle("stale", stale);
+  document.body.classList.toggle("untrue", stale || Boolean(state.trouble));
   chip.classList.toggle("bad", stale);
   set(chip, state.replay ? state.camera_lost || (state.paused ? "record, paused" : "record")
     : state.pictures_ended ? "the last picture" : age === null ? "no picture yet" : stale ? `STALE picture: ${fixed(age)} s old` : `picture ${Math.round(1000 * age)} ms old`);
   const reasons = [];
   if (state.camera_lost && !past) reasons.push(`Camera lost: ${state.camera_lost}. What is shown is the last known state.`);
   if (state.arm_lost) reasons.push(`${state.arm_lost}`);
-  if (!reasons.length && stale && age !== null) reasons.push("The picture is stale. Do not trust it.");
+  if (!reasons.length && stale && age !== null) reasons.push("The picture is stale: nothing moves.");
   byId("camera_banner").hidden = !reasons.length;
   set(byId("camera_banner"), reasons.join(" "));
   alertOnce(reasons.join(" "));
@@ -142,7 +142,7 @@ function showJoints() {
   if (body.children.length !== state.joints.length) body.replaceChildren(...state.joints.map(jointRow));
   state.joints.forEach((joint, k) => showJoint(body.children[k], joint, k));
   const { name, unit } = state.joints[state.selected];
-  set(byId("step_size"), `${inWords(name)} · step ${unit === "m" ? fixed(1000 * stepOf(unit)) + " mm" : stepOf(unit) + "°"}`);
+  set(byId("step_size"), `${inWords(name)} · speed ${fixed(100 * state.speed, 0)} %`);
   set(byId("unit"), unit === "m" ? "m" : "°");
   showRoom(unit);
 }
@@ -160,7 +160,7 @@ function jointRow(joint, k) {
   const bar = make("div", { className: "bar" }, ...["free", "singular", "way", "wanted", "is"].map((name) => make("i", { className: name })));
   bar.setAttribute("role", "meter");
   bar.onclick = (event) => driveTo(k, event);
-  bar.title = "click: select and drive there";
+  bar.title = "click: wanted value; hold Enter to drive there";
   const row = make("tr", { onclick: () => selectJoint(k) },
     make("th", { scope: "row" }, `${k + 1} ${joint.name.replaceAll("_", " ")}`),
     make("td", {}, bar), make("td"), make("td"), make("td"));
@@ -263,7 +263,7 @@ function showRoute() {
     item.className = name;
     if (now) { item.setAttribute("aria-current", "step"); item.scrollIntoView({ block: "nearest" }); } else item.removeAttribute("aria-current");
   });
-  const words = { move: route.share > 0.01 ? "MOVING" : "NEXT", stop: "LET GO", lost: "OFF ROUTE", done: "DONE" };
+  const words = { move: state.driving ? "MOVING" : "NEXT", stop: state.driving ? "ENDING" : "NEXT", lost: "OFF ROUTE", done: "DONE" };
   const due = route.moves.find((move) => move.status === "current");
   byId("advice").className = route.advice;
   set(byId("advice"), words[route.advice] ?? "");
@@ -297,24 +297,35 @@ function showAim() {
 function showButtons() {
   byId("pause").hidden = !state.replay || role.role !== "pilot";
   set(byId("pause").firstChild, state.paused ? "Go on" : "Pause");
-  const mine = role.role === "pilot" && !state.replay, at = (...modes) => mine && modes.includes(state.mode);
-  for (const [id, good] of [["accept", at("proposed")], ["reject", at("proposed")], ["next", at("following")], ["plan", mine],
-    ["replan", mine && Boolean(state.route)], ["back", mine && Boolean(state.route)], ["stop", mine]]) byId(id).disabled = !good;
-  for (const id of ["play", "step_back", "step_on", "scrub", "live"]) byId(id).disabled = role.role !== "pilot" || !state.route;
+  const mine = role.role === "pilot" && !state.replay && !state.trouble, at = (...modes) => mine && modes.includes(state.mode);
+  for (const [id, good] of [["accept", at("proposed")], ["reject", role.role === "pilot" && state.mode === "proposed"], ["next", at("following")], ["plan", mine],
+    ["replan", mine && Boolean(state.route)], ["back", mine && Boolean(state.route)], ["stop", !state.replay],
+    ...["minus", "plus", "go"].map((id) => [id, at("manoeuvre", "choosing", "proposed")])]) byId(id).disabled = !good;
+  for (const id of ["play", "step_back", "step_on", "scrub", "live"]) byId(id).disabled = role.role !== "pilot" || state.mode !== "proposed";
 }
 
 function showPreview() {
-  byId("preview_tag").hidden = state.playing === null || !state.route;
+  const previewed = state.playing !== null && Boolean(state.route);
+  byId("preview_tag").hidden = !previewed;
+  byId("outside_panel").classList.toggle("previewed", previewed);
   if (document.activeElement !== byId("scrub")) byId("scrub").value = state.playing ?? 0;
 }
 
 // --- buttons, mouse ---------------------------------------------------------------------------------------------
 
-for (const name of ["plan", "replan", "accept", "reject", "next", "back", "stop", "take", "hand_over", "pause"]) byId(name).onclick = () => send(name);
+for (const name of ["plan", "replan", "accept", "reject", "back", "take", "hand_over", "pause"]) byId(name).onclick = () => send(name);
+byId("stop").onpointerdown = stopNow;
+byId("stop").onclick = stopNow;
+holdButton(byId("next"), () => ["next", {}]);
+holdButton(byId("go"), () => ["go", {}]);
+holdButton(byId("minus"), () => ["jog", { direction: -1 }]);
+holdButton(byId("plus"), () => ["jog", { direction: 1 }]);
 byId("value").onkeydown = (event) => {
   const typed = event.target.valueAsNumber;
   if (event.key !== "Enter" && event.key !== "Escape") return;
+  event.stopPropagation();  // it is another press of Enter that drives
   if (event.key === "Enter" && Number.isFinite(typed)) send("move", { target: inRadians(typed, state.joints[state.selected].unit) });
+  else if (event.key === "Enter") say("type a number for the joint, for example -20", true);
   event.target.value = "";
   event.target.blur();
 };

@@ -1,0 +1,79 @@
+"""Hold to run: a joint moves only as long as its command is renewed.
+
+Each renewal gives the arm a set point that is a little ahead of it, by no more than `LEASH_SECONDS` of its way. Without
+a renewal, whatever the reason (the key is released, the page or the line hangs), the arm stops there by itself.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rrtik_ompl.arrays import Vector
+from rrtik_ompl.pilot.devices.arm import Arm
+
+LEASH_SECONDS = 0.1  # how far a set point may be ahead of the arm, at the speed of the moment
+HOLD_SECONDS = 0.25  # without a renewal for as long the drive is over
+FIRST_SECONDS = 0.04  # of motion that the first command of a press asks for: a tap moves the arm by as much
+
+
+class Drive:
+    """Drives one joint at a time.
+
+    Attributes:
+        joint: Number of the joint that is driven; None if none is.
+        goal: Where the drive ends [rad or m].
+    """
+
+    def __init__(self, arm: Arm, rates: Vector) -> None:
+        """Begin at rest.
+
+        Args:
+            arm: The arm that is moved.
+            rates: Of its joints at full speed, shape (dof,) [rad/s or m/s].
+        """
+        self.joint: int | None = None
+        self.goal = 0.0
+        self._arm, self._rates = arm, rates
+        self._point, self._renewed = 0.0, -np.inf
+
+    @property
+    def active(self) -> bool:
+        """Whether a joint is driven."""
+        return self.joint is not None
+
+    def renew(self, joint: int, goal: float, speed: float, q: Vector, time: float) -> float:
+        """Drive a joint on towards a goal; returns the set point [rad or m].
+
+        Args:
+            joint: Number of the joint.
+            goal: Where it goes at most [rad or m].
+            speed: Share of its rate, above 0 and up to 1.
+            q: Where the arm is, shape (dof,).
+            time: Now [s].
+        """
+        here, rate = float(q[joint]), speed * float(self._rates[joint])
+        turned = self.active and (goal - self._point) * (self.goal - self._point) < 0.0
+        if joint != self.joint or turned:
+            self.end()
+            self._point, self._renewed = here, time - FIRST_SECONDS
+        self.joint, self.goal = joint, goal
+        seconds = float(np.clip(time - self._renewed, 0.0, LEASH_SECONDS))
+        self._renewed = max(time, self._renewed)
+        step = np.clip(goal - self._point, -rate * seconds, rate * seconds)
+        leash = rate * LEASH_SECONDS
+        self._point = float(np.clip(self._point + step, here - leash, here + leash))
+        self._arm.move(joint, self._point)
+        return self._point
+
+    def expire(self, time: float) -> bool:
+        """End the drive if it was not renewed in time; whether that was so."""
+        over = self.active and time - self._renewed > HOLD_SECONDS
+        if over:
+            self.end()
+        return over
+
+    def end(self) -> None:
+        """Stop the arm, if it is driven."""
+        if self.active:
+            self.joint = None
+            self._arm.stop()

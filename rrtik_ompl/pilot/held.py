@@ -1,0 +1,188 @@
+"""Commands that are held: a joint is driven, or a move of the route is made, as long as they are renewed."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from rrtik_ompl.arrays import Vector, frozen
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.pilot.devices.arm import Arm
+from rrtik_ompl.pilot.drive import Drive
+from rrtik_ompl.pilot.interlock import FOLLOWING, MOVING
+from rrtik_ompl.pilot.routes.follower import Follower, Progress
+from rrtik_ompl.pilot.routes.manoeuvre import JointRange, check_move, move_refusal, way_out
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.units import joint_unit, reading
+from rrtik_ompl.world import World
+
+ARRIVED = np.deg2rad(0.02)  # [rad or m]; a drive ends this close to its goal
+MIN_SPEED = 0.05  # share of the joints' rates
+
+
+class Driven(Protocol):
+    """The session, as the commands that are held use it."""
+
+    robot: Robot
+    arm: Arm
+    rates: Vector
+    q: Vector
+    desired: Vector
+    time: float
+    selected: int
+    mode: str
+    message: str
+    follower: Follower | None
+    progress: Progress | None
+
+    @property
+    def world(self) -> World:
+        """The world for moves by hand."""
+
+    def joint_range(self) -> JointRange:
+        """The range in which the selected joint can be driven now."""
+
+    def refuse_if_blocked(self) -> None:
+        """Raise InputError if the rest of the route is not free any more."""
+
+    def show_due(self, follower: Follower) -> None:
+        """Select the joint of the current move."""
+
+
+class Held:
+    """What a pressed key, button or stick of the pilot does, one at a time.
+
+    Attributes:
+        drive: Moves the arm.
+        speed: Share of the joints' rates, from `MIN_SPEED` to 1.
+        over: The last press was ended: whoever still holds it has to press again.
+    """
+
+    def __init__(self, session: Driven) -> None:
+        """Begin with nothing pressed."""
+        self.drive, self.speed = Drive(session.arm, session.rates), 1.0
+        self._session = session
+        self._press: tuple[str, float] = ("", -1.0)  # command and number of the press that drives, or drove last
+        self.over = False
+        self._due = 0, 0.0  # joint and end of the move that it makes
+        self._near = ARRIVED
+
+    def goes_on(self, verb: str, arguments: dict[str, object]) -> bool:
+        """Whether a command renews the press of before."""
+        return verb in MOVING and (verb, arguments.get("press")) == self._press
+
+    def end(self) -> None:
+        """Stop what is driven; the press that drove it has no effect any more."""
+        self.drive.end()
+        self.over = True
+
+    def refuse(self, verb: str, press: object) -> None:
+        """Stop what is driven; a press that was refused has to be made anew, even if it could be made by now."""
+        self.end()
+        if verb in MOVING and isinstance(press, int | float):
+            self._press = (verb, press)
+
+    def expire(self, time: float) -> None:
+        """End a press that was not renewed in time."""
+        if self.drive.expire(time):
+            self.end()
+
+    def set_speed(self, share: float) -> str:
+        """At which share of their rates joints are driven."""
+        self.speed = float(np.clip(share, MIN_SPEED, 1.0))
+        return f"speed {100 * self.speed:.0f} %"
+
+    def release(self) -> str:
+        """Nothing is pressed any more."""
+        driven = self.drive.active
+        self.end()
+        return "released" if driven and self._session.mode != FOLLOWING else self._session.message
+
+    def jog(self, direction: float, press: float) -> str:
+        """Drive the selected joint, at a share of the speed from -1 to 1."""
+        session, sign = self._session, float(np.sign(direction))
+        self._begins("jog", press)
+        if sign == 0.0:
+            self.drive.end()
+            return "released"
+        joint, room = session.selected, session.joint_range()
+        goal, end = (room.high, room.above) if sign > 0.0 else (room.low, room.below)
+        if room.low == room.high:
+            goal, end = way_out(session.world, session.q, joint, sign), "out of contact"
+        return self._run(joint, goal, min(abs(direction), 1.0), f"end of the range: {end}")
+
+    def move(self, target: float) -> str:
+        """Say where the selected joint is to go; `go`, held, drives it there."""
+        session, joint = self._session, self._session.selected
+        check = check_move(session.world, session.q, joint, float(target))
+        if not check.allowed:
+            raise InputError(move_refusal(session.world, session.q, joint, float(target), check))
+        session.desired = self._with(joint, float(target))
+        return "; ".join((f"{self._place(joint, float(target))}: hold Enter to drive there", *check.warnings))
+
+    def go(self, press: float) -> str:
+        """Drive the selected joint to where it is to go."""
+        session, joint = self._session, self._session.selected
+        target = float(session.desired[joint])
+        if self._begins("go", press):
+            check = check_move(session.world, session.q, joint, target)
+            if not check.allowed:
+                raise InputError(move_refusal(session.world, session.q, joint, target, check))
+        return self._run(joint, target, 1.0, self._place(joint, target))
+
+    def next(self, press: float) -> str:
+        """Make the current move of the route; each press makes one move at most."""
+        session, follower = self._session, self._session.follower
+        if follower is None:
+            raise InputError("there is no route to follow; 'plan' proposes one")
+        if self._begins("next", press):
+            self._due = self._due_move(follower)
+        name = session.robot.joint_names[self._due[0]]
+        return self._run(*self._due, 1.0, f"{name} is there: release, then hold 'next' again")
+
+    def _begins(self, verb: str, press: float) -> bool:
+        """Whether a press is a new one."""
+        if (verb, press) == self._press:
+            return False
+        self.drive.end()
+        self._press, self.over, self._near = (verb, press), False, ARRIVED
+        return True
+
+    def _due_move(self, follower: Follower) -> tuple[int, float]:
+        """Joint and end [rad or m] of the move that is due."""
+        session = self._session
+        session.progress = follower.update(session.q)
+        joint = follower.joint()
+        if session.progress.advice == "lost" or joint is None:
+            raise InputError(session.progress.fault or "all moves are done")
+        session.refuse_if_blocked()
+        session.show_due(follower)
+        end = float(follower.target[joint])
+        self._near = min(ARRIVED, 0.25 * abs(end - float(session.q[joint])))  # a short move has to be made, too
+        return joint, end
+
+    def still_free(self) -> bool:
+        """Whether what is driven by hand is free in the world as it is now."""
+        session, joint = self._session, self.drive.joint
+        return joint is None or session.world.motion_valid(session.q, self._with(joint, self.drive.goal))
+
+    def _run(self, joint: int, goal: float, share: float, at_goal: str) -> str:
+        session = self._session
+        if abs(goal - session.q[joint]) <= self._near:
+            self.end()
+            return at_goal
+        point = self.drive.renew(joint, goal, max(self.speed * share, 1e-3), session.q, session.time)
+        if self._press[0] == "jog":
+            session.desired = self._with(joint, point)
+        return f"driving {session.robot.joint_names[joint]}"
+
+    def _with(self, joint: int, value: float) -> Vector:
+        desired = self._session.q.copy()
+        desired[joint] = value
+        return frozen(desired)
+
+    def _place(self, joint: int, value: float) -> str:
+        robot = self._session.robot
+        number, unit = reading(value, joint_unit(robot.prismatic[joint]))
+        return f"{robot.joint_names[joint]} to {number:.4g} {unit}"

@@ -1,0 +1,71 @@
+"""Which commands are refused, by what is known of the picture, of the arm, and of the route.
+
+The rule: nothing moves, is planned or accepted on a picture that is stale or on joints that are not read any more, and
+no route is followed that was not accepted. Commands that stop, choose or leave are never refused here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING = "manoeuvre", "choosing", "proposed", "following"
+MODES: Final = (MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING)
+STALE_SECONDS = 0.5  # a picture older than that does not show the present
+
+MOVING: Final = ("jog", "go", "next")  # held: the arm moves only as long as they are renewed
+PRESENT: Final = (*MOVING, "move", "plan", "replan", "accept", "back")  # need the arm and a picture of now
+ALWAYS: Final = ("stop", "release", "halt", "select", "speed", "object", "grasp", "reject")
+
+_MANUAL = (MANOEUVRE, CHOOSING, PROPOSED), "a route is being followed: 'next' makes its next move, 'stop' leaves it"
+_ONLY_IN: Final = {
+    "jog": _MANUAL,
+    "go": _MANUAL,
+    "move": _MANUAL,
+    "accept": ((PROPOSED,), "there is no route to accept; 'plan' proposes one"),
+    "next": ((FOLLOWING,), "no route is being followed; 'plan' and 'accept' one first"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Knowledge:
+    """What is known at a moment.
+
+    Attributes:
+        arm_lost: Why the connection to the arm is lost; "" if it is not.
+        picture_age: Of the last picture [s]; inf if there was none.
+        past: Pictures are photographs or a film, and the arm is a simulated one: no picture is of now, none is stale.
+    """
+
+    arm_lost: str
+    picture_age: float
+    past: bool = False
+
+    @property
+    def trouble(self) -> str:
+        """Why the present is not known; "" if it is."""
+        if self.arm_lost:
+            return self.arm_lost
+        if self.past or self.picture_age <= STALE_SECONDS:
+            return ""
+        return "there is no picture yet" if self.picture_age == float("inf") else "the picture is stale"
+
+
+def refusal(verb: str, mode: str, known: Knowledge) -> str:
+    """Why a command is refused, in one line; "" if it is not.
+
+    Args:
+        verb: One of `PRESENT` or `ALWAYS`.
+        mode: One of `MODES`.
+        known: Of the moment.
+
+    Example:
+        >>> refusal("next", FOLLOWING, Knowledge("", picture_age=60.0))
+        'refused: the picture is stale'
+    """
+    modes, otherwise = _ONLY_IN.get(verb, (MODES, ""))
+    if mode not in modes:
+        return otherwise
+    if verb in PRESENT and known.trouble:
+        return f"refused: {known.trouble}"
+    return ""

@@ -1,0 +1,45 @@
+// A gamepad of the browser's Gamepad API, in its standard layout. It acts only while its left shoulder button is held.
+"use strict";
+
+const PAD_PERIOD_MS = 40, DEAD_ZONE = 0.15;
+const ENABLE = 4, STOP_BUTTON = 1;
+const PAD_HELD = new Map([[0, () => ["next", {}]], [5, () => ["go", {}]]]);
+const PAD_TAPPED = new Map([
+  [2, () => send("plan")], [3, () => send("accept")], [8, () => send("reject")], [9, () => nextObject()],
+  [6, () => chooseGrasp(1, 0)], [7, () => chooseGrasp(0, 1)], [12, () => neighbourJoint(-1)],
+  [13, () => neighbourJoint(1)], [14, () => changeSpeed(-1)], [15, () => changeSpeed(1)],
+]);
+const PAD_WORDS = "gamepad: LB held enables · left stick drives the joint · A held: next move · B: STOP · X plan · Y accept · "
+  + "D-pad: joint, speed · LT type · RT level";
+let padBefore = [], padWasThere = false;
+
+const firstPad = () => [...(navigator.getGamepads?.() ?? [])].find((pad) => pad && pad.connected && pad.mapping === "standard");
+const isDown = (pad, number) => Boolean(pad && pad.buttons[number]?.pressed);
+
+function stick() {
+  const pad = firstPad(), pushed = pad && isDown(pad, ENABLE) ? pad.axes[0] : 0, size = Math.abs(pushed);
+  return size < DEAD_ZONE ? null : ["jog", { direction: Math.sign(pushed) * Math.min((size - DEAD_ZONE) / (1 - DEAD_ZONE), 1) }];
+}
+
+function readPad() {
+  const pad = firstPad();
+  if (padWasThere !== Boolean(pad)) showPad(Boolean(pad));
+  if (!pad) { letGo("stick"); for (const number of PAD_HELD.keys()) letGo(`pad ${number}`); padBefore = []; return; }
+  const now = pad.buttons.map((button) => button.pressed), tapped = (number) => now[number] && !padBefore[number];
+  if (tapped(STOP_BUTTON)) { letGo(); send("stop"); }
+  for (const [number, make] of PAD_HELD) {
+    if (tapped(number) && now[ENABLE]) hold(`pad ${number}`, () => isDown(firstPad(), ENABLE) && isDown(firstPad(), number) ? make() : null);
+    if (!now[number]) letGo(`pad ${number}`);
+  }
+  for (const [number, act] of PAD_TAPPED) if (tapped(number) && state) { letGo(); act(); }
+  if (stick()) hold("stick", stick); else letGo("stick");
+  padBefore = now;
+}
+
+function showPad(there) {
+  padWasThere = there;
+  byId("pad").hidden = !there;
+  byId("pad").title = PAD_WORDS;
+  if (!there) say("the gamepad is gone: the arm stands still", true);
+}
+setInterval(readPad, PAD_PERIOD_MS);

@@ -1,0 +1,131 @@
+"""A headless Chromium and a session with its server: what the tests of the pilot's page share."""
+
+import asyncio
+import base64
+import json
+import shutil
+import subprocess
+import threading
+import time
+import urllib.request
+from functools import partial
+from pathlib import Path
+
+import tornado.websocket
+
+from rrtik_ompl.pilot.run import Loop
+from rrtik_ompl.pilot.setup import open_session
+from rrtik_ompl.pilot.web.server import PilotServer
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+OPTIONS = ("--headless=new", "--no-sandbox", "--hide-scrollbars", "--remote-debugging-port=0", "--disable-gpu")
+WIDTH, HEIGHT = 1280, 720
+
+
+class Browser:
+    """A headless Chromium, told what to do through its debugging port."""
+
+    def __init__(self, folder):
+        self._process = subprocess.Popen(
+            [CHROMIUM, *OPTIONS, f"--user-data-dir={folder}", "about:blank"],
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        port_file = Path(folder) / "DevToolsActivePort"
+        waited = self._until(lambda: port_file.exists() and port_file.read_text().strip(), 60.0)
+        self._port = int(waited.split()[0])
+        self._loop, self._count, self._socket = asyncio.new_event_loop(), 0, None
+
+    @staticmethod
+    def _until(look, seconds):
+        end = time.monotonic() + seconds
+        while not (found := look()):
+            assert time.monotonic() < end, "waited in vain"
+            time.sleep(0.03)
+        return found
+
+    def open(self, url):
+        request = urllib.request.Request(f"http://127.0.0.1:{self._port}/json/new?about:blank", method="PUT")
+        page = json.loads(urllib.request.urlopen(request).read())["webSocketDebuggerUrl"]
+        connect = partial(tornado.websocket.websocket_connect, page, max_message_size=1 << 26)
+        self._socket = self._loop.run_until_complete(self._await(connect))
+        self.size(WIDTH, HEIGHT)
+        self.call("Page.navigate", url=url)
+
+    @staticmethod
+    async def _await(thing):
+        return await thing()
+
+    def call(self, method, **parameters):
+        self._count += 1
+        self._socket.write_message(json.dumps({"id": self._count, "method": method, "params": parameters}))
+        while True:
+            answer = json.loads(self._loop.run_until_complete(self._await(self._socket.read_message)))
+            if answer.get("id") == self._count:
+                assert "error" not in answer, answer
+                return answer["result"]
+
+    def ask(self, script):
+        found = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
+        assert "exceptionDetails" not in found, found
+        return found["result"].get("value")
+
+    def wait(self, script, seconds=30.0):
+        try:
+            return self._until(lambda: self.ask(f"document.readyState === 'complete' && ({script})"), seconds)
+        except AssertionError:
+            raise AssertionError(f"{script}: waited in vain; message: {self.text('message')}") from None
+
+    def text(self, name):
+        return self.ask(f"document.getElementById('{name}').textContent")
+
+    def press(self, key):
+        self.key_down(key)
+        self.key_up(key)
+
+    def key_down(self, key):
+        self.call("Input.dispatchKeyEvent", type="keyDown", **self._words(key))
+
+    def key_up(self, key):
+        self.call("Input.dispatchKeyEvent", type="keyUp", **self._words(key))
+
+    @staticmethod
+    def _words(key):
+        code = ord(key.upper()) if len(key) == 1 and key.isalnum() else {" ": 32, "Enter": 13, "Escape": 27}.get(key, 0)
+        return {"key": key, "windowsVirtualKeyCode": code}
+
+    def size(self, width, height):
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+
+    def screenshot(self, file):
+        Path(file).write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))
+
+    def close(self):
+        self._process.terminate()
+        self._process.wait(timeout=30)
+        self._loop.close()
+
+
+class Running:
+    """A session with its server, in a thread of its own."""
+
+    def __init__(self, wanted):
+        self._wanted, self._ended, self._ready = wanted, threading.Event(), threading.Event()
+        self.opened = None
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def _run(self):
+        self.opened = open_session(self._wanted)
+        with PilotServer(title="test") as server:
+            self.server = server
+            self._ready.set()
+            Loop(self.opened.engine, server, watch_only=self._wanted.replay is not None).run(self._ended.is_set)
+        self.opened.close()
+
+    def __enter__(self):
+        self._thread.start()
+        assert self._ready.wait(60)
+        return self
+
+    def __exit__(self, *_):
+        self._ended.set()
+        self._thread.join(30)

@@ -1,0 +1,169 @@
+"""The page under a pilot's hands, in a browser: what is held and let go, a gamepad, who watches, small screens."""
+
+import time
+
+import numpy as np
+import pytest
+
+from rrtik_ompl.pilot.setup import SessionOptions
+from rrtik_tests.browser import Running
+
+PAD = """
+window.pad = { connected: true, mapping: "standard", axes: [0, 0, 0, 0],
+  buttons: Array.from({ length: 17 }, () => ({ pressed: false, value: 0 })) };
+navigator.getGamepads = () => [window.pad];
+window.push = (number, down) => { if (window.pad) window.pad.buttons[number].pressed = down; };
+"""
+
+
+CUT_OFF = """
+[...document.querySelectorAll("#joints th, #joints td, #depth dd, .hands > *, .buttons button, #stop, header > *")]
+  .filter((each) => each.offsetParent)
+  .filter((each) => each.getBoundingClientRect().right > innerWidth || each.scrollWidth > each.clientWidth + 1)
+  .map((each) => each.outerHTML)
+"""
+
+
+@pytest.fixture(scope="module")
+def running():
+    with Running(SessionOptions("titan4_sdu")) as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def tab(browser, running):
+    browser.open(running.server.url)
+    browser.wait("state && role.role === 'pilot'")
+    return browser
+
+
+@pytest.fixture
+def page(tab, running):
+    session = running.opened.engine.session
+    session.arm.stop()
+    session.arm._q[:] = session.problem.start
+    tab.call("Page.reload")
+    time.sleep(0.3)
+    tab.wait("state && state.lamps.length === 6 && role.role === 'pilot' && !state.trouble")
+    tab.press("r")
+    return tab
+
+
+def azimuth(browser):
+    return browser.ask("state.joints[0].value")
+
+
+def settled(browser, seconds=0.5):
+    """Where the azimuth is after a while [deg], by the arm itself."""
+    time.sleep(seconds)
+    return azimuth(browser)
+
+
+def test_a_joint_moves_while_its_key_is_held_and_a_degree_farther_at_most(page, running):
+    arm = running.opened.engine.session.arm
+    page.press("1")
+    before = azimuth(page)
+    page.key_down("ArrowRight")
+    page.wait(f"state.joints[0].value > {before} + 5")
+    let_go = float(np.degrees(arm.read()[0]))
+    page.key_up("ArrowRight")
+    page.wait("!state.driving")
+    assert settled(page) == azimuth(page)
+    # The key is let go in the browser, after `let_go` was read: that takes a little of the way, too.
+    assert azimuth(page) - let_go < 4.0
+    there = azimuth(page)
+    page.key_down("ArrowRight")
+    page.wait(f"state.joints[0].value > {there} + 1")
+    page.ask("window.dispatchEvent(new Event('blur'))")  # another window is in front
+    page.wait("!state.driving")
+    page.key_up("ArrowRight")
+
+
+def test_space_stops_although_the_arrow_is_still_held(page):
+    page.press("1")
+    before = azimuth(page)
+    page.key_down("ArrowRight")
+    page.wait(f"state.joints[0].value > {before} + 2")
+    page.press(" ")
+    page.wait("state.message.startsWith('stopped') && !state.driving")
+    there = settled(page, 0.2)
+    assert settled(page) == there
+    page.key_up("ArrowRight")
+
+
+def test_who_watches_may_stop_the_arm_and_the_button_is_large(page):
+    page.press("h")  # no other page: nobody to hand over to, the arm stands still
+    page.ask("send('hand_over')")
+    page.wait("role.role === 'watching'")
+    assert page.ask("document.getElementById('stop').disabled") is False
+    page.ask("document.getElementById('stop').click()")
+    page.wait("state.message.startsWith('stopped')")
+    page.press("t")
+    page.wait("role.role === 'pilot'")
+    for width, height in ((800, 600), (1280, 720), (3840, 2160)):
+        page.size(width, height)
+        box = page.ask(
+            "(({width, height}) => [width, height])(document.getElementById('stop').getBoundingClientRect())"
+        )
+        assert min(box) >= 75  # 20 mm at 96 pixels an inch
+        assert page.ask("document.documentElement.scrollWidth") <= width
+        assert page.ask("document.documentElement.scrollHeight") <= height
+        assert page.ask(CUT_OFF) == [], (width, height)
+
+
+def test_a_gamepad_drives_while_its_shoulder_button_is_held_and_stops_when_it_is_pulled_out(page):
+    page.ask(PAD)
+    page.wait("!document.getElementById('pad').hidden")
+    page.press("1")
+    page.wait("state.selected === 0")
+    before = azimuth(page)
+    page.ask("pad.axes[0] = 1; 0")
+    assert settled(page, 0.3) == before  # not without the shoulder button
+    page.ask("push(4, true)")
+    page.wait(f"state.joints[0].value > {before} + 3")
+    page.ask("window.pad = null; 0")
+    page.wait("!state.driving && document.getElementById('pad').hidden")
+    there = settled(page, 0.2)
+    assert settled(page, 0.3) == there
+    page.ask(PAD)
+    for button, wanted in ((13, "state.selected === 1"), (12, "state.selected === 0"), (14, "state.speed === 0.5"),
+                           (15, "state.speed === 1")):  # fmt: skip
+        page.ask(f"push({button}, true)")
+        page.wait(wanted)
+        page.ask(f"push({button}, false)")
+        time.sleep(0.1)
+    page.ask("delete navigator.getGamepads; 0")
+
+
+@pytest.mark.slow
+def test_a_whole_route_by_a_gamepad_alone(page, running):
+    session = running.opened.engine.session
+    session.rates.flags.writeable = True
+    usual = session.rates.copy()
+    session.rates[:] = session.arm._rates[:] = 3.0
+    page.ask(PAD)
+
+    def tap(button, until):
+        page.ask(f"push({button}, true)")
+        page.wait(until)
+        page.ask(f"push({button}, false)")
+        time.sleep(0.1)
+
+    tap(6, "state.choice !== null")
+    if page.ask("document.querySelector('.lamp[aria-pressed=true]').dataset.color") != "green":
+        tap(7, "state.choice.level === 1")
+    tap(2, "state.mode === 'proposed'")
+    tap(3, "state.mode === 'following'")
+    page.ask("push(4, true)")
+    for _ in range(40):
+        if page.ask("state.mode") != "following":
+            break
+        now = page.ask("state.route.moves.findIndex(m => m.status === 'current')")
+        page.ask("push(0, true)")
+        page.wait(f"state.mode !== 'following' || (state.route.moves[{now}].status === 'done' && !state.driving)", 20.0)
+        page.ask("push(0, false)")
+        time.sleep(0.1)  # the page looks at it every 40 ms
+        page.wait("state.mode !== 'following' || state.route.moves.some(m => m.status === 'current')")
+    page.wait("state.message === 'all moves are done'")
+    assert page.ask("state.aim.distance") < 0.002
+    session.rates[:] = session.arm._rates[:] = usual
