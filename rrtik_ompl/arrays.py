@@ -53,6 +53,14 @@ def finite_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) ->
     return array
 
 
+def dimensions(values: object) -> int:
+    """How many dimensions a value given by a user has; 0 for nested lists that make no array."""
+    try:
+        return np.ndim(values)  # type: ignore[arg-type]
+    except ValueError:
+        return 0
+
+
 def bounded_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) -> NDArray[np.float64]:
     """As :func:`finite_array`, of numbers that reach the tables of the kernels: none beyond ``LARGEST``.
 

@@ -120,6 +120,11 @@ def problem_folders() -> tuple[Path, ...]:
     return _folders("problem", "problems")
 
 
+def task_files() -> dict[str, Path]:
+    """Files of the tasks that packages ship, by name; they lie in a folder below that of the problems."""
+    return _shipped("problem", "problems", "tasks/")
+
+
 def load_robot(name: str | os.PathLike[str], **options: RobotOption) -> Robot:
     """Load a robot by name or from a file; the same call gives the same object, unless a file of it has changed.
 
@@ -245,9 +250,9 @@ def _problem_files() -> dict[str, Path]:
     return _shipped("problem", "problems")
 
 
-def _shipped(what: str, group: str) -> dict[str, Path]:
+def _shipped(what: str, group: str, below: str = "") -> dict[str, Path]:
     """YAML files by name in the folders that packages offer."""
-    return {file.stem: file for folder in _folders(what, group) for file in sorted(folder.glob("*.yaml"))}
+    return {file.stem: file for folder in _folders(what, group) for file in sorted(folder.glob(f"{below}*.yaml"))}
 
 
 def _folders(what: str, group: str) -> tuple[Path, ...]:

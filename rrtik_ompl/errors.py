@@ -130,7 +130,7 @@ def listed(values: object, what: str) -> tuple[Any, ...]:
     Raises:
         InputError: If it has none.
     """
-    if isinstance(values, str) or not isinstance(values, Iterable):
+    if isinstance(values, str) or not isinstance(values, Iterable) or getattr(values, "ndim", 1) == 0:
         raise InputError(f"{what} must be a list, got {type(values).__name__}")
     return tuple(values)
 

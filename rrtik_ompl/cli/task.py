@@ -101,7 +101,13 @@ def task(
         with progress("drawing"):
             view(loaded.world, plan, html=html, title=f"{loaded.name}: {len(plan.paths)} motions")
     if as_json:
-        kept = {"found": plan.found, "reason": plan.reason, "chosen": list(plan.chosen), "seed": seed}
+        kept = {
+            "found": plan.found,
+            "reason": plan.reason,
+            "chosen": list(plan.chosen),
+            "notes": list(plan.notes),
+            "seed": seed,
+        }
         motions = [
             {"stage": str(s), "waypoints": len(p.waypoints)} for s, p in zip(plan.stages, plan.paths, strict=True)
         ]
@@ -116,5 +122,6 @@ def task(
         held = ", ".join(item.name for item in world.scene.attached)
         proven = "proven free" if path.proven else "checked in steps"
         say(f"  {number + 1} {stage}: {len(path.waypoints)} waypoints, {proven}" + (f", holds {held}" if held else ""))
+    say(*(f"note: {note}" for note in plan.notes))
     say(*(f"wrote {file}" for file in (out, html) if file is not None))
     return 0

@@ -104,6 +104,18 @@ def plan(
     return improved(problem, found, search, request, longer) if found.found and longer > 0.0 else found
 
 
+def plan_counted(problem: Problem, iterations: int, *, seconds: float, seed: int) -> Plan:
+    """A plan by "auto" that ends after a number of iterations of each planner, about, so that no clock decides.
+
+    Args:
+        problem: What to solve.
+        iterations: Of each planner.
+        seconds: Time limit on top of that [s].
+        seed: Of everything random.
+    """
+    return run_portfolio(problem, Request(seconds, seed, RESTARTS, {}, "preferred", None, iterations))
+
+
 def _search_of(problem: Problem, planner: str | PlannerFactory) -> Callable[[Request], Plan]:
     """What plans by a planner, given a request."""
     if not isinstance(planner, str):

@@ -22,6 +22,7 @@ class Request:
         parameters: Options of the planner.
         proof: Whether motions are to be proven.
         clearance: To be kept from obstacles [m], or None.
+        iterations: Of all attempts of a planner together, about; None: as many as there is time for.
     """
 
     seconds: float
@@ -30,6 +31,7 @@ class Request:
     parameters: Mapping[str, Any]
     proof: ProofMode
     clearance: float | None
+    iterations: int | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

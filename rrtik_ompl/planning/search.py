@@ -12,7 +12,7 @@ from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.choices import ProofMode
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ik.goal_configurations import GoalSearch
-from rrtik_ompl.ompl_bridge.attempt import EFFORT_MOTIONS, Attempt, attempt
+from rrtik_ompl.ompl_bridge.attempt import EFFORT_ITERATIONS, EFFORT_MOTIONS, Attempt, attempt
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning.second_check import SecondCheck
@@ -44,6 +44,7 @@ class Search:
         parameters: Options of the planner.
         proof: See :func:`rrtik_ompl.planning.plan`.
         clearance: Likewise.
+        iterations: Of all attempts together, about; of planners that support a limit of iterations.
     """
 
     def __init__(
@@ -56,6 +57,7 @@ class Search:
         parameters: Mapping[str, Any],
         proof: ProofMode,
         clearance: float | None,
+        iterations: int | None = None,
     ) -> None:
         self.totals: dict[str, int | float] = {"attempts": 0, "rejected": 0}
         self.reason, self.counting = "", 0.0
@@ -63,6 +65,7 @@ class Search:
         self._deadline, self._seeds = deadline, seeds
         self._goals = GoalSearch(problem, seeds[0])
         self._traits, joints = traits_of(factory), isinstance(problem.goal, JointGoal)
+        self._iterations = iterations if self._traits.supports_iteration_limit else None
         wanted = {"clearance": clearance} if self._traits.leaves_room and clearance is not None else {}
         self._parameters = {**wanted, **parameters}
         self._aimless = self._traits.finds_goals and not joints
@@ -105,7 +108,11 @@ class Search:
         """Whether there is no time left, or nothing better to be expected."""
         best = self._check.best
         enough = best is not None and self._check.open > (BRIEF_ROUNDS if best.proven else ROUNDS)
-        return self._left() <= 0.0 or self._check.settled or enough or self._separated()
+        return self._left() <= 0.0 or self._used_up() or self._check.settled or enough or self._separated()
+
+    def _used_up(self) -> bool:
+        """Whether all iterations are used."""
+        return self._iterations is not None and self.totals.get("iterations", 0) >= self._iterations
 
     def _separated(self) -> bool:
         """Whether path constraints keep start and goal apart, as far as the planner sees."""
@@ -211,6 +218,9 @@ class Search:
         checked: bool = False,
     ) -> Attempt:
         """One attempt, counted; ``checked``: start and goals are known to be free."""
+        if self._iterations is not None:
+            left = -(-(self._iterations - int(self.totals.get("iterations", 0))) // EFFORT_ITERATIONS)
+            effort = max(left if effort is None else min(effort, left), 1)
         outcome = attempt(
             problem,
             self._factory,

@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic import Field
 
-from rrtik_ompl.catalog import find_problem, list_planners, load_robot, robot_from_entry
+from rrtik_ompl.catalog import find_problem, list_planners, load_robot, robot_from_entry, task_files
 from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError, require
 from rrtik_ompl.files.sections import NotNegative, Positive, Section, Version, parse, without_null
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml, write_yaml
@@ -31,6 +31,7 @@ FilePath = str | os.PathLike[str]
 
 
 ONLY_PATHS = (".csv", ".txt")  # endings; a .json may be either
+NO_GOAL = "it has stages and no goal"
 OF_PATHS = ("waypoints", "points")  # keys of files of paths and of trajectories
 
 
@@ -95,6 +96,8 @@ def _read(path: Path) -> YamlDocument:
     if document is None or (isinstance(document.data, dict) and not document.data.keys().isdisjoint(OF_PATHS)):
         name = path.name
         raise InputError(f"{path}: a path, not a problem; name its problem before it: rrtik check PROBLEM {name}")
+    if isinstance(document.data, dict) and "task" in document.data and "goal" not in document.data:
+        raise InputError(f"{path}: a task, not a problem: {NO_GOAL}; use rrtik task {path.name}")
     return document
 
 
@@ -140,6 +143,8 @@ def problem_path(name_or_file: FilePath) -> Path:
     except UnknownNameError:
         if os.path.isfile(path):
             return path
+        if name_or_file in task_files():
+            raise InputError(f"'{name_or_file}' is a task, not a problem: {NO_GOAL}; use rrtik task {path}") from None
         raise
 
 

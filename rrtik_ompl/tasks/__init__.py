@@ -15,6 +15,7 @@ from rrtik_ompl.errors import require
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import usable_configuration
 from rrtik_ompl.tasks.branches import Branch
+from rrtik_ompl.tasks.notes import notes_of
 from rrtik_ompl.tasks.program import check_program, steps_of
 from rrtik_ompl.tasks.search import TaskSearch
 from rrtik_ompl.tasks.setting import Setting
@@ -41,6 +42,8 @@ class TaskPlan:
         stages: The stage that each motion does.
         chosen: Numbers of the alternatives that were taken, from 0, in their order.
         reason: "" if found, else which stages failed, how often and why.
+        end: The world after the last stage, whatever that is; None if it is not found.
+        notes: What the author of the task may not have meant, a line each: an object attached from far away.
     """
 
     found: bool
@@ -49,6 +52,8 @@ class TaskPlan:
     stages: tuple[Stage, ...]
     chosen: tuple[int, ...]
     reason: str
+    end: World | None = None
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,14 +105,16 @@ class Task:
         given: Any = world.robot.posture(start) if isinstance(start, str) else start
         q = usable_configuration(world, given, "start")
         search = TaskSearch(time.monotonic() + positive(seconds, "seconds"), whole_number(seed, "seed"))
-        motions = search.run(Branch(Setting.of(world), np.array(q), steps))
-        if motions is None:
+        done = search.run(Branch(Setting.of(world), np.array(q), steps))
+        if done is None:
             return TaskPlan(False, (), (), (), (), search.reason())
         return TaskPlan(
             found=True,
-            paths=tuple(path for _, path in motions),
-            worlds=tuple(branch.setting.world for branch, _ in motions),
-            stages=tuple(branch.step.stage for branch, _ in motions if branch.step is not None),
-            chosen=motions[-1][0].chosen if motions else (),
+            paths=tuple(path for _, path in done.motions),
+            worlds=tuple(branch.setting.world for branch, _ in done.motions),
+            stages=tuple(branch.step.stage for branch, _ in done.motions if branch.step is not None),
+            chosen=done.last.chosen,
             reason="",
+            end=done.last.setting.world,
+            notes=notes_of(done.last),
         )

@@ -119,6 +119,16 @@ class Expander:
                 choices.search.more()
                 yield from self._drawn(choices)
 
+    def ends(self, branch: Branch) -> bool:
+        """Whether a branch with nothing left to do may end; the reason why not is noted."""
+        if branch.before is None or branch.step is None or branch.setting is branch.before.setting:
+            return True
+        touching = branch.setting.world.explain(branch.q)
+        if touching:
+            why = f"contact after it: {touching}; attach the object, open the gripper, or allow the pair"
+            self.failures.append((branch.before, branch.step, why))
+        return not touching
+
     def _aims(self, branch: Branch, step: Step, goal: Goal | Vector | str) -> Iterator[Branch]:
         world = branch.setting.world
         if isinstance(goal, str):
@@ -143,15 +153,19 @@ class Expander:
         if touching := world.explain(branch.q):
             self.failures.append((branch, step, f"it cannot begin: {touching}; move it or allow the pair"))
             return
-        made = self._followed(branch, stage)
+        way = _way(branch, stage)
+        if way.leads_nowhere(world.robot):
+            still = JointPath.of(world.robot, branch.q[None]).proved(world)
+            yield _next(branch, step, branch.setting, branch.q, still)
+            return
+        made = self._followed(branch, way)
         if made.fraction < WHOLE:
             self.failures.append((branch, step, f"ends at {100.0 * made.fraction:.3g} %: {made.reason}"))
             return
         yield _next(branch, step, branch.setting, made.rows[-1], path_of(world, made))
 
-    def _followed(self, branch: Branch, stage: Straight) -> Attempt:
-        world, tip = branch.setting.world, branch.setting.robot.fk(branch.q)
-        way = Way((straight_rail(tip, stage.goal(tip)),), TOLERANCE, 0.0)
+    def _followed(self, branch: Branch, way: Way) -> Attempt:
+        world = branch.setting.world
         if branch.effort >= THOROUGH:
             return farthest(world, way, branch.q[None], self.seed)
         return attempt(world, way, branch.q, centred(world.robot))
@@ -160,6 +174,12 @@ class Expander:
 def way_of(robot: Robot, a: Vector, b: Vector) -> float:
     """Of the joints from one configuration to another [rad, metres counted alike]."""
     return float(np.linalg.norm(joint_difference(robot, b, a)))
+
+
+def _way(branch: Branch, stage: Straight) -> Way:
+    """Of the tip on a straight line that begins where a branch has come to."""
+    tip = branch.setting.robot.fk(branch.q)
+    return Way((straight_rail(tip, stage.goal(tip)),), TOLERANCE, 0.0)
 
 
 def again(branch: Branch, effort: int) -> Branch:

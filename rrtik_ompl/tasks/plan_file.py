@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from typing import Annotated, Literal
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -25,12 +26,17 @@ from rrtik_ompl.world import FINEST_RESOLUTION, World
 KIND: Literal["task_plan"] = "task_plan"
 
 
-class MotionEntry(Section):
+class WorldEntry(Section):
+    """A robot, its fingers as they are held, and what surrounds it."""
+
+    robot: RobotEntry
+    scene: SceneEntry = Field(default=SceneEntry())
+
+
+class MotionEntry(WorldEntry):
     """One motion: what it does, where it leads, and the world that it is in."""
 
     stage: StageEntry
-    robot: RobotEntry
-    scene: SceneEntry = Field(default=SceneEntry())
     waypoints: Annotated[list[Numbers], Field(min_length=1)]
 
 
@@ -44,6 +50,8 @@ class TaskPlanFile(Section):
     motion_resolution: Positive = Field(ge=FINEST_RESOLUTION)
     self_margin: NotNegative = 0.0
     motions: Annotated[list[MotionEntry], Field(min_length=1)]
+    end: WorldEntry | None = Field(None, description="after the last stage; the last motion's if left out")
+    notes: list[str] = Field(default=[])
 
 
 def save_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
@@ -59,8 +67,7 @@ def save_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
     motions = [
         {
             "stage": stage_data(stage),
-            "robot": robot_data(world.robot.source, folder),
-            "scene": scene_data(world.scene, folder),
+            **_world_data(world, folder),
             "waypoints": path.waypoints.tolist(),
         }
         for path, world, stage in zip(plan.paths, plan.worlds, plan.stages, strict=True)
@@ -74,6 +81,8 @@ def save_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
         "motion_resolution": first.motion_resolution,
         "self_margin": first.self_margin,
         "motions": motions,
+        "end": _world_data(plan.worlds[-1] if plan.end is None else plan.end, folder),
+        "notes": list(plan.notes),
     }
     write_text(file, json.dumps(document, allow_nan=False))
 
@@ -95,17 +104,30 @@ def load_task_plan(file: str | os.PathLike[str]) -> TaskPlan:
         worlds.append(world)
         paths.append(path)
     stages = tuple(motion.stage.build(world.robot) for motion, world in zip(entry.motions, worlds, strict=True))
-    return TaskPlan(True, tuple(paths), tuple(worlds), stages, tuple(entry.chosen), "")
+    end = worlds[-1] if entry.end is None else _world(document, entry, entry.end, ("end",))
+    return TaskPlan(True, tuple(paths), tuple(worlds), stages, tuple(entry.chosen), "", end, tuple(entry.notes))
 
 
 def _motion(document: YamlDocument, entry: TaskPlanFile, number: int) -> tuple[World, JointPath]:
-    motion, data = entry.motions[number], document.data["motions"][number]
-    with document.at(("motions", number, "robot")):
-        robot = robot_from_entry(data["robot"], document.path.parent)
+    motion, place = entry.motions[number], ("motions", number)
+    world = _world(document, entry, motion, place)
+    with document.at((*place, "waypoints")):
+        rows = finite_array(motion.waypoints, (None, world.robot.dof), "waypoints")
+        return world, JointPath.of(world.robot, rows)
+
+
+def _world(document: YamlDocument, entry: TaskPlanFile, part: WorldEntry, place: tuple[str | int, ...]) -> World:
+    data: Any = document.data
+    for key in (*place, "robot"):
+        data = data[key]
+    with document.at((*place, "robot")):
+        robot = robot_from_entry(data, document.path.parent)
         if robot.joint_names != tuple(entry.joint_names):
             raise InputError(f"robot '{robot.name}' has other joints than the plan's: {', '.join(entry.joint_names)}")
-    scene = motion.scene.build(document, ("motions", number, "scene"))
-    with document.at(("motions", number, "scene")):
-        world = World(robot, scene, motion_resolution=entry.motion_resolution, self_margin=entry.self_margin)
-    with document.at(("motions", number, "waypoints")):
-        return world, JointPath.of(robot, finite_array(motion.waypoints, (None, robot.dof), "waypoints"))
+    scene = part.scene.build(document, (*place, "scene"))
+    with document.at((*place, "scene")):
+        return World(robot, scene, motion_resolution=entry.motion_resolution, self_margin=entry.self_margin)
+
+
+def _world_data(world: World, folder: Path) -> dict[str, Any]:
+    return {"robot": robot_data(world.robot.source, folder), "scene": scene_data(world.scene, folder)}

@@ -8,23 +8,32 @@ from __future__ import annotations
 import heapq
 import time
 from collections import Counter
+from dataclasses import dataclass
 from itertools import count
 
 import numpy as np
 
 from rrtik_ompl.errors import ProblemError
 from rrtik_ompl.path import JointPath, proved_as_clear
-from rrtik_ompl.planning import plan
+from rrtik_ompl.planning import plan_counted
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.tasks.branches import Branch, Expander, again
 from rrtik_ompl.tasks.program import Step
 from rrtik_ompl.world.kept_clearance import CLEARANCE
 
-FIRST_SECONDS = 0.25  # for a motion between postures; four times as much in each further round
-GROWTH = 4.0
+FIRST_ITERATIONS = 4_000  # of each planner for a motion between postures; four times as much in each further round
+GROWTH = 4
 ROUNDS = 8
 NAMED = 6  # stages whose failures a reason names
 MOST_WORDS = 160  # letters of one failure
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Done:
+    """The branch that has done the whole task, and the branches on its way that are motions, with their paths."""
+
+    last: Branch
+    motions: tuple[tuple[Branch, JointPath], ...]
 
 
 class TaskSearch:
@@ -44,8 +53,8 @@ class TaskSearch:
         self._blocked: set[int] = set()  # motions that were not found in this round
         self._late: list[Branch] = []  # what hangs on these
 
-    def run(self, start: Branch) -> list[tuple[Branch, JointPath]] | None:
-        """Branches that are motions, from the start on, with their paths; None if no choices work."""
+    def run(self, start: Branch) -> Done | None:
+        """What does the whole task; None if no choices work."""
         self._push(start)
         for effort in range(ROUNDS):
             found = self._round(effort)
@@ -74,10 +83,10 @@ class TaskSearch:
             (text, _), times = reasons.most_common(1)[0], reasons.total()
             short = text if len(text) <= MOST_WORDS else text[:MOST_WORDS] + "..."
             parts.append(f"{step} failed" + (f" {times} times, for instance: " if times > 1 else ": ") + short)
-        late = "out of time; " if self._out_of_time else ""
-        return late + "; ".join(parts or ["no choice was left"])
+        late = ["out of time before all choices were tried"] if self._out_of_time else []
+        return "; ".join([*late, *parts]) or "no choice of alternatives and configurations works"
 
-    def _round(self, effort: int) -> list[tuple[Branch, JointPath]] | None:
+    def _round(self, effort: int) -> Done | None:
         while self._open:
             if time.monotonic() > self._deadline:
                 self._out_of_time = True
@@ -88,10 +97,10 @@ class TaskSearch:
             elif branch.rest:
                 for following in self._expander.after(branch):
                     self._push(following)
-            else:
-                found = self._motions(branch, effort)
-                if found is not None:
-                    return found
+            elif self._expander.ends(branch):
+                motions = self._motions(branch, effort)
+                if motions is not None:
+                    return Done(branch, tuple(motions))
         return None
 
     def _push(self, branch: Branch) -> None:
@@ -125,7 +134,7 @@ class TaskSearch:
             self._ways[id(link)] = proved_as_clear(straight, world, CLEARANCE)
             return True
         left = max(self._deadline - time.monotonic(), 1e-3)
-        made = plan(problem, seed=self._seed, seconds=min(FIRST_SECONDS * GROWTH**effort, left))
+        made = plan_counted(problem, FIRST_ITERATIONS * GROWTH**effort, seconds=left, seed=self._seed)
         if made.path is None:
             self._expander.failures.append((before, link.step, made.reason))
             return False

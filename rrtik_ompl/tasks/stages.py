@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Vector, finite_array, frozen, not_negative
+from rrtik_ompl.arrays import Vector, dimensions, finite_array, frozen, not_negative
 from rrtik_ompl.choices import one_of
 from rrtik_ompl.errors import InputError, listed, require
 from rrtik_ompl.goal import Goal, PoseGoal
@@ -33,7 +33,7 @@ class MoveTo:
 
     def __post_init__(self) -> None:
         goal = self.goal
-        if isinstance(goal, pin.SE3) or (not isinstance(goal, Goal | str) and np.ndim(goal) == 2):
+        if isinstance(goal, pin.SE3) or (not isinstance(goal, Goal | str) and dimensions(goal) == 2):
             goal = PoseGoal(rigid(goal, "goal of MoveTo"))
         elif not isinstance(goal, Goal | str):
             goal = frozen(finite_array(goal, (None,), "goal of MoveTo"))
@@ -146,7 +146,7 @@ class Alternatives:
     options: tuple[tuple[Stage, ...], ...]
 
     def __init__(self, options: Iterable[Iterable[Stage]]) -> None:
-        rows = tuple(_row(option) for option in options) if isinstance(options, Iterable) else ()
+        rows = tuple(_row(option) for option in listed(options, "options of Alternatives"))
         if not rows or not all(rows):
             raise InputError("Alternatives: needs lists of stages, none of them empty: Alternatives([[...], [...]])")
         object.__setattr__(self, "options", rows)

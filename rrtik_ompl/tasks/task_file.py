@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from pydantic import Field, Tag, model_validator
 
 from rrtik_ompl.arrays import Vector
-from rrtik_ompl.catalog import problem_folders, robot_from_entry
+from rrtik_ompl.catalog import list_problems, robot_from_entry, task_files
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.sections import (
     Name,
@@ -36,7 +35,7 @@ from rrtik_ompl.tasks import Task
 from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, Gripper, MoveTo, Stage, Straight
 from rrtik_ompl.world import FINEST_RESOLUTION, MOTION_RESOLUTION, World
 
-FOLDER = "tasks"  # of shipped tasks, below each folder of problems
+NO_STAGES = "it has a goal and no stages"
 
 
 class MoveToEntry(Section):
@@ -162,7 +161,7 @@ class LoadedTask:
 
 def list_tasks() -> tuple[str, ...]:
     """Names of the tasks that packages ship."""
-    return tuple(sorted(_shipped()))
+    return tuple(sorted(task_files()))
 
 
 def load_task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
@@ -174,13 +173,17 @@ def load_task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
     """
     path = file_name(name_or_file)
     if isinstance(name_or_file, str) and not path.suffix and len(path.parts) == 1:
-        shipped = _shipped()
+        shipped = task_files()
         if name_or_file not in shipped:
+            if name_or_file in list_problems():
+                raise InputError(
+                    f"'{name_or_file}' is a problem, not a task: {NO_STAGES}; use rrtik plan {name_or_file}"
+                )
             raise UnknownNameError("task", name_or_file, shipped)
         path = shipped[name_or_file]
     document = read_yaml(path)
     if isinstance(document.data, dict) and "task" not in document.data and "goal" in document.data:
-        raise InputError(f"{path}: a problem, not a task: it has a goal and no stages; use rrtik plan {path.name}")
+        raise InputError(f"{path}: a problem, not a task: {NO_STAGES}; use rrtik plan {path.name}")
     entry = parse(document, TaskFile)
     with document.at(("robot",)):
         robot = robot_from_entry(document.data["robot"], document.path.parent)
@@ -221,7 +224,3 @@ def _goal_data(goal: Goal | Vector | str) -> dict[str, Any]:
     if isinstance(goal, str):
         return {"posture": goal}
     return {"joints": goal.tolist()} if isinstance(goal, np.ndarray) else goal_data(goal)
-
-
-def _shipped() -> dict[str, Path]:
-    return {file.stem: file for folder in problem_folders() for file in sorted((folder / FOLDER).glob("*.yaml"))}

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Matrix, not_negative, positive, whole_number
+from rrtik_ompl.arrays import Matrix, dimensions, not_negative, positive, whole_number
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import PoseGoal
 from rrtik_ompl.ik.solve import solve_ik
@@ -26,7 +26,6 @@ from rrtik_ompl.world import World
 DEVIATION = 1e-4  # [m]
 TURN_DEVIATION = 0.1 * DEGREE  # [rad]
 BRANCHES = 16  # configurations of a pose from which it is tried
-NO_LENGTH = 1e-12  # [m], [rad]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -224,7 +223,7 @@ def _moved(
     require(world, World, "world", "use World(robot, scene)")
     begin, starts = _begin(world, q, number)
     way = Way(tuple(rails(begin)), tolerance, room)
-    if way.measures(world.robot).sum() <= NO_LENGTH:
+    if way.leads_nowhere(world.robot):
         raise InputError("the tip is at the goal already: there is no line to follow")
     made = farthest(world, way, starts, number)
     return StraightResult(path_of(world, made), made.fraction, made.reason)
@@ -241,7 +240,7 @@ def _begin(world: World, q: ArrayLike | str | pin.SE3, seed: int) -> tuple[pin.S
     robot = world.robot
     if isinstance(q, str):
         q = robot.posture(q)
-    if not isinstance(q, pin.SE3) and np.ndim(q) < 2:
+    if not isinstance(q, pin.SE3) and dimensions(q) < 2:
         start = usable_configuration(world, q, "start")
         return robot.fk(start), start[None]
     begin = rigid(q, "start")

@@ -26,7 +26,8 @@ LEFT = 1e-5  # [m] between what stops the arm and its last configuration, from w
 ENDS = 8  # configurations at the end of the rails towards which a redundant arm is drawn
 RANDOM_REFERENCES = 6
 STRONG = 5.0  # how much a random reference draws
-IK_SECONDS = 0.1
+NO_LENGTH = 1e-12  # [m], a turn counted as `Way.measures` does
+IK_SECONDS = 1e9  # no limit: the rounds of inverse kinematics are counted, some 10 ms of them
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,6 +37,10 @@ class Way:
     rails: tuple[Rail, ...]
     tolerance: Tolerance
     clearance: float
+
+    def leads_nowhere(self, robot: Robot) -> bool:
+        """Whether its end is where it begins."""
+        return bool(self.measures(robot).sum() <= NO_LENGTH)
 
     def measures(self, robot: Robot) -> Vector:
         """How much each rail counts [m]: its length, and its turn at the lever of half the arm's reach."""

@@ -22,6 +22,7 @@ from rrtik_ompl.fast.ik.rail_layout import (
 )
 
 NO_TURN = 1e-12  # [rad]
+MOST_TURNS = 1_000
 STRAIGHT = 1e-9  # share of its length by which three points may leave a line
 Z = (0.0, 0.0, 1.0)
 
@@ -120,18 +121,23 @@ def screw_rail(T_begin: pin.SE3, T_end: pin.SE3, turns: int = 0) -> Rail:
     """From one pose to another (SE3) about and along one line of the world at once, with whole turns more or less.
 
     Raises:
-        InputError: If whole turns are wanted where the poses are not turned against each other.
+        InputError: If turns are no whole number, too many, or wanted where the poses are not turned against each other.
     """
+    whole_turns = whole_number(turns, "turns", -MOST_TURNS)
+    if whole_turns > MOST_TURNS:
+        raise InputError(f"turns must be a whole number from {-MOST_TURNS} to {MOST_TURNS}, got {turns}")
     axis, angle = _turn_between(T_begin, T_end)
     if angle < NO_TURN:
-        if turns:
-            raise InputError("screw: the goal is not turned against the tip, so that whole turns have no axis")
+        if whole_turns:
+            raise InputError(
+                f"turns={turns}: the goal is not turned against the tip, so whole turns have no axis; leave turns out"
+            )
         return straight_rail(T_begin, T_end)
     shift = T_end.translation - _turns(axis, np.array([angle]))[0] @ T_begin.translation
     along = float(axis @ shift) * axis
     rest = shift - along
     centre = 0.5 * (rest + np.cross(axis, rest) / np.tan(0.5 * angle))
-    angle += TAU * whole_number(turns, "turns", -1_000)
+    angle += TAU * whole_turns
     return Rail(T_begin.homogeneous, along, axis, angle, centre, axis, angle)
 
 

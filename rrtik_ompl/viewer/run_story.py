@@ -16,6 +16,7 @@ from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.viewer.drawing.framing import Frame
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
 from rrtik_ompl.viewer.drawing.scene_picture import obstacle_look
+from rrtik_ompl.viewer.task_story import TASK
 
 MAX_POINTS = 40  # of a path's line
 SHOWN_SECONDS = 0.5  # of a path after it was replaced
@@ -27,7 +28,7 @@ def run_story(run: ReplanRun, robot: Robot, scene: Scene, frame: Frame) -> dict[
     lines, numbers = _lines(run, robot)
     moved = sorted({name for tick in run.ticks for name in tick.poses})
     return {
-        "groups": _groups(run.ticks),
+        "groups": _motions(run.ticks) if run.planner == TASK else _groups(run.ticks),
         "outcome": run.outcome + (f": {run.reason}" if run.reason else ""),
         "moving": {node_name(name): _places(scene.obstacle(name), run.ticks, frame) for name in moved},
         "lines": lines,
@@ -45,8 +46,13 @@ def _groups(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
         spent = [1e3 * tick.seconds[event] for tick in rows if event in tick.seconds]  # of a plan or a repair
         text = event + (f" ({reason})" if reason else "")
         text += f", {max(spent):.1f} ms" if spent else ""
-        found.append({"first": first, "count": len(rows), "event": event, "text": text})
+        found.append({"first": first, "count": len(rows), "event": event, "reason": reason, "text": text})
     return found
+
+
+def _motions(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
+    """The same for a task: one group for each of its motions."""
+    return [{**group, "event": "motion", "text": group["reason"]} for group in _groups(ticks)]
 
 
 def _places(obstacle: Obstacle, ticks: list[Tick], frame: Frame) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from rrtik_ompl.replanning.record import ReplanRun, Tick
 from rrtik_ompl.tasks import TaskPlan
 from rrtik_ompl.world import World
 
+TASK = "task"  # the planner of a run that shows one
 RATE = 25.0  # ticks per second
 SPEED = np.deg2rad(40.0)  # [rad/s] or [m/s] of the joint that travels farthest
 LEAST_TICKS = 8  # of a motion
@@ -38,7 +39,7 @@ def run_of(plan: TaskPlan) -> ReplanRun:
         problem=robot.name,
         robot=robot.name,
         joint_names=robot.joint_names,
-        planner="task",
+        planner=TASK,
         seed=0,
         step=1.0,
         rate=RATE,

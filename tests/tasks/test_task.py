@@ -1,5 +1,9 @@
 """Tasks: whole sequences that work, in worlds that hold what the arm holds; what fails is named."""
 
+import time
+import warnings
+from contextlib import suppress
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -43,11 +47,15 @@ def kitchen():
     return rrtik.World(robot, rrtik.Scene([table, cup, wall]))
 
 
+def carry():
+    """Pick and place with three grasps, the first in the palm's way, and two places, the first too far."""
+    stages = [Alternatives([grasp(0.3, lift=-0.01), grasp(0.0), grasp(np.pi / 2)]), Straight(by=UP)]
+    return Task([*stages, Alternatives([place(0.5, -1.2), place(0.5, -0.2)])])
+
+
 @pytest.fixture(scope="module")
 def carried(kitchen):
-    """The plan of pick and place with three grasps, the first in the palm's way, and two places, the first too far."""
-    stages = [Alternatives([grasp(0.3, lift=-0.01), grasp(0.0), grasp(np.pi / 2)]), Straight(by=UP)]
-    return Task([*stages, Alternatives([place(0.5, -1.2), place(0.5, -0.2)])]).plan(kitchen, "ready", seed=1)
+    return carry().plan(kitchen, "ready", seed=1)
 
 
 @pytest.mark.kernels
@@ -211,3 +219,90 @@ def test_fingers_close_on_a_width():
     assert np.linalg.norm(left - right) == pytest.approx(0.05)
     with pytest.raises(UnknownNameError, match="state of a gripper"):
         gripper.posture("ajar")
+
+
+@pytest.fixture
+def hurried(monkeypatch):
+    """All clocks run ten thousand times as fast: what hangs on them and not on a time limit that is longer changes."""
+    for name in ("monotonic", "perf_counter"):
+        real = getattr(time, name)
+        monkeypatch.setattr(time, name, lambda real=real: 1e4 * real())
+
+
+@pytest.mark.kernels
+def test_a_busy_machine_does_not_change_the_plan_of_a_seed(carried, kitchen, request):
+    request.getfixturevalue("hurried")
+    again = carry().plan(kitchen, "ready", seed=1, seconds=1e7)
+    assert again.chosen == carried.chosen
+    for one, other in zip(carried.paths, again.paths, strict=True):
+        assert np.array_equal(one.waypoints, other.waypoints)
+
+
+@pytest.mark.kernels
+def test_a_line_to_where_the_tip_is_already_is_done_at_once(kitchen):
+    here = kitchen.robot.fk(kitchen.robot.posture("ready"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        plan = Task([Straight(to=here), Straight(by=UP)]).plan(kitchen, "ready", seed=1)
+    assert plan.found, plan.reason
+    assert plan.paths[0].length == 0.0
+    assert plan.paths[0].proven
+    assert plan.paths[1].length > 0.0
+
+
+@pytest.mark.kernels
+def test_the_world_after_the_last_stage_is_part_of_the_plan(kitchen):
+    plan = Task(grasp(0.0)).plan(kitchen, "ready", seed=1)
+    assert [item.name for item in plan.worlds[-1].scene.attached] == []
+    assert [item.name for item in plan.end.scene.attached] == ["cup"]
+    assert plan.end.robot.source["locked"]["panda_finger_joint1"] == 0.025
+    assert plan.end.valid(plan.paths[-1].end)
+    still = Task([Gripper("close")]).plan(kitchen, "ready", seed=1)
+    assert still.found
+    assert still.end.robot.source["locked"]["panda_finger_joint1"] == 0.0
+
+
+@pytest.mark.kernels
+def test_a_gripper_that_closes_into_something_at_the_end_is_no_plan(kitchen):
+    reach = grasp(0.0)[:2]
+    plan = Task([*reach, Gripper("close", width=0.03)]).plan(kitchen, "ready", seed=1)
+    assert not plan.found
+    assert "stage 3 (Gripper 'close')" in plan.reason
+    assert "finger" in plan.reason
+    assert "attach the object" in plan.reason
+
+
+@pytest.mark.kernels
+def test_an_object_attached_from_far_away_is_noted(kitchen, carried):
+    plan = Task([Attach("cup", "panda_hand"), Straight(by=UP)]).plan(kitchen, "ready", seed=1)
+    assert plan.found, plan.reason
+    (note,) = plan.notes
+    hand_at = kitchen.robot.fk(kitchen.robot.posture("ready"), "panda_hand").translation
+    said = float(note.split(" is ")[1].split(" mm")[0]) / 1e3
+    assert note.startswith("stage 1 (Attach 'cup'): 'cup' is ")
+    assert np.linalg.norm(hand_at - CUP) - 0.3 < said < np.linalg.norm(hand_at - CUP)
+    assert carried.notes == ()
+
+
+@pytest.mark.parametrize(
+    "value", [None, 3, 1.5, "x", [], {}, [None], [[1, 2], [3]], np.nan, np.eye(3), np.ma.masked, 1j]
+)
+def test_every_argument_of_a_stage_is_taken_or_refused_in_a_line(value):
+    made = [
+        lambda: MoveTo(value),
+        lambda: Straight(by=value),
+        lambda: Straight(to=value),
+        lambda: Straight(by=UP, frame=value),
+        lambda: Attach(value, "panda_hand"),
+        lambda: Attach("cup", value),
+        lambda: Attach("cup", "panda_hand", value),
+        lambda: Detach(value),
+        lambda: Gripper(value),
+        lambda: Gripper("open", value),
+        lambda: Alternatives(value),
+        lambda: Alternatives([value]),
+        lambda: Task(value),
+    ]
+    for make in made:
+        with suppress(InputError):  # whose text is a line, always; nothing else may be raised
+            make()

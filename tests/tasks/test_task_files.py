@@ -67,6 +67,9 @@ def test_a_plan_comes_back_from_its_file_as_it_was(small, tmp_path):
     rrtik.save_task_plan(plan, tmp_path / "plan.json")
     again = rrtik.load_task_plan(tmp_path / "plan.json")
     assert again.chosen == plan.chosen == (1,)
+    assert again.end.scene.names == plan.end.scene.names
+    assert again.end.scene.attached == ()
+    assert again.notes == plan.notes
     assert [stage_data(stage) for stage in again.stages] == [stage_data(stage) for stage in plan.stages]
     for one, other in zip(plan.paths, again.paths, strict=True):
         assert np.array_equal(one.waypoints, other.waypoints)
@@ -84,7 +87,9 @@ def test_the_commands_write_what_they_say(small, tmp_path, capsys):
     assert "small: 4 motions, alternatives 2" in said
     assert "holds part" in said
     assert json.loads(out.read_text())["kind"] == "task_plan"
-    assert "motion 2 of 4: MoveTo" in html.read_text()
+    story = html.read_text()
+    assert "motion 2 of 4: MoveTo" in story
+    assert "walk (" not in story
     assert run(["straight", "titan4_sdu", "--by", "0", "0", "0.02", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["fraction"] == 1.0
     assert run(["straight", "titan4_sdu", "--by", "1", "0", "0", "--out", str(tmp_path / "part.json")]) == 1
@@ -146,5 +151,12 @@ def test_what_is_no_task_and_what_is_no_plan(tmp_path, small, capsys):
     broken.write_text('{"version": 1, "kind": "task_plan", "motions": []}')
     with pytest.raises(InputError, match=r"broken\.json"):
         rrtik.load_task_plan(broken)
+    assert run(["task", "ur5_upright"]) == 2
+    assert "'ur5_upright' is a problem, not a task" in capsys.readouterr().err
+    for command in (["straight", "panda_pick_place", "--by", "0", "0", "0.1"], ["plan", "panda_pick_place"]):
+        assert run(command) == 2
+        assert "'panda_pick_place' is a task, not a problem" in capsys.readouterr().err
+    assert run(["plan", str(small)]) == 2
+    assert "a task, not a problem" in capsys.readouterr().err
     assert run(["straight", "titan4_sdu"]) == 2
     assert "only one of them" in capsys.readouterr().err

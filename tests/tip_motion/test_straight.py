@@ -1,5 +1,7 @@
 """Straight lines, arcs and screws of the tip: on the line everywhere, as far as it goes, and said why not farther."""
 
+import time
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -7,7 +9,7 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError
 from rrtik_ompl.goal import PoseGoal
-from rrtik_ompl.tip_motion.attempts import Way, attempt
+from rrtik_ompl.tip_motion.attempts import ENDS, RANDOM_REFERENCES, Way, _leanings, attempt
 from rrtik_ompl.tip_motion.freedom import centred
 from rrtik_ompl.tip_motion.rails import arc_rail, screw_rail, straight_rail
 from rrtik_ompl.tip_motion.values import Tolerance
@@ -272,5 +274,25 @@ def test_no_line_no_arc_no_turn():
         rrtik.linear(world, UR5_READY, [])
     with pytest.raises(InputError, match="lie on a line"):
         rrtik.arc(world, UR5_READY, beside(begin, 0.0, 0.2, 0.0), beside(begin, 0.0, 0.1, 0.0))
-    with pytest.raises(InputError, match="whole turns have no axis"):
+    with pytest.raises(InputError, match="turns=1: the goal is not turned"):
         rrtik.screw(world, UR5_READY, beside(begin, 0.0, 0.2, 0.0), turns=1)
+    for turns in (1.5, "one", None, 2_000, 10**400):
+        with pytest.raises(InputError, match="turns must be a whole number"):
+            rrtik.screw(world, UR5_READY, beside(begin, 0.0, 0.2, 0.0), turns=turns)
+    with pytest.raises(InputError, match="6 joints"):
+        rrtik.straight(world, [[1.0, 2.0], [3.0]], begin)
+
+
+@pytest.mark.kernels
+def test_the_clock_does_not_decide_which_ways_a_redundant_arm_tries(monkeypatch):
+    panda = rrtik.load_robot("panda")
+    world, q = rrtik.World(panda), panda.posture("ready")
+    begin = panda.fk(q)
+    end = pin.SE3(begin.rotation, beside(begin, 0.1, 0.1, 0.0))
+    way = Way((straight_rail(begin, end),), Tolerance(1e-4, 1e-3), 0.0)
+    usual = [leaning.reference for leaning in _leanings(world, way, q, 3)]
+    real = time.monotonic
+    monkeypatch.setattr(time, "monotonic", lambda: 1e5 * real())
+    hurried = [leaning.reference for leaning in _leanings(world, way, q, 3)]
+    assert len(usual) == 2 + ENDS + RANDOM_REFERENCES
+    assert np.array_equal(usual, hurried)

@@ -178,7 +178,7 @@ function buildLegend() {
   if (story.goal && story.goal !== "joint values") addSwitch(`goal: ${story.goal}`, colors.goal, 1, toggles("goal"));
   if (story.run) {
     addSwitch("path ahead", colors.trail, 1, toggles("current path"));
-    addSwitch("before a repair", colors.before, 1, toggles("replaced path"));
+    if (story.run.replaced.some((line) => line >= 0)) addSwitch("before a repair", colors.before, 1, toggles("replaced path"));
     addSwitch("way gone", colors.trail, 0.45, toggles("trail"), false);
   } else if (story.moves.length) addSwitch("way of the tip", colors.trail, 1, toggles("trail", "beads"));
   if (story.clearance && story.clearance.unproven.length) addSwitch("not proven free", colors.unproven, 1, () => {});
