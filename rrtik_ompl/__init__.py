@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.following.servo import Servo as Servo
     from rrtik_ompl.goal import GoalSet as GoalSet
     from rrtik_ompl.goal import JointGoal as JointGoal
+    from rrtik_ompl.goal import MultiGoal as MultiGoal
     from rrtik_ompl.goal import PoseGoal as PoseGoal
     from rrtik_ompl.goal import PositionGoal as PositionGoal
     from rrtik_ompl.ik.batch import IkBatch as IkBatch
@@ -120,7 +121,7 @@ else:
         "following.follower": ("Followed", "Follower"),
         "following.links": ("RobotLink", "SimulatedLink"),
         "following.servo": ("Servo",),
-        "goal": ("GoalSet", "JointGoal", "PoseGoal", "PositionGoal"),
+        "goal": ("GoalSet", "JointGoal", "MultiGoal", "PoseGoal", "PositionGoal"),
         "ik.batch": ("IkBatch", "solve_ik_batch"),
         "ik.solve": ("IkResult", "list_ik_methods", "solve_ik"),
         "ik.trajectory": ("IkTrajectory", "solve_ik_trajectory"),

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any, TypeAlias
 
@@ -173,6 +173,13 @@ class GoalSet:
         inside: Mask = np.any([part.satisfied(robot, Q) for part in self.parts], axis=0)
         return inside
 
+    def member_at(self, robot: Robot, q: ArrayLike) -> int | None:
+        """Number of the member that a configuration, shape (dof,), reaches, from 0, the nearest of several; or None."""
+        each = self.member_errors(robot, np.atleast_2d(q))[:, 0]
+        reached = [part.satisfied(robot, np.atleast_2d(q))[0] for part in self.parts]
+        away = np.where(reached, each[:, 0] + metres_per_radian(robot) * each[:, 1], np.inf)
+        return int(away.argmin()) if any(reached) else None
+
     def member_errors(self, robot: Robot, Q: ArrayLike) -> NDArray[np.float64]:
         """Distance [m] and angle [rad] (0 for a position) of each row of Q from each member, shape (k, m, 2).
 
@@ -181,13 +188,65 @@ class GoalSet:
         return np.array([part.errors(robot, Q) for part in self.parts]).transpose(0, 2, 1)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class MultiGoal:
+    """Goals of several tips, all of them at once: an arm with two hands.
+
+    Attributes:
+        frames: Names of the links that are tips.
+        parts: The goal of each, in their order.
+
+    Example:
+        >>> import rrtik_ompl as rrtik
+        >>> left, right = (rrtik.PositionGoal([1.2, y, 0.1]) for y in (0.4, -0.4))
+        >>> goal = rrtik.MultiGoal({"left_grip_point": left, "right_grip_point": right})
+        >>> rrtik.plan(rrtik.Problem(rrtik.World(rrtik.load_robot("two_titan4")), "ready", goal), seed=1).found
+        True
+    """
+
+    frames: tuple[str, ...]
+    parts: tuple[GoalPart, ...]
+
+    def __init__(self, goals: Mapping[str, GoalPart]) -> None:
+        if not isinstance(goals, Mapping) or not goals:
+            raise InputError("goal: MultiGoal needs a goal for each tip: MultiGoal({link: PoseGoal(...), ...})")
+        for name, part in goals.items():
+            require(name, str, "tip of a MultiGoal", "name a link")
+            require(part, GoalPart, f"goal of '{name}'", "use a PoseGoal, a PositionGoal or a TaskRegion")
+        object.__setattr__(self, "frames", tuple(goals))
+        object.__setattr__(self, "parts", tuple(goals.values()))
+
+    def __reduce__(self) -> tuple[type[MultiGoal], tuple[dict[str, GoalPart]]]:
+        return MultiGoal, (dict(zip(self.frames, self.parts, strict=True)),)
+
+    def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
+        """Distances of all tips together for each row of Q, shape (m,) [m]; see :meth:`GoalSet.distance`."""
+        total: Vector = np.sum([part.distance(arm, Q) for arm, part in self._each(robot)], axis=0)
+        return total
+
+    def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
+        """In which rows of Q all tips are at their goals, shape (m,)."""
+        there: Mask = np.all([part.satisfied(arm, Q) for arm, part in self._each(robot)], axis=0)
+        return there
+
+    def _each(self, robot: Robot) -> list[tuple[Robot, GoalPart]]:
+        require(robot, Robot, "robot of a goal")
+        return [(_with_tip(robot, frame), part) for frame, part in zip(self.frames, self.parts, strict=True)]
+
+
+@lru_cache(maxsize=64)
+def _with_tip(robot: Robot, frame: str) -> Robot:
+    """The same robot, another of its links being the one that goals refer to."""
+    return replace(robot, tip=frame, closed_form=None)
+
+
 TipGoal: TypeAlias = PoseGoal | PositionGoal | TaskRegion | GoalSet
-Goal: TypeAlias = JointGoal | TipGoal
+Goal: TypeAlias = JointGoal | TipGoal | MultiGoal
 
 
-def parts_of(goal: TipGoal) -> tuple[GoalPart, ...]:
-    """The goals of which one is enough: those of a region, or the goal alone."""
-    return goal.parts if isinstance(goal, GoalSet) else (goal,)
+def parts_of(goal: TipGoal | MultiGoal) -> tuple[GoalPart, ...]:
+    """The goals of which one is enough: those of a region, or the goal alone. Of several tips all of them."""
+    return goal.parts if isinstance(goal, GoalSet | MultiGoal) else (goal,)
 
 
 def has_task_regions(goal: TipGoal) -> bool:

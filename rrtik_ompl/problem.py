@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import TAU, Vector, frozen
 from rrtik_ompl.choices import Accuracy
+from rrtik_ompl.constraints.goal_regions import goal_regions
 from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
 from rrtik_ompl.copies import as_value, shallow_copy
 from rrtik_ompl.errors import InputError, ProblemError, Renamed, require
-from rrtik_ompl.goal import Goal, JointGoal, parts_of
+from rrtik_ompl.goal import Goal, JointGoal, MultiGoal, parts_of
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.world import World
@@ -82,6 +83,8 @@ class Problem:
             wanted = JointGoal(_nearest_turn(world, self.start, ends["goal"]), wanted.tolerance)
         elif any(part.frame or part.from_start for part in parts_of(wanted) if isinstance(part, TaskRegion)):
             raise InputError("goal region: frame and from_start are for path constraints; a goal is of the tip")
+        if isinstance(wanted, MultiGoal):
+            goal_regions(world.robot, world.scene, wanted)  # refuses links that do not exist
         self.goal: Goal = wanted
 
     __copy__, __reduce__ = shallow_copy, as_value

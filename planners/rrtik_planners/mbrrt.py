@@ -9,7 +9,7 @@ from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import Goal, JointGoal
+from rrtik_ompl.goal import Goal, TipGoal
 from rrtik_ompl.ik.mb_rrt.aims import tree_aims
 from rrtik_ompl.ik.mb_rrt.axes import misfit
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop, space_bounds
@@ -58,7 +58,7 @@ class MBRRT(BiCRDT):
         if not ik_seconds > 0.0:
             raise InputError(f"ik_seconds: expected a number greater than 0, got {ik_seconds!r}")
         self.ik_seconds = ik_seconds
-        self.goal = None if isinstance(goal, JointGoal) else goal
+        self.goal = goal if isinstance(goal, TipGoal) else None
         if self.goal is not None:
             _check_fit(world)
 

@@ -9,7 +9,7 @@ from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import Goal, JointGoal, PoseGoal
+from rrtik_ompl.goal import Goal, PoseGoal, TipGoal
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
 from rrtik_ompl.ik.ikurt.tree import IkurtTree
 from rrtik_ompl.ik.method_interface import Target
@@ -34,7 +34,7 @@ class TipSeeker(SafePlanner):
     ) -> None:
         """See :class:`rrtik_planners.ikurt.IKURT`."""
         super().__init__(si, name, world=world, seed=seed)
-        self.goal = None if isinstance(goal, JointGoal) else goal
+        self.goal = goal if isinstance(goal, TipGoal) else None
         if self.goal is not None and not isinstance(world, World):
             raise InputError(f"goal: {name} needs world= to know the arm whose tip it is; or give OMPL configurations")
 

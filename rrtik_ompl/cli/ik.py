@@ -148,7 +148,7 @@ def _goal(
     """The goal that the options describe; of a problem whose goal is joint values, the pose of the tip there."""
     import numpy as np
 
-    from rrtik_ompl import JointGoal, PoseGoal
+    from rrtik_ompl import JointGoal, MultiGoal, PoseGoal
     from rrtik_ompl.poses import pose, pose_from_rpy
 
     if quaternion and rpy_deg:
@@ -158,6 +158,8 @@ def _goal(
             raise InputError("where to? give --position X Y Z, --problem NAME with a goal, or --poses FILE")
         if isinstance(given.goal, JointGoal):
             return PoseGoal(given.robot.fk(given.goal.q), **tolerances)
+        if isinstance(given.goal, MultiGoal):
+            raise InputError("the goal of --problem is of several tips: rrtik plan finds configurations for them")
         if tolerances:
             raise InputError("the goal of --problem has tolerances of its own: leave out --tolerance-mm and -deg")
         return given.goal

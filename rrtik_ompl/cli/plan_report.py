@@ -9,7 +9,7 @@ import numpy as np
 from rich import box
 from rich.table import Table
 
-from rrtik_ompl.goal import JointGoal, PositionGoal
+from rrtik_ompl.goal import GoalSet, JointGoal, PositionGoal
 from rrtik_ompl.moves.text import COLUMNS, moves_document
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, is_auto
 from rrtik_ompl.path import JointPath
@@ -111,6 +111,8 @@ def summary(
         angle = np.degrees(plan.statistics["orientation_error"])
         turned = "" if isinstance(problem.goal, PositionGoal) else f" and {angle:.2g} deg"
         lines.append(f"the tip ends {plan.statistics['position_error']:.2g} m{turned} from the goal")
+    if plan.member is not None and isinstance(problem.goal, GoalSet) and len(problem.goal.members) > 1:
+        lines.append(f"it ends at goal {plan.member + 1} of {len(problem.goal.members)}")
     checked = how_checked(problem.world, path.waypoints, path.proof)
     lines.append(f"planning {plan.seconds:.3f} s, shortening {shorten_seconds:.3f} s; valid: {checked}")
     return lines
@@ -136,6 +138,7 @@ def document(problem: Problem, plan: Plan, path: JointPath | None, shorten_secon
         "proven": proof.proven,
         "clearance": proof.clearance if proof.proven else None,
         "transitions": path.transitions,
+        "member": plan.member,
         "lower_bound": fewest_moves(problem, plan),
         "joint_names": list(path.joint_names),
         "waypoints": path.waypoints.tolist(),

@@ -11,6 +11,7 @@ from rrtik_ompl.choices import IkMethod
 from rrtik_ompl.goal import (
     GoalSet,
     JointGoal,
+    MultiGoal,
     PoseGoal,
     TipGoal,
     as_task_region,
@@ -21,6 +22,7 @@ from rrtik_ompl.goal import (
 from rrtik_ompl.ik.held_goals import held_at_goal
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.methods import METHODS, leaves_a_curve
+from rrtik_ompl.ik.multi_goals import at_all_tips
 from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric_ik
 from rrtik_ompl.ik.numeric.projection import project, projected
 from rrtik_ompl.ik.solve import DRAWS, solve_ik
@@ -95,9 +97,12 @@ class GoalSearch:
         goal, world, known = self._problem.goal, self._problem.world, len(self.rows)
         if self.exhausted or isinstance(goal, JointGoal):
             return False
-        found = self._round(goal)
-        if self._problem.constraints:
-            found = held_at_goal(self._problem, goal, found, self._rng)
+        if isinstance(goal, MultiGoal):
+            found = at_all_tips(self._problem, goal, self._rng)
+        else:
+            found = self._round(goal)
+            if self._problem.constraints:
+                found = held_at_goal(self._problem, goal, found, self._rng)
         self._rounds += 1
         free = found[world.valid_batch(found)]
         free = free[world.certify(free)]
@@ -115,6 +120,9 @@ class GoalSearch:
         if len(self._found):
             why = self._problem.world.explain(self._found[0])
             return f"{len(self._found)} configurations reach the goal, all in collision: for instance {why}"
+        if isinstance(goal, MultiGoal):
+            tips = " and ".join(f"'{frame}'" for frame in goal.frames)
+            return f"no configuration with {tips} at their goals was found in {self._rounds} rounds; are they in reach?"
         rounds = f"{self._rounds} round{'s' * (self._rounds != 1)}"
         if self._problem.constraints:
             return f"no configuration was found in {rounds} that is at the goal and keeps the path constraints"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any, get_args
 
@@ -11,6 +12,7 @@ import numpy as np
 from rrtik_ompl.arrays import not_negative, positive, whole_number
 from rrtik_ompl.choices import Accuracy, ProofMode, one_of
 from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.goal import GoalSet
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto
 from rrtik_ompl.ompl_bridge.planner_names import list_planners as list_planners
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
@@ -101,7 +103,10 @@ def plan(
     longer = not_negative(improve, "improve")
     search = _search_of(problem, planner)
     found = search(request)
-    return improved(problem, found, search, request, longer) if found.found and longer > 0.0 else found
+    found = improved(problem, found, search, request, longer) if found.found and longer > 0.0 else found
+    if found.path is None or not isinstance(problem.goal, GoalSet):
+        return found
+    return replace(found, member=problem.goal.member_at(problem.robot, found.path.end))
 
 
 def plan_counted(problem: Problem, iterations: int, *, seconds: float, seed: int) -> Plan:

@@ -45,7 +45,7 @@ def run_planner(problem: Problem, name: str, factory: PlannerFactory, request: R
         request.parameters,
         request.proof,
         request.clearance,
-        request.iterations,
+        iterations=request.iterations,
     )
     path = search.still() if _nothing_to_do(problem) else search.run()  # some planners would find a detour
     elapsed, reason = time.perf_counter() - begin - search.counting, search.reason

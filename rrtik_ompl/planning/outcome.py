@@ -49,6 +49,7 @@ class Plan:
         statistics: Plain counts, added up over all attempts: attempts, rejected paths, and the planner's own. Those
             that describe the path (``path_statistics`` of the planner's class) are the last attempt's. With
             ``improve=`` also the course of the length.
+        member: Of a goal set, the number of the member that the path reaches, from 0; None for other goals.
     """
 
     found: bool
@@ -58,6 +59,7 @@ class Plan:
     planner: str
     seed: int
     statistics: Mapping[str, Any]
+    member: int | None = None
 
     __reduce__ = as_value
 

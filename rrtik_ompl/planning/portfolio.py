@@ -10,7 +10,7 @@ from typing import Any
 
 from rrtik_ompl.errors import InputError, PlannerError
 from rrtik_ompl.fast.search.shortcut_layout import KERNELS
-from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.goal import TipGoal
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, refuse_options
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits, planners_with
 from rrtik_ompl.planning.one_planner import run_planner
@@ -88,7 +88,7 @@ def members(problem: Problem) -> tuple[str, ...]:
     """
     if problem.constraints:
         return tuple(planners_with(lambda traits: traits.keeps_constraints))
-    tip = not isinstance(problem.goal, JointGoal)
+    tip = isinstance(problem.goal, TipGoal)
     return tuple(name for name, traits in _by_turn() if tip or not traits.finds_goals)
 
 

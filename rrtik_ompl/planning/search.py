@@ -10,7 +10,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.choices import ProofMode
-from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.goal import JointGoal, TipGoal
 from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.ompl_bridge.attempt import EFFORT_ITERATIONS, EFFORT_MOTIONS, Attempt, attempt
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
@@ -57,6 +57,7 @@ class Search:
         parameters: Mapping[str, Any],
         proof: ProofMode,
         clearance: float | None,
+        *,
         iterations: int | None = None,
     ) -> None:
         self.totals: dict[str, int | float] = {"attempts": 0, "rejected": 0}
@@ -68,7 +69,7 @@ class Search:
         self._iterations = iterations if self._traits.supports_iteration_limit else None
         wanted = {"clearance": clearance} if self._traits.leaves_room and clearance is not None else {}
         self._parameters = {**wanted, **parameters}
-        self._aimless = self._traits.finds_goals and not joints
+        self._aimless = self._traits.finds_goals and isinstance(problem.goal, TipGoal)
         self._long_ways = joints and bool(problem.robot.continuous.any()) and len(seeds) > 1
         ruled = any(option in parameters for option in MOVE_RULES)
         self._check = SecondCheck(problem, name, proof, clearance, self._traits, ruled=ruled)

@@ -21,7 +21,7 @@ from rrtik_ompl.files.sections import (
     tag,
     told_apart_by,
 )
-from rrtik_ompl.goal import JOINT_TOLERANCE, Goal, GoalPart, GoalSet, JointGoal, PoseGoal, PositionGoal
+from rrtik_ompl.goal import JOINT_TOLERANCE, Goal, GoalPart, GoalSet, JointGoal, MultiGoal, PoseGoal, PositionGoal
 from rrtik_ompl.poses import pose
 from rrtik_ompl.problem_files.scene import PoseEntry, pose_data
 from rrtik_ompl.robot import Robot
@@ -160,7 +160,7 @@ Member: TypeAlias = Annotated[
     | Annotated[PositionTarget, Tag(tag("position"))]
     | Annotated[TaskRegionTarget, Tag(tag("task_region"))]
     | Annotated[AboutAxis, Tag(tag("about_axis"))],
-    told_apart_by("pose", "position", "task_region", "about_axis", what="a member of any_of"),
+    told_apart_by("pose", "position", "task_region", "about_axis", what="a goal of the tip"),
 ]
 
 
@@ -172,6 +172,16 @@ class AnyOf(Section):
     def build(self) -> GoalSet:
         """The goal."""
         return GoalSet(member.build() for member in self.any_of)
+
+
+class Tips(Section):
+    """Goals of several tips, all of them at once."""
+
+    tips: dict[Name, Member] = Field(min_length=1, description="a goal for each tip, by the name of its link")
+
+    def build(self) -> MultiGoal:
+        """The goal."""
+        return MultiGoal({frame: goal.build() for frame, goal in self.tips.items()})
 
 
 class RegionEntry(PoseTarget):
@@ -194,7 +204,7 @@ class Region(Section):
 
 
 JOINT_KEYS = ("joints_deg", "joints", "posture")
-TIP_KEYS = ("pose", "position", "any_of", "region", "task_region", "about_axis")
+TIP_KEYS = ("pose", "position", "any_of", "region", "task_region", "about_axis", "tips")
 
 StartSection: TypeAlias = Annotated[
     Annotated[JointsDeg, Tag(tag("joints_deg"))]
@@ -212,7 +222,8 @@ GoalSection: TypeAlias = Annotated[
     | Annotated[AnyOf, Tag(tag("any_of"))]
     | Annotated[Region, Tag(tag("region"))]
     | Annotated[TaskRegionTarget, Tag(tag("task_region"))]
-    | Annotated[AboutAxis, Tag(tag("about_axis"))],
+    | Annotated[AboutAxis, Tag(tag("about_axis"))]
+    | Annotated[Tips, Tag(tag("tips"))],
     told_apart_by(*JOINT_KEYS, *TIP_KEYS, what="goal"),
 ]
 
@@ -238,6 +249,8 @@ def goal_data(goal: Goal) -> dict[str, Any]:
         if goal.tolerance != JOINT_TOLERANCE:
             raise InputError(f"goal: a problem file cannot say the tolerance {goal.tolerance:g} of a joint goal")
         return {"joints": goal.q.tolist()}
+    if isinstance(goal, MultiGoal):
+        return {"tips": {frame: _part_data(part) for frame, part in zip(goal.frames, goal.parts, strict=True)}}
     if not isinstance(goal, GoalSet):
         return _part_data(goal)
     freed = goal.free_rotation_axis is not None or bool(goal.box.any())

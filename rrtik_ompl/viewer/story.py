@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.goal import Goal, GoalSet, JointGoal, PoseGoal, PositionGoal
+from rrtik_ompl.goal import Goal, GoalSet, JointGoal, MultiGoal, PoseGoal, PositionGoal
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.transitions import moved, route_length, transitions
@@ -195,6 +195,8 @@ def _goal_text(goal: Goal | None) -> str:
         return "one of several" if len(goal.members) > 1 else "tip region"
     if isinstance(goal, JointGoal):
         return "joint values"
+    if isinstance(goal, MultiGoal):
+        return f"{len(goal.frames)} tips"
     return {PoseGoal: "tip pose", PositionGoal: "tip position"}.get(type(goal), "tip region")
 
 

@@ -109,7 +109,7 @@ def test_an_example_of_contributing_runs_as_it_stands(heading, tmp_path, monkeyp
 
 
 def test_the_problem_file_loads_and_its_other_goals_can_be_reached(tmp_path):
-    text, goal = blocks("files", "yaml")
+    text, goal, tips = blocks("files", "yaml")
     file = tmp_path / "task.yaml"
     file.write_text(text)
     assert load_problem(file).world.scene.names == ("panel", "seabed")
@@ -117,6 +117,8 @@ def test_the_problem_file_loads_and_its_other_goals_can_be_reached(tmp_path):
     problem = load_problem(file)
     for member in problem.goal.members:
         assert solve_ik(problem.robot, member, near=problem.start, world=problem.world).found
+    file.write_text("version: 1\nrobot: two_titan4\nstart: {posture: ready}\n" + tips)
+    assert rrtik_ompl.plan(load_problem(file), seed=1).found
 
 
 def test_the_command_for_the_schema_prints_json(capsys):

@@ -206,7 +206,7 @@ BAD = {
     "wrong tolerance": (text(goal="{pose: {xyz: [1, 0, 0]}, tolerance: 1}"), "did you mean .*tolerance"),
     "position in 2-D": (text(goal="{position: [1, 0]}"), "goal.position: needs at least 3"),
     "nothing of any_of": (text(goal="{any_of: []}"), "goal.any_of: needs at least 1"),
-    "joints in any_of": (text(goal="{any_of: [{joints: [0, 0, 0]}]}"), r"goal\.any_of\[0\]: a member of any_of needs"),
+    "joints in any_of": (text(goal="{any_of: [{joints: [0, 0, 0]}]}"), r"goal\.any_of\[0\]: a goal of the tip needs"),
     "axis of a region": (text(goal="{region: {pose: {xyz: [1, 0, 0]}, free_rotation_axis: w}}"), "'x', 'y' or 'z'"),
     "negative region": (text(goal="{region: {pose: {xyz: [1, 0, 0]}, box: [-1, 0, 0]}}"), r"box\[0\]: must be 0 or"),
     "ranges upside down": (region("x: [0.2, 0.1]"), ":4: goal: .*x goes from 0.2 up to 0.1"),

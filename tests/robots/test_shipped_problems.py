@@ -15,6 +15,7 @@ NAMES = [
     *("puma_pose", "puma_position", "titan4_axis1", "titan4_bar", "titan4_p_axis1", "titan4_prisms"),
     *("replan_planar_arm", "replan_pockets", "replan_titan4", "replan_triangles", "replan_ur5", "replan_walls"),
     *("titan4_regular", "titan4_sdu", "titan4_valve_level", "titan4_wrist", "ur5_upright"),
+    *("panda_upright", "two_titan4"),
 ]
 SINGULAR = {
     "titan4_axis1": (11.4592, 80, 43.9549, -33.9549, 0, 17.1887),

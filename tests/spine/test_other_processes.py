@@ -68,6 +68,7 @@ VALUES = {
     "JointGoal": lambda: rrtik.JointGoal([0, 0, 0]),
     "PoseGoal": lambda: rrtik.PoseGoal(AT),
     "GoalSet": lambda: rrtik.GoalSet([rrtik.PoseGoal(AT), rrtik.PositionGoal([1, 0, 0])], "z", [1, 0, 0]),
+    "MultiGoal": lambda: rrtik.MultiGoal({"link_2": rrtik.PositionGoal([1, 0, 0]), "tip": rrtik.PoseGoal(AT)}),
     "TaskRegion": lambda: rrtik.TaskRegion(AT, np.zeros((6, 2))),
     "Box": lambda: rrtik.Box([1, 2, 3]),
     "Cylinder": lambda: rrtik.Cylinder(1, 2),

@@ -189,3 +189,4 @@ baxter_right = ExampleArm(
     tuple(f"right_{joint}" for joint in _BAXTER),
     "baxter_description/srdf/baxter_manipulation.srdf",
 )
+baxter = replace(baxter_left, name="baxter", joints=(*baxter_left.joints, *baxter_right.joints))  # both arms, two tips

@@ -18,13 +18,22 @@ from rrtik_robots.titan4.geometry import (
     limits_rad,
 )
 from rrtik_robots.titan4.inverse import closed_form
+from rrtik_robots.titan4.pair import two_titan4
 from rrtik_robots.titan4.urdf import titan4_urdf
 
 if TYPE_CHECKING:
     from rrtik_ompl.description.robot_source import BasePose
 
 
-__all__ = ["JOINTS", "LIMITS_ENVELOPE_DEG", "LIMITS_PLANNING_DEG", "TitanGeometry", "titan4", "titan4_urdf"]
+__all__ = [
+    "JOINTS",
+    "LIMITS_ENVELOPE_DEG",
+    "LIMITS_PLANNING_DEG",
+    "TitanGeometry",
+    "titan4",
+    "titan4_urdf",
+    "two_titan4",
+]
 
 FOLDER = Path(__file__).parent
 
