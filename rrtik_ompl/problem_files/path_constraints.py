@@ -6,8 +6,10 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Annotated, Any, Literal, TypeAlias
 
+import numpy as np
 from pydantic import Field, Tag
 
+from rrtik_ompl.arrays import TAU
 from rrtik_ompl.constraints.shorthands import inside, on_line, on_plane, orientation_of, upright
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.sections import Name, NotNegative, Positive, Section, Vector3, tag, told_apart_by
@@ -165,6 +167,23 @@ def build_constraints(
 
 
 def constraint_data(region: TaskRegion) -> dict[str, Any]:
-    """What the ``path_constraints:`` section of a file says about one of them."""
-    data = goal_data(region)
+    """What the ``path_constraints:`` section of a file says about one of them.
+
+    Raises:
+        InputError: If it is ``from_start`` and none that :func:`upright` makes: the format has no words for it.
+    """
+    data = _upright_data(region) if region.from_start else goal_data(region)
     return data if region.frame is None else {**data, "frame": region.frame}
+
+
+def _upright_data(region: TaskRegion) -> dict[str, Any]:
+    seen, free = region.T_world_w.rotation[:, 2], region.bounds
+    axis = int(np.argmax(seen))
+    usual = (
+        np.array_equal(free[3:5], np.zeros((2, 2)))
+        and (free[[0, 1, 2, 5], 1] - free[[0, 1, 2, 5], 0] > TAU - 1e-9).all()
+    )
+    if seen[axis] < 1.0 - 1e-9 or not usual:
+        raise InputError("path constraint: a file cannot say a region from_start other than upright")
+    tolerance = float(np.degrees(region.orientation_tolerance))
+    return {"upright": {"axis": "xyz"[axis], "tolerance_deg": tolerance}}

@@ -9,7 +9,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.errors import InputError, ProblemError
-from rrtik_ompl.goal import Goal, JointGoal, joint_difference
+from rrtik_ompl.goal import JointGoal, joint_difference
 from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
@@ -104,7 +104,7 @@ class Expander:
                 for number, row in enumerate(options_of(step)):
                     yield from self.after(replace(branch, rest=(*row, *rest), chosen=(*branch.chosen, number)))
             elif isinstance(stage, MoveTo):
-                yield from self._aims(branch, step, stage.goal)
+                yield from self._aims(branch, step, stage)
             elif isinstance(stage, Straight):
                 yield from self._line(branch, step, stage)
             else:
@@ -129,16 +129,15 @@ class Expander:
             self.failures.append((branch.before, branch.step, why))
         return not touching
 
-    def _aims(self, branch: Branch, step: Step, goal: Goal | Vector | str) -> Iterator[Branch]:
+    def _aims(self, branch: Branch, step: Step, stage: MoveTo) -> Iterator[Branch]:
         world = branch.setting.world
-        if isinstance(goal, str):
-            goal = world.robot.posture(goal)
-        search = GoalSearch(Problem(world, branch.q, goal), self.rng)
+        problem = Problem(world, branch.q, stage.goal, constraints=stage.constraints)
+        search = GoalSearch(problem, self.rng)
         search.first()
         if search.reason:
             self.failures.append((branch, step, search.reason))
         choices = Choices(branch, search)
-        if not isinstance(goal, JointGoal):
+        if not isinstance(problem.goal, JointGoal):
             self.choices.append(choices)
         yield from self._drawn(choices)
 

@@ -60,6 +60,7 @@ def _after(steps: tuple[Step, ...], states: set[Held], world: World) -> set[Held
                 with_gripper(world.robot, stage)
             elif isinstance(stage, MoveTo):
                 _check_goal(stage, world)
+                _check_frames(stage, states, world)
         except InputError as error:
             if not str(error).startswith("stage "):
                 raise InputError(f"{step}: {error}") from None
@@ -87,6 +88,18 @@ def _detached(stage: Detach, held: Held, world: World) -> Held:
             raise UnknownNameError("attached object", stage.object, world.scene.names)
         raise InputError(f"'{stage.object}' is not held here; attach it first")
     return held - {stage.object}
+
+
+def _check_frames(stage: MoveTo, states: set[Held], world: World) -> None:
+    model = world.robot.model
+    for region in stage.constraints:
+        name = region.frame
+        if name is None or model.existFrame(name):
+            continue
+        if name not in world.scene.names:
+            raise UnknownNameError("frame of a constraint", name, (*world.robot.link_names, *world.scene.names))
+        if not all(name in held for held in states):
+            raise InputError(f"the constraint's frame '{name}' is not held here; attach it first")
 
 
 def _check_goal(stage: MoveTo, world: World) -> None:

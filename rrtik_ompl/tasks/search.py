@@ -19,6 +19,7 @@ from rrtik_ompl.planning import plan_counted
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.tasks.branches import Branch, Expander, again
 from rrtik_ompl.tasks.program import Step
+from rrtik_ompl.tasks.stages import MoveTo
 from rrtik_ompl.world.kept_clearance import CLEARANCE
 
 FIRST_ITERATIONS = 4_000  # of each planner for a motion between postures; four times as much in each further round
@@ -124,14 +125,15 @@ class TaskSearch:
         before, world = link.before, link.setting.world
         assert before is not None, "it comes after another"
         assert link.step is not None, "it has done one"
+        kept = link.step.stage.constraints if isinstance(link.step.stage, MoveTo) else ()
         try:
-            problem = Problem(world, before.q, link.q, name=f"stage {link.step.number}")
+            problem = Problem(world, before.q, link.q, name=f"stage {link.step.number}", constraints=kept)
         except ProblemError as error:
             self._expander.failures.append((before, link.step, str(error)))
             return False
-        if world.motion_proven(before.q, link.q):
+        if problem.world.motion_proven(before.q, link.q):
             straight = JointPath.of(world.robot, np.stack([before.q, link.q]))
-            self._ways[id(link)] = proved_as_clear(straight, world, CLEARANCE)
+            self._ways[id(link)] = proved_as_clear(straight, problem.world, CLEARANCE)
             return True
         left = max(self._deadline - time.monotonic(), 1e-3)
         made = plan_counted(problem, FIRST_ITERATIONS * GROWTH**effort, seconds=left, seed=self._seed)

@@ -15,6 +15,7 @@ from rrtik_ompl.choices import one_of
 from rrtik_ompl.errors import InputError, listed, require
 from rrtik_ompl.goal import Goal, PoseGoal
 from rrtik_ompl.poses import rigid
+from rrtik_ompl.task_region import TaskRegion
 
 LineFrame: TypeAlias = Literal["world", "tip"]
 GripperState: TypeAlias = Literal["open", "close"]
@@ -27,11 +28,17 @@ class MoveTo:
 
     Attributes:
         goal: A goal, the name of a posture, a configuration, shape (dof,), or a pose of the tip as ``SE3`` or matrix.
+        constraints: Regions that a frame must not leave on the way, those ``from_start`` as seen from where this stage
+            begins; see :class:`rrtik_ompl.Problem`.
     """
 
     goal: Any
+    constraints: tuple[TaskRegion, ...] = ()
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "constraints", listed(self.constraints, "constraints of MoveTo"))
+        for region in self.constraints:
+            require(region, TaskRegion, "each constraint of MoveTo", "use upright, on_plane, on_line or inside")
         goal = self.goal
         if isinstance(goal, pin.SE3) or (not isinstance(goal, Goal | str) and dimensions(goal) == 2):
             goal = PoseGoal(rigid(goal, "goal of MoveTo"))

@@ -28,6 +28,7 @@ from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.goal import Goal
 from rrtik_ompl.problem_files.goal import GoalSection, Posture, StartSection, build_goal, goal_data
+from rrtik_ompl.problem_files.path_constraints import ConstraintSection, constraint_data
 from rrtik_ompl.problem_files.robot import RobotEntry
 from rrtik_ompl.problem_files.scene import PoseEntry, SceneEntry, pose_data
 from rrtik_ompl.robot import Robot
@@ -42,10 +43,14 @@ class MoveToEntry(Section):
     """Move to a goal by any way that is free."""
 
     move_to: GoalSection
+    path_constraints: list[ConstraintSection] = Field(
+        default=[], description="regions that a frame must not leave on the way"
+    )
 
     def build(self, robot: Robot) -> MoveTo:
         """The stage."""
-        return MoveTo(self.move_to.posture if isinstance(self.move_to, Posture) else build_goal(self.move_to, robot))
+        goal = self.move_to.posture if isinstance(self.move_to, Posture) else build_goal(self.move_to, robot)
+        return MoveTo(goal, tuple(section.build(robot) for section in self.path_constraints))
 
 
 class LineEntry(Section):
@@ -206,7 +211,8 @@ def stage_data(stage: Stage) -> dict[str, Any]:
     if isinstance(stage, Alternatives):
         return {"alternatives": [[stage_data(each) for each in row] for row in stage.options]}
     if isinstance(stage, MoveTo):
-        return {"move_to": _goal_data(stage.goal)}
+        held = [constraint_data(region) for region in stage.constraints]
+        return {"move_to": _goal_data(stage.goal)} | ({"path_constraints": held} if held else {})
     if isinstance(stage, Straight):
         if stage.by is not None:
             return {"straight": {"by": stage.by.tolist(), "frame": stage.frame}}
