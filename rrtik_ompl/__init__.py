@@ -99,6 +99,8 @@ if TYPE_CHECKING:
     from rrtik_ompl.tasks.plan_file import save_task_plan as save_task_plan
     from rrtik_ompl.tasks.task_file import list_tasks as list_tasks
     from rrtik_ompl.tasks.task_file import load_task as load_task
+    from rrtik_ompl.tasks.timed import TimedTask as TimedTask
+    from rrtik_ompl.tasks.timed import time_task as time_task
     from rrtik_ompl.tip_motion import StraightResult as StraightResult
     from rrtik_ompl.tip_motion import arc as arc
     from rrtik_ompl.tip_motion import linear as linear
@@ -151,6 +153,7 @@ else:
         "tasks.plan_file": ("load_task_plan", "save_task_plan"),
         "tasks.task_file": ("list_tasks", "load_task"),
         "tip_motion": ("StraightResult", "arc", "linear", "screw", "straight"),
+        "tasks.timed": ("TimedTask", "time_task"),
         "trajectory": ("RateLimits", "Trajectory", "load_trajectory", "motion_report", "time_parameterize"),
         "viewer": ("view",),
         "world": ("World",),

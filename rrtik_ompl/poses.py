@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import LARGEST, Mask, Matrix, Vector, bounded_array, finite_array, frozen
+from rrtik_ompl.arrays import LARGEST, Mask, Matrix, Vector, bounded_array, dimensions, finite_array, frozen
 from rrtik_ompl.errors import InputError
 
 IDENTITY_QUATERNION = (0.0, 0.0, 0.0, 1.0)  # x, y, z, w
@@ -60,7 +60,7 @@ def rigid(T: Any, what: str) -> Any:
         InputError: If it is none of these, has a number that is not finite, lies beyond ``LARGEST`` [m], or scales,
             skews or mirrors.
     """
-    if not isinstance(T, pin.SE3) and _is_row(T):
+    if not isinstance(T, pin.SE3) and dimensions(T) == 1:
         return _written_pose(T, what)
     matrix = finite_array(T.homogeneous if isinstance(T, pin.SE3) else T, (4, 4), what)
     x, y, z, last = matrix.tolist()  # numbers of Python's own: four rows are too few for numpy
@@ -83,13 +83,6 @@ def rigid(T: Any, what: str) -> Any:
         outer, _, inner = np.linalg.svd(matrix[:3, :3])  # the nearest rotation
         return pin.SE3(outer @ inner, matrix[:3, 3])
     return pin.SE3(matrix)
-
-
-def _is_row(values: ArrayLike) -> bool:
-    try:
-        return np.ndim(values) == 1
-    except ValueError:  # rows of unequal length, which is said where numbers are read
-        return False
 
 
 def _written_pose(numbers: ArrayLike, what: str) -> Any:

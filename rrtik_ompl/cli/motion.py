@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rrtik_ompl.choices import one_of
-from rrtik_ompl.cli.terminal import progress, say
+from rrtik_ompl.cli.terminal import TRAJECTORY_FORMATS, progress, say
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target, comma_numbers
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.path import JointPath
     from rrtik_ompl.problem import Problem as PlanningProblem
 
-TRAJECTORY_FORMATS, PLOT_FORMATS = (".json", ".csv", ".yaml", ".mcap"), (".png", ".svg")
+PLOT_FORMATS = (".png", ".svg")
 
 Problem = Annotated[str, typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.")]
 GivenPath = Annotated[Path, typer.Argument(help="A path file: .json, .csv or .txt.")]

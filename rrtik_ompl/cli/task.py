@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rrtik_ompl.cli.terminal import progress, say
+from rrtik_ompl.cli.terminal import TRAJECTORY_FORMATS, progress, say
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
+
+if TYPE_CHECKING:
+    from rrtik_ompl.tasks import TaskPlan
 
 Three = tuple[float, float, float]
 
@@ -78,6 +81,14 @@ def task(
     seconds: Annotated[float, typer.Option(help="Time limit [s].")] = 10.0,
     seed: Annotated[int, typer.Option(help="The same seed gives the same plan.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Save all motions with their worlds: .json.")] = None,
+    trajectory: Annotated[
+        Path | None,
+        typer.Option(help="Time the whole task, and save it: .json, .yaml (JointTrajectory of ROS 2), .csv or .mcap."),
+    ] = None,
+    share: Annotated[float, typer.Option(help="Of the limits of the joints, above 0 to 1: 0.5 is half as fast.")] = 1.0,
+    pause: Annotated[
+        float, typer.Option(help="Rest where a gripper works or an object is taken or put down [s].")
+    ] = 1.0,
     html: Annotated[Path | None, typer.Option(help="Write a page that plays the whole task.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> int:
@@ -86,6 +97,7 @@ def task(
     Exit code 1 if no choice of alternatives and configurations works.
     """
     check_target(out, (".json",))
+    check_target(trajectory, TRAJECTORY_FORMATS)
     check_target(html, (".html", ".htm"))
     from rrtik_ompl.tasks.plan_file import save_task_plan
     from rrtik_ompl.tasks.task_file import load_task
@@ -95,33 +107,46 @@ def task(
         plan = loaded.task.plan(loaded.world, loaded.start, seconds=seconds, seed=seed)
     if plan.found and out is not None:
         save_task_plan(plan, out)
+    duration = None if trajectory is None or not plan.found else _timed(plan, trajectory, share, pause)
     if plan.found and html is not None:
         from rrtik_ompl.viewer import view
 
         with progress("drawing"):
             view(loaded.world, plan, html=html, title=f"{loaded.name}: {len(plan.paths)} motions")
     if as_json:
-        kept = {
-            "found": plan.found,
-            "reason": plan.reason,
-            "chosen": list(plan.chosen),
-            "notes": list(plan.notes),
-            "seed": seed,
-        }
-        motions = [
-            {"stage": str(s), "waypoints": len(p.waypoints)} for s, p in zip(plan.stages, plan.paths, strict=True)
-        ]
-        print(json.dumps({**kept, "motions": motions}))
-        return 0 if plan.found else 1
-    if not plan.found:
+        print(json.dumps({**_document(plan), "seed": seed, "duration": duration}))
+    elif plan.found:
+        say(*_lines(loaded.name, plan))
+        say(*([] if duration is None else [f"  in {duration:.2f} s, each rest of {pause:g} s"]))
+        say(*(f"wrote {file}" for file in (out, trajectory, html) if file is not None))
+    else:
         say(f"{loaded.name}: not found: {plan.reason}")
-        return 1
+    return 0 if plan.found else 1
+
+
+def _document(plan: TaskPlan) -> dict[str, Any]:
+    """A plan for machines."""
+    motions = [{"stage": str(s), "waypoints": len(p.waypoints)} for s, p in zip(plan.stages, plan.paths, strict=True)]
+    kept = {"found": plan.found, "reason": plan.reason, "chosen": list(plan.chosen), "notes": list(plan.notes)}
+    return {**kept, "motions": motions}
+
+
+def _lines(name: str, plan: TaskPlan) -> list[str]:
+    """A plan for a person: a line for each motion, and its notes."""
     chosen = f", alternatives {', '.join(str(k + 1) for k in plan.chosen)}" if plan.chosen else ""
-    say(f"{loaded.name}: {len(plan.paths)} motions{chosen}")
+    lines = [f"{name}: {len(plan.paths)} motions{chosen}"]
     for number, (stage, path, world) in enumerate(zip(plan.stages, plan.paths, plan.worlds, strict=True)):
-        held = ", ".join(item.name for item in world.scene.attached)
-        proven = "proven free" if path.proven else "checked in steps"
-        say(f"  {number + 1} {stage}: {len(path.waypoints)} waypoints, {proven}" + (f", holds {held}" if held else ""))
-    say(*(f"note: {note}" for note in plan.notes))
-    say(*(f"wrote {file}" for file in (out, html) if file is not None))
-    return 0
+        names = ", ".join(item.name for item in world.scene.attached)
+        proven, held = "proven free" if path.proven else "checked in steps", f", holds {names}" if names else ""
+        lines.append(f"  {number + 1} {stage}: {len(path.waypoints)} waypoints, {proven}{held}")
+    return [*lines, *(f"note: {note}" for note in plan.notes)]
+
+
+def _timed(plan: TaskPlan, file: Path, share: float, pause: float) -> float:
+    """Time a task and save its trajectory; its duration [s]."""
+    from rrtik_ompl import RateLimits, time_task
+
+    with progress("timing"):
+        timed = time_task(plan, RateLimits.of(plan.worlds[0].robot, share=share), pause=pause)
+    timed.trajectory.save(file)
+    return timed.trajectory.duration

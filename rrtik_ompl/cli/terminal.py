@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+TRAJECTORY_FORMATS = (".json", ".csv", ".yaml", ".mcap")
+
 
 def warn(message: Warning | str, *_: Any, **__: Any) -> None:
     """Say a warning in one line, in place of ``warnings.showwarning``."""
