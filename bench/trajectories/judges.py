@@ -76,7 +76,7 @@ def by_toppra(report: Report, cases: list[Case]) -> None:
             _, speeds, _ = solver.compute_parameterization(0.0, 0.0)
             return float((2.0 * np.diff(grid) / (speeds[1:] + speeds[:-1])).sum())
 
-        grid = curve.grid()
+        grid = curve.grid()[0]
         judged, ours = theirs(grid), along_curve(curve, limits).duration
         free = Bounds.capped(np.full(len(grid), np.inf))
         search.append(fastest(grid, curve.at(grid), limits, free).duration / judged)

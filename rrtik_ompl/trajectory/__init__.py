@@ -51,7 +51,7 @@ def time_parameterize(
     With ``blend`` corners are rounded and passed without a stop, as fast as the limits allow [19]. The motion then
     leaves the path by at most 0.22 of ``blend``. Its acceleration never jumps, not even without jerk limits; it is
     proven free where it leaves the path, if the path is proven, or else checked in steps; :meth:`Trajectory.prove`
-    proves the whole motion anew, with 0.1 mm to spare, which a path nearer than that to something fails. Waypoints
+    proves the whole motion anew. Waypoints
     nearer to each other than 0.02 of ``blend`` are merged, so that many of them are one smooth curve, and no piece of
     such a curve is shorter than 1 ms. A corner that cannot be rounded is a stop; where rounding makes nothing faster
     none is rounded.

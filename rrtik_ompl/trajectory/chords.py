@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.trajectory.cubics import even_parts
-from rrtik_ompl.world import Proof
+from rrtik_ompl.world import Proof, World
 
-CHORD_SLACK = 1e-4  # [m] by which two bodies together may leave their places on the chords
+SLACKS = (1e-4, 1e-6, 1e-8)  # [m] by which two bodies together may leave their places on the chords, tried in turn
 
 
 class Chords(NamedTuple):
@@ -38,14 +39,46 @@ class Chords(NamedTuple):
         return Proof(len(self.counts), proof.clearance, tuple(unproven))
 
 
-def chords_of(durations: Vector, pushes: Vector) -> Chords:
-    """Cut pieces of a motion so that two bodies leave their places on the chords by at most ``CHORD_SLACK`` together.
+def chords_of(durations: Vector, pushes: Vector, slack: float) -> Chords:
+    """Cut pieces of a motion so that two bodies leave their places on the chords by at most ``slack`` [m] together.
 
     Over a part of duration h no coordinate leaves its chord by more than an eighth of h^2 times its acceleration.
 
     Args:
         durations: Of the pieces [s], shape (m,).
         pushes: Largest acceleration of any point of the arm during each of them [m/s^2], shape (m,).
+        slack: See above.
     """
-    counts = np.maximum(np.ceil(durations * np.sqrt(0.25 * pushes / CHORD_SLACK)), 1.0).astype(np.int64)
+    counts = np.maximum(np.ceil(durations * np.sqrt(0.25 * pushes / slack)), 1.0).astype(np.int64)
     return Chords(counts, *even_parts(counts))
+
+
+def proof_by_chords(
+    times: Vector, pushes: Vector, places: Callable[[Vector], Matrix], world: World, clearance: float, finer: int = 0
+) -> Proof:
+    """Prove the pieces of a motion, m of them; those that are not proven by chords are tried again with finer ones.
+
+    Args:
+        times: Of their ends [s], shape (m + 1,).
+        pushes: See :func:`chords_of`.
+        places: Configurations at times, shape (k,) to (k, dof).
+        world: The world.
+        clearance: To be kept from every obstacle [m].
+        finer: How many of ``SLACKS`` have been tried.
+    """
+    h, slack = np.diff(times), SLACKS[finer]
+    chords = chords_of(h, pushes, slack)
+    clock = times[chords.pieces] + chords.shares * h[chords.pieces]
+    found = chords.joined(world.prove(places(np.append(clock, times[-1])), clearance=clearance, slack=slack))
+    if found.proven or finer + 1 == len(SLACKS):
+        return found
+    unproven = np.array([gap.motion for gap in found.unproven])
+    q = places(times[unproven] + np.nan_to_num([gap.share for gap in found.unproven]) * h[unproven])
+    hopeful = world.motions_proven(q, q, clearance=clearance)  # where the motion itself is as near, no chord helps
+    gaps = [gap for gap, hope in zip(found.unproven, hopeful, strict=True) if not hope]
+    near = unproven[hopeful]
+    for stretch in np.split(near, np.flatnonzero(np.diff(near) > 1) + 1) if len(near) else ():
+        first, end = int(stretch[0]), int(stretch[-1]) + 1
+        again = proof_by_chords(times[first : end + 1], pushes[first:end], places, world, clearance, finer + 1)
+        gaps += [replace(gap, motion=first + gap.motion) for gap in again.unproven]
+    return Proof(found.motions, clearance, tuple(sorted(gaps, key=lambda gap: gap.motion)))

@@ -118,17 +118,20 @@ class Curve:
         return self.vertices[edge] + ahead * self.directions[edge]
 
     def tightest(self, places: Vector) -> Vector:
-        """The smallest radius, rounded down to a power of 2, of the corners within which places lie; inf for none."""
+        """The smallest radius, a sixth less at most, of the corners within which places lie; inf for none."""
         at, radii = self.along[1:-1], self.radii[1:-1]
-        octaves, found = np.exp2(np.floor(np.log2(np.maximum(radii, 1e-300)))), np.full(len(places), np.inf)
-        for radius in np.unique(octaves)[::-1]:
-            alike = octaves == radius
+        steps, found = np.floor(4.0 * np.log2(np.maximum(radii, 1e-300))), np.full(len(places), np.inf)
+        for step in np.unique(steps)[::-1]:
+            alike, radius = steps == step, np.exp2(0.25 * step)
             starts, ends = np.sort(at[alike] - radii[alike]), np.sort(at[alike] + radii[alike])
             found[np.searchsorted(starts, places) > np.searchsorted(ends, places)] = radius
         return found
 
-    def grid(self) -> Vector:
-        """Places from the beginning to the end, close where the curve bends: wherever its third derivative jumps."""
+    def grid(self) -> tuple[Vector, Vector]:
+        """Places from the beginning to the end, close where the curve bends: wherever its third derivative jumps.
+
+        Also the smallest radius, about, of the corners within which each lies; see :meth:`tightest`.
+        """
         at, radii = self.along[1:-1], self.radii[1:-1]
         knots = np.unique(np.concatenate([at - radii, at, at + radii, self.along[[0, -1]]]))
         knots = knots[np.concatenate([[True], np.diff(knots) > SAME_PLACE * self.length])]
@@ -140,4 +143,5 @@ class Curve:
         steps = np.minimum(steps, self.length / LEAST_STEPS)
         counts = np.maximum(np.ceil(widths / steps), 1.0).astype(np.int64)
         pieces, shares = even_parts(counts)
-        return np.append(knots[pieces] + shares * widths[pieces], self.length)
+        places = np.append(knots[pieces] + shares * widths[pieces], self.length)
+        return places, np.append(tightest[pieces], np.inf)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.fast.simd.library import library
@@ -14,6 +15,7 @@ from rrtik_ompl.fast.timing.reference import Rows
 from rrtik_ompl.trajectory.curve import Samples
 from rrtik_ompl.trajectory.limits import RateLimits
 
+CRUISE_PARTS, MOST_PARTS = 12.0, 2000  # of the least time of a cruise, and of a motion
 MOST = 1e200  # path speed squared where nothing bounds it
 
 
@@ -70,6 +72,19 @@ class PathTiming:
         found = self.grid[k] + ahead * (speeds[k] + 0.5 * ahead * push)
         return np.maximum.accumulate(np.clip(found, self.grid[0], self.grid[-1]))
 
+    def cruising(self, seconds: float) -> Vector:
+        """Path speeds at the grid, shape (m,), cut where they are higher for less than a time, or a third of it all."""
+        seconds = min(seconds, self.duration / 3.0)
+        count = int(np.clip(np.ceil(CRUISE_PARTS * self.duration / seconds), 1, MOST_PARTS))
+        places = self.places(np.linspace(0.0, self.duration, count + 1))
+        speeds = np.diff(places) * (count / self.duration)
+        width = 1 + int(seconds * count / self.duration)
+        rest = np.zeros(width)
+        least = sliding_window_view(np.concatenate([rest, speeds, rest]), width).min(axis=1)
+        cut = sliding_window_view(least, width).max(axis=1)[1 : count + 1]
+        found: Vector = np.interp(self.grid, 0.5 * (places[1:] + places[:-1]), cut)
+        return found
+
 
 def fastest(grid: Vector, samples: Samples, limits: RateLimits, bounds: Bounds) -> PathTiming:
     """The motion from rest to rest in the shortest time, along a curve that has these samples at the grid."""
@@ -88,6 +103,9 @@ def fastest(grid: Vector, samples: Samples, limits: RateLimits, bounds: Bounds) 
                 layout.GRID: grid,
                 layout.SQUARES: np.zeros(len(grid)),
                 layout.REACHED: np.zeros(len(grid)),
+                layout.LINES: np.zeros(
+                    layout.LINE * layout.line_count(len(limits.velocity), bounds.rows.first.shape[1])
+                ),
                 layout.JOINTS: len(limits.velocity),
                 layout.ROWS: bounds.rows.first.shape[1],
                 layout.POINTS: len(grid),

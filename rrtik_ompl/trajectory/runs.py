@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,10 +20,25 @@ from rrtik_ompl.trajectory.pieces import Pieces
 from rrtik_ompl.trajectory.smoothing import Spline, smoothed, steps_for, widest_window
 
 PERIOD = 1e-3  # [s] the least piece of a curve: the control period of a fast drive
-WINDOWS = (1.0, 0.6, 0.35)  # of the widest one, tried in turn
+CRUISE_SLACK = 1e-3  # of a speed, by which it may be more than is said while the acceleration changes its sign
 SHORT_WINDOW = 0.02  # [s]
 MAX_SLOWINGS = 3  # by limits of the tip or of torques; two are enough but for rounding
 SMOOTHED_SHARE = 0.12  # of a corner's radius: by which the smoothing over time alone may leave the rounded corner
+
+
+class Attempt(NamedTuple):
+    """How a motion is smoothed.
+
+    Attributes:
+        window: Largest one, of the widest that the jerk limits can ask for.
+        cruises: Whether the speed holds for as long between growing and falling: a shorter window is enough then.
+    """
+
+    window: float
+    cruises: bool = False
+
+
+ATTEMPTS = (Attempt(1.0), Attempt(0.7, cruises=True), Attempt(0.35))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,10 +108,12 @@ def along_curve(
     Raises:
         InputError: If numbers do not suffice.
     """
-    grid = curve.grid()
+    grid, tightest = curve.grid()
     shape = curve.at(grid)
     extra = None if more is None else more.bounds(shape)
-    splines = (_smooth(curve, (grid, shape, extra), limits, share) for share in _windows(limits))
+    bends = _lengths(shape.bends)
+    slow = SMOOTHED_SHARE * tightest / np.maximum(bends, 1e-300)
+    splines = (_smooth(curve, (grid, shape, extra), slow, limits, attempt) for attempt in _attempts(limits))
     tried = [_along(curve, spline if more is None else _slowed(spline, more), begin) for spline in splines]
     return min(tried, key=lambda run: (run.apart.max() > room, run.duration))
 
@@ -104,10 +122,10 @@ def _along(curve: Curve, spline: Spline, begin: float) -> Run:
     """A spline in joints and place as the run that it is."""
     knots, velocities, accelerations = (rows[:-1] for rows in spline.knots())
     n = curve.vertices.shape[1]
-    apart = np.linalg.norm(knots[:, :n] - curve.path_at(knots[:, n]), axis=1)
+    apart = _lengths(knots[:, :n] - curve.path_at(knots[:, n]))
     # a piece lies among its four control points: on an edge, if all of them lie on it
     controls, at = spline.controls[:, :n], spline.controls[:, n]
-    near = np.linalg.norm(controls - curve.path_at(at), axis=1) <= COINCIDENCE
+    near = _lengths(controls - curve.path_at(at)) <= COINCIDENCE
     edge = curve.edges(at)
     count = len(knots)
     on_path = (edge[:count] == edge[3 : 3 + count]) & np.logical_and.reduce([near[k : k + count] for k in range(4)])
@@ -115,31 +133,39 @@ def _along(curve: Curve, spline: Spline, begin: float) -> Run:
     return Run(pieces, begin + knots[:, n], apart, on_path)
 
 
-def _windows(limits: RateLimits) -> tuple[float, ...]:
-    """Shares of the widest window to try: one where it is so short that it costs nothing."""
-    return WINDOWS if widest_window(limits) > SHORT_WINDOW else (1.0,)
+def _attempts(limits: RateLimits) -> tuple[Attempt, ...]:
+    """What to try: one window where it is so short that it costs nothing."""
+    return ATTEMPTS if widest_window(limits) > SHORT_WINDOW else (Attempt(1.0),)
 
 
-def _smooth(curve: Curve, samples: tuple[Vector, Samples, Bounds | None], limits: RateLimits, share: float) -> Spline:
-    """The fastest motion that windows of up to this share of the widest one leave near the curve."""
-    widest = share * widest_window(limits)
+def _smooth(
+    curve: Curve, samples: tuple[Vector, Samples, Bounds | None], slow: Vector, limits: RateLimits, attempt: Attempt
+) -> Spline:
+    """The fastest motion that the windows of an attempt leave near the curve.
+
+    That is where the path speed squared, times a twenty-fourth of the window squared, is at most ``slow``, shape (m,).
+    """
+    window = attempt.window * widest_window(limits)
     grid, shape, extra = samples
-    bounds = _near(curve, grid, shape.bends, widest)
-    timing = fastest(grid, shape, limits, bounds if extra is None else bounds.and_also(extra))
+    bounds = Bounds.capped(2.0 * slow / (window**2 / 12.0 + PERIOD**2 / 3.0))
+    bounds = bounds if extra is None else bounds.and_also(extra)
+    timing = fastest(grid, shape, limits, bounds)
     if not np.isfinite(timing.duration) or timing.duration <= 0.0:
         raise InputError(
             f"no motion along {curve.length:.3g} rad or m could be calculated; choose limits of an ordinary size"
         )
-    step, count, most = steps_for(timing.duration, widest, PERIOD)
+    if attempt.cruises:
+        cap = np.square((1.0 + CRUISE_SLACK) * timing.cruising(window))
+        timing = fastest(grid, shape, limits, bounds.and_also(Bounds.capped(cap)))
+    step, count, most = steps_for(timing.duration, window, PERIOD)
     places = timing.places(np.linspace(0.0, timing.duration, count + 1))
     return smoothed(np.column_stack([curve.at(places).positions, places]), step, most, limits)
 
 
-def _near(curve: Curve, grid: Vector, bends: Matrix, window: float) -> Bounds:
-    """Slow enough in bends that the smoothing over time stays near them."""
-    room = SMOOTHED_SHARE * curve.tightest(grid)
-    bow = np.maximum(np.linalg.norm(bends, axis=1), 1e-300)
-    return Bounds.capped(2.0 * room / (bow * (window**2 / 12.0 + PERIOD**2 / 3.0)))
+def _lengths(rows: Matrix) -> Vector:
+    """Of each row, shape (m,)."""
+    found: Vector = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+    return found
 
 
 def _slowed(spline: Spline, more: DynamicLimits) -> Spline:

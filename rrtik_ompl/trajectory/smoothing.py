@@ -16,6 +16,7 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.trajectory.limits import ROUNDING_MARGIN, RateLimits
 
+WIDTHS = (1.0, 0.75, 0.55, 0.4, 0.25)  # of the widest window, tried in turn
 MOST_PIECES = 1250  # of a curve, about
 MOST_STEPS = 16  # of the widest window
 LEAST_PIECES = 8  # of a motion
@@ -89,7 +90,7 @@ def steps_for(duration: float, window: float, period: float) -> tuple[float, int
 
 
 def smoothed(rows: Matrix, step: float, most: int, limits: RateLimits) -> Spline:
-    """The shortest spline that keeps the limits, over all windows of up to ``most`` steps.
+    """The shortest spline that keeps the limits, over some windows of up to ``most`` steps.
 
     Args:
         rows: The motion at even steps from rest to rest, shape (m, k): coordinates of joints, then any others.
@@ -98,7 +99,8 @@ def smoothed(rows: Matrix, step: float, most: int, limits: RateLimits) -> Spline
         limits: Of the joints, the first columns.
     """
     n = len(limits.velocity)
-    splines = (Spline(controls, step) for controls in _means(rows, most))
+    widths = {int(np.ceil(share * most)) for share in WIDTHS}
+    splines = (Spline(controls, step) for controls in _means(rows, widths))
     timed = (spline.slowed(slowing(Spline(spline.controls[:, :n], step), limits)) for spline in splines)
     return min(timed, key=lambda spline: spline.duration)
 
@@ -111,14 +113,15 @@ def slowing(spline: Spline, limits: RateLimits) -> float:
     return max(1.0, most * ROUNDING_MARGIN)
 
 
-def _means(rows: Matrix, most: int) -> Iterator[Matrix]:
-    """Control points: means over windows of 1, 2, ... rows, with as many more at both ends as the spline needs."""
+def _means(rows: Matrix, widths: set[int]) -> Iterator[Matrix]:
+    """Control points: means over windows of so many rows, with as many more at both ends as the spline needs."""
     first = rows[:1]
     gaps = rows - first
     total = np.zeros((len(rows) - 1, rows.shape[1]))
-    for width in range(1, most + 1):
+    for width in range(1, max(widths) + 1):
         rest = np.broadcast_to((width - 1) * gaps[-1], (1, rows.shape[1]))
         total = np.vstack([total, rest])
         total[width - 1 :] += gaps
-        mean = first + total / width
-        yield np.vstack([mean[[0, 0]], mean, mean[[-1, -1]]])
+        if width in widths:
+            mean = first + total / width
+            yield np.vstack([mean[[0, 0]], mean, mean[[-1, -1]]])

@@ -7,7 +7,10 @@ from hypothesis import strategies as st
 
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.path import JointPath
-from rrtik_ompl.trajectory import RateLimits, time_parameterize
+from rrtik_ompl.poses import pose
+from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.shapes import Sphere
+from rrtik_ompl.trajectory import RateLimits, Trajectory, time_parameterize
 from rrtik_ompl.trajectory.corners import COINCIDENCE, first_radii, vertices
 from rrtik_ompl.trajectory.curve import Curve
 from rrtik_ompl.trajectory.fastest import Bounds, fastest
@@ -115,7 +118,7 @@ def test_a_curve_takes_as_long_as_by_toppra(seed):
         JointVelocityConstraint(velocity),
         JointAccelerationConstraint(acceleration, discretization_scheme=DiscretizationType.Interpolation),
     ]
-    grid = curve.grid()
+    grid = curve.grid()[0]
     _, speeds, _ = TOPPRA(rules, Path(), gridpoints=grid, solver_wrapper="seidel").compute_parameterization(0.0, 0.0)
     theirs = float((2.0 * np.diff(grid) / (speeds[1:] + speeds[:-1])).sum())
     free = Bounds.capped(np.full(len(grid), np.inf))
@@ -180,3 +183,21 @@ def test_a_blend_keeps_the_jerk_limit_and_is_no_slower_than_stopping(seed, blend
     motion = time_parameterize(path, limits, blend=blend, world=world)
     assert (motion.peaks().jerk <= limits.jerk * (1 + 1e-9)).all()
     assert motion.duration <= time_parameterize(path, limits).duration * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("gap", [1e-3, 5e-5, 2e-6])
+def test_a_motion_that_is_nearer_to_something_than_its_chords_is_proven(gap):
+    """Chords leave it by 0.1 mm; where that is too much, finer ones are tried."""
+    robot = load_robot("planar3", radius=0.02)
+    q = np.array([1.1, 0.2, 0.3])
+    tip, out = robot.fk(q).translation, np.array([np.cos(1.6), np.sin(1.6), 0.0])
+    ball = Obstacle("ball", Sphere(0.1), pose((tip + (0.12 + gap) * out).tolist()))
+    world = World(robot, Scene([ball]))
+    path = JointPath.of(robot, q + np.array([[0.0, 0.0, 0.0], [-0.8, 0.0, 0.0], [-1.6, 0.3, -0.4]]))
+    assert 0.5 * gap < world.clearance(q) < 2.0 * gap
+    for blend in (0.0, 0.3):
+        proof = time_parameterize(path, robot, blend=blend, world=world).prove(world)
+        assert proof.proven, proof
+    through = Trajectory([0.0, 1.0], q + np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0]]), np.zeros((2, 3)))
+    touching = World(robot, Scene([Obstacle("ball", Sphere(0.1), pose((tip + np.array([-0.25, 0.0, 0.0])).tolist()))]))
+    assert not through.prove(touching).proven

@@ -15,7 +15,7 @@ from rrtik_ompl.fast.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, set_double
 from rrtik_ompl.fast.tables.layout import DoubleArray
 from rrtik_ompl.fast.timing import layout
-from rrtik_ompl.fast.timing.layout import FLAT, ROUNDS, CurveTable, SearchTable
+from rrtik_ompl.fast.timing.layout import FLAT, MOST, ROUNDS, CurveTable, SearchTable
 
 along_of: Callable[[CurveTable], DoubleArray] = field_reader(layout.ALONG)
 radii_of: Callable[[CurveTable], DoubleArray] = field_reader(layout.RADII)
@@ -42,6 +42,7 @@ first_of: Callable[[SearchTable], DoubleArray] = field_reader(layout.FIRST)
 second_of: Callable[[SearchTable], DoubleArray] = field_reader(layout.SECOND)
 low_of: Callable[[SearchTable], DoubleArray] = field_reader(layout.LOW)
 high_of: Callable[[SearchTable], DoubleArray] = field_reader(layout.HIGH)
+lines_of: Callable[[SearchTable], DoubleArray] = field_reader(layout.LINES)
 
 
 @kernel
@@ -99,20 +100,17 @@ def sample_curve(curve: CurveTable) -> int:
 
 
 @inlined
-def narrowed(found: tuple, x: float, low: float, high: float, slope: float) -> tuple:  # type: ignore[type-arg]
-    """``found`` with one more row, which says ``low <= u - slope x <= high``."""
-    least, least_value, least_slope, most, most_value, most_slope = found
-    if high + slope * x < most:
-        most, most_value, most_slope = high + slope * x, high, slope
-    if low + slope * x > least:
-        least, least_value, least_slope = low + slope * x, low, slope
-    return least, least_value, least_slope, most, most_value, most_slope
+def set_line(lines: DoubleArray, number: int, low: float, high: float, slope: float) -> None:
+    """Line ``number`` says ``low <= u - slope x <= high``."""
+    set_double(lines, 3 * number, low)
+    set_double(lines, 3 * number + 1, high)
+    set_double(lines, 3 * number + 2, slope)
 
 
 @inlined
-def by_joints(search: SearchTable, point: int, step: float, x: float, found: tuple) -> tuple:  # type: ignore[type-arg]
-    """``found`` narrowed by the acceleration limits of a point, ``0.5 * step`` ahead of the one where x holds."""
-    n = joints_of(search)
+def joint_lines(search: SearchTable, point: int, step: float, count: int) -> int:
+    """Add lines for the acceleration limits of a point, ``0.5 * step`` ahead of the one where x holds; their number."""
+    n, lines = joints_of(search), lines_of(search)
     shape = double_row(shape_of(search), 3 * n, point)
     for k in range(n):
         second = double_at(shape, 2 * n + k)
@@ -121,14 +119,15 @@ def by_joints(search: SearchTable, point: int, step: float, x: float, found: tup
             continue
         share = 1.0 / first
         most = double_at(acceleration_of(search), k) * abs(share)
-        found = narrowed(found, x, -most, most, -second * share)
-    return found
+        set_line(lines, count, -most, most, -second * share)
+        count += 1
+    return count
 
 
 @inlined
-def by_rows(search: SearchTable, point: int, step: float, x: float, found: tuple) -> tuple:  # type: ignore[type-arg]
-    """The same by the further rows of a point."""
-    rows = rows_of(search)
+def row_lines(search: SearchTable, point: int, step: float, count: int) -> int:
+    """The same for the further rows of a point."""
+    rows, lines = rows_of(search), lines_of(search)
     firsts, seconds = double_row(first_of(search), rows, point), double_row(second_of(search), rows, point)
     lows, highs = double_row(low_of(search), rows, point), double_row(high_of(search), rows, point)
     for r in range(rows):
@@ -138,25 +137,39 @@ def by_rows(search: SearchTable, point: int, step: float, x: float, found: tuple
             continue
         share = 1.0 / first
         one, other = double_at(lows, r) * share, double_at(highs, r) * share
-        found = narrowed(found, x, min(one, other), max(one, other), -second * share)
-    return found
+        set_line(lines, count, min(one, other), max(one, other), -second * share)
+        count += 1
+    return count
+
+
+@kernel
+def lines_at(search: SearchTable, point: int) -> int:
+    """Write down which path accelerations are allowed at a point and lead to where the end can be reached from.
+
+    Gives the number of lines. The first of them is about the next point, its x between 0 and what is reached there.
+    """
+    step = 2.0 * (double_at(grid_of(search), point + 1) - double_at(grid_of(search), point))
+    set_line(lines_of(search), 0, 0.0, double_at(reached_of(search), point + 1) / step, -1.0 / step)
+    count = joint_lines(search, point, 0.0, 1)
+    count = joint_lines(search, point + 1, step, count)
+    if rows_of(search) > 0:
+        count = row_lines(search, point, 0.0, count)
+        count = row_lines(search, point + 1, step, count)
+    return count
 
 
 @inlined
-def accelerations_at(search: SearchTable, point: int, x: float) -> tuple:  # type: ignore[type-arg]
-    """Which path accelerations are allowed at a point, with x there, and lead to where the end can be reached from.
-
-    The lowest one, and of the row that says so its value at x = 0 and its slope; the same of the highest one.
-    """
-    step = 2.0 * (double_at(grid_of(search), point + 1) - double_at(grid_of(search), point))
-    up = double_at(reached_of(search), point + 1) / step
-    found = (-x / step, 0.0, -1.0 / step, up - x / step, up, -1.0 / step)
-    found = by_joints(search, point, 0.0, x, found)
-    found = by_joints(search, point + 1, step, x, found)
-    if rows_of(search) > 0:
-        found = by_rows(search, point, 0.0, x, found)
-        found = by_rows(search, point + 1, step, x, found)
-    return found
+def highest(lines: DoubleArray, count: int, x: float) -> tuple:  # type: ignore[type-arg]
+    """The lowest and the highest path acceleration that are allowed with x, and the lines that say so."""
+    least, most, below, above = -MOST, MOST, 0, 0
+    for k in range(count):
+        part = double_at(lines, 3 * k + 2) * x
+        low, high = double_at(lines, 3 * k) + part, double_at(lines, 3 * k + 1) + part
+        if low > least:
+            least, below = low, k
+        if high < most:
+            most, above = high, k
+    return least, most, below, above
 
 
 @kernel
@@ -178,13 +191,15 @@ def cap_by_joints(search: SearchTable, point: int) -> float:
 @kernel
 def largest_square(search: SearchTable, point: int) -> float:
     """The largest x of a point from which the end is reached."""
-    x = cap_by_joints(search, point)
+    x, lines = cap_by_joints(search, point), lines_of(search)
+    count = lines_at(search, point)
     for _ in range(ROUNDS):
-        low, low_value, low_slope, high, high_value, high_slope = accelerations_at(search, point, x)
+        low, high, below, above = highest(lines, count, x)
         if high >= low:
             return x
-        fall = low_slope - high_slope
-        nearer = (high_value - low_value) / fall if fall > 0.0 else 0.0
+        fall = double_at(lines, 3 * below + 2) - double_at(lines, 3 * above + 2)
+        gap = double_at(lines, 3 * above + 1) - double_at(lines, 3 * below)
+        nearer = gap / fall if fall > 0.0 else 0.0
         if not nearer < x:
             nearer = x * (1.0 - 1e-9)  # rounding alone keeps it there
         x = max(nearer, 0.0)
@@ -201,8 +216,8 @@ def find_squares(search: SearchTable) -> int:
     x = 0.0
     set_double(squares, 0, x)
     for i in range(points - 1):
-        found = accelerations_at(search, i, x)
-        x += 2.0 * (double_at(grid, i + 1) - double_at(grid, i)) * found[3]
+        found = highest(lines_of(search), lines_at(search, i), x)
+        x += 2.0 * (double_at(grid, i + 1) - double_at(grid, i)) * found[1]
         x = min(max(x, 0.0), double_at(reached, i + 1))
         set_double(squares, i + 1, x)
     return 0

@@ -55,6 +55,7 @@ def test_the_fastest_motion(seed, n, extra):
         {layout.SHAPE: shape, layout.VELOCITY: velocity, layout.ACCELERATION: acceleration}
         | dict(zip((layout.FIRST, layout.SECOND, layout.LOW, layout.HIGH), rows, strict=True))
         | {layout.CAP: cap, layout.GRID: grid, layout.SQUARES: np.zeros(60), layout.REACHED: np.zeros(60)}
+        | {layout.LINES: np.zeros(layout.LINE * layout.line_count(n, extra))}
         | {layout.JOINTS: n, layout.ROWS: extra, layout.POINTS: 60}
     )
     library(layout.KERNELS).find_squares(task.address)
