@@ -221,7 +221,7 @@ def _recipe(name: str | os.PathLike[str]) -> _Recipe:
     if suffix in (".urdf", ".xml", ".xacro"):
         return _Recipe("urdf", str(path.resolve()), lambda **given: robot_from_urdf(path, **given), URDF_OPTIONS)
     if os.path.isdir(path):
-        from rrtik_ompl.description.moveit_config import CONFIG_OPTIONS, robot_from_moveit
+        from rrtik_ompl.description.moveit.config import CONFIG_OPTIONS, robot_from_moveit
 
         return _Recipe("moveit", str(path.resolve()), lambda **given: robot_from_moveit(path, **given), CONFIG_OPTIONS)
     if path.parent != Path() or os.path.exists(path):  # which takes a name of any length

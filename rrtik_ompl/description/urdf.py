@@ -8,11 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rrtik_ompl.description.joint_limits import merge_limits, read_joint_limits
+from rrtik_ompl.description.moveit.joint_limits import merge_limits, read_joint_limits
+from rrtik_ompl.description.moveit.srdf import Srdf, read_srdf
+from rrtik_ompl.description.moveit.srdf_gripper import srdf_gripper
 from rrtik_ompl.description.robot_build import JointLimits, build_robot
 from rrtik_ompl.description.robot_source import source_entry
-from rrtik_ompl.description.srdf import Srdf, read_srdf
-from rrtik_ompl.description.srdf_gripper import srdf_gripper
 from rrtik_ompl.description.urdf_read import UrdfDescription, located, read_urdf
 from rrtik_ompl.description.xacro_text import robot_text
 from rrtik_ompl.errors import InputError, UnknownNameError

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.description.joint_limits import read_joint_limits
+from rrtik_ompl.description.moveit.joint_limits import read_joint_limits
 from rrtik_ompl.errors import InputError, RrtikError, UnknownNameError
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_files.problem import load_problem, save_problem

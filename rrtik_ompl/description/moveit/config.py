@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from rrtik_ompl.description.moveit.srdf import Srdf, read_srdf
 from rrtik_ompl.description.package_path import package_folder
-from rrtik_ompl.description.srdf import Srdf, read_srdf
 from rrtik_ompl.description.urdf import URDF_OPTIONS, package_roots, robot_from_urdf
 from rrtik_ompl.description.urdf_read import read_urdf
 from rrtik_ompl.description.xacro_text import robot_text

@@ -11,8 +11,8 @@ import coal
 import pinocchio as pin
 
 from rrtik_ompl.description.gripper import GripperJoints
+from rrtik_ompl.description.moveit.srdf import Srdf
 from rrtik_ompl.description.robot_build import Mimic
-from rrtik_ompl.description.srdf import Srdf
 from rrtik_ompl.description.tree import Tree
 from rrtik_ompl.description.tree_model import build_models
 from rrtik_ompl.errors import InputError
