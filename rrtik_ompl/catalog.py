@@ -37,8 +37,8 @@ RobotOption: TypeAlias = (
     str | float | os.PathLike[str] | Mapping[str, object] | Sequence[object] | NDArray[np.float64] | pin.SE3 | None
 )
 
-FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh", "moveit")
-FILE_KINDS = (".urdf", ".xml", ".xacro", ".yaml", ".yml")
+FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh", "moveit", "mjcf")
+FILE_KINDS = (".urdf", ".xml", ".mjcf", ".xacro", ".yaml", ".yml")
 PARAMETRIC = ("planar", "point2d")  # robots that a problem file describes by a group of keys of their own
 MOUNTING = ("base_pose", "tip", "padding")  # keys that stand beside that group
 
@@ -130,7 +130,7 @@ def load_robot(name: str | os.PathLike[str], **options: RobotOption) -> Robot:
 
     Args:
         name: A name from `list_robots`; or the path of a URDF (``.urdf``, ``.xml``; ``.xacro`` needs the package
-            xacro), of a DH table (``.yaml``), or of a MoveIt configuration folder.
+            xacro), of an MJCF (``.xml``, ``.mjcf``), of a DH table (``.yaml``), or of a MoveIt configuration folder.
         **options: What the robot takes: any of them ``padding`` (see `rrtik_ompl.padded`), and ``base_pose``, ``tip``
             and ``locked`` where they apply; a URDF ``srdf, group, joints, joint_limits, packages, xacro_args``, a
             folder also ``urdf``; a shipped robot for instance ``limits="envelope"``.
@@ -163,6 +163,7 @@ def robot_from_entry(entry: str | Mapping[str, Any], folder: str | os.PathLike[s
 
     Args:
         entry: A name; or ``{name: .., options}``, ``{urdf: FILE, options}``, ``{moveit: FOLDER, options}``,
+            ``{mjcf: FILE, options}``,
             ``{dh: FILE, options}``, ``{planar: {..}}``, ``{point2d: {..}}``; the last two take ``base_pose`` beside
             them.
         folder: Folder of the problem file; files are named relative to it.
@@ -172,7 +173,7 @@ def robot_from_entry(entry: str | Mapping[str, Any], folder: str | os.PathLike[s
     """
     if isinstance(entry, str):
         return load_robot(_beside(entry, folder) if Path(entry).suffix.lower() in FILE_KINDS else entry)
-    kinds = ("name", "moveit", "urdf", "dh", *PARAMETRIC)
+    kinds = ("name", "moveit", "mjcf", "urdf", "dh", *PARAMETRIC)
     if not isinstance(entry, Mapping):
         raise InputError(f"robot: expected a name or one of the keys {', '.join(kinds)}")
     found = [key for key in kinds if key in entry and not (key == "urdf" and "moveit" in entry)]
@@ -218,6 +219,11 @@ def _recipe(name: str | os.PathLike[str]) -> _Recipe:
         from rrtik_ompl.description.dh_file import DH_OPTIONS, robot_from_dh_file
 
         return _Recipe("dh", str(path.resolve()), lambda **given: robot_from_dh_file(path, **given), DH_OPTIONS)
+    if suffix in (".xml", ".mjcf"):
+        from rrtik_ompl.description.mjcf import MJCF_OPTIONS, is_mjcf, robot_from_mjcf
+
+        if is_mjcf(path):
+            return _Recipe("mjcf", str(path.resolve()), lambda **given: robot_from_mjcf(path, **given), MJCF_OPTIONS)
     if suffix in (".urdf", ".xml", ".xacro"):
         return _Recipe("urdf", str(path.resolve()), lambda **given: robot_from_urdf(path, **given), URDF_OPTIONS)
     if os.path.isdir(path):

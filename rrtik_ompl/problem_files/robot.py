@@ -22,7 +22,7 @@ from rrtik_ompl.files.sections import (
 )
 from rrtik_ompl.problem_files.scene import PoseEntry, pose_data
 
-PATH_KEYS = ("urdf", "srdf", "joint_limits", "dh", "moveit", "packages")
+PATH_KEYS = ("urdf", "srdf", "joint_limits", "dh", "moveit", "mjcf", "packages")
 
 
 class _Mounted(Section):
@@ -99,6 +99,15 @@ class MoveitRobot(_Described):
     urdf: Name | None = Field(None, description="a URDF in place of the one that the folder names")
 
 
+class MjcfRobot(_Mounted):
+    """An arm described by an MJCF file of MuJoCo."""
+
+    mjcf: Name
+    joints: Annotated[list[Name], Field(min_length=1)] | None = Field(None, description="joints that move, in order")
+    joint_limits: Name | None = Field(None, description="file in the format of joint_limits.yaml")
+    locked: dict[Name, Number] | None = Field(None, description="values of joints that are held still [rad or m]")
+
+
 class DhRobot(_Mounted):
     """An arm described by a file with a Denavit-Hartenberg table."""
 
@@ -111,9 +120,10 @@ RobotEntry: TypeAlias = Annotated[
     | Annotated[PlanarRobot, Tag(tag("planar"))]
     | Annotated[Point2dRobot, Tag(tag("point2d"))]
     | Annotated[MoveitRobot, Tag(tag("moveit"))]
+    | Annotated[MjcfRobot, Tag(tag("mjcf"))]
     | Annotated[UrdfRobot, Tag(tag("urdf"))]
     | Annotated[DhRobot, Tag(tag("dh"))],
-    told_apart_by("name", "moveit", "planar", "point2d", "urdf", "dh", what="robot", text="a name"),
+    told_apart_by("name", "moveit", "mjcf", "planar", "point2d", "urdf", "dh", what="robot", text="a name"),
 ]
 
 
