@@ -40,9 +40,9 @@ def panel_routes(count: int) -> PanelRoutes:
     for number in range(count + 1):
         kind, level = green[number % len(green)]
         session.seed = number
-        session.command("grasp", 1.0, type=kind, level=level)
+        session.command("grasp", session.time, type=kind, level=level)
         clock, processor = time.perf_counter(), time.process_time()
-        session.command("plan", 1.0)
+        session.command("plan", session.time)
         if number == 0:
             continue
         found.clock.append(time.perf_counter() - clock)

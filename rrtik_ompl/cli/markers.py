@@ -113,6 +113,13 @@ def sense(
         Path | None, typer.Option(help="Write the last picture with the detected objects: .png, .jpg.")
     ] = None,
     sigmas: Annotated[float, typer.Option(help="Margins of obstacles, in standard deviations; 0: none.")] = 3.0,
+    independent: Annotated[
+        bool | None,
+        typer.Option(
+            "--independent/--over-time",
+            help="Each picture by itself, or as a film, smoothed over time. Left out: a folder's by themselves.",
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object a picture.")] = False,
 ) -> int:
     """Print the poses of marked objects, from pictures."""
@@ -124,7 +131,8 @@ def sense(
     from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
     from rrtik_ompl.sensing.sensor import Sensor
 
-    sensor = Sensor(load_camera(camera), load_marker_map(marker_map), sigmas=sigmas)
+    alone = Path(source).is_dir() if independent is None else independent
+    sensor = Sensor(load_camera(camera), load_marker_map(marker_map), smooth=not alone, sigmas=sigmas)
     view = None
     for view in _views(sensor, source, frames):
         say(json.dumps(view.document())) if as_json else say(*view.lines())

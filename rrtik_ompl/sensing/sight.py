@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
+from rrtik_ompl.arrays import frozen
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.alignment import MIN_LIKENESS
@@ -20,6 +22,7 @@ from rrtik_ompl.sensing.markers.corner_pose import (
     pose_of_square,
 )
 from rrtik_ompl.sensing.markers.detection import SeenMarker, find_markers
+from rrtik_ompl.sensing.markers.lens_bend import lens_bend
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
 
 MIN_SIDE_PIXELS = 12.0  # two a cell of the coarsest dictionaries
@@ -112,18 +115,28 @@ def sighting(camera: Camera, thing: MarkedObject, seen: Sequence[SeenMarker]) ->
         return None
     sharp = [marker for marker in usable if marker.likeness >= MIN_LIKENESS]
     sigma = ALIGNED_SIGMA if sharp else ROUGH_SIGMA
-    usable = sharp or usable
+    usable = [_straightened(camera, marker, mounted[marker.number].side) for marker in sharp] or usable
     if len(usable) == 1:
         pose = _of_one(camera, usable[0], mounted[usable[0].number], sigma)
     else:
         points = np.vstack([mounted[m.number].corners for m in usable])
-        pose = pose_of_points(camera, np.vstack([m.corners for m in usable]), points, sigma)
+        spread = None if any(m.spread is None for m in usable) else block_diag(*(m.spread for m in usable))
+        pose = pose_of_points(camera, np.vstack([m.corners for m in usable]), points, sigma, spread)
     return Sighting(thing, pose, own, _refusal(pose, usable))
+
+
+def _straightened(camera: Camera, marker: SeenMarker, side: float) -> SeenMarker:
+    """A marker without what the lens bends within it; half of that is doubted."""
+    bend = lens_bend(camera, marker.corners, side)
+    if marker.spread is None or not bend.any():
+        return marker
+    doubt = float((0.5 * bend.ravel()) @ (0.5 * bend.ravel())) / 8.0
+    return replace(marker, corners=frozen(marker.corners - bend), spread=frozen(marker.spread + doubt * np.eye(8)))
 
 
 def _of_one(camera: Camera, marker: SeenMarker, mounted: MountedMarker, sigma: float) -> CornerPose:
     """The pose of the object from that of its only visible marker."""
-    found = pose_of_square(camera, marker.corners, mounted.side, sigma)
+    found = pose_of_square(camera, marker.corners, mounted.side, sigma, marker.spread)
     T_marker_object = mounted.T_object_marker.inverse()
     first = found.T_camera_object * T_marker_object
     second = None if found.other is None else found.other * T_marker_object

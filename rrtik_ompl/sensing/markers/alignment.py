@@ -3,18 +3,22 @@
 The criterion is the enhanced correlation coefficient of Evangelidis and Psarakis, 2008 [52], which does not change
 with brightness and contrast; the motion is a homography. Four corners alone are pulled inwards by blur, by as much
 as 0.2 pixels; all edges of all cells together are not, if the ideal marker is blurred as the picture is: as much, and
-evenly in the picture, so unevenly on a marker that is tilted.
+evenly in the picture, so unevenly on a marker that is tilted. Blur is blur of light: the ideal marker is blurred first,
+and then shown by the tone curve, and cut off where white is, with which it is most like the picture (`cameras.tone`).
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.sensing.cameras.tone import LINEAR, SRGB, TONES
+from rrtik_ompl.sensing.markers.corner_spread import corner_spread
+from rrtik_ompl.sensing.markers.lighting import shown
 
 Pixels = NDArray[np.float32]
 
@@ -25,19 +29,42 @@ _RIM_CELLS = 0.5  # width of the white rim that is used; farther out blur mixes 
 _DEFAULT_SPOT = 0.8  # standard deviation of a sharp picture's blur: lens, photosite, interpolation [pixels]
 _SPOTS = _DEFAULT_SPOT * 1.5 ** np.arange(-2, 3)  # that are tried
 _SPOT_TOLERANCE = 0.1  # relative difference below which no second alignment is made
+_TONE_TOLERANCE = 0.05
+_ROUNDS = 3  # of alignment, each with what was learned of the picture in the one before
+_LINEAR_BELOW = 0.35  # a smaller tone is taken for that of a linear camera, which coarse sampling makes look larger
+_EVERY = 2  # of the ideal picture's samples in a row are looked at where the way that light is shown is searched for
 _STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 1e-6)
 
 
-def aligned_corners(gray: NDArray[np.uint8], corners: Matrix, cells: NDArray[np.uint8]) -> tuple[Matrix, float]:
-    """Sharper corners of a marker that was found, and how well the ideal marker fits the picture.
+class Aligned(NamedTuple):
+    """A marker that was aligned with a picture.
+
+    Attributes:
+        corners: Shape (4, 2) [pixels].
+        likeness: Correlation of the ideal marker with the picture, from 0 to 1.
+        spread: Covariance of the corners' eight numbers, shape (8, 8) [pixels^2]; None where they were not aligned.
+        tone: Of the picture (`cameras.tone`), NaN where they were not aligned.
+    """
+
+    corners: Matrix
+    likeness: float
+    spread: Matrix | None
+    tone: float
+
+
+def aligned_corners(
+    gray: NDArray[np.uint8], corners: Matrix, cells: NDArray[np.uint8], tone: float | None = None
+) -> Aligned:
+    """Sharper corners of a marker that was found, how sure they are, and how well the ideal marker fits the picture.
 
     Args:
         gray: The picture. Shape (height, width).
         corners: As found, within a few pixels. Shape (4, 2).
         cells: The ideal marker, its border included. Shape (n, n).
+        tone: Of the picture; None: the one with which the marker fits best.
 
     Returns:
-        Corners, shape (4, 2), and likeness from 0 to 1. Below `MIN_LIKENESS` the corners are returned unchanged.
+        Below `MIN_LIKENESS` the corners are returned unchanged.
     """
     count, side = len(cells), float(np.linalg.norm(np.roll(corners, -1, 0) - corners, axis=1).mean())
     cell = int(np.clip(round(side / count), *_CELL_PIXELS))
@@ -45,45 +72,86 @@ def aligned_corners(gray: NDArray[np.uint8], corners: Matrix, cells: NDArray[np.
     square = np.array([[0, 0], [count, 0], [count, count], [0, count]], dtype=np.float64) * cell + rim - 0.5
     low, piece = _neighbourhood(gray, corners, margin=int(0.35 * side) + 4)
     guess = cv2.getPerspectiveTransform(square.astype(np.float32), (corners - low).astype(np.float32))
+    ideal = _ideal(cells, cell, rim)
     try:
-        likeness, homography = _aligned(_ideal(cells, cell, rim), piece, guess.astype(np.float32))
+        fit = _aligned(ideal, piece, guess.astype(np.float32), tone)
     except cv2.error:  # the alignment did not converge
-        return corners, 0.0
-    better = cv2.perspectiveTransform(square[:, None], homography.astype(np.float64))[:, 0] + low
-    if np.abs(better - corners).max() > max(2.0, _MAX_CORNER_SHIFT * side):
-        return corners, 0.0
-    return (better if likeness >= MIN_LIKENESS else corners), likeness
+        return Aligned(corners, 0.0, None, np.nan)
+    moved = cv2.perspectiveTransform(square[:, None], fit.homography.astype(np.float64))[:, 0]
+    better = np.asarray(moved, dtype=np.float64)
+    if np.abs(better + low - corners).max() > max(2.0, _MAX_CORNER_SHIFT * side):
+        return Aligned(corners, 0.0, None, np.nan)
+    if fit.likeness < MIN_LIKENESS:
+        return Aligned(corners, fit.likeness, None, fit.tone)
+    return Aligned(better + low, fit.likeness, corner_spread(fit.model, fit.seen, square, better), fit.tone)
 
 
-def _aligned(ideal: Pixels, piece: Pixels, homography: Pixels) -> tuple[float, Pixels]:
-    """Likeness and the homography from the ideal marker to a picture, whose blur is estimated too."""
-    likeness, rough = _fitted(ideal, piece, homography, _DEFAULT_SPOT)
-    spot = _spot(ideal, piece, rough)
-    if abs(spot - _DEFAULT_SPOT) < _SPOT_TOLERANCE * _DEFAULT_SPOT:
-        return likeness, rough
-    return _fitted(ideal, piece, rough, spot)
+class _Fit(NamedTuple):
+    """The ideal marker as the picture would show it, the picture in its frame, and what leads from one to the other."""
+
+    likeness: float
+    homography: Pixels
+    model: Pixels
+    seen: Pixels
+    tone: float
 
 
-def _fitted(ideal: Pixels, piece: Pixels, homography: Pixels, spot: float) -> tuple[float, Pixels]:
+def _aligned(ideal: Pixels, piece: Pixels, homography: Pixels, tone: float | None) -> _Fit:
+    """The homography from the ideal marker to a picture, whose blur, tone and light are estimated too."""
+    starts, tones = ((LINEAR, SRGB), TONES) if tone is None else ((tone,), (tone,))
+    fits = [_fit(ideal, piece, homography, (_DEFAULT_SPOT, start)) for start in starts]
+    best, before = max(fits, key=lambda fit: fit.likeness), _DEFAULT_SPOT
+    for number in range(_ROUNDS):
+        spot, curve = _spot_and_tone(ideal, best.seen, _spread(best.homography, ideal.shape), tones)
+        curve = LINEAR if tone is None and abs(curve) < _LINEAR_BELOW else curve
+        if number > 1 and abs(spot - before) < _SPOT_TOLERANCE * before and abs(curve - best.tone) < _TONE_TOLERANCE:
+            break
+        best, before = _fit(ideal, piece, best.homography, (spot, curve)), spot
+    return best
+
+
+def _fit(ideal: Pixels, piece: Pixels, homography: Pixels, look: tuple[float, float]) -> _Fit:
+    """The homography for a blur [pixels] and a tone."""
+    blurred = _blurred(ideal, look[0] ** 2 * _spread(homography, ideal.shape))
+    model = shown(blurred, _warped(piece, homography, ideal.shape), look[1])
+    likeness, better = _fitted(model, piece, homography)
+    return _Fit(likeness, better, model, _warped(piece, better, ideal.shape), look[1])
+
+
+def _fitted(model: Pixels, piece: Pixels, homography: Pixels) -> tuple[float, Pixels]:
     align: Any = cv2.findTransformECC  # its type requires a mask where None is allowed
-    blurred = _blurred(ideal, spot**2 * _spread(homography, ideal.shape))
-    likeness, better = align(blurred, piece, homography, cv2.MOTION_HOMOGRAPHY, _STOP, None, 1)
+    likeness, better = align(model, piece, homography, cv2.MOTION_HOMOGRAPHY, _STOP, None, 1)
     return float(likeness), better
 
 
-def _spot(ideal: Pixels, piece: Pixels, homography: Pixels) -> float:
-    """Standard deviation of the blur with which the ideal marker is most like the picture [pixels]."""
+def _warped(piece: Pixels, homography: Pixels, shape: tuple[int, ...]) -> Pixels:
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    seen = cv2.warpPerspective(piece, homography, ideal.shape[::-1], flags=flags)
-    spread = _spread(homography, ideal.shape)
-    rows = np.stack([_blurred(ideal, spot**2 * spread).ravel() for spot in _SPOTS])
-    rows -= rows.mean(axis=1, keepdims=True)
-    likeness = rows @ (seen.ravel() - seen.mean()) / np.sqrt((rows**2).sum(axis=1))
-    best = int(np.clip(likeness.argmax(), 1, len(_SPOTS) - 2))
-    low, middle, high = likeness[best - 1 : best + 2]
+    return np.asarray(cv2.warpPerspective(piece, homography, shape[::-1], flags=flags), dtype=np.float32)
+
+
+def _spot_and_tone(ideal: Pixels, seen: Pixels, spread: Matrix, tones: tuple[float, ...]) -> tuple[float, float]:
+    """Blur [pixels] and tone with which the ideal marker is most like the picture, at every second sample."""
+    few, table = seen[::_EVERY, ::_EVERY], np.empty((len(tones), len(_SPOTS)))
+    middle = few.ravel() - few.mean()
+    for k, spot in enumerate(_SPOTS):
+        light = _blurred(ideal, spot**2 * spread)[::_EVERY, ::_EVERY]
+        for t, tone in enumerate(tones):
+            model = shown(light, few, tone).ravel()
+            model -= model.mean()
+            table[t, k] = model @ middle / np.sqrt(model @ model + 1e-9)
+    t, k = divmod(int(table.argmax()), len(_SPOTS))
+    found = float(_SPOTS[0] * (_SPOTS[1] / _SPOTS[0]) ** _peak(table[t]))
+    if len(tones) == 1:
+        return found, tones[0]
+    return found, float(np.clip(tones[0] + (tones[1] - tones[0]) * _peak(table[:, k]), tones[0], tones[-1]))
+
+
+def _peak(values: NDArray[np.floating[Any]]) -> float:
+    """Where between the places of some values the parabola through the largest and its neighbours is largest."""
+    best = int(np.clip(values.argmax(), 1, len(values) - 2))
+    low, middle, high = (float(value) for value in values[best - 1 : best + 2])
     bend = low - 2.0 * middle + high
-    aside = float(np.clip(0.5 * (low - high) / bend, -1.0, 1.0)) if bend < 0.0 else 0.0
-    return float(_SPOTS[best] * (_SPOTS[1] / _SPOTS[0]) ** aside)
+    return best + (float(np.clip(0.5 * (low - high) / bend, -1.0, 1.0)) if bend < 0.0 else 0.0)
 
 
 def _ideal(cells: NDArray[np.uint8], cell: int, rim: int) -> Pixels:

@@ -21,6 +21,7 @@ MIN_ERROR_RATIO = 6.0  # of the two errors of a square; below it are 27 % of nea
 CHANCE_ERROR = 0.015  # [pixels]: four corners that agree better do so by chance
 ALIGNED_SIGMA = 0.02  # error of a corner [pixels]: a quarter is noise of 1 %, the rest lens and blur
 ROUGH_SIGMA = 0.2  # blur pulls corners that were not aligned inwards by as much
+MAX_SURPRISE = 6.0  # squared deviations that chance makes of a square; what exceeds them enlarges the covariance
 MAX_DISTANCE = 1e4  # [m]
 MIN_BRANCH_ANGLE = 1e-3  # [rad]: minima that are nearer to each other are one; distinct ones are 0.03 apart and more
 _MAX_STEPS = 40
@@ -71,8 +72,18 @@ def square_corners(side: float) -> Matrix:
     return np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
 
 
-def pose_of_square(camera: Camera, pixels: Matrix, side: float, sigma: float = ALIGNED_SIGMA) -> CornerPose:
-    """Pose of one marker of a given side [m] from its four corners. Shape of ``pixels``: (4, 2)."""
+def pose_of_square(
+    camera: Camera, pixels: Matrix, side: float, sigma: float = ALIGNED_SIGMA, spread: Matrix | None = None
+) -> CornerPose:
+    """Pose of one marker from its four corners.
+
+    Args:
+        camera: Of the picture.
+        pixels: Of the corners, shape (4, 2).
+        side: Of the marker [m].
+        sigma: Error of a corner [pixels].
+        spread: Covariance of the corners in place of it, shape (8, 8) [pixels^2].
+    """
     points = square_corners(side)
     # Exactly in front of the camera the closed form fails: not a number, or a marker that faces away.
     guesses = _guesses(camera, points, pixels, cv2.SOLVEPNP_IPPE_SQUARE) or _guesses(camera, points, pixels)
@@ -84,14 +95,19 @@ def pose_of_square(camera: Camera, pixels: Matrix, side: float, sigma: float = A
         merged = turn_between(first, refined[1 - best]) < MIN_BRANCH_ANGLE
         other = max(guesses, key=lambda guess: turn_between(first, guess)) if merged else refined[1 - best]
         other_error = _error(camera, points, pixels, other)
-    return CornerPose(first, other, error, other_error, _covariance(camera, points, first, max(sigma, error)))
+    return CornerPose(first, other, error, other_error, _covariance(camera, points, pixels, first, sigma, spread))
 
 
-def pose_of_points(camera: Camera, pixels: Matrix, points: Matrix, sigma: float = ALIGNED_SIGMA) -> CornerPose:
-    """Pose of an object from points on it that are known in its frame. Shapes (m, 2) and (m, 3), m at least 4."""
+def pose_of_points(
+    camera: Camera, pixels: Matrix, points: Matrix, sigma: float = ALIGNED_SIGMA, spread: Matrix | None = None
+) -> CornerPose:
+    """Pose of an object from points on it that are known in its frame. Shapes (m, 2) and (m, 3), m at least 4.
+
+    ``sigma`` or ``spread``, shape (2 m, 2 m), as in `pose_of_square`.
+    """
     best = _refined(camera, points, pixels, _guesses(camera, points, pixels)[0])
     error = _error(camera, points, pixels, best)
-    return CornerPose(best, None, error, np.inf, _covariance(camera, points, best, max(sigma, error)))
+    return CornerPose(best, None, error, np.inf, _covariance(camera, points, pixels, best, sigma, spread))
 
 
 def _guesses(camera: Camera, points: Matrix, pixels: Matrix, method: int = cv2.SOLVEPNP_SQPNP) -> list[pin.SE3]:
@@ -135,6 +151,15 @@ def _error(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3) -> flo
     return float(np.sqrt((away**2).sum(axis=1).mean()))
 
 
-def _covariance(camera: Camera, points: Matrix, pose: pin.SE3, sigma: float) -> Matrix:
-    slopes = camera.jacobian(points @ pose.rotation.T, pose.translation)
-    return frozen(sigma**2 * np.linalg.pinv(slopes.T @ slopes))
+def _covariance(
+    camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3, sigma: float, spread: Matrix | None
+) -> Matrix:
+    """Of (position, rotation), larger where the points deviate from their pixels by more than they should."""
+    turned = points @ pose.rotation.T
+    slopes = camera.jacobian(turned, pose.translation)
+    back = np.linalg.pinv(slopes)
+    away = (camera.project(turned + pose.translation) - pixels).ravel()
+    if spread is None:
+        return frozen(max(sigma**2, float(away @ away) / len(points)) * (back @ back.T))
+    surprise = float(away @ np.linalg.solve(spread, away)) / MAX_SURPRISE
+    return frozen(max(surprise, 1.0) * (back @ spread @ back.T))

@@ -33,12 +33,16 @@ class SeenMarker:
         corners: Top left, top right, bottom right, bottom left as printed. Shape (4, 2), pixels.
         likeness: Correlation of the ideal marker with the picture, 1 at best; below `MIN_LIKENESS` the corners
             are as they were detected; NaN without alignment.
+        spread: Covariance of the corners, shape (8, 8) [pixels^2]; None where they are as they were detected.
+        tone: Of the picture, by this marker; NaN where it is not known.
     """
 
     dictionary: str
     number: int
     corners: Matrix
     likeness: float
+    spread: Matrix | None = None
+    tone: float = float("nan")
 
     @property
     def side(self) -> float:
@@ -59,13 +63,16 @@ def marker_cells(dictionary: str, number: int) -> NDArray[np.uint8]:
     return np.asarray(cv2.aruco.generateImageMarker(table, number, table.markerSize + 2), dtype=np.uint8)
 
 
-def find_markers(gray: NDArray[np.uint8], dictionary: str, *, align: bool = True) -> tuple[SeenMarker, ...]:
+def find_markers(
+    gray: NDArray[np.uint8], dictionary: str, *, align: bool = True, tone: float | None = None
+) -> tuple[SeenMarker, ...]:
     """All markers of a dictionary in a grey picture, in the order of their numbers.
 
     Args:
         gray: Shape (height, width).
         dictionary: One of `DICTIONARIES`.
         align: Align the ideal marker with the picture (`aligned_corners`); else corners are those of the detector.
+        tone: Of the picture (`cameras.tone`); None: for each marker the one with which it fits best.
     """
     corners, numbers, _ = _detector(dictionary).detectMarkers(gray)
     found: list[SeenMarker] = []
@@ -73,8 +80,11 @@ def find_markers(gray: NDArray[np.uint8], dictionary: str, *, align: bool = True
         return ()
     for k in np.argsort(np.ravel(numbers), kind="stable"):
         number, rough = int(np.ravel(numbers)[k]), corners[k].reshape(4, 2).astype(np.float64)
-        better, likeness = aligned_corners(gray, rough, marker_cells(dictionary, number)) if align else (rough, np.nan)
-        found.append(SeenMarker(dictionary, number, frozen(better), likeness))
+        if not align:
+            found.append(SeenMarker(dictionary, number, frozen(rough), np.nan))
+            continue
+        fit = aligned_corners(gray, rough, marker_cells(dictionary, number), tone)
+        found.append(SeenMarker(dictionary, number, frozen(fit.corners), fit.likeness, fit.spread, fit.tone))
     return tuple(found)
 
 

@@ -1,0 +1,88 @@
+"""Pictures that are coded by a tone curve: poses, their covariance, light that falls off, white that is cut off."""
+
+import cv2
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, published_camera
+from rrtik_ompl.sensing.cameras.tone import coded, light_of
+from rrtik_ompl.sensing.markers.corner_pose import pose_of_square, square_corners
+from rrtik_ompl.sensing.markers.detection import find_markers, marker_cells
+from rrtik_ompl.sensing.markers.lens_bend import lens_bend
+from rrtik_tests.marker_views import SIDE, facing
+
+CAMERA = published_camera()
+BENT = published_camera((-0.12, 0.06, 0.0005, -0.0003, 0.0))
+PLACES = [
+    ([0.5, 0.4, 0.2], [0.1, -0.05, 0.7]),
+    ([-0.4, 0.5, 0.1], [0.05, 0.1, 1.0]),
+    ([0.6, -0.2, 0.3], [-0.1, 0.0, 1.4]),
+]
+
+
+def taken(T, seed, tone, *, light=1.0, falling=0.0, camera=CAMERA):
+    clean = clean_picture(camera, [(T, marker_print(marker_cells("4x4_50", 7), SIDE))], rays=6)
+    clean = cv2.GaussianBlur(clean, (0, 0), 0.6) * np.linspace(light, light * (1.0 - falling), 640, dtype=np.float32)
+    noisy = coded(clean, tone) + np.float32(0.008) * np.random.default_rng(seed).standard_normal(clean.shape)
+    return np.clip(np.rint(255.0 * noisy), 0, 255).astype(np.uint8)
+
+
+def looked(T, seed, tone, camera=CAMERA, **how):
+    (marker,) = find_markers(taken(T, seed, tone, camera=camera, **how), "4x4_50")
+    return marker, pose_of_square(camera, marker.corners, SIDE, spread=marker.spread)
+
+
+@given(st.floats(-0.25, 1.25))
+def test_a_tone_curve_and_its_inverse_agree(tone):
+    grey = np.arange(256)
+    assert 255.0 * coded(light_of(tone) / np.float32(255.0), tone) == pytest.approx(grey, abs=0.15)
+
+
+def test_the_curve_of_srgb_is_the_published_one():
+    assert coded(np.float32([0.0, 0.0031308, 0.214041, 1.0]), 1.0) == pytest.approx([0.0, 0.04045, 0.5, 1.0], abs=1e-4)
+
+
+@pytest.mark.parametrize("how", [{}, {"falling": 0.7}, {"light": 1.6}], ids=["even", "falling", "cut off"])
+@pytest.mark.parametrize("tone", [0.0, 1.0])
+def test_poses_of_coded_and_linear_pictures_are_as_good_as_they_say(tone, how):
+    squares = []
+    for seed, (turn, at) in enumerate(PLACES):
+        T = facing(turn, at)
+        marker, found = looked(T, seed, tone, **how)
+        away = found.T_camera_object.translation - T.translation
+        assert np.linalg.norm(away) < 2.5e-3 * T.translation[2] ** 2
+        squares.append(float(away @ np.linalg.solve(found.covariance[:3, :3], away)))
+        assert marker.likeness > 0.99
+    assert max(squares) < 14.2  # 0.3 % of honest ones are larger
+
+
+def test_the_tone_of_a_picture_is_found():
+    T = facing(*PLACES[0])
+    assert looked(T, 0, 0.0)[0].tone == 0.0
+    assert 0.7 < looked(T, 0, 1.0)[0].tone < 1.2
+
+
+def test_more_noise_is_more_uncertainty():
+    T = facing(*PLACES[1])
+    gray = taken(T, 0, 1.0)
+    grain = np.random.default_rng(1).normal(0.0, 15.0, gray.shape)
+    rough = np.clip(gray + grain, 0, 255).astype(np.uint8)
+    sigmas = [
+        pose_of_square(CAMERA, m.corners, SIDE, spread=m.spread).position_sigma
+        for picture in (gray, rough)
+        for m in find_markers(picture, "4x4_50")
+    ]
+    assert sigmas[1] > 1.5 * sigmas[0]
+
+
+def test_what_the_lens_bends_within_a_marker_is_known():
+    T = pin.SE3(facing([0.5, 0.3, 0.1], [0.1, 0.06, 0.55]))
+    true = BENT.project(square_corners(SIDE) @ T.rotation.T + T.translation)
+    marker, _ = looked(T, 0, 0.0, camera=BENT)
+    bend = lens_bend(BENT, marker.corners, SIDE)
+    before, after = (np.abs(each - true).max() for each in (marker.corners, marker.corners - bend))
+    assert after < 0.6 * before
+    assert not lens_bend(CAMERA, marker.corners, SIDE).any()
