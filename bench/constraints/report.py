@@ -1,19 +1,24 @@
 """Measure planning under path constraints on generated problems, and judge every path densely.
 
-Usage: ``python bench/constraints/report.py [--problems 100] [--others 30] [--jobs 1]
+Usage: ``python bench/constraints/report.py [--problems 100] [--others 30] [--peers 0 --python PYTHON] [--jobs 1]
 [--out bench/reports/constraints.md]``; about a second a problem. An interrupted run goes on where it was.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 import rrtik_ompl as rrtik
 from bench.constraints.judge import judged
+from bench.constraints.pairs import TIPS, Pair, pair
+from bench.constraints.peers import DELTA, Other, Others, others, versions
 from bench.constraints.problems import generated
 from bench.shared.parts import Parts, add_options
 from rrtik_bench.report.machine import processes
@@ -28,6 +33,9 @@ LONG = 3.0  # [s] for what was not solved, to see whether there is a path
 LARGEST_TILT = 5.2  # [deg]
 EXPLORED = 2000  # samples of a search without collisions
 BRANCHES = (("ur5", "upright"), ("ur5", "orientation"), ("titan4", "upright"), ("titan4", "orientation"))
+Set: TypeAlias = tuple[str, str]
+Outcomes: TypeAlias = "dict[tuple[str, str, int], Outcome]"
+Theirs: TypeAlias = "dict[tuple[str, str, str, int], Others]"
 CUP_ARMS, ARMS = ("ur5", "panda"), ("titan4", "ur5", "panda")
 KINDS = ("plane", "line", "orientation")
 
@@ -132,6 +140,35 @@ def branches(name: str, kind: str, seed: int) -> Branches:
     return Branches(plan.found, apart, way is not None, spent)
 
 
+def beside(name: str, kind: str, ours: list[Outcome], theirs: list[Others]) -> list[list[str]]:
+    """Lines of the table of the peers: ours, then theirs, of the same problems."""
+    solvable = sum(each.solvable for each in ours)
+    found = 1e3 * np.array([each.search for each in ours if each.found])
+    most = max(each.metres for each in ours), max(each.degrees for each in ours), sum(each.contacts for each in ours)
+    lines = [_line(name, kind, "ours, with proofs", solvable, found, most)]
+    for peer in ("ompl", "roboplan"):
+        some: list[Other] = [getattr(each, peer) for each in theirs]
+        times = 1e3 * np.array([each.seconds for each in some if each.found])
+        seen = (
+            max(each.metres for each in some),
+            max(each.degrees for each in some),
+            sum(each.contacts for each in some),
+        )
+        lines.append(_line("", "", PEERS[peer], solvable, times, seen))
+    return lines
+
+
+def _line(
+    name: str, kind: str, who: str, solvable: int, times: NDArray[np.float64], seen: tuple[float, float, int]
+) -> list[str]:
+    spread = f"{np.median(times):.2f} / {np.quantile(times, 0.95):.1f}" if len(times) else "-"
+    amounts = [f"{1e3 * seen[0]:.2f}", f"{seen[1]:.3f}", str(seen[2])]
+    return [name, kind, who, f"{len(times)} of {solvable}", spread, *amounts]
+
+
+PEERS = {"ompl": "OMPL, ProjectedStateSpace", "roboplan": "roboplan"}
+
+
 def row(name: str, kind: str, outcomes: list[Outcome]) -> list[str]:
     """A line of the table."""
     found = [each for each in outcomes if each.found]
@@ -173,16 +210,27 @@ def main() -> None:
     """Write the page."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--problems", type=int, default=100, help="with a cup, of each of two robots")
-    parser.add_argument("--others", type=int, default=30, help="of each other constraint and of each of three robots")
+    parser.add_argument(
+        "--others", nargs="+", default=["30"], metavar="N", help="of each other constraint: a number, or ARM=NUMBER"
+    )
     parser.add_argument("--branches", type=int, default=30, help="goals of any branch, of each of four sets")
+    parser.add_argument("--pairs", type=int, default=20, help="scenes of each robot with two arms")
+    parser.add_argument("--peers", type=int, default=0, help="problems of each set for OMPL and roboplan too")
+    parser.add_argument("--python", default=sys.executable, help="interpreter of an environment with roboplan")
     add_options(parser, "constraints")
     given = parser.parse_args()
     cups = [(name, "upright", seed) for name in CUP_ARMS for seed in range(given.problems)]
-    others = [(name, kind, seed) for name in ARMS for kind in KINDS for seed in range(given.others)]
+    counts = _counts(given.others)
+    further = [(name, kind, seed) for name in ARMS for kind in KINDS for seed in range(counts[name])]
     with Parts(given.out, given.jobs) as parts:
-        outcomes = dict(zip(cups + others, parts(measured, cups + others), strict=True))
+        outcomes = dict(zip(cups + further, parts(measured, cups + further), strict=True))
         ends = [(*which, seed) for which in BRANCHES for seed in range(given.branches)]
         seen = dict(zip(ends, parts(branches, ends), strict=True))
+        sets = list(dict.fromkeys((name, kind) for name, kind, _ in cups + further))
+        asked = [(given.python, *which, seed) for which in sets for seed in range(given.peers)]
+        twos = [(name, number) for name in TIPS for number in range(given.pairs)]
+        found = dict(zip(twos, parts(pair, twos), strict=True))
+        theirs = dict(zip(asked, parts(others, asked), strict=True))
     report = Report("Path constraints", "python bench/constraints/report.py", processes(given.jobs))
     report.intro = (
         "Generated problems: an arm among 5 to 20 boxes, balls and cylinders, a start and a goal that keep the "
@@ -198,7 +246,7 @@ def main() -> None:
         report.bar(f"{name}, largest tilt", f"<= {LARGEST_TILT} degrees", f"{tilt:.3f} degrees", tilt <= LARGEST_TILT)
     for name in ARMS:
         for kind in KINDS:
-            some = [outcomes[name, kind, seed] for seed in range(given.others)]
+            some = [outcomes[name, kind, seed] for seed in range(counts[name])]
             _bars(report, f"{name}, {kind}", some)
     wrong = sum(each.apart and each.solvable for each in outcomes.values())
     wrong += sum(each.apart and each.joined for each in seen.values())
@@ -214,7 +262,7 @@ def main() -> None:
         row(name, "upright", [outcomes[name, "upright", seed] for seed in range(given.problems)]) for name in CUP_ARMS
     ]
     table += [
-        row(name, kind, [outcomes[name, kind, seed] for seed in range(given.others)]) for name in ARMS for kind in KINDS
+        row(name, kind, [outcomes[name, kind, seed] for seed in range(counts[name])]) for name in ARMS for kind in KINDS
     ]
     text = (
         "Beyond: how far the judge saw the frame outside the tolerance; 0.5 mm and 0.2 degrees are allowed between "
@@ -229,7 +277,57 @@ def main() -> None:
         lines.append([name, kind, str(len(some)), str(joined), str(apart), str(len(some) - joined - apart)])
     text = f"Goals of any branch of inverse kinematics, without obstacles; {EXPLORED} samples for what is connected."
     report.table("Start and goal apart", heads, lines, text=text)
+    _pairs(report, {name: [found[name, k] for k in range(given.pairs)] for name in TIPS})
+    if theirs:
+        _peers(report, given, sets, outcomes, theirs)
     raise SystemExit(report.finish(given.out))
+
+
+def _pairs(report: Report, outcomes: dict[str, list[Pair]]) -> None:
+    """Bars and table of arms in pairs."""
+    rows = []
+    for name, own in outcomes.items():
+        found, solvable = sum(each.found for each in own), sum(each.solvable for each in own)
+        times, faults = 1e3 * np.array([each.seconds for each in own if each.found]), sum(each.faults for each in own)
+        median = float(np.median(times))
+        report.bar(f"{name}, both hands: solved in 5 s", "100 %", f"{found} of {solvable}", found == solvable)
+        report.bar(f"{name}, both hands: median", "<= 50 ms", f"{median:.1f} ms", median <= 50.0)
+        report.bar(f"{name}, both hands: faults that the judge saw", "0", str(faults), faults == 0)
+        spread = f"{median:.1f} / {np.quantile(times, 0.95):.1f} / {times.max():.1f}"
+        proven = str(sum(each.proven for each in own))
+        rows.append([name, f"{found} / {solvable} / {len(own)}", spread, proven])
+    heads = ["robot", "solved / solvable / all", "ms, median / 95 % / worst", "proven free"]
+    text = (
+        "Both hands go to poses of their own (`MultiGoal`) among six balls, from a random configuration to the "
+        "poses of another one. Whole calls of `plan()`, inverse kinematics, shortening, proofs, second check included."
+    )
+    report.table("Arms in pairs", heads, rows, text=text)
+
+
+def _counts(words: list[str]) -> dict[str, int]:
+    """How many problems each arm gets, from words such as ``100 panda=40``."""
+    counts = dict.fromkeys(ARMS, 0)
+    for word in words:
+        name, _, number = word.rpartition("=")
+        counts |= {name: int(number)} if name else dict.fromkeys(ARMS, int(number))
+    return counts
+
+
+def _peers(report: Report, given: argparse.Namespace, sets: list[Set], outcomes: Outcomes, theirs: Theirs) -> None:
+    """The table of the libraries of others, on the first problems of each set."""
+    rows = []
+    for which in sets:
+        ours = [outcomes[(*which, seed)] for seed in range(given.peers)]
+        rows += beside(*which, ours, [theirs[(given.python, *which, seed)] for seed in range(given.peers)])
+    heads = ["robot", "constraint", "who", "solved / solvable", "ms (median / 95 %)", *HEADS[-3:]]
+    text = (
+        f"The first {given.peers} problems of each set, {LIMIT:g} s of processor time. OMPL: RRTConnect in a "
+        f"ProjectedStateSpace of step {DELTA:g}, motions checked by our world from Python. roboplan: its RRT-Connect "
+        "with the same region as a PoseConstraint, its own checks of 32 a radian, no second check. Ours: `plan()` with "
+        "proofs and second check, the quickest of 3 calls; theirs once. The judge is the same for all."
+    )
+    report.table("Beside others", heads, rows, text=text)
+    report.note("Versions", versions(given.python))
 
 
 def _bars(report: Report, what: str, outcomes: list[Outcome]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -35,6 +35,23 @@ class Solid:
 
 
 @dataclass(frozen=True)
+class Region:
+    """Where ``TIP`` has to be along the whole path: ranges of its displacement from a frame of the world.
+
+    Attributes:
+        pose: ``T_world_frame``, four rows of four numbers.
+        lower, upper: Of x, y, z [m] and roll, pitch, yaw [rad]; None where there is no bound.
+        position_tolerance, orientation_tolerance: Beyond the ranges [m, rad].
+    """
+
+    pose: list[list[float]]
+    lower: list[float | None]
+    upper: list[float | None]
+    position_tolerance: float
+    orientation_tolerance: float
+
+
+@dataclass(frozen=True)
 class Task:
     """What to plan.
 
@@ -44,6 +61,7 @@ class Task:
         obstacles: May touch each other.
         start, goal: Configurations [rad, m].
         seconds: Time limit [s].
+        regions: Path constraints, for libraries that know some.
     """
 
     urdf: str
@@ -53,8 +71,10 @@ class Task:
     start: list[float]
     goal: list[float]
     seconds: float
+    regions: list[Region] = field(default_factory=list)
 
 
 def from_plain(data: dict[str, Any]) -> Task:
     """A task as ``dataclasses.asdict`` writes it."""
-    return Task(**{**data, "obstacles": [Solid(**each) for each in data["obstacles"]]})
+    obstacles, regions = [Solid(**each) for each in data["obstacles"]], [Region(**each) for each in data["regions"]]
+    return Task(**{**data, "obstacles": obstacles, "regions": regions})

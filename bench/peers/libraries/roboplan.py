@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from bench.peers.serve import serve
-from bench.peers.task import GROUP, PER_RADIAN, RANGE, Rows, Search, Solid, Task
+from bench.peers.task import GROUP, PER_RADIAN, RANGE, TIP, Region, Rows, Search, Solid, Task
 
 MOST_NODES = 1_000_000
 
@@ -33,17 +33,26 @@ def search(task: Task) -> Search:
         max_planning_time=task.seconds,
         rrt_connect=True,
     )
-    planner = rrt.RRT(scene, options)
+    planner, held = rrt.RRT(scene, options), [_constraint(rrt, scene, region) for region in task.regions]
     ends = [core.JointConfiguration(task.joints, np.array(q)) for q in (task.start, task.goal)]
 
     def solve(seed: int) -> Rows | None:
         planner.setRngSeed(seed)
         try:
-            return np.array(planner.plan(*ends).positions)
+            return np.array(planner.plan(*ends, held).positions)
         except RuntimeError:  # its word for "not found"
             return None
 
     return solve
+
+
+def _constraint(rrt: Any, scene: Any, region: Region) -> Any:
+    """A path constraint of theirs; a bound that is None is infinite."""
+    lower = np.array([-np.inf if bound is None else bound for bound in region.lower])
+    upper = np.array([np.inf if bound is None else bound for bound in region.upper])
+    pose = np.asfortranarray(region.pose)
+    tolerances = {name: getattr(region, name) for name in ("position_tolerance", "orientation_tolerance")}
+    return rrt.PoseConstraint(scene, GROUP, TIP, lower, upper, pose, **tolerances)
 
 
 def _add(scene: Any, core: Any, item: Solid) -> None:
