@@ -10,12 +10,13 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import finite_array
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.poses import pose, pose_from_rpy, quaternion_xyzw, rigid
 
-BasePose: TypeAlias = "pin.SE3 | Mapping[str, Sequence[float]] | None"
+BasePose: TypeAlias = "pin.SE3 | ArrayLike | Mapping[str, Sequence[float]] | None"
 POSE_KEYS = ("xyz", "quat_xyzw", "rpy_deg")
 
 
@@ -43,17 +44,15 @@ def source_entry(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def base_pose(value: BasePose, what: str = "base_pose") -> pin.SE3 | None:
-    """A base pose given as ``pinocchio.SE3`` or as ``{xyz: .., quat_xyzw: .. | rpy_deg: ..}``.
+    """A base pose in any form that `rrtik_ompl.poses.rigid` takes, or as ``{xyz: .., quat_xyzw: .. | rpy_deg: ..}``.
 
     Raises:
         InputError: If it is neither, or a key or number in it makes no sense.
     """
     if value is None:
         return None
-    if isinstance(value, pin.SE3):
-        return rigid(value, what)
     if not isinstance(value, Mapping):
-        raise InputError(f"{what}: expected a pinocchio.SE3 or {{xyz: [x, y, z], quat_xyzw: [x, y, z, w]}}")
+        return rigid(value, what)
     for key in value:
         if key not in POSE_KEYS:
             raise UnknownNameError("key", key, POSE_KEYS, where=what)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen, not_negative
@@ -15,6 +16,7 @@ from rrtik_ompl.choices import IkMethod, one_of
 from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import (
+    PoseGoal,
     PositionGoal,
     TipGoal,
     has_continuous,
@@ -78,7 +80,7 @@ def list_ik_methods() -> tuple[IkMethod, ...]:
 
 def solve_ik(
     robot: Robot,
-    goal: TipGoal,
+    goal: TipGoal | ArrayLike | pin.SE3,
     *,
     method: IkMethod = "auto",
     near: ArrayLike | None = None,
@@ -91,7 +93,8 @@ def solve_ik(
 
     Args:
         robot: The arm.
-        goal: A pose, a position, or a region with some freedom (of which targets are drawn).
+        goal: A pose, a position, or a region with some freedom (of which targets are drawn); or a pose in any form that
+            `PoseGoal` takes.
         method: A name from `list_ik_methods`; "auto" is the closed form where it fits, else (and where the targets
             drawn from a region, or the curve of a singular pose, bring none) numeric, or projection onto task-space
             regions; the others are there to be compared.
@@ -111,7 +114,7 @@ def solve_ik(
     check_world(world, robot)
     load_kernels(robot)
     begin = time.monotonic()
-    require(goal, TipGoal, "goal", "inverse kinematics needs a goal of the tip, such as PoseGoal(T_world_tip)")
+    goal = _tip_goal(goal)
     limit, random = not_negative(seconds, "seconds"), RandomStream(seed)
     posture = mid_range_configuration(robot) if near is None else robot.configuration(near, "near")
     drawn = (goal,) if isinstance(goal, Target) else tuple(targets(goal, max(DRAWS, len(parts_of(goal))), random.rng))
@@ -124,6 +127,13 @@ def solve_ik(
 
     request = IkRequest(robot, goal, drawn, posture, accept, all, begin + limit, random, world)
     return _solved(request, name, method == "auto", begin)
+
+
+def _tip_goal(goal: TipGoal | ArrayLike | pin.SE3) -> TipGoal:
+    """The goal itself, or that of a pose."""
+    taken: Any = PoseGoal(goal) if isinstance(goal, (pin.SE3, np.ndarray, list, tuple)) else goal
+    require(taken, TipGoal, "goal", "inverse kinematics needs a goal of the tip, such as PoseGoal(T_world_tip)")
+    return taken  # type: ignore[no-any-return]
 
 
 def _solved(request: IkRequest, name: IkMethod, auto: bool, begin: float) -> IkResult:

@@ -248,8 +248,8 @@ def test_bad_arguments_are_refused_in_one_line():
         solve_ik(titan, goal, near=[0.0])
     with pytest.raises(InputError, match="goal must be of type PoseGoal"):
         solve_ik(titan, rrtik.JointGoal(np.zeros(6)))
-    with pytest.raises(InputError, match=r"got SE3; .* such as PoseGoal\(T_world_tip\)"):
-        solve_ik(titan, goal.T_world_tip)
+    with pytest.raises(InputError, match=r"got NoneType; .* such as PoseGoal\(T_world_tip\)"):
+        solve_ik(titan, None)
 
 
 POSES = np.tile(np.eye(4), (2, 1, 1))
