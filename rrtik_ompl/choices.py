@@ -21,6 +21,8 @@ ShorteningMethod: TypeAlias = Literal[
     "ompl",
     "fewest-moves",
 ]
+PathObjective: TypeAlias = Literal["length", "time", "clearance"]
+ImproveStrategy: TypeAlias = Literal["restart-shorten", "shorten"]
 CommandShortening: TypeAlias = Literal[ShorteningMethod, "none"]
 SuiteShortening: TypeAlias = Literal[ShorteningMethod, "by-kind", "none"]
 IkMethod: TypeAlias = Literal[

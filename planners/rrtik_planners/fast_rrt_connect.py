@@ -41,6 +41,7 @@ class FastRRTConnect(SafePlanner):
         range: float | None = None,
         domain: float | None = None,
         max_iterations: int | None = None,
+        bound: float | None = None,
     ) -> None:
         """Make a planner.
 
@@ -51,6 +52,8 @@ class FastRRTConnect(SafePlanner):
             range: Length of a motion of the trees, at most [unit of the space]; what suits the bounds if None.
             domain: Radius in which a vertex is extended once it was blocked [unit of the space]; as with ``range``.
             max_iterations: Samples at most; without limit if None.
+            bound: Length that the path has to stay below, unless it is a straight motion [unit of the space]; then the
+                search is one of AORRTC [15]. For worlds with kernels; any length elsewhere, and if None.
 
         Raises:
             InputError: If an option is out of range or the space is of another kind.
@@ -59,6 +62,7 @@ class FastRRTConnect(SafePlanner):
         self.range = None if range is None else positive(range, "range")
         self.domain = None if domain is None else positive(domain, "domain")
         self.max_iterations = iteration_limit(max_iterations)
+        self.bound = None if bound is None else positive(bound, "bound")
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
@@ -74,6 +78,7 @@ class FastRRTConnect(SafePlanner):
                 ask=None if is_conservative(world) else checker.motion_valid_batch,
                 stop=ptc,
                 max_iterations=self.max_iterations,
+                bound=self.bound,
             )
             counts = kernels.statistics()
         checker.checked_motions += int(counts["motions"] - counts["questions"])  # the questions it has counted

@@ -10,13 +10,14 @@ from typing import Any, get_args
 import numpy as np
 
 from rrtik_ompl.arrays import not_negative, positive, whole_number
-from rrtik_ompl.choices import Accuracy, ProofMode, one_of
+from rrtik_ompl.choices import Accuracy, ImproveStrategy, PathObjective, ProofMode, one_of
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import GoalSet
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto
 from rrtik_ompl.ompl_bridge.planner_names import list_planners as list_planners
+from rrtik_ompl.ompl_bridge.planner_options import planner_options
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
-from rrtik_ompl.planning.improving import improved
+from rrtik_ompl.planning.improving import Improvement, improved
 from rrtik_ompl.planning.one_planner import run_planner
 from rrtik_ompl.planning.outcome import Plan as Plan
 from rrtik_ompl.planning.outcome import Request
@@ -27,6 +28,7 @@ from rrtik_ompl.world.kept_clearance import check_clearance
 
 RESTARTS = 20
 MAX_RESTARTS = 1_000_000
+BOUND_OPTION = "bound"  # of planners that can be told how long a path may be
 MAX_SECONDS = 1e9  # thirty years; OMPL's clock overflows at about nine times as much
 PROOF_MODES: tuple[ProofMode, ...] = get_args(ProofMode)
 
@@ -43,6 +45,8 @@ def plan(
     proof: ProofMode = "preferred",
     clearance: float | None = None,
     improve: float = 0.0,
+    objective: PathObjective = "length",
+    strategy: ImproveStrategy = "restart-shorten",
 ) -> Plan:
     """Find a collision-free path from the start to the goal of a problem.
 
@@ -75,15 +79,20 @@ def plan(
             checked, and nothing is said of proofs.
         clearance: What the path keeps from every obstacle on top of its margin [m], if there is such a path. None:
             1 mm, or what start and goal have.
-        improve: How long the path may go on getting shorter after it was found [s], within ``seconds``: further plans
-            with other seeds, each shortened, of which the shortest is kept. It ends when sixty of them in a row gain
-            nothing, or the path is as short as can be. ``statistics["cost_over_time"]`` has the course, rows of
-            seconds and length, ``"length_bound"`` a length below which there is none. Ctrl-C ends it, and the best path
-            so far is returned. The clock decides how many plans are tried, so paths of a seed may differ.
+        improve: How long the path may go on getting better after it was found [s], within ``seconds``: further plans
+            with other seeds, each shortened, of which the best is kept. It ends when sixty of them in a row gain
+            nothing, or the path is as short as can be. ``statistics["cost_over_time"]`` has the course, rows of seconds
+            and cost, ``"length_bound"`` a length below which there is none. Ctrl-C ends it, and the best path so far is
+            returned. The clock decides how many plans are tried, so paths of a seed may differ.
+        objective: What ``improve`` makes small: "length" in joint space; "time", which the robot's velocity limits
+            allow at least; or "clearance", the length of which each piece counts more the nearer the arm is to
+            something, double at 5 cm. Paths are shortened in length all the same: the objective chooses among them.
+        strategy: Of ``improve``: "restart-shorten" as above, or "shorten", the first path alone.
 
     Raises:
-        UnknownNameError: If there is no planner or no accuracy of that name.
-        InputError: If a number or a parameter makes no sense, or start or goal cannot keep the clearance.
+        UnknownNameError: If there is no planner, accuracy, objective or strategy of that name.
+        InputError: If a number or a parameter makes no sense, start or goal cannot keep the clearance, or the objective
+            is "time" and the robot has no velocity limits.
         PlannerError: If the planner broke.
     """
     require(problem, Problem, "problem to plan", "use Problem(world, start, goal) or load_problem(name)")
@@ -100,13 +109,23 @@ def plan(
     request = Request(limit, used, restarts, parameters or {}, proof, clearance)
     problem = problem if accuracy is None else problem.with_accuracy(accuracy)
     check_clearance(problem.world, clearance, fixed_ends(problem))
-    longer = not_negative(improve, "improve")
-    search = _search_of(problem, planner)
-    found = search(request)
-    found = improved(problem, found, search, request, longer) if found.found and longer > 0.0 else found
+    how = Improvement(
+        not_negative(improve, "improve"),
+        one_of(get_args(PathObjective), objective, "objective"),
+        one_of(get_args(ImproveStrategy), strategy, "strategy of improve"),
+    )
+    found = _search_of(problem, planner)(request)
+    found = _improved(problem, planner, found, request, how) if found.found and how.seconds > 0.0 else found
     if found.path is None or not isinstance(problem.goal, GoalSet):
         return found
     return replace(found, member=problem.goal.member_at(problem.robot, found.path.end))
+
+
+def _improved(problem: Problem, planner: str | PlannerFactory, found: Plan, request: Request, how: Improvement) -> Plan:
+    """The plan improved by its planner; of several by the one that found the path."""
+    again = found.planner if isinstance(planner, str) else planner
+    bounded = BOUND_OPTION in planner_options(find_planner(again) if isinstance(again, str) else again)
+    return improved(problem, found, _search_of(problem, again), request, replace(how, bounded=bounded))
 
 
 def plan_counted(problem: Problem, iterations: int, *, seconds: float, seed: int) -> Plan:

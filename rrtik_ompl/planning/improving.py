@@ -1,6 +1,7 @@
 """Paths that go on getting shorter: plan again, shorten, keep the best, until the time is up or nothing is gained.
 
-New seeds lead past obstacles on other sides, which shortening alone never does.
+New seeds lead past obstacles on other sides, which shortening alone never does. Most of them are not worth much work:
+each new path is shortened for a moment, and of a few such paths only the best one for as long as it takes.
 """
 
 from __future__ import annotations
@@ -8,43 +9,74 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from rrtik_ompl.choices import ImproveStrategy, PathObjective
 from rrtik_ompl.errors import PlannerError
-from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning.outcome import Plan, Request
+from rrtik_ompl.planning.path_costs import COSTS, least_cost
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.shortening import shorten
 
-PATIENCE = 60  # rounds in which nothing is gained, after which the search has converged
-GAIN = 1e-4  # of the length, below which nothing is gained
+PATIENCE = 60  # plans of which nothing is gained, after which the search has converged
+GAIN = 1e-4  # of the cost, below which nothing is gained
 LEAST_SECONDS = 1e-3  # for which another round is begun
+QUICK_CHECKS = 120  # motions that are checked to see what a path is worth; some 3 ms
+PLANS = 4  # of which the best is shortened further ...
+SETTLED = 1e-2  # of the cost, gained less than which a path is not shortened again
+WORTH = 1.2  # ... if it costs no more than so many times the best one
+BOUND = 1.5  # times the length of the best path are further ones to stay below, before they are shortened
+BOUNDED_SAMPLES = 3000  # that are drawn to find one
 
 
-def improved(problem: Problem, first: Plan, again: Callable[[Request], Plan], request: Request, seconds: float) -> Plan:
+@dataclass(frozen=True, slots=True)
+class Improvement:
+    """How a path is to be improved.
+
+    Attributes:
+        seconds: How much longer it may take [s].
+        objective: What is to be made small.
+        strategy: Whether further plans are made, or the first path alone is shortened.
+        bounded: Whether the planner takes a bound of the path's length.
+    """
+
+    seconds: float
+    objective: PathObjective = "length"
+    strategy: ImproveStrategy = "restart-shorten"
+    bounded: bool = False
+
+
+def improved(
+    problem: Problem, first: Plan, again: Callable[[Request], Plan], request: Request, how: Improvement
+) -> Plan:
     """The best of many plans, each shortened.
 
     Args:
         problem: What was planned.
         first: A plan that found a path.
         again: Plans with another request.
-        request: That of the first plan.
-        seconds: How much longer it may take [s]; never beyond ``request.seconds`` in all.
+        request: That of the first plan; the work ends when its time is up.
+        how: What is to be made small, for how long, and by what.
 
     Returns:
-        The first plan with the shortest path, which is proven if the first one is. Its statistics have
-        ``cost_over_time``, rows of seconds since the beginning and the length then [rad; m], ``improving_rounds``, and
-        ``length_bound`` where the goal is in joint values: no path is shorter. Ctrl-C ends the work, not the plan.
+        The first plan with the best path, which is proven if the first one is. Its statistics have ``cost_over_time``,
+        rows of seconds since the beginning and the cost then, ``improving_rounds``, and ``length_bound`` (of other
+        objectives ``cost_bound``) where the goal is in joint values: no path costs less. Ctrl-C ends the work, not the
+        plan.
+
+    Raises:
+        InputError: If the objective cannot be computed for the robot.
     """
-    work = _Work(problem, first, again, request, min(seconds, request.seconds - first.seconds))
+    work = _Work(problem, first, again, request, how)
     with suppress(KeyboardInterrupt):  # what was found by then is the answer
         work.run()
-    bound = {"length_bound": work.bound} if work.bound > 0.0 else {}
+    name = "length_bound" if how.objective == "length" else "cost_bound"
+    bound = {name: work.bound} if work.bound > 0.0 else {}
     course = {"improving_rounds": work.rounds, "cost_over_time": tuple(work.course)}
     path = work.best.with_waypoints(work.best.waypoints) if request.proof == "off" else work.best
     statistics = MappingProxyType({**first.statistics, **bound, **course})
@@ -55,62 +87,92 @@ class _Work:
     """The rounds of plans and shortenings; ``best`` and ``course`` hold at any moment."""
 
     def __init__(
-        self, problem: Problem, first: Plan, again: Callable[[Request], Plan], request: Request, seconds: float
+        self, problem: Problem, first: Plan, again: Callable[[Request], Plan], request: Request, how: Improvement
     ) -> None:
         assert first.path is not None
-        self._problem, self._first, self._again, self._request = problem, first, again, request
-        self._begin, self._seconds = time.perf_counter(), seconds
-        self.best, self.bound, self.rounds = first.path, _bound(problem), 0
+        self._problem, self._first, self._again, self._request, self._how = problem, first, again, request, how
+        self._begin, self._seconds = time.perf_counter(), min(how.seconds, request.seconds - first.seconds)
+        self.best, self.bound, self.rounds = first.path, least_cost(problem, how.objective), 0
         self._one_joint, self._proven = first.path.one_joint_at_a_time, first.path.proven
-        self.course = [(first.seconds, first.path.length)]
-        self._idle = 0
+        self._least = self._cost(first.path)
+        self.course = [(first.seconds, self._least[1])]
+        self._idle = self._shortenings = 0
 
     def clock(self) -> float:
         """Time since the first plan was begun [s]."""
         return self._first.seconds + time.perf_counter() - self._begin
 
     def run(self) -> None:
-        """Go on until the time is up, nothing is gained any more, or the path is as short as can be."""
+        """Go on until the time is up, nothing is gained any more, or the path costs as little as can be."""
         seeds = np.random.default_rng([self._request.seed, 1])
-        candidate: JointPath | None = self.best
-        while (left := self._left()) > LEAST_SECONDS:
-            if candidate is not None:
-                self._take(self._shortened(candidate, left))
-            left = self._left()
-            if self._idle > PATIENCE or left <= LEAST_SECONDS or self.best.length <= self.bound * (1.0 + GAIN):
-                return
-            self.rounds, self._idle = self.rounds + 1, self._idle + 1
-            candidate = _found(self._again, replace(self._request, seconds=left, seed=int(seeds.integers(2**31))))
+        paths = [self._shortened(self.best, self._quick)]
+        while self._how.strategy == "restart-shorten" and self._idle < PATIENCE:
+            while len(paths) < PLANS and self._idle < PATIENCE:
+                if self._done():
+                    return
+                self.rounds, self._idle = self.rounds + 1, self._idle + 1
+                found = _found(self._again, self._next_request(int(seeds.integers(2**31))))
+                paths += [] if found is None else [self._shortened(found, self._quick)]
+            self._settle(min(paths, key=self._cost, default=self.best))
+            paths = []
+        self._settle(self.best)
+
+    @property
+    def _quick(self) -> int | None:
+        """Checks by which it is seen what a path is worth; ways to shorten single-joint moves know no such limit."""
+        return None if self._one_joint else QUICK_CHECKS
+
+    def _next_request(self, seed: int) -> Request:
+        """For another plan; of a planner that takes a bound, one whose path is not much longer than the best."""
+        request = replace(self._request, seconds=self._left(), seed=seed)
+        if not self._how.bounded or self._one_joint:
+            return request
+        limits = {"bound": BOUND * self.best.length, "max_iterations": BOUNDED_SAMPLES}
+        return replace(request, restarts=0, parameters={**limits, **request.parameters})
+
+    def _settle(self, path: JointPath) -> None:
+        """Shorten a path as long as that gains something, if it is worth it."""
+        before = np.inf
+        if self._one_joint or self._cost(path)[1] > WORTH * self._least[1]:
+            return
+        while self._cost(path)[1] < before * (1.0 - SETTLED) and not self._done():
+            before = self._cost(path)[1]
+            path = self._shortened(path, None)
+
+    def _done(self) -> bool:
+        return self._left() <= LEAST_SECONDS or self._least[1] <= self.bound * (1.0 + GAIN)
 
     def _left(self) -> float:
         return self._seconds - (time.perf_counter() - self._begin)
 
-    def _shortened(self, path: JointPath, seconds: float) -> JointPath:
-        one_joint = None if self._one_joint else False
-        limits: dict[str, Any] = {"seconds": seconds, "clearance": self._request.clearance}
-        return shorten(path, self._problem, one_joint=one_joint, seed=self._request.seed + self.rounds, **limits)
+    def _shortened(self, path: JointPath, checks: int | None) -> JointPath:
+        """A path after some work, kept if it is the best; as it was if there is no time."""
+        left = self._left()
+        if left <= LEAST_SECONDS:
+            return path
+        self._shortenings += 1
+        end, seed = time.perf_counter() + left, self._request.seed + self._shortenings
+        limits: dict[str, Any] = {"checks": checks, "clearance": self._request.clearance, "seed": seed}
+        single = None if self._one_joint else False
+        found = shorten(path, self._problem, stop=lambda: time.perf_counter() > end, one_joint=single, **limits)
+        self._take(found)
+        return found
 
     def _take(self, candidate: JointPath) -> None:
         """Keep a path if it is the best: proven and of single-joint moves if the first one is."""
-        moves, length = self._cost(self.best)
-        if self._one_joint and not candidate.one_joint_at_a_time:
+        if (self._one_joint and not candidate.one_joint_at_a_time) or (self._proven and not candidate.proven):
             return
-        if self._cost(candidate) >= (moves, length) or (self._proven and not candidate.proven):
+        moves, cost = self._cost(candidate)
+        if (moves, cost) >= self._least:
             return
-        if self._cost(candidate) < (moves, length * (1.0 - GAIN)):
+        if (moves, cost) < (self._least[0], self._least[1] * (1.0 - GAIN)):
             self._idle = 0
-        self.best = candidate
-        self.course.append((self.clock(), candidate.length))
+        self.best, self._least = candidate, (moves, cost)
+        self.course.append((self.clock(), cost))
 
     def _cost(self, path: JointPath) -> tuple[int, float]:
-        """What is to be small: the length, of single-joint moves their number first."""
-        return (path.transitions if self._one_joint else 0), path.length
-
-
-def _bound(problem: Problem) -> float:
-    """What no path can be shorter than: the straight motion to a goal in joint values; 0 for any other goal."""
-    goal = problem.goal
-    return float(np.linalg.norm(goal.q - problem.start)) if isinstance(goal, JointGoal) else 0.0
+        """What is to be small; of single-joint moves their number first."""
+        return (path.transitions if self._one_joint else 0), COSTS[self._how.objective](path, self._problem)
 
 
 def _found(again: Callable[[Request], Plan], request: Request) -> JointPath | None:

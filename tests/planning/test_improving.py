@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from rrtik_ompl.cli.app import run
-from rrtik_ompl.errors import InputError, PlannerError
+from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.planning import improving, plan
-from rrtik_ompl.planning.improving import improved
+from rrtik_ompl.planning.improving import Improvement, improved
 from rrtik_ompl.planning.outcome import Request
+from rrtik_ompl.planning.path_costs import COSTS, least_time, weighted_length
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_files.problem import load_problem
 
@@ -72,7 +75,7 @@ def test_planners_that_find_nothing_or_break_leave_the_first_path(few_rounds):
     def broken(_):
         raise PlannerError("it broke")
 
-    kept = improved(problem, first, broken, request, LONG)
+    kept = improved(problem, first, broken, request, Improvement(LONG))
     assert kept.found
     assert kept.path.length <= first.path.length
 
@@ -88,7 +91,7 @@ def test_ctrl_c_ends_the_work_and_keeps_the_best_path():
             raise KeyboardInterrupt
         return plan(problem, "fastrrtconnect", seed=request.seed)
 
-    kept = improved(problem, first, interrupted, Request(LONG, 1, 0, {}, "preferred", None), LONG)
+    kept = improved(problem, first, interrupted, Request(LONG, 1, 0, {}, "preferred", None), Improvement(LONG))
     assert kept.statistics["improving_rounds"] == 3
     assert kept.path.length < first.path.length
     assert kept.path.length == kept.statistics["cost_over_time"][-1][1]
@@ -98,7 +101,7 @@ def test_no_round_begins_when_the_time_of_all_is_up():
     problem = load_problem("titan4_prisms")
     first = plan(problem, "fastrrtconnect", seed=1)
     request = Request(first.seconds, 1, 0, {}, "preferred", None)
-    kept = improved(problem, first, lambda _: pytest.fail("a further plan"), request, LONG)
+    kept = improved(problem, first, lambda _: pytest.fail("a further plan"), request, Improvement(LONG))
     assert kept.path is first.path
     assert kept.statistics["improving_rounds"] == 0
 
@@ -112,3 +115,61 @@ def test_no_time_is_named(bad):
 def test_the_command_takes_it(capsys):
     assert run(["plan", "planar3_boxes", "--planner", "RRTConnect", "--improve", "0.2", "--json"]) == 0
     assert '"cost_over_time"' in capsys.readouterr().out
+
+
+def test_the_first_path_alone_is_shortened_if_that_is_wanted():
+    problem = load_problem("titan4_prisms")
+    first = plan(problem, "fastrrtconnect", seed=1)
+    better = plan(problem, "fastrrtconnect", seed=1, seconds=LONG, improve=LONG, strategy="shorten")
+    assert better.statistics["improving_rounds"] == 0
+    assert better.path.length < first.path.length
+
+
+@pytest.mark.parametrize("objective", ["time", "clearance"])
+def test_another_objective_falls_and_is_that_of_the_path(few_rounds, objective):
+    problem = load_problem("titan4_prisms")
+    found = plan(problem, "fastrrtconnect", seed=3, seconds=LONG, improve=LONG, objective=objective)
+    course = np.array(found.statistics["cost_over_time"])
+    assert (np.diff(course[:, 1]) < 0.0).all()
+    assert course[-1, 1] == pytest.approx(COSTS[objective](found.path, problem))
+    assert course[-1, 1] >= found.statistics["cost_bound"]
+
+
+def test_least_time_is_that_of_the_slowest_joint_of_each_motion():
+    problem = load_problem("titan4_prisms")
+    path = plan(problem, "fastrrtconnect", seed=3).path
+    slowest = [max(abs(b - a) / problem.robot.velocity) for a, b in pairwise(path.waypoints)]
+    assert least_time(path, problem) == pytest.approx(sum(slowest))
+
+
+def test_weighted_length_is_an_integral_over_the_clearance():
+    problem = load_problem("titan4_prisms")
+    path = plan(problem, "fastrrtconnect", seed=3).path
+    rows, world = path.waypoints, problem.world
+    total = 0.0
+    for a, b in pairwise(rows):
+        places = a + (np.arange(40)[:, None] + 0.5) / 40 * (b - a)
+        total += np.linalg.norm(b - a) * np.mean([1.0 + 0.05 / max(world.clearance(q), 1e-3) for q in places])
+    assert weighted_length(path, problem) == pytest.approx(total, rel=0.1)  # clearances are told apart by 5 %
+    assert weighted_length(path, problem) > path.length
+
+
+def test_a_robot_without_velocity_limits_has_no_time():
+    problem = load_problem("planar3_boxes")
+    if np.isfinite(problem.robot.velocity).any():
+        pytest.skip("it has some")
+    with pytest.raises(InputError, match="no velocity limits"):
+        plan(problem, "RRTConnect", seed=1, improve=0.1, objective="time")
+
+
+@pytest.mark.parametrize("bad", [{"objective": "energy"}, {"strategy": "hope"}])
+def test_unknown_objectives_and_strategies_are_named(bad):
+    with pytest.raises(UnknownNameError, match=next(iter(bad.values()))):
+        plan(load_problem("titan4_prisms"), improve=0.1, **bad)
+
+
+def test_the_default_planner_goes_on_with_the_one_that_found_the_path(few_rounds):
+    problem = load_problem("titan4_prisms")
+    found = plan(problem, seed=2, seconds=LONG, improve=LONG)
+    assert found.statistics["improving_rounds"] > 0
+    assert found.proven

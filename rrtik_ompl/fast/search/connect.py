@@ -72,7 +72,7 @@ class ConnectSearch:
         self.range, self.domain = connect_lengths(*box, range_, domain, turning=np.ones(dof, dtype=bool))
         joints = 0 if motions.identity else motions.joints
         self._trees = [tree_table(dof, joints, FIRST_CAPACITY) for _ in range(2)]
-        numbers = np.array([self.range, self.domain, connect_layout.UNBOUNDED_SPREAD])
+        numbers = np.array([self.range, self.domain, connect_layout.UNBOUNDED_SPREAD, connect_layout.UNBOUNDED_COST])
         self._search = _search_table(motions, self._trees, box, numbers)
         fields: Any = self._search.header
         self._fields = memoryview(fields)  # numpy takes ten times as long for one number
@@ -93,6 +93,7 @@ class ConnectSearch:
         ask: MotionsFree | None = None,
         stop: Callable[[], object] | None = None,
         max_iterations: int | None = None,
+        bound: float | None = None,
     ) -> Matrix | None:
         """Search for a path from any start to any goal.
 
@@ -104,6 +105,7 @@ class ConnectSearch:
                 count as colliding.
             stop: Called about every millisecond and before each question; true to give up.
             max_iterations: Samples at most.
+            bound: Length that the path has to stay below, if it is not a straight motion; None for any path.
 
         Returns:
             The path, start first, shape (k, n), or None.
@@ -115,6 +117,8 @@ class ConnectSearch:
         self._set_roots(1, goals)
         self._fields[connect_layout.RESOLVE] = ask is not None
         self._fields[connect_layout.LIMIT] = NO_LIMIT if max_iterations is None else max_iterations
+        length = connect_layout.UNBOUNDED_COST if bound is None else bound
+        self._search[connect_layout.NUMBERS][connect_layout.BOUND] = length
         self._questions = 0
         counts, number = (len(starts), len(goals)), int(seed) & (2**63 - 1)
         status = self._kernels.solve(self._search.address, *counts, number, FIRST_BUDGET)

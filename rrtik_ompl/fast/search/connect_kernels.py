@@ -1,7 +1,7 @@
 """RRT-Connect whole in a kernel: two trees grow towards each other until a path between a start and a goal is certain.
 
 Sources: RRT-Connect [4]; the smaller tree grows [5]; dynamic domain: a vertex that was blocked is only extended towards
-samples near it [6].
+samples near it [6]. With a BOUND it is AORRTC [15], see :mod:`rrtik_ompl.fast.search.bounded.cost_kernels`.
 
 The search, as worlds without kernels run it in Python, and the kernels of each line::
 
@@ -41,6 +41,7 @@ The search runs in short calls of :func:`resume`. Nothing depends on how its wor
 from __future__ import annotations
 
 from rrtik_ompl.fast.search import connect_layout
+from rrtik_ompl.fast.search.bounded.cost_kernels import note_cost
 from rrtik_ompl.fast.search.box_kernels import copy_inside
 from rrtik_ompl.fast.search.connect_layout import ConnectTable
 from rrtik_ompl.fast.search.connect_motions import (
@@ -73,8 +74,10 @@ def candidate(search: ConnectTable) -> bool:
     phase = field(search, connect_layout.PHASE)
     if phase == connect_layout.CONNECT:
         side, start = field(search, connect_layout.GROWING), field(search, connect_layout.FROM)
-        aim_at_vertex(search, side, start, field(search, connect_layout.TARGET))
-        return True
+        if aim_at_vertex(search, side, start, field(search, connect_layout.TARGET)):
+            return True
+        set_field(search, connect_layout.PHASE, connect_layout.EXTEND)
+        return False
     if phase == connect_layout.STRAIGHT:
         if aim_straight(search):
             return True
@@ -154,7 +157,7 @@ def plant_roots(search: ConnectTable, side: int, rows: Configuration, count: int
     for k in range(count):
         if not load_row(search, row_at(rows, dof_in(search), k)):
             return k
-        add_vertex(tree, row, values, NO_PARENT, CERTAIN, connect_layout.UNBOUNDED_DOMAIN)
+        note_cost(search, tree, add_vertex(tree, row, values, NO_PARENT, CERTAIN, connect_layout.UNBOUNDED_DOMAIN))
     return -1
 
 

@@ -29,8 +29,9 @@ CENTRE = 38
 PATH, PATH_CAPACITY, PATH_ROWS, FIELD_COUNT = range(39, 43)
 
 # The numbers, all in the unit of the configurations. RANGE: longest motion of the trees · DOMAIN: radius in which a
-# vertex is extended once it was blocked.
-RANGE, DOMAIN, SPREAD = range(3)
+# vertex is extended once it was blocked · BOUND: length that paths have to stay below, see fast/search/bounded.
+RANGE, DOMAIN, SPREAD, BOUND = range(4)
+UNBOUNDED_COST = 1e30  # [unit of the configurations] of BOUND: paths of any length
 UNBOUNDED_SPREAD = 1e30  # [unit of the configurations] samples lie in the whole box
 UNBOUNDED_DOMAIN = 1e30  # [unit of the configurations] of a vertex that was never blocked
 

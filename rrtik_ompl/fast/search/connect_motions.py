@@ -9,6 +9,7 @@ import numpy as np
 
 from rrtik_ompl.fast.checks.check_kernels import check_part
 from rrtik_ompl.fast.search import connect_layout
+from rrtik_ompl.fast.search.bounded.cost_kernels import bound_of, from_roots, is_bounded, may_lead, vertex_for
 from rrtik_ompl.fast.search.connect_layout import ConnectTable
 from rrtik_ompl.fast.search.motions.motion_kernels import (
     descends,
@@ -20,8 +21,10 @@ from rrtik_ompl.fast.search.motions.motion_kernels import (
 from rrtik_ompl.fast.search.motions.motion_layout import MotionTable
 from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row, distance
 from rrtik_ompl.fast.search.tree_kernels import (
+    cost_of,
     live_of,
     nearest_and_square,
+    nearest_by_cost,
     nearest_vertex,
     radius_of,
     row_of,
@@ -105,6 +108,18 @@ def nearest_to(search: ConnectTable, side: int, row: Configuration) -> Any:
 
 
 @kernel
+def met_by(search: ConnectTable, side: int, vertex: int) -> Any:
+    """The vertex of the other tree that is joined with a new one of tree ``side``."""
+    tree, other, row = tree_of(search, side), tree_of(search, 1 - side), candidate_row_of(search)
+    if not is_bounded(search):
+        return nearest_to(search, 1 - side, row)
+    query = field(search, connect_layout.QUERY)
+    for k in range(dof_in(search)):
+        set_float(query, k, np.float32(double_at(row, k)))
+    return nearest_by_cost(other, query, max(bound_of(search) - cost_of(tree, vertex), 0.0))
+
+
+@kernel
 def steer(search: ConnectTable, start: Configuration, aim: Configuration, length: float) -> Any:
     """Set ROW to ``aim``, or to the point at the range on the motion to it; returns whether it is ``aim``."""
     row, span = candidate_row_of(search), number_of(search, connect_layout.RANGE)
@@ -147,13 +162,18 @@ def set_candidate(search: ConnectTable, side: int, start: int, bridge: int) -> N
 
 
 @kernel
-def aim_at_vertex(search: ConnectTable, side: int, start: int, target: int) -> None:
-    """The next motion: from a vertex of tree ``side`` towards a vertex of the other tree."""
+def aim_at_vertex(search: ConnectTable, side: int, start: int, target: int) -> bool:
+    """The next motion: from a vertex of tree ``side`` towards one of the other tree. False if a bound forbids it."""
     goal = row_of(tree_of(search, 1 - side), target)
+    if is_bounded(search):
+        rest = cost_of(tree_of(search, 1 - side), target)
+        if not may_lead(search, tree_of(search, side), start, goal, rest):
+            return False
     begin = row_of(tree_of(search, side), start)
     reached = steer(search, begin, goal, distance(dof_in(search), begin, goal))
     set_field(search, connect_layout.TARGET, target)
     set_candidate(search, side, start, 1 if reached else 0)
+    return True
 
 
 @kernel
@@ -188,6 +208,20 @@ def place_sample(search: ConnectTable) -> None:
 
 
 @kernel
+def nearest_inside(search: ConnectTable, side: int) -> Any:
+    """The vertex of a tree to be extended towards the sample; -1 if that is outside its domain, or of no use."""
+    tree = tree_of(search, side)
+    if is_bounded(search):
+        near = vertex_for(search, tree, tree_of(search, 1 - side), candidate_row_of(search))
+        far = near >= 0 and distance(dof_in(search), row_of(tree, near), candidate_row_of(search)) > radius_of(
+            tree, near
+        )
+        return -1 if far else near
+    near, square = nearest_and_square(tree, field(search, connect_layout.QUERY))
+    return -1 if np.sqrt(square) > radius_of(tree, near) else near
+
+
+@kernel
 def aim_at_sample(search: ConnectTable) -> bool:
     """The next motion: from the nearest vertex of a tree towards a sample. False if that is outside its domain."""
     count_up(search, connect_layout.ITERATIONS)
@@ -200,13 +234,17 @@ def aim_at_sample(search: ConnectTable) -> bool:
     next_point(search, connect_layout.RANDOM, point, bases, dof)
     place_sample(search)
     tree = tree_of(search, side)
-    near, square = nearest_and_square(tree, field(search, connect_layout.QUERY))
-    if np.sqrt(square) > radius_of(tree, near):
+    near = nearest_inside(search, side)
+    if near < 0:
         return False
     begin = row_of(tree, near)
     length = distance(dof, begin, row)
     if length == 0.0:
         return False
     steer(search, begin, row, length)
+    if is_bounded(search):
+        rest = from_roots(dof, tree_of(search, 1 - side), row)
+        if not may_lead(search, tree, near, row, rest):
+            return False
     set_candidate(search, side, near, 0)
     return True

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from rrtik_ompl.fast.search import connect_layout
+from rrtik_ompl.fast.search.bounded.cost_kernels import is_bounded, note_cost
 from rrtik_ompl.fast.search.connect_layout import ConnectTable
 from rrtik_ompl.fast.search.connect_motions import (
     candidate_row_of,
     candidate_values_of,
     dof_in,
     meeting_of,
-    nearest_to,
+    met_by,
     number_of,
     set_meeting,
     tree_of,
@@ -56,10 +57,12 @@ def on_free(search: ConnectTable, state: int) -> int:
         return finish_or_ask(search)
     row, values = candidate_row_of(search), candidate_values_of(search)
     vertex = add_vertex(tree_of(search, side), row, values, start, state, connect_layout.UNBOUNDED_DOMAIN)
+    if is_bounded(search):
+        note_cost(search, tree_of(search, side), vertex)
     if field(search, connect_layout.PHASE) == connect_layout.EXTEND:
         set_field(search, connect_layout.PHASE, connect_layout.CONNECT)
         set_field(search, connect_layout.GROWING, 1 - side)
-        set_field(search, connect_layout.FROM, nearest_to(search, 1 - side, row))
+        set_field(search, connect_layout.FROM, met_by(search, side, vertex))
         set_field(search, connect_layout.TARGET, vertex)
     else:
         set_field(search, connect_layout.FROM, vertex)

@@ -24,6 +24,7 @@ from rrtik_ompl.fast.simd.lanes import (
     float_at,
     int_at,
     lanes_at,
+    larger,
     lowest,
     set_field,
     set_float,
@@ -51,6 +52,7 @@ all_values_of: Callable[[TreeTable], JointValues] = field_reader(tree_layout.VAL
 parents_of: Callable[[TreeTable], IntArray] = field_reader(tree_layout.PARENTS)
 radii_of: Callable[[TreeTable], LaneArray] = field_reader(tree_layout.RADII)
 states_of: Callable[[TreeTable], IntArray] = field_reader(tree_layout.STATES)
+costs_of: Callable[[TreeTable], LaneArray] = field_reader(tree_layout.COSTS)
 
 
 @inlined
@@ -96,6 +98,18 @@ def set_radius(tree: TreeTable, vertex: int, radius: float) -> None:
 
 
 @inlined
+def cost_of(tree: TreeTable, vertex: int) -> Any:
+    """Length of the path from a root to a vertex, where it was set."""
+    return float_at(costs_of(tree), vertex)
+
+
+@inlined
+def set_cost(tree: TreeTable, vertex: int, cost: float) -> None:
+    """Set the length of the path from a root to a vertex."""
+    set_float(costs_of(tree), vertex, np.float32(cost))
+
+
+@inlined
 def is_full(tree: TreeTable) -> Any:
     """Whether a tree has no room for one more vertex."""
     return size_of(tree) >= capacity_of(tree)
@@ -114,19 +128,47 @@ def nearest_vertex(tree: TreeTable, query: int) -> Any:
     return vertex
 
 
+@inlined
+def squares_of(points: LaneArray, query: int, dof: int, block: int) -> Any:
+    """Squared distances of a block of vertices from ``dof`` floats, in lanes."""
+    total = spread(ZERO)
+    for k in range(dof):
+        gap = lanes_at(points, block * dof + k) - float_at(query, k)
+        total = total + gap * gap
+    return total
+
+
+@kernel
+def nearest_by_cost(tree: TreeTable, query: int, cost: float) -> Any:
+    """The vertex nearest to ``DOF`` floats and a cost, as if what it costs more were one more coordinate."""
+    dof, points, costs, wanted = dof_of(tree), points_of(tree), costs_of(tree), np.float32(cost)
+    least, place = spread(UNBOUNDED_SQUARE), spread(ZERO)
+    for block in range((size_of(tree) + WIDTH - 1) // WIDTH):
+        dearer = larger(lanes_at(costs, block) - wanted, ZERO)
+        total = squares_of(points, query, dof, block) + dearer * dearer
+        closer = total < least
+        least = choose(closer, total, least)
+        place = choose(closer, spread(np.float32(block)), place)
+    vertex, _ = least_lane(least, place)
+    return vertex
+
+
 @kernel
 def nearest_and_square(tree: TreeTable, query: int) -> Any:
     """The same, and the square of its distance."""
     dof, points = dof_of(tree), points_of(tree)
     least, place = spread(UNBOUNDED_SQUARE), spread(ZERO)
     for block in range((size_of(tree) + WIDTH - 1) // WIDTH):
-        total = spread(ZERO)
-        for k in range(dof):
-            gap = lanes_at(points, block * dof + k) - float_at(query, k)
-            total = total + gap * gap
+        total = squares_of(points, query, dof, block)
         closer = total < least
         least = choose(closer, total, least)
         place = choose(closer, spread(np.float32(block)), place)
+    return least_lane(least, place)
+
+
+@inlined
+def least_lane(least: Any, place: Any) -> Any:
+    """The first vertex with the least number, from the least of each lane and its block; and that number."""
     square = lowest(least)
     winners = least <= square
     lane = first_bit(bits(winners))

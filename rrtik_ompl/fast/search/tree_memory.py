@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.fast.search.tree_layout import (
     CAPACITY,
+    COSTS,
     DOF,
     JOINTS,
     LIVE,
@@ -58,6 +59,7 @@ def _arrays(dof: int, joints: int, capacity: int) -> dict[int, NDArray[Any]]:
         PARENTS: np.zeros(capacity, dtype=np.int32),
         RADII: np.zeros(capacity, dtype=np.float32),
         STATES: np.zeros(capacity, dtype=np.int32),
+        COSTS: np.zeros(capacity, dtype=np.float32),
     }
 
 

@@ -13,7 +13,7 @@ from rrtik_ompl.fast.search.motions.motion_layout import MotionTable
 from rrtik_ompl.fast.search.motions.row_kernels import Configuration, distance
 from rrtik_ompl.fast.search.roadmap import layout
 from rrtik_ompl.fast.search.roadmap.layout import BLOCKED, DOUBTFUL, SURE, UNKNOWN, RoadmapTable
-from rrtik_ompl.fast.search.tree_kernels import add_vertex, points_of, row_of, values_of
+from rrtik_ompl.fast.search.tree_kernels import add_vertex, points_of, row_of, squares_of, values_of
 from rrtik_ompl.fast.search.tree_layout import CERTAIN, NO_PARENT, TreeTable
 from rrtik_ompl.fast.simd.access import count_up, field_reader, lane_at
 from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
@@ -22,19 +22,16 @@ from rrtik_ompl.fast.simd.lanes import (
     field,
     float_at,
     int_at,
-    lanes_at,
     lowest,
     set_double,
     set_field,
     set_float,
     set_int,
-    spread,
 )
 from rrtik_ompl.fast.tables.layout import FREE, UNDECIDED, JointValues
 
 ANY_RADIUS = 0.0  # domains of vertices are of no use here
 FARTHEST = np.float32(3e38)  # more than any squared distance
-ZERO = np.float32(0.0)
 
 motions_of: Callable[[RoadmapTable], MotionTable] = field_reader(layout.MOTIONS)
 vertices_of: Callable[[RoadmapTable], TreeTable] = field_reader(layout.VERTICES)
@@ -106,10 +103,7 @@ def find_near(roadmap: RoadmapTable, below: int) -> int:
     tree, query, dof = vertices_of(roadmap), field(roadmap, layout.QUERY), dof_of(motions_of(roadmap))
     points, wanted, count, worst = points_of(tree), field(roadmap, layout.NEAR), 0, FARTHEST
     for block in range((below + WIDTH - 1) // WIDTH):
-        total = spread(ZERO)
-        for k in range(dof):
-            gap = lanes_at(points, block * dof + k) - float_at(query, k)
-            total = total + gap * gap
+        total = squares_of(points, query, dof, block)
         if lowest(total) >= worst:
             continue
         for lane in range(min(WIDTH, below - block * WIDTH)):

@@ -1,0 +1,1 @@
+"""Searches for paths below a length, in the space of configurations and costs."""

@@ -1,0 +1,71 @@
+"""What a path costs, and what no path of a problem costs less than: what `plan(improve=)` makes small."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import TypeAlias
+
+import numpy as np
+
+from rrtik_ompl.arrays import Vector
+from rrtik_ompl.choices import PathObjective
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.world.clearance_curve import clearance_along
+
+NEAREST = 1e-3  # [m] clearances below this cost no more
+DOUBLE = 0.05  # [m] the clearance at which a piece of a path counts double
+
+PathCost: TypeAlias = Callable[[JointPath, Problem], float]
+
+
+def length(path: JointPath, _: Problem) -> float:
+    """Length in joint space [rad; m]."""
+    return path.length
+
+
+def least_time(path: JointPath, problem: Problem) -> float:
+    """Time [s] that the robot needs at least: of each motion the slowest joint at its velocity limit.
+
+    Raises:
+        InputError: If the robot has no velocity limit.
+    """
+    return float(_seconds(np.diff(path.waypoints, axis=0), problem.robot).sum())
+
+
+def weighted_length(path: JointPath, problem: Problem) -> float:
+    """Length in joint space, where each piece counts ``1 + 0.05 m / clearance`` times [rad; m].
+
+    The clearance is proven at 240 places on the path, so the true one is no smaller.
+    """
+    curve, rows = clearance_along(problem.world, path.waypoints), path.waypoints
+    lengths = np.append(np.linalg.norm(np.diff(rows, axis=0), axis=1), 0.0)
+    ends = np.append(np.where(curve.motions[1:] == curve.motions[:-1], curve.shares[1:], 1.0), 1.0)
+    pieces = lengths[np.minimum(curve.motions, len(lengths) - 1)] * (ends - curve.shares)
+    return float(pieces @ (1.0 + DOUBLE / np.maximum(curve.distances, NEAREST)))
+
+
+COSTS: Mapping[PathObjective, PathCost] = MappingProxyType(
+    {"length": length, "time": least_time, "clearance": weighted_length}
+)
+
+
+def least_cost(problem: Problem, objective: PathObjective) -> float:
+    """What no path costs less than: that of the straight motion to a goal in joint values; 0 for any other goal."""
+    goal = problem.goal
+    if not isinstance(goal, JointGoal):
+        return 0.0
+    span = goal.q - problem.start
+    return float(_seconds(span[None], problem.robot)[0] if objective == "time" else np.linalg.norm(span))
+
+
+def _seconds(motions: np.ndarray, robot: Robot) -> Vector:
+    """Least time of each motion, shapes (m, dof) and (m,)."""
+    if not np.isfinite(robot.velocity).any():
+        raise InputError(f"objective 'time': robot '{robot.name}' has no velocity limits; give them in its URDF")
+    found: Vector = (np.abs(motions) / robot.velocity).max(axis=1, initial=0.0)
+    return found
