@@ -52,9 +52,13 @@ STL = "solid a\n" + "".join(
     f"facet normal 0 0 0\nouter loop\n{corners}endloop\nendfacet\n"
     for corners in ("vertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n", "vertex 0 0 1\nvertex 1 0 0\nvertex 0 1 0\n")
 )
+MJCF = """<mujoco model="arm"><compiler angle="radian"/><worldbody><body name="base"><geom size=".1"/>
+<body name="hand" pos="0.5 0 0"><joint name="turn" axis="0 0 1" range="-1 1"/><geom type="box" size=".1 .1 .1"/>
+<site name="tip"/></body></body></worldbody><keyframe><key name="home" qpos="0"/></keyframe></mujoco>"""
 FILES: dict[str, tuple[str, Callable[[Path], object]]] = {
     "problem.yaml": (PROBLEM, rrtik.load_problem),
     "arm.urdf": (URDF, rrtik.load_robot),
+    "arm.xml": (MJCF, rrtik.load_robot),
     "dh.yaml": (
         "version: 1\nname: arm\ndh: {convention: standard, rows: [{a: 1, limits_deg: [-90, 90]}]}\n",
         rrtik.load_robot,
@@ -93,11 +97,14 @@ def corpus() -> list[Any]:
     problem = rrtik.Problem(world, [0, 0, 0], [0.5, 0.2, 0])
     path = rrtik.JointPath.of(robot, [[0, 0, 0], [0.5, 0.2, 0]])
     good = [robot, world, problem, path, world.scene, rrtik.pose([1, 0, 0]), rrtik.PositionGoal([1, 1, 0]), "planar3"]
+    good += [rrtik.TaskRegion([1, 1, 0], np.zeros((6, 2))), rrtik.MoveRules(["a", "b", "c"]), rrtik.GoalSet([good[6]])]
     good += [rrtik.PoseGoal(rrtik.pose([1, 1, 0])), rrtik.Sphere(0.1), [0, 0, 0], [1.0, 0.5, 0.1], "auto", "RRTConnect"]
     good += [np.zeros((2, 3)), np.eye(4), 1, 2, 0.5, True, world.scene.obstacles, ["joint1"], {"range": 0.1}]
     odd = [None, -1, 0, 10**400, float("nan"), float("inf"), 1e300, 1j, "", "\x00", "\ud800", "a" * 5000, b"x", [], {}]
     odd += [
         [[]],
+        [[1, 2], [3]],
+        "\ud7ff\udc00",
         [None],
         ["a"],
         {"a": 1},

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, whole_number
-from rrtik_ompl.errors import InputError, UnknownNameError, at_most, listed
+from rrtik_ompl.errors import InputError, UnknownNameError, at_most, listed, name_of
 from rrtik_ompl.transitions import merge_moves
 
 MOST_JOINTS = 1_000  # of an arm
@@ -48,7 +48,7 @@ class MoveRules:
         smallest_move: PerJoint = 0.0,
         dof: int | None = None,
     ) -> None:
-        names = listed(names, "names of joints")
+        names = tuple(name_of(name, "a joint") for name in listed(names, "names of joints"))
         dof = len(names) if dof is None else whole_number(dof, "dof")
         at_most(dof, MOST_JOINTS, "dof")
         self.joint_costs = costs_of_joints(joint_costs, dof)
@@ -62,9 +62,7 @@ class MoveRules:
         Raises:
             InputError: If it is no route of n joints, or has no row.
         """
-        route = finite_array(route, (None, len(self.joint_costs)), "route")
-        if len(route) == 0:
-            raise InputError("route: needs at least one row")
+        route = self._route(route)
         ending = np.diff(route[self.head(route) - 1 :], axis=0)
         others = np.delete(ending, self.last_joints, axis=1)
         once = (np.count_nonzero(np.diff(merge_moves(route, tolerance=0.0), axis=0), axis=0) <= 1)[self.last_joints]
@@ -72,9 +70,20 @@ class MoveRules:
         return bool(rests and once.all() and not others.any() and long_enough(route, self.smallest_move))
 
     def head(self, route: Matrix) -> int:
-        """How many waypoints of a route, shape (k, n), come before the last joints move."""
+        """How many waypoints of a route, shape (k, n), come before the last joints move.
+
+        Raises:
+            InputError: As :meth:`kept_by`.
+        """
+        route = self._route(route)
         waiting = (route[:, self.last_joints] == route[0, self.last_joints]).all(axis=1)
         return len(route) if waiting.all() else int(waiting.argmin())
+
+    def _route(self, given: Matrix) -> Matrix:
+        route = finite_array(given, (None, len(self.joint_costs)), "route")
+        if len(route) == 0:
+            raise InputError("route: needs at least one row")
+        return route
 
 
 def long_enough(route: Matrix, smallest_move: Vector) -> bool:

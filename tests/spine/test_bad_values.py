@@ -70,6 +70,8 @@ CASES = {
     "route of nothing": (lambda: MoveRules(["a"]).kept_by(None), "route: expected"),
     "route of no row": (lambda: MoveRules(["a"]).kept_by(np.zeros((0, 1))), "route: needs at least one row"),
     "route of other joints": (lambda: MoveRules(["a"]).kept_by([[0.0, 1.0]]), "route: expected an array of shape"),
+    "head of no route": (lambda: MoveRules(["a"]).head([0.0]), "route: expected an array of shape"),
+    "numbers as names of joints": (lambda: MoveRules([[1.0]]), "name of a joint must be of type str"),
     "inflation of NaN": (lambda: inflated(NAN), "inflation: that of 'far'"),
     "inflation without end": (lambda: inflated(np.inf), "inflation"),
 } | {
