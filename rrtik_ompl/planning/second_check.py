@@ -12,9 +12,8 @@ from rrtik_ompl.ompl_bridge.attempt import Attempt
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits
 from rrtik_ompl.path import JointPath, proved_as_clear
 from rrtik_ompl.problem import Problem, densely_checked
-from rrtik_ompl.world import FINEST_RESOLUTION
 from rrtik_ompl.world.detours import with_detours
-from rrtik_ompl.world.kept_clearance import Room, room_between
+from rrtik_ompl.world.kept_clearance import Room, leaving_room, room_between
 
 TOUCHING = 1e-6  # [m]; bodies that are nearer to their margin than this count as touching
 
@@ -82,19 +81,16 @@ class SecondCheck:
     def strict(self, *, proving: bool) -> Problem:
         """The problem for searches that leave room: motions keep more than the clearance in steps, and may be proven.
 
-        Where they are not proven, no point moves between two steps farther than twice what is kept beyond the
-        clearance, so that what is thin is not stepped over: in between, too, obstacles are the clearance away [16].
+        Where they are not proven, see :func:`leaving_room`.
 
         Args:
             proving: Whether motions have to be proven, which searches in kernels cannot.
         """
         room = self._room(self._problem.start[None]) or Room(0.0, 0.0)
         strict = densely_checked(self._problem)
-        world, step = strict.world.with_clearance(room.searched), 2.0 * (room.searched - room.kept)
         if proving:
-            return strict.with_world(world.proving(room.kept))
-        fine = FINEST_RESOLUTION <= step < world.motion_resolution
-        return strict.with_world(world.with_resolution(step) if fine else world)
+            return strict.with_world(strict.world.with_clearance(room.searched).proving(room.kept))
+        return strict.with_world(leaving_room(strict.world, room))
 
     def accepted(self, outcome: Attempt, seed: int) -> JointPath | None:
         """The path of an attempt if it is accepted.

@@ -9,7 +9,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, not_negative
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.world import World
+from rrtik_ompl.world import FINEST_RESOLUTION, World
 
 CLEARANCE = 1e-3  # [m] that is kept where nobody says
 SPARE = 1e-3  # [m] that searches keep on top, but not more than twice: they look at points of a motion alone
@@ -42,6 +42,16 @@ def room_between(world: World, ends: Matrix, clearance: float | None) -> Room | 
         if world.motions_proven(ends, ends, clearance=searched).all():
             return Room(min(wanted, searched), searched)
     return None
+
+
+def leaving_room(world: World, room: Room) -> World:
+    """The same world for searches: motions keep more than what is to be kept, at points that lie close enough.
+
+    No point of the arm moves between two of them farther than twice what is kept beyond ``room.kept``, so that what is
+    thin is not stepped over: in between, too, obstacles are that far away [16].
+    """
+    wider, step = world.with_clearance(room.searched), 2.0 * (room.searched - room.kept)
+    return wider.with_resolution(step) if FINEST_RESOLUTION <= step < world.motion_resolution else wider
 
 
 def check_clearance(world: World, clearance: float | None, ends: dict[str, Matrix]) -> None:

@@ -52,6 +52,8 @@ class FastWorld:
 
     Attributes:
         address: Of the tables in memory, for other kernels; 0 without kernels. Valid as long as this object lives.
+        table: What is there; none without kernels.
+        moving, standing: Numbers of the bodies that move, in sets that count as one, and of those that stand still.
 
     Args:
         chain: The tree of joints.
@@ -97,7 +99,8 @@ class FastWorld:
         self._arm: ArmTables = arm_tables(chain, bodies, moving, kept, outer, inner, solids, self._limits, like=same)
         self._checked = checked_table(moving, standing, clear)
         self._primitives = standing_tables(bodies, standing, self._checked, outer, inner)
-        self._standing, self._outer, self._placed = standing, outer, PlacedPrimitives()
+        self.moving, self.standing = moving, standing
+        self._outer, self._placed = outer, PlacedPrimitives()
         self._flagged = Flags(clear, self._arm, moving, standing)
         self._reference = ReferenceChecks(self._arm.arm, self._arm.balls, self._primitives)
         self._kernels = library("checks.check_kernels") if compiled else None
@@ -107,10 +110,8 @@ class FastWorld:
         if self._kernels is not None:
             self._scratch = scratch_table(self._arm.arm, self._arm.balls, self._arm.bounds, self._primitives)
             self._solids = standing_solids(bodies, standing, solids)
-            arm, own = self._arm, (self._scratch, self._arm.solids, self._solids)
-            tables = (arm.arm, *arm.balls, *self._primitives, *own, arm.wider_solids, arm.bounds)
-            self._world = table({k: t.address for k, t in enumerate(tables)})
-            self.address = self._world.address
+            self.table = table({k: t.address for k, t in enumerate(self.tables)})
+            self.address = self.table.address
             self._marks = self._scratch[MARKS]
 
     def update_obstacles(self, bodies: Sequence[Body], inflation: Sequence[float]) -> None:
@@ -124,7 +125,7 @@ class FastWorld:
             inflation: For each body how far from it, beyond its margin, the arm must stay to be FREE [m]; read for
                 those that stand still.
         """
-        around = self._placed.primitives(bodies, self._standing, self._outer, inflation)
+        around = self._placed.primitives(bodies, self.standing, self._outer, inflation)
         first = not self._moved
         self._moved = True
         inside = primitive_table(joined([]), self._checked) if first else self._primitives[1]
@@ -132,18 +133,24 @@ class FastWorld:
         self._reference = ReferenceChecks(self._arm.arm, self._arm.balls, self._primitives)
         self._probe = None
         if self._kernels is not None:
-            self._world.header[OUTER_PRIMITIVES : OUTER_PRIMITIVES + 2] = [each.address for each in self._primitives]
+            self.table.header[OUTER_PRIMITIVES : OUTER_PRIMITIVES + 2] = [each.address for each in self._primitives]
             if first:  # the solids stand where nothing is any more; that none is known holds wherever bodies go
-                self._solids = standing_solids(bodies, self._standing, [NO_SOLIDS] * len(bodies))
-                self._world.header[STANDING_SOLIDS] = self._solids.address
+                self._solids = standing_solids(bodies, self.standing, [NO_SOLIDS] * len(bodies))
+                self.table.header[STANDING_SOLIDS] = self._solids.address
 
     def intact(self) -> bool:
         """Whether no kernel has written beyond its own memory; tests check it after each call."""
         arm = self._arm
         tables = [arm.arm, *arm.balls, *self._primitives, arm.solids, arm.wider_solids, arm.bounds]
         if self._kernels is not None:
-            tables += [self._scratch, self._solids, self._world]
+            tables += [self._scratch, self._solids, self.table]
         return all(each.intact() for each in tables) and (self._probe is None or self._probe.intact())
+
+    @property
+    def tables(self) -> tuple[Table, ...]:
+        """What the fields of the world's table point to, in their order."""
+        arm, own = self._arm, (self._scratch, self._arm.solids, self._solids)
+        return (arm.arm, *arm.balls, *self._primitives, *own, arm.wider_solids, arm.bounds)
 
     @property
     def margin(self) -> float:

@@ -44,6 +44,7 @@ class ConnectSearch:
         range_: See ``range``; what suits the box if None.
         domain: See ``domain``; what suits the box if None.
         patience: Paths that may be rejected until undecided motions are asked for before they are used.
+        vertices: For which each tree has room at first, a multiple of ``WIDTH``.
 
     Raises:
         InputError: If there are no kernels, shapes do not fit, or a number is out of range.
@@ -58,6 +59,7 @@ class ConnectSearch:
         range_: float | None = None,
         domain: float | None = None,
         patience: int = PATIENCE,
+        vertices: int = FIRST_CAPACITY,
     ) -> None:
         kernels = library(connect_layout.KERNELS)
         if kernels is None:
@@ -71,7 +73,7 @@ class ConnectSearch:
         motions.require_covered(*box)
         self.range, self.domain = connect_lengths(*box, range_, domain, turning=np.ones(dof, dtype=bool))
         joints = 0 if motions.identity else motions.joints
-        self._trees = [tree_table(dof, joints, FIRST_CAPACITY) for _ in range(2)]
+        self._trees = [tree_table(dof, joints, vertices) for _ in range(2)]
         numbers = np.array([self.range, self.domain, connect_layout.UNBOUNDED_SPREAD, connect_layout.UNBOUNDED_COST])
         self._search = _search_table(motions, self._trees, box, numbers)
         fields: Any = self._search.header
@@ -127,6 +129,21 @@ class ConnectSearch:
             what = f"start {root}" if root < counts[0] else f"goal {root - counts[0]}"
             raise InputError(f"search: {what} is not in the box of configurations")
         return self._path() if self._finished(status, ask, stop) == connect_layout.SOLVED else None
+
+    @property
+    def table(self) -> Table:
+        """What the kernels read."""
+        return self._search
+
+    @property
+    def trees(self) -> tuple[Table, Table]:
+        """The trees of the start and of the goal."""
+        return self._trees[0], self._trees[1]
+
+    @property
+    def rows(self) -> tuple[Matrix, Matrix, Matrix]:
+        """Where starts, goals and the path stand, shapes (k, n)."""
+        return self._roots[0], self._roots[1], self._path_rows
 
     @property
     def capacity(self) -> int:

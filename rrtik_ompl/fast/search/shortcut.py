@@ -24,6 +24,9 @@ class ShortcutSearch:
     Every edge of the result that is not one of the input's is free: proven by the kernels or answered by ``ask``. The
     ends stay as they are to the bit, and no try makes the route longer.
 
+    Attributes:
+        table: What the kernels read.
+
     Args:
         motions: How motions are checked in a world.
         waypoints: A route whose edges are free, shape (k, dof), k at least 2.
@@ -61,7 +64,7 @@ class ShortcutSearch:
         route[: len(rows)] = rows
         self._kernels = kernels
         self._motions, self._dof = motions, dof  # its tables live as long as this search
-        self._table = table(
+        self.table = table(
             {
                 shortcut_layout.MOTIONS: motions.address,
                 shortcut_layout.METRIC: lengths * lengths,
@@ -91,7 +94,7 @@ class ShortcutSearch:
     @property
     def address(self) -> int:
         """Of the table, for other kernels; valid as long as this object lives."""
-        return self._table.address
+        return self.table.address
 
     @property
     def capacity(self) -> int:
@@ -121,7 +124,7 @@ class ShortcutSearch:
 
     def answer(self, free: bool) -> None:
         """Answer whether all of the questions are free."""
-        self._table.header[shortcut_layout.ANSWERED] = shortcut_layout.ANSWER_YES if free else shortcut_layout.ANSWER_NO
+        self.table.header[shortcut_layout.ANSWERED] = shortcut_layout.ANSWER_YES if free else shortcut_layout.ANSWER_NO
 
     def run(
         self,
@@ -144,11 +147,11 @@ class ShortcutSearch:
         Returns:
             Whether the search came to its end.
         """
-        self._table.header[shortcut_layout.MAX_TRIES] = min(tries, NO_LIMIT)
-        self._table.header[shortcut_layout.PATIENCE] = min(patience, NO_LIMIT)
+        self.table.header[shortcut_layout.MAX_TRIES] = min(tries, NO_LIMIT)
+        self.table.header[shortcut_layout.PATIENCE] = min(patience, NO_LIMIT)
         while True:
             self._motions.make_ready()
-            status = self._kernels.resume(self._table.address, chunk)
+            status = self._kernels.resume(self.table.address, chunk)
             if status == shortcut_layout.DONE:
                 return True
             if status == shortcut_layout.ASKING:
@@ -158,11 +161,11 @@ class ShortcutSearch:
 
     def intact(self) -> bool:
         """Whether no kernel has written beyond the memory of the search or what it works on."""
-        return self._table.intact() and self._motions.intact()
+        return self.table.intact() and self._motions.intact()
 
     def _number(self, place: int) -> int:
-        return int(self._table.header[place])
+        return int(self.table.header[place])
 
     def _rows(self, place: int, count: int) -> Matrix:
-        flat: Vector = self._table[place]
+        flat: Vector = self.table[place]
         return flat[: count * self._dof].reshape(-1, self._dof).copy()

@@ -6,7 +6,6 @@ it, for one processor.
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -120,7 +119,3 @@ def write_bitcode(folder: Path) -> None:
         code = compiled_module(name)
         for target in targets_of_this_width():
             write_code(folder / bitcode_name(name, target), bitcode_key(name, target), retargeted(code, target))
-
-
-if __name__ == "__main__":
-    write_bitcode(Path(sys.argv[1]))

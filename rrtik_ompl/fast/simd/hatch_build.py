@@ -1,10 +1,10 @@
 """What hatch does when it builds a wheel: kernels go along as LLVM bitcode, so that nobody who installs it compiles.
 
-One wheel has the bitcode of every kind of machine (:mod:`rrtik_ompl.fast.simd.targets`), wherever it is built. That
-takes a minute or two and numba, which the built package needs anyway; ``RRTIK_KERNELS=0`` in the environment goes
-without. Whatever goes wrong, there is a wheel: kernels are then compiled when they are first used. For a wheel that is
-to be published, ``RRTIK_KERNELS=1`` makes that an error. Editable installs compile at first use too, because their
-sources change.
+One wheel has the bitcode of every kind of machine (:mod:`rrtik_ompl.fast.simd.targets`) and what pages run, wherever it
+is built. That takes a minute or two and numba, which the built package needs anyway; ``RRTIK_KERNELS=0`` in the
+environment goes without. Whatever goes wrong, there is a wheel: kernels are then compiled when they are first used. For
+a wheel that is to be published, ``RRTIK_KERNELS=1`` makes that an error. Editable installs compile at first use too,
+because their sources change.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 SETTING = os.environ.get("RRTIK_KERNELS", "")
 WITHOUT, REQUIRED = "0", "1"
 WIDTHS = ("8", "16")
+ENDINGS = (".bitcode", ".wasm")
 PATIENCE = None if SETTING == REQUIRED else 1800.0  # [s]; a wheel that must have all kernels waits for them
 PORTABLE = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}  # nothing that only this processor can do
 
@@ -48,7 +49,7 @@ class KernelBitcode(BuildHookInterface):  # type: ignore[misc]
         except OSError as error:
             self.app.display_warning(f"kernels as bitcode: {error}")
             return
-        made = sorted(Path(self._made.name).glob("*.bitcode"))
+        made = sorted(file for ending in ENDINGS for file in Path(self._made.name).glob(f"*{ending}"))
         build_data["force_include"].update({str(file): f"rrtik_ompl/fast/{file.name}" for file in made})
         names = ", ".join(file.name for file in made)
         self.app.display_info(f"kernels as bitcode: {names or 'none (is numba there?)'}")
@@ -74,6 +75,6 @@ def _compiler(width: str, root: Path, folder: Path) -> subprocess.Popen[bytes]:
     """A process that compiles all kernels of a width into a folder, for all kinds of machine that have it."""
     places = {"PYTHONPATH": os.pathsep.join(sys.path), "NUMBA_CACHE_DIR": str(folder)}
     environment = {**os.environ, **PORTABLE, **places, "RRTIK_LANES": width}
-    command = [sys.executable, "-m", "rrtik_ompl.fast.simd.bitcode", str(folder)]
+    command = [sys.executable, "-m", "rrtik_ompl.fast.shipped", str(folder)]
     errors = None if SETTING == REQUIRED else subprocess.DEVNULL
     return subprocess.Popen(command, env=environment, cwd=root, stderr=errors)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.fast.ik import ik_layout
-from rrtik_ompl.fast.tables.memory import WORD, PlannedTable, Table, TablePlan
+from rrtik_ompl.fast.tables.memory import WORD, PlannedTable, Table, TablePlan, table
 
 
 class KernelCall:
@@ -89,6 +89,19 @@ def spare_calls(limb: Table) -> list[KernelCall]:
 
 @lru_cache(maxsize=64)
 def _plan_of(limb: Table, aims: int, rows: int, near: bool, begun: bool, steps: int, patience: int) -> TablePlan:
+    return TablePlan(*_fields_of(limb, aims, rows, near, begun, steps, patience))
+
+
+def call_table(limb: Table, steps: int, patience: int) -> Table:
+    """What a call for a single row works on, as a table that lives long; see :class:`KernelCall`."""
+    arrays, numbers = _fields_of(limb, 1, 1, True, True, steps, patience)
+    return table({place: np.zeros(words) for place, words in arrays.items()} | dict(numbers))
+
+
+def _fields_of(
+    limb: Table, aims: int, rows: int, near: bool, begun: bool, steps: int, patience: int
+) -> tuple[dict[int, int], dict[int, int]]:
+    """Words of the arrays of a call, and its other fields, by their places."""
     dof, joints = int(limb.header[ik_layout.DOF]), int(limb.header[ik_layout.JOINTS])
     arrays = {
         ik_layout.AIMS: ik_layout.AIM_FLOATS * aims,
@@ -113,4 +126,4 @@ def _plan_of(limb: Table, aims: int, rows: int, near: bool, begun: bool, steps: 
         ik_layout.NEAR_BYTES: WORD * dof,
         ik_layout.DONE: 0,
     }
-    return TablePlan(arrays, numbers)
+    return arrays, numbers

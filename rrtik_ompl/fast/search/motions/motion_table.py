@@ -51,7 +51,8 @@ class FastMotions:
         resolve: Whether the world decides motions that the kernels leave undecided; False if it is conservative.
         spare: What searches keep here from one call to the next, by its kind; whoever uses it takes it out meanwhile.
         identity: Whether joint values are the configuration itself.
-        address: Of the table in memory, for kernels; valid as long as this object lives.
+        table: What kernels read.
+        address: Of it in memory; valid as long as this object lives.
 
     Args:
         fast: Must have kernels (an ``address`` other than 0).
@@ -89,7 +90,7 @@ class FastMotions:
         self.spare: dict[str, Any] = {}
         self.resolution = positive(resolution, "resolution")
         self.identity = matrix.shape == (joints, joints) and bool((matrix == np.eye(joints)).all() and not shift.any())
-        self._table = table(
+        self.table = table(
             {
                 motion_layout.WORLD: fast.address,
                 motion_layout.DOF: self.dof,
@@ -103,7 +104,7 @@ class FastMotions:
                 motion_layout.PROOF: 0,
             }
         )
-        self.address = self._table.address
+        self.address = self.table.address
 
     @property
     def joints(self) -> int:
@@ -117,11 +118,11 @@ class FastMotions:
     def make_ready(self) -> None:
         """To be called before kernels that ask for proofs: others may have proven with another clearance meanwhile."""
         if self._proof is not None:
-            self._table.header[motion_layout.PROOF] = self._proof()
+            self.table.header[motion_layout.PROOF] = self._proof()
 
     def intact(self) -> bool:
         """Whether no kernel has written beyond this table or those of the checks."""
-        return self._table.intact() and self.fast.intact()
+        return self.table.intact() and self.fast.intact()
 
     def require_covered(self, lower: Vector, upper: Vector) -> None:
         """Refuse a box of configurations that the checks' margin against rounding does not cover; shapes (dof,).

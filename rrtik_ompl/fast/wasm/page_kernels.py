@@ -1,0 +1,74 @@
+"""The WebAssembly module of pages: from the package, from the user's cache, or made of the kernels' sources."""
+
+from __future__ import annotations
+
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+
+from rrtik_ompl.fast.simd.code_files import FOLDER, Code, read_code, sources_digest, write_code
+from rrtik_ompl.fast.simd.processor import WIDTH
+from rrtik_ompl.files.cache import cache_folder, nobody_else_s
+from rrtik_ompl.files.notice import tell_once
+
+# Libraries that a page has, by what the names of their functions begin with there.
+LIBRARIES = {
+    "connect": "search.connect_kernels",
+    "shortcut": "search.shortcut_kernels",
+    "ik": "ik.ik_kernels",
+    "check": "checks.check_kernels",
+    "distance": "checks.distance_kernels",
+}
+LAYOUT = 1
+COMPILING_PAGES = "compiling the kernels of pages that plan, once per machine: some 20 s"
+
+
+def page_kernels_name() -> str:
+    """Name of the file that the package may bring."""
+    return f"page-{WIDTH}.wasm"
+
+
+def page_kernels_key() -> str:
+    """What the module depends on."""
+    sources = " ".join(f"{name} {module} {sources_digest(module)}" for name, module in LIBRARIES.items())
+    return f"layout {LAYOUT} {WIDTH} lanes {sources}"
+
+
+def made_page_kernels() -> bytes:
+    """The module, made anew.
+
+    Raises:
+        ImportError: Without numba.
+        RuntimeError: If this LLVM cannot make it.
+    """
+    from rrtik_ompl.fast.simd.bitcode import compiled_module
+    from rrtik_ompl.fast.wasm.emit import wasm_module
+
+    return wasm_module({name: compiled_module(module) for name, module in LIBRARIES.items()})
+
+
+def write_page_kernels(folder: Path) -> None:
+    """Make the file that :func:`page_kernels` takes instead of compiling."""
+    write_code(folder / page_kernels_name(), page_kernels_key(), Code({}, made_page_kernels()))
+
+
+@cache
+def page_kernels() -> bytes | None:
+    """The module; None where it can be neither found nor made."""
+    key = page_kernels_key()
+    packaged = read_code(FOLDER / page_kernels_name(), key)
+    if packaged is not None:
+        return packaged.code
+    folder = cache_folder("kernels")
+    file = None if folder is None else folder / f"page-{sha256(key.encode()).hexdigest()[:24]}.wasm"
+    kept = read_code(file, key) if file is not None and nobody_else_s(file) else None
+    if kept is not None:
+        return kept.code
+    try:
+        tell_once(COMPILING_PAGES)
+        made = made_page_kernels()
+    except (ImportError, RuntimeError):
+        return None
+    if file is not None:
+        write_code(file, key, Code({}, made))
+    return made
