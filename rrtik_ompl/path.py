@@ -238,9 +238,10 @@ class JointPath:
         Raises:
             InputError: If the ending is another one or the file cannot be written.
         """
-        write_text(path, dumps(self._document(), known_ending(path, FORMATS, "path")))
+        write_text(path, dumps(self.document(), known_ending(path, FORMATS, "path")))
 
-    def _document(self) -> dict[str, Any]:
+    def document(self) -> dict[str, Any]:
+        """What a .json file of the path holds."""
         return {
             "version": 1,
             "kind": "joint_path",

@@ -125,10 +125,11 @@ def show(
     before: Annotated[Path | None, typer.Option(help="Another path file, to compare with.")] = None,
     html: HtmlFile = None,
     port: Annotated[int, typer.Option(help="Port on 127.0.0.1; 0 takes a free one.", min=0, max=65535)] = 0,
+    still: Annotated[bool, typer.Option("--still", help="A page that does not plan by itself: smaller.")] = False,
 ) -> int:
     """Show a problem, and a path for it, in 3-D.
 
-    A live page on 127.0.0.1, or a file.
+    A live page on 127.0.0.1, or a file. Start, goal and obstacles can be dragged there: the page plans by itself.
     """
     check_target(html, (".html", ".htm"))
     from rrtik_ompl import load_path, load_problem
@@ -138,10 +139,11 @@ def show(
     route = None if path is None else load_path(path, question.world.robot)
     earlier = None if before is None else load_path(before, question.world.robot)
     if html is not None:
-        view(question, route, html=html, before=earlier)
+        view(question, route, html=html, before=earlier, still=still)
         say(f"wrote {html}")
         return FOUND
-    view(question, route, before=earlier, port=port, on_ready=lambda url: say(f"open {url} in a browser; Ctrl-C ends"))
+    ready = lambda url: say(f"open {url} in a browser; Ctrl-C ends")  # noqa: E731
+    view(question, route, before=earlier, port=port, still=still, on_ready=ready)
     return FOUND
 
 
@@ -193,8 +195,12 @@ def warmup() -> int:
     No later command waits for them then.
     """
     from rrtik_ompl.fast import warm_up
+    from rrtik_ompl.fast.wasm.page_kernels import page_kernels
 
-    return FOUND if warm_up(say) else NOT_FOUND
+    ready = warm_up(say)
+    if ready and page_kernels() is not None:
+        say("pages that plan: ready")
+    return FOUND if ready else NOT_FOUND
 
 
 COMMANDS: dict[str, Callable[..., int]] = {

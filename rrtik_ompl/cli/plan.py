@@ -73,6 +73,7 @@ def plan(
     ] = 0.0,
     out: Annotated[Path | None, typer.Option(help="Save the path: .json, .csv or .txt (OMPL matrix).")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")] = None,
+    still: Annotated[bool, typer.Option("--still", help="A page that does not plan by itself: smaller.")] = False,
     certificate: Annotated[Path | None, typer.Option(help="Write what proves the path free: .json.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> int:
@@ -99,7 +100,7 @@ def plan(
     with progress("shortening"):
         rules = {name: value for name, value in options.items() if name in RULES}
         path, shorten_seconds = _shortened(found.path, question, shorten, found.seed, rules, clearance)
-    lack = "" if path is None else _write(question, path, found.path, out, html, certificate)
+    lack = "" if path is None else _write(question, path, found.path, out, html, certificate, still=still)
     if as_json:
         print(json.dumps(report.document(question, found, path, shorten_seconds)))
     else:
@@ -120,7 +121,9 @@ def _say_path(path: Any, written: tuple[Path | None, ...]) -> None:
     say(*(f"wrote {file}" for file in written if file is not None))
 
 
-def _write(problem: Any, path: Any, raw: Any, out: Path | None, html: Path | None, certificate: Path | None) -> str:
+def _write(
+    problem: Any, path: Any, raw: Any, out: Path | None, html: Path | None, certificate: Path | None, *, still: bool
+) -> str:
     """Write the files that were asked for; returns why there is no certificate, "" if nothing is missing."""
     if out is not None:
         path.save(out)
@@ -128,7 +131,7 @@ def _write(problem: Any, path: Any, raw: Any, out: Path | None, html: Path | Non
         from rrtik_ompl.viewer import view
 
         with progress("drawing"):
-            view(problem, path, html=html, before=None if path is raw else raw)
+            view(problem, path, html=html, before=None if path is raw else raw, still=still)
     if certificate is None:
         return ""
     from rrtik_ompl.cli.plan_report import write_certificate

@@ -49,7 +49,7 @@ def read_urdf(
     """
     robot = parse_xml(text, "robot", where)
     if robot.find(".//{http://www.ros.org/wiki/xacro}*") is not None:
-        raise InputError(f"{where}: holds xacro macros; name it .xacro, or expand them first: xacro FILE > robot.urdf")
+        raise InputError(f"{where}: holds xacro macros; expand them first: xacro FILE > robot.urdf")
     reader = _Reader(where, folder, tuple(packages), {})
     for material in robot.iter("material"):
         reader.learn_material(material)

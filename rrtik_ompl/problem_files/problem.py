@@ -110,7 +110,15 @@ def save_problem(problem: Problem, path: FilePath) -> None:
         InputError: If the file cannot be written, or the format has no words for something in the problem.
     """
     require(problem, Problem, "problem to save")
-    folder = file_name(path).parent
+    write_yaml(path, problem_data(problem, file_name(path).parent))
+
+
+def problem_data(problem: Problem, folder: Path) -> dict[str, Any]:
+    """What the file of a problem in a folder holds.
+
+    Raises:
+        InputError: If the format has no words for something in the problem.
+    """
     world = problem.world
     data: dict[str, Any] = {"version": 1, "robot": robot_data(world.robot.source, folder)}
     scene = scene_data(world.scene, folder)
@@ -120,7 +128,7 @@ def save_problem(problem: Problem, path: FilePath) -> None:
     data |= {"self_margin": world.self_margin} if world.self_margin else {}
     held = [constraint_data(region) for region in problem.constraints]
     data |= {"path_constraints": held} if held else {}
-    write_yaml(path, data if problem.planner is None else data | {"planner": problem.planner})
+    return data if problem.planner is None else data | {"planner": problem.planner}
 
 
 def problem_schema() -> dict[str, Any]:

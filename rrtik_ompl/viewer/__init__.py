@@ -34,6 +34,7 @@ def view(
     run: ReplanRun | None = None,
     html: str | os.PathLike[str] | None = None,
     title: str | None = None,
+    still: bool = False,
     port: int = 0,
     on_ready: Callable[[str], object] = webbrowser.open,
 ) -> Path | None:
@@ -51,6 +52,8 @@ def view(
         run: A ``ReplanRun`` of :func:`rrtik_ompl.replanning.replan` to replay, in place of a path.
         html: File to write. If None, the page is served on 127.0.0.1 until Ctrl-C is pressed.
         title: Heading of the page; made from the problem's or the robot's name if None.
+        still: Whether to leave out what plans in the page: with it, start, goal and obstacles of a problem can be
+            dragged, and the page finds new paths by itself, without a network.
         port: Port to serve on; a free one if 0.
         on_ready: Called with the URL once the page is being served; opens the browser unless something else is given.
 
@@ -63,7 +66,7 @@ def view(
     from rrtik_ompl.viewer.page import page
     from rrtik_ompl.viewer.serve import PageServer
 
-    text = page(shown, path, before=before, ghosts=ghosts, marks=marks, run=run, title=title)
+    text = page(shown, path, before=before, ghosts=ghosts, marks=marks, run=run, title=title, still=still)
     if html is not None:
         write_text(html, text)
         return Path(html)

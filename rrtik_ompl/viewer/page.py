@@ -11,21 +11,29 @@ from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
 from string import Template
+from typing import Any
 
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.tasks import TaskPlan
+from rrtik_ompl.viewer.drawing.framing import Frame
 from rrtik_ompl.viewer.drawing.marks import Mark
+from rrtik_ompl.viewer.page_planner import page_planner
 from rrtik_ompl.viewer.picture import draw
-from rrtik_ompl.viewer.story import story_of
+from rrtik_ompl.viewer.story import play_pace, story_of
 from rrtik_ompl.viewer.subject import Showable, ShownPath, Subject, subject_of, subject_of_run
 from rrtik_ompl.viewer.task_story import run_of
 
 # The page may run its own script and nothing else: no request leaves the machine that shows it.
-POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
+# WebAssembly may be compiled, text may not be run as script.
+SCRIPT_POLICY = "script-src 'unsafe-inline' 'wasm-unsafe-eval'"
+POLICY = f"default-src 'none'; {SCRIPT_POLICY}; style-src 'unsafe-inline'; img-src data: blob:"
 SCRIPTS = ("kinematics.js", "stage.js", "panel.js", "replay.js", "clearance.js", "player.js")
+BOX_SHARE = 0.1  # side of a box that is added, of the arm
+PLANNING = ("kernels.js", "obstacles.js", "planner.js", "controls.js")
 
 
 def page(
@@ -37,6 +45,7 @@ def page(
     marks: Sequence[Mark] = (),
     run: ReplanRun | None = None,
     title: str | None = None,
+    still: bool = False,
 ) -> str:
     """The page that shows something, as the text of one HTML file that needs no other file and no network.
 
@@ -50,6 +59,7 @@ def page(
         marks: Further bodies.
         run: A run to replay in place of a path; obstacles are where they were.
         title: Heading; made from the problem's or the robot's name if None.
+        still: Whether to leave out what plans in the page.
 
     Raises:
         InputError: If that cannot be shown.
@@ -59,7 +69,9 @@ def page(
     subject = subject_of(shown, path, before, ghosts, tuple(marks)) if run is None else subject_of_run(shown, run)
     recording, frame = draw(subject)
     heading = _title(subject) if title is None else title
-    story = json.dumps(story_of(subject, frame, heading), allow_nan=False, separators=(",", ":"))
+    told = story_of(subject, frame, heading)
+    told["plan"] = None if still else _planning(shown, subject, frame)
+    story = json.dumps(told, allow_nan=False, separators=(",", ":"))
     return Template(_asset("page.html")).substitute(
         title=html.escape(heading),
         policy=html.escape(POLICY),
@@ -68,8 +80,17 @@ def page(
         meshcat=_meshcat("main.min.js"),
         story=story.replace("<", "\\u003c"),  # so that no name can end the element that holds it
         commands=json.dumps([base64.b64encode(command).decode("ascii") for command in recording.commands], indent=0),
-        script="\n".join(_asset(name) for name in SCRIPTS),
+        script="\n".join(_asset(name) for name in SCRIPTS + (PLANNING if told["plan"] else ())),
     )
+
+
+def _planning(shown: Showable, subject: Subject, frame: Frame) -> dict[str, Any] | None:
+    """What the page needs to plan by itself; None where it cannot, or nothing is to be planned."""
+    plain = subject.run is None and subject.times is None and subject.ghosts is None
+    if not isinstance(shown, Problem) or subject.end is None or not plain:
+        return None
+    found = page_planner(shown, subject.end, BOX_SHARE * frame.arm)
+    return None if found is None else found | play_pace(shown.robot, frame.arm)
 
 
 def _title(subject: Subject) -> str:

@@ -92,12 +92,22 @@ def play_times(robot: Robot, waypoints: Matrix, arm: float) -> Vector:
         waypoints: Shape (k, dof).
         arm: Diagonal of the box around the arm's postures [m].
     """
-    speed = np.where(robot.prismatic, arm / 6.0, PLAY_SPEED)
+    speed = _speeds(robot, arm)
     seconds = (np.abs(np.diff(waypoints, axis=0)) / speed).max(axis=1, initial=0.0)
     total = float(seconds.sum())
     if total > 0.0:
         seconds *= np.clip(total, *PLAY_SECONDS) / total
     return np.concatenate([[0.0], np.cumsum(seconds)])
+
+
+def play_pace(robot: Robot, arm: float) -> dict[str, Any]:
+    """What :func:`play_times` goes by, for paths that the page finds itself."""
+    return {"speeds": _speeds(robot, arm).tolist(), "seconds": list(PLAY_SECONDS)}
+
+
+def _speeds(robot: Robot, arm: float) -> Vector:
+    """Of each joint [rad/s or m/s]."""
+    return np.where(robot.prismatic, arm / 6.0, PLAY_SPEED)
 
 
 def grid_cell(size: float) -> float:

@@ -84,6 +84,7 @@ function showJoints(q, move, moving) {
 
 // Moves ------------------------------------------------------------------------------------------------------------
 const moveRows = [];
+let shownMove = null;
 story.moves.forEach((move, k) => Object.assign(move, { from: story.waypoints[k], to: story.waypoints[k + 1] }));
 
 function describe(k) {
@@ -96,8 +97,11 @@ function describe(k) {
 }
 
 function buildMoves(goTo) {
-  document.getElementById("moves-section").hidden = false;
+  document.getElementById("moves-section").hidden = story.moves.length === 0;
   const table = document.getElementById("moves");
+  table.replaceChildren();
+  moveRows.length = 0;
+  shownMove = null;
   table.append(make("tr", {}, make("th", { textContent: "no." }), make("th", { textContent: "joint and way" })));
   story.moves.forEach((_, k) => {
     const row = make("tr", {}, make("td", { textContent: k + 1 }), make("td", { textContent: describe(k) }));
@@ -107,7 +111,6 @@ function buildMoves(goTo) {
   });
 }
 
-let shownMove = null;
 function showMove(k) {
   if (k === shownMove) return;
   if (shownMove !== null) moveRows[shownMove].className = "";
@@ -200,11 +203,16 @@ function buildLegend() {
   addSwitch(`grid of ${story.grid} m`, "#d2d9e0", 1, toggles("grid"));
 }
 
-function addLabels() {
+function labelObstacles() {
   for (const obstacle of story.obstacles) {
     const box = new THREE.Box3().setFromObject(node("obstacles", obstacle.node)).getCenter(new THREE.Vector3());
     addLabel(obstacle.name, "obstacle", { x: box.x, y: -box.z, z: box.y });
   }
+}
+
+/** Numbers at the waypoints, and words at both ends. */
+function labelPath() {
+  dropLabels("start", "goal", "waypoint");
   const last = story.moves.length;
   if (last === 0) return;
   const between = [...Array(last - 1).keys()].map((k) => k + 1);
@@ -220,7 +228,8 @@ function addLabels() {
 }
 
 viewer.scene.updateMatrixWorld(true);
-addLabels();
+labelObstacles();
+labelPath();
 buildLegend();
 for (const name of Object.keys(VIEWPOINTS)) {
   const button = make("button", { textContent: name, title: `look from: ${name.toLowerCase()}` });

@@ -1,5 +1,5 @@
 // The player: one time, set by buttons, keys, the scrub bar, the list of moves, the address, or by playing.
-const total = story.times.length ? story.times[story.times.length - 1] : 0;
+let total = 0;
 const scrub = document.getElementById("scrub");
 let now = 0;
 let playingSince = null;
@@ -34,6 +34,7 @@ function goTo(time) {
 }
 
 function play() {
+  if (story.moves.length === 0) return;
   if (now >= total) show(0);
   playingSince = performance.now();
   document.getElementById("play").textContent = "Pause";
@@ -62,16 +63,46 @@ const ACTIONS = {
   End: () => goTo(total),
 };
 
-function addPlayer() {
+/** Take over the moves and times of the story: bar, ticks, list of moves and labels. */
+function newPath() {
+  total = story.times.length ? story.times[story.times.length - 1] : 0;
   document.getElementById("player").hidden = false;
   scrub.max = total;
+  addTicks();
+  if (!run && !story.timed) buildMoves(goTo);
+  if (story.moves.length) show(Math.min(now, total));
+  else showStill();
+  labelPath();
+}
+
+/** The first posture, and nothing to play. */
+function showStill() {
+  pause();
+  now = 0;
+  setPosture(node("robot"), story.waypoints[0]);
+  showJoints(story.waypoints[0], null, false);
+  document.getElementById("now").textContent = "no path";
+}
+
+function addTicks() {
+  const seconds = [...Array(Math.floor(total) + 1).keys()];
+  const marked = story.timed ? seconds : run ? run.groups.filter((group) => group.event !== "walk").map((group) => story.times[group.first]) : story.times;
+  const ticks = marked.length > 200 ? [] : marked.map((time) => {
+    const tick = document.createElement("i");
+    tick.style.left = `${(100 * time) / (total || 1)}%`;
+    return tick;
+  });
+  document.getElementById("ticks").replaceChildren(...ticks);
+}
+
+function addPlayer() {
   scrub.addEventListener("input", () => goTo(Number(scrub.value)));
   const buttons = { play: " ", forward: "ArrowRight", back: "ArrowLeft", first: "Home", last: "End" };
   for (const [id, action] of Object.entries(buttons)) {
     document.getElementById(id).addEventListener("click", ACTIONS[action]);
   }
   addEventListener("keydown", (event) => {
-    const action = ACTIONS[event.key];
+    const action = story.moves.length ? ACTIONS[event.key] : undefined;
     const own = event.key === " " ? "select, button, [type=checkbox]" : "select";  // what answers this key by itself
     if (!action || event.target.matches?.(own) || event.ctrlKey || event.altKey || event.metaKey) return;
     event.preventDefault();
@@ -80,15 +111,6 @@ function addPlayer() {
   addEventListener("click", (event) => {  // after a click with the mouse the space bar plays again
     if (event.detail > 0 && event.target.matches("button, [type=checkbox]")) event.target.blur();
   });
-  const seconds = [...Array(Math.floor(total) + 1).keys()];
-  const marked = story.timed ? seconds : run ? run.groups.filter((group) => group.event !== "walk").map((group) => story.times[group.first]) : story.times;
-  if (marked.length <= 200) {
-    for (const time of marked) {
-      const tick = document.createElement("i");
-      tick.style.left = `${(100 * time) / (total || 1)}%`;
-      document.getElementById("ticks").append(tick);
-    }
-  }
   addEventListener("hashchange", followAddress);
 }
 
@@ -104,11 +126,11 @@ function followAddress() {
 
 if (robot) {
   buildJoints();
+  addPlayer();
   if (story.moves.length) {
     if (run) buildEvents(goTo);
-    else if (!story.timed) buildMoves(goTo);
     if (story.clearance) showClearance = buildClearance(goTo);
-    addPlayer();
+    newPath();
   } else {
     const q = story.waypoints[0].slice();
     const pose = () => { setPosture(node("robot"), q); showJoints(q, null, false); };

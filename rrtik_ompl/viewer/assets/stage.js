@@ -124,6 +124,13 @@ function addLabel(text, kind, position) {
   labels.push({ element, kind, position: new THREE.Vector3(position.x, position.z, -position.y), on: true });
 }
 
+function dropLabels(...kinds) {
+  for (const label of labels.filter(({ kind }) => kinds.includes(kind))) {
+    label.element.remove();
+    labels.splice(labels.indexOf(label), 1);
+  }
+}
+
 function setLabels(kind, on) {
   labels.filter((label) => label.kind === kind).forEach((label) => { label.on = on; });
   viewer.set_dirty();

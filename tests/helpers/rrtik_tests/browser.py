@@ -18,16 +18,17 @@ from rrtik_ompl.pilot.setup import open_session
 from rrtik_ompl.pilot.web.server import PilotServer
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-OPTIONS = ("--headless=new", "--no-sandbox", "--hide-scrollbars", "--remote-debugging-port=0", "--disable-gpu")
+OPTIONS = ("--headless=new", "--no-sandbox", "--hide-scrollbars", "--remote-debugging-port=0")
+FLAT, DRAWING_3D = ("--disable-gpu",), ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 WIDTH, HEIGHT = 1280, 720
 
 
 class Browser:
     """A headless Chromium, told what to do through its debugging port."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, graphics=FLAT):
         self._process = subprocess.Popen(
-            [CHROMIUM, *OPTIONS, f"--user-data-dir={folder}", "about:blank"],
+            [CHROMIUM, *OPTIONS, *graphics, f"--user-data-dir={folder}", "about:blank"],
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
         port_file = Path(folder) / "DevToolsActivePort"
@@ -87,6 +88,13 @@ class Browser:
 
     def key_up(self, key):
         self.call("Input.dispatchKeyEvent", type="keyUp", **self._words(key))
+
+    def drag(self, begin, end, steps=8):
+        """Press the mouse at one place [pixels], move it to another, let go."""
+        places = [[a + (b - a) * k / steps for a, b in zip(begin, end, strict=True)] for k in range(steps + 1)]
+        acts = [("mousePressed", begin), *(("mouseMoved", place) for place in places), ("mouseReleased", end)]
+        for kind, (x, y) in acts:
+            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
     @staticmethod
     def _words(key):

@@ -64,7 +64,7 @@ def _joint(document: YamlDocument, location: Location, values: Mapping[str, Any]
             raise UnknownNameError("key", key, _KEYS, where=document.place((*location, key)))
         if key.startswith("has_") and not isinstance(value, bool):
             raise document.error((*location, key), f"expected true or false, found {describe(value)}")
-        if key in _NUMBERS and values.get(f"has_{key.partition('_')[2]}_limits") is not False:  # else MoveIt writes 0
+        if key in _NUMBERS:
             _number(document, (*location, key), value, positive=not key.endswith("position"))
     found: dict[str, float | None] = {}
     for rate in RATES:

@@ -1,0 +1,201 @@
+// The kernels of the library as WebAssembly, on an image of the tables that Python packed: searches, shortcuts, inverse
+// kinematics, distances. What they leave undecided counts as colliding, so that what they call free is free.
+const LANE_BYTES = 4;
+const NUMBER_BYTES = 8;
+const STACK_ROOM = 64;  // bytes between the stack and the image
+const FREE_ROOM = 1 << 20;  // bytes behind the image
+
+async function unpacked(text) {
+  const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+/** Whether this browser has what the kernels need: vectors in WebAssembly and whole numbers of 64 bits. */
+function hasKernels() {
+  const vectors = [0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11];
+  return typeof DecompressionStream === "function" && typeof BigInt64Array === "function"
+    && typeof WebAssembly === "object" && WebAssembly.validate(new Uint8Array(vectors));
+}
+
+class Kernels {
+  /** From the planner's part of a story; see page_planner.py. */
+  static async load(plan) {
+    const [code, image] = await Promise.all([unpacked(plan.module), unpacked(plan.image)]);
+    const memory = new WebAssembly.Memory({ initial: Math.ceil((plan.end + FREE_ROOM) / 65536) });
+    const stack = new WebAssembly.Global({ value: "i32", mutable: true }, plan.base - STACK_ROOM);
+    const env = { __linear_memory: memory, __stack_pointer: stack, sin: Math.sin, cos: Math.cos };
+    const { instance } = await WebAssembly.instantiate(code, { env });
+    new Uint8Array(memory.buffer).set(image, plan.base);
+    return new Kernels(plan, instance.exports, memory.buffer);
+  }
+
+  constructor(plan, entries, buffer) {
+    Object.assign(this, { plan, entries, buffer, dof: plan.dof });
+    this.whole = new BigInt64Array(buffer);
+    this.doubles = new Float64Array(buffer);
+    this.floats = new Float32Array(buffer);
+    this.ints = new Int32Array(buffer);
+    const { places, names } = plan;
+    this.search = this.table(places.search, names.connect);
+    this.shortcuts = this.table(places.shortcuts, names.shortcut);
+    this.motions = this.table(places.motions, names.motion);
+    this.world = this.table(places.world, names.table);
+    this.spare = plan.end;
+    const joints = this.motions.get("JOINTS");
+    this.room = { values: this.reserve(NUMBER_BYTES * joints), found: this.reserve(NUMBER_BYTES), pair: this.reserve(LANE_BYTES), answer: this.reserve(LANE_BYTES) };
+  }
+
+  /** The fields of a table by their names: table.get("COUNT"), table.set("COUNT", 3). */
+  table(address, names) {
+    const first = address / NUMBER_BYTES;
+    return {
+      address,
+      get: (name) => Number(this.whole[first + names[name]]),
+      set: (name, value) => { this.whole[first + names[name]] = BigInt(value); },
+    };
+  }
+
+  /** Memory behind the image, for arrays of a fixed size. */
+  reserve(bytes) {
+    const place = this.spare;
+    this.spare += Math.ceil(bytes / 64) * 64;
+    return place;
+  }
+
+  writeRow(address, row) {
+    this.doubles.set(row, address / NUMBER_BYTES);
+  }
+
+  readRows(address, count) {
+    const first = address / NUMBER_BYTES;
+    const row = (k) => Array.from(this.doubles.subarray(first + k * this.dof, first + (k + 1) * this.dof));
+    return Array.from({ length: count }, (_, k) => row(k));
+  }
+
+  inBox(q) {
+    return q.every((value, k) => value >= this.plan.lower[k] && value <= this.plan.upper[k]);
+  }
+
+  /** Whether a configuration is inside the limits and proven free. */
+  free(q) {
+    if (!this.inBox(q)) return false;
+    this.setValues(q);
+    const { values, answer } = this.room;
+    this.entries.check_classify(...[this.world.address, values, 1, answer, 1].map(BigInt));
+    return this.ints[answer / LANE_BYTES] === this.plan.names.table.FREE;
+  }
+
+  /** Write the joint values of a configuration where single answers are found. */
+  setValues(q) {
+    const joints = this.motions.get("JOINTS");
+    const [gain, offset] = ["GAIN", "OFFSET"].map((name) => this.motions.get(name) / NUMBER_BYTES);
+    for (let j = 0; j < joints; j += 1) {
+      let sum = this.doubles[offset + j];
+      for (let k = 0; k < this.dof; k += 1) sum += this.doubles[gain + j * this.dof + k] * q[k];
+      this.doubles[this.room.values / NUMBER_BYTES + j] = sum;
+    }
+  }
+
+  /** A path from start to goal, rows of joint values, or null; `seed` as in Python. */
+  search_path(start, goal, seed) {
+    const { search, plan } = this;
+    const names = plan.names.connect;
+    this.writeRow(search.get("START_ROWS"), start);
+    this.writeRow(search.get("GOAL_ROWS"), goal);
+    search.set("RESOLVE", 1);  // the solids are compared too; what they leave undecided is asked, at once
+    search.set("PATIENCE", 0);
+    search.set("LIMIT", plan.samples);
+    search.set("PATH_CAPACITY", plan.places.pathRows);
+    const address = BigInt(search.address);
+    let status = Number(this.entries.connect_solve(address, 1n, 1n, BigInt(seed), 4096n));
+    while (status === names.RUNNING || status === names.ASKING) {
+      if (status === names.ASKING) this.refuse(search);
+      status = Number(this.entries.connect_resume(address, 4096n));
+    }
+    const count = search.get("PATH_ROWS");
+    return status === names.SOLVED && count <= plan.places.pathRows ? this.readRows(search.get("PATH"), count) : null;
+  }
+
+  /** Answer that none of the motions that a search asks about is free. */
+  refuse(search) {
+    const first = search.get("ANSWERS") / LANE_BYTES;
+    this.ints.fill(0, first, first + search.get("QUESTIONS"));
+  }
+
+  /** Begin to make a path shorter by random shortcuts. */
+  beginShortening(rows, seed) {
+    const { shortcuts, plan } = this;
+    const route = shortcuts.get("ROUTE");
+    rows.forEach((row, k) => this.writeRow(route + k * this.dof * NUMBER_BYTES, row));
+    for (const name of ["TRIES", "FAILURES", "GAINS", "QUESTIONS", "FIRST", "SECOND", "CUTS"]) shortcuts.set(name, 0);
+    shortcuts.set("RESOLVE", 1);
+    shortcuts.set("COUNT", rows.length);
+    shortcuts.set("RANDOM", seed);
+    shortcuts.set("MAX_TRIES", rows.length < 3 ? 0 : plan.tries);
+    shortcuts.set("PATIENCE", Math.ceil(plan.tries / 4));
+    shortcuts.set("ANSWERED", plan.names.shortcut.NO_ANSWER);
+  }
+
+  /** Go on with that for about so long; whether it is done. The same seed gives the same path, however it is divided. */
+  goOnShortening(milliseconds) {
+    const { shortcuts, plan } = this;
+    const names = plan.names.shortcut;
+    const end = performance.now() + milliseconds;
+    do {
+      const status = Number(this.entries.shortcut_resume(BigInt(shortcuts.address), 16n));
+      if (status === names.DONE) return true;
+      if (status === names.ASKING) shortcuts.set("ANSWERED", names.ANSWER_NO);
+    } while (performance.now() < end);
+    return false;
+  }
+
+  /** The path as short as it is by now. */
+  shortened() {
+    return this.readRows(this.shortcuts.get("ROUTE"), this.shortcuts.get("COUNT"));
+  }
+
+  /** Joint values near `from` that bring the tip to a pose (12 numbers: the rotation row by row, the origin), or null. */
+  reach(pose, from) {
+    const { places, names } = this.plan;
+    if (places.ik === undefined) return null;
+    const call = this.table(places.ik, names.ik);
+    const aim = call.get("AIMS") / NUMBER_BYTES;
+    this.doubles.fill(0, aim, aim + names.ik.AIM_FLOATS);
+    this.doubles.set(pose, aim);
+    this.doubles[aim + names.ik.POSITION_TOLERANCE] = 1e-5;
+    this.doubles[aim + names.ik.CHORD_TOLERANCE] = 1e-5;
+    this.doubles[aim + names.ik.FREE_TURN] = names.ik.NO_TURN;
+    this.writeRow(call.get("NEAR"), from);
+    this.whole[call.get("NEXT") / NUMBER_BYTES] = 0n;
+    const solved = this.entries.ik_solve(BigInt(places.limb), BigInt(places.ik));
+    return solved === 1n ? this.readRows(call.get("Q"), 1)[0] : null;
+  }
+
+  /** A lower bound of the distance from contact at a configuration [m], by the covers, and the pair that it is of. */
+  nearest(q) {
+    this.setValues(q);
+    const { values, found, pair } = this.room;
+    const tables = [this.world.address, this.world.get("OUTER"), this.world.get("OUTER_PRIMITIVES"), values, 1, this.plan.places.probe, found, pair];
+    this.entries.distance_measure(...tables.map(BigInt));
+    const flag = this.ints[pair / LANE_BYTES];
+    return { metres: flag < 0 ? Infinity : this.doubles[found / NUMBER_BYTES], pair: flag < 0 ? null : this.pairOf(flag) };
+  }
+
+  /** Names of the bodies that a flag of the kernels stands for. */
+  pairOf(flag) {
+    const { moving, standing, names } = this.plan;
+    const crossing = moving.length * standing.length;
+    if (flag < crossing) return [moving[Math.floor(flag / standing.length)], standing[flag % standing.length]];
+    const pairs = this.table(this.world.get("OUTER"), names.table).get("PAIRS") / LANE_BYTES;
+    const first = pairs + names.table.PAIR_INTS * (flag - crossing);
+    return [moving[this.ints[first + names.table.PAIR_ONE]], moving[this.ints[first + names.table.PAIR_OTHER]]];
+  }
+
+  /** Why a configuration is not free, in a few words. */
+  blame(q) {
+    if (!this.inBox(q)) return "outside the joint limits";
+    const { pair } = this.nearest(q);
+    return pair === null ? "not proven free" : `${pair.join(" and ")} are too near each other`;
+  }
+}

@@ -1,0 +1,152 @@
+// Planning in the page: from its state (start, goal, obstacles) to a path, which is drawn and played at once.
+const planning = story.plan;
+const LIVE_MILLISECONDS = 8;  // of shortening in one frame
+const AWAY = 1e3;  // [m] where removed obstacles stand
+const CLEARANCE_SAMPLES = 200;
+const UNDO_STEPS = 200;
+const ENDS = { start: "start ghost", goal: "goal ghost" };
+let kernels = null;
+let state = null;  // { start, goal, seed, obstacles: [{ pose, half, radius, length, disc, shown }] }
+let shortening = 0;  // number of the path that is being made shorter
+const past = [];
+
+const copyOf = (value) => JSON.parse(JSON.stringify(value));
+const planStatus = (text, bad = false) => {
+  const line = document.getElementById("plan-state");
+  line.textContent = text;
+  line.classList.toggle("bad", bad);
+};
+
+// The picture ------------------------------------------------------------------------------------------------------
+function moveGhost(end, q, free) {
+  const name = ENDS[end];
+  const color = free ? story.colors[end] : "#c2185b";
+  if (!viewer.scene_tree.find([...ROOT, name]).object.children.length) addGhost(name, color, q);
+  for (const copy of node(name).children[0].children) {
+    setPosture(copy, q);
+    copy.traverse((item) => { if (item.isMesh && item.material.emissive) item.material.color.set(color); });
+  }
+}
+
+function moveDrawing(k) {
+  const { pose, shown } = state.obstacles[k];
+  const obstacle = planning.obstacles[k];
+  const group = node("obstacles", obstacle.node);
+  const drawnAt = obstacle.spare ? new THREE.Matrix4() : new THREE.Matrix4().multiplyMatrices(rowMajor(obstacle.first).invert(), group.matrix);
+  obstacle.drawn ??= drawnAt;
+  new THREE.Matrix4().multiplyMatrices(rowMajor(pose), obstacle.drawn).decompose(group.position, group.quaternion, new THREE.Vector3());
+  group.updateMatrix();
+  group.visible = shown;
+}
+
+function pathTimes(rows) {
+  const times = [0];
+  for (let k = 1; k < rows.length; k += 1) {
+    times.push(times[k - 1] + Math.max(...rows[k].map((value, j) => Math.abs(value - rows[k - 1][j]) / planning.speeds[j])));
+  }
+  const whole = times[times.length - 1];
+  const scale = whole > 0 ? Math.min(Math.max(whole, planning.seconds[0]), planning.seconds[1]) / whole : 1;
+  return times.map((time) => time * scale);
+}
+
+function drawTrail(rows) {
+  const trail = new THREE.Group();
+  for (let k = 1; k < rows.length; k += 1) {
+    const piece = new THREE.Group();
+    piece.name = `piece ${k - 1}`;
+    const turn = Math.max(...rows[k].map((value, j) => Math.abs(value - rows[k - 1][j])));
+    const steps = Math.min(Math.max(Math.ceil(turn / 0.06), 1), 60);
+    const points = Array.from({ length: steps + 1 }, (_, s) => tipPosition(rows[k - 1].map((a, j) => a + ((rows[k][j] - a) * s) / steps)).toArray());
+    const apart = points.filter((point, s) => s === 0 || Math.hypot(...point.map((x, i) => x - points[s - 1][i])) > 1e-6);
+    if (apart.length > 1) piece.add(lineMesh(apart, story.colors.trail, 0.0025 * size));
+    trail.add(piece);
+  }
+  viewer.delete_path([...ROOT, "trail"]);
+  viewer.delete_path([...ROOT, "beads"]);
+  viewer.set_object([...ROOT, "trail"], trail);
+}
+
+/** Play other rows from now on; an empty list for none. */
+function replacePath(rows) {
+  story.waypoints = rows.length ? rows : [state.start];
+  story.moves = rows.slice(1).map((to, k) => ({ from: rows[k], to, piece: k, joints: to.flatMap((value, j) => (value === rows[k][j] ? [] : [j])) }));
+  story.times = rows.length ? pathTimes(rows) : [];
+  drawTrail(rows);
+  document.getElementById("clearance-section").hidden = true;
+  showClearance = () => {};
+  newPath();
+}
+
+// The state --------------------------------------------------------------------------------------------------------
+function remember() {
+  past.push(copyOf(state));
+  if (past.length > UNDO_STEPS) past.shift();
+}
+
+function undo() {
+  if (past.length === 0) return;
+  state = past.pop();
+  state.obstacles.forEach((_, k) => applyObstacle(k));
+  showSelected();
+  changed();
+}
+
+function applyObstacle(k) {
+  const kept = state.obstacles[k];
+  const pose = kept.shown ? kept.pose : kept.pose.map((value, n) => (n === 11 ? value - AWAY : value));
+  placeObstacle(kernels, planning.obstacles[k], pose);
+  moveDrawing(k);
+}
+
+let waiting = false;
+function changed() {
+  if (waiting) return;
+  waiting = true;
+  requestAnimationFrame(() => { waiting = false; plan(); });
+}
+
+function plan() {
+  shortening += 1;
+  const begin = performance.now();
+  const blocked = Object.keys(ENDS).filter((end) => {
+    const free = kernels.free(state[end]);
+    moveGhost(end, state[end], free);
+    return !free;
+  });
+  viewer.set_dirty();
+  if (blocked.length) {
+    replacePath([]);
+    planStatus(blocked.map((end) => `${end}: ${kernels.blame(state[end])}`).join("; "), true);
+    return;
+  }
+  const found = kernels.search_path(state.start, state.goal, state.seed);
+  if (!found) {
+    replacePath([]);
+    planStatus(`no path found in ${planning.samples.toLocaleString("en")} samples; another seed may find one`, true);
+    return;
+  }
+  const searched = performance.now() - begin;
+  if (document.getElementById("plan-shorten").checked) {
+    kernels.beginShortening(found, state.seed);
+    shortenOn(searched, shortening);
+  } else finish(found, searched);
+}
+
+/** Shorten on in every frame until the path is as short as it gets, or another one is wanted. */
+function shortenOn(searched, number) {
+  if (number !== shortening) return;
+  const done = kernels.goOnShortening(LIVE_MILLISECONDS);
+  finish(kernels.shortened(), searched);
+  if (!done) requestAnimationFrame(() => shortenOn(searched, number));
+}
+
+function finish(rows, searched) {
+  replacePath(rows);
+  const length = rows.slice(1).reduce((sum, row, k) => sum + Math.hypot(...row.map((value, j) => value - rows[k][j])), 0);
+  let least = Infinity;
+  for (let s = 0; s <= CLEARANCE_SAMPLES; s += 1) {
+    least = Math.min(least, kernels.nearest(postureAt((story.times[story.times.length - 1] * s) / CLEARANCE_SAMPLES)).metres);
+  }
+  const near = least === Infinity ? "" : `, at least ${Math.max(1000 * least, 1000 * planning.clearance).toFixed(1)} mm clear`;
+  planStatus(`${count(rows.length - 1, "move")}, length ${length.toFixed(2)}${near}; found in ${searched.toFixed(1)} ms`);
+}

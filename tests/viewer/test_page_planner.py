@@ -1,0 +1,244 @@
+"""A page that plans: its answers in node are those of Python, its saved files those that the commands take."""
+
+import json
+import shutil
+import subprocess
+from contextlib import closing
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.fast.search.connect import ConnectSearch
+from rrtik_ompl.fast.tables.layout import FREE
+from rrtik_ompl.generated_problems import generated_problem
+from rrtik_ompl.problem import Problem, densely_checked
+from rrtik_ompl.scene import Scene
+from rrtik_ompl.viewer.page import page
+from rrtik_ompl.viewer.page_planner import SAMPLES, VERTICES, page_planner
+from rrtik_ompl.world.kept_clearance import Room, leaving_room, room_between
+from rrtik_tests.browser import CHROMIUM, DRAWING_3D, Browser
+
+pytestmark = pytest.mark.kernels
+needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on PATH: pages cannot be looked at")
+ASSETS = files("rrtik_ompl.viewer").joinpath("assets")
+RUN = """
+const fs = require("fs");
+const read = (name) => fs.readFileSync(`${process.argv[2]}/${name}`, "utf8");
+const source = ["kernels.js", "obstacles.js"].map(read).join("");
+const shown = "{ Kernels, placeObstacle, hasKernels }";
+const { Kernels, placeObstacle, hasKernels } = new Function(`${source}; return ${shown}`)();
+(async () => {
+  const { plan, seeds, moves, poses } = JSON.parse(fs.readFileSync(0, "utf8"));
+  const kernels = await Kernels.load(plan);
+  const paths = seeds.map((seed) => kernels.search_path(plan.start, plan.goal, seed));
+  const short = paths.map((path, k) => {
+    if (path === null) return null;
+    kernels.beginShortening(path, seeds[k]);
+    while (!kernels.goOnShortening(5));
+    return kernels.shortened();
+  });
+  const reached = poses.map(({ pose, from }) => kernels.reach(pose, from));
+  const free = moves.map(({ obstacle, pose, Q }) => {
+    placeObstacle(kernels, plan.obstacles[obstacle], pose);
+    return Q.map((q) => kernels.free(q));
+  });
+  console.log(JSON.stringify({ has: hasKernels(), paths, short, reached, free }));
+})();
+"""
+
+
+def in_node(plan, tmp_path, **work):
+    if shutil.which("node") is None:
+        pytest.skip("no node on PATH: the page's kernels cannot be run")
+    script = tmp_path / "run.js"
+    script.write_text(RUN, encoding="utf-8")
+    given = json.dumps({"plan": plan, "seeds": [], "moves": [], "poses": [], **work})
+    done = subprocess.run(["node", script, str(ASSETS)], input=given, capture_output=True, text=True, check=True)
+    return json.loads(done.stdout)
+
+
+def searched_world(problem: Problem) -> rrtik.World:
+    room = room_between(problem.world, np.stack([problem.start, problem.goal.q]), None) or Room(0.0, 0.0)
+    return leaving_room(densely_checked(problem).world, room)
+
+
+def refused(A: Matrix, B: Matrix) -> np.ndarray:
+    return np.zeros(len(A), dtype=bool)
+
+
+PROBLEMS = {
+    "titan4": lambda: rrtik.load_problem("titan4_sdu"),
+    "panda": lambda: generated_problem(rrtik.load_robot("panda"), "pipes", 1),
+    "ur5": lambda: generated_problem(rrtik.load_robot("ur5"), "clutter", 0),
+}
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_searches_in_the_page_find_pythons_paths(name, tmp_path):
+    """Equal but for the last digit or two: this machine may round a product and a sum at once, WebAssembly does not."""
+    problem, seeds = PROBLEMS[name](), [1, 2, 3]
+    plan = page_planner(problem, problem.goal.q, 0.1)
+    found = in_node(plan, tmp_path, seeds=seeds)
+    world = searched_world(problem)
+    search = ConnectSearch(world.motions, *problem.robot.finite_range(), vertices=VERTICES, patience=0)
+    for seed, path, short in zip(seeds, found["paths"], found["short"], strict=True):
+        wanted = search.solve(problem.start[None], problem.goal.q[None], seed, ask=refused, max_iterations=SAMPLES)
+        np.testing.assert_allclose(path, wanted, rtol=0.0, atol=1e-12)
+        shortened = rrtik.JointPath.of(problem.robot, np.array(short))
+        assert shortened.violations(problem.world) == ()
+        assert shortened.length <= rrtik.JointPath.of(problem.robot, wanted).length + 1e-9
+        assert (shortened.start == problem.start).all()
+        assert (shortened.end == problem.goal.q).all()
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_moved_obstacles_are_packed_as_python_packs_them(name, tmp_path):
+    problem, rng = PROBLEMS[name](), np.random.default_rng(3)
+    plan = page_planner(problem, problem.goal.q, 0.1)
+    room = room_between(problem.world, np.stack([problem.start, problem.goal.q]), None)
+    named = {each["name"]: k for k, each in enumerate(plan["obstacles"])}
+    scene, moves, wanted = problem.world.scene, [], []
+    lower, upper = problem.robot.finite_range()
+    for _ in range(8):
+        chosen = scene.obstacles[int(rng.integers(len(scene.obstacles)))]
+        placed = pin.SE3(pin.exp3(rng.normal(size=3)), np.array(chosen.pose.translation) + rng.normal(0.0, 0.2, 3))
+        Q = rng.uniform(lower, upper, (150, problem.robot.dof))
+        kept = tuple(replace(each, pose=placed) if each is chosen else each for each in scene.obstacles)
+        scene = Scene(kept, scene.attached, scene.allowed_collisions)
+        world = rrtik.World(problem.robot, scene).with_clearance(room.searched)
+        wanted.append(world.fast.classify(problem.robot.joint_values(Q)) == FREE)
+        moves.append({"obstacle": named[chosen.name], "pose": placed.homogeneous.ravel().tolist(), "Q": Q.tolist()})
+    assert 0 < np.mean(wanted) < 1
+    np.testing.assert_array_equal(in_node(plan, tmp_path, moves=moves)["free"], wanted)
+
+
+def test_every_kind_of_obstacle_that_can_be_dragged_is_packed_alike(tmp_path):
+    robot, rng = rrtik.load_robot("ur5"), np.random.default_rng(4)
+    solids = {
+        "ball": rrtik.Sphere(0.15),
+        "capsule": rrtik.Capsule(0.06, 0.5),
+        "can": rrtik.Cylinder(0.1, 0.4),
+        "box": rrtik.Box([0.3, 0.2, 0.1]),
+    }
+    far = pin.SE3(np.eye(3), np.array([2.0, 2.0, 0.0]))
+    scene = Scene(tuple(rrtik.Obstacle(name, solid, far, margin=0.01) for name, solid in solids.items()))
+    ends = np.zeros(6), np.full(6, -0.5)
+    problem = Problem(rrtik.World(robot, scene), *ends)
+    plan = page_planner(problem, problem.goal.q, 0.1)
+    room = room_between(problem.world, np.stack(ends), None)
+    moves, wanted = [], []
+    for k, each in enumerate(plan["obstacles"][: len(solids)]):
+        placed = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(0.0, 0.3, 3))
+        Q = rng.uniform(-3.0, 3.0, (200, 6))
+        scene = scene.without(each["name"]).with_(
+            rrtik.Obstacle(each["name"], solids[each["name"]], placed, margin=0.01)
+        )
+        world = rrtik.World(robot, scene).with_clearance(room.searched)
+        wanted.append(world.fast.classify(robot.joint_values(Q)) == FREE)
+        moves.append({"obstacle": k, "pose": placed.homogeneous.ravel().tolist(), "Q": Q.tolist()})
+    assert all(0.05 < share.mean() < 0.95 for share in wanted)
+    np.testing.assert_array_equal(in_node(plan, tmp_path, moves=moves)["free"], wanted)
+
+
+def test_a_pose_is_reached_within_its_tolerances(tmp_path):
+    problem, rng = rrtik.load_problem("titan4_sdu"), np.random.default_rng(2)
+    robot = problem.robot
+    starts = rng.uniform(robot.lower, robot.upper, (30, robot.dof))
+    tips = robot.fk_batch(np.clip(starts + rng.normal(0.0, 0.05, starts.shape), robot.lower, robot.upper))
+    poses = [
+        {"pose": [*tip[:3, :3].ravel(), *tip[:3, 3]], "from": q.tolist()} for tip, q in zip(tips, starts, strict=True)
+    ]
+    found = in_node(page_planner(problem, problem.goal.q, 0.1), tmp_path, poses=poses)["reached"]
+    reached = robot.fk_batch(np.array(found))
+    assert np.abs(reached - tips).max() < 2e-5
+    assert (np.array(found) >= robot.lower).all()
+    assert (np.array(found) <= robot.upper).all()
+
+
+def test_what_cannot_plan_is_a_still_page():
+    problem = rrtik.load_problem("ur5_upright")
+    assert page_planner(problem, problem.start, 0.1) is None  # its path is constrained
+    moving = rrtik.load_problem("titan4_sdu")
+    assert '"plan":null' in page(moving, still=True)
+    assert '"plan":null' in page(moving.robot)
+    assert "wasm-unsafe-eval" in page(moving, still=True)
+    assert "placeObstacle" not in page(moving, still=True)
+
+
+FRAMES = "(async () => { for (let k = 0; k < 30; k += 1) await new Promise((r) => requestAnimationFrame(r)); })()"
+# Where a person would take hold of something: the middle one of the places where the pointer meets it.
+SPOT = """(() => {
+  const r = pane.getBoundingClientRect();
+  const places = [];
+  for (let x = r.left + 5; x < r.right; x += 15) for (let y = r.top + 5; y < r.bottom; y += 15) {
+    pointerAt({ clientX: x, clientY: y });
+    if (hitThing()?.name === "%s") places.push([x, y]);
+  }
+  return places[Math.floor(places.length / 2)];
+})()"""
+
+
+@needs_chromium
+def test_in_a_browser_goal_and_obstacles_are_dragged_and_the_saved_files_hold(tmp_path):
+    crate = rrtik.Obstacle("crate", rrtik.Box([0.2, 0.2, 0.2]), rrtik.pose([0.6, 0.6, 0.6]))
+    world = rrtik.World(rrtik.load_robot("ur5"), Scene((crate,)))
+    problem = Problem(world, [0.0, -1.2, 1.0, 0.2, 0.0, 0.0], [1.6, -1.2, 1.0, 0.2, 0.0, 0.0])
+    file = tmp_path / "page.html"
+    file.write_text(page(problem, rrtik.plan(problem, seed=1).path), encoding="utf-8")
+    with closing(Browser(tmp_path / "browser", DRAWING_3D)) as browser:
+        browser.open(file.as_uri())
+        browser.wait("document.documentElement.dataset.plans")
+        spot = browser.ask(SPOT % "goal")
+        browser.drag(spot, [spot[0] - 12.0, spot[1] - 8.0])
+        browser.ask(FRAMES)
+        goal, chosen = browser.ask("state.goal"), browser.ask("selected")
+        spot = browser.ask(SPOT % "crate")
+        browser.drag(spot, [spot[0] + 10.0, spot[1] - 40.0])
+        browser.ask(FRAMES)
+        moved = browser.ask("[state.obstacles[0].pose[3], state.obstacles[0].pose[7], state.obstacles[0].pose[11]]")
+        browser.ask("document.getElementById('plan-add').click()")
+        browser.ask("moveSelected(new THREE.Vector3(0, 0, 0.9), 0.3)")
+        browser.ask(FRAMES)
+        status = browser.ask("document.getElementById('plan-state').textContent")
+        assert "length" in status, status
+        (tmp_path / "path.json").write_text(browser.ask("pathText()"), encoding="utf-8")
+        (tmp_path / "problem.yaml").write_text(browser.ask("problemText()"), encoding="utf-8")
+        for _ in range(4):
+            browser.ask("document.getElementById('plan-undo').click()")
+        assert browser.ask("state.goal") == problem.goal.q.tolist()
+    assert chosen == "goal"
+    assert np.abs(goal - problem.goal.q).max() > 1e-3
+    saved = rrtik.load_problem(tmp_path / "problem.yaml")
+    path = rrtik.load_path(tmp_path / "path.json", saved.robot)
+    assert [each.name for each in saved.world.scene.obstacles] == ["crate", "box 1"]
+    np.testing.assert_allclose(saved.world.scene.obstacles[0].pose.translation, moved, atol=1e-9)
+    assert np.linalg.norm(np.array(moved) - 0.6) > 0.01
+    assert path.violations(saved.world) == ()
+    np.testing.assert_array_equal(path.end, saved.goal.q)
+    np.testing.assert_array_equal(saved.goal.q, goal)
+
+
+@needs_chromium
+def test_the_page_says_what_it_cannot_plan(tmp_path: Path) -> None:
+    problem = rrtik.load_problem("planar3_a")
+    file = tmp_path / "page.html"
+    file.write_text(page(problem, rrtik.plan(problem, seed=1).path), encoding="utf-8")
+    with closing(Browser(tmp_path / "browser", DRAWING_3D)) as browser:
+        browser.open(file.as_uri())
+        browser.wait("document.documentElement.dataset.plans")
+        blocked = browser.ask(
+            "(async () => { const k = 0; const q = state.start; const t = tipPosition(q);"
+            " state.obstacles[k].pose = [1, 0, 0, t.x, 0, 1, 0, t.y, 0, 0, 1, t.z, 0, 0, 0, 1];"
+            " applyObstacle(k); plan();"
+            " return document.getElementById('plan-state').textContent; })()"
+        )
+        assert blocked.startswith("start: ")
+        assert "too near" in blocked
+        browser.ask("document.getElementById('plan-save-path').click()")
+        assert browser.ask("document.getElementById('plan-state').textContent") == "there is no path to save"
