@@ -63,6 +63,7 @@ def test_from_start_to_grasp_by_keys_alone(browser, tmp_path):
         browser.key_down("ArrowRight")
         browser.wait("/driving|refused|end of the range/.test(state.message)")
         browser.key_up("ArrowRight")
+        browser.wait("!held && !state.driving")  # else the arm goes on to its set point from where it is put next
         type_a_value(browser, running)
     kinds = [json.loads(line)["kind"] for line in record.read_text().splitlines()]
     assert kinds[0] == "begin"
