@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from rrtik_ompl.errors import ProblemError as ProblemError
     from rrtik_ompl.errors import RrtikError as RrtikError
     from rrtik_ompl.errors import UnknownNameError as UnknownNameError
+    from rrtik_ompl.files.cloud import load_cloud as load_cloud
+    from rrtik_ompl.files.cloud import save_cloud as save_cloud
     from rrtik_ompl.files.mesh import load_mesh as load_mesh
     from rrtik_ompl.following.follower import Followed as Followed
     from rrtik_ompl.following.follower import Follower as Follower
@@ -82,6 +84,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.shapes import Cylinder as Cylinder
     from rrtik_ompl.shapes import HalfSpace as HalfSpace
     from rrtik_ompl.shapes import Mesh as Mesh
+    from rrtik_ompl.shapes import PointCloud as PointCloud
     from rrtik_ompl.shapes import Prism as Prism
     from rrtik_ompl.shapes import Sphere as Sphere
     from rrtik_ompl.shortening import MoveRules as MoveRules
@@ -113,6 +116,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.trajectory import time_parameterize as time_parameterize
     from rrtik_ompl.viewer import view as view
     from rrtik_ompl.world import World as World
+    from rrtik_ompl.world.robot_points import without_robot as without_robot
 else:
     _HOMES = {
         "catalog": ("list_problems", "list_robots", "load_robot"),
@@ -130,6 +134,7 @@ else:
         "ompl_bridge": ("objectives",),
         "ompl_bridge.goal_sampler": ("GoalSampler",),
         "ompl_bridge.simple_setup": ("simple_setup", "space_information"),
+        "files.cloud": ("load_cloud", "save_cloud"),
         "files.mesh": ("load_mesh",),
         "moves.staircase": ("one_joint_moves",),
         "path": ("JointPath", "load_path"),
@@ -146,7 +151,7 @@ else:
         "scene": ("AttachedObject", "ConstantVelocity", "Obstacle", "Scene", "TimedPoses"),
         "problem_files.scene": ("load_scene", "save_scene"),
         "search.roadmap": ("Roadmap", "load_roadmap"),
-        "shapes": ("Box", "Capsule", "Cylinder", "HalfSpace", "Mesh", "Prism", "Sphere"),
+        "shapes": ("Box", "Capsule", "Cylinder", "HalfSpace", "Mesh", "PointCloud", "Prism", "Sphere"),
         "shortening": ("MoveRules", "shorten"),
         "task_region": ("TaskRegion",),
         "tasks": ("Alternatives", "Attach", "Detach", "Gripper", "MoveTo", "Straight", "Task", "TaskPlan"),
@@ -156,6 +161,7 @@ else:
         "tasks.timed": ("TimedTask", "time_task"),
         "trajectory": ("RateLimits", "Trajectory", "load_trajectory", "motion_report", "time_parameterize"),
         "viewer": ("view",),
+        "world.robot_points": ("without_robot",),
         "world": ("World",),
     }
     _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}

@@ -143,6 +143,10 @@ class TipWarning(UserWarning):
     """Nobody has said where the tip of an arm is, and more than one link may be it."""
 
 
+class CloudWarning(UserWarning):
+    """A cloud of points is probably not what its author meant, but work can go on."""
+
+
 class PathWarning(UserWarning):
     """What was asked for does not apply to a path, which stays as it is."""
 

@@ -145,8 +145,8 @@ class AttachedObject:
         object.__setattr__(self, "allow", listed(self.allow, f"allow of '{self.name}'"))
         for name in self.allow:
             name_of(name, f"what '{self.name}' may touch")
-        if not self.shape.bounded:
-            raise InputError("a half-space cannot be attached to a link")
+        if not self.shape.movable:
+            raise InputError(f"a {type(self.shape).__name__} cannot be attached to a link: '{self.name}'")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,6 +10,7 @@ from rrtik_ompl.collision.digests import robot_digest, scene_digest
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.fast.proof.log import ProofLog
 from rrtik_ompl.path import JointPath
+from rrtik_ompl.shapes import PointCloud
 from rrtik_ompl.world import World
 
 
@@ -22,13 +23,17 @@ def certificate_of(world: World, path: JointPath, clearance: float = 0.0) -> Cer
         clearance: Kept from every obstacle beside its margin [m].
 
     Raises:
-        InputError: If the path is another robot's, or the clearance is negative or infinite.
+        InputError: If the path is another robot's, the clearance is negative or infinite, or the scene has a cloud.
     """
     require(world, World, "world of a certificate")
     require(path, JointPath, "path of a certificate")
     kept, rows, robot = not_negative(clearance, "clearance"), path.waypoints, world.robot
     if rows.shape[1] != robot.dof:
         raise InputError(f"path of {rows.shape[1]} joints: robot '{robot.name}' has {robot.dof}; it is another robot's")
+    if clouds := [o.name for o in world.scene.obstacles if isinstance(o.shape, PointCloud)]:
+        raise InputError(
+            f"a certificate names planes of solids, and '{clouds[0]}' is a cloud; plan.proven says as much"
+        )
     told = world.prover.logged(np.vstack([rows, rows]) if len(rows) == 1 else rows, clearance=kept)
     if told is None:
         return None

@@ -17,6 +17,7 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.body_arrays import body_arrays
 from rrtik_ompl.collision.boxes import Boxes, PlacedBoxes
+from rrtik_ompl.collision.cloud_solid import cloud_gap, has_cloud
 from rrtik_ompl.collision.containment import Containment
 from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, request
 from rrtik_ompl.collision.motion_bound import approach_weights
@@ -175,8 +176,10 @@ def distance(
     None if the margin is not kept. Computed with a fresh request and result.
     """
     transforms = [coal.Transform3s(pose[:3, :3], pose[:3, 3]) for pose in (first_pose, second_pose)]
-    result = coal.CollisionResult()
-    if coal.collide(first, transforms[0], second, transforms[1], request(margin), result):
+    ends, result = (first, transforms[0], second, transforms[1]), coal.CollisionResult()
+    if has_cloud(ends):
+        return cloud_gap(ends, margin)
+    if coal.collide(*ends, request(margin), result):
         return None
     return float(result.distance_lower_bound)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import coal
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.cloud_solid import Ends, cloud_gap, has_cloud, nearest_of_cloud
 from rrtik_ompl.collision.margins import kept_apart, request
 from rrtik_ompl.collision.solids import is_mesh
 from rrtik_ompl.copies import as_value
@@ -69,11 +69,18 @@ def measured(
     for i, j in pairs:
         margin = kept_apart(bodies[i], bodies[j])
         ends = (bodies[i].geometry, transforms[i], bodies[j].geometry, transforms[j])
-        if near_only and not coal.collide(*ends, request(margin), coal.CollisionResult()):
+        if near_only and not _near(ends, margin):
             continue
         distance, first, second = _distance(ends, depth=near_only)
         distance = min(distance, margin) if near_only else distance
         yield Contact(bodies[i].name, bodies[j].name, distance, first, second, margin)
+
+
+def _near(ends: Ends, margin: float) -> bool:
+    """Whether two geometries touch or come nearer than a margin [m]."""
+    if has_cloud(ends):
+        return cloud_gap(ends, margin) is None
+    return bool(coal.collide(*ends, request(margin), coal.CollisionResult()))
 
 
 def inside(first: str, second: str) -> Contact:
@@ -82,8 +89,10 @@ def inside(first: str, second: str) -> Contact:
     return Contact(first, second, 0.0, nowhere, nowhere)
 
 
-def _distance(ends: tuple[Any, Any, Any, Any], *, depth: bool) -> tuple[float, Vector, Vector]:
+def _distance(ends: Ends, *, depth: bool) -> tuple[float, Vector, Vector]:
     """Signed distance of two geometries at their places [m], and the points that it is between."""
+    if has_cloud(ends):
+        return nearest_of_cloud(ends)
     touching, result = coal.CollisionResult(), coal.DistanceResult()
     distance = float(coal.distance(*ends, coal.DistanceRequest(), result))
     meshes = depth and distance <= 0.0 and is_mesh(ends[0]) and is_mesh(ends[2])

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Mask, Matrix, frozen
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.body_arrays import body_arrays
+from rrtik_ompl.collision.cloud_solid import CloudSolid
 from rrtik_ompl.collision.enclosure import enclosure
 from rrtik_ompl.collision.shape_table import has_core
 from rrtik_ompl.collision.solids import SameObject, inside_mesh, is_closed, is_mesh, mesh_arrays
@@ -50,7 +51,9 @@ class Containment:
             if _has_inside(bodies[k]):
                 holding[k] = bodies[k].geometry.aabb_radius
         both_ways = np.concatenate([listed, listed[:, ::-1]])
-        may_hold = own.halves.max(axis=1, initial=0.0)[both_ways[:, 1]] <= holding[both_ways[:, 0]]
+        sizes = own.halves.max(axis=1, initial=0.0)
+        sizes[[isinstance(body.geometry, CloudSolid) for body in bodies]] = np.inf  # its points are asked one by one
+        may_hold = sizes[both_ways[:, 1]] <= holding[both_ways[:, 0]]
         outer, inner = both_ways[may_hold].T
         self.pairs: list[tuple[int, int]] = list(zip(outer.tolist(), inner.tolist(), strict=True))
         self.ways = np.where(may_hold, np.cumsum(may_hold) - 1, -1).reshape(2, -1).T

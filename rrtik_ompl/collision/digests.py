@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.collision.bodies import Body, link_bodies
+from rrtik_ompl.collision.cloud_solid import CloudSolid
 from rrtik_ompl.collision.shape_table import sizes_of
 from rrtik_ompl.collision.solids import is_mesh, mesh_arrays
 from rrtik_ompl.robot import Robot
@@ -59,6 +60,8 @@ def _shape(geometry: Any) -> Iterable[ArrayLike]:
     sizes = sizes_of(geometry)
     if sizes is not None:
         return (sizes,)
+    if isinstance(geometry, CloudSolid):
+        return (geometry.cloud.points, geometry.cloud.radius)
     if is_mesh(geometry):
         return mesh_arrays(geometry)
     if isinstance(geometry, coal.Halfspace):

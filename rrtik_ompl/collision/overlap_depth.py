@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.cloud_solid import CloudSolid
 from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, kept_apart, request
 from rrtik_ompl.collision.solids import is_mesh
 from rrtik_ompl.robot import Robot
@@ -19,7 +20,7 @@ class OverlapDepth:
 
     The depth of two convex solids is the shortest translation that parts them, by their margin if they have one. A
     motion in which no point moves that far does not part them either: along no direction do their extents then cease to
-    overlap. Pairs with a mesh, for which coal knows no depth, are left out.
+    overlap. Pairs with a mesh or a cloud, for which coal knows no depth, are left out.
 
     Args:
         robot: The arm.
@@ -29,7 +30,7 @@ class OverlapDepth:
 
     def __init__(self, robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> None:
         self._robot, self._bodies = robot, bodies
-        self._pairs = [pair for pair in pairs if not any(is_mesh(bodies[k].geometry) for k in pair)]
+        self._pairs = [pair for pair in pairs if not any(_hollow(bodies[k].geometry) for k in pair)]
         self._data = robot.model.createData()
 
     def travel(self, q: Vector) -> float:
@@ -53,3 +54,7 @@ class OverlapDepth:
     def _transform(self, body: Body) -> coal.Transform3s:
         pose = self._data.oMi[body.joint] * body.placement
         return coal.Transform3s(pose.rotation, pose.translation)
+
+
+def _hollow(geometry: object) -> bool:
+    return is_mesh(geometry) or isinstance(geometry, CloudSolid)

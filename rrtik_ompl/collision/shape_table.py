@@ -17,8 +17,9 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.arrays import Matrix, Vector, frozen
+from rrtik_ompl.collision.cloud_solid import CloudSolid, cloud_solid
 from rrtik_ompl.collision.solids import SameObject, bvh, convexified, hull, is_mesh, measured, mesh_arrays
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
+from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, PointCloud, Prism, Shape, Sphere
 from rrtik_ompl.shapes.polygons import convex_parts
 
 BOX_CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
@@ -155,6 +156,7 @@ ROWS = (
     ShapeRow(HalfSpace, lambda plane: [coal.Halfspace(np.array(plane.normal), plane.offset)]),
     ShapeRow(Prism, lambda prism: [hull(_extruded(part, prism.height)) for part in convex_parts(prism.polygon)]),
     ShapeRow(Mesh, _mesh),
+    ShapeRow(PointCloud, lambda cloud: [cloud_solid(cloud)]),
 )
 _BY_SHAPE: dict[type, ShapeRow] = {}
 _BY_GEOMETRY: dict[type, CoalSolid] = {}
@@ -244,6 +246,8 @@ def shape_of(geometry: Any) -> Shape | None:
     row = _BY_GEOMETRY.get(type(geometry))
     if row is not None:
         return row.shape(*row.sizes(geometry).tolist())
+    if isinstance(geometry, CloudSolid):
+        return geometry.cloud
     if is_mesh(geometry):
         return Mesh(*mesh_arrays(geometry))
     if isinstance(geometry, coal.Convex):

@@ -12,6 +12,7 @@ from pydantic import Field, create_model, model_validator
 from pydantic_core import PydanticCustomError
 
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.cloud import load_cloud
 from rrtik_ompl.files.mesh import load_mesh
 from rrtik_ompl.files.sections import (
     Length,
@@ -24,7 +25,8 @@ from rrtik_ompl.files.sections import (
     Vector3,
     exactly_one,
 )
-from rrtik_ompl.shapes import SHAPES, Measure, Mesh, Shape
+from rrtik_ompl.shapes import SHAPES, Measure, Mesh, PointCloud, Shape
+from rrtik_ompl.shapes.point_cloud import RADIUS, Invalid
 from rrtik_ompl.shapes.shape import MeasureKind
 
 ONE_SHAPE = {"oneOf": [{"required": [key]} for key in SHAPES]}
@@ -47,6 +49,15 @@ def _required(measure: Measure) -> Any:
     return _TYPES[measure.kind], Field(default, description=measure.text)
 
 
+class CloudEntry(Section):
+    """A cloud of points: each is a ball of one radius."""
+
+    file: Name = Field(description="NPY, PLY, PCD or XYZ file, relative to the folder of this file")
+    radius: Length = Field(RADIUS, description="of each point [m]")
+    scale: Positive = Field(1.0, description="metres per unit of the file")
+    invalid: Invalid = Field("refuse", description="what is done with points that are not finite")
+
+
 def _keys(kind: type[Shape]) -> dict[str, Any]:
     """The keys of one kind of shape, all of them optional, with their types and descriptions."""
     if kind is Mesh:
@@ -54,6 +65,8 @@ def _keys(kind: type[Shape]) -> dict[str, Any]:
             kind.key: _optional(Name, "STL, OBJ or DAE file, relative to the folder of this file"),
             "scale": _optional(Positive, "of a mesh: metres per unit of its file; 1 if absent"),
         }
+    if kind is PointCloud:
+        return {kind.key: _optional(CloudEntry, None)}
     if kind.grouped:
         entry = create_model(
             f"{kind.__name__}Entry",
@@ -84,6 +97,7 @@ if TYPE_CHECKING:
     class _ShapeKeys(NamedEntry):
         mesh: str | None
         scale: float | None
+        cloud: CloudEntry | None
 else:
     _ShapeKeys = create_model(
         "_ShapeKeys", __base__=NamedEntry, **{key: field for keys in _KEYS.values() for key, field in keys.items()}
@@ -102,11 +116,13 @@ class ShapeEntry(_ShapeKeys):
         return self
 
     def build_shape(self, folder: Path) -> Shape:
-        """The shape; meshes are looked for relative to ``folder``."""
+        """The shape; meshes and clouds are looked for relative to ``folder``."""
         kind = next(kind for key, kind in SHAPES.items() if getattr(self, key) is not None)
         value: Any = getattr(self, kind.key)
         if kind is Mesh:
             return load_mesh(folder / str(value), 1.0 if self.scale is None else self.scale)
+        if kind is PointCloud:
+            return load_cloud(folder / value.file, value.radius, scale=value.scale, invalid=value.invalid)
         return kind(**dict(self._values(kind, value)))
 
     def _values(self, kind: type[Shape], value: Any) -> Iterator[tuple[str, Any]]:
@@ -122,10 +138,12 @@ def shape_data(name: str, shape: Shape, folder: Path) -> dict[str, Any]:
     """What a file in ``folder`` says about the shape of the solid of that name.
 
     Raises:
-        InputError: If it is a mesh that does not come from a file.
+        InputError: If it is a mesh or a cloud that does not come from a file.
     """
     if isinstance(shape, Mesh):
         return _mesh_data(name, shape, folder)
+    if isinstance(shape, PointCloud):
+        return _cloud_data(name, shape, folder)
     values = {m.name: np.asarray(getattr(shape, m.name), dtype=np.float64).tolist() for m in shape.measures}
     if shape.grouped:
         return {shape.key: values}
@@ -135,5 +153,16 @@ def shape_data(name: str, shape: Shape, folder: Path) -> dict[str, Any]:
 def _mesh_data(name: str, mesh: Mesh, folder: Path) -> dict[str, Any]:
     if not mesh.source:
         raise InputError(f"'{name}': a mesh made in memory cannot be written; save it as STL and use load_mesh")
-    file = os.path.relpath(os.path.realpath(mesh.source), os.path.realpath(folder))
-    return {"mesh": Path(file).as_posix()} | ({} if mesh.scale == 1.0 else {"scale": mesh.scale})
+    return {"mesh": _relative(mesh.source, folder)} | ({} if mesh.scale == 1.0 else {"scale": mesh.scale})
+
+
+def _cloud_data(name: str, cloud: PointCloud, folder: Path) -> dict[str, Any]:
+    if not cloud.source:
+        raise InputError(f"'{name}': a cloud made in memory cannot be written; use the one that save_cloud returns")
+    data: dict[str, Any] = {"file": _relative(cloud.source, folder), "radius": cloud.radius}
+    data |= {} if cloud.scale == 1.0 else {"scale": cloud.scale}
+    return {"cloud": data | ({"invalid": "drop"} if cloud.dropped else {})}
+
+
+def _relative(source: str, folder: Path) -> str:
+    return Path(os.path.relpath(os.path.realpath(source), os.path.realpath(folder))).as_posix()

@@ -12,10 +12,13 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.bodies import Body, link_bodies, scene_bodies
+from rrtik_ompl.collision.cloud_solid import cloud_gap, has_cloud, nearest_of_cloud
+from rrtik_ompl.errors import InputError
 from rrtik_ompl.replanning.feed import Feed
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.shapes import same_shape
 
 SAMPLES_PER_TICK = 10
 MAX_DISTANCE = 0.05  # [m]; larger distances are not measured
@@ -49,6 +52,9 @@ def check_contacts(
         source: The scene whose obstacles state their motion, or a function from any time [s] to a scene, between the
             ticks too.
         samples_per_tick: Number of checks in a tick.
+
+    Raises:
+        InputError: If a cloud does not keep its points.
     """
     ticks, seconds = run.ticks, 1.0 / run.rate
     shares = np.arange(samples_per_tick) / samples_per_tick
@@ -70,6 +76,10 @@ def _poses(source: Scene | Feed, times: list[float]) -> dict[str, NDArray[np.flo
         return {o.name: np.array([_place(o, time).homogeneous for time in times]) for o in source.obstacles}
     scenes = [source(time) for time in times]
     names = [o.name for o in scenes[0].obstacles]
+    for name in names:
+        shape = scenes[0].obstacle(name).shape
+        if any(not same_shape(scene.obstacle(name).shape, shape) for scene in scenes):
+            raise InputError(f"check of contacts: '{name}' has other points later; check such a run tick by tick")
     return {name: np.array([scene.obstacle(name).pose.homogeneous for scene in scenes]) for name in names}
 
 
@@ -115,7 +125,10 @@ def _distance(
     first: coal.CollisionGeometry, first_pose: Matrix, second: coal.CollisionGeometry, second_pose: Matrix
 ) -> float:
     """Coal's distance of two geometries [m], 0 if they touch."""
-    ends = [coal.Transform3s(pose[:3, :3], pose[:3, 3]) for pose in (first_pose, second_pose)]
-    if coal.collide(first, ends[0], second, ends[1], coal.CollisionRequest(), coal.CollisionResult()):
+    poses = [coal.Transform3s(pose[:3, :3], pose[:3, 3]) for pose in (first_pose, second_pose)]
+    ends = (first, poses[0], second, poses[1])
+    if has_cloud(ends):
+        return max(0.0, nearest_of_cloud(ends).distance) if cloud_gap(ends, 0.0) is not None else 0.0
+    if coal.collide(*ends, coal.CollisionRequest(), coal.CollisionResult()):
         return 0.0
-    return float(coal.distance(first, ends[0], second, ends[1], coal.DistanceRequest(), coal.DistanceResult()))
+    return float(coal.distance(*ends, coal.DistanceRequest(), coal.DistanceResult()))

@@ -118,7 +118,10 @@ class MotionTracker:
             if not np.array_equal(last.pose.homogeneous, obstacle.pose.homogeneous):
                 changed = True
                 self._measure(obstacle, last.pose, time - before[0], time)
-            changed |= obstacle.margin != last.margin or not same_shape(obstacle.shape, last.shape)
+            if not same_shape(obstacle.shape, last.shape):  # a cloud that was seen anew: its points may have moved
+                changed = True
+                self.speeds.setdefault(obstacle.name, 0.0)
+            changed |= obstacle.margin != last.margin
         return changed
 
     def later(self, scene: Scene, seconds: float) -> Scene:

@@ -16,6 +16,7 @@ from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError, at_most
 from rrtik_ompl.shapes.half_space import HalfSpace
 from rrtik_ompl.shapes.mesh import Mesh
+from rrtik_ompl.shapes.point_cloud import PointCloud
 from rrtik_ompl.shapes.prism import Prism
 from rrtik_ompl.shapes.shape import Measure, Shape, same_shape
 from rrtik_ompl.shapes.surfaces import Triangles, extruded, round_ended, rounded
@@ -28,6 +29,7 @@ __all__ = [
     "HalfSpace",
     "Measure",
     "Mesh",
+    "PointCloud",
     "Prism",
     "Shape",
     "Sphere",
@@ -184,4 +186,5 @@ def _circle(sides: int) -> tuple[Vector, Matrix]:
     return turn, np.stack([np.cos(turn), np.sin(turn)], 1)
 
 
-SHAPES: dict[str, type[Shape]] = {kind.key: kind for kind in (Box, Sphere, Cylinder, Capsule, HalfSpace, Prism, Mesh)}
+_KINDS: tuple[type[Shape], ...] = (Box, Sphere, Cylinder, Capsule, HalfSpace, Prism, Mesh, PointCloud)
+SHAPES: dict[str, type[Shape]] = {kind.key: kind for kind in _KINDS}

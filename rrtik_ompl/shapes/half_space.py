@@ -24,6 +24,7 @@ class HalfSpace(Shape):
     key = "half_space"
     measures = (Measure("normal", "vector", None), Measure("offset", "number", default=0.0))
     bounded = False
+    movable = False
 
     normal: Vector
     offset: float

@@ -42,6 +42,7 @@ class Shape(ABC):
         in_urdf: Whether URDF knows it.
         moveit: Names of its measures in the order of MoveIt's ``dimensions``; none if MoveIt does not know it.
         bounded: Whether it has an end in all directions.
+        movable: Whether a link can hold it.
         smooth: Whether its surface has no edges.
     """
 
@@ -53,6 +54,7 @@ class Shape(ABC):
     in_urdf: ClassVar[bool] = False
     moveit: ClassVar[tuple[str, ...]] = ()
     bounded: ClassVar[bool] = True
+    movable: ClassVar[bool] = True
     smooth: ClassVar[bool] = False
 
     @property

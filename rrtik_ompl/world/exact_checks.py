@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.cloud_solid import cloud_gap, has_cloud
 from rrtik_ompl.collision.containment import Containment
 from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, kept_apart, request
 from rrtik_ompl.collision.motion_bound import approach_weights
@@ -154,6 +155,9 @@ def distance(first: Any, first_pose: Any, second: Any, second_pose: Any, margin:
     For solids coal's answer to "do they touch" comes with the distance. Meshes take much longer, so their hulls are
     checked first: where those are apart, the meshes are.
     """
+    ends = first, first_pose, second, second_pose
+    if has_cloud(ends):
+        return cloud_gap(ends, margin)
     result = coal.CollisionResult()
     hulls = around(first), around(second)
     if not coal.collide(hulls[0], first_pose, hulls[1], second_pose, request(margin), result):
@@ -161,7 +165,7 @@ def distance(first: Any, first_pose: Any, second: Any, second_pose: Any, margin:
     if hulls[0] is first and hulls[1] is second:
         return None
     result = coal.CollisionResult()
-    if coal.collide(first, first_pose, second, second_pose, request(margin), result):
+    if coal.collide(*ends, request(margin), result):
         return None
     return float(result.distance_lower_bound)
 

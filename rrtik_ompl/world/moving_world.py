@@ -16,12 +16,13 @@ from rrtik_ompl.arrays import Mask, Vector, finite_array, not_negative
 from rrtik_ompl.choices import Accuracy
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.certificate import fixed_contact
+from rrtik_ompl.collision.cloud_solid import cloud_solid
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast import FREE, FastWorld
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions, motions_of, step_counts
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import same_shape
+from rrtik_ompl.shapes import PointCloud, same_shape
 from rrtik_ompl.world import World
 from rrtik_ompl.world.arm_cache import arm_cache
 from rrtik_ompl.world.moving_proof import MovingProver
@@ -91,7 +92,7 @@ class MovingWorld:
         return tuple(o.name for o in self.scene.obstacles)
 
     def move(self, *scenes: Scene, inflation: Mapping[str, float] | None = None) -> None:
-        """Put the obstacles where they are now, and their copies where they will be.
+        """Put the obstacles where they are now, and their copies where they will be. A cloud may have other points.
 
         Args:
             *scenes: The scene now, then one for each further copy; the last one for those that are missing as well.
@@ -102,7 +103,7 @@ class MovingWorld:
             InputError: If a scene has other obstacles than the world began with, or an inflation is not 0 or more.
             UnknownNameError: If an inflation is given for what is no obstacle.
         """
-        places = [{o.name: (o.pose, o.margin) for o in scene.obstacles} for scene in scenes]
+        places = [{o.name: o for o in scene.obstacles} for scene in scenes]
         for scene in scenes:
             _check_obstacles(scene, self._known)
         for name, metres in (inflation or {}).items():
@@ -111,9 +112,11 @@ class MovingWorld:
             not_negative(metres, f"inflation: that of '{name}'")
         for k, body in enumerate(self._bodies):
             if body.kind == "obstacle":
-                pose, margin = places[min(self._copy[k], len(places) - 1)][body.name]
-                if margin != body.margin or not np.array_equal(pose.homogeneous, body.placement.homogeneous):
-                    self._bodies[k] = replace(body, placement=pose.copy(), margin=margin)
+                now = places[min(self._copy[k], len(places) - 1)][body.name]
+                solid = cloud_solid(now.shape) if isinstance(now.shape, PointCloud) else body.geometry
+                here = solid is body.geometry and np.array_equal(now.pose.homogeneous, body.placement.homogeneous)
+                if not here or now.margin != body.margin:
+                    self._bodies[k] = replace(body, placement=now.pose.copy(), margin=now.margin, geometry=solid)
                 if inflation is not None and body.name in inflation:
                     self._inflation[k] = float(inflation[body.name])
         self.scene = scenes[0]
@@ -166,11 +169,13 @@ class MovingWorld:
 
 
 def _check_obstacles(scene: Scene, known: Mapping[str, Obstacle]) -> None:
-    """Raise unless a scene has the obstacles that are known: their names and shapes."""
+    """Raise unless a scene has the obstacles that are known: their names and shapes; clouds may have other points."""
     if {o.name for o in scene.obstacles} != known.keys():
         raise InputError(f"scene: expected the obstacles {', '.join(sorted(known))}, got {scene}")
     for obstacle in scene.obstacles:
-        if not same_shape(obstacle.shape, known[obstacle.name].shape):
+        before = known[obstacle.name].shape
+        clouds = isinstance(before, PointCloud) and isinstance(obstacle.shape, PointCloud)
+        if not clouds and not same_shape(obstacle.shape, before):
             raise InputError(f"scene: '{obstacle.name}' has another shape than before; make a new world")
 
 

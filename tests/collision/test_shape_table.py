@@ -18,14 +18,15 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.overlay.surfaces import surface_of_shape
 from rrtik_ompl.problem_files.scene import load_scene, save_scene
 from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import SHAPES, Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Sphere, same_shape
+from rrtik_ompl.shapes import SHAPES, Box, Capsule, Cylinder, HalfSpace, Mesh, PointCloud, Prism, Sphere, same_shape
 from rrtik_ompl.viewer.drawing.meshes import look_of_margin, look_of_shape
 
 ROOT = Path(__file__).resolve().parents[2]
 L_SHAPE = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]]
 TETRAHEDRON = Mesh(np.vstack([np.zeros(3), np.eye(3)]), [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 PRIMITIVES = [Box([0.2, 0.3, 0.4]), Sphere(0.2), Cylinder(0.2, 0.5), Capsule(0.1, 0.5)]
-BOUNDED = [*PRIMITIVES, Prism(L_SHAPE, 0.5), TETRAHEDRON]
+CLOUD = PointCloud([[0.25, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 1.0]], 0.125)
+BOUNDED = [*PRIMITIVES, Prism(L_SHAPE, 0.5), TETRAHEDRON, CLOUD]
 FLOOR = HalfSpace([0.0, 0.0, 1.0], -0.1)
 kinds = pytest.mark.parametrize("shape", BOUNDED, ids=lambda shape: type(shape).__name__)
 primitives = pytest.mark.parametrize("shape", PRIMITIVES, ids=lambda shape: type(shape).__name__)

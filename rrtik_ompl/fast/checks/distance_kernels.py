@@ -16,7 +16,6 @@ from rrtik_ompl.fast.checks.obstacle_kernels import (
     ZERO,
     primitive_gap,
     primitives_in_reach,
-    squared,
 )
 from rrtik_ompl.fast.checks.sphere_kernels import place_cluster, placed_centre, prepare
 from rrtik_ompl.fast.simd.compiled import WIDTH, entry, inlined, kernel
@@ -36,6 +35,7 @@ from rrtik_ompl.fast.simd.lanes import (
     spread,
     square_root,
 )
+from rrtik_ompl.fast.simd.vectors import squared
 from rrtik_ompl.fast.tables.accessors import (
     arm_of,
     balls_of,

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.fast.checks.obstacle_kernels import along
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, int_at, nearest, single, spread, wide_lanes_at
+from rrtik_ompl.fast.simd.vectors import along
 from rrtik_ompl.fast.tables.accessors import (
     first_row_of,
     frame_at,

@@ -9,6 +9,7 @@ from __future__ import annotations
 from math import sqrt
 from typing import Any
 
+from rrtik_ompl.fast.checks.cloud_phase import compare_cloud, is_cloud
 from rrtik_ompl.fast.checks.gjk import (
     SHORTEST,
     Frames,
@@ -248,9 +249,12 @@ def narrow_phase(world: WorldTable, wanted: int) -> Any:
         else:
             pair = pair_at(pairs, k - crossing)
             first, second, others = one_body_of(pair), other_body_of(pair), wider_solids_of(world)
-        left, hit = compare_bodies(scratch, mine, first, others, second, marked)
-        if k < crossing and left != hit:
-            hit |= corners_inside(world, first, second, left & ~hit)
+        if k < crossing and is_cloud(others, second):
+            left, hit = compare_cloud(world, first, second, marked)
+        else:
+            left, hit = compare_bodies(scratch, mine, first, others, second, marked)
+            if k < crossing and left != hit:
+                hit |= corners_inside(world, first, second, left & ~hit)
         set_int(marks, k, left | int_at(marks, k) & colliding)
         open_ |= left
         colliding |= hit

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from rrtik_ompl.fast.clouds.primitive_kernels import cloud_gap, meets_cloud
 from rrtik_ompl.fast.simd.access import float_reader, vector_reader
 from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import (
@@ -29,11 +30,14 @@ from rrtik_ompl.fast.simd.lanes import (
     spread,
     square_root,
 )
+from rrtik_ompl.fast.simd.vectors import along, squared
 from rrtik_ompl.fast.tables import layout
 from rrtik_ompl.fast.tables.accessors import (
     Vector,
     boxes_of,
+    centre_of,
     end_plane_of,
+    first_axis_of,
     first_plane_of,
     head_at,
     head_of,
@@ -45,10 +49,12 @@ from rrtik_ompl.fast.tables.accessors import (
     plane_at,
     planes_of,
     primitive_count_of,
+    second_axis_of,
     shape_at,
     shape_of,
     shapes_of,
     standing_body_of,
+    third_axis_of,
 )
 from rrtik_ompl.fast.tables.layout import (
     KIND_COUNT,
@@ -63,14 +69,10 @@ from rrtik_ompl.fast.tables.layout import (
 )
 
 # Numbers of the shapes of primitives
-centre_of: Callable[[PrimitiveShape], Vector] = vector_reader(layout.SHAPE_CENTRE)
 ball_radius_of: Callable[[PrimitiveShape], float] = float_reader(layout.BALL_RADIUS)
 capsule_axis_of: Callable[[PrimitiveShape], Vector] = vector_reader(layout.CAPSULE_AXIS)
 inverse_square_of: Callable[[PrimitiveShape], float] = float_reader(layout.CAPSULE_INVERSE_SQUARE)
 capsule_radius_of: Callable[[PrimitiveShape], float] = float_reader(layout.CAPSULE_RADIUS)
-first_axis_of: Callable[[PrimitiveShape], Vector] = vector_reader(layout.BOX_AXES)
-second_axis_of: Callable[[PrimitiveShape], Vector] = vector_reader(layout.BOX_AXES + 3)
-third_axis_of: Callable[[PrimitiveShape], Vector] = vector_reader(layout.BOX_AXES + 6)
 half_sizes_of: Callable[[PrimitiveShape], Vector] = vector_reader(layout.BOX_HALF_SIZES)
 cylinder_axis_of: Callable[[PrimitiveShape], Vector] = vector_reader(layout.CYLINDER_AXIS)
 half_length_of: Callable[[PrimitiveShape], float] = float_reader(layout.CYLINDER_HALF_LENGTH)
@@ -92,18 +94,6 @@ def kinds_known(primitives: PrimitiveTable) -> bool:
     if count > 0:
         known = kind_of(head_of(primitives, 0)) >= 0 and kind_of(head_of(primitives, count - 1)) < KIND_COUNT
     return known
-
-
-@inlined
-def squared(x: Any, y: Any, z: Any) -> Any:
-    """Squared length."""
-    return x * x + y * y + z * z
-
-
-@inlined
-def along(vector: Any, x: Any, y: Any, z: Any) -> Any:
-    """Dot product of lanes of points with three numbers."""
-    return x * vector[0] + y * vector[1] + z * vector[2]
 
 
 @inlined
@@ -168,8 +158,12 @@ def meets_primitive(
     z: Any,
     radius: float,
     bound: bool,
+    wanted: int,
 ) -> Any:
-    """Lanes in which a ball meets a primitive; ``bound``: the ball only stands for balls inside it."""
+    """Lanes in which a ball meets a primitive; ``bound``: the ball only stands for balls inside it.
+
+    Of a cloud only lanes among ``wanted`` are looked at.
+    """
     kind = kind_of(head)
     if kind < 0 or kind >= layout.CENTRED_KINDS:
         if kind == layout.HALF_SPACE:
@@ -177,6 +171,8 @@ def meets_primitive(
         if kind == layout.CONVEX:
             share, planes = ONE if bound else share_of(shape), planes_of(primitives)
             return meets_convex(planes, first_plane_of(head), end_plane_of(head), share, x, y, z, radius)
+        if kind == layout.CLOUD:
+            return meets_cloud(primitives, head, shape, x, y, z, radius, bound, wanted)
         return ALL_LANES
     centre = centre_of(shape)
     x, y, z = x - centre[0], y - centre[1], z - centre[2]
@@ -217,6 +213,8 @@ def primitive_gap(primitives: PrimitiveTable, number: int, x: Any, y: Any, z: An
                 return height
             # Outside, the height is too small for an inner primitive.
             return choose(height < ZERO, height, spread(UNBOUNDED_DISTANCE))
+        if kind == layout.CLOUD:
+            return cloud_gap(primitives, head, shape, x, y, z)
         return spread(-UNBOUNDED_DISTANCE)
     centre = centre_of(shape)
     x, y, z = x - centre[0], y - centre[1], z - centre[2]
@@ -256,7 +254,7 @@ def meets_primitives(
     for k in range(count):
         number = int_at(source, k)
         head, shape = head_at(heads, number), shape_at(shapes, number)
-        found = meets_primitive(primitives, head, shape, x, y, z, radius, bound) & wanted
+        found = meets_primitive(primitives, head, shape, x, y, z, radius, bound, wanted) & wanted
         if found != 0:
             meeting |= found
             set_int(sink, kept, number)

@@ -5,14 +5,15 @@ For computers without numba, and to test the kernels; some thousand times slower
 
 from __future__ import annotations
 
-from typing import NoReturn
+from functools import lru_cache
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.tables import layout
+from rrtik_ompl.fast.tables import cloud_layout, layout
 from rrtik_ompl.fast.tables.memory import Table
 
 CHUNK = 64  # configurations at a time, to bound memory
@@ -51,6 +52,7 @@ class PrimitiveView:
         self.kind, self.standing = int(head[layout.KIND]), int(head[layout.STANDING_BODY])
         self._planes = primitives[layout.PLANES].reshape(-1, layout.PLANE_FLOATS)
         self._span = slice(head[layout.FIRST_PLANE], head[layout.END_PLANE])
+        self._clouds, self._cloud = primitives.parts, int(head[layout.FIRST_PLANE])
 
     def number(self, place: int) -> float:
         """One of its numbers."""
@@ -90,6 +92,20 @@ class PrimitiveView:
         beyond = np.abs(along) - self.number(layout.CYLINDER_HALF_LENGTH)
         return beyond, across - self.number(layout.CYLINDER_RADIUS)
 
+    def to_points(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distance of points, shape (..., 3) and seen from a cloud's origin, from its nearest point. Shape (...)."""
+        axes = self._shape[layout.CLOUD_AXES : layout.CLOUD_AXES + 9].reshape(3, 3)
+        return np.asarray(_search_tree(self._clouds[self._cloud]).query(away @ axes.T)[0])
+
+
+@lru_cache(maxsize=8)
+def _search_tree(cloud: Table) -> Any:
+    """SciPy's tree of a cloud's points."""
+    from scipy.spatial import cKDTree  # loads slower than most plans take, and few scenes have a cloud
+
+    blocks = cloud[cloud_layout.BLOCKS].reshape(-1, layout.AXES, cloud_layout.LEAF)
+    return cKDTree(blocks.transpose(0, 2, 1).reshape(-1, layout.AXES).astype(np.float64))
+
 
 def heads(primitives: Table) -> NDArray[np.int32]:
     """Heads of all primitives, shape (k, ``HEAD_INTS``)."""
@@ -123,6 +139,8 @@ def meets_primitive(primitives: Table, number: int, points: NDArray[np.float64],
         return np.asarray(np.linalg.norm(away, axis=-1) < radii + own.number(layout.BALL_RADIUS))
     if own.kind == layout.CAPSULE:
         return np.asarray(own.to_capsule(away) < radii + own.number(layout.CAPSULE_RADIUS))
+    if own.kind == layout.CLOUD:
+        return np.asarray(own.to_points(away) < radii + own.number(layout.CLOUD_RADIUS))
     if own.kind == layout.CYLINDER:
         ends, side = own.beyond_ends(away)
         return np.asarray(np.hypot(np.maximum(ends, 0.0), np.maximum(side, 0.0)) < radii)
@@ -148,6 +166,8 @@ def primitive_gap(primitives: Table, number: int, points: NDArray[np.float64]) -
         return _outside(own.beyond_faces(away))
     if own.kind == layout.CAPSULE:
         return np.asarray(own.to_capsule(away) - own.number(layout.CAPSULE_RADIUS))
+    if own.kind == layout.CLOUD:
+        return np.asarray(own.to_points(away) - own.number(layout.CLOUD_RADIUS))
     if own.kind == layout.CYLINDER:
         return _outside(np.stack(own.beyond_ends(away), axis=-1))
     refuse_kind(own.kind)

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from rrtik_ompl.fast.checks.obstacle_kernels import squared
 from rrtik_ompl.fast.checks.sphere_kernels import place_cluster, placed_centre
 from rrtik_ompl.fast.checks.watch_kernels import ZERO, set_clear, slack_at
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
 from rrtik_ompl.fast.simd.lanes import bits, int_at, set_int
+from rrtik_ompl.fast.simd.vectors import squared
 from rrtik_ompl.fast.tables.accessors import (
     balls_of,
     body_balls_of,

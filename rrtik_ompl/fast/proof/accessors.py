@@ -40,6 +40,8 @@ log_room_of: Callable[[ProofTable], int] = field_reader(layout.LOG_ROOM)
 log_of: Callable[[ProofTable], int] = field_reader(layout.LOG)
 log_ways_of: Callable[[ProofTable], int] = field_reader(layout.LOG_WAYS)
 log_count_of: Callable[[ProofTable], int] = field_reader(layout.LOG_COUNT)
+clouds_of: Callable[[ProofTable], int] = field_reader(layout.CLOUDS)
+cloud_poses_of: Callable[[ProofTable], int] = field_reader(layout.CLOUD_POSES)
 
 # Function (array, number) that reads one number of a record.
 frame_of_solid: Callable[[int, int], int] = int_column(layout.SOLID_SIZE, layout.SOLID_FRAME)

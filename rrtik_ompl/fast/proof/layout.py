@@ -23,6 +23,8 @@ TOP_COUNT, TOP_PAIRS = range(23, 25)
 # records of int32 · LOG_WAYS: of each the unit normal of its plane, seen from the base of its pair, or zeros ·
 # LOG_COUNT: one int32, counts records, also those for which there was no room
 LOG_ROOM, LOG, LOG_WAYS, LOG_COUNT = range(25, 29)
+# CLOUDS: addresses of the tables of clouds · CLOUD_POSES: their frames in the world
+CLOUDS, CLOUD_POSES = range(29, 31)
 
 # Joint (doubles): rotation of its placement row by row, origin, axis.
 JOINT_SIZE = 15
@@ -33,6 +35,7 @@ FRAME_SIZE = 12
 SOLID_SIZE = 4
 SOLID_FRAME, FIRST_CORNER, END_CORNER, SOLID_KIND = range(4)
 CONVEX_SOLID, HALF_SPACE, WHOLE_BODY, UNKNOWN = range(4)  # a whole body, or several, has a ball and a box, no corners
+CLOUD = 4  # and its number among the clouds; its corners are the points that are compared at the moment
 # Sizes (doubles): bounding ball; axes of the box row by row, its middle along them, its half sides; radius of the disc
 # (offset of a half-space) and its axis; radius of the ball around every point.
 SIZE_COUNT = 24

@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.fast.proof import layout
-from rrtik_ompl.fast.proof.packing import ProofPairs
+from rrtik_ompl.fast.proof.cloud_frames import cloud_bodies, cloud_poses
+from rrtik_ompl.fast.proof.packing import ProofPairs, sizes_of
+from rrtik_ompl.fast.tables.cloud_tables import cloud_table
+from rrtik_ompl.fast.tables.solid_tables import convex_solids, placed_bodies
 
 _BALL = slice(layout.BALL_CENTRE, layout.BALL_CENTRE + 3)
 _AXES = slice(layout.BOX_AXES, layout.BOX_AXES + 9)
@@ -71,6 +74,22 @@ class MovedObstacles:
         packed.table[layout.SIZES].reshape(-1, layout.SIZE_COUNT)[self._solids] = rows
         corners = _turned(turns[self._corner_owners], self._corners) + shifts[self._corner_owners]
         packed.table[layout.CORNERS].reshape(-1, 3)[self._corner_places] = corners
+        self._put_clouds(bodies)
+
+    def _put_clouds(self, bodies: Sequence[Body]) -> None:
+        """Put the clouds where they are now, and other points in their place where these have changed."""
+        table, numbers = self._packed.table, cloud_bodies(bodies)
+        if not numbers:
+            return
+        table[layout.CLOUD_POSES][:] = cloud_poses(bodies).ravel()
+        self._clouds = [cloud_table(bodies[k].geometry) for k in numbers]
+        table[layout.CLOUDS][:] = [cloud.address for cloud in self._clouds]
+        sizes = table[layout.SIZES].reshape(-1, layout.SIZE_COUNT)
+        kinds = table[layout.SOLIDS].reshape(-1, layout.SOLID_SIZE)[:, layout.SOLID_KIND]
+        places = [bodies[k].placement.homogeneous for k in numbers]
+        around = placed_bodies([convex_solids(bodies[k].geometry) for k in numbers], np.array(places))
+        turns = np.array([place[:3, :3] for place in places])
+        sizes[np.flatnonzero(kinds >= layout.CLOUD)] = sizes_of([solids.around for solids in around], turns)
 
 
 def _turned(turns: NDArray[np.float64], a: Matrix) -> Matrix:

@@ -14,16 +14,19 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.body_arrays import body_arrays
 from rrtik_ompl.fast.proof import layout
-from rrtik_ompl.fast.proof.layout import CONVEX_SOLID, HALF_SPACE, NODES, UNKNOWN, WHOLE_BODY
+from rrtik_ompl.fast.proof.cloud_frames import cloud_bodies, cloud_poses
+from rrtik_ompl.fast.proof.layout import CLOUD, CONVEX_SOLID, HALF_SPACE, NODES, UNKNOWN, WHOLE_BODY
+from rrtik_ompl.fast.tables.cloud_tables import cloud_table
+from rrtik_ompl.fast.tables.layout import CLOUD_SOLID, HALF_SPACE_SOLID
 from rrtik_ompl.fast.tables.layout import CONVEX_SOLID as IS_CONVEX
-from rrtik_ompl.fast.tables.layout import HALF_SPACE_SOLID
 from rrtik_ompl.fast.tables.memory import Table, table
 from rrtik_ompl.fast.tables.solid_tables import ConvexSolid, Solids, placed_bodies
 from rrtik_ompl.robot import Chain
 
 ROOM = 1e-8  # [m] for rounding: float64 misplaces points of an arm of 30 joints and 100 m by less than a tenth of it
 Members: TypeAlias = tuple[int, ...]  # numbers of bodies
-KINDS = {IS_CONVEX: CONVEX_SOLID, HALF_SPACE_SOLID: HALF_SPACE}
+KINDS = {IS_CONVEX: CONVEX_SOLID, HALF_SPACE_SOLID: HALF_SPACE, CLOUD_SOLID: CLOUD}
+SIZED = (IS_CONVEX, CLOUD_SOLID)  # have a ball and a box around them
 
 
 @dataclass(slots=True, eq=False)
@@ -115,6 +118,7 @@ def proof_pairs(
     sides = rows[:, layout.PAIR_SIZE :]
     named = np.sort(sides[:, ::2], axis=1)
     packed = _solid_arrays(bodies, parts, [members for members, _ in groups])
+    clouds = [cloud_table(bodies[k].geometry) for k in cloud_bodies(bodies)]
     made = table(
         {
             layout.JOINT_COUNT: joints,
@@ -144,7 +148,10 @@ def proof_pairs(
             layout.LOG: np.zeros(0, dtype=np.int32),
             layout.LOG_WAYS: np.zeros(0),
             layout.LOG_COUNT: np.zeros(1, dtype=np.int32),
-        }
+            layout.CLOUDS: np.array([cloud.address for cloud in clouds], dtype=np.int64),
+            layout.CLOUD_POSES: cloud_poses(bodies),
+        },
+        clouds,
     )
     arrays = body_arrays(bodies)
     beside = np.asarray(arrays.obstacles[named].any(axis=1))
@@ -211,7 +218,7 @@ def _reaches(chain: Chain, joint: int, parts: Sequence[ConvexSolid], strokes: Ve
     return reaches
 
 
-def _sizes(groups: Sequence[Sequence[ConvexSolid]], turns: NDArray[np.float64]) -> Matrix:
+def sizes_of(groups: Sequence[Sequence[ConvexSolid]], turns: NDArray[np.float64]) -> Matrix:
     """Ball and box around groups of solids, and the measures of the first of each, shape (n, SIZE_COUNT).
 
     Args:
@@ -222,7 +229,7 @@ def _sizes(groups: Sequence[Sequence[ConvexSolid]], turns: NDArray[np.float64]) 
     first = [group[0] for group in groups]
     made[:, layout.DISC] = [solid.disc for solid in first]
     made[:, layout.DISC_AXIS : layout.DISC_AXIS + 3] = [solid.axis for solid in first]
-    known = np.array([all(solid.kind == IS_CONVEX for solid in group) for group in groups])
+    known = np.array([all(solid.kind in SIZED for solid in group) for group in groups])
     if not known.any():
         return made
     turns, kept = turns[known], [group for group, convex in zip(groups, known, strict=True) if convex]
@@ -277,8 +284,11 @@ def _solid_arrays(
         numbers.append((bodies[members[0]].joint, 0, 0, WHOLE_BODY))
         solids.append([solid for k in members for solid in parts[k]])
     turns = np.concatenate([turns, np.tile(np.eye(3), (len(groups), 1, 1))])
+    records = np.array(numbers, dtype=np.int32)
+    clouds = np.flatnonzero(records[:, layout.SOLID_KIND] == CLOUD)
+    records[clouds, layout.SOLID_KIND] += np.arange(len(clouds), dtype=np.int32)
     return {
-        layout.SOLIDS: np.array(numbers, dtype=np.int32),
-        layout.SIZES: _sizes(solids, turns),
+        layout.SOLIDS: records,
+        layout.SIZES: sizes_of(solids, turns),
         layout.CORNERS: np.concatenate(corners),
     }

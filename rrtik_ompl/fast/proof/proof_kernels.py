@@ -49,6 +49,7 @@ from rrtik_ompl.fast.proof.accessors import (
     vector_at,
     ways_of,
 )
+from rrtik_ompl.fast.proof.cloud_planes import cloud_apart
 from rrtik_ompl.fast.proof.frames import bound_bends, place_frames, seen_from
 from rrtik_ompl.fast.proof.layout import ProofTable
 from rrtik_ompl.fast.proof.planes import ball_gap, best_plane, beyond_half_space
@@ -56,6 +57,7 @@ from rrtik_ompl.fast.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.fast.simd.lanes import double_at, int_at, set_double, set_int
 
 EAGER = 0.9  # of a ball's radius: bodies that are nearer than the sagitta less this are split at once, not compared
+SHARE = 0.25  # of a ball's radius: up to this sagitta bodies are compared with the points of a cloud
 NARROW = 0.01  # width of an interval from which on they are compared nevertheless
 STILL = 2  # level at which what does not move is given up: by then groups of bodies have been taken apart
 PATIENT = 0.1  # width of an interval down to which whole bodies are kept together, if only the sagitta is in the way
@@ -113,6 +115,15 @@ def placed(table: ProofTable, pair: int, begin: int, end: int) -> Any:
 
 
 @kernel
+def from_cloud(
+    table: ProofTable, one: int, other: int, seen: int, places: Any, wanted: float, bend: float, width: float
+) -> int:
+    """By what a solid is proven apart from a cloud; not looked for where it bends away too far from its chord [m]."""
+    near = bend <= SHARE * size_at(table, one, layout.BALL_RADIUS) or width <= NARROW
+    return layout.BY_PLANE if near and cloud_apart(table, one, other, seen, places, wanted) else layout.OPEN
+
+
+@kernel
 def apart(table: ProofTable, pair: int, begin: int, end: int, width: float) -> int:
     """By what a pair is proven apart on an interval, whose ends' frames are given; ``OPEN`` (0) if it is not."""
     pairs, solids, ways = pairs_of(table), solids_of(table), ways_of(table)
@@ -130,8 +141,10 @@ def apart(table: ProofTable, pair: int, begin: int, end: int, width: float) -> i
     gap, way = ball_gap(table, one, other, seen, places)
     if gap > wanted:
         return layout.BY_BALL
-    if mine != layout.CONVEX_SOLID or others != layout.CONVEX_SOLID:
+    if mine != layout.CONVEX_SOLID or others == layout.WHOLE_BODY:
         return layout.OPEN
+    if others >= layout.CLOUD:
+        return from_cloud(table, one, other, seen, places, wanted, wanted - kept, width)
     if width > NARROW and wanted > kept and gap + EAGER * size_at(table, one, layout.BALL_RADIUS) <= wanted:
         return layout.OPEN
     last = vector_at(ways, 3 * pair)

@@ -118,6 +118,7 @@ planes_of: Callable[[layout.PrimitiveTable], layout.PlaneArray] = field_reader(l
 checked_of: Callable[[layout.PrimitiveTable], layout.IntArray] = field_reader(layout.CHECKED)
 excluding_of: Callable[[layout.PrimitiveTable], layout.IntArray] = field_reader(layout.EXCLUDING)
 own_of: Callable[[layout.PrimitiveTable], layout.IntArray] = field_reader(layout.OWN)
+clouds_of: Callable[[layout.PrimitiveTable], layout.CloudArray] = field_reader(layout.CLOUDS)
 head_of: Callable[[layout.PrimitiveTable, int], layout.PrimitiveHead] = member_reader(
     layout.NUMBERS, INT_BYTES * layout.HEAD_INTS
 )
@@ -136,6 +137,13 @@ shape_of: Callable[[layout.PrimitiveTable, int], layout.PrimitiveShape] = member
 )
 shapes_of: Callable[[layout.PrimitiveTable], layout.ShapeArray] = field_reader(layout.PRIMITIVES)
 shape_at: Callable[[layout.ShapeArray, int], layout.PrimitiveShape] = record_reader(FLOAT_BYTES * layout.SHAPE_FLOATS)
+
+# Numbers of the shapes of primitives that several modules read
+centre_of: Callable[[layout.PrimitiveShape], Vector] = vector_reader(layout.SHAPE_CENTRE)
+first_axis_of: Callable[[layout.PrimitiveShape], Vector] = vector_reader(layout.BOX_AXES)
+second_axis_of: Callable[[layout.PrimitiveShape], Vector] = vector_reader(layout.BOX_AXES + 3)
+third_axis_of: Callable[[layout.PrimitiveShape], Vector] = vector_reader(layout.BOX_AXES + 6)
+cloud_radius_of: Callable[[layout.PrimitiveShape], float] = float_reader(layout.CLOUD_RADIUS)
 
 # Solids
 span_of: Callable[[layout.SolidTable, int], layout.Span] = member_reader(layout.SPANS, INT_BYTES * layout.SPAN_INTS)

@@ -37,6 +37,7 @@ BallArray = NewType("BallArray", int)
 HeadArray = NewType("HeadArray", int)
 ShapeArray = NewType("ShapeArray", int)
 PlaneArray = NewType("PlaneArray", int)
+CloudArray = NewType("CloudArray", int)  # addresses of tables, int64
 GroupArray = NewType("GroupArray", int)
 PairGroupArray = NewType("PairGroupArray", int)
 PairArray = NewType("PairArray", int)
@@ -112,10 +113,11 @@ BOUND_BLOCKS, BOUNDS = range(2)
 # Primitives: what stands still. BOXES: BOX_RUNS of PADDED_COUNT floats · NUMBERS: the heads · PRIMITIVES: the
 # shapes · CHECKED: one int for each moving and standing body, 0 to ignore that pair ·
 # EXCLUDING: for each moving body whether it has a pair to ignore · OWN: for each standing body the primitive that has
-# its formula, or any of its balls, -1 if it has none
+# its formula, or any of its balls, -1 if it has none · CLOUDS: addresses of the tables of clouds
 PRIMITIVE_COUNT, PADDED_COUNT, BOXES, PRIMITIVES, NUMBERS, PLANES, STANDING_COUNT, CHECKED, EXCLUDING, OWN = range(10)
+CLOUDS = 10
 LOW_X, HIGH_X, LOW_Y, HIGH_Y, LOW_Z, HIGH_Z = BOX_RUNS = range(6)
-# Head of a primitive (ints): kind, number of its standing body, planes from, to.
+# Head of a primitive (ints): kind, number of its standing body, planes from, to (of a cloud: its number among these).
 HEAD_INTS = 4
 KIND, STANDING_BODY, FIRST_PLANE, END_PLANE = range(4)
 # Plane (floats): outward normal, offset.
@@ -123,7 +125,7 @@ PLANE_FLOATS = 4
 PLANE_NORMAL, PLANE_OFFSET = 0, 3
 
 # Kinds of primitives. A new one needs a branch in `meets_primitive` and `primitive_gap`, in kernels and in numpy.
-BALL, CAPSULE, BOX, CYLINDER, HALF_SPACE, CONVEX = KINDS = range(6)
+BALL, CAPSULE, BOX, CYLINDER, HALF_SPACE, CONVEX, CLOUD = KINDS = range(7)
 KIND_COUNT, CENTRED_KINDS = len(KINDS), 4  # the latter: so many, the first ones, have a centre
 # Shape of a primitive (floats): all but half-spaces and convex ones begin with their centre, a capsule with one end.
 SHAPE_FLOATS = 16
@@ -133,6 +135,7 @@ CAPSULE_AXIS, CAPSULE_INVERSE_SQUARE, CAPSULE_RADIUS = 3, 6, 7  # vector to the 
 BOX_AXES, BOX_HALF_SIZES = 3, 12
 CYLINDER_AXIS, CYLINDER_HALF_LENGTH, CYLINDER_RADIUS = 3, 6, 7
 HALF_SPACE_NORMAL, HALF_SPACE_OFFSET = 0, 3  # outward
+CLOUD_AXES, CLOUD_RADIUS = 3, 12  # a cloud's centre is the origin of its frame
 CONVEX_SHARE = 0  # 1 if a ball meets it that reaches behind all planes, 0 if the ball's centre must lie behind them
 
 # Solids of bodies, moving ones or those that stand still. CORNERS: blocks of WIDTH floats of x, of y, of z
@@ -144,6 +147,7 @@ SPAN_FRAME, AROUND_FIRST, AROUND_END, INSIDE_FIRST, INSIDE_END = range(5)
 SOLID_INTS = 4
 SOLID_KIND, FIRST_BLOCK, END_BLOCK, IS_INSIDE = range(4)
 UNKNOWN_SOLID, CONVEX_SOLID, HALF_SPACE_SOLID, MERE_CORNERS = range(4)  # the last: nothing between
+CLOUD_SOLID = 4  # stands for one point after the other, which a kernel puts into its corners
 # Sizes of a solid (doubles): radius of its disc (offset of a half-space), axis, radius of its ball, slack, bounding
 # ball (centre, radius).
 SIZE_COUNT = 10

@@ -49,10 +49,14 @@ def is_intact(array: NDArray[Any]) -> bool:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Table:
-    """Fields for the kernels, where they are, and the arrays whose addresses they hold, all by their places."""
+    """Fields for the kernels, where they are, and the arrays whose addresses they hold, all by their places.
+
+    ``parts`` are other tables, whose addresses an array holds.
+    """
 
     header: Header
     arrays: dict[int, NDArray[Any]]
+    parts: tuple[Table, ...] = ()
     address: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -63,17 +67,19 @@ class Table:
 
     def intact(self) -> bool:
         """Whether nothing has been written beyond an array or the fields."""
-        return all(is_intact(array) for array in (self.header, *self.arrays.values()))
+        own = all(is_intact(array) for array in (self.header, *self.arrays.values()))
+        return own and all(part.intact() for part in self.parts)
 
 
-def table(fields: Mapping[int, int | NDArray[Any]]) -> Table:
+def table(fields: Mapping[int, int | NDArray[Any]], parts: Sequence[Table] = ()) -> Table:
     """A table that lives long, from its fields; every place from 0 up has one: a number, or an array to copy.
 
-    Arrays are flat, begin on a multiple of ``ALIGNMENT`` bytes and stay where they are as long as the table lives.
+    Arrays are flat, begin on a multiple of ``ALIGNMENT`` bytes and stay where they are as long as the table lives, and
+    so do ``parts``, other tables whose addresses it holds.
     """
     arrays = {place: aligned(value) for place, value in fields.items() if isinstance(value, np.ndarray)}
     header = [arrays[place].ctypes.data if place in arrays else fields[place] for place in range(len(fields))]
-    return Table(aligned(np.array(header, dtype=np.int64)), arrays)
+    return Table(aligned(np.array(header, dtype=np.int64)), arrays, tuple(parts))
 
 
 def record(size: int, numbers: Mapping[int, float | NDArray[Any]]) -> NDArray[np.float64]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ from rrtik_ompl.fast.tables.layout import (
     BOX_RUNS,
     BOXES,
     CHECKED,
+    CLOUD,
+    CLOUDS,
     END_PLANE,
     EXCLUDING,
     FIRST_PLANE,
@@ -43,6 +46,8 @@ from rrtik_ompl.fast.tables.memory import Table, table
 LANE_PADDING = 16  # boxes are compared this many at a time, or half as many
 UNBOUNDED_COORDINATE = 1e30  # [m]
 
+Detail: TypeAlias = Matrix | Table | None
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Primitives:
@@ -53,7 +58,7 @@ class Primitives:
         kinds: Shape (n,).
         numbers: Shape (n, SHAPE_FLOATS).
         lows, highs: Their bounds in the world, shape (n, 3) each.
-        planes: Planes of each, shape (m, PLANE_FLOATS); None if it has none.
+        details: Of each its planes, shape (m, PLANE_FLOATS), or the table of its cloud; None if it has neither.
     """
 
     bodies: NDArray[np.int64]
@@ -61,7 +66,7 @@ class Primitives:
     numbers: Matrix
     lows: Matrix
     highs: Matrix
-    planes: tuple[Matrix | None, ...]
+    details: tuple[Detail, ...]
 
     def __len__(self) -> int:
         return len(self.kinds)
@@ -75,7 +80,7 @@ class Primitives:
             self.numbers[places],
             self.lows[places],
             self.highs[places],
-            tuple(self.planes[k] for k in places.tolist()),
+            tuple(self.details[k] for k in places.tolist()),
         )
 
 
@@ -88,7 +93,7 @@ def joined(parts: Sequence[Primitives]) -> Primitives:
         np.concatenate([np.zeros((0, SHAPE_FLOATS)), *(part.numbers for part in parts)]),
         np.concatenate([points, *(part.lows for part in parts)]),
         np.concatenate([points, *(part.highs for part in parts)]),
-        tuple(planes for part in parts for planes in part.planes),
+        tuple(detail for part in parts for detail in part.details),
     )
 
 
@@ -105,9 +110,12 @@ def primitive_table(primitives: Primitives, checked: NDArray[np.bool_]) -> Table
         raise InputError(f"primitives for kernels: unknown kind {unknown[0]}; have {KINDS.start} to {KINDS.stop - 1}")
     ordered = primitives.only(np.lexsort((primitives.bodies, primitives.kinds)))
     heads = np.zeros((len(ordered), HEAD_INTS), dtype=np.int32)
-    ends = np.cumsum([0, *(0 if planes is None else len(planes) for planes in ordered.planes)])
+    planes = [detail for detail in ordered.details if isinstance(detail, np.ndarray)]
+    clouds = [detail for detail in ordered.details if isinstance(detail, Table)]
+    ends = np.cumsum([0, *(len(each) if isinstance(each, np.ndarray) else 0 for each in ordered.details)])
     heads[:, KIND], heads[:, STANDING_BODY] = ordered.kinds, ordered.bodies
     heads[:, FIRST_PLANE], heads[:, END_PLANE] = ends[:-1], ends[1:]
+    heads[ordered.kinds == CLOUD, FIRST_PLANE] = np.arange(len(clouds))
     own = np.full(checked.shape[1], -1, dtype=np.int32)
     own[ordered.bodies] = np.arange(len(ordered))  # the last one of a body remains
     boxes = _bounding_boxes(ordered)
@@ -118,14 +126,14 @@ def primitive_table(primitives: Primitives, checked: NDArray[np.bool_]) -> Table
             BOXES: boxes,
             PRIMITIVES: ordered.numbers.astype(np.float32),
             NUMBERS: heads,
-            PLANES: np.concatenate(
-                [np.zeros((0, PLANE_FLOATS)), *(planes for planes in ordered.planes if planes is not None)]
-            ).astype(np.float32),
+            PLANES: np.concatenate([np.zeros((0, PLANE_FLOATS)), *planes]).astype(np.float32),
             STANDING_COUNT: checked.shape[1],
             CHECKED: checked.astype(np.int32),
             EXCLUDING: np.asarray((~checked).any(axis=1), dtype=np.int32),
             OWN: own,
-        }
+            CLOUDS: np.array([cloud.address for cloud in clouds], dtype=np.int64),
+        },
+        clouds,
     )
 
 

@@ -17,9 +17,11 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.cloud_solid import CloudSolid
 from rrtik_ompl.collision.shape_table import Core, core_of
 from rrtik_ompl.collision.solids import SameObject
 from rrtik_ompl.covers.planes import known_planes, outer_planes
+from rrtik_ompl.fast.tables.cloud_tables import cloud_table
 from rrtik_ompl.fast.tables.layout import (
     BALL,
     BALL_RADIUS,
@@ -30,6 +32,9 @@ from rrtik_ompl.fast.tables.layout import (
     CAPSULE_AXIS,
     CAPSULE_INVERSE_SQUARE,
     CAPSULE_RADIUS,
+    CLOUD,
+    CLOUD_AXES,
+    CLOUD_RADIUS,
     CONVEX,
     CONVEX_SHARE,
     CYLINDER,
@@ -45,7 +50,7 @@ from rrtik_ompl.fast.tables.layout import (
     SHAPE_FLOATS,
 )
 from rrtik_ompl.fast.tables.memory import record
-from rrtik_ompl.fast.tables.primitive_tables import UNBOUNDED_COORDINATE, Primitives, joined
+from rrtik_ompl.fast.tables.primitive_tables import UNBOUNDED_COORDINATE, Detail, Primitives, joined
 from rrtik_ompl.fast.tables.robot_tables import Spheres, usable_cover
 
 UNBOUNDED_LENGTH = 1e12  # [m] what is larger or farther away counts as being everywhere
@@ -76,14 +81,14 @@ def outer_primitives(
     made.kinds[endless], made.numbers[endless] = BALL, 0.0
     made.numbers[endless, BALL_RADIUS] = UNBOUNDED_LENGTH
     made.lows[endless], made.highs[endless] = -UNBOUNDED_LENGTH, UNBOUNDED_LENGTH
-    return replace(made, planes=tuple(None if e else p for e, p in zip(endless, made.planes, strict=True)))
+    return replace(made, details=tuple(None if e else d for e, d in zip(endless, made.details, strict=True)))
 
 
 def inner_primitives(bodies: Sequence[Body], inner: Sequence[Spheres]) -> Primitives:
     """Primitives that lie within the margins around standing bodies, or inside these."""
     margins = _kept(bodies)
     places = _by_formula(bodies)
-    rounded = [k for kind in (BALL, CAPSULE, HALF_SPACE) for k in places.get(kind, ())]
+    rounded = [k for kind in (BALL, CAPSULE, HALF_SPACE, CLOUD) for k in places.get(kind, ())]
     beside = np.zeros(len(bodies))
     beside[rounded] = margins[rounded]  # what has corners does not keep its kind when it grows
     rest = [(k, np.asarray(inner[k]).reshape(-1, 4)) for k in (*places.pop(None, ()), *places.get(CONVEX, ()))]
@@ -99,9 +104,9 @@ def _kept(bodies: Sequence[Body]) -> Vector:
 def _fits(primitives: Primitives) -> Mask:
     """The primitives whose numbers the kernels can square, shape (n,)."""
     fits: Mask = np.abs(primitives.numbers).max(axis=1, initial=0.0) < UNBOUNDED_LENGTH
-    for k, planes in enumerate(primitives.planes):
-        if planes is not None:
-            fits[k] &= bool(np.abs(planes).max() < UNBOUNDED_LENGTH)
+    for k, detail in enumerate(primitives.details):
+        if isinstance(detail, np.ndarray):
+            fits[k] &= bool(np.abs(detail).max() < UNBOUNDED_LENGTH)
     return fits
 
 
@@ -117,6 +122,8 @@ def _by_formula(bodies: Sequence[Body]) -> dict[int | None, list[int]]:
 def _formula(key: SameObject) -> int | None:
     """The kind of primitive that a coal geometry is, None if it is none."""
     solid = key.geometry
+    if isinstance(solid, CloudSolid):
+        return CLOUD
     if isinstance(solid, coal.ShapeBase) and solid.getSweptSphereRadius() != 0.0:
         return None
     if isinstance(solid, coal.Halfspace):
@@ -147,9 +154,8 @@ def _exact(
     made = []
     for kind, chosen in places.items():
         own = np.array(chosen, dtype=np.int64)
-        if kind in (HALF_SPACE, CONVEX):
-            build = _half_space if kind == HALF_SPACE else _convex
-            made += [build(bodies[k], k, grow, float(beside[k])) for k in chosen]
+        if kind in _BUILDERS:
+            made += [_BUILDERS[kind](bodies[k], k, grow, float(beside[k])) for k in chosen]
         elif kind is not None:
             poses = np.array([bodies[k].placement.homogeneous for k in chosen])
             cores = [cast(Core, core_of(bodies[k].geometry)) for k in chosen]
@@ -273,7 +279,22 @@ def _convex(body: Body, place: int, grow: float, inflation: float) -> Primitives
     return _single(CONVEX, place, numbers, low - inflation, high + inflation, world)
 
 
-def _single(kind: int, place: int, numbers: Vector, low: Vector, high: Vector, planes: Matrix | None) -> Primitives:
+def _cloud(body: Body, place: int, grow: float, inflation: float) -> Primitives:
+    """A cloud of points by the table of its tree; nothing is left of it if nothing is left of a point."""
+    solid = cast(CloudSolid, body.geometry)
+    (low, high), rotation, origin = solid.cloud.bounds, body.placement.rotation, body.placement.translation
+    centre, spread = rotation @ (0.5 * (low + high)) + origin, np.abs(rotation) @ (0.5 * (high - low))
+    slack = 3.0 * float(_slack(centre[None], np.abs(origin - centre).max(keepdims=True) + spread.max())[0])
+    radius, reach = solid.cloud.radius + grow * slack + inflation, spread + grow * slack + inflation + slack
+    numbers = record(SHAPE_FLOATS, {SHAPE_CENTRE: origin, CLOUD_AXES: rotation.T.ravel(), CLOUD_RADIUS: radius})
+    made = _single(CLOUD, place, numbers, centre - reach, centre + reach, cloud_table(solid))
+    return made.only(np.array([radius > 0.0]))
+
+
+_BUILDERS = {HALF_SPACE: _half_space, CONVEX: _convex, CLOUD: _cloud}
+
+
+def _single(kind: int, place: int, numbers: Vector, low: Vector, high: Vector, detail: Detail) -> Primitives:
     """One primitive, of the body at a place."""
     places, kinds = np.array([place], dtype=np.int64), np.array([kind], dtype=np.int64)
-    return Primitives(places, kinds, numbers[None], low[None], high[None], (planes,))
+    return Primitives(places, kinds, numbers[None], low[None], high[None], (detail,))

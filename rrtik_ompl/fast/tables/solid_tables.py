@@ -17,16 +17,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.collision.cloud_solid import CloudSolid
 from rrtik_ompl.collision.shape_table import core_of
 from rrtik_ompl.collision.solids import SameObject, is_mesh
 from rrtik_ompl.covers.cache import cached_convex_pieces
 from rrtik_ompl.fast.simd.processor import WIDTH
+from rrtik_ompl.fast.tables.cloud_layout import LEAF
 from rrtik_ompl.fast.tables.layout import (
     AROUND_END,
     AROUND_FIRST,
     AXIS,
     BOUND_CENTRE,
     BOUND_RADIUS,
+    CLOUD_SOLID,
     CONVEX_SOLID,
     CORNERS,
     DISC,
@@ -66,7 +69,7 @@ class ConvexSolid:
         axis: Unit vector, shape (3,).
         radius: Of the ball around every point of the core.
         slack: How far rounding may misplace its points [m].
-        kind: CONVEX_SOLID, HALF_SPACE_SOLID, UNKNOWN_SOLID, or MERE_CORNERS: points of a body.
+        kind: CONVEX_SOLID, HALF_SPACE_SOLID, UNKNOWN_SOLID, MERE_CORNERS: points of a body, or CLOUD_SOLID.
     """
 
     corners: Matrix
@@ -99,12 +102,22 @@ def convex_solids(geometry: Any) -> Solids:
 
 @lru_cache(maxsize=1024)
 def _convex_solids(key: SameObject) -> Solids:
+    if isinstance(key.geometry, CloudSolid):
+        return _cloud(key.geometry)
     if is_mesh(key.geometry):
         around, inside, points = cached_convex_pieces(key.geometry)
         held = (*map(ConvexSolid, inside), *(ConvexSolid(p, kind=MERE_CORNERS) for p in points))
         return Solids(tuple(ConvexSolid(p, inside=False) for p in around), held)
     own = _own_solid(key.geometry)
     return NO_SOLIDS if own is None else Solids((own,), (own,))
+
+
+def _cloud(solid: CloudSolid) -> Solids:
+    """What has room for as many points of a cloud as a kernel compares at once; until then the corners of its box."""
+    low, high = solid.cloud.tree.bounds
+    corners = np.where(np.indices((2, 2, 2)).reshape(3, -1).T == 0, low, high).astype(np.float64)
+    every = ConvexSolid(np.tile(corners, (LEAF // len(corners), 1)), radius=solid.cloud.radius, kind=CLOUD_SOLID)
+    return Solids((every,), (every,))
 
 
 def _own_solid(solid: Any) -> ConvexSolid | None:

@@ -14,12 +14,20 @@ from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.collision.shape_table import shape_of
 from rrtik_ompl.collision.solids import is_mesh
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.shapes import Box, Cylinder, HalfSpace, Mesh, Shape, Sphere
+from rrtik_ompl.shapes import Box, Cylinder, HalfSpace, Mesh, PointCloud, Shape, Sphere
 from rrtik_ompl.shapes.surfaces import Faces
-from rrtik_ompl.viewer.drawing.objects import BoxGeometry, CylinderGeometry, Geometry, SphereGeometry, TriangleGeometry
+from rrtik_ompl.viewer.drawing.objects import (
+    BoxGeometry,
+    CylinderGeometry,
+    Geometry,
+    PointGeometry,
+    SphereGeometry,
+    TriangleGeometry,
+)
 from rrtik_ompl.viewer.drawing.triangles import box_corners, split_creases, thin_out, tube
 
 MAX_OBSTACLE_TRIANGLES = 30_000  # a drawn mesh above this is thinned out; the one that is checked stays as it is
+MOST_POINTS = 1_000_000  # drawn of a cloud; a page has 16 bytes for each
 BEAD = 0.9  # radius of the bead that stands for a robot that is a mere point, in thicknesses of a line
 _Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # three.js has its cylinders along y
 
@@ -132,6 +140,11 @@ def _frame_along(normal: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([x, np.cross(normal, x), normal], 1)
 
 
+def _points(cloud: PointCloud) -> PointGeometry:
+    """Points of a cloud, of a very large one some of them."""
+    return PointGeometry(cloud.points[:: -(-len(cloud.points) // MOST_POINTS)], cloud.radius)
+
+
 # What three.js draws by itself, smoother and in fewer bytes than triangles.
 OWN_LOOKS: dict[type[Shape], Callable[[Any], Look]] = {
     Sphere: lambda ball: _primitive(SphereGeometry(ball.radius), np.eye(4), np.full(3, ball.radius)),
@@ -141,4 +154,5 @@ OWN_LOOKS: dict[type[Shape], Callable[[Any], Look]] = {
         [solid.radius, solid.radius, 0.5 * solid.length],
     ),
     Box: lambda box: _primitive(BoxGeometry(tuple(box.size.tolist())), np.eye(4), 0.5 * box.size),
+    PointCloud: lambda cloud: Look(_points(cloud), np.eye(4), box_corners(np.stack(cloud.bounds))),
 }

@@ -78,6 +78,18 @@ class TriangleGeometry:
         return {"type": "BufferGeometry", "data": {"attributes": {"position": position}, "index": index}}
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class PointGeometry:
+    """Points, shape (n, 3) [m], each drawn as a square as wide as its ball."""
+
+    points: NDArray[np.float32]
+    radius: float
+
+    def described(self) -> dict[str, Any]:
+        """Its kind and points."""
+        return {"type": "BufferGeometry", "data": {"attributes": {"position": _packed(self.points, FLOATS)}}}
+
+
 def _packed(rows: NDArray[Any], kind: tuple[str, int]) -> dict[str, Any]:
     name, number = kind
     return {"itemSize": 3, "type": name, "array": umsgpack.Ext(number, rows.tobytes()), "normalized": False}
@@ -113,9 +125,13 @@ class Material:
 def described_object(path: str, geometry: Geometry, material: Material) -> dict[str, Any]:
     """A solid with its material; all parts are named after its path, so that the same picture gives the same bytes."""
     names = {part: f"{path}/{part}" for part in ("geometry", "material")}
+    kind, look = "Mesh", material.described()
+    if isinstance(geometry, PointGeometry):
+        seen = {name: look[name] for name in ("color", "opacity", "transparent")}
+        kind, look = "Points", {"type": "PointsMaterial", "size": 2.0 * geometry.radius, **seen}
     return {
         "metadata": {"version": 4.5, "type": "Object"},
         "geometries": [{"uuid": names["geometry"], **geometry.described()}],
-        "materials": [{"uuid": names["material"], **material.described()}],
-        "object": {"uuid": f"{path}/object", "type": "Mesh", **names, "matrix": IDENTITY},
+        "materials": [{"uuid": names["material"], **look}],
+        "object": {"uuid": f"{path}/object", "type": kind, **names, "matrix": IDENTITY},
     }

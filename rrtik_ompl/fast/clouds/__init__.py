@@ -1,0 +1,1 @@
+"""Clouds of points in kernels: the tree that they walk, and which of its points are near."""

@@ -1,0 +1,108 @@
+"""Files of points -> `shapes.PointCloud`, and back."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import positive
+from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.files.pcd import pcd_points
+from rrtik_ompl.files.ply import ply_points
+from rrtik_ompl.files.point_records import records, text_rows
+from rrtik_ompl.files.text import file_name, read_bytes, write_bytes
+from rrtik_ompl.shapes import PointCloud
+from rrtik_ompl.shapes.point_cloud import RADIUS, Invalid
+
+MAX_BYTES = 1024 * 1024 * 1024
+PLY_HEADER = "ply\nformat binary_little_endian 1.0\nelement vertex {}\n" + "".join(
+    f"property float {axis}\n" for axis in "xyz"
+)
+
+
+def load_cloud(
+    path: str | os.PathLike[str], radius: float = RADIUS, *, scale: float = 1.0, invalid: Invalid = "refuse"
+) -> PointCloud:
+    """Read a cloud of points: ``.npy`` (an array of shape (n, 3)), ``.ply``, ``.pcd``, or ``.xyz`` (rows of numbers).
+
+    Args:
+        path: The file.
+        radius: Of the ball that each point is [m].
+        scale: Metres per unit of the file; 0.001 for millimetres.
+        invalid: Whether points that are not finite are refused or dropped.
+
+    Raises:
+        InputError: If the file cannot be read, is broken, or holds no point that can be used; one line.
+
+    Warns:
+        CloudWarning: If the cloud is so wide that it is rather in millimetres.
+
+    Example:
+        >>> cloud = load_cloud("scan.ply", radius=0.01).voxel(0.01)  # doctest: +SKIP
+    """
+    file_name(path)
+    factor = positive(scale, f"{path}: scale")
+    suffix = Path(path).suffix.lower()
+    if suffix not in _READERS:
+        raise InputError(f"{path}: unknown kind of cloud; have {', '.join(_READERS)}; export it as PLY")
+    points = _READERS[suffix](read_bytes(path, MAX_BYTES), str(path))
+    if factor != 1.0:
+        points = points * factor
+    return PointCloud(points, radius, invalid=invalid, source=os.path.abspath(path), scale=factor)
+
+
+def save_cloud(cloud: PointCloud, path: str | os.PathLike[str]) -> PointCloud:
+    """Write the points of a cloud as ``.npy`` or ``.ply``, whole or not at all.
+
+    Returns:
+        The cloud as that file has it, so that a scene with it can be written.
+
+    Raises:
+        InputError: If the name ends otherwise, or the file cannot be written.
+    """
+    require(cloud, PointCloud, "cloud to save")
+    suffix = file_name(path).suffix.lower()
+    if suffix == ".npy":
+        stream = io.BytesIO()
+        np.save(stream, cloud.points)
+        data = stream.getvalue()
+    elif suffix == ".ply":
+        data = (PLY_HEADER.format(len(cloud.points)) + "end_header\n").encode() + cloud.points.astype("<f4").tobytes()
+    else:
+        raise InputError(f"{path}: a cloud is written as .npy or .ply")
+    write_bytes(path, data)
+    return PointCloud(cloud.points, cloud.radius, source=os.path.abspath(path))
+
+
+def _npy_points(data: bytes, what: str) -> NDArray[Any]:
+    stream = io.BytesIO(data)
+    try:
+        version = np.lib.format.read_magic(stream)
+        read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
+        shape, columnwise, kind = read(stream)
+    except (ValueError, KeyError) as error:
+        raise InputError(f"{what}: not a .npy file of numpy: {str(error).splitlines()[0]}") from None
+    if kind.kind not in "fiu" or len(shape) != 2 or shape[1] != 3:
+        raise InputError(f"{what}: expected numbers of shape (any, 3), got {kind} of shape {shape}")
+    rows = records(data, stream.tell(), np.dtype((kind, (3,))), shape[0], what)
+    if not columnwise:
+        return rows
+    return records(data, stream.tell(), kind, 3 * shape[0], what).reshape(3, -1).T
+
+
+def _xyz_points(data: bytes, what: str) -> NDArray[Any]:
+    return text_rows(data, (0, 1, 2), what)
+
+
+_READERS: dict[str, Callable[[bytes, str], NDArray[Any]]] = {
+    ".npy": _npy_points,
+    ".ply": ply_points,
+    ".pcd": pcd_points,
+    ".xyz": _xyz_points,
+}

@@ -1,0 +1,70 @@
+"""Depth pictures -> clouds of points."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import not_negative, positive, whole_number
+from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.poses import rigid
+from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.shapes import PointCloud
+from rrtik_ompl.shapes.point_cloud import RADIUS
+
+
+def cloud_from_depth(
+    depth: ArrayLike,
+    camera: Camera,
+    pose: ArrayLike | pin.SE3 | None = None,
+    *,
+    radius: float = RADIUS,
+    scale: float = 1.0,
+    nearest: float = 0.05,
+    farthest: float = 10.0,
+    every: int = 1,
+) -> PointCloud:
+    """A cloud from a depth picture: a point for each pixel that has a depth.
+
+    Args:
+        depth: Shape (height, width), along the camera's axis; what is not finite, or not between ``nearest`` and
+            ``farthest``, was not seen.
+        camera: Its intrinsics, as :func:`rrtik_ompl.sensing.cameras.camera_file.load_camera` reads them.
+        pose: T_world_camera (x right, y down, z away from it); the camera's own frame if None.
+        radius: Of the ball that each point is [m].
+        scale: Metres per unit of the picture; 0.001 for millimetres.
+        nearest: See above [m].
+        farthest: See above [m].
+        every: Take every so many-th pixel along both axes.
+
+    Raises:
+        InputError: If the picture has another size than the camera's, a number makes no sense, or no pixel is left.
+
+    Example:
+        >>> import numpy as np
+        >>> camera = Camera([[100.0, 0.0, 1.0], [0.0, 100.0, 1.0], [0.0, 0.0, 1.0]], 3, 3)
+        >>> cloud_from_depth(np.full((3, 3), 2.0), camera).points[0].tolist()
+        [-0.019999999552965164, -0.019999999552965164, 2.0]
+    """
+    require(camera, Camera, "camera", "use load_camera(file)")
+    try:
+        picture = np.asarray(depth, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError("depth picture: expected numbers") from error
+    if picture.shape != (camera.height, camera.width):
+        size = f"{camera.height} rows of {camera.width}"
+        raise InputError(f"depth picture: the camera has {size} pixels, got an array of shape {picture.shape}")
+    step, low = whole_number(every, "every", 1), not_negative(nearest, "nearest")
+    z = positive(scale, "scale") * picture[::step, ::step]
+    seen = np.isfinite(z) & (z >= low) & (z <= positive(farthest, "farthest")) & (z > 0.0)
+    if not seen.any():
+        raise InputError(f"depth picture: no pixel has a depth between {low:g} and {farthest:g} m; check its scale")
+    row, column = np.nonzero(seen)
+    away = z[row, column]
+    flat = camera.rays(step * np.column_stack([column, row]).astype(np.float64))
+    points = np.column_stack([flat * away[:, None], away])
+    if pose is not None:
+        place = rigid(pose, "pose of the camera")
+        points = points @ place.rotation.T + place.translation
+    return PointCloud(points, radius)

@@ -1,0 +1,80 @@
+"""The arm's own body in what its sensors see: points on it are no obstacles."""
+
+from __future__ import annotations
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import Mask, Matrix, not_negative
+from rrtik_ompl.collision.bodies import Body, link_bodies, scene_bodies
+from rrtik_ompl.collision.cloud_solid import cloud_gap, cloud_solid
+from rrtik_ompl.errors import require
+from rrtik_ompl.poses import rigid
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import Scene
+from rrtik_ompl.shapes import PointCloud
+from rrtik_ompl.world.arm_cache import arm_cache
+
+
+def without_robot(
+    cloud: PointCloud,
+    robot: Robot,
+    q: ArrayLike,
+    margin: float = 0.02,
+    *,
+    pose: ArrayLike | pin.SE3 | None = None,
+    scene: Scene | None = None,
+) -> PointCloud:
+    """A cloud without the points that are on the arm, or on what it holds.
+
+    Args:
+        cloud: What was seen.
+        robot: The arm.
+        q: Where it was when that was seen, shape (dof,).
+        margin: Points whose balls are no farther from a link than this are left out [m]: what the sensor, its place and
+            the joints' angles may be wrong by.
+        pose: T_world_cloud; that of the world if None.
+        scene: Whose attached objects are part of the arm.
+
+    Raises:
+        InputError: If q is no configuration of the robot, the margin is negative, or no point is left.
+
+    Example:
+        >>> import rrtik_ompl as rrtik
+        >>> robot = rrtik.load_robot("titan4")
+        >>> q = [0.1] * 6
+        >>> seen = rrtik.PointCloud([robot.fk(q).translation, [9.0, 0.0, 0.0]], radius=0.01)
+        >>> rrtik.without_robot(seen, robot, q)
+        PointCloud(1 points, radius=0.01 m)
+    """
+    require(cloud, PointCloud, "cloud")
+    require(robot, Robot, "robot", "use load_robot(name or file)")
+    kept, place = not_negative(margin, "margin"), pin.SE3.Identity() if pose is None else rigid(pose, "pose of a cloud")
+    frames = robot.joint_frames(robot.configuration(q)[None])[0]
+    held = [] if scene is None else [body for body in scene_bodies(robot, scene) if body.kind == "attached"]
+    bodies = (*link_bodies(robot), *held)
+    outside = np.ones(len(cloud.points), dtype=bool)
+    for body, (balls, _) in zip(bodies, arm_cache(robot).covers_of(bodies), strict=True):
+        from_body = (pin.SE3(frames[body.joint]) * body.placement).actInv(place)
+        outside &= ~_on_body(cloud, from_body, body, balls, kept + body.padding)
+    return cloud.only(outside, "without_robot")
+
+
+def _on_body(cloud: PointCloud, from_body: pin.SE3, body: Body, balls: Matrix, margin: float) -> Mask:
+    """Which points of a cloud, whose pose is seen from a body, are on it, shape (n,)."""
+    found = np.zeros(len(cloud.points), dtype=bool)
+    box, reach = body.geometry.aabb_local, margin + cloud.radius
+    points = cloud.points.astype(np.float64) @ from_body.rotation.T + from_body.translation
+    inside = (points >= np.array(box.min_) - reach) & (points <= np.array(box.max_) + reach)
+    near = np.flatnonzero(inside.all(axis=1))
+    found[near] = len(balls) == 0  # what stands still and has a formula has no cover
+    for ball in balls:
+        close = np.linalg.norm(points[near] - ball[:3], axis=1) <= ball[3] + reach
+        found[near[close]] = True
+    here = coal.Transform3s()
+    for k in np.flatnonzero(found).tolist():
+        one = cloud_solid(PointCloud(points[k : k + 1], cloud.radius))
+        found[k] = cloud_gap((body.geometry, here, one, here), margin) is None
+    return found

@@ -1,0 +1,58 @@
+"""The arm's own points are left out of a cloud, and no others."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.collision.bodies import link_bodies
+from rrtik_ompl.collision.solids import is_mesh, mesh_arrays
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.shapes import PointCloud
+from rrtik_ompl.world import World
+
+
+def skin(robot, q, rng, count=15):
+    """Corners of the links at a configuration, in the world."""
+    frames, found = robot.joint_frames(np.array(q)[None])[0], []
+    for body in link_bodies(robot):
+        if is_mesh(body.geometry):
+            corners = mesh_arrays(body.geometry)[0]
+        elif hasattr(body.geometry, "points"):
+            corners = np.array(body.geometry.points()).reshape(-1, 3)
+        else:
+            corners = np.array(body.geometry.aabb_center)[None]
+        pose = pin.SE3(frames[body.joint]) * body.placement
+        some = corners[rng.integers(len(corners), size=count)]
+        found.append(some @ pose.rotation.T + pose.translation)
+    return np.concatenate(found)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur5", "titan4"])
+def test_points_on_the_links_go_and_all_others_stay(name):
+    robot, rng = rrtik.load_robot(name), np.random.default_rng(3)
+    q = robot.clamp(np.full(robot.dof, 0.2))
+    own, around = skin(robot, q, rng), rng.uniform(-1.5, 1.5, (300, 3))
+    place = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(size=3))
+    seen = (np.concatenate([own, around]) - place.translation) @ place.rotation
+    left = rrtik.without_robot(PointCloud(seen, 0.005), robot, q, 0.01, pose=place)
+    kept = {tuple(point) for point in left.points.tolist()}
+    given = PointCloud(seen, 0.005).points
+    assert not any(tuple(point) in kept for point in given[: len(own)].tolist())
+    bodies = World(robot)
+    for k, point in enumerate(given[len(own) :].tolist()):
+        alone = rrtik.Obstacle("p", PointCloud([point], 0.005), place, margin=0.01)
+        world = bodies.with_scene(rrtik.Scene([alone]))
+        touching = any("p" in (c.first, c.second) for c in world.contacts(q))
+        if touching:  # a base that stands still keeps no margin, so that this is no more than one way
+            assert tuple(point) not in kept, k
+    assert len(left.points) > 200
+
+
+def test_bad_input_is_one_line():
+    robot = rrtik.load_robot("planar3")
+    cloud = PointCloud([[0.5, 0.0, 0.0]], 0.01)
+    with pytest.raises(InputError, match="none of the 1 points is left"):
+        rrtik.without_robot(cloud, robot, np.zeros(3), 0.5)
+    with pytest.raises(InputError, match="margin must not be negative"):
+        rrtik.without_robot(cloud, robot, np.zeros(3), -0.5)
