@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
@@ -146,7 +147,8 @@ class AttachedObject:
         for name in self.allow:
             name_of(name, f"what '{self.name}' may touch")
         if not self.shape.movable:
-            raise InputError(f"a {type(self.shape).__name__} cannot be attached to a link: '{self.name}'")
+            kind = re.sub("(?<=[a-z])(?=[A-Z])", "-", type(self.shape).__name__).lower()
+            raise InputError(f"a {kind} cannot be attached to a link: '{self.name}'")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

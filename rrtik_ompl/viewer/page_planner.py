@@ -14,6 +14,7 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.shape_table import core_of
+from rrtik_ompl.collision.solids import SameObject
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast.ik import ik_layout
@@ -26,6 +27,7 @@ from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.fast.tables import layout
 from rrtik_ompl.fast.tables.primitive_tables import UNBOUNDED_COORDINATE
 from rrtik_ompl.fast.tables.scene_tables import SLACK_PER_METRE as PRIMITIVE_SLACK
+from rrtik_ompl.fast.tables.scene_tables import primitive_kind
 from rrtik_ompl.fast.tables.scratch import probe_table
 from rrtik_ompl.fast.tables.solid_tables import SLACK_PER_METRE as SOLID_SLACK
 from rrtik_ompl.fast.tables.solid_tables import convex_solids
@@ -204,10 +206,11 @@ def _packed_shape(body: Body) -> dict[str, Any] | None:
     core = None if body.kind != "obstacle" else core_of(body.geometry)
     if core is None or len(convex_solids(body.geometry).around) != 1:
         return None
-    kinds = {1: layout.BALL, 2: layout.CAPSULE if core.disc is None else layout.CYLINDER}
-    half = core.half_sides
+    kind, half = primitive_kind(SameObject(body.geometry)), core.half_sides
+    if kind is None or kind >= layout.CENTRED_KINDS:
+        return None
     return {
-        "kind": layout.BOX if half is not None else kinds[len(core.corners)],
+        "kind": kind,
         "half": [] if half is None else half.tolist(),
         "length": core.half_length,
         "disc": core.disc or 0.0,

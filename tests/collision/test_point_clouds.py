@@ -13,8 +13,9 @@ from rrtik_ompl.collision.shape_table import pieces
 from rrtik_ompl.collision.solids import bvh, measured
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast import COLLIDING, FREE
+from rrtik_ompl.fast.tables import cloud_layout
 from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
-from rrtik_ompl.shapes import Mesh, PointCloud, Sphere
+from rrtik_ompl.shapes import Mesh, PointCloud, Sphere, point_tree
 from rrtik_ompl.world import World
 from rrtik_ompl.world.moving_world import MovingWorld
 
@@ -195,3 +196,7 @@ def test_no_certificate_is_written_of_a_scene_with_a_cloud():
     world = World(robot, Scene([Obstacle("scan", PointCloud([[9.0, 9.0, 9.0]], 0.1))]))
     with pytest.raises(InputError, match="'scan' is a cloud"):
         certificate_of(world, rrtik.JointPath.of(robot, [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]))
+
+
+def test_kernels_have_the_blocks_of_the_tree():
+    assert cloud_layout.LEAF == point_tree.LEAF

@@ -60,7 +60,7 @@ PLANE_SLACK = 1e-5  # [m] for planes that stand for a few others with almost the
 
 def needs_covers(body: Body) -> tuple[bool, bool]:
     """Whether a body needs outer and inner spheres: what stands still and has a formula can do without."""
-    kind = None if body.joint > 0 else _formula(SameObject(body.geometry))
+    kind = None if body.joint > 0 else primitive_kind(SameObject(body.geometry))
     return kind is None, kind in (None, CONVEX)
 
 
@@ -72,7 +72,7 @@ def outer_primitives(
     They contain every point that is no farther from its body than its margin, padding and ``inflation`` [m].
     """
     beside = _kept(bodies) + (0.0 if inflation is None else np.asarray(inflation))
-    places = _by_formula(bodies)
+    places = _byprimitive_kind(bodies)
     rest = [(k, usable_cover(bodies[k].geometry, covers[k])) for k in places.pop(None, ())]
     made = joined([*_exact(bodies, places, 1.0, beside), _balls(bodies, rest, 1.0, beside)])
     endless = ~_fits(made)
@@ -87,7 +87,7 @@ def outer_primitives(
 def inner_primitives(bodies: Sequence[Body], inner: Sequence[Spheres]) -> Primitives:
     """Primitives that lie within the margins around standing bodies, or inside these."""
     margins = _kept(bodies)
-    places = _by_formula(bodies)
+    places = _byprimitive_kind(bodies)
     rounded = [k for kind in (BALL, CAPSULE, HALF_SPACE, CLOUD) for k in places.get(kind, ())]
     beside = np.zeros(len(bodies))
     beside[rounded] = margins[rounded]  # what has corners does not keep its kind when it grows
@@ -110,17 +110,17 @@ def _fits(primitives: Primitives) -> Mask:
     return fits
 
 
-def _by_formula(bodies: Sequence[Body]) -> dict[int | None, list[int]]:
+def _byprimitive_kind(bodies: Sequence[Body]) -> dict[int | None, list[int]]:
     """Places of the bodies by their kinds of primitive, None for those without a formula."""
     found: dict[int | None, list[int]] = {}
     for k, body in enumerate(bodies):
-        found.setdefault(_formula(SameObject(body.geometry)), []).append(k)
+        found.setdefault(primitive_kind(SameObject(body.geometry)), []).append(k)
     return found
 
 
 @lru_cache(maxsize=4096)
-def _formula(key: SameObject) -> int | None:
-    """The kind of primitive that a coal geometry is, None if it is none."""
+def primitive_kind(key: SameObject) -> int | None:
+    """The kind of primitive, of the layout's, that a coal geometry is; None if it is none."""
     solid = key.geometry
     if isinstance(solid, CloudSolid):
         return CLOUD

@@ -231,7 +231,8 @@ def test_warming_up_makes_all_kernels(cached, capsys):
     before = cached.read_bytes()
     cached.unlink()
     assert run(["warmup"]) == 0
-    assert capsys.readouterr().out.splitlines() == [f"{name}: ready" for name in code_files.kernel_modules()]
+    ready = [*(f"{name}: ready" for name in code_files.kernel_modules()), "pages that plan: ready"]
+    assert capsys.readouterr().out.splitlines() == ready
     assert described(cached.read_bytes()) == described(before)
     assert library._kept(KERNELS) is not None
 
