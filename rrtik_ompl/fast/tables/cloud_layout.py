@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NewType
 
-LEAF = 16  # points of a block, boxes of a group: those of the tree; kernels import nothing from outside, so a test compares
+LEAF = 16  # points of a block, boxes of a group, as in the tree: kernels import nothing from there, so a test compares
 
 CloudTable = NewType("CloudTable", int)
 BoxGroups = NewType("BoxGroups", int)
