@@ -51,6 +51,8 @@ class Raiser(Bad):
         raise ValueError("no idea")
 """
 
+RAISING = 1 + BAD_PLANNERS.splitlines().index('        raise ValueError("no idea")')
+
 
 def command(*arguments, **options):
     """`rrtik` in a process of its own."""
@@ -82,7 +84,8 @@ def test_planners_that_crash_hang_quit_or_eat_the_memory_do_not_end_a_campaign(t
     process = command("bench", suite, "--out", tmp_path / "out", "--views", 0, "--jobs", 2, env=env)
     said, errors = process.communicate(timeout=120)
     assert (process.returncode, errors) == (1, "")  # for one of them never did anything but raise
-    assert "planar3_a, raiser: 1 x error: ValueError: no idea" in said.splitlines()
+    broken = f"planner Raiser broke: ValueError: no idea (bad_planners.py, line {RAISING})"
+    assert f"planar3_a, raiser: 1 x error: {broken}" in said.splitlines()
     outcomes = {
         record["planner"]: (record["status"], record["reason"]) for record in read_records(tmp_path / "out" / NAME)
     }
@@ -90,7 +93,7 @@ def test_planners_that_crash_hang_quit_or_eat_the_memory_do_not_end_a_campaign(t
     assert outcomes["quitter"] == ("crash", "exit code 3: these are my last words")
     assert outcomes["hanger"] == ("hang", "killed after 2 s")
     assert outcomes["eater"][0] == "out of memory"
-    assert outcomes["raiser"] == ("error", "ValueError: no idea")
+    assert outcomes["raiser"] == ("error", broken)
     assert outcomes["bicrdt"] == ("solved", "")
     assert "crash: SIGSEGV" in (tmp_path / "out" / "summary.md").read_text()
 

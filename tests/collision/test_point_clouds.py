@@ -180,7 +180,7 @@ def test_a_cloud_that_is_moved_is_where_it_is_now():
 
 
 def test_a_link_cannot_hold_a_cloud():
-    with pytest.raises(InputError, match="PointCloud cannot be attached"):
+    with pytest.raises(InputError, match="point-cloud cannot be attached"):
         AttachedObject("c", "tool", PointCloud([[0.0, 0.0, 0.0]], 0.1))
 
 
