@@ -151,11 +151,11 @@ def _named(name: str) -> Iterator[None]:
     """Whatever leaves the code of a planner, C++'s exceptions or those of a file of anybody, in one line with its name.
 
     Raises:
-        PlannerError: If anything does but an error of ours and Ctrl-C.
+        PlannerError: If anything does but an error of ours, a lack of memory and Ctrl-C.
     """
     try:
         yield
-    except RrtikError:
+    except (RrtikError, MemoryError):  # a campaign has a status of its own for the latter
         raise
     except (Exception, SystemExit) as error:
         at = traceback.extract_tb(error.__traceback__)[-1]
