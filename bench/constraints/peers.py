@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -22,6 +20,7 @@ from bench.peers.description import task_of
 from bench.peers.host import Host
 from bench.peers.task import Region, Rows
 from rrtik_ompl.constraints.held_region import ANYWHERE
+from rrtik_ompl.ompl_bridge.attempt import quiet
 from rrtik_ompl.ompl_bridge.region_constraint import RegionConstraint
 from rrtik_ompl.problem import Problem
 
@@ -87,7 +86,7 @@ def _seen(problem: Problem, rows: Rows | None, seconds: float, failed: str) -> O
 def projected(problem: Problem, seed: int) -> tuple[Rows | None, float]:
     """RRTConnect in OMPL's ProjectedStateSpace, motions checked in our world; path, shape (k, dof), and time [s]."""
     robot, world = problem.robot, problem.world.unheld  # type: ignore[attr-defined]
-    with _quiet():
+    with quiet():
         ou.RNG.setSeed(seed + 1)
         begin = time.process_time()
         ambient, bounds = ob.RealVectorStateSpace(robot.dof), ob.RealVectorBounds(robot.dof)
@@ -145,13 +144,3 @@ def absent(python: str) -> str:
 def versions(python: str) -> str:
     """Of roboplan and what it stands on."""
     return _host(python).versions
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    level = ou.getLogLevel()
-    ou.setLogLevel(ou.LogLevel.LOG_NONE)
-    try:
-        yield
-    finally:
-        ou.setLogLevel(level)
