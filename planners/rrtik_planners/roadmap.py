@@ -8,17 +8,15 @@ from typing import ClassVar
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix, whole_number
+from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.collision.digests import world_digest
 from rrtik_ompl.errors import InputError, PlannerError, require
 from rrtik_ompl.fast.search import connect_layout
 from rrtik_ompl.fast.search.roadmap.graph import KernelGraph
 from rrtik_ompl.fast.search.roadmap.layout import KERNELS
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
-from rrtik_ompl.search.roadmap import NEAR, Graph, Roadmap, load_roadmap
-from rrtik_ompl.search.roadmap_in_python import PythonGraph
+from rrtik_ompl.search.roadmap import NEAR, Graph, Roadmap, checked_near, graph_in, load_roadmap
 from rrtik_ompl.world import World
-from rrtik_ompl.world.motion_queries import has_kernels, is_conservative
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
 
 FIRST_VERTICES = 100  # of a roadmap that is made for one query
@@ -56,9 +54,7 @@ class RoadmapPlanner(SafePlanner):
         """
         super().__init__(si, "RoadmapPlanner", world=world, seed=seed)
         require(roadmap, Roadmap | str | os.PathLike | None, "roadmap", "use Roadmap(world), or the file of one")
-        self.near = whole_number(near, "near")
-        if not 1 <= self.near <= 100:
-            raise InputError(f"near must be from 1 to 100, got {near}")
+        self.near = checked_near(near)
         self.roadmap = None if roadmap is None else _roadmap_in(world, roadmap)
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
@@ -92,19 +88,10 @@ class RoadmapPlanner(SafePlanner):
         return rows, int(planner.statistics["checked_motions"])
 
     def _new_graph(self, checker: MotionChecker, ptc: Stop) -> Graph:
-        graph = self._empty_graph(checker)
+        seed = int(self.rng.integers(2**31))
+        graph = graph_in(self._world, *self.bounds(), near=self.near, seed=seed, checks=checker)
         graph.grow(FIRST_VERTICES, ptc)
         return graph
-
-    def _empty_graph(self, checker: MotionChecker) -> Graph:
-        lower, upper = self.bounds()
-        seed, world = int(self.rng.integers(2**31)), self._world
-        if not has_kernels(world, KERNELS):
-            free, motion_free = checker.valid, checker.motion_valid
-            return PythonGraph(lower, upper, near=self.near, seed=seed, valid=free, motion_free=motion_free)
-        ask = None if is_conservative(world) else checker.motion_valid_batch
-        lower, upper = np.maximum(lower, world.robot.lower), np.minimum(upper, world.robot.upper)
-        return KernelGraph(world.motions, lower, upper, near=self.near, seed=seed, ask=ask)
 
 
 def _without_repeats(path: Matrix) -> Matrix:

@@ -23,7 +23,7 @@ from rrtik_ompl.problem import usable_configurations
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.search.roadmap_in_python import PythonGraph
 from rrtik_ompl.world import World
-from rrtik_ompl.world.motion_queries import Stop, has_kernels, is_conservative
+from rrtik_ompl.world.motion_queries import MotionQueries, Stop, has_kernels, is_conservative
 
 VERTICES = 2000
 NEAR = 10
@@ -71,11 +71,24 @@ class Graph(Protocol):
         """Counts."""
 
 
-def graph_in(world: World, lower: Vector, upper: Vector, *, near: int, seed: int) -> Graph:
-    """An empty roadmap in a world: in kernels where it has some."""
+def checked_near(near: object) -> int:
+    """With how many of the vertices near it a new one is joined.
+
+    Raises:
+        InputError: If it is none of 1 to 100.
+    """
+    if not 1 <= (count := whole_number(near, "near")) <= 100:
+        raise InputError(f"near must be from 1 to 100, got {near}")
+    return count
+
+
+def graph_in(
+    world: MotionQueries | None, lower: Vector, upper: Vector, *, near: int, seed: int, checks: MotionQueries
+) -> Graph:
+    """An empty roadmap in a box of a world: in kernels where it has some; ``checks`` answers what these do not."""
     if not has_kernels(world, KERNELS):
-        return PythonGraph(lower, upper, near=near, seed=seed, valid=world.valid, motion_free=world.motion_valid)
-    ask = None if is_conservative(world) else world.motion_valid_batch
+        return PythonGraph(lower, upper, near=near, seed=seed, valid=checks.valid, motion_free=checks.motion_valid)
+    ask = None if is_conservative(world) else checks.motion_valid_batch
     lower, upper = np.maximum(lower, world.robot.lower), np.minimum(upper, world.robot.upper)
     return KernelGraph(world.motions, lower, upper, near=near, seed=seed, ask=ask)
 
@@ -115,10 +128,9 @@ class Roadmap:
         require(world, World, "world of a roadmap", "use World(robot, scene)")
         if not 0 <= whole_number(vertices, "vertices") <= MOST_VERTICES:
             raise InputError(f"vertices must be {MOST_VERTICES} or less, got {vertices}")
-        if not 1 <= whole_number(near, "near") <= 100:
-            raise InputError(f"near must be from 1 to 100, got {near}")
-        self.world, self.seed, self.near = world, whole_number(seed, "seed"), near
-        self.graph = graph_in(world, *_box(world.robot), near=near, seed=self.seed)
+        self.near = checked_near(near)
+        self.world, self.seed = world, whole_number(seed, "seed")
+        self.graph = graph_in(world, *_box(world.robot), near=near, seed=self.seed, checks=world)
         self.grow(vertices)
 
     def __repr__(self) -> str:
@@ -260,7 +272,7 @@ def _restored(
 ) -> Roadmap:
     """A roadmap from what another one had; what it adds later begins with other samples."""
     made = Roadmap(world, vertices=0, seed=seed, near=near)
-    made.graph = graph_in(world, *_box(world.robot), near=near, seed=seed + len(rows))
+    made.graph = graph_in(world, *_box(world.robot), near=near, seed=seed + len(rows), checks=world)
     made.graph.restore(rows, edges, states)
     return made
 
