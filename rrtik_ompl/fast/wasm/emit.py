@@ -70,51 +70,13 @@ def sections(module: bytes) -> Iterator[tuple[int, bytes]]:
     """The sections of a WebAssembly module: the kind of each, and its bytes with their head."""
     begin = HEAD_BYTES
     while begin < len(module):
-        size, inside = _number(module, begin + 1)
+        size, inside = leb128(module, begin + 1)
         yield module[begin], module[begin : inside + size]
         begin = inside + size
 
 
-def names_of(module: bytes, kind: int) -> list[str]:
-    """Names in the import (kind 2, fields alone) or export section (kind 7) of a module."""
-    found: list[str] = []
-    for section, data in sections(module):
-        if section != kind:
-            continue
-        _, at = _number(data, 1)
-        count, at = _number(data, at)
-        for _ in range(count):
-            if kind == IMPORTS:
-                _, at = _text(data, at)
-            name, at = _text(data, at)
-            found.append(name)
-            at = _behind_import(data, at) if kind == IMPORTS else _number(data, at + 1)[1]
-    return found
-
-
-IMPORTS, EXPORTS = 2, 7
-_FUNCTION, _TABLE, _MEMORY, _GLOBAL = range(4)
-
-
-def _behind_import(data: bytes, at: int) -> int:
-    kind = data[at]
-    if kind == _FUNCTION:
-        return _number(data, at + 1)[1]
-    if kind == _GLOBAL:
-        return at + 3
-    at += 1 if kind == _MEMORY else 2  # a table begins with the kind of its elements
-    limited, at = data[at], at + 1
-    _, at = _number(data, at)
-    return _number(data, at)[1] if limited & 1 else at
-
-
-def _text(data: bytes, at: int) -> tuple[str, int]:
-    size, at = _number(data, at)
-    return data[at : at + size].decode(), at + size
-
-
-def _number(data: Any, at: int) -> tuple[int, int]:
-    """A whole number, seven bits a byte, and the place behind it."""
+def leb128(data: Any, at: int) -> tuple[int, int]:
+    """A whole number, seven bits a byte (LEB128), and the place behind it."""
     value = shift = 0
     while True:
         byte = data[at]

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from functools import cache
-from hashlib import sha256
 from pathlib import Path
 
-from rrtik_ompl.fast.simd.code_files import FOLDER, Code, read_code, sources_digest, write_code
+from rrtik_ompl.fast.simd.code_files import FOLDER, Code, file_name, read_code, sources_digest, write_code
 from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.files.cache import cache_folder, nobody_else_s
 from rrtik_ompl.files.notice import tell_once
@@ -60,7 +59,7 @@ def page_kernels() -> bytes | None:
     if packaged is not None:
         return packaged.code
     folder = cache_folder("kernels")
-    file = None if folder is None else folder / f"page-{sha256(key.encode()).hexdigest()[:24]}.wasm"
+    file = None if folder is None else folder / file_name("page", key)
     kept = read_code(file, key) if file is not None and nobody_else_s(file) else None
     if kept is not None:
         return kept.code

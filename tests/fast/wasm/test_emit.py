@@ -2,10 +2,46 @@
 
 import pytest
 
-from rrtik_ompl.fast.wasm.emit import EXPORTS, IMPORTS, names_of, sections
+from rrtik_ompl.fast.wasm.emit import leb128, sections
 from rrtik_ompl.fast.wasm.page_kernels import LIBRARIES, page_kernels
 
 pytestmark = pytest.mark.kernels
+IMPORTS, EXPORTS = 2, 7  # kinds of sections
+FUNCTION, TABLE, MEMORY, GLOBAL = range(4)  # kinds of imports
+
+
+def names_of(module, kind):
+    """Names in the import (kind 2, fields alone) or export section (kind 7) of a module."""
+    found = []
+    for section, data in sections(module):
+        if section != kind:
+            continue
+        _, at = leb128(data, 1)
+        count, at = leb128(data, at)
+        for _ in range(count):
+            if kind == IMPORTS:
+                _, at = text(data, at)
+            name, at = text(data, at)
+            found.append(name)
+            at = behind_import(data, at) if kind == IMPORTS else leb128(data, at + 1)[1]
+    return found
+
+
+def behind_import(data, at):
+    kind = data[at]
+    if kind == FUNCTION:
+        return leb128(data, at + 1)[1]
+    if kind == GLOBAL:
+        return at + 3
+    at += 1 if kind == MEMORY else 2  # a table begins with the kind of its elements
+    limited, at = data[at], at + 1
+    _, at = leb128(data, at)
+    return leb128(data, at)[1] if limited & 1 else at
+
+
+def text(data, at):
+    size, at = leb128(data, at)
+    return data[at : at + size].decode(), at + size
 
 
 def test_the_module_exports_every_entry_and_imports_what_a_page_gives():
