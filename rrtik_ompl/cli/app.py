@@ -142,7 +142,10 @@ def show(
         view(question, route, html=html, before=earlier, still=still)
         say(f"wrote {html}")
         return FOUND
-    ready = lambda url: say(f"open {url} in a browser; Ctrl-C ends")  # noqa: E731
+
+    def ready(url: str) -> None:
+        say(f"open {url} in a browser; Ctrl-C ends")
+
     view(question, route, before=earlier, port=port, still=still, on_ready=ready)
     return FOUND
 

@@ -21,7 +21,7 @@ from rrtik_ompl.fast.ik import ik_layout
 from rrtik_ompl.fast.search import connect_layout, shortcut_layout, tree_layout
 from rrtik_ompl.fast.search.connect import ConnectSearch
 from rrtik_ompl.fast.search.motions import motion_layout
-from rrtik_ompl.fast.search.motions.motion_table import NO_LIMIT, FastMotions
+from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.fast.search.shortcut import ShortcutSearch
 from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.fast.tables import layout
@@ -106,7 +106,6 @@ def page_planner(problem: Problem, goal: Vector, side: float) -> dict[str, Any] 
         "dof": problem.robot.dof,
         "lower": lower.tolist(),
         "upper": upper.tolist(),
-        "limit": NO_LIMIT,
         "samples": SAMPLES,
         "tries": TRIES,
         "far": UNBOUNDED_COORDINATE,

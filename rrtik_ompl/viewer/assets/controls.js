@@ -195,8 +195,7 @@ function download(name, text) {
 
 function pathText() {
   const rows = story.waypoints;
-  const length = rows.slice(1).reduce((sum, row, k) => sum + Math.hypot(...row.map((value, j) => value - rows[k][j])), 0);
-  return JSON.stringify({ ...planning.path, length, transitions: rows.length - 1, waypoints: rows }, null, 1);
+  return JSON.stringify({ ...planning.path, length: lengthOf(rows), transitions: rows.length - 1, waypoints: rows }, null, 1);
 }
 
 /** The problem as it is now; JSON is YAML too. */

@@ -6,7 +6,7 @@ const CLEARANCE_SAMPLES = 200;
 const UNDO_STEPS = 200;
 const ENDS = { start: "start ghost", goal: "goal ghost" };
 let kernels = null;
-let state = null;  // { start, goal, seed, obstacles: [{ pose, half, radius, length, disc, shown }] }
+let state = null;  // { start, goal, seed, obstacles: [{ pose, shown }] }
 let shortening = 0;  // number of the path that is being made shorter
 const past = [];
 
@@ -32,8 +32,7 @@ function moveDrawing(k) {
   const { pose, shown } = state.obstacles[k];
   const obstacle = planning.obstacles[k];
   const group = node("obstacles", obstacle.node);
-  const drawnAt = obstacle.spare ? new THREE.Matrix4() : new THREE.Matrix4().multiplyMatrices(rowMajor(obstacle.first).invert(), group.matrix);
-  obstacle.drawn ??= drawnAt;
+  obstacle.drawn ??= obstacle.spare ? new THREE.Matrix4() : rowMajor(obstacle.first).invert().multiply(group.matrix);
   new THREE.Matrix4().multiplyMatrices(rowMajor(pose), obstacle.drawn).decompose(group.position, group.quaternion, new THREE.Vector3());
   group.updateMatrix();
   group.visible = shown;
@@ -48,6 +47,8 @@ function pathTimes(rows) {
   const scale = whole > 0 ? Math.min(Math.max(whole, planning.seconds[0]), planning.seconds[1]) / whole : 1;
   return times.map((time) => time * scale);
 }
+
+const lengthOf = (rows) => rows.slice(1).reduce((sum, row, k) => sum + Math.hypot(...row.map((value, j) => value - rows[k][j])), 0);
 
 function drawTrail(rows) {
   const trail = new THREE.Group();
@@ -142,11 +143,10 @@ function shortenOn(searched, number) {
 
 function finish(rows, searched) {
   replacePath(rows);
-  const length = rows.slice(1).reduce((sum, row, k) => sum + Math.hypot(...row.map((value, j) => value - rows[k][j])), 0);
   let least = Infinity;
   for (let s = 0; s <= CLEARANCE_SAMPLES; s += 1) {
     least = Math.min(least, kernels.nearest(postureAt((story.times[story.times.length - 1] * s) / CLEARANCE_SAMPLES)).metres);
   }
   const near = least === Infinity ? "" : `, at least ${Math.max(1000 * least, 1000 * planning.clearance).toFixed(1)} mm clear`;
-  planStatus(`${count(rows.length - 1, "move")}, length ${length.toFixed(2)}${near}; found in ${searched.toFixed(1)} ms`);
+  planStatus(`${count(rows.length - 1, "move")}, length ${lengthOf(rows).toFixed(2)}${near}; found in ${searched.toFixed(1)} ms`);
 }
