@@ -29,6 +29,13 @@ class RrtikError(Exception):
     """Root of every error raised on purpose by the toolkit.
 
     Its text is always a single line fit for a person: the file, the field, what was found, the remedy.
+
+    Example:
+        >>> try:
+        ...     rrtik.load_problem("no_such_problem")
+        ... except rrtik.RrtikError as error:
+        ...     print(type(error).__name__)
+        UnknownNameError
     """
 
     def __init__(self, message: str) -> None:
@@ -39,7 +46,13 @@ class RrtikError(Exception):
 
 
 class InputError(RrtikError):
-    """A file, an argument or a value given by the user cannot be used."""
+    """A file, an argument or a value given by the user cannot be used.
+
+    Example:
+        >>> rrtik.Box([0.1, -0.2, 0.3])
+        Traceback (most recent call last):
+        rrtik_ompl.errors.InputError: box size must be three numbers greater than 0, got [0.1, -0.2, 0.3]
+    """
 
 
 class MissingFileError(InputError):
@@ -52,6 +65,11 @@ class UnknownNameError(InputError):
     Attributes:
         name: The name that was asked for.
         alternatives: The names that exist, sorted.
+
+    Example:
+        >>> rrtik.load_robot("pnada")
+        Traceback (most recent call last):
+        rrtik_ompl.errors.UnknownNameError: no robot 'pnada'; ... did you mean 'panda'?
     """
 
     def __init__(self, kind: str, name: object, alternatives: Iterable[str], *, where: str = "") -> None:
@@ -71,6 +89,13 @@ class ProblemError(RrtikError):
     Attributes:
         contacts: Pairs of names in collision, empty if the reason is another one.
         part: What is wrong with it: "start" or "goal".
+
+    Example:
+        >>> ball = rrtik.Obstacle("ball", rrtik.Sphere(0.5), [1.0, 0.0, 0.0])
+        >>> world = rrtik.World(rrtik.load_robot("planar3"), rrtik.Scene([ball]))
+        >>> rrtik.Problem(world, np.zeros(3), [1.5, 0.0, 0.0])
+        Traceback (most recent call last):
+        rrtik_ompl.errors.ProblemError: start is in collision...
     """
 
     def __init__(self, message: str, contacts: Iterable[tuple[str, str]] = (), *, part: str = "start") -> None:
@@ -84,7 +109,12 @@ def in_file(path: object, error: InputError) -> InputError:
 
 
 class PlannerError(RrtikError):
-    """A planner broke (as opposed to not finding a path, which is data: see ``Plan.reason``)."""
+    """A planner broke (as opposed to not finding a path, which is data: see ``Plan.reason``).
+
+    Example:
+        >>> issubclass(rrtik.PlannerError, rrtik.RrtikError)
+        True
+    """
 
 
 def require(value: object, kind: type | UnionType, what: str, remedy: str = "") -> None:

@@ -24,6 +24,10 @@ def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), quat_xyzw: ArrayLike = IDENTITY_QUATE
 
     Raises:
         InputError: If a number is not finite, or the quaternion's length differs from 1 by more than 1e-3.
+
+    Example:
+        >>> rrtik.pose([0.1, 0.2, 0.3], [0.0, 0.0, 1.0, 0.0]).translation
+        array([0.1, 0.2, 0.3])
     """
     position = bounded_array(xyz, (3,), f"{what}: xyz")
     quaternion = finite_array(quat_xyzw, (4,), f"{what}: quat_xyzw")

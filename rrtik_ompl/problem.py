@@ -50,6 +50,11 @@ class Problem:
             region of a constraint; pair, margin, joint, limit, or constraint and amount are named.
         InputError: If start or goal has the wrong number of joints or is not finite.
         UnknownNameError: If there is no posture of a name.
+
+    Example:
+        >>> world = rrtik.World(rrtik.load_robot("panda"))
+        >>> rrtik.Problem(world, "default", rrtik.PositionGoal([0.3, 0.5, 0.4])).start.shape
+        (7,)
     """
 
     def __init__(

@@ -65,6 +65,13 @@ class TaskRegion(WithinTolerances):
         frame: What has to be there in place of the tip, for path constraints: a link or an attached object.
         from_start: Whether ``T_world_w`` is the frame of the region as seen from the constrained frame at the start of
             a path; a :class:`rrtik_ompl.Problem` makes a region of the world of it.
+
+    Example:
+        >>> bounds = np.zeros((6, 2))
+        >>> bounds[5] = -np.pi, np.pi  # the tool may turn about the z axis of the region
+        >>> drill = rrtik.TaskRegion(rrtik.pose([0.4, 0.2, 0.3], [1.0, 0.0, 0.0, 0.0]), bounds)
+        >>> rrtik.solve_ik(rrtik.load_robot("ur5"), drill).found
+        True
     """
 
     T_world_w: Any

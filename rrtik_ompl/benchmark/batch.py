@@ -53,6 +53,10 @@ def plan_batch(
     Raises:
         UnknownNameError: If there is no such problem, planner, parameter or method of shortening.
         InputError: If a number makes no sense, a file is not there, or the scheduler cannot be used.
+
+    Example:
+        >>> [row["status"] for row in rrtik.plan_batch(["planar3_boxes", "titan4_prisms"], "bicrdt", seed=1)]
+        ['solved', 'solved']
     """
     if isinstance(problems, str | os.PathLike) or not isinstance(problems, Iterable):
         raise InputError(f"problems must be a list of names or files, got {problems!r:.80}")

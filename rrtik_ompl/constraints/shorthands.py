@@ -36,8 +36,10 @@ def upright(robot: Robot, axis: FrameAxis = "z", *, tolerance_deg: float = 5.0, 
     Example:
         >>> import rrtik_ompl as rrtik
         >>> robot = rrtik.load_robot("ur5")
-        >>> start, goal = robot.configuration([0, -1.5, 1.5, 0, 0, 0]), robot.configuration([1, -1.5, 1.5, 0, 0, 0])
+        >>> start, goal = [0.0, -1.5, 1.5, -1.57, -1.57, 0.0], [1.0, -1.5, 1.5, -1.57, -1.57, 0.0]
         >>> problem = rrtik.Problem(rrtik.World(robot), start, goal, constraints=[rrtik.upright(robot)])
+        >>> rrtik.plan(problem, seed=1).found
+        True
     """
     require(robot, Robot, "robot of a path constraint", "use load_robot(name)")
     require(axis, str, "upright: axis")
@@ -111,7 +113,8 @@ def orientation_of(pose: Any, tolerances_deg: ArrayLike = 1.0, *, frame: str | N
         InputError: If the pose is none, or a tolerance is negative or too large.
 
     Example:
-        >>> level = rrtik.orientation_of(robot.fk(start), 2.0)
+        >>> robot = rrtik.load_robot("ur5")
+        >>> level = rrtik.orientation_of(robot.fk([0.0, -1.5, 1.5, -1.57, -1.57, 0.0]), 2.0)
     """
     number_rows(tolerances_deg, "orientation_of: tolerances_deg")
     bounds = _anywhere()

@@ -65,6 +65,11 @@ def save_cloud(cloud: PointCloud, path: str | os.PathLike[str]) -> PointCloud:
 
     Raises:
         InputError: If the name ends otherwise, or the file cannot be written.
+
+    Example:
+        >>> cloud = rrtik.PointCloud(np.eye(3), radius=0.01)
+        >>> rrtik.save_cloud(cloud, "scan.ply").points.shape
+        (3, 3)
     """
     require(cloud, PointCloud, "cloud to save")
     suffix = file_name(path).suffix.lower()

@@ -42,6 +42,9 @@ def load_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
 
     Warns:
         MeshWarning: If the surface is not closed (or not manifold): it is then treated as a surface, not as a solid.
+
+    Example:
+        >>> rrtik.load_mesh("part.stl", scale=0.001)  # a file in millimetres  # doctest: +SKIP
     """
     file_name(path)
     factor = positive(scale, f"{path}: scale")

@@ -32,6 +32,13 @@ class Followed:
         place: How far it came, of the trajectory's own time [s].
         seconds: How long it took [s].
         late: By how much the motion was put off for set points that came late, on top of that [s].
+
+    Example:
+        >>> path = rrtik.JointPath([[0.0, 0.0, 0.0], [0.05, 0.0, 0.0]])
+        >>> motion = rrtik.time_parameterize(path, rrtik.RateLimits(2.0, 20.0))
+        >>> arm = rrtik.SimulatedLink(rrtik.load_robot("planar3"), np.zeros(3))
+        >>> rrtik.Follower(motion, arm).run().arrived
+        True
     """
 
     arrived: bool

@@ -13,7 +13,13 @@ from rrtik_ompl.robot import Robot
 
 @runtime_checkable
 class RobotLink(Protocol):
-    """An arm that takes set points of its joints at a control rate."""
+    """An arm that takes set points of its joints at a control rate.
+
+    Example:
+        >>> arm = rrtik.SimulatedLink(rrtik.load_robot("planar3"), np.zeros(3))
+        >>> isinstance(arm, rrtik.RobotLink)
+        True
+    """
 
     def positions(self) -> Vector:
         """Joint values now, shape (n,) [rad or m]."""
@@ -27,6 +33,13 @@ class SimulatedLink:
 
     Attributes:
         sent: Times and set points so far.
+
+    Example:
+        >>> path = rrtik.JointPath([[0.0, 0.0, 0.0], [0.05, 0.0, 0.0]])
+        >>> motion = rrtik.time_parameterize(path, rrtik.RateLimits(2.0, 20.0))
+        >>> arm = rrtik.SimulatedLink(rrtik.load_robot("planar3"), np.zeros(3))
+        >>> rrtik.Follower(motion, arm).run().arrived
+        True
     """
 
     def __init__(self, robot: Robot, start: ArrayLike) -> None:

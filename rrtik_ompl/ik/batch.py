@@ -35,6 +35,12 @@ class IkBatch:
         residuals: Distance [m] and angle [rad] by forward kinematics, shape (m, 2); NaN where there is none.
         reasons: Why there is none, "" where there is one: see `IkResult`.
         details: The same in lines: by how much, which joint, what touches.
+
+    Example:
+        >>> robot = rrtik.load_robot("ur5")
+        >>> poses = robot.fk_batch(np.full((3, 6), 0.4) + np.linspace(0.0, 0.2, 3)[:, None])
+        >>> rrtik.solve_ik_batch(robot, poses).found
+        array([ True,  True,  True])
     """
 
     q: Matrix
@@ -70,6 +76,12 @@ def solve_ik_batch(
     Raises:
         UnknownNameError: If there is no such method.
         InputError: If a pose is none, the method does not fit the robot, or an argument makes no sense.
+
+    Example:
+        >>> robot = rrtik.load_robot("panda")
+        >>> rows = robot.posture("default") + np.linspace(0.0, 0.3, 50)[:, None]
+        >>> rrtik.solve_ik_batch(robot, robot.fk_batch(rows)).q.shape
+        (50, 7)
     """
     check_world(world, robot)
     load_kernels(robot)

@@ -36,6 +36,11 @@ class MoveRules:
     Raises:
         InputError: If a number is out of range.
         UnknownNameError: If there is no joint of a name.
+
+    Example:
+        >>> rules = rrtik.MoveRules(["base", "elbow", "wrist"], last_joints=["wrist"], joint_costs=[3.0, 2.0, 1.0])
+        >>> list(rules.last_joints)
+        [2]
     """
 
     def __init__(

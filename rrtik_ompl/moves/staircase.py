@@ -56,6 +56,12 @@ def one_joint_moves(
     Raises:
         InputError: If the path is not valid, or comes so close to something that no staircase passes there; if an end
             of the path cannot keep the clearance.
+
+    Example:
+        >>> problem = rrtik.load_problem("titan4_prisms")
+        >>> path = rrtik.plan(problem, "fastrrtconnect", seed=1).path
+        >>> rrtik.one_joint_moves(path, problem).one_joint_at_a_time
+        True
     """
     world = problem.world if isinstance(problem, Problem) else problem
     require(path, JointPath, "path to convert", "a plan has one if plan.found")

@@ -25,6 +25,10 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
     Three planners of OMPL need one goal that is not Python's: give them :meth:`states`. PRM and PRMstar sample goals
     in a second thread, which waits for the interpreter for ever, as the first one holds it while it waits for the
     second. AORRTC takes a second goal for a path of no length and gives up.
+
+    Example:
+        >>> problem = rrtik.load_problem("titan4_sdu")
+        >>> sampler = rrtik.GoalSampler(problem, seed=1)  # an OMPL goal, for ProblemDefinition.setGoal
     """
 
     def __init__(

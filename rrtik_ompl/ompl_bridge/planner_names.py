@@ -16,7 +16,12 @@ _OMPL_PREFIX, _MOVEIT_SUFFIX = "geometric::", "kConfigDefault"  # as in ompl_pla
 
 
 def list_planners() -> tuple[str, ...]:
-    """Names of all planners: "auto", ours and those of other packages in lower case, OMPL's as OMPL writes them."""
+    """Names of all planners: "auto", ours and those of other packages in lower case, OMPL's as OMPL writes them.
+
+    Example:
+        >>> rrtik.list_planners()[:3]
+        ('auto', 'bicrdt', 'cbirrt')
+    """
     return (AUTO, *catalog.list_planners(), *sorted(ompl_planners()))
 
 

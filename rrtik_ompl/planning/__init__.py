@@ -94,6 +94,11 @@ def plan(
         InputError: If a number or a parameter makes no sense, start or goal cannot keep the clearance, or the objective
             is "time" and the robot has no velocity limits.
         PlannerError: If the planner broke.
+
+    Example:
+        >>> problem = rrtik.load_problem("titan4_sdu")
+        >>> rrtik.plan(problem, "fewest-moves", seed=1).path.transitions
+        6
     """
     require(problem, Problem, "problem to plan", "use Problem(world, start, goal) or load_problem(name)")
     planner = (problem.planner or AUTO) if planner is None else planner

@@ -50,6 +50,11 @@ class Plan:
             that describe the path (``path_statistics`` of the planner's class) are the last attempt's. With
             ``improve=`` also the course of the length.
         member: Of a goal set, the number of the member that the path reaches, from 0; None for other goals.
+
+    Example:
+        >>> plan = rrtik.plan(rrtik.load_problem("planar3_boxes"), seed=1)
+        >>> plan.found, plan.proven, plan.path.violations(rrtik.load_problem("planar3_boxes").world)
+        (True, True, ())
     """
 
     found: bool

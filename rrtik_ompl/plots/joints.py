@@ -44,6 +44,9 @@ def plot_joints(
     Raises:
         InputError: If the ending is another one, the file cannot be written, ``motion`` is something else, or the
             limits are for another number of joints.
+
+    Example:
+        >>> rrtik.plot_joints(rrtik.JointPath([[0.0, 0.2], [1.0, 0.5]]), "joints.svg")
     """
     known_ending(file, FORMATS, "plot")
     require(motion, Trajectory | JointPath, "motion to plot")

@@ -68,6 +68,11 @@ def load_problem(name_or_file: FilePath, *, robot: Robot | FilePath | None = Non
     Raises:
         InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
         ProblemError: If start or goal is in collision or outside the limits.
+
+    Example:
+        >>> problem = rrtik.load_problem("titan4_sdu")
+        >>> problem.planner, problem.robot.dof
+        ('bicrdt', 6)
     """
     path = problem_path(name_or_file)
     document = _read(path)
@@ -108,6 +113,11 @@ def save_problem(problem: Problem, path: FilePath) -> None:
 
     Raises:
         InputError: If the file cannot be written, or the format has no words for something in the problem.
+
+    Example:
+        >>> rrtik.save_problem(rrtik.load_problem("planar3_boxes"), "boxes.yaml")
+        >>> rrtik.load_problem("boxes.yaml").world.scene.names == rrtik.load_problem("planar3_boxes").world.scene.names
+        True
     """
     require(problem, Problem, "problem to save")
     write_yaml(path, problem_data(problem, file_name(path).parent))

@@ -163,6 +163,11 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
 
     Raises:
         InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
+
+    Example:
+        >>> rrtik.save_scene(rrtik.Scene([rrtik.Obstacle("post", rrtik.Box([0.1, 0.1, 1.0]))]), "scene.yaml")
+        >>> rrtik.load_scene("scene.yaml")
+        Scene(post)
     """
     document = read_yaml(path)
     return parse(document, SceneFile).scene.build(document)
@@ -173,6 +178,11 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
 
     Raises:
         InputError: If the file cannot be written, or a mesh does not come from a file.
+
+    Example:
+        >>> rrtik.save_scene(rrtik.Scene(), "empty.yaml")
+        >>> print(open("empty.yaml").read().splitlines()[0])
+        version: 1
     """
     require(scene, Scene, "scene to save")
     write_yaml(path, {"version": 1, "scene": scene_data(scene, file_name(path).parent)})

@@ -32,6 +32,11 @@ class ReachMap:
         values: Shape (x, y, z), 0 where no sample came.
         samples: Postures that counted.
         base: Where the arm's base is, shape (3,) [m].
+
+    Example:
+        >>> reach = rrtik.reach_map(rrtik.load_robot("planar3"), samples=2000, seed=1)
+        >>> reach.measure, reach.values.ndim
+        ('orientations', 3)
     """
 
     robot: str
@@ -150,6 +155,11 @@ def load_reach_map(path: str | os.PathLike[str]) -> ReachMap:
 
     Raises:
         InputError: If the file cannot be used.
+
+    Example:
+        >>> rrtik.reach_map(rrtik.load_robot("planar3"), samples=2000, seed=1).save("reach.npz")
+        >>> rrtik.load_reach_map("reach.npz").robot
+        'planar3'
     """
     if known_ending(path, FORMATS, "map of reach") != ".npz":
         raise InputError(f"{path}: only .npz holds a whole map; a .csv cannot be read back")

@@ -55,6 +55,11 @@ def reach_map(
     Raises:
         UnknownNameError: If there is no such measure.
         InputError: If an argument makes no sense, or the grid would be too large.
+
+    Example:
+        >>> reach = rrtik.reach_map(rrtik.load_robot("planar3"), samples=2000, seed=1)
+        >>> reach.measure, reach.values.ndim
+        ('orientations', 3)
     """
     check_world(world, robot)
     if measure not in MEASURES:

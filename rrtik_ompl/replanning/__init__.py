@@ -75,6 +75,12 @@ def replan(  # noqa: D417 - the settings are described in one place
         InputError: If a number is out of range, times go backwards, an obstacle begins in contact with the robot, or
             no configuration reaches the goal.
         UnknownNameError: If there is no planner of that name.
+
+    Example:
+        >>> scenario = rrtik.load_scenario("replan_walls")
+        >>> run = rrtik.replan(scenario.problem, step=0.05, rate=20.0, seconds=2.0, seed=1)
+        >>> run.problem
+        'replan_walls'
     """
     refuse_renamed(renamed)
     settings = ReplanSettings(

@@ -70,6 +70,12 @@ class ReplanRun:
         ticks: One after the other.
         outcome: One of ``OUTCOMES``.
         reason: Why the robot has not arrived, or "".
+
+    Example:
+        >>> scenario = rrtik.load_scenario("replan_walls")
+        >>> rrtik.replan(scenario.problem, step=0.05, rate=20.0, seconds=1.0, seed=1).save("run.json")
+        >>> rrtik.load_run("run.json").seed
+        1
     """
 
     problem: str
@@ -167,6 +173,12 @@ def load_run(path: str | os.PathLike[str]) -> ReplanRun:
 
     Raises:
         InputError: If the file is missing or malformed; the message names it.
+
+    Example:
+        >>> scenario = rrtik.load_scenario("replan_walls")
+        >>> rrtik.replan(scenario.problem, step=0.05, rate=20.0, seconds=1.0, seed=1).save("run.json")
+        >>> rrtik.load_run("run.json").seed
+        1
     """
     try:
         document = json_object(read_text(path, MAX_RECORD_BYTES), KIND, "ticks")

@@ -30,6 +30,11 @@ class Scenario:
         problem: Robot, scene with its motions, start and goal.
         settings: Steps, ticks, distances and limits.
         goal_feed: A goal that moves, or None.
+
+    Example:
+        >>> scenario = rrtik.load_scenario("replan_planar_arm")
+        >>> scenario.problem.robot.dof > 1
+        True
     """
 
     problem: Problem
@@ -64,6 +69,10 @@ def load_scenario(name_or_file: str | os.PathLike[str]) -> Scenario:
     Raises:
         InputError: If the file cannot be used or has no such section; one line with file, key and remedy.
         ProblemError: If start or goal is in collision or outside the limits.
+
+    Example:
+        >>> rrtik.load_scenario("replan_ur5").problem.robot.name
+        'ur5'
     """
     path = problem_path(name_or_file)
     document = read_yaml(path)

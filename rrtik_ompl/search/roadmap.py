@@ -242,6 +242,12 @@ def load_roadmap(path: str | os.PathLike[str], world: World, *, moved: bool = Fa
 
     Raises:
         InputError: If the file cannot be used or is of another world.
+
+    Example:
+        >>> world = rrtik.World(rrtik.load_robot("planar3"))
+        >>> rrtik.Roadmap(world, seed=1).save("map.npz")
+        >>> rrtik.load_roadmap("map.npz", world).world is world
+        True
     """
     known_ending(path, (".npz",), "file of a roadmap")
     require(world, World, "world of a roadmap", "use World(robot, scene)")

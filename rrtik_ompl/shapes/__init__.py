@@ -43,7 +43,12 @@ MOST_SEGMENTS = 2_000  # half a million vertices
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Box(Shape):
-    """A box centred on its frame. ``size``: full side lengths, shape (3,), metres."""
+    """A box centred on its frame. ``size``: full side lengths, shape (3,), metres.
+
+    Example:
+        >>> rrtik.Box([0.1, 0.2, 0.3]).size
+        array([0.1, 0.2, 0.3])
+    """
 
     key = "box"
     measures = (Measure("size", "three lengths", "full side lengths [m]"),)
@@ -80,7 +85,12 @@ class Box(Shape):
 
 @dataclass(frozen=True, slots=True)
 class Sphere(Shape):
-    """A ball centred on its frame. ``radius`` in metres."""
+    """A ball centred on its frame. ``radius`` in metres.
+
+    Example:
+        >>> rrtik.Sphere(0.1).radius
+        0.1
+    """
 
     key = "sphere"
     measures = (Measure("radius", text="radius [m]"),)
@@ -110,7 +120,12 @@ class Sphere(Shape):
 
 @dataclass(frozen=True, slots=True)
 class Cylinder(Shape):
-    """A cylinder along z, centred on its frame. ``radius`` and full ``length`` in metres."""
+    """A cylinder along z, centred on its frame. ``radius`` and full ``length`` in metres.
+
+    Example:
+        >>> rrtik.Cylinder(0.05, 0.2).length
+        0.2
+    """
 
     key = "cylinder"
     measures = (Measure("radius"), Measure("length"))
@@ -145,7 +160,12 @@ class Cylinder(Shape):
 
 @dataclass(frozen=True, slots=True)
 class Capsule(Shape):
-    """A capsule along z, centred on its frame. ``length`` is the distance between the two cap centres, in metres."""
+    """A capsule along z, centred on its frame. ``length`` is the distance between the two cap centres, in metres.
+
+    Example:
+        >>> rrtik.Capsule(0.05, 0.2).radius
+        0.05
+    """
 
     key = "capsule"
     measures = (Measure("radius"), Measure("length"))

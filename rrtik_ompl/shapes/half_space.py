@@ -19,6 +19,11 @@ class HalfSpace(Shape):
     """The filled side of a plane: points with ``normal . x <= offset``; the free side is ``normal . x > offset``.
 
     ``normal`` is stored with unit length, and ``offset`` [m] is scaled with it.
+
+    Example:
+        >>> floor = rrtik.HalfSpace([0.0, 0.0, 2.0], offset=0.2)
+        >>> floor.normal, floor.offset
+        (array([0., 0., 1.]), 0.1)
     """
 
     key = "half_space"

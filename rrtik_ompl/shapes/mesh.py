@@ -26,6 +26,12 @@ class Mesh(Shape):
         triangles: Vertex numbers, shape (m, 3).
         source: Path of the file it was read from, or "".
         scale: The factor that was applied to the file's numbers, kept for writing the scene back.
+
+    Example:
+        >>> corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+        >>> solid = rrtik.Mesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+        >>> rrtik.Obstacle("tetrahedron", solid, [0.5, 0.0, 0.0]).shape.triangles.shape
+        (4, 3)
     """
 
     key = "mesh"

@@ -23,6 +23,10 @@ class Prism(Shape):
         polygon: Vertices in order (either sense), shape (k, 2), metres; convex or not, without self-crossings and
             without places where two sides touch.
         height: Full extent along z [m].
+
+    Example:
+        >>> rrtik.Prism([[0.0, 0.0], [0.4, 0.0], [0.0, 0.3]], height=0.1).polygon.shape
+        (3, 2)
     """
 
     key = "polygon"

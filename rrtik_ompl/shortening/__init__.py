@@ -153,9 +153,9 @@ def shorten(
             clearance.
 
     Example:
-        >>> problem = load_problem("planar3_boxes")
-        >>> found = plan(problem, "RRTConnect", seed=1)
-        >>> shorten(found.path, problem).length < found.path.length
+        >>> problem = rrtik.load_problem("planar3_boxes")
+        >>> found = rrtik.plan(problem, "RRTConnect", seed=1)
+        >>> rrtik.shorten(found.path, problem).length < found.path.length
         True
     """
     require(path, JointPath, "path to shorten", "a plan has one if plan.found")

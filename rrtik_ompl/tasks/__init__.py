@@ -44,6 +44,12 @@ class TaskPlan:
         reason: "" if found, else which stages failed, how often and why.
         end: The world after the last stage, whatever that is; None if it is not found.
         notes: What the author of the task may not have meant, a line each: an object attached from far away.
+
+    Example:
+        >>> loaded = rrtik.load_task("titan4_drawer")
+        >>> plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
+        >>> plan.found, len(plan.paths) == len(plan.worlds)
+        (True, True)
     """
 
     found: bool

@@ -59,6 +59,13 @@ def save_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
 
     Raises:
         InputError: If it has no motion, the ending is another one, or the file cannot be written.
+
+    Example:
+        >>> loaded = rrtik.load_task("titan4_drawer")
+        >>> plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
+        >>> rrtik.save_task_plan(plan, "task.json")
+        >>> len(rrtik.load_task_plan("task.json").paths) == len(plan.paths)
+        True
     """
     known_ending(file, (".json",), "task plan")
     if not plan.paths:
@@ -92,6 +99,13 @@ def load_task_plan(file: str | os.PathLike[str]) -> TaskPlan:
 
     Raises:
         InputError: If the file is missing, malformed, or its parts do not fit each other.
+
+    Example:
+        >>> loaded = rrtik.load_task("titan4_drawer")
+        >>> plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
+        >>> rrtik.save_task_plan(plan, "task.json")
+        >>> len(rrtik.load_task_plan("task.json").paths) == len(plan.paths)
+        True
     """
     document = read_yaml(file_name(file))
     entry = parse(document, TaskPlanFile)

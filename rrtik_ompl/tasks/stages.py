@@ -30,6 +30,10 @@ class MoveTo:
         goal: A goal, the name of a posture, a configuration, shape (dof,), or a pose of the tip as ``SE3`` or matrix.
         constraints: Regions that a frame must not leave on the way, those ``from_start`` as seen from where this stage
             begins; see :class:`rrtik_ompl.Problem`.
+
+    Example:
+        >>> rrtik.MoveTo("ready").goal
+        'ready'
     """
 
     goal: Any
@@ -58,6 +62,10 @@ class Straight:
         by: Shift of the tip [m], shape (3,), its orientation kept.
         to: Pose of the tip at the end, as :func:`rrtik_ompl.straight` takes it.
         frame: Whose axes the shift is in: "world", or "tip" as it is at the beginning.
+
+    Example:
+        >>> rrtik.Straight(by=[0.0, 0.0, -0.1], frame="tip").by.tolist()
+        [0.0, 0.0, -0.1]
     """
 
     by: Vector | None = None
@@ -97,6 +105,10 @@ class Attach:
         object: Name of the obstacle.
         link: That holds it.
         allow: Links and obstacles that it may touch while it is held, beside that link.
+
+    Example:
+        >>> rrtik.Attach("box", "panda_hand", allow=["table"]).allow
+        ('table',)
     """
 
     object: str
@@ -114,7 +126,12 @@ class Attach:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detach:
-    """What is held stays where it is from now on. ``object``: its name."""
+    """What is held stays where it is from now on. ``object``: its name.
+
+    Example:
+        >>> print(rrtik.Detach("box"))
+        Detach 'box'
+    """
 
     object: str
 
@@ -132,6 +149,10 @@ class Gripper:
     Attributes:
         state: "open" or "close".
         width: How far apart the fingers are afterwards [m]; wide open or shut if None.
+
+    Example:
+        >>> rrtik.Gripper("close", width=0.04).width
+        0.04
     """
 
     state: GripperState
@@ -148,7 +169,13 @@ class Gripper:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Alternatives:
-    """Any of several rows of stages."""
+    """Any of several rows of stages.
+
+    Example:
+        >>> grasps = [[rrtik.MoveTo("up")], [rrtik.MoveTo("home"), rrtik.Attach("box", "tool0")]]
+        >>> len(rrtik.Alternatives(grasps).options)
+        2
+    """
 
     options: tuple[tuple[Stage, ...], ...]
 

@@ -165,7 +165,12 @@ class LoadedTask:
 
 
 def list_tasks() -> tuple[str, ...]:
-    """Names of the tasks that packages ship."""
+    """Names of the tasks that packages ship.
+
+    Example:
+        >>> "panda_pick_place" in rrtik.list_tasks()
+        True
+    """
     return tuple(sorted(task_files()))
 
 
@@ -175,6 +180,12 @@ def load_task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
     Raises:
         UnknownNameError: If it is a bare word, and no name.
         InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
+
+    Example:
+        >>> loaded = rrtik.load_task("titan4_drawer")
+        >>> plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
+        >>> plan.found, len(plan.paths) == len(plan.worlds)
+        (True, True)
     """
     path = file_name(name_or_file)
     if isinstance(name_or_file, str) and not path.suffix and len(path.parts) == 1:

@@ -28,6 +28,12 @@ class TimedTask:
         trajectory: All of its motions one after the other; the arm rests where something is done.
         begins: When each motion of the plan begins [s], shape (k,).
         pauses: When the arm begins to rest for a gripper or an object, and when it goes on [s], shape (p, 2).
+
+    Example:
+        >>> loaded = rrtik.load_task("titan4_drawer")
+        >>> timed = rrtik.time_task(loaded.task.plan(loaded.world, loaded.start, seed=1))
+        >>> bool(timed.begins[0] == 0.0)
+        True
     """
 
     trajectory: Trajectory

@@ -36,6 +36,12 @@ class StraightResult:
         path: Its configurations, every motion of it proven free; None if the fraction is 0.
         fraction: Share of the way that it covers, from 0 to 1.
         reason: Why it ends there: the limit of a joint, a singular posture, the pair in contact; "" if it is whole.
+
+    Example:
+        >>> world, q = rrtik.World(rrtik.load_robot("ur5")), np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
+        >>> far = rrtik.straight(world, q, world.robot.fk(q).translation + [2.0, 0.0, 0.0])
+        >>> 0.0 < far.fraction < 1.0, far.reason != ""
+        (True, True)
     """
 
     path: JointPath | None
@@ -117,6 +123,12 @@ def arc(
         ProblemError: See :func:`straight`.
         UnknownNameError: See there.
         InputError: See there; also if the three points lie on a line.
+
+    Example:
+        >>> world, q = rrtik.World(rrtik.load_robot("ur5")), np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
+        >>> here = world.robot.fk(q).translation
+        >>> rrtik.arc(world, q, here + [0.0, 0.1, 0.0], through=here + [0.0, 0.05, 0.05]).fraction
+        1.0
     """
 
     def rails(begin: pin.SE3) -> list[Rail]:
@@ -152,6 +164,13 @@ def screw(
         ProblemError: See :func:`straight`.
         UnknownNameError: See there.
         InputError: See there; also if turns are wanted of a goal that is not turned.
+
+    Example:
+        >>> world, q = rrtik.World(rrtik.load_robot("ur5")), np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
+        >>> valve = world.robot.fk(q)
+        >>> valve.rotation = valve.rotation @ np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+        >>> rrtik.screw(world, q, valve).fraction  # a quarter turn about the tip's z axis
+        1.0
     """
 
     def rails(begin: pin.SE3) -> list[Rail]:
@@ -185,6 +204,12 @@ def linear(
         ProblemError: See :func:`straight`.
         InputError: See there; also if there is no pose.
         UnknownNameError: See there.
+
+    Example:
+        >>> world, q = rrtik.World(rrtik.load_robot("ur5")), np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
+        >>> here = world.robot.fk(q).translation
+        >>> rrtik.linear(world, q, [here + [0.0, 0.0, 0.1], here + [0.0, 0.1, 0.1]]).fraction
+        1.0
     """
 
     def rails(begin: pin.SE3) -> list[Rail]:

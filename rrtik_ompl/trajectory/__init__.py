@@ -79,6 +79,14 @@ def time_parameterize(
         InputError: If the path has one waypoint, does not move, or has another number of joints than the limits; if the
             blend is negative or comes without a world, an end of the path cannot keep the clearance, or the arm cannot
             be held still within the torques.
+
+    Example:
+        >>> problem = rrtik.load_problem("planar3_boxes")
+        >>> path = rrtik.plan(problem, seed=1).path
+        >>> stops = rrtik.time_parameterize(path, rrtik.RateLimits(1.0, 2.0, 20.0))
+        >>> smooth = rrtik.time_parameterize(path, rrtik.RateLimits(1.0, 2.0, 20.0), blend=0.05, world=problem.world)
+        >>> smooth.duration < stops.duration
+        True
     """
     require(path, JointPath, "path to time", "a plan has one if plan.found")
     bounds = RateLimits.of(limits) if isinstance(limits, Robot) else limits

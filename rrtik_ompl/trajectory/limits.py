@@ -31,6 +31,11 @@ class RateLimits:
         velocity: [rad/s or m/s], finite.
         acceleration: [rad/s^2 or m/s^2], finite.
         jerk: [rad/s^3 or m/s^3]; inf for none.
+
+    Example:
+        >>> limits = rrtik.RateLimits.of(rrtik.load_robot("panda"), share=0.5)
+        >>> limits.velocity.shape
+        (7,)
     """
 
     velocity: Vector

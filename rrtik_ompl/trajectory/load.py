@@ -25,6 +25,12 @@ def load_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) ->
 
     Raises:
         InputError: If the file is missing, malformed, or does not fit the robot; the message names file and line.
+
+    Example:
+        >>> motion = rrtik.time_parameterize(rrtik.JointPath([[0.0], [1.0]]), rrtik.RateLimits(1.0, 4.0))
+        >>> motion.save("motion.json")
+        >>> rrtik.load_trajectory("motion.json").duration
+        1.25
     """
     require(robot, Robot | None, "robot of a trajectory", "use load_robot(name)")
     ending = known_ending(file, FORMATS, "trajectory")

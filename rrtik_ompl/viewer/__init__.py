@@ -62,6 +62,11 @@ def view(
 
     Raises:
         InputError: If that cannot be shown, the file cannot be written or the port cannot be used.
+
+    Example:
+        >>> problem = rrtik.load_problem("planar3_boxes")
+        >>> rrtik.view(problem, rrtik.plan(problem, seed=1).path, html="plan.html").name
+        'plan.html'
     """
     from rrtik_ompl.viewer.page import page
     from rrtik_ompl.viewer.serve import PageServer
