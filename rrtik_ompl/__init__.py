@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.moves.staircase import one_joint_moves as one_joint_moves
     from rrtik_ompl.ompl_bridge import objectives as objectives
     from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler as GoalSampler
+    from rrtik_ompl.ompl_bridge.inspection.benchmark_notes import BenchmarkNotes as BenchmarkNotes
     from rrtik_ompl.ompl_bridge.simple_setup import simple_setup as simple_setup
     from rrtik_ompl.ompl_bridge.simple_setup import space_information as space_information
     from rrtik_ompl.path import JointPath as JointPath
@@ -133,6 +134,7 @@ else:
         "ik.trajectory": ("IkTrajectory", "solve_ik_trajectory"),
         "ompl_bridge": ("objectives",),
         "ompl_bridge.goal_sampler": ("GoalSampler",),
+        "ompl_bridge.inspection.benchmark_notes": ("BenchmarkNotes",),
         "ompl_bridge.simple_setup": ("simple_setup", "space_information"),
         "files.cloud": ("load_cloud", "save_cloud"),
         "files.mesh": ("load_mesh",),

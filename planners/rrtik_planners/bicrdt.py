@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.fast.search.crdt.rules import KERNELS, CrdtRules
@@ -43,7 +44,9 @@ class BiCRDT(OneJointPlanner):
             path = met if self.options.accepts(met) else None
         checker.checked_motions += trees.motions
         edges = trees.vertices - len(starts) - len(goals)
-        return SearchResult(path, {"iterations": trees.iterations, "vertices": trees.vertices, "edges": edges})
+        graph = self.grown(lambda: trees.grown(0), lambda: trees.grown(1))
+        counts = {"iterations": trees.iterations, "vertices": trees.vertices, "edges": edges}
+        return SearchResult(path, counts, graph=graph)
 
 
 class TwoTreeSearch:
@@ -82,6 +85,10 @@ class TwoTreeSearch:
     def meeting(self) -> tuple[Matrix, Matrix]:
         """From the root of each tree the branch to the vertex at which they met, shapes (k, n)."""
         return self._trees[0].branch(self._met[0]), self._trees[1].branch(self._met[1])
+
+    def grown(self, number: int) -> tuple[Matrix, NDArray[np.int64]]:
+        """The vertices of a tree, shape (size, n), and their parents, shape (size,)."""
+        return self._trees[number].grown()
 
     def _step(self) -> bool:
         """One iteration; whether the trees have met."""

@@ -18,7 +18,7 @@ from rrtik_ompl.ik.held_tables import HeldTables, held_tables
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_ompl.world.holding_world import HoldingWorld
 from rrtik_ompl.world.motion_queries import has_kernels, is_conservative, turning_joints
-from rrtik_planners.fast_rrt_connect import python_rules, search_in_python
+from rrtik_planners.fast_rrt_connect import python_rules, search_in_python, sound_tree
 from rrtik_planners.one_joint_options import iteration_limit
 
 PLAIN_SAMPLES = 200  # before it is asked whether the constraints alone separate start and goal
@@ -76,7 +76,7 @@ class CBiRRT(SafePlanner):
             rules = python_rules(
                 self.bounds(), self.range, None, self.max_iterations, turning=turning_joints(self._world)
             )
-            return search_in_python(starts, goals, rules, checker, ptc, self.rng)
+            return search_in_python(self, starts, goals, rules, checker, ptc)
         return self._in_kernels(starts, goals, checker, ptc, motions, tables)
 
     def _in_kernels(
@@ -100,7 +100,8 @@ class CBiRRT(SafePlanner):
         counts = search.statistics()
         checker.checked_motions += int(counts["motions"])
         counts |= {"edges": counts["vertices"] - len(starts) - len(goals)} | ({"separated": 1} if reason else {})
-        return SearchResult(path, counts, reason=reason)
+        graph = self.grown(lambda: sound_tree(search.trees[0]), lambda: sound_tree(search.trees[1]))
+        return SearchResult(path, counts, reason=reason, graph=graph)
 
     def _box(self, motions: FastMotions) -> tuple[Vector, Vector]:
         lower, upper = self.bounds()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix
@@ -99,9 +100,10 @@ class CRDT(OneJointPlanner):
         checker.checked_motions += tree.motions
         statistics = {"iterations": tree.iterations, "vertices": tree.vertices, "edges": tree.vertices - len(starts)}
         if path is not None:
-            return SearchResult(path, statistics)
+            return SearchResult(path, statistics, graph=self.grown(lambda: tree.grown(0)))
         nearest, distance = _nearest_to_goal(tree.tree(0), goals)
-        return SearchResult(tree.branch(0, nearest), statistics, distance)
+        graph = self.grown(lambda: tree.grown(0))
+        return SearchResult(tree.branch(0, nearest), statistics, distance, graph=graph)
 
 
 class OneTreeSearch:
@@ -165,6 +167,10 @@ class OneTreeSearch:
     def tree(self, number: int) -> Matrix:
         """The vertices of the only tree, shape (size, n)."""
         return np.array([self._tree.vertex(i) for i in range(self._tree.size)])
+
+    def grown(self, number: int) -> tuple[Matrix, NDArray[np.int64]]:
+        """The vertices of the only tree, shape (size, n), and their parents, shape (size,)."""
+        return self._tree.grown()
 
     def _near_goals(self, known: int) -> list[tuple[int, int]]:
         """Vertices added since there were ``known`` and goals within the tolerance around them."""

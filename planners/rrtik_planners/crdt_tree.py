@@ -69,6 +69,10 @@ class CrdtTree:
         """Coordinates of vertex i, shape (n,)."""
         return self._coordinates[:, i].copy()
 
+    def grown(self) -> tuple[Matrix, NDArray[np.int64]]:
+        """The vertices, shape (size, n), and their parents, shape (size,), below 0 for a root."""
+        return self._coordinates[:, : self.size].T.copy(), self._parents[: self.size].copy()
+
     def nearest(self, q: Vector) -> int:
         """The vertex nearest to q, shape (n,), in the scaled Euclidean metric; among equals the oldest."""
         difference = (self._coordinates[:, : self.size] - q[:, None]) * self._rules.scale[:, None]

@@ -13,7 +13,10 @@ from rrtik_ompl.fast.search.connect import ConnectSearch
 from rrtik_ompl.fast.search.connect_keeping import kept_search
 from rrtik_ompl.fast.search.connect_layout import KERNELS
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
+from rrtik_ompl.fast.search.tree_memory import certain_tree
+from rrtik_ompl.fast.tables.memory import Table
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
+from rrtik_ompl.ompl_bridge.inspection.graph import Tree, without
 from rrtik_ompl.search.rrt_connect import ConnectRules, RrtConnect, straight_path
 from rrtik_ompl.world.motion_queries import KernelWorld, has_kernels, is_conservative, turning_joints
 from rrtik_planners.one_joint_options import iteration_limit
@@ -69,7 +72,7 @@ class FastRRTConnect(SafePlanner):
         world = self._world
         if not has_kernels(world, KERNELS):
             rules = python_rules(self.bounds(), *self._lengths, self.max_iterations, turning=turning_joints(world))
-            return search_in_python(starts, goals, rules, checker, ptc, self.rng)
+            return search_in_python(self, starts, goals, rules, checker, ptc)
         with self._kernels(world) as kernels:
             path = kernels.solve(
                 starts,
@@ -81,8 +84,9 @@ class FastRRTConnect(SafePlanner):
                 bound=self.bound,
             )
             counts = kernels.statistics()
+            graph = self.grown(lambda: sound_tree(kernels.trees[0]), lambda: sound_tree(kernels.trees[1]))
         checker.checked_motions += int(counts["motions"] - counts["questions"])  # the questions it has counted
-        return SearchResult(path, {**counts, "edges": counts["vertices"] - len(starts) - len(goals)})
+        return SearchResult(path, {**counts, "edges": counts["vertices"] - len(starts) - len(goals)}, graph=graph)
 
     def ends_free(self, rows: Matrix, checker: MotionChecker) -> Mask:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.ends_free`; the kernels know in a few microseconds."""
@@ -124,12 +128,19 @@ def python_rules(
     return ConnectRules(lower, upper, *lengths, balanced=True, max_iterations=max_iterations)
 
 
+def sound_tree(tree: Table) -> Tree:
+    """The vertices of a tree in kernels to which certain motions lead, and their parents."""
+    return without(*certain_tree(tree))
+
+
 def search_in_python(
-    starts: Matrix, goals: Matrix, rules: ConnectRules, checker: MotionChecker, ptc: Stop, rng: np.random.Generator
+    planner: SafePlanner, starts: Matrix, goals: Matrix, rules: ConnectRules, checker: MotionChecker, ptc: Stop
 ) -> SearchResult:
-    """The search without kernels, where every motion is decided at once."""
-    search = RrtConnect(starts, goals, rules, checker.motion_valid, rng)
+    """The search of a planner without kernels, where every motion is decided at once."""
+    search = RrtConnect(starts, goals, rules, checker.motion_valid, planner.rng)
     path = straight_path(starts, goals, checker.motion_valid, ptc)
     path = search.run(ptc) if path is None else path
     edges = search.vertices - len(starts) - len(goals)
-    return SearchResult(path, {"iterations": search.iterations, "vertices": search.vertices, "edges": edges})
+    counts = {"iterations": search.iterations, "vertices": search.vertices, "edges": edges}
+    graph = planner.grown(search.trees[0].grown, search.trees[1].grown)
+    return SearchResult(path, counts, graph=graph)

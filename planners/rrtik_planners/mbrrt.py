@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -66,7 +67,7 @@ class MBRRT(BiCRDT):
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         aims = self._aims(starts)
         result = super().search(starts, aims if len(aims) else goals, checker, ptc)
-        return SearchResult(result.path, {**result.statistics, "tree_goals": len(aims)}, result.difference)
+        return replace(result, statistics={**result.statistics, "tree_goals": len(aims)})
 
     def _aims(self, starts: Matrix) -> Matrix:
         """Free configurations at the goal of the tip inside the bounds of the space, shape (k, n)."""

@@ -70,7 +70,9 @@ class TipSeeker(SafePlanner):
         elif exact:
             path, exact = _ended(path, metric.goals, checker)
         difference = 0.0 if exact else max(float(tree.distance[nearest]), LEAST_DIFFERENCE)
-        return SearchResult(path, {**counts, "metric_evaluations": metric.evaluations, **tip}, difference)
+        return SearchResult(
+            path, {**counts, "metric_evaluations": metric.evaluations, **tip}, difference, graph=self.grown(tree.grown)
+        )
 
 
 def misses(metric: TipMetric, q: Vector, what: str) -> str:

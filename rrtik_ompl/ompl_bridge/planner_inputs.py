@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.results import IllPosed
 from rrtik_ompl.ompl_bridge.states import StateIO
@@ -78,3 +79,31 @@ def _goals(inputs: ob.PlannerInputStates, io: StateIO, goal: ob.Goal, stop: Stop
 def _different(rows: list[Vector]) -> list[Vector]:
     """The rows in their order, each once."""
     return rows if len(rows) < 2 else list({row.tobytes(): row for row in rows}.values())
+
+
+def usable(starts: Matrix, goals: Matrix | None, free: Mask) -> tuple[Matrix, Matrix]:
+    """The free ones of starts and goals, shapes (s, n) and (g, n), at least one each; no goals where none are needed.
+
+    Args:
+        starts: Shape (s, n).
+        goals: Shape (g, n), or None.
+        free: Which of both are free, shape (s + g,) or (s,).
+
+    Raises:
+        IllPosed: If there is none.
+    """
+    kept = starts[free[: len(starts)]]
+    if len(kept) == 0:
+        raise IllPosed(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
+    if goals is None:
+        return kept, starts[:0]
+    aims = goals[free[len(starts) :]]
+    if len(aims) == 0:
+        raise IllPosed(ob.PlannerStatus.INVALID_GOAL, f"no valid goal: {NONE_USABLE}")
+    return kept, aims
+
+
+def condition_of(ptc: ob.PlannerTerminationCondition | Callable[[], object] | float) -> Stop:
+    """A termination condition from what OMPL or a person hands to solve."""
+    condition: Stop = ob.timedPlannerTerminationCondition(float(ptc)) if isinstance(ptc, (int, float)) else ptc
+    return condition

@@ -11,8 +11,9 @@ from ompl import base as ob
 
 from rrtik_ompl.arrays import finite_array
 from rrtik_ompl.errors import InputError, UnknownNameError, require
+from rrtik_ompl.ompl_bridge.inspection.settings import keyword_parameters
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
-from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner, keyword_parameters
+from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
 from rrtik_ompl.problem import Problem
 
 

@@ -10,6 +10,7 @@ from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.ompl_bridge.inspection.graph import PlannerGraph
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,12 +22,16 @@ class SearchResult:
         statistics: Plain counts of the search.
         difference: Distance from the end of the path to the goal [unit of the space]; 0 if the path is exact.
         reason: Why there is no exact path, if the search can say it.
+        graph: What was grown, by :meth:`SafePlanner.grown`, if anybody wants to know.
+        progress: Pairs of a time since the search began [s] and the length of the best path then; of one that improves.
     """
 
     path: Matrix | None
     statistics: Mapping[str, int | float] = field(default_factory=dict)
     difference: float = 0.0
     reason: str = ""
+    graph: PlannerGraph | None = None
+    progress: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,3 +77,10 @@ def explained(error: BaseException) -> str:
         link.__traceback__ = None
         link = link.__context__
     return text
+
+
+def status_of(found: SearchResult) -> ob.PlannerStatus:
+    """OMPL's word for what a search brought back."""
+    if found.path is None:
+        return ob.PlannerStatus.TIMEOUT
+    return ob.PlannerStatus.APPROXIMATE_SOLUTION if found.difference > 0.0 else ob.PlannerStatus.EXACT_SOLUTION

@@ -7,9 +7,10 @@ arrays at once, and ``solve`` always returns a status.
 
 from __future__ import annotations
 
-import inspect
+import time
 from collections.abc import Callable, Mapping
-from functools import cached_property, lru_cache
+from dataclasses import replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any, ClassVar
 
@@ -20,13 +21,13 @@ from ompl import util as ou
 from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen, whole_number
 from rrtik_ompl.errors import PlannerError
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
+from rrtik_ompl.ompl_bridge.inspection.graph import PlannerGraph, Tree, graph_of_path, graph_of_trees, nearest_approach
+from rrtik_ompl.ompl_bridge.inspection.settings import FILLED_IN, change, keyword_parameters, options_of, remembering
 from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker
-from rrtik_ompl.ompl_bridge.planner_inputs import NONE_USABLE, starts_and_goals
-from rrtik_ompl.ompl_bridge.results import Failure, IllPosed, SearchResult, explained, failure_of
+from rrtik_ompl.ompl_bridge.planner_inputs import condition_of, starts_and_goals, usable
+from rrtik_ompl.ompl_bridge.results import Failure, IllPosed, SearchResult, explained, failure_of, status_of
 from rrtik_ompl.ompl_bridge.states import StateIO, real_vector_space, space_bounds
 from rrtik_ompl.world.motion_queries import MotionQueries, Stop
-
-GIVEN_OPTIONS = ("world", "seed", "goal")  # that `plan()` fills in
 
 
 class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
@@ -53,6 +54,8 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         error: Why the last ``solve`` could not be done, with the traceback if it broke off, or None.
         failure: Why the last ``solve`` broke off, or None.
         reason: Why the last ``solve`` was done in vain, if the search could say it.
+        progress: Pairs of a time since the last ``solve`` began [s] and the length of the best path then.
+        graph_wanted: For :meth:`search`: whether anybody can ask for the graph afterwards.
     """
 
     anytime: ClassVar[bool] = False
@@ -67,6 +70,11 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     proof_iterations: ClassVar[int] = 0
     portfolio_turn: ClassVar[int] = 0
     keeps_constraints: ClassVar[bool] = False
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if "__init__" in vars(cls):
+            cls.__init__ = remembering(vars(cls)["__init__"])  # type: ignore[method-assign]
 
     def __init__(
         self, si: ob.SpaceInformation, name: str, *, world: MotionQueries | None = None, seed: int | None = None
@@ -83,13 +91,16 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
             InputError: If the space is of another kind or the seed is no such number.
         """
         real_vector_space(si)
-        used = _seed(seed)
+        used = int(ou.RNG().uniformInt(0, 2**31 - 1)) if seed is None else whole_number(seed, "seed")
         super().__init__(si, name)
         self.seed = used
         self.statistics: dict[str, int | float] = {}
         self.error: str | None = None
         self.failure: Failure | None = None
         self.reason = ""
+        self.progress: tuple[tuple[float, float], ...] = ()
+        self.graph_wanted = False
+        self._graph: PlannerGraph | None = None
         self._world = world
         self._states: StateIO | None = None
         self._known_bounds: tuple[Any, Any] = ((), ())  # numbers of the space, and the arrays made from them
@@ -102,7 +113,37 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     @classmethod
     def default_options(cls) -> dict[str, Any]:
         """The options that the planner takes, with their defaults."""
-        return {name: default for name, default in keyword_parameters(cls).items() if name not in GIVEN_OPTIONS}
+        return {name: default for name, default in keyword_parameters(cls).items() if name not in FILLED_IN}
+
+    def set(self, name: str, value: object) -> None:
+        """Change an option, by its name in the constructor; a text such as "0.3" is read as a number.
+
+        Raises:
+            InputError: If there is no such option, or the planner refuses the value; it is as it was then.
+        """
+        change(self, name, value)
+
+    def parameters(self) -> dict[str, Any]:
+        """The options with their values, as :meth:`set` takes them; None is what suits the problem."""
+        return options_of(self)
+
+    def graph(self) -> PlannerGraph:
+        """What the last ``solve`` by OMPL has grown: vertices, edges that were found free, their costs.
+
+        Of a planner that keeps no tree, its path; `plan()` keeps none.
+
+        Raises:
+            PlannerError: If there is none: nothing was solved since the planner was made or cleared.
+        """
+        if self._graph is None:
+            raise PlannerError(f"{self.getName()}: there is no graph; use planner.solve(), or solve of a SimpleSetup")
+        return self._graph
+
+    def grown(self, starts: Callable[[], Tree], goals: Callable[[], Tree] | None = None) -> PlannerGraph | None:
+        """The graph of trees, for the result of :meth:`search`; None if nobody can ask for it. For subclasses."""
+        if not self.graph_wanted:
+            return None
+        return graph_of_trees(starts(), None if goals is None else goals())
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """Look for a path from any start to any goal until ``ptc()`` is true. For subclasses.
@@ -136,7 +177,8 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         Returns:
             ``ompl.base.PlannerStatus``.
         """
-        status, _ = self._searched(lambda: self._in_ompl(_condition(ptc)))
+        self.graph_wanted = True
+        status, _ = self._searched(lambda: self._in_ompl(condition_of(ptc)))
         return ob.PlannerStatus(status)
 
     def solve_rows(
@@ -154,7 +196,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         Returns:
             The status, and the path, shape (k, n), if there is an exact one.
         """
-        self._known_bounds = (), bounds
+        self._known_bounds, self.graph_wanted = ((), bounds), False
         status, found = self._searched(lambda: self._between(starts, goals, stop, known_free=checked))
         exact = found is not None and found.difference <= 0.0
         return ob.PlannerStatus(status), found.path if found is not None and exact else None
@@ -195,10 +237,11 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         except Exception as error:
             self.failure, self.error = failure_of(error), explained(error)
             return ob.PlannerStatus.CRASH, None
-        return _status(found), found
+        return status_of(found), found
 
     def _forget(self) -> None:
         self.statistics, self.error, self.failure, self.reason = {}, None, None, ""
+        self.progress, self._graph = (), None
 
     def _read_bounds(self) -> tuple[Vector, Vector]:
         numbers = self._io.bounds()
@@ -216,13 +259,27 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self._read_bounds()  # refuses missing ones in clearer words than OMPL
         if self._world is None and not si.isSetup():
             si.setup()  # before it, checkMotion looks at the end point alone
-        inputs, aimless = self.getPlannerInputStates(), not self.needs_goals()
-        found = self._between(*starts_and_goals(inputs, pdef, self._io, ptc, aimless=aimless), ptc)
+        inputs, aimless, begun = self.getPlannerInputStates(), not self.needs_goals(), time.perf_counter()
+        ends = starts_and_goals(inputs, pdef, self._io, ptc, aimless=aimless)
+        found = self._between(*ends, ptc)
         if found.path is None and isinstance(pdef.getGoal(), GoalSampler):
             pdef.getGoal().more()  # for the next attempt
+        found = self._kept(found, ends[1], time.perf_counter() - begun)
         if found.path is not None:
             path = self._io.path(si, found.path)
             pdef.addSolutionPath(path, found.difference > 0.0, float(found.difference), self.getName())
+        return found
+
+    def _kept(self, found: SearchResult, goals: Matrix, seconds: float) -> SearchResult:
+        """What was found, or the nearest approach to it; graph and progress are kept."""
+        if found.path is None:
+            self._graph = found.graph
+            near = None if found.graph is None or len(goals) == 0 else nearest_approach(found.graph, goals)
+            return found if near is None else replace(found, path=near[0], difference=near[1])
+        path = graph_of_path(found.path)
+        self._graph = found.graph or path
+        if found.difference <= 0.0:
+            self.progress = found.progress or ((seconds, float(path.costs.sum())),)
         return found
 
     def _between(self, starts: Matrix, goals: Matrix, stop: Stop, *, known_free: bool = False) -> SearchResult:
@@ -238,45 +295,6 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     def _free_ends(self, starts: Matrix, goals: Matrix, checker: MotionChecker) -> tuple[Matrix, Matrix]:
         """The free ones of starts and, if needed, goals, at least one each."""
         if not self.needs_goals():
-            starts, goals = starts[checker.valid_batch(starts)], goals[:0]
-            if len(starts) == 0:
-                raise IllPosed(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
-            return starts, goals
+            return usable(starts, None, checker.valid_batch(starts))
         free = self.ends_free(np.concatenate([starts, goals]), checker)  # all at once: a call costs more than a check
-        if len(goals) and free.all():
-            return starts, goals
-        starts, goals = starts[free[: len(starts)]], goals[free[len(starts) :]]
-        if len(starts) == 0:
-            raise IllPosed(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
-        if len(goals) == 0:
-            raise IllPosed(ob.PlannerStatus.INVALID_GOAL, f"no valid goal: {NONE_USABLE}")
-        return starts, goals
-
-
-def _status(found: SearchResult) -> ob.PlannerStatus:
-    """OMPL's word for what a search brought back."""
-    if found.path is None:
-        return ob.PlannerStatus.TIMEOUT
-    return ob.PlannerStatus.APPROXIMATE_SOLUTION if found.difference > 0.0 else ob.PlannerStatus.EXACT_SOLUTION
-
-
-def keyword_parameters(planner: type[SafePlanner]) -> Mapping[str, Any]:
-    """The parameters of a planner's class but the first one, which is the space information, and their defaults."""
-    constructor: Any = planner
-    return _parameters(constructor)
-
-
-@lru_cache(maxsize=64)
-def _parameters(planner: Any) -> Mapping[str, Any]:
-    parameters = list(inspect.signature(planner).parameters.values())[1:]
-    return MappingProxyType({each.name: each.default for each in parameters})
-
-
-def _condition(ptc: ob.PlannerTerminationCondition | Callable[[], object] | float) -> Stop:
-    """A termination condition from what OMPL or a person hands to solve."""
-    condition: Stop = ob.timedPlannerTerminationCondition(float(ptc)) if isinstance(ptc, (int, float)) else ptc
-    return condition
-
-
-def _seed(seed: int | None) -> int:
-    return int(ou.RNG().uniformInt(0, 2**31 - 1)) if seed is None else whole_number(seed, "seed")
+        return usable(starts, goals, free)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 
@@ -31,6 +32,10 @@ class ConfigurationTree:
     def rows(self) -> Matrix:
         """The configurations, shape (size, n); a view that holds until a vertex is added."""
         return self._rows[: self.size]
+
+    def grown(self) -> tuple[Matrix, NDArray[np.int64]]:
+        """The configurations, shape (size, n), and their parents, shape (size,), -1 for a root."""
+        return self.rows.copy(), np.array(self.parents, dtype=np.int64)
 
     def row(self, vertex: int) -> Vector:
         """The configuration of a vertex, shape (n,)."""

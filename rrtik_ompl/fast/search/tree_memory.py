@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.fast.search.tree_layout import (
     CAPACITY,
+    CERTAIN,
     COSTS,
     DOF,
     JOINTS,
@@ -49,6 +51,13 @@ def grow(tree: Table, factor: int = 2) -> None:
         tree.header[place] = roomy.ctypes.data
     tree.header[CAPACITY] = capacity
     _share_values(tree, joints)
+
+
+def certain_tree(tree: Table) -> tuple[Matrix, NDArray[np.int64], Mask]:
+    """Vertices of a tree, shape (size, n), their parents, below 0 for a root, and which motions to them are certain."""
+    size, dof = int(tree.header[SIZE]), int(tree.header[DOF])
+    parents, rows = tree[PARENTS][:size].astype(np.int64), tree[ROWS].reshape(-1, dof)[:size].copy()
+    return rows, parents, (tree[STATES][:size] == CERTAIN) | (parents < 0)
 
 
 def _arrays(dof: int, joints: int, capacity: int) -> dict[int, NDArray[Any]]:

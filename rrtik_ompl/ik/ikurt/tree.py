@@ -46,6 +46,10 @@ class IkurtTree:
         self.size += len(q)
         return numbers
 
+    def grown(self) -> tuple[Matrix, NDArray[np.int64]]:
+        """The vertices, shape (size, n), and their parents, shape (size,), -1 for a root."""
+        return self.q.copy(), self._parent[: self.size].copy()
+
     def best(self) -> int:
         """The vertex nearest to the goal in the workspace, penalties counted."""
         return int(self._rank[: self.size].argmin())

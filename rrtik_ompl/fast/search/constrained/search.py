@@ -144,6 +144,11 @@ class ConstrainedSearch:
         return rows if len(open_) == 0 or ask(rows[open_ - 1], rows[open_]).all() else None
 
     @property
+    def trees(self) -> list[Table]:
+        """The trees from the starts and from the goals."""
+        return self._trees
+
+    @property
     def sizes(self) -> tuple[int, int]:
         """Vertices of the trees from the starts and from the goals."""
         first, second = (int(tree.header[tree_layout.SIZE]) for tree in self._trees)

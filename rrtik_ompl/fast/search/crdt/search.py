@@ -11,6 +11,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import PlannerError
@@ -111,6 +112,10 @@ class CrdtSearch:
     def tree(self, number: int) -> Matrix:
         """The vertices of a tree, shape (size, n)."""
         return np.ascontiguousarray(self._trees[number].vertices)
+
+    def grown(self, number: int) -> tuple[Matrix, NDArray[np.int64]]:
+        """The vertices of a tree, shape (size, n), and their parents, shape (size,)."""
+        return self.tree(number), self._trees[number].parents
 
     def branch(self, number: int, vertex: int) -> Matrix:
         """The branch of a tree from its root to a vertex, shape (k, n)."""

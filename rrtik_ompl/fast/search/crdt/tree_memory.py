@@ -42,6 +42,11 @@ class TreeMemory:
         """Shape (size, n). A view."""
         return self._runs[:, : self.size].T
 
+    @property
+    def parents(self) -> NDArray[np.int64]:
+        """The parent of each vertex, shape (size,), below 0 for a root; a copy."""
+        return self._parents[: self.size].astype(np.int64)
+
     def branch(self, vertex: int) -> Matrix:
         """The configurations from the root to a vertex, shape (k, n)."""
         chain = [vertex]

@@ -1,0 +1,179 @@
+"""What a planner has grown, as arrays: vertices, edges, costs; and in the files and objects that others read."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from ompl import base as ob
+
+from rrtik_ompl.arrays import Matrix, Vector, frozen
+from rrtik_ompl.files.text import write_text
+from rrtik_ompl.ompl_bridge.states import StateIO
+
+Numbers: TypeAlias = NDArray[np.int64]
+Tree: TypeAlias = tuple[Matrix, ArrayLike]  # vertices, and the number of each one's parent, below 0 for a root
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlannerGraph:
+    """What a planner has grown in its last ``solve``. The arrays are read-only.
+
+    Attributes:
+        vertices: Configurations, shape (v, n) [unit of the space].
+        edges: Pairs of vertices whose motion was found free, shape (e, 2); of a tree the parent first.
+        costs: Length of each edge, shape (e,) [unit of the space].
+        starts: Numbers of the vertices that are starts.
+        goals: Likewise of goals.
+    """
+
+    vertices: Matrix
+    edges: Numbers
+    costs: Vector
+    starts: Numbers
+    goals: Numbers
+
+    def save(self, file: str | os.PathLike[str]) -> None:
+        """Write it as GraphML, which Gephi, NetworkX, igraph and others read.
+
+        The coordinates of a vertex are in ``coords``, divided by commas, as OMPL writes them; ``weight`` of an edge is
+        its cost.
+
+        Raises:
+            InputError: If the file cannot be written.
+        """
+        write_text(os.fspath(file), "\n".join([*_graph_ml(self), ""]))
+
+    def planner_data(self, si: ob.SpaceInformation) -> ob.PlannerData:
+        """The graph as ``ompl.base.PlannerData``, which has its own copies of the states.
+
+        Args:
+            si: Of the planner.
+        """
+        io, data = StateIO(si), ob.PlannerData(si)
+        states = [si.allocState() for _ in self.vertices]  # the data hold only their addresses until they are decoupled
+        starts, goals = set(self.starts.tolist()), set(self.goals.tolist())
+        for number, (one, row) in enumerate(zip(states, self.vertices, strict=True)):
+            io.write(one, row)
+            vertex = ob.PlannerDataVertex(one)
+            if number in starts:
+                data.addStartVertex(vertex)
+            elif number in goals:
+                data.addGoalVertex(vertex)
+            else:
+                data.addVertex(vertex)
+        for first, second in self.edges.tolist():
+            data.addEdge(first, second)
+        data.decoupleFromPlanner()
+        return data
+
+
+def graph_of(vertices: Matrix, edges: ArrayLike, starts: ArrayLike = (), goals: ArrayLike = ()) -> PlannerGraph:
+    """A graph; its costs are the lengths of its edges.
+
+    Args:
+        vertices: Shape (v, n).
+        edges: Pairs of vertices, shape (e, 2).
+        starts: Numbers of vertices.
+        goals: Likewise.
+    """
+    pairs = np.asarray(edges, dtype=np.int64).reshape(-1, 2)
+    costs = np.linalg.norm(vertices[pairs[:, 1]] - vertices[pairs[:, 0]], axis=1)
+    joined, first, last = (frozen(each, dtype=np.int64) for each in (pairs, starts, goals))
+    return PlannerGraph(frozen(vertices), joined, frozen(costs), first, last)
+
+
+def graph_of_trees(starts: Tree, goals: Tree | None = None) -> PlannerGraph:
+    """A graph of a tree that grows from starts and, if there is one, a tree that grows from goals."""
+    rows, edges, roots = [], [], []
+    count = 0
+    for tree in (starts, goals):
+        vertices = np.empty((0, starts[0].shape[1])) if tree is None else np.asarray(tree[0])
+        parents = np.empty(0, dtype=np.int64) if tree is None else np.asarray(tree[1], dtype=np.int64)
+        grown = np.flatnonzero(parents >= 0)
+        rows.append(vertices)
+        edges.append(np.stack([parents[grown], grown], axis=1) + count)
+        roots.append(np.flatnonzero(parents < 0) + count)
+        count += len(vertices)
+    return graph_of(np.concatenate(rows), np.concatenate(edges), *roots)
+
+
+def graph_of_path(path: Matrix) -> PlannerGraph:
+    """A path, shape (k, n), as a graph: what is left of a planner that keeps no tree."""
+    steps = np.arange(len(path) - 1)
+    return graph_of(path, np.stack([steps, steps + 1], axis=1), [0], [len(path) - 1])
+
+
+def without(rows: Matrix, parents: NDArray[np.integer], kept: NDArray[np.bool_]) -> Tree:
+    """A tree without the vertices that are not kept and those below them."""
+    sound, above = kept.copy(), np.where(parents < 0, 0, parents)
+    while True:
+        left = sound & ((parents < 0) | sound[above])
+        if (left == sound).all():
+            break
+        sound = left
+    numbers = np.cumsum(sound) - 1
+    return rows[sound], np.where(parents < 0, -1, numbers[above])[sound]
+
+
+def nearest_approach(graph: PlannerGraph, goals: Matrix) -> tuple[Matrix, float] | None:
+    """The way from a start, along edges, to the vertex nearest to a goal; and how far from it that is.
+
+    Args:
+        graph: Grown by a planner.
+        goals: Shape (g, n).
+
+    Returns:
+        The way, shape (k, n), and the distance [unit of the space]; None if nothing is nearer than a start.
+    """
+    came = _reached(graph)
+    if not came:
+        return None
+    numbers = np.fromiter(came, dtype=np.int64)
+    gaps = np.linalg.norm(graph.vertices[numbers][:, None] - goals[None], axis=2).min(axis=1)
+    vertex, away = int(numbers[gaps.argmin()]), float(gaps.min())
+    if came[vertex] < 0 or away == 0.0:
+        return None
+    way = [vertex]
+    while came[way[-1]] >= 0:
+        way.append(came[way[-1]])
+    return graph.vertices[way[::-1]].copy(), away
+
+
+def _reached(graph: PlannerGraph) -> dict[int, int]:
+    """The vertices to which edges lead from a start, each with the one before it, -1 for a start."""
+    leaving: dict[int, list[int]] = {}
+    for first, second in graph.edges.tolist():
+        leaving.setdefault(first, []).append(second)
+    came = dict.fromkeys(graph.starts.tolist(), -1)
+    waiting = deque(came)
+    while waiting:
+        vertex = waiting.popleft()
+        for head in leaving.get(vertex, ()):
+            if head not in came:
+                came[head] = vertex
+                waiting.append(head)
+    return came
+
+
+def _graph_ml(graph: PlannerGraph) -> Iterator[str]:
+    yield '<?xml version="1.0" encoding="UTF-8"?>'
+    yield '<graphml xmlns="http://graphml.graphdrawing.org/xmlns">'
+    yield '  <key id="coords" for="node" attr.name="coords" attr.type="string"/>'
+    yield '  <key id="role" for="node" attr.name="role" attr.type="string"/>'
+    yield '  <key id="weight" for="edge" attr.name="weight" attr.type="double"/>'
+    yield '  <graph id="graph" edgedefault="directed">'
+    roles = dict.fromkeys(graph.goals.tolist(), "goal") | dict.fromkeys(graph.starts.tolist(), "start")
+    for number, row in enumerate(graph.vertices.tolist()):
+        role = f'<data key="role">{roles[number]}</data>' if number in roles else ""
+        coords = ",".join(map(repr, row))
+        yield f'    <node id="n{number}"><data key="coords">{coords}</data>{role}</node>'
+    for (first, second), cost in zip(graph.edges.tolist(), graph.costs.tolist(), strict=True):
+        yield f'    <edge source="n{first}" target="n{second}"><data key="weight">{cost!r}</data></edge>'
+    yield "  </graph>"
+    yield "</graphml>"
