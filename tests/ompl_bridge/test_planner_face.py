@@ -72,7 +72,7 @@ def test_graphs_are_written_and_become_planner_data(tmp_path: Path) -> None:
     space = {"g": "http://graphml.graphdrawing.org/xmlns"}
     root = ET.parse(tmp_path / "graph.xml").getroot()
     nodes, edges = root.findall(".//g:node", space), root.findall(".//g:edge", space)
-    coords = [[float(x) for x in node.find("g:data", space).text.split(",")] for node in nodes]  # type: ignore[union-attr]
+    coords = [[float(x) for x in node.find("g:data", space).text.split(",")] for node in nodes]
     assert np.array_equal(coords, graph.vertices)
     assert len(edges) == len(graph.edges)
     data = graph.planner_data(setup.getSpaceInformation())
