@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -46,32 +45,33 @@ def limits_of(arm: str) -> RateLimits:
     return RateLimits(found.velocity, found.acceleration, JERK_SHARE * found.acceleration)
 
 
-def planned(folder: Path, per_family: int) -> Iterator[Case]:
-    """Paths of ``plan()`` for MotionBenchMaker problems, so many of each family and arm."""
+def planned_files(folder: Path, per_family: int) -> list[tuple[str, str]]:
+    """Arms and MotionBenchMaker problems, so many of each family and arm."""
+    found = []
     for arm in ARMS:
-        home = folder / f"mbm_{arm}"
-        for family in sorted((home / "problems").iterdir()):
+        for family in sorted((folder / f"mbm_{arm}" / "problems").iterdir()):
             files = sorted(family.glob("scene*.yaml"))
-            for file in files[:: max(1, len(files) // per_family)][:per_family]:
-                problem = load_motion_bench_maker(file, robot=home / f"{arm}.urdf")
-                found = plan(problem, seed=1, seconds=5.0)
-                if found.path is not None:
-                    yield Case("planned", arm, found.path, problem.world, limits_of(arm))
+            found += [(arm, str(file)) for file in files[:: max(1, len(files) // per_family)][:per_family]]
+    return found
 
 
-def lines(count: int) -> Iterator[Case]:
+def planned(arm: str, file: str) -> list[Case]:
+    """The path of ``plan()`` for a MotionBenchMaker problem; none if it finds none."""
+    problem = load_motion_bench_maker(file, robot=Path(file).parents[2] / f"{arm}.urdf")
+    found = plan(problem, seed=1, seconds=20.0)
+    return [] if found.path is None else [Case("planned", arm, found.path, problem.world, limits_of(arm))]
+
+
+def lines(arm: str, part: int, count: int) -> list[Case]:
     """Straight lines of the tip, of 27 to 500 points, from random postures."""
-    rng, made = np.random.default_rng(11), 0
-    worlds = {arm: World(load_robot(arm)) for arm in ARMS}
-    while made < count:
-        arm = ARMS[made % 2]
-        robot, world = worlds[arm].robot, worlds[arm]
-        low, high = robot.finite_range()
+    rng, world, made = np.random.default_rng([11, part]), World(load_robot(arm)), list[Case]()
+    low, high = world.robot.finite_range()
+    while len(made) < count:
         start = rng.uniform(0.7 * low + 0.3 * high, 0.3 * low + 0.7 * high)
-        rows = _line(robot, start, rng, LINE_POINTS[made // 2 % len(LINE_POINTS)])
-        if rows is not None and not JointPath.of(robot, rows).violations(world):
-            made += 1
-            yield Case("line of the tip", arm, JointPath.of(robot, rows), world, limits_of(arm))
+        rows = _line(world.robot, start, rng, LINE_POINTS[len(made) % len(LINE_POINTS)])
+        if rows is not None and not JointPath.of(world.robot, rows).violations(world):
+            made.append(Case("line of the tip", arm, JointPath.of(world.robot, rows), world, limits_of(arm)))
+    return made
 
 
 def _line(robot: Robot, start: Matrix, rng: np.random.Generator, points: int) -> Matrix | None:
@@ -82,16 +82,12 @@ def _line(robot: Robot, start: Matrix, rng: np.random.Generator, points: int) ->
     return found.q if found.found and not found.jumps else None
 
 
-def single_joint_moves(count: int) -> Iterator[Case]:
+def single_joint_moves(arm: str, part: int, count: int) -> list[Case]:
     """Three to ten moves of one joint each."""
-    rng = np.random.default_rng(12)
-    worlds = {arm: World(load_robot(arm)) for arm in ARMS}
-    made = 0
-    while made < count:
-        arm = ARMS[made % 2]
-        world = worlds[arm]
-        robot = world.robot
-        low, high = robot.finite_range()
+    rng, world, made = np.random.default_rng([12, part]), World(load_robot(arm)), list[Case]()
+    robot = world.robot
+    low, high = robot.finite_range()
+    while len(made) < count:
         rows = [rng.uniform(0.6 * low + 0.4 * high, 0.4 * low + 0.6 * high)]
         for _ in range(int(rng.integers(3, 11))):
             joint = int(rng.integers(robot.dof))
@@ -99,5 +95,5 @@ def single_joint_moves(count: int) -> Iterator[Case]:
             rows[-1][joint] = rng.uniform(0.7 * low[joint] + 0.3 * high[joint], 0.3 * low[joint] + 0.7 * high[joint])
         path = JointPath.of(robot, np.array(rows))
         if not path.violations(world):
-            made += 1
-            yield Case("single-joint moves", arm, path, world, limits_of(arm))
+            made.append(Case("single-joint moves", arm, path, world, limits_of(arm)))
+    return made
