@@ -38,7 +38,8 @@ def blended(
 
     None where no such motion is faster than ``slowest`` [s], or none is free.
     """
-    rows = vertices(corners[spaced(corners, MERGED_SHARE * blend)])
+    kept = spaced(corners, MERGED_SHARE * blend)
+    rows = corners if len(kept) == len(corners) else vertices(corners[kept])
     along = np.concatenate([np.zeros(1), np.cumsum(np.linalg.norm(np.diff(rows, axis=0), axis=1))])
     radii, room = first_radii(rows, blend), (DEVIATION_SHARE - MERGED_SHARE) * blend
     for _ in range(MAX_ROUNDS):

@@ -1,0 +1,160 @@
+"""What the built wheel holds, how long its installation takes, and what importing it costs.
+
+Usage: ``python bench/install/wheel_report.py [--wheel FILE] [--out bench/reports/wheel.md]``; without a wheel it makes
+one with all kernels, some minutes. The installation goes to a fresh environment, from pip's own cache: run it twice,
+and the second run is what the page should tell of. For Linux.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from zipfile import ZipFile
+
+from bench.shared.pages import add_out
+from rrtik_bench.report.machine import versions
+from rrtik_bench.report.page import Report
+
+ROOT = Path(__file__).resolve().parents[2]
+ROUNDS = 5
+COMPILED = {".so", ".o", ".a", ".dylib", ".pyd", ".nbc", ".nbi"}
+IMPORTS = {
+    "`rrtik_ompl`": "import rrtik_ompl",
+    "what `plan()` needs": "import rrtik_ompl as r; (r.plan, r.Problem, r.World, r.load_robot)",
+    "and problem files": "import rrtik_ompl as r; (r.plan, r.Problem, r.World, r.load_robot, r.load_problem)",
+    "pinocchio, coal, llvmlite and OMPL alone": "import pinocchio, coal, llvmlite.binding, ompl.base",
+}
+# the peak of the process alone: ru_maxrss would be that of the process it came from, if that was larger
+MEASURE = (
+    "; import resource as _r; _u = _r.getrusage(_r.RUSAGE_SELF)"
+    "; _m = [line.split()[1] for line in open('/proc/self/status') if line.startswith('VmHWM')]"
+    "; print(_u.ru_utime + _u.ru_stime, int(_m[0]) / 1024)"
+)
+FIRST_COMMAND = (
+    "plan",
+    "titan4_sdu",
+    "--seed",
+    "1",
+    "--out",
+    "titan4_sdu.json",
+    "--html",
+    "titan4_sdu.html",
+)  # of README
+
+
+def main() -> int:
+    """Write the page."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--wheel", type=Path, help="a wheel that was built already")
+    add_out(parser, "wheel.md")
+    given = parser.parse_args()
+    report = Report("The wheel", "python bench/install/wheel_report.py")
+    report.intro = (
+        f"{versions('numpy', 'llvmlite')}. Times are processor times of all processes together; imports the least of "
+        f"{ROUNDS}, memory the most that the process held."
+    )
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        wheel = given.wheel or built(folder)
+        contents(report, wheel)
+        python = installed(report, wheel, folder / "fresh")
+        imports(report, python)
+        first_command(report, python, folder)
+    return report.finish(given.out)
+
+
+def built(folder: Path) -> Path:
+    """Make the wheel of this checkout with its kernels."""
+    command = [sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "--quiet", "--no-deps"]
+    run([*command, "--wheel-dir", str(folder), str(ROOT)], RRTIK_KERNELS="1")
+    (wheel,) = folder.glob("rrtik_ompl-*.whl")
+    return wheel
+
+
+def contents(report: Report, wheel: Path) -> None:
+    """What is in it, by kind; bitcode by triple."""
+    with ZipFile(wheel) as archive:
+        members = [item for item in archive.infolist() if not item.is_dir()]
+    sizes: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
+    for item in members:
+        kind = Path(item.filename).suffix or "none"
+        sizes[kind] += item.compress_size
+        counts[kind] += 1
+    rows = [[kind, str(counts[kind]), f"{size / 1e6:.2f}"] for kind, size in sizes.most_common(12)]
+    code = Counter(str(Path(item.filename).parent) for item in members if item.filename.endswith((".bc", ".bc.xz")))
+    universal = wheel.name.endswith("py3-none-any.whl")
+    report.bar("one wheel for all machines", "py3-none-any", wheel.name, universal)
+    compiled = sum(counts[kind] for kind in COMPILED)
+    report.bar("machine code in it", "none", f"{compiled} files", compiled == 0)
+    text = f"`{wheel.name}`, {wheel.stat().st_size / 1e6:.1f} MB."
+    report.table("Contents", ("ending", "files", "compressed [MB]"), rows, text=text)
+    if code:
+        report.table("Bitcode", ("folder", "libraries"), [[where, str(count)] for where, count in sorted(code.items())])
+
+
+def installed(report: Report, wheel: Path, home: Path) -> Path:
+    """Install it in a fresh environment; its Python."""
+    run([sys.executable, "-m", "venv", str(home)])
+    python = home / "bin" / "python"
+    spent = run([str(python), "-m", "pip", "--disable-pip-version-check", "install", "--quiet", str(wheel)])
+    report.bar("installation, dependencies cached", "<= 20 s", f"{spent:.1f} s of processor time", spent <= 20.0)
+    (package,) = home.glob("lib/python*/site-packages/rrtik_ompl")
+    made = sum(file.suffix in COMPILED for file in package.rglob("*"))
+    report.bar("files compiled by the installation", "none", str(made), made == 0)
+    return python
+
+
+def imports(report: Report, python: Path) -> None:
+    """Time and memory of imports, in fresh processes."""
+    rows = []
+    for name, line in {"Python alone": "pass", **IMPORTS}.items():
+        found = [measured(python, line) for _ in range(ROUNDS)]
+        rows.append((name, min(time for time, _ in found), min(memory for _, memory in found)))
+    bare = rows[0][1]
+    _, spent, memory = rows[2]
+    report.bar("import of what plan() needs", "<= 0.25 s", f"{spent - bare:.2f} s", spent - bare <= 0.25)
+    report.bar("memory of what plan() needs", "<= 135 MB", f"{memory:.0f} MB", memory <= 135.0)
+    cells = [[name, f"{time - bare:.2f}", f"{held:.0f}"] for name, time, held in rows]
+    report.table("Imports", ("", "seconds more than Python alone", "memory [MB]"), cells)
+
+
+def first_command(report: Report, python: Path, folder: Path) -> None:
+    """README's first command, with an empty cache; whether it compiles a kernel, and how large its page is."""
+    cache, before = folder / "cache", resource.getrusage(resource.RUSAGE_CHILDREN)
+    command = [str(python.with_name("rrtik")), *FIRST_COMMAND]
+    environment = {**os.environ, "XDG_CACHE_HOME": str(cache)}
+    done = subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, check=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    compiled = [line for line in done.stderr.splitlines() if "compiling" in line]
+    said = "; ".join(compiled) or f"none; {spent:.1f} s of processor time"
+    report.bar("kernels that README's first command compiles", "none", said, not compiled)
+    size = (folder / "titan4_sdu.html").stat().st_size / 1e6
+    report.bar("the page that it writes", "<= 1.25 MB", f"{size:.2f} MB", size <= 1.25)
+
+
+def measured(python: Path, line: str) -> tuple[float, float]:
+    """Processor time [s] and memory [MB] of a process that runs a line."""
+    done = subprocess.run([str(python), "-c", line + MEASURE], capture_output=True, text=True, check=True)
+    time, memory = done.stdout.split()
+    return float(time), float(memory)
+
+
+def run(command: Sequence[str], **environment: str) -> float:
+    """Run a command to its end; its processor time [s]."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(command, check=True, env={**os.environ, **environment})
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
