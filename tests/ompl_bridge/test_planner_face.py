@@ -126,7 +126,16 @@ def test_options_are_set_by_texts_and_refused_as_by_the_constructor() -> None:
     assert joints.options.staying
 
 
-def test_the_log_of_a_benchmark_has_options_graphs_and_progress(tmp_path: Path) -> None:
+def test_notes_are_taken_of_a_benchmark_of_ompl_only() -> None:
+    for wrong in ("log.txt", None, [[1, 2]]):
+        with pytest.raises(InputError, match=r"benchmark: expected an ompl\.tools\.Benchmark"):
+            rrtik.BenchmarkNotes(wrong)
+
+
+def test_the_log_of_a_benchmark_has_options_graphs_and_progress(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # OMPL's Benchmark writes a console file where it runs
     setup = small_problem()
     si = setup.getSpaceInformation()
     benchmark = ot.Benchmark(setup, "notes")

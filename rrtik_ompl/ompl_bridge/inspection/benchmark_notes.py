@@ -8,7 +8,7 @@ from itertools import pairwise
 from ompl import base as ob
 from ompl import tools as ot
 
-from rrtik_ompl.errors import PlannerError
+from rrtik_ompl.errors import InputError, PlannerError
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
 
 PROGRESS = ("best cost REAL", "time REAL")  # sorted, as OMPL writes the values of a row
@@ -25,6 +25,9 @@ class BenchmarkNotes:
     Args:
         benchmark: Its event after a run is taken; the planners are added to it as objects, not by allocators.
 
+    Raises:
+        InputError: If ``benchmark`` is none of OMPL's.
+
     Example:
         >>> notes = rrtik.BenchmarkNotes(benchmark)  # doctest: +SKIP
         >>> benchmark.benchmark(request)  # doctest: +SKIP
@@ -33,6 +36,8 @@ class BenchmarkNotes:
     """
 
     def __init__(self, benchmark: ot.Benchmark) -> None:
+        if not isinstance(benchmark, ot.Benchmark):
+            raise InputError(f"benchmark: expected an ompl.tools.Benchmark, got {type(benchmark).__name__}")
         self._benchmark = benchmark
         self._heard: list[_Run | None] = []
         heard = self._heard  # an event that held the notes would hold the benchmark, which holds the event
