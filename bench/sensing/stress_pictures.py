@@ -1,0 +1,232 @@
+"""Pictures of printed markers under everything that goes wrong with a camera, with the true pose.
+
+This renderer shares nothing with `sensing.cameras.synthetic_camera`: rays are traced to a sheet that may be bent, light
+falls on it, the lens blurs light, and the sensor codes it by sRGB's curve (IEC 61966-2-1). 25 rays a photosite.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.sensing.markers.detection import marker_cells
+
+Light = NDArray[np.float32]
+
+SIDE = 0.08  # of a marker [m]
+INK, PAPER, WALL = 0.04, 0.80, 0.35  # share of the light that comes back
+RAYS = 5  # along a side of a photosite
+FINE = 40  # samples along a side of a cell
+LENS_STEPS = 12  # of the fixed point that takes the lens out
+
+
+@dataclass(frozen=True, slots=True)
+class Trouble:
+    """What is wrong with a picture; lengths in shares of the marker's side where nothing else is said.
+
+    Attributes:
+        linear: The sensor does not code light by a curve.
+        noise: Of the coded values, of full scale.
+        blur: Standard deviation of the lens's spot [pixels].
+        motion: Length of a blur along a random direction [pixels].
+        falling: Share of the light that is lost across the marker.
+        shadow: Light in a shadow with a hard edge through the marker; 1 for none.
+        spot: Light of a mirrored lamp, of full scale.
+        haze: Transmission per metre.
+        snow: Number of particles before the marker.
+        strip: Width of what hangs over the marker, as a range.
+        corner: Side of what hides one corner.
+        light: Of the scene; 1 makes white paper 80 % of full scale.
+        jpeg: Quality of a compression.
+        ink: How far black has spread [m].
+        bent: Radius of the sheet [m]; 0: flat.
+    """
+
+    linear: bool = False
+    noise: float = 0.008
+    blur: float = 0.6
+    motion: tuple[float, float] = (0.0, 0.0)
+    falling: float = 0.0
+    shadow: float = 1.0
+    spot: float = 0.0
+    haze: float = 1.0
+    snow: int = 0
+    strip: tuple[float, float] = (0.0, 0.0)
+    corner: float = 0.0
+    light: float = 1.0
+    jpeg: int | None = None
+    ink: float = 0.0
+    bent: float = 0.0
+
+
+def taken(
+    camera: Camera,
+    markers: list[tuple[Any, int]],
+    dictionary: str,
+    trouble: Trouble,
+    rng: np.random.Generator,
+    *,
+    side: float = SIDE,
+) -> NDArray[np.uint8]:
+    """The grey picture of markers at ``T_camera_marker``, each with its number. Shape (height, width)."""
+    light = np.full((camera.height, camera.width), WALL, dtype=np.float32)
+    light += _blurred(rng.normal(0.0, 1.5, light.shape).astype(np.float32), 12.0)
+    light = np.clip(light, 0.05, 0.9)
+    for T, number in markers:
+        _draw(light, camera, T, _sheet(dictionary, number, side, trouble.ink), side, trouble, rng)
+    light *= np.float32(trouble.light)
+    if trouble.haze < 1.0:
+        passed = np.float32(trouble.haze ** np.linalg.norm(markers[0][0].translation))
+        light = passed * light + (1.0 - passed) * np.float32(0.45)
+    for _ in range(trouble.snow):
+        x, y, size = rng.uniform([0, 0, 0.8], [camera.width, camera.height, 3.0])
+        _add_spot(light, x, y, size, rng.uniform(0.2, 0.8))
+    light = _blurred(light, trouble.blur)
+    if trouble.motion[1] > 0.0:
+        light = _moved(light, rng.uniform(*trouble.motion), rng.uniform(0.0, np.pi))
+    return _coded(light, trouble, rng)
+
+
+def _blurred(light: Light, spot: float) -> Light:
+    return np.asarray(cv2.GaussianBlur(light, (0, 0), spot), dtype=np.float32)
+
+
+def _sheet(dictionary: str, number: int, side: float, ink: float) -> Light:
+    """Reflectance of a marker and its rim of one cell, `FINE` samples a cell."""
+    cells = np.pad(marker_cells(dictionary, number), 1, constant_values=255)
+    fine = np.kron(cells, np.ones((FINE, FINE), dtype=np.uint8))
+    if ink > 0.0:
+        reach = round(ink / (side / (len(cells) - 2)) * FINE)
+        round_spot = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+        fine = np.asarray(cv2.erode(fine, round_spot), dtype=np.uint8)
+    return (INK + (PAPER - INK) * fine / np.float32(255.0)).astype(np.float32)
+
+
+def _draw(
+    light: Light, camera: Camera, T: Any, sheet: Light, side: float, trouble: Trouble, rng: np.random.Generator
+) -> None:
+    cells = len(sheet) // FINE
+    half = 0.5 * side * cells / (cells - 2)
+    outline = np.array([[x, y, 0.0] for x in (-half, half) for y in (-half, half)]) @ T.rotation.T + T.translation
+    pixels = camera.project(outline)
+    low = np.clip(np.floor(pixels.min(axis=0)).astype(int) - 4, 0, [camera.width, camera.height])
+    high = np.clip(np.ceil(pixels.max(axis=0)).astype(int) + 5, 0, [camera.width, camera.height])
+    if (high <= low).any():
+        return
+    within = (np.arange(RAYS) + 0.5) / RAYS - 0.5
+    u, v = np.meshgrid((np.arange(low[0], high[0])[:, None] + within).ravel(),
+                       (np.arange(low[1], high[1])[:, None] + within).ravel())  # fmt: skip
+    x, y = _on_sheet(_undistorted(camera, u, v), T, trouble.bent)
+    hit = (np.abs(x) < half) & (np.abs(y) < half)
+    column, row = (x + half) / (2 * half) * len(sheet), (half - y) / (2 * half) * len(sheet)
+    at = (column - 0.5).astype(np.float32), (row - 0.5).astype(np.float32)
+    plain = np.asarray(cv2.remap(sheet, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), dtype=np.float32)
+    grey = _lit(plain, x / side, y / side, trouble, rng)
+    shape = (high[1] - low[1], RAYS, high[0] - low[0], RAYS)
+    share = hit.reshape(shape).mean(axis=(1, 3), dtype=np.float32)
+    seen = np.where(hit, grey, 0.0).reshape(shape).mean(axis=(1, 3), dtype=np.float32)
+    place = light[low[1] : high[1], low[0] : high[0]]
+    place[:] = seen + (1.0 - share) * place
+
+
+def _undistorted(camera: Camera, u: Matrix, v: Matrix) -> tuple[Matrix, Matrix]:
+    """Directions of pixels through Brown's lens, by a fixed point."""
+    k1, k2, p1, p2, k3 = camera.distortion
+    x0, y0 = (u - camera.matrix[0, 2]) / camera.matrix[0, 0], (v - camera.matrix[1, 2]) / camera.matrix[1, 1]
+    x, y = x0, y0
+    for _ in range(LENS_STEPS if camera.distortion.any() else 0):
+        r2 = x * x + y * y
+        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        x, y = (
+            (x0 - 2.0 * p1 * x * y - p2 * (r2 + 2.0 * x * x)) / radial,
+            (y0 - p1 * (r2 + 2.0 * y * y) - 2.0 * p2 * x * y) / radial,
+        )
+    return x, y
+
+
+def _on_sheet(directions: tuple[Matrix, Matrix], T: Any, radius: float) -> tuple[Matrix, Matrix]:
+    """Where rays meet the sheet, in its own flat coordinates [m]; it is bent away from the camera about its y axis."""
+    turn, origin = T.rotation.T, -T.rotation.T @ T.translation
+    d = [turn[k, 0] * directions[0] + turn[k, 1] * directions[1] + turn[k, 2] for k in range(3)]
+    along = -origin[2] / d[2]
+    for _ in range(8 if radius else 0):
+        x = np.clip(origin[0] + along * d[0], -0.95 * radius, 0.95 * radius)
+        along = (-(radius - np.sqrt(radius**2 - x**2)) - origin[2]) / d[2]
+    x, y = origin[0] + along * d[0], origin[1] + along * d[1]
+    return (radius * np.arcsin(np.clip(x / radius, -1.0, 1.0)) if radius else x), y
+
+
+def _lit(grey: Light, x: Matrix, y: Matrix, trouble: Trouble, rng: np.random.Generator) -> Light:
+    """The sheet under its light, and what hangs before it; x and y in sides of the marker."""
+    way, edge = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(-0.25, 0.25)
+    across = np.cos(way) * x + np.sin(way) * y
+    if trouble.falling:
+        grey = grey * (1.0 - trouble.falling * np.clip(across + 0.5, 0.0, 1.0)).astype(np.float32)
+    if trouble.shadow < 1.0:
+        grey = np.where(across < edge, np.float32(trouble.shadow) * grey, grey)
+    if trouble.spot:
+        a, b = rng.uniform(-0.35, 0.35, 2)
+        grey = grey + np.float32(trouble.spot) * np.exp(-((x - a) ** 2 + (y - b) ** 2) / (2 * 0.12**2)).astype(
+            np.float32
+        )
+    if trouble.strip[1]:
+        grey = np.where(np.abs(across - edge) < 0.5 * rng.uniform(*trouble.strip), np.float32(0.5), grey)
+    if trouble.corner:
+        a, b = rng.choice([-0.5, 0.5], 2)
+        hidden = (np.abs(x - a) < trouble.corner) & (np.abs(y - b) < trouble.corner)
+        grey = np.where(hidden, np.float32(rng.choice([0.1, 0.6])), grey)
+    return grey.astype(np.float32)
+
+
+def _add_spot(light: Light, x: float, y: float, size: float, strength: float) -> None:
+    reach = int(3 * size) + 1
+    left, top = max(int(x) - reach, 0), max(int(y) - reach, 0)
+    part = light[top : int(y) + reach + 1, left : int(x) + reach + 1]
+    v, u = np.mgrid[top : top + part.shape[0], left : left + part.shape[1]]
+    cover = np.float32(strength) * np.exp(-((u - x) ** 2 + (v - y) ** 2) / (2 * size**2)).astype(np.float32)
+    part[:] = (1.0 - cover) * part + cover * np.float32(0.9)
+
+
+def _moved(light: Light, length: float, way: float) -> Light:
+    reach = int(np.ceil(length / 2)) + 1
+    kernel, fine = np.zeros((2 * reach + 1, 2 * reach + 1), dtype=np.float32), 200
+    for s in np.linspace(-0.5, 0.5, fine):
+        a, b = reach + s * length * np.cos(way), reach + s * length * np.sin(way)
+        i, j = int(b), int(a)
+        for di, dj in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            kernel[i + di, j + dj] += abs(1 - di - (b - i)) * abs(1 - dj - (a - j)) / fine
+    return np.asarray(cv2.filter2D(light, cv2.CV_32F, kernel), dtype=np.float32)
+
+
+def _coded(light: Light, trouble: Trouble, rng: np.random.Generator) -> NDArray[np.uint8]:
+    value = np.clip(light.astype(np.float64), 0.0, 1.0)
+    if not trouble.linear:
+        value = np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1.0 / 2.4) - 0.055)
+    value = value + trouble.noise * rng.standard_normal(value.shape)
+    taken: NDArray[np.uint8] = np.clip(np.rint(255.0 * value), 0, 255).astype(np.uint8)
+    if trouble.jpeg is None:
+        return taken
+    packed = cv2.imencode(".jpg", taken, [cv2.IMWRITE_JPEG_QUALITY, trouble.jpeg])[1]
+    return np.asarray(cv2.imdecode(packed, cv2.IMREAD_GRAYSCALE), dtype=np.uint8)
+
+
+def facing(rng: np.random.Generator, camera: Camera, distance: tuple[float, float], tilt: tuple[float, float]) -> Any:
+    """``T_camera_marker`` at a random place in the picture; distances [m], log-uniform, and tilts [deg] from ranges."""
+    while True:
+        far = float(np.exp(rng.uniform(np.log(distance[0]), np.log(distance[1]))))
+        bent, way, roll = np.deg2rad(rng.uniform(*tilt)), rng.uniform(0.0, 2 * np.pi), rng.uniform(-np.pi, np.pi)
+        spot = rng.uniform([-0.3, -0.22], [0.3, 0.22]) * far
+        tipped = pin.exp3(bent * np.array([np.cos(way), np.sin(way), 0.0]))
+        T = pin.SE3(tipped @ pin.exp3(np.array([0.0, 0.0, roll])) @ np.diag([1.0, -1.0, -1.0]), np.array([*spot, far]))
+        reach = 0.5 * SIDE * 1.4
+        outline = np.array([[x, y, 0.0] for x in (-reach, reach) for y in (-reach, reach)])
+        pixels = camera.project(outline @ T.rotation.T + T.translation)
+        if (pixels > 4).all() and (pixels < np.array([camera.width, camera.height]) - 5).all():
+            return T
