@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, published_camera
+from rrtik_ompl.sensing.cameras.synthetic_camera import Print, clean_picture, marker_print, published_camera
 from rrtik_ompl.sensing.cameras.tone import coded, light_of
 from rrtik_ompl.sensing.markers.corner_pose import pose_of_square, square_corners
 from rrtik_ompl.sensing.markers.detection import find_markers, marker_cells
@@ -57,6 +57,31 @@ def test_poses_of_coded_and_linear_pictures_are_as_good_as_they_say(tone, how):
         squares.append(float(away @ np.linalg.solve(found.covariance[:3, :3], away)))
         assert marker.likeness > 0.99
     assert max(squares) < 14.2  # 0.3 % of honest ones are larger
+
+
+def test_ink_that_has_spread_is_taken_out():
+    T = facing(*PLACES[0])
+    sheet = marker_print(marker_cells("4x4_50", 7), SIDE)
+    fine = np.kron(sheet.cells, np.ones((20, 20), dtype=np.uint8))
+    spread = cv2.erode(fine, np.ones((3, 3), dtype=np.uint8))  # by 0.7 mm, which moves corners by as many pixels
+    light = cv2.GaussianBlur(clean_picture(CAMERA, [(T, Print(spread, sheet.cell / 20))], rays=6), (0, 0), 0.6)
+    gray = np.rint(255.0 * coded(light, 1.0)).astype(np.uint8)
+    (marker,) = find_markers(gray, "4x4_50")
+    found = pose_of_square(CAMERA, marker.corners, SIDE, spread=marker.spread)
+    away = found.T_camera_object.translation - T.translation
+    assert np.linalg.norm(away) < 1e-3
+    assert away @ np.linalg.solve(found.covariance[:3, :3], away) < 14.2
+
+
+def test_a_marker_in_haze_is_found_at_the_second_try():
+    T = facing(*PLACES[1])
+    clean = clean_picture(CAMERA, [(T, marker_print(marker_cells("4x4_50", 7), SIDE))], rays=4)
+    light = 0.03 * cv2.GaussianBlur(clean, (0, 0), 0.6) + np.float32(0.4)
+    noisy = light + np.float32(0.003) * np.random.default_rng(0).standard_normal(light.shape)
+    (marker,) = find_markers(np.rint(255.0 * noisy).astype(np.uint8), "4x4_50")
+    true = CAMERA.project(square_corners(SIDE) @ T.rotation.T + T.translation)
+    assert marker.number == 7
+    assert np.abs(marker.corners - true).max() < 0.5
 
 
 def test_the_tone_of_a_picture_is_found():

@@ -27,12 +27,12 @@ _MAX_CORNER_SHIFT = 0.25  # of a side; inner edges are sometimes found in place 
 _CELL_PIXELS = (3, 16)  # of a cell in the ideal picture; near its size in the camera's
 _RIM_CELLS = 0.5  # width of the white rim that is used; farther out blur mixes in the background
 _DEFAULT_SPOT = 0.8  # standard deviation of a sharp picture's blur: lens, photosite, interpolation [pixels]
-_SPOTS = _DEFAULT_SPOT * 1.5 ** np.arange(-2, 3)  # that are tried
+_SPOTS = _DEFAULT_SPOT * 1.5 ** np.arange(-2, 5)  # that are tried
 _SPOT_TOLERANCE = 0.1  # relative difference below which no second alignment is made
 _TONE_TOLERANCE = 0.05
 _ROUNDS = 3  # of alignment, each with what was learned of the picture in the one before
 _LINEAR_BELOW = 0.35  # a smaller tone is taken for that of a linear camera, which coarse sampling makes look larger
-_EVERY = 2  # of the ideal picture's samples in a row are looked at where the way that light is shown is searched for
+_FEW = 48  # samples along a side are enough where the way that light is shown is searched for
 _STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 1e-6)
 
 
@@ -83,7 +83,8 @@ def aligned_corners(
         return Aligned(corners, 0.0, None, np.nan)
     if fit.likeness < MIN_LIKENESS:
         return Aligned(corners, fit.likeness, None, fit.tone)
-    return Aligned(better + low, fit.likeness, corner_spread(fit.model, fit.seen, square, better), fit.tone)
+    corners, spread = corner_spread(fit.model, fit.seen, square, better)
+    return Aligned(corners + low, fit.likeness, spread, fit.tone)
 
 
 class _Fit(NamedTuple):
@@ -102,7 +103,7 @@ def _aligned(ideal: Pixels, piece: Pixels, homography: Pixels, tone: float | Non
     fits = [_fit(ideal, piece, homography, (_DEFAULT_SPOT, start)) for start in starts]
     best, before = max(fits, key=lambda fit: fit.likeness), _DEFAULT_SPOT
     for number in range(_ROUNDS):
-        spot, curve = _spot_and_tone(ideal, best.seen, _spread(best.homography, ideal.shape), tones)
+        spot, curve = _spot_and_tone(ideal, best.seen, _spread(best.homography, ideal.shape), best.tone, tones)
         curve = LINEAR if tone is None and abs(curve) < _LINEAR_BELOW else curve
         if number > 1 and abs(spot - before) < _SPOT_TOLERANCE * before and abs(curve - best.tone) < _TONE_TOLERANCE:
             break
@@ -129,27 +130,35 @@ def _warped(piece: Pixels, homography: Pixels, shape: tuple[int, ...]) -> Pixels
     return np.asarray(cv2.warpPerspective(piece, homography, shape[::-1], flags=flags), dtype=np.float32)
 
 
-def _spot_and_tone(ideal: Pixels, seen: Pixels, spread: Matrix, tones: tuple[float, ...]) -> tuple[float, float]:
-    """Blur [pixels] and tone with which the ideal marker is most like the picture, at every second sample."""
-    few, table = seen[::_EVERY, ::_EVERY], np.empty((len(tones), len(_SPOTS)))
+def _spot_and_tone(
+    ideal: Pixels, seen: Pixels, spread: Matrix, tone: float, tones: tuple[float, ...]
+) -> tuple[float, float]:
+    """Blur [pixels] and tone with which the ideal marker is most like the picture: first the one, then the other."""
+    every = max(len(seen) // _FEW, 1)
+    few = seen[::every, ::every]
     middle = few.ravel() - few.mean()
-    for k, spot in enumerate(_SPOTS):
-        light = _blurred(ideal, spot**2 * spread)[::_EVERY, ::_EVERY]
-        for t, tone in enumerate(tones):
-            model = shown(light, few, tone).ravel()
-            model -= model.mean()
-            table[t, k] = model @ middle / np.sqrt(model @ model + 1e-9)
-    t, k = divmod(int(table.argmax()), len(_SPOTS))
-    found = float(_SPOTS[0] * (_SPOTS[1] / _SPOTS[0]) ** _peak(table[t]))
+
+    def likeness(light: Pixels, curve: float) -> float:
+        model = shown(light, few, curve).ravel()
+        model -= model.mean()
+        return float(model @ middle / np.sqrt(model @ model + 1e-9))
+
+    def blurred(spot: float) -> Pixels:
+        return _blurred(ideal, spot**2 * spread)[::every, ::every]
+
+    ratio = float(_SPOTS[1] / _SPOTS[0])
+    spot = float(_SPOTS[0] * ratio ** _peak([likeness(blurred(each), tone) for each in _SPOTS]))
     if len(tones) == 1:
-        return found, tones[0]
-    return found, float(np.clip(tones[0] + (tones[1] - tones[0]) * _peak(table[:, k]), tones[0], tones[-1]))
+        return spot, tones[0]
+    light = blurred(spot)
+    place = _peak([likeness(light, each) for each in tones])
+    return spot, float(np.clip(tones[0] + (tones[1] - tones[0]) * place, tones[0], tones[-1]))
 
 
-def _peak(values: NDArray[np.floating[Any]]) -> float:
+def _peak(values: list[float]) -> float:
     """Where between the places of some values the parabola through the largest and its neighbours is largest."""
-    best = int(np.clip(values.argmax(), 1, len(values) - 2))
-    low, middle, high = (float(value) for value in values[best - 1 : best + 2])
+    best = int(np.clip(np.argmax(values), 1, len(values) - 2))
+    low, middle, high = values[best - 1 : best + 2]
     bend = low - 2.0 * middle + high
     return best + (float(np.clip(0.5 * (low - high) / bend, -1.0, 1.0)) if bend < 0.0 else 0.0)
 

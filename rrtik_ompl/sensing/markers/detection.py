@@ -20,6 +20,11 @@ DICTIONARIES = {
     "aruco_original": "DICT_ARUCO_ORIGINAL",
     "aruco_mip_36h12": "DICT_ARUCO_MIP_36h12",
 }
+_ENLARGED = 2.0  # for the second try
+_CALM = 1.0  # standard deviation of the blur against noise there [pixels of the enlarged picture]
+_AROUND = 81  # side of the window in which light and contrast are made even there
+_FAINT = 1.5  # grey values: less contrast is noise
+_CONTRAST = 60.0  # grey values for a standard deviation of the window
 MIN_OUTLINE_SHARE = 0.01  # of a marker's outline, of the picture's longer side; OpenCV's own 0.03 drops distant ones
 
 
@@ -75,6 +80,8 @@ def find_markers(
         tone: Of the picture (`cameras.tone`); None: for each marker the one with which it fits best.
     """
     corners, numbers, _ = _detector(dictionary).detectMarkers(gray)
+    if numbers is None:
+        corners, numbers = _second_try(gray, dictionary)
     found: list[SeenMarker] = []
     if numbers is None:
         return ()
@@ -86,6 +93,17 @@ def find_markers(
         fit = aligned_corners(gray, rough, marker_cells(dictionary, number), tone)
         found.append(SeenMarker(dictionary, number, frozen(fit.corners), fit.likeness, fit.spread, fit.tone))
     return tuple(found)
+
+
+def _second_try(gray: NDArray[np.uint8], dictionary: str) -> tuple[Any, Any]:
+    """Corners and numbers of what is too faint, too blurred or too small at first: in an enlarged, evened picture."""
+    large = cv2.resize(gray, None, fx=_ENLARGED, fy=_ENLARGED, interpolation=cv2.INTER_CUBIC).astype(np.float32)
+    calm = cv2.GaussianBlur(large, (0, 0), _CALM)
+    around = cv2.boxFilter(calm, -1, (_AROUND, _AROUND))
+    spread = np.sqrt(np.maximum(cv2.boxFilter(calm * calm, -1, (_AROUND, _AROUND)) - around * around, _FAINT**2))
+    even = np.clip(128.0 + _CONTRAST * (calm - around) / spread, 0.0, 255.0).astype(np.uint8)
+    corners, numbers, _ = _detector(dictionary).detectMarkers(even)
+    return [(each + 0.5) / _ENLARGED - 0.5 for each in corners], numbers
 
 
 def dictionaries_seen(gray: NDArray[np.uint8]) -> tuple[str, ...]:

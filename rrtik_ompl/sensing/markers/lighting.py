@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,10 +26,9 @@ def shown(ideal: Pixels, seen: Pixels, tone: float) -> Pixels:
         tone: Of the picture.
     """
     height, width = ideal.shape
-    across = np.tile(np.linspace(-1.0, 1.0, width, dtype=np.float32), height)
-    down = np.repeat(np.linspace(-1.0, 1.0, height, dtype=np.float32), width)
     share = ideal.ravel() / np.float32(255.0)
-    columns = np.stack([np.ones_like(share), across, down, share, share * across, share * down])
+    even = _even(height, width)
+    columns = np.concatenate([even, share * even])
     whole = seen.ravel() < CUT_OFF
     light = light_of(tone)[np.clip(np.rint(seen.ravel()), 0, 255).astype(np.intp)]
     inside = columns * whole
@@ -35,3 +36,12 @@ def shown(ideal: Pixels, seen: Pixels, tone: float) -> Pixels:
     weights = np.linalg.solve(normal, (inside @ light).astype(np.float64))
     made = weights.astype(np.float32) @ columns
     return coded_values(made, tone).reshape(ideal.shape)
+
+
+@lru_cache(maxsize=64)
+def _even(height: int, width: int) -> Pixels:
+    """One, and what changes evenly across and down. Shape (3, height * width)."""
+    down, across = np.mgrid[-1.0 : 1.0 : height * 1j, -1.0 : 1.0 : width * 1j].astype(np.float32)
+    found = np.stack([np.ones(height * width, dtype=np.float32), across.ravel(), down.ravel()])
+    found.flags.writeable = False
+    return found
