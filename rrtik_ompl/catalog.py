@@ -37,8 +37,8 @@ RobotOption: TypeAlias = (
     str | float | os.PathLike[str] | Mapping[str, object] | Sequence[object] | NDArray[np.float64] | pin.SE3 | None
 )
 
-FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh")
-FILE_KINDS = (".urdf", ".xml", ".yaml", ".yml")
+FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh", "moveit", "mjcf")
+FILE_KINDS = (".urdf", ".xml", ".mjcf", ".xacro", ".yaml", ".yml")
 PARAMETRIC = ("planar", "point2d")  # robots that a problem file describes by a group of keys of their own
 MOUNTING = ("base_pose", "tip", "padding")  # keys that stand beside that group
 
@@ -129,10 +129,11 @@ def load_robot(name: str | os.PathLike[str], **options: RobotOption) -> Robot:
     """Load a robot by name or from a file; the same call gives the same object, unless a file of it has changed.
 
     Args:
-        name: A name from `list_robots`, or the path of a URDF (``.urdf``, ``.xml``) or of a DH table (``.yaml``).
+        name: A name from `list_robots`; or the path of a URDF (``.urdf``, ``.xml``; ``.xacro`` needs the package
+            xacro), of an MJCF (``.xml``, ``.mjcf``), of a DH table (``.yaml``), or of a MoveIt configuration folder.
         **options: What the robot takes: any of them ``padding`` (see `rrtik_ompl.padded`), and ``base_pose``, ``tip``
-            and ``locked`` where they apply; a URDF ``srdf, group, joints, joint_limits, packages``; a shipped robot for
-            instance ``limits="envelope"``.
+            and ``locked`` where they apply; a URDF ``srdf, group, joints, joint_limits, packages, xacro_args``, a
+            folder also ``urdf``; a shipped robot for instance ``limits="envelope"``.
             ``base_pose`` is a ``pinocchio.SE3`` or ``{"xyz": [..], "quat_xyzw": [..]}``.
 
     Raises:
@@ -152,7 +153,8 @@ def load_robot(name: str | os.PathLike[str], **options: RobotOption) -> Robot:
     if cached is None:
         robot = recipe.make(**{option: value for option, value in given.items() if option != "padding"})
         robot = padded(robot, given["padding"]) if "padding" in given else robot
-        cached = _cache.put(key, replace(robot, source=recipe.source(given)), [recipe.target, *_paths(given)])
+        files = [recipe.target, *_paths(given), *_paths(robot.source)]
+        cached = _cache.put(key, replace(robot, source=recipe.source(given)), files)
     return cached
 
 
@@ -160,8 +162,10 @@ def robot_from_entry(entry: str | Mapping[str, Any], folder: str | os.PathLike[s
     """Robot that a problem file names under ``robot``.
 
     Args:
-        entry: A name; or ``{name: .., options}``, ``{urdf: FILE, options}``, ``{dh: FILE, options}``,
-            ``{planar: {..}}``, ``{point2d: {..}}``; the last two take ``base_pose`` beside them.
+        entry: A name; or ``{name: .., options}``, ``{urdf: FILE, options}``, ``{moveit: FOLDER, options}``,
+            ``{mjcf: FILE, options}``,
+            ``{dh: FILE, options}``, ``{planar: {..}}``, ``{point2d: {..}}``; the last two take ``base_pose`` beside
+            them.
         folder: Folder of the problem file; files are named relative to it.
 
     Raises:
@@ -169,10 +173,10 @@ def robot_from_entry(entry: str | Mapping[str, Any], folder: str | os.PathLike[s
     """
     if isinstance(entry, str):
         return load_robot(_beside(entry, folder) if Path(entry).suffix.lower() in FILE_KINDS else entry)
-    kinds = ("name", "urdf", "dh", *PARAMETRIC)
+    kinds = ("name", "moveit", "mjcf", "urdf", "dh", *PARAMETRIC)
     if not isinstance(entry, Mapping):
         raise InputError(f"robot: expected a name or one of the keys {', '.join(kinds)}")
-    found = [key for key in kinds if key in entry]
+    found = [key for key in kinds if key in entry and not (key == "urdf" and "moveit" in entry)]
     if len(found) != 1:
         raise InputError(f"robot: needs exactly one of the keys {', '.join(kinds)}; found {', '.join(found) or 'none'}")
     kind = found[0]
@@ -211,16 +215,23 @@ def _recipe(name: str | os.PathLike[str]) -> _Recipe:
         make = _load("robot", "robots", text)
         return _Recipe("name", text, make, tuple(sorted(inspect.signature(make).parameters)))
     suffix = path.suffix.lower()
-    if suffix == ".xacro":
-        raise InputError(f"{text}: xacro must be expanded first: xacro {path.name} > {path.stem}")
     if suffix in (".yaml", ".yml"):  # what reads YAML is not loaded before there is some
         from rrtik_ompl.description.dh_file import DH_OPTIONS, robot_from_dh_file
 
         return _Recipe("dh", str(path.resolve()), lambda **given: robot_from_dh_file(path, **given), DH_OPTIONS)
-    if suffix in (".urdf", ".xml"):
+    if suffix in (".xml", ".mjcf"):
+        from rrtik_ompl.description.mjcf import MJCF_OPTIONS, is_mjcf, robot_from_mjcf
+
+        if is_mjcf(path):
+            return _Recipe("mjcf", str(path.resolve()), lambda **given: robot_from_mjcf(path, **given), MJCF_OPTIONS)
+    if suffix in (".urdf", ".xml", ".xacro"):
         return _Recipe("urdf", str(path.resolve()), lambda **given: robot_from_urdf(path, **given), URDF_OPTIONS)
+    if os.path.isdir(path):
+        from rrtik_ompl.description.moveit.config import CONFIG_OPTIONS, robot_from_moveit
+
+        return _Recipe("moveit", str(path.resolve()), lambda **given: robot_from_moveit(path, **given), CONFIG_OPTIONS)
     if path.parent != Path() or os.path.exists(path):  # which takes a name of any length
-        raise InputError(f"{text}: not a robot file; expected a URDF (.urdf) or a DH table (.yaml)")
+        raise InputError(f"{text}: not a robot file; expected a URDF (.urdf, .xacro), a DH table (.yaml) or a folder")
     raise UnknownNameError("robot", text, list_robots())
 
 

@@ -19,7 +19,8 @@ class GripperJoints:
     Attributes:
         joints: Their names; what mimics them follows.
         opened, closed: Their values [rad or m] where the gripper is open and closed.
-        width: Between the fingers where it is open [m]; 0 where it is closed, in proportion in between.
+        width: How much farther the fingers are apart where it is open than where it is closed [m], in proportion in
+            between; 0 if that is not known.
 
     Example:
         >>> import rrtik_ompl as rrtik
@@ -51,6 +52,8 @@ class GripperJoints:
             InputError: If the gripper does not open so far.
         """
         wanted = finite_number(width, "width of a gripper")
+        if self.width == 0.0:
+            raise InputError("width of a gripper: how far this one opens is not known; use its states open and closed")
         if not 0.0 <= wanted <= self.width:
             raise InputError(f"width of a gripper: it opens from 0 to {self.width:g} m, got {wanted:g}")
         share = wanted / self.width

@@ -45,6 +45,13 @@ def resolve_mesh(uri: str, folder: Path | None, packages: Iterable[Path], where:
     return found.resolve()
 
 
+def package_folder(name: str, folder: Path, packages: Iterable[Path]) -> Path | None:
+    """The folder of a package: in ``packages`` or one of them, in ``folder`` or any above it; None if there is none."""
+    roots = [*packages, folder, *folder.parents]
+    found = (root if root.name == name else root / name for root in roots)
+    return next((each for each in found if name and each.is_dir()), None)
+
+
 def _in_packages(name: str, roots: Iterable[Path]) -> Iterator[Path]:
     package, _, rest = name.partition("/")
     for root in roots:

@@ -205,7 +205,8 @@ def _limits(name: str, joints: Iterable[Joint], given: Mapping[str, JointLimits]
             )
         if joint.kind == "prismatic" and not max(abs(low), abs(high)) <= LARGEST:
             raise InputError(
-                f"robot '{name}': prismatic joint '{joint.name}' needs finite limits, in metres, up to {LARGEST:g}"
+                f"robot '{name}': prismatic joint '{joint.name}' needs finite limits, in metres, up to {LARGEST:g}; "
+                "give them in the file or by joint_limits=FILE, or leave the joint out of joints=[...]"
             )
         rates = [joint.velocity if wanted.velocity is None else wanted.velocity]
         rates += [np.inf if rate is None else rate for rate in (wanted.acceleration, wanted.jerk)]

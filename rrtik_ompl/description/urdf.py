@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rrtik_ompl.description.joint_limits import merge_limits, read_joint_limits
+from rrtik_ompl.description.moveit.joint_limits import merge_limits, read_joint_limits
+from rrtik_ompl.description.moveit.srdf import Srdf, read_srdf
+from rrtik_ompl.description.moveit.srdf_gripper import srdf_gripper
 from rrtik_ompl.description.robot_build import JointLimits, build_robot
 from rrtik_ompl.description.robot_source import source_entry
-from rrtik_ompl.description.srdf import Srdf, read_srdf
 from rrtik_ompl.description.urdf_read import UrdfDescription, located, read_urdf
+from rrtik_ompl.description.xacro_text import robot_text
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.files.text import read_text
 from rrtik_ompl.robot import Robot
 
 if TYPE_CHECKING:
@@ -21,23 +23,26 @@ if TYPE_CHECKING:
 
 
 FilePath = str | os.PathLike[str]
-URDF_OPTIONS = ("base_pose", "group", "joint_limits", "joints", "locked", "packages", "srdf", "tip")
+URDF_OPTIONS = ("base_pose", "group", "joint_limits", "joints", "locked", "packages", "srdf", "tip", "xacro_args")
 
 
-def robot_from_urdf(path: FilePath, *, name: str | None = None, **options: Any) -> Robot:
+def robot_from_urdf(
+    path: FilePath, *, name: str | None = None, xacro_args: Mapping[str, object] | None = None, **options: Any
+) -> Robot:
     """Load a robot from a URDF file.
 
     Args:
-        path: The URDF (expanded, no xacro).
+        path: The URDF; one named ``.xacro`` is expanded by the package xacro.
         name: Name for messages; the URDF's own if None.
+        xacro_args: Arguments of its macros by name.
         **options: As for `robot_from_urdf_text`.
 
     Raises:
         InputError: If anything in the files or options cannot be used; one line names file, element and remedy.
     """
-    text = read_text(path)
+    text = robot_text(Path(path), package_roots(options.get("packages", ())), xacro_args)
     file = Path(path).resolve()
-    options = {"source": {"urdf": str(file)} | source_entry(options)} | options
+    options = {"source": {"urdf": str(file)} | source_entry(options | {"xacro_args": xacro_args})} | options
     return robot_from_urdf_text(text, name=name, where=str(path), folder=file.parent, **options)
 
 
@@ -73,7 +78,8 @@ def robot_from_urdf_text(
         name: Name for messages; the URDF's own if None.
         where: What error messages call the text (its file name).
         folder: Folder relative to which meshes are named.
-        srdf: SRDF file.
+        srdf: SRDF file; one named ``.xacro`` is expanded. It also describes the robot's gripper, an
+            end effector whose group has states called open and closed.
         group: Group of the SRDF whose joints are actuated; its end is the default tip.
         joints: Actuated joints, in the order wanted.
         tip: Link that goals refer to.
@@ -91,18 +97,18 @@ def robot_from_urdf_text(
     Raises:
         InputError: If anything in the text, the files or the options cannot be used.
     """
-    roots = [packages] if isinstance(packages, (str, os.PathLike)) else list(packages)
+    roots = package_roots(packages)
     home = None if folder is None else Path(folder)
-    description = read_urdf(text, where=where, folder=home, packages=[Path(root) for root in roots])
+    description = read_urdf(text, where=where, folder=home, packages=roots)
     tree = description.tree
-    semantics = Srdf(where) if srdf is None else read_srdf(read_text(srdf), str(srdf))
+    semantics = Srdf(where) if srdf is None else read_srdf(robot_text(Path(srdf), roots), str(srdf))
     if group is not None and srdf is None:
         raise InputError(f"{where}: group '{group}' needs an SRDF file; give srdf=FILE, or joints=[...] in its place")
     end = semantics.group_tip(group, tree) if group in semantics.groups and tip is None and group is not None else tip
     actuated = _actuated(description, semantics, group, joints, tip)
     from_file = {} if joint_limits is None else read_joint_limits(joint_limits, [j.name for j in tree.joints])
     with located(where):
-        return build_robot(
+        robot = build_robot(
             name or description.name or Path(where).stem,
             tree,
             joints=actuated,
@@ -112,11 +118,17 @@ def robot_from_urdf_text(
             base_pose=base_pose,
             limits=merge_limits(from_file, limits or {}),
             postures=semantics.postures(group) | {key: dict(value) for key, value in (postures or {}).items()},
-            allowed_collisions=[*semantics.allowed, *allowed_collisions],
+            allowed_collisions=[*semantics.allowed_pairs(tree), *allowed_collisions],
             self_collision=self_collision,
             closed_form=closed_form,
             source=source,
         )
+        return replace(robot, gripper=srdf_gripper(semantics, tree, description.mimics, actuated))
+
+
+def package_roots(packages: FilePath | Iterable[FilePath]) -> list[Path]:
+    """Folders that hold packages, given as one or several."""
+    return [Path(each) for each in ([packages] if isinstance(packages, (str, os.PathLike)) else packages)]
 
 
 def _actuated(

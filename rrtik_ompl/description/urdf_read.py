@@ -49,7 +49,7 @@ def read_urdf(
     """
     robot = parse_xml(text, "robot", where)
     if robot.find(".//{http://www.ros.org/wiki/xacro}*") is not None:
-        raise InputError(f"{where}: holds xacro macros; expand them first: xacro FILE > robot.urdf")
+        raise InputError(f"{where}: holds xacro macros; name it .xacro, or expand them first: xacro FILE > robot.urdf")
     reader = _Reader(where, folder, tuple(packages), {})
     for material in robot.iter("material"):
         reader.learn_material(material)
@@ -62,8 +62,8 @@ def read_urdf(
     return UrdfDescription(robot.get("name", ""), Tree(where, links, joints), _flatten(where, joints, mimics))
 
 
-def parse_xml(text: str, root: str, where: str) -> Element:
-    """Top element of XML text.
+def parse_xml(text: str, root: str | None, where: str) -> Element:
+    """Top element of XML text, of any name if ``root`` is None.
 
     Raises:
         InputError: If the text is not XML (with the line) or its top element is not ``root``.
@@ -73,7 +73,7 @@ def parse_xml(text: str, root: str, where: str) -> Element:
     except (ElementTree.ParseError, ValueError) as error:
         line = getattr(error, "position", (1, 0))[0]
         raise InputError(f"{where}:{line}: not valid XML: {error}; correct it or export it again") from error
-    if element.tag != root:
+    if root is not None and element.tag != root:
         raise InputError(f"{where}: the top element is <{element.tag}>, expected <{root}>; is it the right file?")
     return element
 

@@ -107,9 +107,12 @@ def _volume(mesh: Mesh) -> float:
 
 
 def finite_numbers(data: bytes) -> bool:
-    """Whether a mesh file is free of NaN and infinity, about which the C++ library would write to the terminal."""
+    """Whether a mesh file is free of NaN and infinity, about which the C++ library would write to the terminal.
+
+    Normals of a binary STL are not read: those of triangles without area are NaN in the files of some programs.
+    """
     count = int.from_bytes(data[80:84], "little")
     if len(data) == 84 + 50 * count:  # binary STL: per triangle twelve floats and two bytes
-        rows = np.frombuffer(data, dtype=[("corners", "<f4", 12), ("rest", "<u2")], offset=84)
+        rows = np.frombuffer(data, dtype=[("normal", "<f4", 3), ("corners", "<f4", 9), ("rest", "<u2")], offset=84)
         return bool(np.isfinite(rows["corners"]).all())
     return _NOT_FINITE.search(data) is None

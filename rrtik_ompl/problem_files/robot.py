@@ -22,7 +22,7 @@ from rrtik_ompl.files.sections import (
 )
 from rrtik_ompl.problem_files.scene import PoseEntry, pose_data
 
-PATH_KEYS = ("urdf", "srdf", "joint_limits", "dh", "packages")
+PATH_KEYS = ("urdf", "srdf", "joint_limits", "dh", "moveit", "mjcf", "packages")
 
 
 class _Mounted(Section):
@@ -74,15 +74,37 @@ class Point2dRobot(_Mounted):
     point2d: Point2dMeasures
 
 
-class UrdfRobot(_Mounted):
-    """An arm described by a URDF file; file names are relative to the folder of the problem file."""
+class _Described(_Mounted):
+    """What robots of a URDF may say."""
 
-    urdf: Name
-    srdf: Name | None = Field(None, description="groups, named postures, allowed collisions")
+    srdf: Name | None = Field(None, description="groups, named postures, allowed collisions, gripper")
     group: Name | None = Field(None, description="group of the SRDF whose joints move")
     joints: Annotated[list[Name], Field(min_length=1)] | None = Field(None, description="joints that move, in order")
     joint_limits: Name | None = Field(None, description="file in the format of joint_limits.yaml")
     packages: list[Name] | Name | None = Field(None, description="folders in which package:// names are sought")
+    locked: dict[Name, Number] | None = Field(None, description="values of joints that are held still [rad or m]")
+    xacro_args: dict[Name, Name | Number] | None = Field(None, description="arguments of the macros of a .xacro file")
+
+
+class UrdfRobot(_Described):
+    """An arm described by a URDF file; file names are relative to the folder of the problem file."""
+
+    urdf: Name
+
+
+class MoveitRobot(_Described):
+    """An arm described by a folder that MoveIt's setup assistant wrote, relative to the folder of the problem file."""
+
+    moveit: Name
+    urdf: Name | None = Field(None, description="a URDF in place of the one that the folder names")
+
+
+class MjcfRobot(_Mounted):
+    """An arm described by an MJCF file of MuJoCo."""
+
+    mjcf: Name
+    joints: Annotated[list[Name], Field(min_length=1)] | None = Field(None, description="joints that move, in order")
+    joint_limits: Name | None = Field(None, description="file in the format of joint_limits.yaml")
     locked: dict[Name, Number] | None = Field(None, description="values of joints that are held still [rad or m]")
 
 
@@ -97,9 +119,11 @@ RobotEntry: TypeAlias = Annotated[
     | Annotated[NamedRobot, Tag(tag("name"))]
     | Annotated[PlanarRobot, Tag(tag("planar"))]
     | Annotated[Point2dRobot, Tag(tag("point2d"))]
+    | Annotated[MoveitRobot, Tag(tag("moveit"))]
+    | Annotated[MjcfRobot, Tag(tag("mjcf"))]
     | Annotated[UrdfRobot, Tag(tag("urdf"))]
     | Annotated[DhRobot, Tag(tag("dh"))],
-    told_apart_by("name", "planar", "point2d", "urdf", "dh", what="robot", text="a name"),
+    told_apart_by("name", "moveit", "mjcf", "planar", "point2d", "urdf", "dh", what="robot", text="a name"),
 ]
 
 

@@ -242,7 +242,7 @@ class World:
 
         ``known_free`` leaves out the check for contacts, where they were ruled out before.
         """
-        touching = () if known_free else self.contacts(q)
+        touching = () if known_free is True else self.contacts(q)
         if touching:
             return touching[0]
         found = measured(self.bodies, self.pairs, self.robot.joint_frames(self._rows(q, 1))[0], near_only=False)

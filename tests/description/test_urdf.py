@@ -254,7 +254,7 @@ BAD_TEXTS = {
     "colour of words": (arm("<material name='m'><color rgba='red'/></material>"), "material 'm'"),
     "xacro": (
         arm("<xacro:macro name='x' xmlns:xacro='http://www.ros.org/wiki/xacro'/>"),
-        "xacro macros; expand them first",
+        "xacro macros; name it .xacro, or expand them first",
     ),
 }
 

@@ -200,6 +200,15 @@ def test_numbers_that_are_not_finite_are_refused_before_c_sees_them(tmp_path, ca
     assert capfd.readouterr().err == ""
 
 
+def test_normals_of_a_binary_file_may_be_no_numbers(tmp_path, capfd):
+    """Programs divide by the area of triangles that have none."""
+    data = bytearray(stl_binary())
+    data[84:96] = np.full(3, np.nan, dtype="<f4").tobytes()
+    (tmp_path / "a.stl").write_bytes(data)
+    assert volume(load_mesh(tmp_path / "a.stl")) > 0.0
+    assert capfd.readouterr().err == ""
+
+
 def test_a_mesh_beyond_the_world_is_refused(tmp_path):
     file = tmp_path / "a.stl"
     file.write_bytes(stl_text().replace(b"vertex 1.0 0.0 0.0", b"vertex 1e30 0 0"))

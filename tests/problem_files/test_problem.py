@@ -183,7 +183,7 @@ BAD = {
     "no start": (f"version: 1\nrobot: {ARM}\ngoal: {{joints: [0, 0, 0]}}\n", "start: missing"),
     "empty goal": (text(goal=""), ":4: goal: nothing stands after the colon"),
     "unknown robot": (text("titan5"), ":2: robot: no robot 'titan5'; have .*titan4"),
-    "robot is a number": (text("4"), ":2: robot: robot needs one of the keys name, planar"),
+    "robot is a number": (text("4"), ":2: robot: robot needs one of the keys name, moveit, mjcf, planar"),
     "robot of two kinds": (text("{planar: {lengths: [1]}, urdf: a.urdf}"), "robot.urdf: unknown key 'urdf'"),
     "no such option": (text("{name: titan4, limit: envelope}"), "robot: .*no option 'limit'"),
     "no such limits": (text("{name: titan4, limits: enveloppe}"), "robot: .*enveloppe"),

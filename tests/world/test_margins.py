@@ -227,3 +227,9 @@ def test_a_base_that_touches_is_said_to_be_nothing_that_a_posture_can_mend(name)
         ProblemError, match=r"'table' overlap by .* mm; no joint moves either; move the obstacle or the"
     ):
         Problem(world, q, q)
+
+
+def test_only_true_leaves_out_the_check_for_contacts():
+    """An array, which has no truth value, raised an error of numpy."""
+    world, q = on_a_table("ur5", 0.01)
+    assert str(world.closest(q, known_free=np.zeros(2))) == str(world.closest(q))

@@ -90,7 +90,7 @@ class ExampleArm:
                 for joint, acceleration, jerk in zip(self.joints, self.acceleration, self.jerk, strict=False)
             },
         )
-        return replace(robot, gripper=self.gripper)
+        return replace(robot, gripper=self.gripper or robot.gripper)
 
 
 def _numbered(prefix: str, count: int, first: int = 1) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rrtik_ompl.description.moveit.parameters import parameters
 from rrtik_ompl.description.robot_build import JointLimits
 from rrtik_ompl.errors import UnknownNameError
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, describe, read_yaml
@@ -35,12 +36,13 @@ def read_joint_limits(path: str | os.PathLike[str], joints: Iterable[str]) -> di
     """
     document = read_yaml(path)
     known = tuple(joints)
-    table = document.data.get("joint_limits")
+    top, found = parameters(document, "robot_description_planning")
+    table = found.get("joint_limits")
     if not isinstance(table, Mapping):
-        raise document.error(("joint_limits",), "expected 'joint_limits:' with one group of keys per joint")
+        raise document.error((*top, "joint_limits"), "expected 'joint_limits:' with one group of keys per joint")
     limits = {}
     for joint, values in table.items():
-        location: Location = ("joint_limits", joint)
+        location: Location = (*top, "joint_limits", joint)
         if joint not in known:
             raise UnknownNameError("joint", joint, known, where=document.place(location))
         if not isinstance(values, Mapping):
@@ -64,7 +66,7 @@ def _joint(document: YamlDocument, location: Location, values: Mapping[str, Any]
             raise UnknownNameError("key", key, _KEYS, where=document.place((*location, key)))
         if key.startswith("has_") and not isinstance(value, bool):
             raise document.error((*location, key), f"expected true or false, found {describe(value)}")
-        if key in _NUMBERS:
+        if key in _NUMBERS and values.get(f"has_{key.partition('_')[2]}_limits") is not False:  # else MoveIt writes 0
             _number(document, (*location, key), value, positive=not key.endswith("position"))
     found: dict[str, float | None] = {}
     for rate in RATES:

@@ -23,6 +23,16 @@ class Group:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class EndEffector:
+    """What is at the end of a group: the link that holds it, the group of its own joints, the group that it ends."""
+
+    name: str
+    parent_link: str
+    group: str
+    parent_group: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Srdf:
     """What an SRDF says.
 
@@ -31,15 +41,20 @@ class Srdf:
         groups: By name.
         states: Joint values [rad or m] by (group, state).
         allowed: Pairs of link names never checked against each other.
-        end_effectors: Pairs (group, link): the link at the end of that group.
+        never: Links that are checked against none, but those that a pair of ``checked`` names.
+        checked: Pairs that are checked although one of them is in ``never``.
+        end_effectors: In the order of the file.
         passive: Joints that no motor moves.
+        virtual: Joints between the world and the base.
     """
 
     where: str
     groups: Mapping[str, Group] = field(default_factory=dict)
     states: Mapping[tuple[str, str], Mapping[str, float]] = field(default_factory=dict)
     allowed: frozenset[frozenset[str]] = frozenset()
-    end_effectors: tuple[tuple[str, str], ...] = ()
+    never: frozenset[str] = frozenset()
+    checked: frozenset[frozenset[str]] = frozenset()
+    end_effectors: tuple[EndEffector, ...] = ()
     passive: frozenset[str] = frozenset()
     virtual: frozenset[str] = frozenset()
 
@@ -49,11 +64,24 @@ class Srdf:
         Raises:
             InputError: If the group does not exist, is empty, or names a joint or link that the robot does not have.
         """
-        wanted = self._members(group, tree, ())
-        chosen = tuple(j.name for j in tree.walk() if j.name in wanted - self.passive and j.kind != "fixed")
+        chosen = self.movable(group, tree)
         if not chosen:
             raise InputError(f"{self.where}: group '{group}' holds no movable joint; choose another group")
         return chosen
+
+    def movable(self, group: str, tree: Tree) -> tuple[str, ...]:
+        """As :meth:`group_joints`, of a group that may have none.
+
+        Raises:
+            InputError: If the group does not exist, or names a joint or link that the robot does not have.
+        """
+        wanted = self._members(group, tree, ()) - self.passive
+        return tuple(joint.name for joint in tree.walk() if joint.name in wanted and joint.kind != "fixed")
+
+    def allowed_pairs(self, tree: Tree) -> frozenset[frozenset[str]]:
+        """Pairs of links of a robot that are never checked against each other."""
+        everything = {frozenset((link, other.name)) for link in self.never for other in tree.links}
+        return self.allowed | frozenset(pair for pair in everything - self.checked if len(pair) == 2)
 
     def group_tip(self, group: str, tree: Tree) -> str:
         """Link at the end of a group: its chain's, else its end effector's, else the child of its last joint."""
@@ -61,9 +89,9 @@ class Srdf:
         if chains:
             return chains[-1][1]
         links = {link.name for link in tree.links}
-        for owner, link in self.end_effectors:
-            if owner == group and link in links:
-                return link
+        for end in self.end_effectors:
+            if group in (end.parent_group, end.group) and end.parent_link in links:
+                return end.parent_link
         last = self.group_joints(group, tree)[-1]
         return next(joint.child for joint in tree.joints if joint.name == last)
 
@@ -110,21 +138,26 @@ def read_srdf(text: str, where: str = "SRDF text") -> Srdf:
     for element in robot.findall("group_state"):
         name = attribute(element, "group_state", "name", where)
         states[(element.get("group", ""), name)] = _state(element, f"{where}: group_state '{name}'")
-    ends = [
-        (owner, element.get("parent_link", ""))
+    ends = tuple(
+        EndEffector(*(element.get(key, "") for key in ("name", "parent_link", "group", "parent_group")))
         for element in robot.findall("end_effector")
-        for owner in (element.get("parent_group", ""), element.get("group", ""))
-    ]
-    pairs = [frozenset((e.get("link1", ""), e.get("link2", ""))) for e in robot.findall("disable_collisions")]
+    )
     return Srdf(
         where=where,
         groups={group.name: group for group in groups},
         states=states,
-        allowed=frozenset(pair for pair in pairs if len(pair) == 2),
-        end_effectors=tuple(ends),
+        allowed=_pairs(robot, "disable_collisions"),
+        never=frozenset(e.get("link", "") for e in robot.findall("disable_default_collisions")),
+        checked=_pairs(robot, "enable_collisions"),
+        end_effectors=ends,
         passive=frozenset(e.get("name", "") for e in robot.findall("passive_joint")),
         virtual=frozenset(e.get("name", "") for e in robot.findall("virtual_joint")),
     )
+
+
+def _pairs(robot: Element, tag: str) -> frozenset[frozenset[str]]:
+    pairs = (frozenset((e.get("link1", ""), e.get("link2", ""))) for e in robot.findall(tag))
+    return frozenset(pair for pair in pairs if len(pair) == 2)
 
 
 def _group(element: Element, where: str) -> Group:

@@ -1,0 +1,85 @@
+"""Robots from MuJoCo's MJCF files: bodies, hinges and slides, collision geometry, limits, sites, excluded pairs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from rrtik_ompl.description.mjcf.read import Mjcf, read_mjcf
+from rrtik_ompl.description.moveit.joint_limits import read_joint_limits
+from rrtik_ompl.description.robot_build import build_robot
+from rrtik_ompl.description.robot_source import source_entry
+from rrtik_ompl.description.urdf_read import located
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.text import read_text
+from rrtik_ompl.robot import Robot
+
+MJCF_OPTIONS = ("base_pose", "joint_limits", "joints", "locked", "tip")
+TIP_SITES = ("attachment_site", "tip", "tcp", "ee", "ee_site", "end_effector", "eef", "grip_site", "pinch")  # by custom
+BEGINNING = 65536  # characters in which the top element of a file stands
+
+
+def is_mjcf(path: Path) -> bool:
+    """Whether a file is named ``.mjcf``, or is an ``.xml`` whose top element is ``<mujoco>``."""
+    if path.suffix.lower() == ".xml":
+        try:
+            return "<mujoco" in read_text(path)[:BEGINNING]
+        except InputError:  # which whoever reads it says
+            return False
+    return path.suffix.lower() == ".mjcf"
+
+
+def robot_from_mjcf(
+    path: str | os.PathLike[str],
+    *,
+    joints: Iterable[str] | None = None,
+    tip: str | None = None,
+    joint_limits: str | os.PathLike[str] | None = None,
+    locked: Mapping[str, float] | None = None,
+    base_pose: Any = None,
+) -> Robot:
+    """Load a robot from an MJCF file.
+
+    Bodies and sites become links. Geoms that may collide (``contype``, ``conaffinity``) are collision geometry, meshes
+    as they are and not their hulls; planes and height fields belong to the scene and are left out. ``<exclude>`` and
+    the masks give pairs that are never checked, ``<equality><joint>`` joints that follow others, keyframes postures.
+    Free joints are held where the file puts them. MJCF knows no limits of velocity: give ``joint_limits``.
+
+    Args:
+        path: The file; what it includes is read too.
+        joints: Actuated joints, in order; those up to ``tip``, or all, if None.
+        tip: A body or site; if None a site with a usual name, such as ``attachment_site`` or ``tcp``.
+        joint_limits: File in the format of MoveIt's ``joint_limits.yaml``.
+        locked: Values [rad or m] of joints that are held still.
+        base_pose: ``pinocchio.SE3`` T_world_base.
+
+    Raises:
+        InputError: If anything in the file cannot be used; one line names file, element and remedy.
+    """
+    found = read_mjcf(Path(path))
+    options = {"joints": joints, "tip": tip, "joint_limits": joint_limits, "locked": locked, "base_pose": base_pose}
+    limits = {} if joint_limits is None else read_joint_limits(joint_limits, [j.name for j in found.tree.joints])
+    with located(str(path)):
+        return build_robot(
+            found.name or Path(path).stem,
+            found.tree,
+            joints=_actuated(found, joints, tip),
+            mimics=found.mimics,
+            locked=locked,
+            tip=next((site for site in TIP_SITES if site in found.sites), None) if tip is None else tip,
+            base_pose=base_pose,
+            limits=limits,
+            postures=found.postures,
+            allowed_collisions=found.excluded,
+            source={"mjcf": str(Path(path).resolve())} | source_entry(options),
+        )
+
+
+def _actuated(found: Mjcf, joints: Iterable[str] | None, tip: str | None) -> tuple[str, ...]:
+    if joints is not None:
+        return tuple(joints)
+    followers = {tie.joint for tie in found.mimics}
+    over = found.tree.walk() if tip is None else found.tree.chain(tip)
+    return tuple(joint.name for joint in over if joint.kind != "fixed" and joint.name not in followers)

@@ -1,0 +1,225 @@
+"""MJCF text to links and joints; every element is checked here, every error names file, element and remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.description.mjcf.geoms import OF_THE_SCENE, masks, meshes_of, solid_of
+from rrtik_ompl.description.mjcf.values import MAIN, Settings
+from rrtik_ompl.description.robot_build import Mimic
+from rrtik_ompl.description.tree import Joint, Link, MeshFile, Solid, Tree
+from rrtik_ompl.description.urdf_read import attribute, located, numbers, parse_xml
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.files.text import read_text
+
+WORLD = "world"
+MOST_FILES = 100  # that include each other
+UNREAD = ("composite", "flexcomp", "replicate", "attach", "frame")  # what makes bodies out of other bodies
+SIZES = {"hinge": 1, "slide": 1, "ball": 4, "free": 7}  # numbers of a joint in a keyframe
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mjcf:
+    """What a file says.
+
+    Attributes:
+        name: Of the model.
+        tree: Bodies and sites as links, hinges and slides as joints.
+        sites: Names of the sites.
+        mimics: Joints that follow others.
+        excluded: Pairs of links that never collide.
+        postures: Keyframes: joint values [rad or m] by name.
+    """
+
+    name: str
+    tree: Tree
+    sites: tuple[str, ...]
+    mimics: tuple[Mimic, ...]
+    excluded: frozenset[frozenset[str]]
+    postures: Mapping[str, Mapping[str, float]]
+
+
+def read_mjcf(path: Path) -> Mjcf:
+    """Read a file and what it includes.
+
+    Raises:
+        InputError: If anything in it cannot be used.
+    """
+    where = str(path)
+    root = parse_xml(read_text(path), "mujoco", where)
+    _include(root, path.resolve().parent)
+    settings = Settings()
+    settings.read(root, where)
+    reader = _Reader(where, settings, meshes_of(root, settings, path.resolve().parent, where))
+    for world in root.findall("worldbody"):
+        reader.read(world)
+    tree = Tree(where, reader.finished(), reader.joints)
+    sites = tuple(dict.fromkeys(reader.sites))
+    return Mjcf(
+        root.get("model", ""), tree, sites, _followers(root, where), _excluded(root, reader), _keys(root, reader)
+    )
+
+
+def _include(root: Element, folder: Path) -> None:
+    """Put the contents of included files in the places of ``<include>``; their top elements have any name."""
+    stack, count = [root], 0
+    while stack:
+        element = stack.pop()
+        children = list(element)
+        for place, item in reversed(list(enumerate(children))):
+            if item.tag == "include":
+                count += 1
+                if count > MOST_FILES:
+                    raise InputError(f"{folder}: more than {MOST_FILES} files included; is it a ring?")
+                file = folder / attribute(item, "include", "file", str(folder))
+                text = read_text(file)
+                children[place : place + 1] = list(parse_xml(text, None, str(file)))
+        element[:] = children
+        if any(item.tag == "include" for item in element):
+            stack.append(element)
+        else:
+            stack += list(element)
+
+
+@dataclass(slots=True, eq=False)
+class _Reader:
+    where: str
+    settings: Settings
+    meshes: Mapping[str, tuple[MeshFile, Any]]
+    solids: dict[str, tuple[list[Solid], list[Solid]]] = field(default_factory=lambda: {WORLD: ([], [])})
+    joints: list[Joint] = field(default_factory=list)
+    sites: list[str] = field(default_factory=list)
+    masks: dict[str, list[tuple[int, int]]] = field(default_factory=dict)
+    moving: list[tuple[str, str]] = field(default_factory=list)  # joints and their kinds, in the order of keyframes
+
+    def read(self, world: Element) -> None:
+        """Bodies, each branch to its end before the next one begins, which is the order of keyframes."""
+        self.contents(world, WORLD, MAIN)
+        stack = _below(world, WORLD, MAIN)
+        while stack:
+            body, parent, name, style = stack.pop()
+            self.mount(body, parent, name, style)
+            self.contents(body, name, style)
+            stack += _below(body, name, style)
+
+    def contents(self, element: Element, link: str, style: str) -> None:
+        """Geoms and sites of a body."""
+        place = f"{self.where}: body '{link}'"
+        for item in element:
+            if item.tag in UNREAD:
+                raise InputError(f"{place}: <{item.tag}> cannot be read; save the compiled model and load that")
+        for item in element.findall("geom"):
+            geom = self.settings.filled(item, style, place)
+            if geom.get("type") in OF_THE_SCENE:
+                continue
+            with located(place):
+                solid, mask = solid_of(geom, self.settings, self.meshes, place), masks(geom, place)
+            self.solids[link][not any(mask)].append(solid)
+            if any(mask):
+                self.masks.setdefault(link, []).append(mask)
+        for item in element.findall("site"):
+            site = self.settings.filled(item, style, place)
+            name = site.get("name", "")
+            if name and name not in self.solids:
+                self.solids[name] = [], []
+                self.sites.append(name)
+                self.fix(link, name, self.settings.placement(site, place))
+
+    def mount(self, body: Element, parent: str, name: str, style: str) -> None:
+        """The joints between a body and its parent; a link without solids between any two of them."""
+        place = f"{self.where}: body '{name}'"
+        if name in self.solids:
+            raise InputError(f"{place}: its name stands there twice; rename one body or site")
+        link, offset = parent, self.settings.placement(body, place)
+        for number, item in enumerate([*body.findall("joint"), *body.findall("freejoint")]):
+            joint = self.settings.filled(item, style, place)
+            called = joint.get("name") or f"{name}/joint{number + 1}"
+            kind = joint.get("type", "hinge") if joint.tag == "joint" else "free"
+            if kind not in SIZES or kind == "ball":
+                raise UnknownNameError("usable type of joint", kind, ("hinge", "slide", "free"), where=place)
+            self.moving.append((called, kind))
+            if kind != "free":
+                link, offset = self.turned(joint, kind, called, link, offset)
+        self.solids[name] = [], []
+        self.fix(link, name, offset)
+
+    def turned(self, joint: Element, kind: str, name: str, link: str, offset: Any) -> tuple[str, Any]:
+        """Add a joint; the link behind it, and where the body is in that one."""
+        place = f"{self.where}: joint '{name}'"
+        at = pin.SE3(np.eye(3), np.array(numbers(joint, "pos", 3, (0.0, 0.0, 0.0), place)))
+        axis = np.array(numbers(joint, "axis", 3, (0.0, 0.0, 1.0), place))
+        slides = kind == "slide"
+        unit = 1.0 if slides else self.settings.angle(1.0)
+        low, high = (unit * value for value in numbers(joint, "range", 2, (0.0, 0.0), place))
+        usual = "true" if self.settings.limited and joint.get("range") is not None else "false"
+        limited = joint.get("limited", "auto").replace("auto", usual) == "true"
+        known = "prismatic" if slides else "revolute" if limited else "continuous"
+        bounds = {"lower": low, "upper": high} if limited else {"lower": -np.inf, "upper": np.inf}
+        child = f"{name}/link"
+        with located(place):
+            self.joints.append(Joint(name, known, link, child, offset * at, axis, **bounds))
+        self.solids[child] = [], []
+        zero = unit * numbers(joint, "ref", 1, (0.0,), place)[0]
+        way = -zero * self.joints[-1].axis
+        back = pin.SE3(np.eye(3), way) if slides else pin.SE3(pin.exp3(way), np.zeros(3))
+        return child, back * at.inverse()
+
+    def fix(self, parent: str, child: str, placement: Any) -> None:
+        """A link that is fixed to another one."""
+        self.joints.append(Joint(f"{child}/mount", "fixed", parent, child, placement))
+
+    def finished(self) -> list[Link]:
+        """All links; what is not drawn otherwise is drawn by its collision geometry."""
+        return [Link(name, tuple(hard), tuple(drawn or hard)) for name, (hard, drawn) in self.solids.items()]
+
+
+def _below(body: Element, name: str, style: str) -> list[tuple[Element, str, str, str]]:
+    """The bodies in a body, the last one first: element, parent, name, class of defaults."""
+    found = [
+        (each, name, each.get("name") or f"{name}/body{number + 1}", each.get("childclass", style))
+        for number, each in enumerate(body.findall("body"))
+    ]
+    return found[::-1]
+
+
+def _followers(root: Element, where: str) -> tuple[Mimic, ...]:
+    found = []
+    for tie in root.findall("equality/joint"):
+        if tie.get("joint2") is None or tie.get("active", "true") != "true":
+            continue
+        name, source = (attribute(tie, "joint", key, f"{where}: equality") for key in ("joint1", "joint2"))
+        words = [float(number) for number in numbers(tie, "polycoef", 5, (0.0, 1.0, 0.0, 0.0, 0.0), where)]
+        if any(words[2:]):
+            raise InputError(f"{where}: joint '{name}' follows '{source}' by a curve; only straight lines can be read")
+        found.append(Mimic(name, source, words[1], words[0]))
+    return tuple(found)
+
+
+def _excluded(root: Element, reader: _Reader) -> frozenset[frozenset[str]]:
+    """Pairs that ``<exclude>`` names, and those of which no two geoms have masks that meet."""
+    pairs = {frozenset((item.get("body1", ""), item.get("body2", ""))) for item in root.findall("contact/exclude")}
+    for (one, own), (other, others) in combinations(reader.masks.items(), 2):
+        if not any(a & d or c & b for a, b in own for c, d in others):
+            pairs.add(frozenset((one, other)))
+    return frozenset(pair for pair in pairs if len(pair) == 2)
+
+
+def _keys(root: Element, reader: _Reader) -> dict[str, dict[str, float]]:
+    found = {}
+    total = sum(SIZES[kind] for _, kind in reader.moving)
+    for number, key in enumerate(root.findall("keyframe/key")):
+        if key.get("qpos") is None:
+            continue
+        values = numbers(key, "qpos", total, None, f"{reader.where}: key '{key.get('name', number)}'")
+        starts = np.cumsum([0, *(SIZES[kind] for _, kind in reader.moving)]).tolist()
+        own = {name: values[at] for (name, kind), at in zip(reader.moving, starts, strict=False) if kind != "free"}
+        found[key.get("name") or f"key{number}"] = own
+    return found

@@ -1,0 +1,125 @@
+"""Attributes of MJCF elements: defaults of classes, angles, orientations in MuJoCo's five ways."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.description.urdf_read import numbers
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.poses import pose, turned_z
+
+MAIN = "main"  # the class that all others build on
+Attributes = Mapping[str, str]
+_UNITS = dict(zip("xyz", np.eye(3), strict=True))
+_ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
+
+
+@dataclass(slots=True, eq=False)
+class Settings:
+    """What holds in a whole file.
+
+    Attributes:
+        degrees: Whether angles are in degrees.
+        sequence: Of Euler angles; capital letters are axes that stay.
+        limited: Whether a joint with a range has limits.
+        meshes: Folder of meshes, as the file names it.
+        classes: Defaults by class and tag.
+    """
+
+    degrees: bool = True
+    sequence: str = "xyz"
+    limited: bool = True
+    meshes: str = ""
+    classes: dict[str, dict[str, Attributes]] = field(default_factory=lambda: {MAIN: {}})
+
+    def read(self, root: Element, where: str) -> None:
+        """Take over what ``<compiler>`` and ``<default>`` say.
+
+        Raises:
+            InputError: If a value makes no sense.
+        """
+        for compiler in root.findall("compiler"):
+            self.degrees = compiler.get("angle", "degree" if self.degrees else "radian") == "degree"
+            self.sequence = compiler.get("eulerseq", self.sequence)
+            self.limited = compiler.get("autolimits", "true" if self.limited else "false") == "true"
+            self.meshes = compiler.get("meshdir", compiler.get("assetdir", self.meshes))
+        if len(self.sequence) != 3 or set(self.sequence.lower()) - set("xyz"):
+            raise InputError(f"{where}: eulerseq '{self.sequence}' must be three of the letters x, y, z")
+        stack = [(element, MAIN) for element in root.findall("default")]
+        while stack:
+            element, above = stack.pop()
+            name = element.get("class", MAIN)
+            known = self.classes.get(name, self.classes[above])
+            own = {item.tag: {**known.get(item.tag, {}), **item.attrib} for item in element if item.tag != "default"}
+            self.classes[name] = {**known, **own}
+            stack += [(item, name) for item in element.findall("default")]
+
+    def filled(self, element: Element, above: str, where: str) -> Element:
+        """The element with the defaults of its class, or of the class of the body that it is in.
+
+        Raises:
+            UnknownNameError: If there is no such class.
+        """
+        name = element.get("class", above)
+        if name not in self.classes:
+            raise UnknownNameError("default class", name, self.classes, where=where)
+        filled = ElementTree.Element(element.tag, {**self.classes[name].get(element.tag, {}), **element.attrib})
+        for key in _ORIENTATIONS:  # an orientation of its own takes the place of any other
+            if key in element.attrib:
+                for other in (other for other in _ORIENTATIONS if other not in element.attrib):
+                    filled.attrib.pop(other, None)
+        return filled
+
+    def angle(self, value: float) -> float:
+        """An angle of the file [rad]."""
+        return float(np.radians(value)) if self.degrees else value
+
+    def placement(self, element: Element, where: str) -> Any:
+        """``pinocchio.SE3`` of an element with pos and one of the five orientations."""
+        position = numbers(element, "pos", 3, (0.0, 0.0, 0.0), where)
+        given = [key for key in _ORIENTATIONS if element.get(key) is not None]
+        if len(given) > 1:
+            raise InputError(f"{where}: <{element.tag}> has {' and '.join(given)}; leave one")
+        turn = getattr(self, f"_{given[0]}")(element, where) if given else np.eye(3)
+        return pin.SE3(turn, np.array(position))
+
+    def _quat(self, element: Element, where: str) -> Any:
+        w, x, y, z = numbers(element, "quat", 4, None, where)
+        length = float(np.linalg.norm([w, x, y, z]))
+        if length < 1e-9:
+            raise InputError(f"{where}: <{element.tag} quat> is zero; 1 0 0 0 turns nothing")
+        return pose(quat_xyzw=np.array([x, y, z, w]) / length).rotation
+
+    def _axisangle(self, element: Element, where: str) -> Any:
+        *axis, angle = numbers(element, "axisangle", 4, None, where)
+        return pin.exp3(self.angle(angle) * _unit(axis, element, where))
+
+    def _euler(self, element: Element, where: str) -> Any:
+        turn = np.eye(3)
+        for letter, angle in zip(self.sequence, numbers(element, "euler", 3, None, where), strict=True):
+            step = pin.exp3(self.angle(angle) * _UNITS[letter.lower()])
+            turn = turn @ step if letter.islower() else step @ turn
+        return turn
+
+    def _xyaxes(self, element: Element, where: str) -> Any:
+        values = np.array(numbers(element, "xyaxes", 6, None, where))
+        x = _unit(values[:3], element, where)
+        y = _unit(values[3:] - values[3:] @ x * x, element, where)
+        return np.column_stack([x, y, np.cross(x, y)])
+
+    def _zaxis(self, element: Element, where: str) -> Any:
+        return turned_z(_unit(numbers(element, "zaxis", 3, None, where), element, where))
+
+
+def _unit(values: Any, element: Element, where: str) -> Any:
+    length = float(np.linalg.norm(values))
+    if length < 1e-9:
+        raise InputError(f"{where}: <{element.tag}> has an axis of length 0; give a direction such as 0 0 1")
+    return np.asarray(values) / length

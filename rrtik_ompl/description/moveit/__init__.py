@@ -1,0 +1,1 @@
+"""What MoveIt says of a robot: SRDF, joint limits, configuration folders."""

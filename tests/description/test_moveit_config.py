@@ -1,0 +1,260 @@
+"""Folders that MoveIt's setup assistant wrote, xacro, and the grippers that an SRDF describes."""
+
+import shutil
+import sys
+
+import numpy as np
+import pytest
+
+from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.description.moveit.joint_limits import read_joint_limits
+from rrtik_ompl.errors import InputError, RrtikError, UnknownNameError
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.problem_files.problem import load_problem, save_problem
+from rrtik_ompl.world import World
+from rrtik_robots.example_arms import data_folder
+
+PACKAGE, SRDF = "panda_description", "panda_description/srdf/panda.srdf"
+ARM = [f"panda_joint{k}" for k in range(1, 8)]
+HAND = """
+  <group name="panda_arm"><chain base_link="panda_link0" tip_link="panda_link8"/></group>
+  <group name="hand"><joint name="panda_finger_joint1"/></group>
+  <group_state name="open" group="hand"><joint name="panda_finger_joint1" value="0.04"/></group_state>
+  <group_state name="close" group="hand"><joint name="panda_finger_joint1" value="0"/></group_state>
+  <group_state name="half" group="hand"><joint name="panda_finger_joint1" value="0.02"/></group_state>
+  <group_state name="ready" group="panda_arm">{ready}</group_state>
+  <end_effector name="hand" parent_link="panda_link8" group="hand" parent_group="panda_arm"/>
+"""
+READY = (0, -0.785, 0, -2.356, 0, 1.571, 0.785)
+ASSISTANT = """moveit_setup_assistant_config:
+  urdf: {package: panda_description, relative_path: urdf/panda.urdf}
+  srdf: {relative_path: config/panda.srdf}
+  package_settings: {author_name: Somebody, generated_timestamp: 1700000000}
+"""
+LIMITS = """default_velocity_scaling_factor: 0.1
+default_acceleration_scaling_factor: 0.1
+joint_limits:
+  panda_joint1: {has_velocity_limits: true, max_velocity: 1.5, has_acceleration_limits: true, max_acceleration: 3.75}
+  panda_joint2: {has_velocity_limits: true, max_velocity: 1.25, has_acceleration_limits: false, max_acceleration: 0}
+"""
+KINEMATICS = """panda_arm:
+  kinematics_solver: kdl_kinematics_plugin/KDLKinematicsPlugin
+  kinematics_solver_search_resolution: 0.005
+  kinematics_solver_timeout: 0.05
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A configuration of the Panda beside its description package, as in a workspace."""
+    config = tmp_path / "panda_moveit_config" / "config"
+    config.mkdir(parents=True)
+    (tmp_path / PACKAGE).symlink_to(data_folder() / PACKAGE)
+    text = (data_folder() / SRDF).read_text()
+    ready = "".join(f'<joint name="{joint}" value="{value}"/>' for joint, value in zip(ARM, READY, strict=True))
+    head, tail = '<robot name="panda">', text[text.index("    <disable_collisions") :]
+    (config / "panda.srdf").write_text(head + HAND.format(ready=ready) + tail)
+    (config.parent / ".setup_assistant").write_text(ASSISTANT)
+    (config / "joint_limits.yaml").write_text(LIMITS)
+    (config / "kinematics.yaml").write_text(KINEMATICS)
+    return config.parent
+
+
+def test_one_call_reads_all_that_a_folder_says(folder):
+    robot = load_robot(folder)
+    assert robot is load_robot(folder)
+    assert list(robot.joint_names) == ARM
+    assert robot.tip == "panda_link8"
+    assert robot.posture("ready") == pytest.approx(READY)
+    assert robot.velocity[:2].tolist() == [1.5, 1.25]
+    assert robot.acceleration[:2].tolist() == [3.75, np.inf]
+    shipped = load_robot("panda")
+    assert robot.allowed_collisions == shipped.allowed_collisions
+    q = np.array(READY)
+    link = np.linalg.inv(shipped.fk(q, "panda_link8").homogeneous) @ robot.fk(q).homogeneous
+    assert link == pytest.approx(np.eye(4), abs=1e-9)
+    Q = np.random.default_rng(1).uniform(robot.lower, robot.upper, (200, 7))
+    assert (World(robot).valid_batch(Q) == World(shipped).valid_batch(Q)).all()
+
+
+@pytest.mark.parametrize("around", ["{0}:", "/**:\n  ros__parameters:\n    {0}:"])
+def test_parameters_may_stand_within_their_names_on_the_parameter_server(folder, around):
+    """Folders for ROS 1 and for parameter files of ROS 2."""
+    for file, name in (("joint_limits", "robot_description_planning"), ("kinematics", "robot_description_kinematics")):
+        path, head = folder / "config" / f"{file}.yaml", around.format(name)
+        indent = " " * (head.splitlines()[-1].count(" ") + 2)
+        path.write_text(head + "\n" + "".join(indent + line + "\n" for line in path.read_text().splitlines()))
+    srdf = folder / "config" / "panda.srdf"
+    srdf.write_text(
+        srdf.read_text().replace("</robot>", '<group name="b"><joint name="panda_joint1"/></group></robot>')
+    )
+    robot = load_robot(folder)  # which group has a solver is said in kinematics.yaml
+    assert robot.tip == "panda_link8"
+    assert robot.velocity[:2].tolist() == [1.5, 1.25]
+    broken(folder, "joint_limits.yaml", "panda_joint2", "panda_joint99")
+    with pytest.raises(InputError, match=r"joint_limits.yaml:\d: robot_description_planning|no joint 'panda_joint99'"):
+        load_robot(folder)
+
+
+def test_the_gripper_is_that_of_the_end_effectors_states(folder):
+    hand = load_robot(folder).gripper
+    assert hand.posture("open") == {"panda_finger_joint1": 0.04}
+    assert hand.posture("close") == {"panda_finger_joint1": 0.0}
+    assert hand.width == pytest.approx(load_robot("panda").gripper.width, abs=1e-4)
+    holding = load_robot(folder, locked=hand.close_on(0.05))
+    apart = [holding.fk(np.array(READY), f"panda_{side}finger").translation for side in ("left", "right")]
+    assert np.linalg.norm(apart[0] - apart[1]) == pytest.approx(0.05, abs=1e-4)
+
+
+def test_a_gripper_that_is_part_of_the_arm_is_none(folder):
+    assert load_robot(folder, joints=[*ARM, "panda_finger_joint1"], tip="panda_link8").gripper is None
+
+
+@pytest.mark.parametrize(
+    ("names", "state"),
+    [(("hand_open", "hand_closed"), True), (("Open", "Close"), True), (("wide", "narrow"), False)],
+)
+def test_states_are_known_by_the_words_in_their_names(folder, names, state):
+    srdf = folder / "config" / "panda.srdf"
+    text = srdf.read_text().replace('name="open"', f'name="{names[0]}"').replace('name="close"', f'name="{names[1]}"')
+    srdf.write_text(text)
+    hand = load_robot(folder).gripper
+    assert (hand is not None) == state
+    assert hand is None or hand.opened == (0.04,)
+
+
+def test_problem_files_name_the_folder(folder):
+    robot = load_robot(folder, padding={"panda_hand": 0.01})
+    save_problem(Problem(World(robot), "ready", "ready"), folder.parent / "problem.yaml")
+    assert "moveit: panda_moveit_config" in (folder.parent / "problem.yaml").read_text()
+    assert load_problem(folder.parent / "problem.yaml").robot is robot
+
+
+def test_a_changed_file_is_read_again(folder):
+    before = load_robot(folder)
+    (folder / "config" / "joint_limits.yaml").write_text(LIMITS.replace("1.25", "1.125"))
+    assert load_robot(folder).velocity[1] == 1.125
+    assert before.velocity[1] == 1.25
+
+
+def test_links_that_are_never_checked_but_with_a_few(folder):
+    srdf = folder / "config" / "panda.srdf"
+    extra = '<disable_default_collisions link="panda_hand"/><enable_collisions link1="panda_hand" link2="panda_link2"/>'
+    srdf.write_text(srdf.read_text().replace("</robot>", extra + "</robot>"))
+    allowed = load_robot(folder).allowed_collisions
+    never = {other for pair in allowed if "panda_hand" in pair for other in pair}
+    assert never == set(load_robot(folder).link_names) - {"panda_link2"}
+
+
+def broken(folder, file, old, new):
+    path = folder / "config" / file if file != ".setup_assistant" else folder / file
+    path.write_text(path.read_text().replace(old, new))
+
+
+FAULTS = {
+    "no folder": (shutil.rmtree, "moveit_config"),
+    "no SRDF": (lambda f: (f / "config" / "panda.srdf").unlink(), r"config: no SRDF in this folder; .* give srdf=FILE"),
+    "two SRDFs": (
+        lambda f: (shutil.copy(f / "config/panda.srdf", f / "config/b.srdf"), (f / ".setup_assistant").unlink()),
+        r"2 files are an SRDF: b.srdf, panda.srdf; choose one by srdf=FILE",
+    ),
+    "no package": (lambda f: (f.parent / PACKAGE).unlink(), r"'panda_description' is not found; give packages="),
+    "no URDF": (lambda f: (f / ".setup_assistant").unlink(), r"config: no URDF in this folder; .* give urdf=FILE"),
+    "assistant": (lambda f: broken(f, ".setup_assistant", "moveit_", "m_"), r"\.setup_assistant.*setup assistant"),
+    "assistant no YAML": (lambda f: broken(f, ".setup_assistant", ":", "["), r"\.setup_assistant:\d"),
+    "group of kinematics": (lambda f: broken(f, "kinematics.yaml", "panda_arm", "arm"), r"yaml:1: arm: no group 'arm'"),
+    "joint of a limit": (lambda f: broken(f, "joint_limits.yaml", "t1", "t99"), r"joint_limits.yaml:4: .*no joint"),
+    "joint of a group": (lambda f: broken(f, "panda.srdf", '"panda_finger_', '"'), r"panda.srdf: group 'hand'"),
+    "two arms": (
+        lambda f: (
+            broken(f, "panda.srdf", "</robot>", '<group name="b"><joint name="panda_joint1"/></group></robot>'),
+            (f / "config/kinematics.yaml").unlink(),
+        ),
+        r"which group is the arm\? choose one by group=, of panda_arm, b",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_what_is_missing_or_wrong_is_one_line_with_the_remedy(folder, fault):
+    spoil, said = FAULTS[fault]
+    spoil(folder)
+    with pytest.raises(RrtikError, match=said) as error:
+        load_robot(folder)
+    assert "\n" not in str(error.value)
+
+
+def test_a_solver_tells_the_arm_among_several_groups(folder):
+    more = '<group name="turret"><joint name="panda_joint1"/></group></robot>'
+    broken(folder, "panda.srdf", "</robot>", more)
+    assert list(load_robot(folder).joint_names) == ARM
+    assert load_robot(folder, group="turret").joint_names == ("panda_joint1",)
+
+
+def test_a_limit_that_is_switched_off_may_say_anything(tmp_path):
+    (tmp_path / "l.yaml").write_text("joint_limits: {a: {has_jerk_limits: false, max_jerk: 0, max_velocity: 0}}\n")
+    with pytest.raises(InputError, match=r"max_velocity.* 0"):
+        read_joint_limits(tmp_path / "l.yaml", ["a"])
+    (tmp_path / "l.yaml").write_text("joint_limits: {a: {has_jerk_limits: false, max_jerk: 0}}\n")
+    assert read_joint_limits(tmp_path / "l.yaml", ["a"])["a"].jerk == np.inf
+
+
+XACRO = """<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <xacro:arg name="reach" default="0.5"/><xacro:include filename="$(find parts)/turn.xacro"/>
+  <link name="base"/><link name="hand"/><xacro:turn reach="$(arg reach)"/>
+</robot>"""
+TURN = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:macro name="turn" params="reach">
+  <joint name="turn" type="revolute"><parent link="base"/><child link="hand"/><origin xyz="${2 * reach} 0 0"/>
+  <axis xyz="0 0 1"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint></xacro:macro></robot>"""
+
+
+@pytest.fixture
+def xacro_file(tmp_path):
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "turn.xacro").write_text(TURN)
+    (tmp_path / "arm").mkdir()
+    (tmp_path / "arm" / "arm.urdf.xacro").write_text(XACRO)
+    return tmp_path / "arm" / "arm.urdf.xacro"
+
+
+def test_without_the_package_xacro_one_line_names_it(xacro_file, monkeypatch):
+    monkeypatch.setitem(sys.modules, "xacro", None)
+    with pytest.raises(InputError, match=r"arm.urdf.xacro: holds macros, .*pip install xacro.*xacro arm.urdf.xacro > "):
+        load_robot(xacro_file)
+
+
+def test_macros_are_expanded(xacro_file, tmp_path):
+    pytest.importorskip("xacro")
+    assert load_robot(xacro_file).fk([0.0]).translation[0] == 1.0
+    robot = load_robot(xacro_file, xacro_args={"reach": 0.75})
+    assert robot.fk([0.0]).translation[0] == 1.5
+    save_problem(Problem(World(robot), [0.0], [0.5]), tmp_path / "p.yaml")
+    assert load_problem(tmp_path / "p.yaml").robot is robot
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("find parts", "find elsewhere", "package 'elsewhere' is not found; give packages="),
+        ("turn.xacro", "tunr.xacro", "tunr.xacro"),
+        ("</robot>", "", "arm.urdf.xacro: xacro: "),
+        ("$(arg reach)", "${1 / 0}", "division by zero"),
+        ("$(arg reach)", "$(arg rich)", "rich"),
+    ],
+)
+def test_what_is_wrong_in_macros_is_one_line(xacro_file, old, new, said):
+    pytest.importorskip("xacro")
+    xacro_file.write_text(XACRO.replace(old, new))
+    with pytest.raises(InputError, match=said) as error:
+        load_robot(xacro_file)
+    assert "\n" not in str(error.value)
+
+
+def test_arguments_of_macros_are_for_macros():
+    with pytest.raises(InputError, match=r"xacro_args are for files named \.xacro"):
+        load_robot(data_folder() / "panda_description/urdf/panda.urdf", xacro_args={"a": 1})
+
+
+def test_a_name_of_no_robot_lists_robots_still():
+    with pytest.raises(UnknownNameError, match="no robot 'pandda'"):
+        load_robot("pandda")
