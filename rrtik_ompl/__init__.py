@@ -103,6 +103,8 @@ if TYPE_CHECKING:
     from rrtik_ompl.tasks.plan_file import save_task_plan as save_task_plan
     from rrtik_ompl.tasks.task_file import list_tasks as list_tasks
     from rrtik_ompl.tasks.task_file import load_task as load_task
+    from rrtik_ompl.tasks.through import PlanThrough as PlanThrough
+    from rrtik_ompl.tasks.through import plan_through as plan_through
     from rrtik_ompl.tasks.timed import TimedTask as TimedTask
     from rrtik_ompl.tasks.timed import time_task as time_task
     from rrtik_ompl.tip_motion import StraightResult as StraightResult
@@ -160,6 +162,7 @@ else:
         "tasks.plan_file": ("load_task_plan", "save_task_plan"),
         "tasks.task_file": ("list_tasks", "load_task"),
         "tip_motion": ("StraightResult", "arc", "linear", "screw", "straight"),
+        "tasks.through": ("PlanThrough", "plan_through"),
         "tasks.timed": ("TimedTask", "time_task"),
         "trajectory": ("RateLimits", "Trajectory", "load_trajectory", "motion_report", "time_parameterize"),
         "viewer": ("view",),

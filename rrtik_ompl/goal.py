@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Vector, finite_array, frozen, positive
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
 from rrtik_ompl.choices import FrameAxis
 from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError, require
@@ -228,6 +228,13 @@ class MultiGoal:
         """In which rows of Q all tips are at their goals, shape (m,)."""
         there: Mask = np.all([part.satisfied(arm, Q) for arm, part in self._each(robot)], axis=0)
         return there
+
+    def errors(self, robot: Robot, Q: ArrayLike) -> Matrix:
+        """Distance [m] and angle [rad] of each row of Q, of the tip that is farthest away, shape (m, 2)."""
+        each = np.array([part.errors(arm, Q) for arm, part in self._each(robot)]).transpose(0, 2, 1)
+        worst = np.argmax(each[..., 0] + metres_per_radian(robot) * each[..., 1], axis=0)
+        farthest: Matrix = each[worst, np.arange(each.shape[1])]
+        return farthest
 
     def _each(self, robot: Robot) -> list[tuple[Robot, GoalPart]]:
         require(robot, Robot, "robot of a goal")

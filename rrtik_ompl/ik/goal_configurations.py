@@ -30,6 +30,7 @@ from rrtik_ompl.ik.targets import leaves_freedom, targets
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.task_region import TaskRegion
+from rrtik_ompl.world.holding_world import HoldingWorld
 
 STARTS = 48  # of inverse kinematics in one round
 FEWEST = 4  # for each part, to say how near the arm came
@@ -98,7 +99,9 @@ class GoalSearch:
         if self.exhausted or isinstance(goal, JointGoal):
             return False
         if isinstance(goal, MultiGoal):
-            found = at_all_tips(self._problem, goal, self._rng)
+            kept = world.constraints.regions if isinstance(world, HoldingWorld) else ()
+            start, scene = self._problem.start, world.scene
+            found = at_all_tips(world.robot, goal, start, self._rng, scene=scene, kept=kept)
         else:
             found = self._round(goal)
             if self._problem.constraints:

@@ -2,45 +2,102 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable, Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen
+from rrtik_ompl.choices import IkMethod
 from rrtik_ompl.constraints.goal_regions import goal_regions
 from rrtik_ompl.constraints.held_region import HeldRegion
 from rrtik_ompl.constraints.held_regions import HeldRegions
-from rrtik_ompl.goal import MultiGoal
+from rrtik_ompl.goal import MultiGoal, joint_difference
 from rrtik_ompl.ik.held_tables import projected_onto
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.ik.result import IkResult, different_rows
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.world.holding_world import HoldingWorld
+from rrtik_ompl.scene import Scene
 
+PROJECTION: IkMethod = "projection"
 STARTS = 96  # random ones, for each tip
 
 
-def at_all_tips(problem: Problem, goal: MultiGoal, rng: np.random.Generator) -> Matrix:
-    """Configurations with all tips at their goals that keep the path constraints of a problem, shape (k, dof).
+def at_all_tips(
+    robot: Robot, goal: MultiGoal, near: Vector, rng: np.random.Generator, *, scene: Scene, kept: Iterable[HeldRegion]
+) -> Matrix:
+    """Configurations with all tips at their goals that keep path constraints, shape (k, dof).
 
     First each tip alone is moved to its goal from many starts, then the joints of one tip's are put together with those
     of another's. Where tips share joints, or there are path constraints, that is but a start for all at once.
+
+    Args:
+        robot: With all the tips.
+        goal: Of each.
+        near: One of the starts, shape (dof,).
+        rng: Of the others.
+        scene: Whose attached objects may have goals too.
+        kept: Regions of path constraints.
     """
-    robot, world = problem.robot, problem.world
-    regions = goal_regions(robot, world.scene, goal)
+    regions = goal_regions(robot, scene, goal)
     starts = rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
-    starts[0] = problem.start
+    starts[0] = near
     joined = starts.copy()
     for region in regions:
         own = projected_onto(robot, HeldRegions((region,)), starts)
         if len(own) == 0:
             return own
-        own = own[np.argsort(np.linalg.norm(own - problem.start, axis=1))]
+        own = own[np.argsort(np.linalg.norm(own - near, axis=1))]
         rows = np.append(0, rng.integers(len(own), size=STARTS - 1))  # the nearest ones of all tips first
         moved = _moving(robot, region)
         joined[:, moved] = own[rows][:, moved]
-    kept = world.constraints.regions if isinstance(world, HoldingWorld) else ()
     found = projected_onto(robot, HeldRegions((*kept, *regions)), joined)
     there: Matrix = found[goal.satisfied(robot, found)] if len(found) else found
     return there
+
+
+def solve_all_tips(
+    robot: Robot,
+    goal: MultiGoal,
+    near: Vector,
+    accept: Callable[[Matrix], Mask],
+    deadline: float,
+    rng: np.random.Generator,
+    *,
+    scene: Scene,
+) -> IkResult:
+    """Inverse kinematics of several tips: all solutions of the first round that has any, nearest first.
+
+    Args:
+        robot: See :func:`at_all_tips`.
+        goal: Likewise.
+        near: Likewise.
+        accept: Which configurations, shape (m, dof), are free, shape (m,).
+        deadline: When to end [s, of ``time.monotonic``]; there is a first round in any case.
+        rng: See :func:`at_all_tips`.
+        scene: Likewise.
+    """
+    begin, rounds = time.monotonic(), 0
+    reason, detail = "time", ""
+    while rounds == 0 or time.monotonic() < deadline:
+        rounds += 1
+        found = at_all_tips(robot, goal, near, rng, scene=scene, kept=())
+        free = found[accept(found)]
+        if len(free):
+            turned = joint_difference(robot, free, near)
+            kept = different_rows(turned, np.vecdot(turned, turned).argsort(kind="stable"))
+            rows = np.where(robot.continuous, near + turned[kept], free[kept])
+            return _result(rows, goal.errors(robot, rows), "", "", rounds, begin)
+        if len(found):
+            reason, detail = "collision", f"{len(found)} configurations reach the goals, all in collision"
+    tips = " and ".join(f"'{frame}'" for frame in goal.frames)
+    detail = detail or f"no configuration with {tips} at their goals in {rounds} rounds; are they in reach?"
+    return _result(np.zeros((0, robot.dof)), np.zeros((0, 2)), reason, detail, rounds, begin)
+
+
+def _result(rows: Matrix, residuals: Matrix, reason: str, detail: str, rounds: int, begin: float) -> IkResult:
+    spent = time.monotonic() - begin
+    return IkResult(frozen(rows), frozen(residuals), reason, detail, rounds, PROJECTION, spent)
 
 
 def _moving(robot: Robot, region: HeldRegion) -> NDArray[np.intp]:

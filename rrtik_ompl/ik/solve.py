@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, get_args
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen, not_negative
 from rrtik_ompl.choices import IkMethod, one_of
-from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import (
+    MultiGoal,
     PoseGoal,
     PositionGoal,
     TipGoal,
@@ -28,49 +27,21 @@ from rrtik_ompl.goal import (
 from rrtik_ompl.ik.mb_rrt.search import out_of_reach
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target, tolerances
 from rrtik_ompl.ik.methods import METHODS, load_kernels
+from rrtik_ompl.ik.multi_goals import PROJECTION, solve_all_tips
 from rrtik_ompl.ik.random_stream import RandomStream
 from rrtik_ompl.ik.residual import error_of_one
+from rrtik_ompl.ik.result import IkResult as IkResult
+from rrtik_ompl.ik.result import different_rows
 from rrtik_ompl.ik.targets import leaves_freedom, targets
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import Scene
 from rrtik_ompl.world import World
 from rrtik_ompl.world.check_world import check_world
 
 SECONDS = 1.0
+METHOD = "inverse kinematics method"
 DRAWS = 32  # targets drawn from a goal that leaves freedom; one for each part if it has more parts
 DIGITS = 9  # of metres and degrees in a message: less is rounding
-SAME_POSTURE = 1e-3  # [rad] or [m]; solutions of a numeric method this near are one
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class IkResult:
-    """What inverse kinematics found.
-
-    Attributes:
-        solutions: Configurations at the goal, inside the limits, free if a world was given, nearest first; shape
-            (k, dof). At most one unless all were asked for.
-        residuals: Distance [m] and angle [rad] of each from the goal by forward kinematics, shape (k, 2).
-        reason: "" or why there is none: ``unreachable``, ``limits``, ``collision``, ``time`` (or the method gave up,
-            or tried a part of a region alone).
-        detail: The same in a line: by how much, which joint, what touches.
-        iterations: Steps of a numeric method.
-        method: The method that answered.
-        seconds: Time taken.
-    """
-
-    solutions: Matrix
-    residuals: Matrix
-    reason: str
-    detail: str
-    iterations: int
-    method: IkMethod
-    seconds: float
-
-    __reduce__ = as_value
-
-    @property
-    def found(self) -> bool:
-        """Whether there is a solution."""
-        return len(self.solutions) > 0
 
 
 def list_ik_methods() -> tuple[IkMethod, ...]:
@@ -80,7 +51,7 @@ def list_ik_methods() -> tuple[IkMethod, ...]:
 
 def solve_ik(
     robot: Robot,
-    goal: TipGoal | ArrayLike | pin.SE3,
+    goal: TipGoal | MultiGoal | ArrayLike | pin.SE3,
     *,
     method: IkMethod = "auto",
     near: ArrayLike | None = None,
@@ -94,10 +65,10 @@ def solve_ik(
     Args:
         robot: The arm.
         goal: A pose, a position, or a region with some freedom (of which targets are drawn); or a pose in any form that
-            `PoseGoal` takes.
+            `PoseGoal` takes; or a `MultiGoal`, for several tips at once.
         method: A name from `list_ik_methods`; "auto" is the closed form where it fits, else (and where the targets
             drawn from a region, or the curve of a singular pose, bring none) numeric, or projection onto task-space
-            regions; the others are there to be compared.
+            regions; the others are there to be compared. Of several tips it is projection.
         near: Posture near which a solution is wanted, shape (dof,); the middle of the limits if None. A closed form
             gives the nearest one there is (of a singular pose its nearest representative), a numeric method the
             first that it finds on its way from there.
@@ -114,9 +85,15 @@ def solve_ik(
     check_world(world, robot)
     load_kernels(robot)
     begin = time.monotonic()
-    goal = _tip_goal(goal)
     limit, random = not_negative(seconds, "seconds"), RandomStream(seed)
     posture = mid_range_configuration(robot) if near is None else robot.configuration(near, "near")
+    if isinstance(goal, MultiGoal):
+        if method not in ("auto", PROJECTION):
+            raise InputError(f"method '{one_of(get_args(IkMethod), method, METHOD)}' is for one tip; use {PROJECTION}")
+        scene, accepted = Scene() if world is None else world.scene, partial(free_of_collision, world)
+        found = solve_all_tips(robot, goal, posture, accepted, begin + limit, random.rng, scene=scene)
+        return found if all else found.nearest()
+    goal = _tip_goal(goal)
     drawn = (goal,) if isinstance(goal, Target) else tuple(targets(goal, max(DRAWS, len(parts_of(goal))), random.rng))
     name = chosen_method(robot, drawn, method)
     if method == "auto" and name == "numeric":
@@ -188,7 +165,7 @@ def chosen_method(robot: Robot, drawn: tuple[Target, ...], method: IkMethod) -> 
 
     if method == "auto":
         return next(name for name in METHODS if not misfit(name))
-    fault = misfit(one_of(get_args(IkMethod), method, "inverse kinematics method"))
+    fault = misfit(one_of(get_args(IkMethod), method, METHOD))
     if fault:
         raise InputError(
             f"method '{method}' does not fit robot '{robot.name}' and this goal: {fault}; "
@@ -234,15 +211,6 @@ def _reaching(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix, Mask]:
     robot = request.robot
     rows, residuals = _at_goal(robot, request.goal, robot.clamp(q[robot.within_limits(q)]))
     return rows, residuals, request.accept(rows)
-
-
-def different_rows(rows: Matrix, order: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Numbers of the rows, taken in that order, without those that repeat an earlier one to `SAME_POSTURE`."""
-    kept: list[int] = []
-    for k in order.tolist():
-        if not kept or np.abs(rows[k] - rows[kept]).max(axis=1).min() > SAME_POSTURE:
-            kept.append(k)
-    return np.array(kept, dtype=np.intp)
 
 
 def _at_goal(robot: Robot, goal: TipGoal, q: Matrix) -> tuple[Matrix, Matrix]:

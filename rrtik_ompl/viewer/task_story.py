@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector, frozen
+from rrtik_ompl.arrays import Vector, frozen
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.poses import quaternion_xyzw
 from rrtik_ompl.replanning.record import ReplanRun, Tick
 from rrtik_ompl.tasks import TaskPlan
+from rrtik_ompl.tasks.timed import time_task
 from rrtik_ompl.world import World
 
 TASK = "task"  # the planner of a run that shows one
 RATE = 25.0  # ticks per second
-SPEED = np.deg2rad(40.0)  # [rad/s] or [m/s] of the joint that travels farthest
-LEAST_TICKS = 8  # of a motion
 
 
 def run_of(plan: TaskPlan) -> ReplanRun:
-    """The run that shows a plan; its times are for display.
+    """The run that shows a plan as :func:`time_task` times it: at the robot's own limits, with rests between motions.
 
     Raises:
         InputError: If there is no plan to show.
@@ -26,15 +25,13 @@ def run_of(plan: TaskPlan) -> ReplanRun:
     if not plan.paths:
         raise InputError("task plan to show: it has no motion" + (f": {plan.reason}" if plan.reason else ""))
     robot = plan.worlds[0].robot
-    ticks: list[Tick] = []
     held_first = {item.name for item in plan.worlds[0].scene.attached}
-    for number, (path, world) in enumerate(zip(plan.paths, plan.worlds, strict=True)):
+    ticks: list[Tick] = []
+    for number, q in _timed(plan):
+        path, world = plan.paths[number], plan.worlds[number]
         text = f"motion {number + 1} of {len(plan.paths)}: {plan.stages[number]}"
-        rows = _spread(path.waypoints)
-        last = number == len(plan.paths) - 1
-        for q in rows if last else rows[:-1]:
-            poses = {name: pose for name, pose in _poses(world, q).items() if name not in held_first}
-            ticks.append(Tick(len(ticks) / RATE, q, "walk", path.waypoints, poses, {}, reason=text))
+        poses = {name: pose for name, pose in _poses(world, q).items() if name not in held_first}
+        ticks.append(Tick(len(ticks) / RATE, q, "walk", path.waypoints, poses, {}, reason=text))
     return ReplanRun(
         problem=robot.name,
         robot=robot.name,
@@ -50,13 +47,16 @@ def run_of(plan: TaskPlan) -> ReplanRun:
     )
 
 
-def _spread(waypoints: Matrix) -> Matrix:
-    """Configurations of a motion at the rate of the ticks, shape (k, dof)."""
-    seconds = np.abs(np.diff(waypoints, axis=0)).max(axis=1) / SPEED
-    times = np.append(0.0, np.cumsum(np.maximum(seconds, 1e-9)))
-    count = max(int(np.ceil(times[-1] * RATE)), LEAST_TICKS)
-    wanted = np.linspace(0.0, times[-1], count + 1)
-    return frozen(np.stack([np.interp(wanted, times, column) for column in waypoints.T], axis=1))
+def _timed(plan: TaskPlan) -> list[tuple[int, Vector]]:
+    """Number of the motion and configuration, tick after tick; a motion that leads nowhere has one too."""
+    if not any(path.length > 0.0 for path in plan.paths):
+        return [(number, path.start) for number, path in enumerate(plan.paths)]
+    timed = time_task(plan)
+    clock, states = timed.trajectory.sampled(RATE)
+    numbers = np.searchsorted(timed.begins, clock, side="right") - 1
+    missing = np.setdiff1d(np.arange(len(plan.paths)), numbers).tolist()  # what leads nowhere takes no time
+    rows = [*zip(numbers.tolist(), states.positions, strict=True), *((k, plan.paths[k].start) for k in missing)]
+    return [(number, frozen(q)) for number, q in sorted(rows, key=lambda row: row[0])]
 
 
 def _poses(world: World, q: Vector) -> dict[str, Vector]:

@@ -111,7 +111,25 @@ def test_the_page_carries_the_object_with_the_hand(small):
         assert np.allclose(tick.poses["part"][:3], (robot.fk(tick.q, held.link) * held.pose).translation)
     still = [tick.poses["part"] for tick in ticks if tick.reason.startswith("motion 4")]
     assert np.allclose(still, still[0])
-    assert max(np.abs(b.q - a.q).max() for a, b in pairwise(ticks)) < 0.1
+    farthest = rrtik.RateLimits.of(robot).velocity / run_of(plan).rate
+    assert all((np.abs(b.q - a.q) <= farthest + 1e-6).all() for a, b in pairwise(ticks))
+
+
+@pytest.mark.kernels
+def test_the_page_plays_a_task_in_the_time_that_it_takes(small):
+    loaded = rrtik.load_task(small)
+    plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
+    shown, timed = run_of(plan), rrtik.time_task(plan)
+    duration = timed.trajectory.duration
+    assert shown.times[-1] == pytest.approx(duration, abs=2.0 / shown.rate)
+    for tick in shown.ticks[:-1:20]:
+        assert tick.q == pytest.approx(timed.trajectory(tick.time).positions, abs=1e-9)
+        number = int(tick.reason.split()[1])
+        assert timed.begins[number - 1] <= tick.time
+    rest = timed.pauses[0]
+    waiting = [tick.q for tick in shown.ticks if rest[0] < tick.time < rest[1]]
+    assert len(waiting) > 5
+    assert np.ptp(waiting, axis=0).max() < 1e-9
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,82 @@
+"""`plan_through()`: goals that are reached one after the other, as one path."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.errors import InputError, listed
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.task_region import TaskRegion
+from rrtik_ompl.tasks import SECONDS, MoveTo, Task
+from rrtik_ompl.world import World
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlanThrough:
+    """A path through several goals.
+
+    Attributes:
+        found: Whether all of them can be reached, in their order.
+        path: The whole way, or None.
+        reached: Number of the waypoint at which each goal is reached.
+        reason: "" if found, else which goal could not be reached, how often and why.
+    """
+
+    found: bool
+    path: JointPath | None
+    reached: tuple[int, ...]
+    reason: str
+
+
+def plan_through(
+    world: World,
+    start: ArrayLike | str,
+    goals: Sequence[object],
+    *,
+    constraints: Iterable[TaskRegion] = (),
+    seconds: float = SECONDS,
+    seed: int = 0,
+) -> PlanThrough:
+    """Plan a path that reaches one goal after the other, with configurations chosen such that all can be reached.
+
+    Args:
+        world: Robot and scene.
+        start: Configuration, shape (dof,), or the name of a posture.
+        goals: Each a goal, the name of a posture, a configuration, shape (dof,), or a pose of the tip as ``SE3`` or
+            matrix.
+        constraints: Regions that a frame must not leave on the whole path, those ``from_start`` as seen from the start.
+        seconds: Time limit [s].
+        seed: The same seed gives the same path, as long as the time limit does not cut in.
+
+    Raises:
+        InputError: If there is no goal, or one makes no sense; its number is said.
+        ProblemError: If the start is in collision, outside the limits or outside the region of a constraint.
+
+    Example:
+        >>> import rrtik_ompl as rrtik
+        >>> world = rrtik.World(rrtik.load_robot("titan4"))
+        >>> tour = rrtik.plan_through(world, "zero", ["ready", rrtik.PositionGoal([1.0, 0.4, 0.2]), "zero"], seed=1)
+        >>> tour.found, len(tour.reached), tour.reached[-1] == len(tour.path.waypoints) - 1
+        (True, 3, True)
+    """
+    wanted = listed(goals, "goals to be reached in order")
+    if not wanted:
+        raise InputError(
+            "goals to be reached in order: there is none; give at least one, such as PoseGoal(T_world_tip)"
+        )
+    held = tuple(constraints)
+    placed = Problem(world, start, start, constraints=held).constraints if held else ()
+    stages = [MoveTo(goal, constraints=placed) for goal in wanted]
+    plan = Task(stages).plan(world, start, seconds=seconds, seed=seed)
+    if not plan.found:
+        return PlanThrough(False, None, (), plan.reason)
+    rows = [plan.paths[0].waypoints, *(path.waypoints[1:] for path in plan.paths[1:])]
+    reached = np.cumsum([len(part) for part in rows]) - 1
+    path = plan.paths[0].with_waypoints(np.vstack(rows))
+    judge = Problem(world, path.start, path.end, constraints=placed).world if placed else world
+    return PlanThrough(True, path.proved(judge), tuple(reached.tolist()), "")
