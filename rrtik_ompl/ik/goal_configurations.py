@@ -81,6 +81,7 @@ class GoalSearch:
         self.rows: Matrix = frozen(np.zeros((0, problem.world.robot.dof)))
         self.exhausted = isinstance(problem.goal, JointGoal)
         self._problem, self._rounds, self._found = problem, 0, self.rows
+        self._unheld = self.rows  # at the goal, whether or not they keep path constraints
         if isinstance(problem.goal, JointGoal):
             self.rows = frozen(_turns(problem, problem.goal.q) if all_turns else problem.goal.q[None])
         else:
@@ -105,6 +106,7 @@ class GoalSearch:
         else:
             found = self._round(goal)
             if self._problem.constraints:
+                self._unheld = np.vstack([self._unheld, found])
                 found = held_at_goal(self._problem, goal, found, self._rng)
         self._rounds += 1
         free = found[world.valid_batch(found)]
@@ -128,8 +130,18 @@ class GoalSearch:
             return f"no configuration with {tips} at their goals was found in {self._rounds} rounds; are they in reach?"
         rounds = f"{self._rounds} round{'s' * (self._rounds != 1)}"
         if self._problem.constraints:
-            return f"no configuration was found in {rounds} that is at the goal and keeps the path constraints"
+            fault = f"no configuration was found in {rounds} that is at the goal and keeps the path constraints"
+            return fault + (f"; the nearest one breaks {breach}" if (breach := self._least_breach()) else "")
         return f"inverse kinematics found no configuration at the goal in {rounds}; {_miss(self._problem, goal)}"
+
+    def _least_breach(self) -> str:
+        """Which path constraint the configuration at the goal breaks that breaks them least, and by how much."""
+        world = self._problem.world
+        if not isinstance(world, HoldingWorld) or len(self._unheld) == 0:
+            return ""
+        regions = world.constraints.regions
+        amounts = [sum(sum(region.outside(q)) for region in regions) for q in self._unheld]
+        return world.constraints.explain(self._unheld[int(np.argmin(amounts))])
 
     def _round(self, goal: TipGoal) -> Matrix:
         """Configurations at the goal, in collision or not, by the method whose turn it is, shape (m, dof)."""

@@ -47,6 +47,9 @@ class MoveTo:
         if isinstance(goal, pin.SE3) or (not isinstance(goal, Goal | str) and dimensions(goal) == 2):
             goal = PoseGoal(rigid(goal, "goal of MoveTo"))
         elif not isinstance(goal, Goal | str):
+            if dimensions(goal) != 1:
+                kinds = "a goal such as PoseGoal, the name of a posture, a configuration, or a pose of the tip"
+                raise InputError(f"goal of MoveTo: expected {kinds}, got {type(goal).__name__}")
             goal = frozen(finite_array(goal, (None,), "goal of MoveTo"))
         object.__setattr__(self, "goal", goal)
 

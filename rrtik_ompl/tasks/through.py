@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rrtik_ompl.arrays import dimensions
 from rrtik_ompl.errors import InputError, listed
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
@@ -71,6 +73,8 @@ def plan_through(
         )
     held = tuple(constraints)
     placed = Problem(world, start, start, constraints=held).constraints if held else ()
+    if dimensions(goals) == 1 and all(isinstance(goal, Real) for goal in wanted):
+        raise InputError("goals to be reached in order: this is one configuration; put it into a list: [q]")
     stages = [MoveTo(goal, constraints=placed) for goal in wanted]
     plan = Task(stages).plan(world, start, seconds=seconds, seed=seed)
     if not plan.found:

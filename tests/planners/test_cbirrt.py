@@ -1,5 +1,7 @@
 """CBiRRT along path constraints, through plan()."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -76,6 +78,9 @@ def test_a_pose_that_no_path_can_keep_is_said():
     plan = rrtik.plan(other, seed=1, seconds=2.0)
     assert not plan.found
     assert "at the goal and keeps the path constraints" in plan.reason
+    away = re.search(r"the nearest one breaks path constraint 1 \(frame '.*'\): (\S+) degrees outside", plan.reason)
+    tilt = np.degrees(np.arccos(problem.robot.fk(problem.start).rotation[2, 2]))  # between the axis and the goal's
+    assert float(away[1]) == pytest.approx(tilt - 5.0, abs=0.2)
 
 
 def test_shortening_keeps_the_constraint():

@@ -69,6 +69,8 @@ def test_a_goal_out_of_reach_is_named(world):
         ([], InputError, "there is none; give at least one"),
         ("up", InputError, "goals to be reached in order must be a list, got str"),
         ([START, "upp"], InputError, "stage 2.*no posture .*'upp'.*did you mean 'up'"),
+        (START, InputError, r"this is one configuration; put it into a list: \[q\]"),
+        ([START, None], InputError, "goal of MoveTo: expected a goal such as PoseGoal.*got NoneType"),
         ([START, [0.0, 1.0]], InputError, "stage 2.*6 joints"),
     ],
 )
