@@ -43,7 +43,7 @@ def draw(subject: Subject) -> tuple[Recording, Frame]:
     else:
         frame = _draw_robot(vis, robot, subject)
         draw_goal(vis, subject.goal, frame)
-        draw_constraints(vis, subject.held, subject.waypoints[0], frame)
+        draw_constraints(vis, subject.held, frame)
         if len(subject.waypoints) > 1:
             doubtful = () if subject.curve is None else subject.curve.unproven
             beads = subject.run is None and subject.times is None

@@ -48,7 +48,7 @@ class Subject:
         run: The run whose ticks the waypoints are, or None.
         curve: How far the path stays from obstacles, or None if that is not known.
         times: When the waypoints of a timed motion are reached [s], shape (k,), or None.
-        held: Regions of path constraints.
+        held: Regions of path constraints, and the configurations, shape (dof,), in which they begin to be held.
     """
 
     name: str
@@ -63,7 +63,7 @@ class Subject:
     run: ReplanRun | None = None
     curve: ClearanceCurve | None = None
     times: Vector | None = None
-    held: tuple[HeldRegion, ...] = ()
+    held: tuple[tuple[HeldRegion, Vector], ...] = ()
 
     @property
     def start(self) -> Vector | None:
@@ -141,7 +141,7 @@ def subject_of(
         if not isinstance(getattr(world, "robot", None), Robot) or not isinstance(getattr(world, "scene", None), Scene):
             raise InputError(f"view: cannot show a {type(shown).__name__}; give a problem, world, robot or scene")
         robot, scene = world.robot, world.scene
-    goal, held = getattr(shown, "goal", None), _held(getattr(shown, "world", shown))
+    goal, regions = getattr(shown, "goal", None), _held(getattr(shown, "world", shown))
     named = getattr(shown, "name", "problem")
     name = robot.name if named == "problem" else str(named)
     tinted = None if ghosts is None else _waypoints(robot, ghosts)
@@ -150,11 +150,13 @@ def subject_of(
         times, path = _timed(robot, path)
         rows = _waypoints(robot, path)
         curve = _curve(getattr(shown, "world", shown), rows)
+        held = tuple((region, rows[0]) for region in regions)
         return Subject(
             name, robot, scene, goal, rows, True, earlier, tinted, marks, curve=curve, times=times, held=held
         )
     start = getattr(shown, "start", None)
     posture = robot.clamp(np.zeros(robot.dof)) if start is None else robot.configuration(start, "start")
+    held = tuple((region, posture) for region in regions)
     return Subject(name, robot, scene, goal, frozen(posture[None]), False, None, tinted, marks, held=held)
 
 

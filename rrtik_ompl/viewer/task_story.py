@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from rrtik_ompl.arrays import Vector, frozen
+from rrtik_ompl.constraints.held_region import HeldRegion
+from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.poses import quaternion_xyzw
 from rrtik_ompl.replanning.record import ReplanRun, Tick
-from rrtik_ompl.tasks import TaskPlan
+from rrtik_ompl.tasks import MoveTo, TaskPlan
 from rrtik_ompl.tasks.timed import time_task
 from rrtik_ompl.world import World
 
@@ -45,6 +47,16 @@ def run_of(plan: TaskPlan) -> ReplanRun:
         ticks=ticks,
         outcome="arrived",
     )
+
+
+def held_in(plan: TaskPlan) -> tuple[tuple[HeldRegion, Vector], ...]:
+    """The regions of the path constraints of all motions, and where each motion begins, shape (dof,)."""
+    found: list[tuple[HeldRegion, Vector]] = []
+    for path, world, stage in zip(plan.paths, plan.worlds, plan.stages, strict=True):
+        if isinstance(stage, MoveTo):
+            held = held_regions(world.robot, world.scene, stage.constraints, path.start)
+            found += [(region, path.start) for region in held.regions]
+    return tuple(found)
 
 
 def _timed(plan: TaskPlan) -> list[tuple[int, Vector]]:

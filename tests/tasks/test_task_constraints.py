@@ -1,5 +1,8 @@
 """Stages that keep path constraints: a cup that stays upright while it is carried."""
 
+import base64
+import re
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -9,6 +12,8 @@ from rrtik_ompl import Alternatives, Attach, MoveTo, Straight, Task
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.problem_files.path_constraints import constraint_data
 from rrtik_ompl.tasks.task_file import stage_data
+from rrtik_ompl.viewer.page import page
+from rrtik_ompl.viewer.task_story import held_in
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +63,17 @@ def test_a_plan_with_constraints_comes_back_from_its_file(served, tmp_path):
     assert [stage_data(stage) for stage in again.stages] == [stage_data(stage) for stage in served.stages]
     assert again.stages[3].constraints[0].from_start
     assert again.stages[3].constraints[0].frame == "cup"
+
+
+@pytest.mark.kernels
+def test_the_page_draws_the_regions_of_stages_where_they_begin(served):
+    ((region, begin),) = held_in(served)
+    stage = served.stages.index(next(each for each in served.stages if getattr(each, "constraints", ())))
+    assert region.frame == "cup"
+    assert (begin == served.paths[stage].start).all()
+    assert region.outside(begin) == (0.0, 0.0)
+    commands = re.findall(r'"([A-Za-z0-9+/]{40,}=*)"', page(served.worlds[0], served, still=True))
+    assert any(b"constraints/0/axis" in base64.b64decode(command) for command in commands)
 
 
 @pytest.mark.kernels

@@ -24,16 +24,15 @@ THINNEST = 0.004  # [diagonal of the arm] of a plane or a line
 OPACITY = 0.2
 
 
-def draw_constraints(vis: Node, regions: Iterable[HeldRegion], start: Vector, frame: Frame) -> None:
+def draw_constraints(vis: Node, held: Iterable[tuple[HeldRegion, Vector]], frame: Frame) -> None:
     """Draw regions under ``constraints``: what bounds the position where it is, a cone where the frame starts.
 
     Args:
         vis: The page.
-        regions: Of the problem.
-        start: Configuration, shape (dof,).
+        held: Regions, and the configurations, shape (dof,), in which they begin to be held.
         frame: What the page shows.
     """
-    for k, region in enumerate(regions):
+    for k, (region, start) in enumerate(held):
         node = vis["constraints"][f"{k}"]
         D = region.displacements(start[None])[0]
         if (np.abs(region.region.bounds[:3]) < ANYWHERE).any():
