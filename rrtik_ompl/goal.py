@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, positive
+from rrtik_ompl.arrays import Mask, Vector, finite_array, frozen, positive
 from rrtik_ompl.choices import FrameAxis
 from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError, require
@@ -221,22 +221,16 @@ class MultiGoal:
 
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
         """Distances of all tips together for each row of Q, shape (m,) [m]; see :meth:`GoalSet.distance`."""
-        total: Vector = np.sum([part.distance(arm, Q) for arm, part in self._each(robot)], axis=0)
+        total: Vector = np.sum([part.distance(arm, Q) for arm, part in self.each(robot)], axis=0)
         return total
 
     def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
         """In which rows of Q all tips are at their goals, shape (m,)."""
-        there: Mask = np.all([part.satisfied(arm, Q) for arm, part in self._each(robot)], axis=0)
+        there: Mask = np.all([part.satisfied(arm, Q) for arm, part in self.each(robot)], axis=0)
         return there
 
-    def errors(self, robot: Robot, Q: ArrayLike) -> Matrix:
-        """Distance [m] and angle [rad] of each row of Q, of the tip that is farthest away, shape (m, 2)."""
-        each = np.array([part.errors(arm, Q) for arm, part in self._each(robot)]).transpose(0, 2, 1)
-        worst = np.argmax(each[..., 0] + metres_per_radian(robot) * each[..., 1], axis=0)
-        farthest: Matrix = each[worst, np.arange(each.shape[1])]
-        return farthest
-
-    def _each(self, robot: Robot) -> list[tuple[Robot, GoalPart]]:
+    def each(self, robot: Robot) -> list[tuple[Robot, GoalPart]]:
+        """The goal of each tip, with the robot that has this tip."""
         require(robot, Robot, "robot of a goal")
         return [(_with_tip(robot, frame), part) for frame, part in zip(self.frames, self.parts, strict=True)]
 

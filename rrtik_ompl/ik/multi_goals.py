@@ -15,9 +15,10 @@ from rrtik_ompl.constraints.held_region import HeldRegion
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.goal import MultiGoal, joint_difference
 from rrtik_ompl.ik.held_tables import projected_onto
-from rrtik_ompl.ik.result import IkResult, different_rows
+from rrtik_ompl.ik.method_interface import IkResult, different_rows
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
+from rrtik_ompl.tip_distance import metres_per_radian
 
 PROJECTION: IkMethod = "projection"
 STARTS = 96  # random ones, for each tip
@@ -87,12 +88,20 @@ def solve_all_tips(
             turned = joint_difference(robot, free, near)
             kept = different_rows(turned, np.vecdot(turned, turned).argsort(kind="stable"))
             rows = np.where(robot.continuous, near + turned[kept], free[kept])
-            return _result(rows, goal.errors(robot, rows), "", "", rounds, begin)
+            return _result(rows, _residuals(robot, goal, rows), "", "", rounds, begin)
         if len(found):
             reason, detail = "collision", f"{len(found)} configurations reach the goals, all in collision"
     tips = " and ".join(f"'{frame}'" for frame in goal.frames)
     detail = detail or f"no configuration with {tips} at their goals in {rounds} rounds; are they in reach?"
     return _result(np.zeros((0, robot.dof)), np.zeros((0, 2)), reason, detail, rounds, begin)
+
+
+def _residuals(robot: Robot, goal: MultiGoal, rows: Matrix) -> Matrix:
+    """Distance [m] and angle [rad] of each row from the goals, of the tip that is farthest away, shape (m, 2)."""
+    each = np.array([part.errors(arm, rows) for arm, part in goal.each(robot)]).transpose(0, 2, 1)
+    worst = np.argmax(each[..., 0] + metres_per_radian(robot) * each[..., 1], axis=0)
+    farthest: Matrix = each[worst, np.arange(len(rows))]
+    return farthest
 
 
 def _result(rows: Matrix, residuals: Matrix, reason: str, detail: str, rounds: int, begin: float) -> IkResult:

@@ -25,13 +25,12 @@ from rrtik_ompl.goal import (
     tip_errors,
 )
 from rrtik_ompl.ik.mb_rrt.search import out_of_reach
-from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target, tolerances
+from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target, different_rows, tolerances
+from rrtik_ompl.ik.method_interface import IkResult as IkResult
 from rrtik_ompl.ik.methods import METHODS, load_kernels
 from rrtik_ompl.ik.multi_goals import PROJECTION, solve_all_tips
 from rrtik_ompl.ik.random_stream import RandomStream
 from rrtik_ompl.ik.residual import error_of_one
-from rrtik_ompl.ik.result import IkResult as IkResult
-from rrtik_ompl.ik.result import different_rows
 from rrtik_ompl.ik.targets import leaves_freedom, targets
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene

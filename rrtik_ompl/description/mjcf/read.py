@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
-from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -93,7 +92,7 @@ def _include(root: Element, folder: Path) -> None:
 class _Reader:
     where: str
     settings: Settings
-    meshes: Mapping[str, tuple[MeshFile, Any]]
+    meshes: Mapping[str, tuple[MeshFile, pin.SE3]]
     solids: dict[str, tuple[list[Solid], list[Solid]]] = field(default_factory=lambda: {WORLD: ([], [])})
     joints: list[Joint] = field(default_factory=list)
     sites: list[str] = field(default_factory=list)
@@ -151,7 +150,7 @@ class _Reader:
         self.solids[name] = [], []
         self.fix(link, name, offset)
 
-    def turned(self, joint: Element, kind: str, name: str, link: str, offset: Any) -> tuple[str, Any]:
+    def turned(self, joint: Element, kind: str, name: str, link: str, offset: pin.SE3) -> tuple[str, pin.SE3]:
         """Add a joint; the link behind it, and where the body is in that one."""
         place = f"{self.where}: joint '{name}'"
         at = pin.SE3(np.eye(3), np.array(numbers(joint, "pos", 3, (0.0, 0.0, 0.0), place)))
@@ -172,7 +171,7 @@ class _Reader:
         back = pin.SE3(np.eye(3), way) if slides else pin.SE3(pin.exp3(way), np.zeros(3))
         return child, back * at.inverse()
 
-    def fix(self, parent: str, child: str, placement: Any) -> None:
+    def fix(self, parent: str, child: str, placement: pin.SE3) -> None:
         """A link that is fixed to another one."""
         self.joints.append(Joint(f"{child}/mount", "fixed", parent, child, placement))
 

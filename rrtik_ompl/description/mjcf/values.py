@@ -10,7 +10,9 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
+from rrtik_ompl.arrays import Vector
 from rrtik_ompl.description.urdf_read import numbers
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.poses import pose, turned_z
@@ -81,7 +83,7 @@ class Settings:
         """An angle of the file [rad]."""
         return float(np.radians(value)) if self.degrees else value
 
-    def placement(self, element: Element, where: str) -> Any:
+    def placement(self, element: Element, where: str) -> pin.SE3:
         """``pinocchio.SE3`` of an element with pos and one of the five orientations."""
         position = numbers(element, "pos", 3, (0.0, 0.0, 0.0), where)
         given = [key for key in _ORIENTATIONS if element.get(key) is not None]
@@ -118,8 +120,9 @@ class Settings:
         return turned_z(_unit(numbers(element, "zaxis", 3, None, where), element, where))
 
 
-def _unit(values: Any, element: Element, where: str) -> Any:
+def _unit(values: ArrayLike, element: Element, where: str) -> Vector:
     length = float(np.linalg.norm(values))
     if length < 1e-9:
         raise InputError(f"{where}: <{element.tag}> has an axis of length 0; give a direction such as 0 0 1")
-    return np.asarray(values) / length
+    unit: Vector = np.asarray(values) / length
+    return unit
