@@ -166,7 +166,7 @@ def _in_the_way(world: World, q: Vector, what: str) -> ProblemError:
         remedy = "no joint moves either; move the obstacle or the base, or allow the pair"
         return ProblemError(f"{what} is in collision: {fixed[0]}; {remedy}", pairs, part=what)
     if touching and all(c.distance > 0.0 for c in touching):
-        thick = bool(world.robot.padding)
+        thick = any(body.padding for body in world.bodies)
         lower = "lower the margin" + (" or the padding" if thick else "")
         remedy = f"move it or {lower}" + (", or allow the pair" if world.self_margin or thick else "")
         return ProblemError(f"{what} is too near: {world.explain(q)}; {remedy}", pairs, part=what)

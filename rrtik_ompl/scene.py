@@ -103,6 +103,13 @@ def _checked_solid(name: object, shape: object, pose: object) -> pin.SE3:
     return rigid(pose, f"pose of '{name}'")
 
 
+def _room(value: float, what: str) -> float:
+    room = float(bounded_array(value, (), what))
+    if room < 0.0:
+        raise InputError(f"{what} must be 0 metres or more, got {room:g}")
+    return room
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Obstacle:
     """A named solid in the world.
@@ -124,24 +131,26 @@ class Obstacle:
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", _checked_solid(self.name, self.shape, self.pose))
         require(self.motion, Motion | None, f"motion of '{self.name}'")
-        margin = float(bounded_array(self.margin, (), f"margin of '{self.name}'"))
-        if margin < 0.0:
-            raise InputError(f"margin of '{self.name}' must be 0 metres or more, got {margin:g}")
-        object.__setattr__(self, "margin", margin)
+        object.__setattr__(self, "margin", _room(self.margin, f"margin of '{self.name}'"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AttachedObject:
-    """A solid held by a link. ``pose`` is T_link_object; ``allow`` names further links that it may touch."""
+    """A solid held by a link. ``pose`` is T_link_object; ``allow`` names further links that it may touch.
+
+    ``padding`` [m] is what it keeps from all that it may not touch, on top of margins, as that of a link does.
+    """
 
     name: str
     link: str
     shape: Shape
     pose: pin.SE3 = field(default_factory=pin.SE3.Identity)
     allow: tuple[str, ...] = ()
+    padding: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", _checked_solid(self.name, self.shape, self.pose))
+        object.__setattr__(self, "padding", _room(self.padding, f"padding of '{self.name}'"))
         name_of(self.link, f"the link of '{self.name}'")
         object.__setattr__(self, "allow", listed(self.allow, f"allow of '{self.name}'"))
         for name in self.allow:
@@ -223,7 +232,13 @@ class Scene:
         )
 
     def attaching(
-        self, name: str, link: str, allow: Iterable[str] = (), *, pose: ArrayLike | pin.SE3 | None = None
+        self,
+        name: str,
+        link: str,
+        allow: Iterable[str] = (),
+        *,
+        pose: ArrayLike | pin.SE3 | None = None,
+        padding: float = 0.0,
     ) -> Scene:
         """The scene in which an obstacle has become an attached object; pairs that may touch still may.
 
@@ -232,13 +247,14 @@ class Scene:
             link: That holds it from now on.
             allow: Links and obstacles that it may touch beside that link.
             pose: T_link_object, in any form that :func:`rrtik_ompl.poses.rigid` takes; the link's own frame if None.
+            padding: What it keeps from all that it may not touch [m].
 
         Raises:
             UnknownNameError: If there is no obstacle of that name.
             InputError: If it has no end, or the pose is none.
         """
         taken, rest = self.obstacle(name), self.without(name)
-        held = AttachedObject(name, link, taken.shape, pin.SE3.Identity() if pose is None else pose)
+        held = AttachedObject(name, link, taken.shape, pin.SE3.Identity() if pose is None else pose, padding=padding)
         beside = set(rest.names)
         names = listed(allow, f"allow of '{name}'")
         for other in names:

@@ -34,7 +34,7 @@ class Body:
         kind: "link", "attached" or "obstacle".
         margin: Of an obstacle how far what moves must stay from it, of a link or attached object how far other ones
             must [m].
-        padding: How much thicker a link is than its geometry [m].
+        padding: How much thicker a link or attached object is than its geometry [m].
     """
 
     name: str
@@ -78,7 +78,9 @@ def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body,
         frame = robot.model.frames[robot.model.getFrameId(item.link, pin.FrameType.BODY)]
         mount = frame.placement * item.pose
         found += [
-            Body(item.name, frame.parentJoint, mount * piece.placement, piece.geometry, "attached", margin)
+            Body(
+                item.name, frame.parentJoint, mount * piece.placement, piece.geometry, "attached", margin, item.padding
+            )
             for piece in _pieces(item)
         ]
     return tuple(found)

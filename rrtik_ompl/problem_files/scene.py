@@ -112,10 +112,12 @@ class AttachedEntry(SolidEntry, json_schema_extra=ONE_SHAPE):
 
     link: Name
     allow: list[Name] = Field(default=[], description="further links that it may touch")
+    padding: NotNegative = Field(default=0.0, description="[m] kept from all that it may not touch")
 
     def build(self, folder: Path) -> AttachedObject:
         """The attached object."""
-        return AttachedObject(self.name, self.link, self.build_shape(folder), self.build_pose(), tuple(self.allow))
+        shape, pose = self.build_shape(folder), self.build_pose()
+        return AttachedObject(self.name, self.link, shape, pose, tuple(self.allow), self.padding)
 
 
 class SceneEntry(Section):
@@ -222,4 +224,5 @@ def _obstacle_data(obstacle: Obstacle, folder: Path) -> dict[str, Any]:
 def _attached_data(held: AttachedObject, folder: Path) -> dict[str, Any]:
     data = {"name": held.name, "link": held.link, **shape_data(held.name, held.shape, folder)}
     data["pose"] = pose_data(held.pose)
-    return data | ({"allow": list(held.allow)} if held.allow else {})
+    data |= {"allow": list(held.allow)} if held.allow else {}
+    return data | ({"padding": held.padding} if held.padding else {})

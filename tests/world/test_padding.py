@@ -119,6 +119,33 @@ def test_the_nearest_pair_is_named_with_all_that_it_has_to_keep(judged):
             Problem(world, Q[k], Q[k])
 
 
+def test_what_is_held_may_be_padded_too():
+    robot, scene = load_robot("panda"), crowd("panda")
+    bare = World(robot, scene, self_margin=0.004)
+    world = World(robot, replace(scene, attached=(replace(HELD, padding=0.06),)), self_margin=0.004)
+    Q = np.random.default_rng(3).uniform(robot.lower, robot.upper, (400, 7))
+    Q = Q[bare.valid_batch(Q)][:100]
+    room, valid = rooms(bare, Q, {"rod": 0.06}), world.valid_batch(Q)
+    assert 0.1 < valid.mean() < 0.95
+    assert (room[valid] > -NEARLY).all()
+    assert valid[room > NEARLY].all()
+    assert (world.certify(Q) == valid).all()
+    proven = world.motions_proven(Q, Q)
+    assert (proven <= valid).all()
+    assert proven[room > 0.01].mean() > 0.8
+    assert world.prove(Q[valid][:1]).digest != bare.prove(Q[valid][:1]).digest
+
+
+def test_a_file_keeps_the_padding_of_what_is_held(tmp_path):
+    scene = Scene([Obstacle("cup", Sphere(0.03))]).attaching("cup", "panda_hand", pose=[0.0, 0.0, 0.2], padding=0.01)
+    assert scene.attached[0].padding == 0.01
+    save_problem(Problem(World(load_robot("panda"), scene), "ready", "ready"), tmp_path / "p.yaml")
+    assert load_problem(tmp_path / "p.yaml").world.scene.attached[0].padding == 0.01
+    for value, said in ((-1.0, "0 metres or more"), (float("nan"), "padding of 'cup'"), ("wide", "padding of 'cup'")):
+        with pytest.raises(InputError, match=said):
+            AttachedObject("cup", "panda_hand", Sphere(0.03), padding=value)
+
+
 def test_paths_and_certificates_keep_it():
     wall = Obstacle("wall", Box([0.4, 0.4, 0.4]), [3.0, 2.2, 0.0])
     robot = padded(load_robot("planar6"), {"link6": 0.3})
