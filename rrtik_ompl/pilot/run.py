@@ -11,11 +11,13 @@ import cv2
 
 from rrtik_ompl.files.messages import quoted
 from rrtik_ompl.pilot.engine import VIEW_COMMANDS, Engine
+from rrtik_ompl.pilot.web.handlers import MAX_PAGES
 from rrtik_ompl.pilot.web.server import PilotServer
 from rrtik_ompl.world.motion_queries import Stop, no_stop
 
 PERIOD_SECONDS = 1.0 / 32.0  # a little less than a camera's, so that none of its pictures is left out
 CAMERA, OUTSIDE = "C", "O"
+MAX_SEQUENCE = 2**53  # the largest number that a page counts to
 
 
 class Loop:
@@ -97,8 +99,10 @@ class Loop:
             self._engine.session.arm.stop()
             what = f"'{quoted(command.get('name'))}' broke: {quoted(error) or type(error).__name__}"
             self._engine.session.message = f"{what}; the arm was stopped"
-        if isinstance(sequence, int) and not isinstance(sequence, bool):
+        if isinstance(sequence, int) and sequence is not True and 0 <= sequence <= MAX_SEQUENCE:
             self._answered[client] = sequence
+            while len(self._answered) > MAX_PAGES:  # of pages that have left
+                del self._answered[min(self._answered)]
         self._show_state()
 
     def _execute(self, command: dict[str, Any]) -> None:

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import socket
 import socketserver
 import threading
+import time
+from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler
+from typing import Any
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.viewer.page import POLICY
 
 ADDRESS = "127.0.0.1"
+MOST_OPEN = 64  # connections at a time; a browser has some six
+OPEN_SECONDS = 60.0  # of a connection at most, however slowly its bytes trickle
+LOOK_SECONDS = 0.5
 
 
 class PageServer:
@@ -56,17 +63,51 @@ class PageServer:
         self._thread.join()
 
     def wait(self) -> None:
-        """Return when Ctrl-C is pressed, which is how a person ends a live view."""
+        """Return when Ctrl-C is pressed, which is how a person ends a live view.
+
+        Raises:
+            InputError: If the server has ended by itself.
+        """
         try:
-            threading.Event().wait()
+            while self._thread.is_alive():
+                self._thread.join(LOOK_SECONDS)
         except KeyboardInterrupt:
             return
+        raise InputError(f"the server of the page on port {self.port} has ended; show it again")
 
 
 class _Server(socketserver.ThreadingTCPServer):
     allow_reuse_address = True
     daemon_threads = True
     body = b""
+
+    def __init__(self, address: tuple[str, int], handler: type[BaseHTTPRequestHandler]) -> None:
+        self._open: dict[socket.socket, float] = {}
+        super().__init__(address, handler)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Answer in a thread of its own; close at once where too many are open."""
+        if len(self._open) >= MOST_OPEN:
+            self.shutdown_request(request)
+            return
+        self._open[request] = time.monotonic()
+        super().process_request(request, client_address)
+
+    def shutdown_request(self, request: Any) -> None:
+        """End a connection."""
+        self._open.pop(request, None)
+        super().shutdown_request(request)
+
+    def service_actions(self) -> None:
+        """Cut connections that are open for too long."""
+        oldest = time.monotonic() - OPEN_SECONDS
+        for each, begin in list(self._open.items()):
+            if begin < oldest:
+                with suppress(OSError):
+                    each.shutdown(socket.SHUT_RDWR)
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Print nothing: that a browser has gone, or talks nonsense, concerns nobody here."""
 
 
 class _Handler(BaseHTTPRequestHandler):

@@ -1,10 +1,19 @@
 """A small share of the fuzz of the public face, with fixed seeds: answers, and errors of ours in one line."""
 
+import os
+import time
+
+import numpy as np
 import pytest
 
 from bench import fuzz
+from bench.robustness import commands, spoilt_files
+from rrtik_ompl.errors import InputError
 
 CALLS = 400
+
+# On a machine ten times as busy kernels may have to be compiled first, and nothing here may fail for being slow.
+pytestmark = pytest.mark.timeout(3600)
 
 
 @pytest.fixture(scope="module")
@@ -18,24 +27,73 @@ def test_no_call_crashes_hangs_or_takes_all_memory(finds):
 
 
 def test_no_spoilt_file_gives_more_than_a_line(finds):
-    assert [(seed, wrong) for seed, wrong in finds if any(f"| {name}:" in wrong for name in fuzz.FILES)] == []
+    assert [(seed, wrong) for seed, wrong in finds if any(f"| {name}:" in wrong for name in spoilt_files.FILES)] == []
 
 
 def test_no_call_ends_in_an_error_of_python_or_numpy(finds):
     assert finds == []
 
 
-@pytest.mark.parametrize("break_", ["os.abort()", "time.sleep(99)", "raise KeyError(3)", "[0] * 10**12"])
-def test_the_fuzz_sees_what_is_wrong_and_goes_on(monkeypatch, tmp_path, break_):
-    import os
-    import time
+BREAKS = {
+    "os.abort()": "crash",
+    "time.sleep(99)": "hang",
+    "while True: pass": "hang",
+    "raise KeyError(3)": "KeyError",
+    "[0] * 10**12": "out of",
+}
 
+
+@pytest.mark.parametrize("break_", BREAKS)
+def test_the_fuzz_sees_what_is_wrong_and_goes_on(monkeypatch, tmp_path, break_):
     def call(seed, folder):
         if seed == 1:
             exec(break_, {"os": os, "time": time})
 
     monkeypatch.setattr(fuzz, "call", call)
-    monkeypatch.setattr(fuzz, "SECONDS", 1)
+    monkeypatch.setattr(fuzz, "PROCESSOR_SECONDS", 1.0)
+    monkeypatch.setattr(fuzz, "WALL_SECONDS", 5.0 if "sleep" in break_ else 1200.0)
     ((seed, wrong),) = fuzz.run(0, 4, tmp_path)
-    kind = {"os.abort()": "crash", "time.sleep(99)": "hang", "raise KeyError(3)": "KeyError", "[0] * 10**12": "out of"}
-    assert (seed, wrong.startswith(kind[break_])) == (1, True)
+    assert (seed, wrong.startswith(BREAKS[break_])) == (1, True)
+
+
+def test_who_waits_uses_no_processor_time_and_is_no_hang(monkeypatch, tmp_path):
+    monkeypatch.setattr(fuzz, "call", lambda seed, folder: time.sleep(1.5))
+    monkeypatch.setattr(fuzz, "PROCESSOR_SECONDS", 1.0)
+    assert list(fuzz.run(0, 1, tmp_path)) == []
+
+
+ANSWERS = {
+    "a traceback": (1, "Traceback (most recent call last):\n  File\nKeyError: 3\n", "none of ours"),
+    "another code": (3, "", "exit code 3"),
+    "bad input without a word": (2, "", "without a word"),
+    "a line that steers a terminal": (2, "rrtik: \x1b[2J\n", "none of ours"),
+    "one good line": (2, "rrtik: a.yaml: no such file\n", None),
+    "a warning and an answer": (0, "rrtik: warning: slow\n", None),
+}
+
+
+@pytest.mark.parametrize("case", ANSWERS)
+def test_answers_of_commands_are_judged(case):
+    code, errors, wrong = ANSWERS[case]
+    if wrong is None:
+        commands.judge(code, errors)
+    else:
+        with pytest.raises(commands.UnfitAnswer, match=wrong):
+            commands.judge(code, errors)
+
+
+def test_every_command_is_drawn_but_those_that_compile():
+    from rrtik_ompl.cli.app import COMMANDS
+
+    assert {name for name, *_ in commands.commands()} == {*COMMANDS, "markers"} - {"warmup"}
+    assert commands.said(["check", "none.yaml"])[0] == 2
+
+
+def test_spoilt_files_are_most_often_refused(tmp_path):
+    refused = 0
+    for seed in range(60):
+        try:
+            spoilt_files.read_one(np.random.default_rng(seed), tmp_path)
+        except InputError:
+            refused += 1
+    assert 20 < refused < 60

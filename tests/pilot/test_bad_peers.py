@@ -8,6 +8,8 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.messages import MAX_DEPTH, message_in, quoted
@@ -26,6 +28,20 @@ START = PROBLEM.start
 def _soon(monkeypatch):
     for module in ("line_arm", "camera_feed"):
         monkeypatch.setattr(f"rrtik_ompl.pilot.devices.{module}.RETRY_SECONDS", 0.1)
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=20),
+    lambda inner: st.lists(inner, max_size=6) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+    max_leaves=8,
+)
+
+
+class ServerOf:
+    """A server without a connection."""
+
+    def __init__(self, arm):
+        self.arm = arm
 
 
 GREETING = json.dumps({"protocol": PROTOCOL, "version": VERSION, "joints": list(ROBOT.joint_names)}).encode() + b"\n"
@@ -159,6 +175,37 @@ def test_a_request_that_trickles_in_stops_the_arm_and_frees_the_place():
         arm.close()
 
 
+def test_a_connection_that_cannot_be_taken_does_not_end_the_server(monkeypatch):
+    with LineServer(SimulatedArm(ROBOT, START)) as server:
+        accept, failures = socket.socket.accept, iter([OSError(24, "Too many open files")] * 3)
+
+        def failing(listening):
+            raise next(failures, None) or TimeoutError
+
+        monkeypatch.setattr(socket.socket, "accept", failing)
+        until(lambda: next(failures, None) is None)
+        monkeypatch.setattr(socket.socket, "accept", accept)
+        arm = LineArm(ROBOT, "127.0.0.1", server.port)
+        assert not arm.lost
+        arm.close()
+
+
+@given(
+    do=st.sampled_from(["move", "follow", "read", "stop"]) | st.text(),
+    joint=JSON,
+    target=JSON,
+    q=JSON | st.lists(st.floats(-4, 4), min_size=6, max_size=6),
+)
+def test_whatever_a_request_says_the_arm_stays_where_an_arm_can_be(do, joint, target, q):
+    arm = SimulatedArm(ROBOT, START)
+    fault = LineServer._execute(ServerOf(arm), {"do": do, "joint": joint, "target": target, "q": q})
+    assert fault == "" or fault.isprintable()
+    moves = do == "move" and type(joint) is int and type(target) in (int, float) and fault == ""
+    assert (arm.moving is not None) == moves
+    arm.advance(1e3)
+    assert ROBOT.within_limits(arm.read(), 1e-9)[0]
+
+
 def test_a_silent_thread_stops_the_arm_once_and_is_named():
     arm, told = SimulatedArm(ROBOT, START), []
     last = {"one": time.monotonic(), "two": np.inf}
@@ -224,6 +271,12 @@ def test_a_camera_that_breaks_in_any_way_is_lost_and_comes_back():
     until(all_seen)
     assert reasons == {"the camera broke: a driver", "the camera broke: MemoryError", "no such device"}
     assert feed.reported > 0.0
+
+
+@given(st.text() | st.binary() | JSON.map(json.dumps))
+def test_any_text_is_an_object_or_none(text):
+    found = message_in(text)
+    assert found is None or json.loads(text) == found or found != found or "NaN" in str(text)
 
 
 def test_messages_are_shallow_objects_or_none():

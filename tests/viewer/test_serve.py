@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import re
 import socket
+import struct
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -12,7 +13,9 @@ from collections.abc import Iterator
 import pytest
 
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.viewer import serve
 from rrtik_ompl.viewer.serve import PageServer
+from rrtik_tests.waiting import until
 
 
 @pytest.fixture
@@ -54,6 +57,53 @@ def test_a_port_that_is_taken_or_no_port_is_refused(server: PageServer) -> None:
     for port in (server.port, 70000):
         with pytest.raises(InputError, match=f"port {port}"):
             PageServer("", port)
+
+
+def test_browsers_that_go_in_the_middle_are_no_news(capfd: pytest.CaptureFixture[str]) -> None:
+    with PageServer("x" * 5_000_000) as server:
+        for _ in range(20):
+            line = socket.create_connection(("127.0.0.1", server.port), timeout=5)
+            line.sendall(f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n\r\n".encode())
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            line.close()  # with a reset
+        assert ask(server)[0] == 200
+        until(lambda: not server._server._open)
+    assert capfd.readouterr().err == ""
+
+
+def test_a_request_that_trickles_in_has_one_deadline(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serve, "OPEN_SECONDS", 0.3)
+    with PageServer("page") as server, socket.create_connection(("127.0.0.1", server.port), timeout=5) as line:
+        line.settimeout(0.05)
+
+        def cut() -> bool:
+            try:
+                line.sendall(b"G")
+                return line.recv(1) == b""
+            except TimeoutError:
+                return False
+            except OSError:
+                return True
+
+        until(cut, 30.0)
+
+
+def test_more_connections_than_a_browser_has_are_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serve, "MOST_OPEN", 3)
+    with PageServer("page") as server:
+        silent = [socket.create_connection(("127.0.0.1", server.port), timeout=30) for _ in range(4)]
+        assert silent[3].recv(1) == b""
+        silent[0].close()
+        until(lambda: len(server._server._open) == 2)
+        assert ask(server)[0] == 200
+        for each in silent:
+            each.close()
+
+
+def test_a_live_view_ends_with_a_line_when_its_server_has_ended(server: PageServer) -> None:
+    server._server.shutdown()
+    with pytest.raises(InputError, match="has ended; show it again"):
+        server.wait()
 
 
 SERVE_AND_PRESS_CTRL_C = """

@@ -32,6 +32,8 @@ from rrtik_ompl.fast.simd.targets import UnknownMachineError, target_of, this_ta
 from rrtik_ompl.files.cache import cache_folder, nobody_else_s
 from rrtik_ompl.files.notice import COMPILING, tell_once
 
+MAX_REASON = 300  # [letters]
+
 
 class Library:
     """The functions of a kernel module that Python calls, as attributes.
@@ -55,7 +57,10 @@ _lock = RLock()
 
 
 def library(name: str) -> Library | None:
-    """The kernels of a module of ``fast`` (``"checks.check_kernels"``); None, and one warning, if there can be none."""
+    """The kernels of a module of ``fast`` (``"checks.check_kernels"``); None if there can be none.
+
+    Why is said in a warning, once for each reason.
+    """
     with _lock:
         if name not in _libraries:
             _libraries[name] = _tried(name)
@@ -78,26 +83,26 @@ def warm_up(report: Callable[[str], None]) -> bool:
     return all(library(name) is not None for name in names)
 
 
-_warned = False
+_said: set[str] = set()  # reasons
 
 
 def _tried(name: str) -> Library | None:
-    global _warned
     try:
         this_target()  # code is not even tried on a machine that it has never been made for
         return _kept(name) or _made(name)
     except Exception as error:  # another version of a compiler may fail in any way, and numpy has the same answers
-        if not _warned:
-            message = f"collision checks run in plain numpy, many times slower: {_reason(error)}"
+        if (why := _reason(error)) not in _said:  # without numba it is the same for all, an edit may break one
+            _said.add(why)
+            message = f"there are no kernels {name}: what they do is done in plain numpy, many times slower: {why}"
             warnings.warn(message, RuntimeWarning, stacklevel=4)
-        _warned = True
         return None
 
 
 def _reason(error: Exception) -> str:
     if isinstance(error, ImportError):
         return f"{error}; install numba"
-    return str(error) if isinstance(error, UnknownMachineError) else f"{type(error).__name__}: {error}"
+    text = str(error) if isinstance(error, UnknownMachineError) else f"{type(error).__name__}: {error}"
+    return " ".join(text.split())[:MAX_REASON]  # a compiler's is a page
 
 
 def _file(name: str) -> Path | None:

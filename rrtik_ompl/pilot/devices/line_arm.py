@@ -239,6 +239,9 @@ class LineServer:
                 connection, _ = self._listening.accept()
             except TimeoutError:
                 continue
+            except OSError:  # a client that has gone already, or no file handle is left: others will be
+                self._ended.wait(POLL_SECONDS)
+                continue
             line = Line(connection)
             with suppress(Exception):  # the client has gone, is silent, or sends what is no request
                 line.send(protocol=PROTOCOL, version=VERSION, joints=list(self.arm.robot.joint_names))
@@ -262,7 +265,8 @@ class LineServer:
         if what == "stop":
             self.arm.stop()
         elif what == "move":
-            good = isinstance(joint, int) and 0 <= joint < self.arm.robot.dof and isinstance(target, int | float)
+            numbers = isinstance(joint, int) and isinstance(target, int | float)
+            good = numbers and not {type(joint), type(target)} & {bool} and 0 <= joint < self.arm.robot.dof
             if not good or not abs(target) < LARGEST:  # type: ignore[arg-type]
                 return f"move needs a joint from 0 to {self.arm.robot.dof - 1} and a finite target"
             self.arm.move(int(joint), float(target))  # type: ignore[arg-type]

@@ -32,27 +32,18 @@ from tornado.httputil import HTTPServerRequest
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.messages import message_in
-from rrtik_ompl.pilot.web.clients import Client, Clients, Message
+from rrtik_ompl.pilot.web.clients import Client, Clients
 from rrtik_ompl.pilot.web.exposure import all_addresses, tls_context
+from rrtik_ompl.pilot.web.handlers import FILES, PageHandler, SocketHandler
 
 LOOPBACK = "127.0.0.1"
-PAGE = Path(__file__).parent / "page"
 MAX_MESSAGE_BYTES = 16 * 1024  # from a page
 MAX_QUEUED_COMMANDS = 200
 MIN_TOKEN_LENGTH = 16
-MAX_NAME_LENGTH = 40
 GOING_AWAY, FAREWELL_SECONDS = 1001, 0.1  # code of a WebSocket that is closed, and time for it to arrive
 PING_SECONDS, PONG_SECONDS = 5.0, 5.0
 REPORT_SECONDS = 0.25
-NO_TOKEN = "the token is missing or wrong: open the address as rrtik pilot printed it"
-WRONG_ORIGIN = "requested under another name, or from another page: open the address as rrtik pilot printed it"
-POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; "
-    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-)
-SCRIPTS = ("hold.js", "keys.js", "link.js", "pilot.js", "gamepad.js")
-FILES = {"/": ("index.html", "text/html"), "/pilot.css": ("pilot.css", "text/css")}
-FILES |= {f"/{name}": (name, "text/javascript") for name in SCRIPTS}
+REQUEST_SECONDS = 20.0  # for a whole request, and between two on one connection
 
 
 class PilotServer:
@@ -198,95 +189,24 @@ class PilotServer:
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
         logging.getLogger("tornado").addHandler(logging.NullHandler())  # errors are shown on the page
-        handlers: list[Any] = [(path, _PageHandler, {"server": self, "file": file}) for path, file in FILES.items()]
+        handlers: list[Any] = [(path, PageHandler, {"server": self, "file": file}) for path, file in FILES.items()]
         application = tornado.web.Application(
-            [*handlers, ("/ws", _SocketHandler, {"server": self})],
+            [*handlers, ("/ws", SocketHandler, {"server": self})],
             log_function=lambda _: None,
             websocket_max_message_size=MAX_MESSAGE_BYTES,
             websocket_ping_interval=PING_SECONDS,
             websocket_ping_timeout=PONG_SECONDS,
         )
-        http = tornado.httpserver.HTTPServer(application, max_body_size=MAX_MESSAGE_BYTES, ssl_options=self._tls)
+        http = tornado.httpserver.HTTPServer(
+            application,
+            max_body_size=MAX_MESSAGE_BYTES,
+            ssl_options=self._tls,
+            idle_connection_timeout=REQUEST_SECONDS,
+            body_timeout=REQUEST_SECONDS,
+        )
         http.add_sockets(self._sockets)
         self._report()
         self._loop.run_forever()
         http.stop()
         self._loop.run_until_complete(http.close_all_connections())
         self._loop.close()
-
-
-def _forget(sent: asyncio.Future[None]) -> None:
-    if not sent.cancelled():
-        sent.exception()
-
-
-class _Guarded(tornado.web.RequestHandler):
-    """Refuses requests that do not come from the server's own page."""
-
-    server: PilotServer
-
-    def prepare(self) -> None:
-        if not self.server.may(self.request):
-            raise tornado.web.HTTPError(403, reason=WRONG_ORIGIN)
-
-    def set_default_headers(self) -> None:
-        for name, value in (
-            ("Content-Security-Policy", POLICY),
-            ("X-Content-Type-Options", "nosniff"),
-            ("Referrer-Policy", "no-referrer"),
-            ("Cross-Origin-Resource-Policy", "same-origin"),
-            ("Cross-Origin-Opener-Policy", "same-origin"),
-            ("Cache-Control", "no-store"),
-        ):
-            self.set_header(name, value)
-
-    def write_error(self, status_code: int, **_: Any) -> None:
-        self.set_header("Content-Type", "text/plain; charset=utf-8")
-        self.finish(f"{status_code} {self._reason}\n")
-
-
-class _PageHandler(_Guarded):
-    def initialize(self, server: PilotServer, file: tuple[str, str]) -> None:
-        self.server, self._file = server, file
-
-    def get(self) -> None:
-        if self._file[0] == "index.html" and not self.server.knows_token(self.get_argument("token", "")):
-            raise tornado.web.HTTPError(403, reason=NO_TOKEN)
-        self.set_header("Content-Type", f"{self._file[1]}; charset=utf-8")
-        self.finish((PAGE / self._file[0]).read_bytes())
-
-
-class _SocketHandler(_Guarded, tornado.websocket.WebSocketHandler):
-    def initialize(self, server: PilotServer) -> None:
-        self.server = server
-        self._client: Client | None = None
-
-    def prepare(self) -> None:
-        super().prepare()
-        if not self.server.knows_token(self.get_argument("token", "")):
-            raise tornado.web.HTTPError(403, reason=NO_TOKEN)
-
-    def check_origin(self, origin: str) -> bool:
-        return self.server.may(self.request)
-
-    def open(self, *_: str, **__: str) -> None:
-        self.set_nodelay(True)
-        name = self.get_argument("page", "")[:MAX_NAME_LENGTH]
-        self._client = Client(next(self.server.numbers), name, self._send)
-        self._client.send_json(kind="title", title=self.server.title)
-        self.server.open_sockets.add(self)
-        self.server.clients.join(self._client)
-
-    def on_message(self, message: Message) -> None:
-        if self._client is not None and isinstance(message, str):
-            self.server.receive(self._client, message)
-
-    def on_close(self) -> None:
-        self.server.open_sockets.discard(self)
-        if self._client is not None:
-            self.server.clients.leave(self._client)
-
-    def _send(self, message: Message) -> None:
-        with suppress(tornado.websocket.WebSocketClosedError):  # `on_close` follows
-            sent = self.write_message(message, binary=isinstance(message, bytes))
-            asyncio.ensure_future(sent).add_done_callback(_forget)  # a page that was closed abruptly is no news

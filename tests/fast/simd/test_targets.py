@@ -109,7 +109,7 @@ def test_foreign_bitcode_is_never_used(code, target, tmp_path, monkeypatch):
 def test_a_machine_of_no_known_kind_takes_the_reference_path_and_says_so_once(monkeypatch):
     monkeypatch.setattr(llvm, "get_process_triple", lambda: "x86_64-pc-windows-msvc")
     monkeypatch.setattr(library, "_libraries", {})
-    monkeypatch.setattr(library, "_warned", False)
+    monkeypatch.setattr(library, "_said", set())
     monkeypatch.setattr(library, "_kept", lambda name: pytest.fail("code was tried"))
     monkeypatch.setattr(library, "_made", lambda name: pytest.fail("code was made"))
     this_target.cache_clear()

@@ -3,8 +3,8 @@
 import time
 
 
-def until(good, seconds=10.0):
-    """Wait until ``good()`` is true; fail after ``seconds`` [s]."""
+def until(good, seconds=100.0):
+    """Wait until ``good()`` is true; fail after ``seconds`` [s], of which a busy machine may need many."""
     end = time.monotonic() + seconds
     while not good():
         assert time.monotonic() < end, "waited in vain"
