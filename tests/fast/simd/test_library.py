@@ -21,7 +21,8 @@ from rrtik_ompl.fast.simd import bitcode, code_files, compiled, library
 from rrtik_ompl.fast.simd.targets import this_target
 from rrtik_ompl.files import notice
 
-pytestmark = pytest.mark.kernels
+# kernels are compiled anew here, which takes minutes on a busy machine
+pytestmark = [pytest.mark.kernels, pytest.mark.timeout(3600)]
 
 KERNELS = "checks.check_kernels"
 PROGRAM = """
@@ -58,7 +59,7 @@ def start(code=PROGRAM, **environment):
 
 
 def finished(process):
-    out, err = process.communicate(timeout=200)
+    out, err = process.communicate(timeout=3000)
     assert process.returncode == 0, err
     answers, marks, backend = out.splitlines()
     return answers + marks, backend, err
