@@ -20,14 +20,39 @@ LEFT_OUT = {"view", "plan_batch", "replan", "GoalSampler"}  # a server, processe
 def corpus() -> list[Any]:
     """Values that arguments are drawn from: good ones of every kind, and odd ones."""
     robot = rrtik.load_robot("planar3")
-    world = rrtik.World(robot, rrtik.Scene([rrtik.Obstacle("far", rrtik.Sphere(0.1), rrtik.pose([9, 9, 9]))]))
+    world = rrtik.World(robot, rrtik.Scene((rrtik.Obstacle("far", rrtik.Sphere(0.1), rrtik.pose([9, 9, 9])),)))
     problem = rrtik.Problem(world, [0, 0, 0], [0.5, 0.2, 0])
-    path = rrtik.JointPath.of(robot, [[0, 0, 0], [0.5, 0.2, 0]])
-    good = [robot, world, problem, path, world.scene, rrtik.pose([1, 0, 0]), rrtik.PositionGoal([1, 1, 0]), "planar3"]
+    path = rrtik.JointPath.of(robot, np.array([[0, 0, 0], [0.5, 0.2, 0]]))
+    good: list[Any] = [
+        robot,
+        world,
+        problem,
+        path,
+        world.scene,
+        rrtik.pose([1, 0, 0]),
+        rrtik.PositionGoal([1, 1, 0]),
+        "planar3",
+    ]
     good += [rrtik.TaskRegion([1, 1, 0], np.zeros((6, 2))), rrtik.MoveRules(["a", "b", "c"]), rrtik.GoalSet([good[6]])]
     good += [rrtik.PoseGoal(rrtik.pose([1, 1, 0])), rrtik.Sphere(0.1), [0, 0, 0], [1.0, 0.5, 0.1], "auto", "RRTConnect"]
     good += [np.zeros((2, 3)), np.eye(4), 1, 2, 0.5, True, world.scene.obstacles, ["joint1"], {"range": 0.1}]
-    odd = [None, -1, 0, 10**400, float("nan"), float("inf"), 1e300, 1j, "", "\x00", "\ud800", "a" * 5000, b"x", [], {}]
+    odd: list[Any] = [
+        None,
+        -1,
+        0,
+        10**400,
+        float("nan"),
+        float("inf"),
+        1e300,
+        1j,
+        "",
+        "\x00",
+        "\ud800",
+        "a" * 5000,
+        b"x",
+        [],
+        {},
+    ]
     odd += [
         [[]],
         [[1, 2], [3]],
@@ -50,7 +75,7 @@ def corpus() -> list[Any]:
 @cache
 def functions() -> list[tuple[str, Callable[..., Any]]]:
     """Public functions and classes, and the public methods of what the corpus holds."""
-    names = [name for name in rrtik.__all__ if name not in LEFT_OUT]
+    names = [name for name in vars(rrtik)["__all__"] if name not in LEFT_OUT]
     found = [(name, getattr(rrtik, name)) for name in names]
     for thing in corpus():
         if type(thing).__module__.startswith("rrtik_ompl"):

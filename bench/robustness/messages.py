@@ -55,16 +55,17 @@ class Witness(SimulatedArm):
 
 def mutated(rng: np.random.Generator, good: Sequence[str], end: str = "\n") -> bytes:
     """A message: a good one, one that is spoilt, several at once, noise, or far too much."""
-    text = good[rng.integers(len(good))]
+    text = good[int(rng.integers(len(good)))]
     kind = rng.random()
     if kind < 0.15:
         return (text + end).encode()
     if kind < 0.7:
         return (spoilt(rng, text) + (end if rng.random() < 0.9 else "")).encode("utf-8", errors=BACKSLASH)
     if kind < 0.8:
-        return "".join(good[k] + end for k in rng.integers(len(good), size=int(rng.integers(2, 40)))).encode()
+        several = rng.integers(len(good), size=int(rng.integers(2, 40))).tolist()
+        return "".join(good[k] + end for k in several).encode()
     if kind < 0.98:
-        return rng.bytes(int(rng.integers(0, 200))) + end.encode()
+        return bytes(rng.bytes(int(rng.integers(0, 200)))) + end.encode()
     return (text[: len(text) // 2] + "9" * HUGE_BYTES + end).encode()
 
 

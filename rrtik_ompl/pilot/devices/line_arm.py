@@ -265,9 +265,8 @@ class LineServer:
         if what == "stop":
             self.arm.stop()
         elif what == "move":
-            numbers = isinstance(joint, int) and isinstance(target, int | float)
-            good = numbers and not {type(joint), type(target)} & {bool} and 0 <= joint < self.arm.robot.dof
-            if not good or not abs(target) < LARGEST:  # type: ignore[arg-type]
+            numbers = type(joint) is int and type(target) in (int, float)  # true is neither
+            if not (numbers and 0 <= joint < self.arm.robot.dof and abs(target) < LARGEST):  # type: ignore[operator,arg-type]
                 return f"move needs a joint from 0 to {self.arm.robot.dof - 1} and a finite target"
             self.arm.move(int(joint), float(target))  # type: ignore[arg-type]
         elif what == "follow":
