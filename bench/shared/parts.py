@@ -15,6 +15,7 @@ from typing import Any, TextIO, get_type_hints
 from pydantic import TypeAdapter, ValidationError
 
 from bench.shared.pages import add_out
+from rrtik_ompl.files.text import write_text
 
 Part = Sequence[Any]  # what the work is given: plain words and numbers, files, None
 
@@ -45,9 +46,8 @@ class Parts:
         if self._known:
             print(f"{self._kept} has {len(self._known)} parts; delete it to begin anew", file=sys.stderr)
         self._kept.parent.mkdir(parents=True, exist_ok=True)
-        self._file = self._kept.open("w", encoding="utf-8")
-        self._file.writelines(_line(key, result) for key, result in self._known.items())
-        self._file.flush()
+        write_text(self._kept, "".join(_line(key, result) for key, result in self._known.items()))
+        self._file = self._kept.open("a", encoding="utf-8")
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:

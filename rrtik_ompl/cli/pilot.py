@@ -67,6 +67,8 @@ def pilot(
         _serve(server, opened, watch_only=replay is not None, browser=not no_browser)
     finally:
         opened.close()
+    if opened.record.fault:
+        raise InputError(opened.record.fault)
     if record is not None:
         say(f"wrote {record}")
     return 0

@@ -6,6 +6,7 @@ import os
 import secrets
 import stat
 from difflib import get_close_matches
+from errno import EDQUOT, EFBIG, ENOSPC
 from pathlib import Path
 
 from rrtik_ompl.errors import InputError
@@ -99,13 +100,39 @@ def _replace(target: Path, data: bytes) -> None:
         raise PermissionError(None, "it is write-protected; choose another name")
     temporary = target.with_name(f".{secrets.token_hex(8)}.tmp")
     try:
-        with open(temporary, "xb") as file:
-            file.write(data)
+        if not _appears_whole(temporary, data):
+            with open(temporary, "xb") as file:
+                file.write(data)
         if mode is not None:
             temporary.chmod(mode)
         os.replace(temporary, target)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _appears_whole(file: Path, data: bytes) -> bool:
+    """Write a file that has no name before it is whole, so that not even a kill leaves a half; False where none can be.
+
+    Raises:
+        OSError: If there is no room for it.
+    """
+    try:
+        folder = os.open(file.parent, os.O_PATH)
+    except (AttributeError, OSError):  # Linux has such files, on most of its file systems
+        return False
+    try:
+        number = os.open(".", os.O_TMPFILE | os.O_WRONLY, 0o666, dir_fd=folder)
+        with open(number, "wb") as unnamed:
+            unnamed.write(data)
+            unnamed.flush()
+            os.link(f"/proc/self/fd/{number}", file.name, dst_dir_fd=folder, follow_symlinks=True)
+    except OSError as error:
+        if error.errno in (ENOSPC, EDQUOT, EFBIG):
+            raise
+        return False
+    finally:
+        os.close(folder)
+    return True
 
 
 def make_folder(path: str | os.PathLike[str]) -> None:

@@ -111,14 +111,17 @@ def write_film(path: Path, frames: Iterable[NDArray[np.uint8]], rate: float) -> 
     """
     if path.suffix.lower() not in FILMS:
         raise InputError(f"{path}: a film ends in {', '.join(FILMS)}")
-    unfinished, writer = path.with_name(f".{path.stem}.unfinished{path.suffix}"), None
+    unfinished, writer, count = path.with_name(f".{path.stem}.unfinished{path.suffix}"), None, 0
     try:
         for frame in frames:
             writer = writer or _writer(unfinished, path, rate, frame.shape)
             writer.write(frame)
+            count += 1
         if writer is None:
             raise InputError(f"{path}: there is no picture to write")
         writer.release()
+        if _pictures_in(unfinished) != count:  # of a full disk the writer says nothing
+            raise InputError(f"{path}: cannot be written whole; is there room on the disk?")
         os.replace(unfinished, path)
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
@@ -126,6 +129,16 @@ def write_film(path: Path, frames: Iterable[NDArray[np.uint8]], rate: float) -> 
         if writer is not None:
             writer.release()
         unfinished.unlink(missing_ok=True)
+
+
+def _pictures_in(film: Path) -> int:
+    """How many pictures a film says that it has; 0 if it cannot be read."""
+    with quiet():
+        opened = cv2.VideoCapture(str(film))
+        try:
+            return int(opened.get(cv2.CAP_PROP_FRAME_COUNT)) if opened.isOpened() else 0
+        finally:
+            opened.release()
 
 
 def _writer(file: Path, path: Path, rate: float, shape: tuple[int, ...]) -> cv2.VideoWriter:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -12,30 +13,55 @@ from rrtik_ompl.errors import InputError
 
 
 class Record:
-    """A file that grows line by line; whatever ends the session, the lines before it are there."""
+    """A file that grows line by line; whatever ends the session, the lines before it are there.
+
+    Attributes:
+        fault: Why the record has ended before the session, as where the disk is full; "" if it has not.
+    """
 
     def __init__(self, path: str | os.PathLike[str] | None) -> None:
         """Begin a record; None keeps none.
 
         Raises:
-            InputError: If the file cannot be written.
+            InputError: If the file cannot be written, or holds something: a session cannot be repeated.
         """
-        self._file = None
+        self.fault, self._told = "", False
+        self._path, self._file, self._end = path, None, 0
         if path is not None:
             try:
-                self._file = open(path, "w", encoding="utf-8", buffering=1)  # noqa: SIM115 - open as long as the session
+                self._file = open(path, "ab", buffering=0)  # noqa: SIM115 - open as long as the session
+                if self._file.tell() > 0:
+                    self.close()
+                    raise InputError(f"{path}: holds something already; choose another name, or delete it")
             except OSError as error:
                 raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
 
     def write(self, kind: str, time: float, **values: object) -> None:
-        """Add a line."""
-        if self._file is not None:
-            self._file.write(json.dumps({"time": round(time, 6), "kind": kind, **values}) + "\n")
+        """Add a line. Where there is no room for it the record ends with the line before: the session goes on."""
+        if self._file is None:
+            return
+        line = (json.dumps({"time": round(time, 6), "kind": kind, **values}) + "\n").encode()
+        written = 0
+        try:
+            while written < len(line):
+                written += self._file.write(line[written:])
+        except OSError as error:
+            self.fault = f"{self._path}: the record ends here: {error.strerror or error}; what was before is kept"
+            with suppress(OSError):
+                self._file.truncate(self._end)
+            self.close()
+        self._end += len(line)
+
+    def news(self) -> str:
+        """Why the record has ended, the first time that this is asked; else ""."""
+        said, self._told = "" if self._told else self.fault, bool(self.fault)
+        return said
 
     def close(self) -> None:
         """End the record."""
         if self._file is not None:
-            self._file.close()
+            with suppress(OSError):
+                self._file.close()
             self._file = None
 
 

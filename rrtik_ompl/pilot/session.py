@@ -97,21 +97,21 @@ class Session:
     def tick(self, time: float) -> None:
         """Read the arm and update its progress along the route; stop it where the present is not known any more."""
         self.time = max(self.time, time)
-        q = frozen(self.arm.read())
-        if not np.array_equal(q, self.q):
-            self._record.write("joints", time, q=q.tolist())
-        self.q = q
+        before, self.q = self.q, frozen(self.arm.read())
+        if not np.array_equal(before, self.q):
+            self._record.write("joints", time, q=self.q.tolist())
+        self.message = self._record.news() or self.message
         self.held.expire(time)
         self._watch()
         if self.follower is None or self.mode != FOLLOWING:
             return
-        before, self.progress = self.follower.current, self.follower.update(q)
+        due, self.progress = self.follower.current, self.follower.update(self.q)
         if self.progress.advice == "lost":
             self._stand_still()
             self.message = f"off the route: {self.progress.fault}; 'replan' finds a new one from here"
         elif self.progress.advice == "done" and not self.held.drive.active:
             self.mode, self.message = MANOEUVRE, "all moves are done"
-        elif self.follower.current != before:
+        elif self.follower.current != due:
             self.show_due(self.follower)
             self.message = f"move {self.follower.current} of {len(self.follower.moves)} is done; 'next' makes the next"
 

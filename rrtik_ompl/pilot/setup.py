@@ -53,11 +53,12 @@ class SessionOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OpenSession:
-    """A session with everything that it holds open, and when the threads of arm and camera reported last."""
+    """A session with all that it holds open, when the threads of arm and camera reported last, and its record."""
 
     engine: Engine
     closing: tuple[Callable[[], None], ...]
     reports: Mapping[str, Report] = field(default_factory=dict)
+    record: Record = field(default_factory=lambda: Record(None))
 
     def close(self) -> None:
         """Stop the arm, and release arm, camera and record."""
@@ -88,7 +89,7 @@ def open_session(options: SessionOptions) -> OpenSession:
     if isinstance(arm, LineArm):
         closing.insert(0, arm.close)
         reports["the line to the arm"] = lambda: arm.reported
-    return OpenSession(Engine(session, perception, simulated=simulated), tuple(closing), reports)
+    return OpenSession(Engine(session, perception, simulated=simulated), tuple(closing), reports, record)
 
 
 def _perception(options: SessionOptions, problem: Problem, arm: Arm) -> LivePerception:

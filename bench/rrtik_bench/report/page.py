@@ -12,6 +12,7 @@ import numpy as np
 from rrtik_bench.report.machine import processes
 from rrtik_bench.report.rows import Row, Verdict, verdict
 from rrtik_ompl.benchmark.tables import markdown_table
+from rrtik_ompl.files.text import write_text
 
 
 @dataclass
@@ -74,7 +75,7 @@ class Report:
     def save(self, file: Path) -> None:
         """Write the page; its folder is made if need be."""
         file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(self.markdown(), encoding="utf-8")
+        write_text(file, self.markdown())
 
     def finish(self, file: Path) -> int:
         """Write the page and print it.

@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.files.text import check_target
+from rrtik_ompl.files.text import check_target, write_bytes
 from rrtik_ompl.sensing.markers.detection import charuco_board, marker_cells
 
 PAPERS = {"a4": (0.210, 0.297), "a3": (0.297, 0.420), "letter": (0.2159, 0.2794)}  # width, height [m]
@@ -116,17 +117,17 @@ def _write(
     file = Path(path)
     check_target(file, SHEET_FORMATS)
     figures = [_page(page, size) for page in pages]
-    try:
-        if file.suffix.lower() == ".pdf":
-            with PdfPages(file) as book:
-                for figure in figures:
-                    book.savefig(figure)
-            return
-        for k, figure in enumerate(figures):
-            target = file if len(figures) == 1 else file.with_stem(f"{file.stem}-{k + 1}")
-            figure.savefig(target, dpi=dots_per_inch)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+    if file.suffix.lower() == ".pdf":
+        made = BytesIO()
+        with PdfPages(made) as book:
+            for figure in figures:
+                book.savefig(figure)
+        write_bytes(file, made.getvalue())
+        return
+    for k, figure in enumerate(figures):
+        target, made = file if len(figures) == 1 else file.with_stem(f"{file.stem}-{k + 1}"), BytesIO()
+        figure.savefig(made, format=file.suffix[1:].lower(), dpi=dots_per_inch)
+        write_bytes(target, made.getvalue())
 
 
 def _page(tiles: list[_Tile], size: tuple[float, float]) -> Any:
