@@ -12,7 +12,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -141,7 +141,7 @@ def _load(work: Callable[[], int]) -> None:
     with TemporaryDirectory() as folder, open(os.devnull, "w", encoding="utf-8") as nowhere:
         os.chdir(folder)
         try:
-            with redirect_stdout(nowhere), redirect_stderr(nowhere):
+            with redirect_stdout(nowhere), redirect_stderr(nowhere), suppress(Exception):
                 work()
         finally:
             os.chdir(before)

@@ -24,6 +24,7 @@ from rrtik_ompl.sensing.sensor import Sensor
 FILMS = {".mp4": "mp4v", ".avi": "MJPG"}
 DEFAULT_RATE, MAX_RATE = 30.0, 240.0  # pictures a second
 TRAIL_POINTS = 80
+ROOM_BYTES = 65536
 
 
 class ArmInPictures:
@@ -120,7 +121,7 @@ def write_film(path: Path, frames: Iterable[NDArray[np.uint8]], rate: float) -> 
         if writer is None:
             raise InputError(f"{path}: there is no picture to write")
         writer.release()
-        if _pictures_in(unfinished) != count:  # of a full disk the writer says nothing
+        if not _room_behind(unfinished) or _pictures_in(unfinished) != count:
             raise InputError(f"{path}: cannot be written whole; is there room on the disk?")
         os.replace(unfinished, path)
     except OSError as error:
@@ -129,6 +130,18 @@ def write_film(path: Path, frames: Iterable[NDArray[np.uint8]], rate: float) -> 
         if writer is not None:
             writer.release()
         unfinished.unlink(missing_ok=True)
+
+
+def _room_behind(file: Path) -> bool:
+    """Whether a file could be longer: of a full disk the writer of films says nothing, and may lack the index alone."""
+    size = file.stat().st_size
+    try:
+        with open(file, "ab", buffering=0) as film:
+            return film.write(bytes(ROOM_BYTES)) == ROOM_BYTES
+    except OSError:
+        return False
+    finally:
+        os.truncate(file, size)
 
 
 def _pictures_in(film: Path) -> int:

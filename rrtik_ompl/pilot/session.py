@@ -100,9 +100,9 @@ class Session:
         before, self.q = self.q, frozen(self.arm.read())
         if not np.array_equal(before, self.q):
             self._record.write("joints", time, q=self.q.tolist())
-        self.message = self._record.news() or self.message
         self.held.expire(time)
         self._watch()
+        self.message = self._record.news() or self.message
         if self.follower is None or self.mode != FOLLOWING:
             return
         due, self.progress = self.follower.current, self.follower.update(self.q)

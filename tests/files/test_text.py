@@ -2,6 +2,8 @@
 
 import csv
 import os
+import resource
+import signal
 import stat
 from concurrent.futures import ThreadPoolExecutor
 
@@ -9,6 +11,7 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.files import text
 from rrtik_ompl.files.text import write_bytes, write_text
 
 
@@ -46,6 +49,40 @@ def test_a_new_file_has_the_mode_of_any_other(tmp_path):
     (tmp_path / "other").touch()
     write_bytes(tmp_path / "a.txt", b"")
     assert (tmp_path / "a.txt").stat().st_mode == (tmp_path / "other").stat().st_mode
+
+
+def full_disk(size):
+    """Files grow no larger than that from now on."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
+
+
+@pytest.mark.parametrize("named", [False, True])
+def test_a_full_disk_leaves_the_old_file_and_no_other(tmp_path, monkeypatch, named):
+    if named:  # where the system has no files without a name
+        monkeypatch.setattr(text, "_appears_whole", lambda file, data: False)
+    write_text(tmp_path / "a.json", "old")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    try:
+        full_disk(1000)
+        with pytest.raises(InputError, match=r"a\.json: cannot be written: File too large"):
+            write_text(tmp_path / "a.json", "n" * 2000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert (os.listdir(tmp_path), (tmp_path / "a.json").read_text()) == (["a.json"], "old")
+
+
+@pytest.mark.skipif(not hasattr(os, "O_TMPFILE"), reason="Linux alone has files without a name")
+def test_a_kill_in_the_middle_leaves_nothing(tmp_path):
+    write_text(tmp_path / "a.json", "old")
+    child = os.fork()
+    if child == 0:
+        signal.signal(signal.SIGXFSZ, signal.SIG_DFL)  # ends the process at once, in the middle of the file
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        full_disk(100_000)
+        write_text(tmp_path / "a.json", "n" * 200_000)
+        os._exit(0)
+    assert os.WTERMSIG(os.waitpid(child, 0)[1]) == signal.SIGXFSZ
+    assert (os.listdir(tmp_path), (tmp_path / "a.json").read_text()) == (["a.json"], "old")
 
 
 def test_half_a_letter_is_named(tmp_path):

@@ -1,5 +1,6 @@
 """A film out of a film; from photographs to a scene, a plan and a film; solids that grow by their uncertainty."""
 
+import resource
 import shlex
 from pathlib import Path
 
@@ -87,6 +88,20 @@ def test_a_film_comes_out_of_a_film_with_its_rate(capsys, tmp_path, ending):
     assert [frame.time for frame in frames] == pytest.approx([0.0, 0.1, 0.2, 0.3])
     assert (np.abs(frames[0].pixels.astype(int) - 128).max(axis=2) > 30).sum() > 5000
     assert sorted(file.name for file in tmp_path.iterdir()) == ["in.avi", f"out{ending}"]
+
+
+@pytest.mark.parametrize("ending", [".avi", ".mp4"])
+def test_a_film_for_which_there_is_no_room_is_said_and_leaves_no_file(tmp_path, ending):
+    frames = np.random.default_rng(1).integers(0, 256, (8, 120, 160, 3), dtype=np.uint8)
+    write_film(tmp_path / f"whole{ending}", iter(frames), 10.0)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, ((tmp_path / f"whole{ending}").stat().st_size // 2, limits[1]))
+    try:
+        with pytest.raises(InputError, match="cannot be written whole; is there room on the disk"):
+            write_film(tmp_path / f"a{ending}", iter(frames), 10.0)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert [file.name for file in tmp_path.iterdir()] == [f"whole{ending}"]
 
 
 def test_a_failure_in_the_middle_leaves_no_file(tmp_path):

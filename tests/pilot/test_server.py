@@ -1,20 +1,16 @@
 """Who may reach the page, who is the pilot, and that a slow page holds nobody up."""
 
-import asyncio
 import gc
 import http.client
-import json
 import socket
 import ssl
 import struct
 import time
-from functools import partial
 
 import pytest
 import tornado.httpclient
 import tornado.websocket
 
-from bench.robustness.bad_pages import RawPage
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.pilot.run import Loop
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
@@ -22,6 +18,7 @@ from rrtik_ompl.pilot.web.clients import Client, Clients, Lane
 from rrtik_ompl.pilot.web.exposure import all_addresses
 from rrtik_ompl.pilot.web.server import MAX_MESSAGE_BYTES, MAX_QUEUED_COMMANDS, PilotServer
 from rrtik_tests import tls
+from rrtik_tests.page_by_hand import UPGRADE, Page, answer
 from rrtik_tests.waiting import until
 
 TOKEN = "a-secret-of-many-letters"
@@ -38,67 +35,6 @@ def _no_pings(monkeypatch):
 def server():
     with PilotServer(title="test") as made:
         yield made
-
-
-class Page:
-    """What a page's script does, without a browser."""
-
-    def __init__(self, server, name="one", **headers):
-        self.heard, self.closed = [], False
-        self._loop = asyncio.new_event_loop()
-        url = f"ws://127.0.0.1:{server.port}/ws?page={name}&token={server.token}"
-        request = tornado.httpclient.HTTPRequest(url, headers=headers, request_timeout=100)
-        self._socket = self._do(partial(tornado.websocket.websocket_connect, request))
-
-    def _do(self, call):
-        async def wait():
-            return await asyncio.wait_for(asyncio.ensure_future(call()), 100)
-
-        return self._loop.run_until_complete(wait())
-
-    def say(self, /, **words):
-        self._do(partial(self._socket.write_message, json.dumps(words)))
-
-    def say_raw(self, text):
-        self._do(partial(self._socket.write_message, text))
-
-    def hear(self):
-        message = self._do(self._socket.read_message)
-        if message is None:
-            self.closed = True
-            raise ConnectionError("closed")
-        return json.loads(message) if isinstance(message, str) else message
-
-    def hear_until(self, good):
-        """The first message that is good; frames and states before it are acknowledged."""
-        while True:
-            message = self.hear()
-            if good(message):
-                return message
-            if isinstance(message, bytes) or message["kind"] == "state":
-                self.say(shown="frame" if isinstance(message, bytes) else "state")
-
-    def role(self):
-        return self.hear_until(lambda m: isinstance(m, dict) and m["kind"] == "role")["role"]
-
-    def leave(self):
-        self._socket.close()
-        self._loop.run_until_complete(asyncio.sleep(0.05))
-
-
-def answer(server, path="/", **headers):
-    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=100)
-    given = {"Host": f"127.0.0.1:{server.port}"} | {name.replace("_", "-"): value for name, value in headers.items()}
-    connection.request("GET", path, headers=given)
-    return connection.getresponse()
-
-
-UPGRADE = {
-    "Upgrade": "websocket",
-    "Connection": "Upgrade",
-    "Sec_WebSocket_Version": "13",
-    "Sec_WebSocket_Key": "x" * 22 + "==",
-}
 
 
 # --- who may come ------------------------------------------------------------------------------------------------
@@ -277,52 +213,6 @@ def test_a_page_that_shows_nothing_holds_nobody_up():
     assert len(frames[1]) == 20
 
 
-def test_a_page_that_floods_and_reads_nothing_is_closed_and_the_others_are_served(server):
-    pilot = Page(server, "one")
-    assert pilot.role() == "pilot"
-    flooding = RawPage(server.port, "two")
-    flooding.line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-    until(lambda: len(server.clients) == 2)
-    flooding.line.settimeout(0.5)
-
-    def closed():
-        return not all(flooding.say(b'{"name": "plan"}') for _ in range(500)) or len(server.clients) == 1
-
-    until(closed, 60.0)  # every message is refused, and nobody takes the refusals
-    until(lambda: len(server.clients) == 1, 60.0)
-    pilot.say(name="release", seq=1)
-    assert server.commands.get(timeout=10)[1]["name"] == "release"
-
-
-def test_more_pages_than_anybody_opens_are_refused(server, monkeypatch):
-    monkeypatch.setattr("rrtik_ompl.pilot.web.handlers.MAX_PAGES", 2)
-    pages = [Page(server, "one"), Page(server, "two")]
-    assert [page.role() for page in pages] == ["pilot", "watching"]
-    assert answer(server, "/ws", **UPGRADE).status == 503
-    assert answer(server).status == 200
-    pages[1].leave()
-    until(lambda: len(server.clients) == 1)
-    assert Page(server, "two").role() == "watching"
-
-
-def test_a_request_that_trickles_in_has_one_deadline(monkeypatch):
-    monkeypatch.setattr("rrtik_ompl.pilot.web.server.REQUEST_SECONDS", 0.5)
-    with PilotServer() as server, socket.create_connection(("127.0.0.1", server.port), timeout=30) as line:
-        line.sendall(b"GET / HTTP/1.1\r\n")
-        line.settimeout(0.1)
-
-        def cut():
-            try:
-                line.sendall(b"A")
-                return line.recv(1) == b""
-            except TimeoutError:
-                return False
-            except OSError:
-                return True
-
-        until(cut, 60.0)
-
-
 # --- with a session ----------------------------------------------------------------------------------------------
 
 
@@ -381,17 +271,6 @@ def test_a_command_that_breaks_stops_the_arm_and_says_so(monkeypatch):
         loop.run(lambda: server.commands.empty())
     assert arm.moving is None
     assert opened.engine.session.message == "'jog' broke: division by zero; the arm was stopped"
-
-
-def test_answers_to_pages_that_have_left_do_not_pile_up(monkeypatch):
-    monkeypatch.setattr("rrtik_ompl.pilot.run.MAX_PAGES", 3)
-    opened = open_session(SessionOptions("titan4_sdu"))
-    with PilotServer() as server:
-        loop = Loop(opened.engine, server)
-        for client, sequence in [(1, 5), (2, 10**400), (3, True), (4, 0), (5, 2), (6, 7), (7, -1)]:
-            server.commands.put((client, {"name": "release", "seq": sequence}))
-        loop.run(lambda: server.commands.empty())
-    assert loop._answered == {4: 0, 5: 2, 6: 7}
 
 
 def test_what_a_watchdog_says_is_shown():

@@ -227,26 +227,6 @@ def test_a_compiler_that_fails_is_told_once_and_replaced_by_numpy(cached, monkey
     assert library.library(KERNELS) is None
 
 
-def test_every_kernel_that_does_not_compile_is_told_in_one_line_with_its_name(monkeypatch):
-    def fail(name):
-        raise ValueError(f"in {name}:\n  line 3\n" + "no such name\n" * 999 if name != "b" else "of all")
-
-    monkeypatch.setattr(library, "_kept", lambda name: None)
-    monkeypatch.setattr(library, "_made", fail)
-    monkeypatch.setattr(library, "_libraries", {})
-    monkeypatch.setattr(library, "_said", set())
-    with pytest.warns(RuntimeWarning) as caught:
-        assert [library.library(name) for name in ("a", "b", "c", "a", "b")] == [None] * 5
-    said = [str(warning.message) for warning in caught]
-    assert [line.split(":")[0] for line in said] == [f"there are no kernels {name}" for name in "abc"]
-    assert all(line.isprintable() and len(line) < 500 for line in said)
-    assert "ValueError: in c: line 3 no such name" in said[2]
-    monkeypatch.setattr(library, "_libraries", {})
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        library.library("b")  # the same reason
-
-
 @pytest.mark.slow
 def test_warming_up_makes_all_kernels(cached, capsys):
     before = cached.read_bytes()
