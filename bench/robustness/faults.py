@@ -11,6 +11,7 @@ import resource
 import signal
 import sys
 import time
+import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass
@@ -26,6 +27,7 @@ from rrtik_ompl.errors import RrtikError
 KINDS = ("kill", "interrupt", "full disk", "clock")
 MARK = "RRTIK_TRIAL"  # an environment variable by which what a child has started is found
 OUTLIVE_SECONDS = 120.0  # in which what a killed process has started must have ended, too
+BROKEN = 99  # exit code of a child that ended in no way of ours
 LATEST = 1.15  # of the time that the work takes: a few moments are after its end
 NOT_OURS = {"said", "errors", "suite.yaml"}
 
@@ -151,26 +153,14 @@ _WAITING = [each.work for each in WORK.values() if each.waits]
 
 
 def _child(work: Callable[[], int], folder: Path, fault: Callable[[], object] | None, mark: str) -> None:
-    os.chdir(folder)
-    os.environ[MARK] = mark
-    for number, name in ((1, "said"), (2, "errors")):
-        os.dup2(os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
-    sys.stdout, sys.stderr = (os.fdopen(os.dup(number), "w", encoding="utf-8") for number in (1, 2))
-    code = 99
+    """Do some work, and end, whatever comes: no child may go on as if it were its parent."""
     try:
-        if fault is not None:
-            fault()
-        code = work()
-    except KeyboardInterrupt:
-        code = INTERRUPTED
-    except RrtikError as error:
-        print(f"rrtik: {error}", file=sys.stderr)
-        code = BAD_INPUT
-    except BaseException:
-        import traceback
-
-        traceback.print_exc()
-    finally:
+        os.chdir(folder)
+        os.environ[MARK] = mark
+        for number, name in ((1, "said"), (2, "errors")):
+            os.dup2(os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+        sys.stdout, sys.stderr = (os.fdopen(os.dup(number), "w", encoding="utf-8") for number in (1, 2))
+        code = _code_of(work, fault)
         for kind in (signal.ITIMER_PROF, signal.ITIMER_REAL):
             signal.setitimer(kind, 0.0)
         try:
@@ -179,6 +169,24 @@ def _child(work: Callable[[], int], folder: Path, fault: Callable[[], object] | 
         except OSError:
             code = code if code != FOUND else BAD_INPUT
         os._exit(code)
+    finally:
+        os._exit(BROKEN)
+
+
+def _code_of(work: Callable[[], int], fault: Callable[[], object] | None) -> int:
+    """The exit code of some work; errors are printed as the command line prints them."""
+    try:
+        if fault is not None:
+            fault()
+        return int(work())
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except RrtikError as error:
+        print(f"rrtik: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except BaseException:
+        traceback.print_exc()
+        return BROKEN
 
 
 def _timer(waits: bool, moment: float, act: object) -> None:

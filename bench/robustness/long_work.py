@@ -26,7 +26,7 @@ from rrtik_ompl.tasks.plan_file import load_task_plan
 
 SUITE = "version: 1\nproblems: [planar3_a]\nplanners: [bicrdt, fastrrtconnect]\nruns: 3\nseconds: 0.5\n"
 RUNS = 6
-PICTURES, PLACES = 12, 40
+PICTURES, PLACES = 12, 6
 UNFINISHED = ".film.unfinished.avi"  # which says by its name that it is none
 
 Reader = Callable[[Path], object]
