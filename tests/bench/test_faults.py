@@ -9,7 +9,6 @@ import pytest
 from bench.robustness import faults, long_work
 from bench.robustness.long_work import LongWork
 from rrtik_ompl import load_path
-from rrtik_ompl.files.text import write_text
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(3600)]
 
@@ -26,16 +25,16 @@ def test_a_record_of_a_session_outlives_a_full_disk():
     assert faults.trials("pilot --record", "full disk", 0, 1) == []
 
 
-def writes(text, *, slowly=False):
+def writes(text, name="path.json", *, slowly=False):
     def work():
-        with open("path.json", "w") as file:
+        with open(name, "w") as file:
             for letter in text:
                 file.write(letter)
                 file.flush()
                 end = time.process_time() + 0.002 * slowly
                 while time.process_time() < end:
                     pass
-        print("wrote path.json")
+        print(f"wrote {name}")
         return 0
 
     return work
@@ -43,7 +42,7 @@ def writes(text, *, slowly=False):
 
 BAD = {
     "a half file": (writes(PATH, slowly=True), "kill", "path.json: "),
-    "a file of another name": (lambda: write_text("b.json", PATH) or 0, "clock", "nobody asked for"),
+    "a file of another name": (writes(PATH, "b.json"), "clock", "nobody asked for"),
     "a word without a file": (lambda: print("wrote path.json") or 0, "clock", "it is not there"),
     "another error": (lambda: 1 // (time.time() > 1.75e9), "clock", "none of ours"),
     "a process that lives on": (lambda: os.spawnlp(os.P_NOWAIT, "sleep", "sleep", "3") and 0, "clock", "lives on"),
