@@ -27,6 +27,13 @@ class PlanThrough:
         path: The whole way, or None.
         reached: Number of the waypoint at which each goal is reached.
         reason: "" if found, else which goal could not be reached, how often and why.
+
+    Example:
+        >>> import rrtik_ompl as rrtik
+        >>> world = rrtik.World(rrtik.load_robot("titan4"))
+        >>> tour = rrtik.plan_through(world, "zero", ["ready", "zero"], seed=1)
+        >>> bool((tour.path.waypoints[tour.reached[0]] == world.robot.posture("ready")).all())
+        True
     """
 
     found: bool
