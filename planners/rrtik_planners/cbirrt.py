@@ -17,7 +17,7 @@ from rrtik_ompl.fast.search.motions.motion_table import NO_LIMIT, FastMotions
 from rrtik_ompl.ik.held_tables import HeldTables, held_tables
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_ompl.world.holding_world import HoldingWorld
-from rrtik_ompl.world.motion_queries import has_kernels, is_conservative, turning_joints
+from rrtik_ompl.world.motion_queries import has_kernels, is_conservative
 from rrtik_planners.fast_rrt_connect import python_rules, search_in_python, sound_tree
 from rrtik_planners.one_joint_options import iteration_limit
 
@@ -49,7 +49,7 @@ class CBiRRT(SafePlanner):
         """Make a planner.
 
         Args:
-            si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
+            si: ``ompl.base.SpaceInformation`` of real coordinates and angles.
             world: Checks configurations and motions instead of ``si``, if given.
             seed: At least 0; drawn from OMPL's if None.
             range: Length of a step, at most [unit of the space]; what suits the bounds if None.
@@ -73,9 +73,7 @@ class CBiRRT(SafePlanner):
         elif has_kernels(world, KERNELS):
             motions, tables = world.motions, held_tables(world.robot, HeldRegions(()))
         if motions is None or tables is None:
-            rules = python_rules(
-                self.bounds(), self.range, None, self.max_iterations, turning=turning_joints(self._world)
-            )
+            rules = python_rules(self.bounds(), self.range, None, self.max_iterations, turning=self.turning())
             return search_in_python(self, starts, goals, rules, checker, ptc)
         return self._in_kernels(starts, goals, checker, ptc, motions, tables)
 

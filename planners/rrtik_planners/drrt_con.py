@@ -15,7 +15,7 @@ from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, Se
 from rrtik_ompl.replanning.connecting import KERNELS as LIBRARIES
 from rrtik_ompl.replanning.connecting import KernelConnect, PythonConnect
 from rrtik_ompl.replanning.drrt_con import DrrtCon, points_along
-from rrtik_ompl.world.motion_queries import has_kernels, is_conservative, turning_joints
+from rrtik_ompl.world.motion_queries import has_kernels, is_conservative
 
 
 class DRRTCon(SafePlanner):
@@ -41,7 +41,7 @@ class DRRTCon(SafePlanner):
         """Make a planner.
 
         Args:
-            si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
+            si: ``ompl.base.SpaceInformation`` of real coordinates and angles.
             world: Checks configurations and motions instead of ``si``, if given.
             seed: At least 0; drawn from OMPL's if None.
             range: Longest motion of the trees [unit of the space]; what suits the bounds if None.
@@ -97,7 +97,7 @@ class DRRTCon(SafePlanner):
 
     def _new(self) -> DrrtCon:
         lower, upper = self.bounds()
-        max_edge, _ = connect_lengths(lower, upper, self.range, None, turning=turning_joints(self._world))
+        max_edge, _ = connect_lengths(lower, upper, self.range, None, turning=self.turning())
         seed, world = int(self.rng.integers(2**63)), self._world
         if is_conservative(world) and has_kernels(world, *LIBRARIES):
             return DrrtCon(KernelConnect(world, lower, upper, max_edge, seed, NO_LIMIT), max_edge)

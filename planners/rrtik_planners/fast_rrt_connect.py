@@ -18,7 +18,7 @@ from rrtik_ompl.fast.tables.memory import Table
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_ompl.ompl_bridge.inspection.graph import Tree, without
 from rrtik_ompl.search.rrt_connect import ConnectRules, RrtConnect, straight_path
-from rrtik_ompl.world.motion_queries import KernelWorld, has_kernels, is_conservative, turning_joints
+from rrtik_ompl.world.motion_queries import KernelWorld, has_kernels, is_conservative
 from rrtik_planners.one_joint_options import iteration_limit
 
 
@@ -49,7 +49,7 @@ class FastRRTConnect(SafePlanner):
         """Make a planner.
 
         Args:
-            si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
+            si: ``ompl.base.SpaceInformation`` of real coordinates and angles.
             world: Checks configurations and motions instead of ``si``, if given.
             seed: At least 0; drawn from OMPL's if None.
             range: Length of a motion of the trees, at most [unit of the space]; what suits the bounds if None.
@@ -71,7 +71,7 @@ class FastRRTConnect(SafePlanner):
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         world = self._world
         if not has_kernels(world, KERNELS):
-            rules = python_rules(self.bounds(), *self._lengths, self.max_iterations, turning=turning_joints(world))
+            rules = python_rules(self.bounds(), *self._lengths, self.max_iterations, turning=self.turning())
             return search_in_python(self, starts, goals, rules, checker, ptc)
         with self._kernels(world) as kernels:
             path = kernels.solve(
@@ -109,7 +109,7 @@ class FastRRTConnect(SafePlanner):
         return kept_search(world.motions, key, lambda: self._made(world, lower, upper))
 
     def _made(self, world: KernelWorld, lower: Vector, upper: Vector) -> ConnectSearch:
-        range_, domain = connect_lengths(lower, upper, *self._lengths, turning=turning_joints(world))
+        range_, domain = connect_lengths(lower, upper, *self._lengths, turning=self.turning())
         lower, upper = np.maximum(lower, world.robot.lower), np.minimum(upper, world.robot.upper)  # unknown to kernels
         return ConnectSearch(world.motions, lower, upper, range_=range_, domain=domain)
 

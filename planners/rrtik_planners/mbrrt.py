@@ -13,7 +13,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import Goal, TipGoal
 from rrtik_ompl.ik.mb_rrt.aims import tree_aims
 from rrtik_ompl.ik.mb_rrt.axes import misfit
-from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop, space_bounds
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.world import World
 from rrtik_planners.bicrdt import BiCRDT
 
@@ -43,7 +43,7 @@ class MBRRT(BiCRDT):
         """Make a planner.
 
         Args:
-            si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
+            si: ``ompl.base.SpaceInformation`` of real coordinates and angles.
             world: Checks configurations and motions instead of ``si``, if given.
             seed: At least 0; drawn from OMPL's if None.
             goal: What the tip has to reach; needs a world. If None, or where the tree finds nothing, the
@@ -74,7 +74,7 @@ class MBRRT(BiCRDT):
         if self.goal is None or not isinstance(self._world, World):
             return np.zeros((0, starts.shape[1]))
         rows = tree_aims(self._world, self.goal, starts[0], self.rng, seconds=self.ik_seconds)
-        lower, upper = space_bounds(self.getSpaceInformation())
+        lower, upper = self.bounds()
         inside: Matrix = rows[((rows >= lower) & (rows <= upper)).all(axis=1)]
         return inside
 

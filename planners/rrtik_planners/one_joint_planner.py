@@ -43,7 +43,7 @@ class OneJointPlanner(SafePlanner):
         """Make a planner. These are the options of all planners that move one joint at a time; some take a part.
 
         Args:
-            si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
+            si: ``ompl.base.SpaceInformation`` of real coordinates and angles.
             world: Checks configurations and motions instead of ``si``, if given.
             seed: At least 0; drawn from OMPL's if None.
             scale_by_range: Divide each coordinate by its range in the metric of the nearest neighbour.

@@ -43,7 +43,7 @@ class RoadmapPlanner(SafePlanner):
         """Make a planner.
 
         Args:
-            si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
+            si: ``ompl.base.SpaceInformation`` of real coordinates and angles.
             world: Checks configurations and motions instead of ``si``, if given.
             seed: At least 0; drawn from OMPL's if None.
             roadmap: A :class:`~rrtik_ompl.search.roadmap.Roadmap` of the world, or the file of one.

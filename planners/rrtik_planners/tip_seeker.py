@@ -16,7 +16,6 @@ from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.targets import targets
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
 from rrtik_ompl.world import World
-from rrtik_ompl.world.motion_queries import turning_joints
 
 DRAWS = 16  # targets of a goal that leaves freedom
 ARM_DIAGONAL = 14.0  # [rad] of the limits of an arm with seven joints
@@ -48,7 +47,7 @@ class TipSeeker(SafePlanner):
 
     def radian(self) -> float:
         """What counts as a radian in this space: one where it is that of an arm, else a share of its diagonal."""
-        if turning_joints(self._world) is not None:
+        if self.turning() is not None:
             return 1.0
         lower, upper = self.bounds()
         return float(np.linalg.norm(upper - lower)) / ARM_DIAGONAL

@@ -124,7 +124,7 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
         """Which rows lie inside the bounds and are valid to the checker of the space information, if it has one."""
         si = self.getSpaceInformation()
         lower, upper = space_bounds(si)
-        usable: Mask = np.all((rows >= lower) & (rows <= upper), axis=1)
+        usable: Mask = np.all(self._io.turning | ((rows >= lower) & (rows <= upper)), axis=1)
         if si.getStateValidityChecker() is None:
             return usable
         state = si.allocState()

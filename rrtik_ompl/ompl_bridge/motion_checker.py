@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
 from ompl import base as ob
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.ompl_bridge.spaces.unrolled import pieces
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.world.motion_queries import MotionQueries
 
@@ -85,6 +87,12 @@ class SpaceChecker:
     def motion_valid(self, a: Vector, b: Vector) -> bool:
         """Whether the straight motion from a to b, shapes (n,), is free; a itself is taken to be."""
         self.checked_motions += 1
+        return all(self._short_motion_valid(*ends) for ends in self._pieces(a, b))
+
+    def _pieces(self, a: Vector, b: Vector) -> Iterable[tuple[Vector, Vector]]:
+        return pairwise(pieces(a, b, self._io.turning)) if self._io.turns else ((a, b),)
+
+    def _short_motion_valid(self, a: Vector, b: Vector) -> bool:
         self._io.write(self._a, a)
         self._io.write(self._b, b)
         return bool(self._si.checkMotion(self._a, self._b))

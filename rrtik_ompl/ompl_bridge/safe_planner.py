@@ -18,7 +18,7 @@ import numpy as np
 from ompl import base as ob
 from ompl import util as ou
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen, whole_number
+from rrtik_ompl.arrays import Mask, Matrix, Vector, whole_number
 from rrtik_ompl.errors import PlannerError
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.inspection.graph import PlannerGraph, Tree, graph_of_path, graph_of_trees, nearest_approach
@@ -26,8 +26,10 @@ from rrtik_ompl.ompl_bridge.inspection.settings import FILLED_IN, change, keywor
 from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker
 from rrtik_ompl.ompl_bridge.planner_inputs import condition_of, starts_and_goals, usable
 from rrtik_ompl.ompl_bridge.results import Failure, IllPosed, SearchResult, explained, failure_of, status_of
-from rrtik_ompl.ompl_bridge.states import StateIO, real_vector_space, space_bounds
-from rrtik_ompl.world.motion_queries import MotionQueries, Stop
+from rrtik_ompl.ompl_bridge.spaces.coordinates import coordinates_of
+from rrtik_ompl.ompl_bridge.spaces.unrolled import Unrolled
+from rrtik_ompl.ompl_bridge.states import StateIO
+from rrtik_ompl.world.motion_queries import MotionQueries, Stop, turning_joints
 
 
 class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
@@ -42,10 +44,8 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     :meth:`search`. The options are the keyword parameters of the constructor; ``world``, ``seed`` and, for planners
     that want the goal of the tip, ``goal`` are filled in by `plan()`.
 
-    Traits of the class, for `plan()`; see :class:`~rrtik_ompl.ompl_bridge.planner_traits.PlannerTraits`:
-    ``anytime``, ``one_goal``, ``finds_goals``, ``straight_first``, ``supports_iteration_limit`` (such a planner has the
-    option ``max_iterations``), ``path_statistics``, ``kernels``, ``one_joint``, ``brief_options``,
-    ``proof_iterations`` and ``keeps_constraints``.
+    Traits of the class, for `plan()`, are explained at :class:`~rrtik_ompl.ompl_bridge.planner_traits.PlannerTraits`;
+    one with ``supports_iteration_limit`` has the option ``max_iterations``.
 
     Attributes:
         seed: The seed in use; given, or drawn from OMPL's, so that ``ompl.util.RNG.setSeed`` fixes it too.
@@ -82,7 +82,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         """Make a planner.
 
         Args:
-            si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace.
+            si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace, an SO2StateSpace or a compound of them.
             name: Name for OMPL's reports.
             world: Checks configurations and motions instead of ``si``, if given.
             seed: At least 0.
@@ -90,7 +90,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         Raises:
             InputError: If the space is of another kind or the seed is no such number.
         """
-        real_vector_space(si)
+        coordinates_of(si)  # refuses other spaces
         used = int(ou.RNG().uniformInt(0, 2**31 - 1)) if seed is None else whole_number(seed, "seed")
         super().__init__(si, name)
         self.seed = used
@@ -103,7 +103,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self._graph: PlannerGraph | None = None
         self._world = world
         self._states: StateIO | None = None
-        self._known_bounds: tuple[Any, Any] = ((), ())  # numbers of the space, and the arrays made from them
+        self._bounds: tuple[Vector, Vector] | None = None
 
     @cached_property
     def rng(self) -> np.random.Generator:
@@ -196,7 +196,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         Returns:
             The status, and the path, shape (k, n), if there is an exact one.
         """
-        self._known_bounds, self.graph_wanted = ((), bounds), False
+        self._bounds, self.graph_wanted = bounds, False
         status, found = self._searched(lambda: self._between(starts, goals, stop, known_free=checked))
         exact = found is not None and found.difference <= 0.0
         return ob.PlannerStatus(status), found.path if found is not None and exact else None
@@ -211,11 +211,16 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         return checker.valid_batch(rows)
 
     def bounds(self) -> tuple[Vector, Vector]:
-        """Lower and upper bounds of the space, shapes (n,), as they were when ``solve`` was last called.
+        """Lower and upper bounds, shapes (n,), read-only, as they were when ``solve`` was last called.
 
-        They are the same read-only arrays as long as they do not change.
+        Angles of SO(2) are laid out on a line: they go from a turn below the first start to a turn above it.
         """
-        return self._known_bounds[1] or self._read_bounds()
+        return self._io.bounds() if self._bounds is None else self._bounds
+
+    def turning(self) -> Mask | None:
+        """Which coordinates turn, shape (n,): of the world's arm, or angles of SO(2); None where nobody knows."""
+        joints = turning_joints(self._world)
+        return self._io.turning if joints is None and self._io.turns else joints
 
     @property
     def _io(self) -> StateIO:
@@ -243,30 +248,25 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self.statistics, self.error, self.failure, self.reason = {}, None, None, ""
         self.progress, self._graph = (), None
 
-    def _read_bounds(self) -> tuple[Vector, Vector]:
-        numbers = self._io.bounds()
-        if numbers != self._known_bounds[0]:
-            lower, upper = space_bounds(self.getSpaceInformation())
-            self._known_bounds = numbers, (frozen(lower), frozen(upper))
-        known: tuple[Vector, Vector] = self._known_bounds[1]
-        return known
-
     def _in_ompl(self, ptc: Stop) -> SearchResult:
         """Search between the starts and goals of the problem definition, and hand the path to it."""
         si, pdef = self.getSpaceInformation(), self.getProblemDefinition()
         if pdef is None:
             raise PlannerError(f"{self.getName()}: no problem definition; use SimpleSetup or setProblemDefinition()")
-        self._read_bounds()  # refuses missing ones in clearer words than OMPL
+        self._bounds = self._io.bounds()  # refuses missing ones in clearer words than OMPL
         if self._world is None and not si.isSetup():
             si.setup()  # before it, checkMotion looks at the end point alone
         inputs, aimless, begun = self.getPlannerInputStates(), not self.needs_goals(), time.perf_counter()
         ends = starts_and_goals(inputs, pdef, self._io, ptc, aimless=aimless)
+        line = Unrolled(*ends, self._io.turning) if self._io.turns else None
+        if line is not None:
+            ends, self._bounds = (line.starts, line.goals), line.bounds(*self._bounds)
         found = self._between(*ends, ptc)
         if found.path is None and isinstance(pdef.getGoal(), GoalSampler):
             pdef.getGoal().more()  # for the next attempt
         found = self._kept(found, ends[1], time.perf_counter() - begun)
         if found.path is not None:
-            path = self._io.path(si, found.path)
+            path = self._io.path(si, found.path if line is None else line.path(found.path))
             pdef.addSolutionPath(path, found.difference > 0.0, float(found.difference), self.getName())
         return found
 
@@ -276,10 +276,9 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
             self._graph = found.graph
             near = None if found.graph is None or len(goals) == 0 else nearest_approach(found.graph, goals)
             return found if near is None else replace(found, path=near[0], difference=near[1])
-        path = graph_of_path(found.path)
-        self._graph = found.graph or path
+        self._graph = found.graph or graph_of_path(found.path)
         if found.difference <= 0.0:
-            self.progress = found.progress or ((seconds, float(path.costs.sum())),)
+            self.progress = found.progress or ((seconds, float(graph_of_path(found.path).costs.sum())),)
         return found
 
     def _between(self, starts: Matrix, goals: Matrix, stop: Stop, *, known_free: bool = False) -> SearchResult:

@@ -7,11 +7,13 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import groupby
 
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import TAU, Matrix, Vector, frozen
+from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector, frozen
+from rrtik_ompl.ompl_bridge.spaces.unrolled import near_image
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.world import World
@@ -84,8 +86,9 @@ class CheckedMotions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no t
         self._motion_valid, self._states = motion_valid, StateIO(si)
 
     def checkMotion(self, first: ob.State, second: ob.State, *_: object) -> bool:
-        """Whether the motion between two states is free."""
-        return self._motion_valid(self._states.read(first), self._states.read(second))
+        """Whether the motion between two states is free; angles of SO(2) turn the short way."""
+        a, b = self._states.read(first), self._states.read(second)
+        return self._motion_valid(a, near_image(b, a, self._states.turning) if self._states.turns else b)
 
 
 def planning_bounds(problem: Problem, goals: Matrix) -> tuple[Vector, Vector]:
@@ -135,13 +138,38 @@ atexit.register(_kept_space.cache_clear)  # the bindings complain of objects tha
 
 def bounded_space(lower: Vector, upper: Vector) -> ob.SpaceInformation:
     """A SpaceInformation whose space has bounds, shapes (n,)."""
-    space = ob.RealVectorStateSpace(len(lower))
-    bounds = ob.RealVectorBounds(len(lower))
+    return ob.SpaceInformation(_real_space(lower, upper))
+
+
+def circular_space(lower: Vector, upper: Vector, turning: Mask) -> ob.SpaceInformation:
+    """A SpaceInformation of a compound: an SO2StateSpace for each coordinate that turns, the others with bounds.
+
+    Args:
+        lower: Lower bounds, shape (n,); without meaning where a coordinate turns.
+        upper: Upper bounds, shape (n,), likewise.
+        turning: Shape (n,).
+    """
+    space, begin = ob.CompoundStateSpace(), 0
+    for turns, run in groupby(turning.tolist()):
+        end = begin + len(list(run))
+        parts = (
+            [ob.SO2StateSpace() for _ in range(begin, end)]
+            if turns
+            else [_real_space(lower[begin:end], upper[begin:end])]
+        )
+        for part in parts:
+            space.addSubspace(part, 1.0)
+        begin = end
+    return ob.SpaceInformation(space)
+
+
+def _real_space(lower: Vector, upper: Vector) -> ob.RealVectorStateSpace:
+    space, bounds = ob.RealVectorStateSpace(len(lower)), ob.RealVectorBounds(len(lower))
     for k in range(len(lower)):
         bounds.setLow(k, float(lower[k]))
         bounds.setHigh(k, float(upper[k]))
     space.setBounds(bounds)
-    return ob.SpaceInformation(space)
+    return space
 
 
 def problem_definition(problem: Problem, goals: Matrix, si: ob.SpaceInformation) -> ob.ProblemDefinition:

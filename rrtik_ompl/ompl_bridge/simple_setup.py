@@ -12,7 +12,8 @@ from rrtik_ompl.arrays import Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
-from rrtik_ompl.ompl_bridge.setup import CheckedMotions, bounded_space, planning_bounds
+from rrtik_ompl.ompl_bridge.setup import CheckedMotions, bounded_space, circular_space, planning_bounds
+from rrtik_ompl.ompl_bridge.spaces.coordinates import Coordinates, coordinates_of
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
@@ -51,9 +52,9 @@ class TipProjection(ob.ProjectionEvaluator):  # type: ignore[misc]  # OMPL has n
     OMPL chooses the size of the cells from samples. It must not hold the space, which holds it, or neither is freed.
     """
 
-    def __init__(self, space: ob.StateSpace, robot: Robot) -> None:
+    def __init__(self, space: ob.StateSpace, robot: Robot, coordinates: Coordinates) -> None:
         super().__init__(space)
-        self._robot = robot
+        self._robot, self._coordinates = robot, coordinates
 
     def getDimension(self) -> int:
         """Three; called by OMPL."""
@@ -61,10 +62,10 @@ class TipProjection(ob.ProjectionEvaluator):  # type: ignore[misc]  # OMPL has n
 
     def project(self, state: ob.State, projection: Vector) -> None:
         """Write the position of the tip [m]; called by OMPL."""
-        projection[:] = self._robot.fk_batch([state[0 : self._robot.dof]])[0, :3, 3]
+        projection[:] = self._robot.fk_batch([self._coordinates.read(state)])[0, :3, 3]
 
 
-def space_information(world_or_problem: World | Problem) -> ob.SpaceInformation:
+def space_information(world_or_problem: World | Problem, *, so2: bool = False) -> ob.SpaceInformation:
     """A set-up ``ompl.base.SpaceInformation`` over the joints of an arm, whose questions a world answers.
 
     Its space is a RealVectorStateSpace within the joint limits [rad; m]; a joint without limits gets a turn on both
@@ -74,6 +75,8 @@ def space_information(world_or_problem: World | Problem) -> ob.SpaceInformation:
 
     Args:
         world_or_problem: A `World`, or a `Problem`, whose world it is then.
+        so2: Whether a joint without limits becomes an SO2StateSpace, in which a whole turn more is the same posture.
+            The space is a CompoundStateSpace then, with the joints in their order, and "tip" its default projection.
 
     Raises:
         InputError: If it is neither, or a problem has path constraints.
@@ -85,7 +88,7 @@ def space_information(world_or_problem: World | Problem) -> ob.SpaceInformation:
         6
     """
     if isinstance(world_or_problem, World):
-        return _information(world_or_problem, *world_or_problem.robot.finite_range())
+        return _information(world_or_problem, *world_or_problem.robot.finite_range(), so2)
     if not isinstance(world_or_problem, Problem):
         raise InputError(f"space_information: expected a World or a Problem, got {type(world_or_problem).__name__}")
     if world_or_problem.constraints:
@@ -95,10 +98,10 @@ def space_information(world_or_problem: World | Problem) -> ob.SpaceInformation:
         )
     goal = world_or_problem.goal
     ends = goal.q[None] if isinstance(goal, JointGoal) else world_or_problem.start[None]
-    return _information(world_or_problem.world, *planning_bounds(world_or_problem, ends))
+    return _information(world_or_problem.world, *planning_bounds(world_or_problem, ends), so2)
 
 
-def simple_setup(problem: Problem, *, seed: int = 0) -> og.SimpleSetup:
+def simple_setup(problem: Problem, *, seed: int = 0, so2: bool = False) -> og.SimpleSetup:
     """A problem as ``ompl.geometric.SimpleSetup``: space, checks, start and goal; only the planner is missing.
 
     A goal in joint values is a GoalState, any other one a :class:`~rrtik_ompl.ompl_bridge.GoalSampler`; its docstring
@@ -107,6 +110,7 @@ def simple_setup(problem: Problem, *, seed: int = 0) -> og.SimpleSetup:
     Args:
         problem: What is to be planned.
         seed: Of the search for configurations at a goal of the tip.
+        so2: See :func:`space_information`.
 
     Raises:
         InputError: If it is no problem, or has path constraints.
@@ -119,7 +123,7 @@ def simple_setup(problem: Problem, *, seed: int = 0) -> og.SimpleSetup:
     """
     if not isinstance(problem, Problem):
         raise InputError(f"simple_setup: expected a Problem, got {type(problem).__name__}")
-    si = space_information(problem)
+    si = space_information(problem, so2=so2)
     setup, states, state = og.SimpleSetup(si), StateIO(si), si.allocState()
     states.write(state, problem.start)
     setup.addStartState(state)
@@ -134,10 +138,15 @@ def simple_setup(problem: Problem, *, seed: int = 0) -> og.SimpleSetup:
     return setup
 
 
-def _information(world: World, lower: Vector, upper: Vector) -> ob.SpaceInformation:
-    si = bounded_space(lower, upper)
+def _information(world: World, lower: Vector, upper: Vector, so2: bool) -> ob.SpaceInformation:
+    endless = world.robot.continuous
+    si = circular_space(lower, upper, endless) if so2 and endless.any() else bounded_space(lower, upper)
     si.setStateValidityChecker(WorldValidity(si, world))
     si.setMotionValidator(CheckedMotions(si, world.motion_valid))
-    si.getStateSpace().registerProjection(TIP_PROJECTION, TipProjection(si.getStateSpace(), world.robot))
+    space = si.getStateSpace()
+    tip = TipProjection(space, world.robot, coordinates_of(si))
+    space.registerProjection(TIP_PROJECTION, tip)
+    if space.isCompound():  # has none of its own, and KPIECE1 and its kin need one
+        space.registerDefaultProjection(tip)
     si.setup()
     return si

@@ -9,34 +9,23 @@ import numpy as np
 from ompl import base as ob
 from ompl import geometric as og
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.errors import InputError
-
-
-def real_vector_space(si: ob.SpaceInformation) -> ob.RealVectorStateSpace:
-    """The state space of a SpaceInformation.
-
-    Raises:
-        InputError: If ``si`` is no SpaceInformation or its space is not a RealVectorStateSpace.
-    """
-    if not isinstance(si, ob.SpaceInformation):
-        raise InputError(f"planner: expected an ompl.base.SpaceInformation, got {type(si).__name__}")
-    space = si.getStateSpace()
-    if not isinstance(space, ob.RealVectorStateSpace):
-        raise InputError(f"planner: needs a RealVectorStateSpace (one value per joint), got a {type(space).__name__}")
-    if space.getDimension() == 0:
-        raise InputError("planner: needs a space of at least one coordinate, got none")
-    return space
+from rrtik_ompl.ompl_bridge.spaces.coordinates import coordinates_of
+from rrtik_ompl.ompl_bridge.spaces.unrolled import on_circles
 
 
 def space_bounds(si: ob.SpaceInformation) -> tuple[Vector, Vector]:
-    """Lower and upper bounds of a RealVectorStateSpace, shapes (n,).
+    """Lower and upper bounds of the coordinates of a space, shapes (n,); of an angle of SO(2) -pi and pi.
 
     Raises:
         InputError: If a bound is missing: not finite, or the lower one not below the upper one.
     """
-    bounds = real_vector_space(si).getBounds()
-    lower, upper = np.array(bounds.low, dtype=np.float64), np.array(bounds.high, dtype=np.float64)
+    return _checked_bounds(*coordinates_of(si).bounds(si.getStateSpace()))
+
+
+def _checked_bounds(low: list[float], high: list[float]) -> tuple[Vector, Vector]:
+    lower, upper = frozen(low), frozen(high)
     bad = np.flatnonzero(~(np.isfinite(lower) & np.isfinite(upper) & (lower < upper)))
     if len(bad):
         i = int(bad[0])
@@ -48,38 +37,51 @@ def space_bounds(si: ob.SpaceInformation) -> tuple[Vector, Vector]:
 
 
 class StateIO:
-    """Copies one configuration at a time between numpy and a state of a RealVectorStateSpace.
+    """Copies one configuration at a time between numpy and a state of real coordinates and angles of SO(2).
 
     OMPL's ``serialize`` writes through a pointer. Handing it the address of a numpy buffer, in a capsule of the name
     that the bindings expect, copies a state several times faster than reading its coordinates one by one. The name is
-    an internal of the bindings: it is tried once at construction, and if it fails, slices do the same work.
+    an internal of the bindings: it is tried once at construction, and if it fails, the coordinates are read so. An
+    angle is written in [-pi, pi], whatever turn it is in.
+
+    Attributes:
+        dof: Number of coordinates, n.
+        turning: Which of them are angles of SO(2), shape (n,).
+        turns: Whether any is.
+        fast: Whether the capsule works.
 
     For one thread. It holds the space and no state, so whatever a space does not lead to may keep it.
     """
 
     def __init__(self, si: ob.SpaceInformation) -> None:
-        self._space = real_vector_space(si)
-        self.dof = int(self._space.getDimension())
+        self._coordinates = coordinates_of(si)
+        self._space = si.getStateSpace()
+        self.dof, self.turning = self._coordinates.size, self._coordinates.turning
+        self.turns = bool(self.turning.any())
+        self._bounds: tuple[object, tuple[Vector, Vector]] | None = None
         self._buffer = np.zeros(self.dof)
         self._capsule = _capsule(self._buffer)
         self.fast = self._capsule is not None and self._capsule_works(si)
 
-    def bounds(self) -> tuple[list[float], list[float]]:
-        """Lower and upper bounds of the space as they are."""
-        bounds = self._space.getBounds()
-        return list(bounds.low), list(bounds.high)
+    def bounds(self) -> tuple[Vector, Vector]:
+        """:func:`space_bounds` as they are; the same arrays as long as they do not change."""
+        numbers = self._coordinates.bounds(self._space)
+        if self._bounds is None or numbers != self._bounds[0]:
+            self._bounds = numbers, _checked_bounds(*numbers)
+        return self._bounds[1]
 
     def read(self, state: ob.State) -> Vector:
         """A private copy of the coordinates of a state, shape (n,)."""
         if not self.fast:
-            return np.array(state[0 : self.dof], dtype=np.float64)
+            return np.array(self._coordinates.read(state), dtype=np.float64)
         self._space.serialize(self._capsule, state)
         return self._buffer.copy()
 
     def write(self, state: ob.State, q: Vector) -> None:
         """Set the coordinates of a state to q, shape (n,)."""
+        q = on_circles(q, self.turning) if self.turns else q
         if not self.fast:
-            state[0 : self.dof] = q.tolist()
+            self._coordinates.write(state, q.tolist())
             return
         self._buffer[:] = q
         self._space.deserialize(state, self._capsule)
@@ -104,8 +106,8 @@ class StateIO:
         try:
             self._buffer[:] = probe
             self._space.deserialize(state, self._capsule)
-            written = state[0 : self.dof] == probe.tolist()
-            state[0 : self.dof] = (-probe).tolist()
+            written = self._coordinates.read(state) == probe.tolist()
+            self._coordinates.write(state, (-probe).tolist())
             self._space.serialize(self._capsule, state)
         except (TypeError, RuntimeError):
             return False

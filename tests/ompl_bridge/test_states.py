@@ -67,7 +67,7 @@ def test_missing_bounds_are_named_with_the_remedy(low: float, high: float) -> No
 
 
 def test_other_spaces_are_refused_by_name() -> None:
-    with pytest.raises(InputError, match=r"needs a RealVectorStateSpace .*SE3StateSpace"):
+    with pytest.raises(InputError, match=r"needs a RealVectorStateSpace, .*SE3StateSpace"):
         StateIO(ob.SpaceInformation(ob.SE3StateSpace()))
 
 

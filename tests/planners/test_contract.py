@@ -15,7 +15,7 @@ from rrtik_ompl.errors import PlannerError
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult, check_planner
 from rrtik_ompl.ompl_bridge.contract import CONTRACT, moves_one_joint_at_a_time
 from rrtik_ompl.ompl_bridge.contract.problems import Clause, small_problem, solution_rows
-from rrtik_ompl.ompl_bridge.contract.spaces import takes_starts_that_lead_nowhere
+from rrtik_ompl.ompl_bridge.contract.spaces import takes_starts_that_lead_nowhere, turns_either_way
 from rrtik_planners import (
     CRDT,
     IKURT,
@@ -43,7 +43,8 @@ KEPT = [
     (planner, clause)
     for planner in PLANNERS
     for clause in CONTRACT
-    if not (planner is IKURTPublished and clause is takes_starts_that_lead_nowhere)  # it takes the first, by its paper
+    # it takes the first start, by its paper, and is lost in three coordinates with a wall
+    if not (planner is IKURTPublished and clause in (takes_starts_that_lead_nowhere, turns_either_way))
 ]
 
 
@@ -180,4 +181,4 @@ def test_start_that_is_the_goal_is_a_path_of_one_configuration(planner: Any) -> 
 @pytest.mark.parametrize("planner", PLANNERS, ids=lambda p: p.__name__)
 def test_other_spaces_are_refused_at_construction(planner: Any) -> None:
     with pytest.raises(Exception, match="needs a RealVectorStateSpace"):
-        planner(ob.SpaceInformation(ob.SE2StateSpace()))
+        planner(ob.SpaceInformation(ob.SE3StateSpace()))

@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 from ompl import base as ob
+from ompl import geometric as og
 
 from rrtik_ompl.ompl_bridge.contract.problems import (
     START,
@@ -27,6 +28,7 @@ COORDINATES = (1, 2, 7, 60)
 ALWAYS_SOLVED = 2  # coordinates: a single tree without aim, which is a planner too, is lost in many more
 SECONDS = 5.0  # [s] for problems that take milliseconds
 BRIEF = 0.3  # [s] where no path need be found
+TURNED = (-0.5, 0.0, 0.3), (0.5, 0.0, -0.3)  # two coordinates and an angle, on both sides of a wall
 COARSE = 0.02  # of the extent, between two looks of OMPL at an edge
 
 
@@ -98,15 +100,73 @@ def says_when_there_was_no_time(factory: Factory) -> None:
     require_status(status, "Exact solution", "a solve with a function and an interval")
 
 
+def turns_either_way(factory: Factory) -> None:
+    """In SE(2) and in a compound with SO(2) a path leads past half a turn where the short way round is shut."""
+    for space, write in ((_plane(), _write_plane), (_arm(), _write_arm)):
+        setup = og.SimpleSetup(space)
+        setup.setStateValidityChecker(_past_half_a_turn)
+        si = setup.getSpaceInformation()
+        ends = si.allocState(), si.allocState()
+        for state, q in zip(ends, TURNED, strict=True):
+            write(state, q)
+        setup.setStartAndGoalStates(*ends)
+        planner = factory(si, seed=1)
+        setup.setPlanner(planner)
+        status, what = str(setup.solve(SECONDS)), f"a {type(space).__name__} with an angle"
+        require(getattr(planner, "error", None) is None, what, getattr(planner, "error", None))
+        require_status(status, "Exact solution", what)
+        path = setup.getSolutionPath()
+        require(bool(path.check()), f"{what}: the path is not valid", status)
+        for state, k in zip(ends, (0, path.getStateCount() - 1), strict=True):
+            require(bool(space.equalStates(path.getState(k), state)), f"{what}: the path does not end exactly", k)
+
+
 SPACES: tuple[Clause, ...] = (
     asks_for_every_edge,
     does_not_depend_on_the_unit,
     works_in_any_dimension,
     takes_starts_that_lead_nowhere,
     says_when_there_was_no_time,
+    turns_either_way,
 )
 
 
 def _between_discs(state: ob.State) -> bool:
     x, y = (3.0 * state[0]) % 1.0 - 0.5, (3.0 * state[1]) % 1.0 - 0.5
     return bool(x * x + y * y > 0.09)
+
+
+def _plane() -> ob.StateSpace:
+    space = ob.SE2StateSpace()
+    space.setBounds(_square())
+    return space
+
+
+def _arm() -> ob.StateSpace:
+    space, sliding = ob.CompoundStateSpace(), ob.RealVectorStateSpace(2)
+    sliding.setBounds(_square())
+    space.addSubspace(ob.SO2StateSpace(), 1.0)
+    space.addSubspace(sliding, 0.5)
+    return space
+
+
+def _square() -> ob.RealVectorBounds:
+    bounds = ob.RealVectorBounds(2)
+    bounds.setLow(-1.0)
+    bounds.setHigh(1.0)
+    return bounds
+
+
+def _write_plane(state: ob.State, q: tuple[float, float, float]) -> None:
+    state.setXY(*q[:2])
+    state.setYaw(q[2])
+
+
+def _write_arm(state: ob.State, q: tuple[float, float, float]) -> None:
+    state[0].value, state[1][0:2] = q[2], list(q[:2])
+
+
+def _past_half_a_turn(state: ob.State) -> bool:
+    """Free but for a wall with one opening, near half a turn."""
+    x, angle = (state.getX(), state.getYaw()) if hasattr(state, "getYaw") else (state[1][0], state[0].value)
+    return bool(abs(x) > 0.1 or abs(angle) > 2.5)

@@ -1,0 +1,101 @@
+"""Angles of SO(2) laid out on a line, so that searches need know nothing of circles.
+
+A search moves from the first start up to a turn to either side. A goal is there once for each way round, and motions
+are asked, and put into paths, in pieces of less than half a turn, which OMPL interpolates in the same direction.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise, product
+
+import numpy as np
+
+from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector
+from rrtik_ompl.units import wrapped
+
+LONGEST = 0.75 * np.pi  # [rad] of the turn in a piece of a motion
+MOST_GOALS = 64  # with their other ways round
+
+
+def on_circles(q: Vector, turning: Mask) -> Vector:
+    """q, shape (n,), with its angles in [-pi, pi]; those that are there already to the bit."""
+    beyond = turning & (np.abs(q) > np.pi)
+    return np.where(beyond, wrapped(q), q) if beyond.any() else q
+
+
+def near_image(q: Vector, base: Vector, turning: Mask) -> Vector:
+    """q, shape (n,), with each angle moved by full turns until it is as near to ``base`` as can be."""
+    turns = np.round((q - base) / TAU) * TAU
+    return np.where(turning & (turns != 0.0), q - turns, q)
+
+
+def pieces(a: Vector, b: Vector, turning: Mask) -> Matrix:
+    """A straight motion as points, the first a and the last b, shape (k, n), between which no angle turns far."""
+    count = int(np.ceil(np.abs(b - a)[turning].max(initial=0.0) / LONGEST))
+    if count < 2:
+        return np.stack([a, b])
+    points = a + np.linspace(0.0, 1.0, count + 1)[:, None] * (b - a)
+    points[-1] = b
+    return points
+
+
+class Unrolled:
+    """Starts and goals of one search on a line.
+
+    Attributes:
+        starts: Shape (s, n), each angle within half a turn of that of the first start.
+        goals: Shape (g, n), the nearest image of each goal first, then the other ways round.
+
+    Args:
+        starts: Shape (s, n), s at least 1, angles in [-pi, pi].
+        goals: Likewise, shape (g, n).
+        turning: Which coordinates are angles, shape (n,).
+    """
+
+    def __init__(self, starts: Matrix, goals: Matrix, turning: Mask) -> None:
+        base = starts[0]
+        self._turning, self._base = turning, base
+        self._given: dict[bytes, Vector] = {}
+        self.starts = np.array([self._known(self._near(row), row) for row in starts])
+        each = max(1, MOST_GOALS // max(len(goals), 1))
+        images = [[self._known(row, goal) for row in self._images(goal)[:each]] for goal in goals]
+        rows = [row for of_goal in images for row in of_goal[:1]] + [row for of_goal in images for row in of_goal[1:]]
+        self.goals = np.array(rows).reshape(-1, len(base))
+
+    def bounds(self, lower: Vector, upper: Vector) -> tuple[Vector, Vector]:
+        """Bounds of the search, shapes (n,): those given, but of angles a turn to either side of the first start."""
+        return (
+            np.where(self._turning, self._base - TAU, lower),
+            np.where(self._turning, self._base + TAU, upper),
+        )
+
+    def path(self, rows: Matrix) -> Matrix:
+        """A path on the line, shape (k, n), as one whose angles turn the short way; its ends are those given."""
+        points = [rows[:1], *(pieces(a, b, self._turning)[1:] for a, b in pairwise(rows))]
+        path = np.vstack(points)
+        for end in (0, -1):
+            path[end] = self._given.get(path[end].tobytes(), path[end])
+        return path
+
+    def _known(self, image: Vector, given: Vector) -> Vector:
+        self._given[image.tobytes()] = given
+        return image
+
+    def _near(self, row: Vector) -> Vector:
+        return near_image(row, self._base, self._turning)
+
+    def _images(self, row: Vector) -> list[Vector]:
+        """The images of a row within a turn of the first start, the nearest ones first."""
+        near = self._near(row)
+        other = np.where(near > self._base, -TAU, TAU)
+        axes = np.flatnonzero(self._turning)
+        if 2 ** len(axes) <= MOST_GOALS:
+            chosen = [np.array(flips) for flips in product((False, True), repeat=len(axes))]
+        else:
+            chosen = [np.zeros(len(axes), dtype=bool), *np.eye(len(axes), dtype=bool)]
+        images = []
+        for flips in chosen:
+            image = near.copy()
+            image[axes[flips]] += other[axes[flips]]
+            images.append(image)
+        return sorted(images, key=lambda image: float(np.linalg.norm(image - self._base)))
