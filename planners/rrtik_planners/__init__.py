@@ -10,11 +10,13 @@ if TYPE_CHECKING:
     from rrtik_planners.cbirrt import CBiRRT as CBiRRT
     from rrtik_planners.crdt import CRDT as CRDT
     from rrtik_planners.drrt_con import DRRTCon as DRRTCon
+    from rrtik_planners.fast_aorrtc import FastAORRTC as FastAORRTC
     from rrtik_planners.fast_rrt_connect import FastRRTConnect as FastRRTConnect
     from rrtik_planners.fewest_moves import FewestMoves as FewestMoves
     from rrtik_planners.ikurt import IKURT as IKURT
     from rrtik_planners.ikurt_published import IKURTPublished as IKURTPublished
     from rrtik_planners.mbrrt import MBRRT as MBRRT
+    from rrtik_planners.restart_shorten import RestartShorten as RestartShorten
     from rrtik_planners.roadmap import RoadmapPlanner as RoadmapPlanner
 
 __all__ = [
@@ -24,9 +26,11 @@ __all__ = [
     "BiCRDT",
     "CBiRRT",
     "DRRTCon",
+    "FastAORRTC",
     "FastRRTConnect",
     "FewestMoves",
     "IKURTPublished",
+    "RestartShorten",
     "RoadmapPlanner",
 ]
 
@@ -35,11 +39,13 @@ _MODULES = {
     "CBiRRT": "cbirrt",
     "CRDT": "crdt",
     "DRRTCon": "drrt_con",
+    "FastAORRTC": "fast_aorrtc",
     "FastRRTConnect": "fast_rrt_connect",
     "FewestMoves": "fewest_moves",
     "IKURT": "ikurt",
     "IKURTPublished": "ikurt_published",
     "MBRRT": "mbrrt",
+    "RestartShorten": "restart_shorten",
     "RoadmapPlanner": "roadmap",
 }
 

@@ -69,9 +69,22 @@ class FastRRTConnect(SafePlanner):
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
+        return self.between(starts, goals, checker, ptc, bound=self.bound, max_iterations=self.max_iterations)
+
+    def between(
+        self,
+        starts: Matrix,
+        goals: Matrix,
+        checker: MotionChecker,
+        ptc: Stop,
+        *,
+        bound: float | None = None,
+        max_iterations: int | None = None,
+    ) -> SearchResult:
+        """One search; see the options of the planner."""
         world = self._world
         if not has_kernels(world, KERNELS):
-            rules = python_rules(self.bounds(), *self._lengths, self.max_iterations, turning=self.turning())
+            rules = python_rules(self.bounds(), *self._lengths, max_iterations, turning=self.turning())
             return search_in_python(self, starts, goals, rules, checker, ptc)
         with self._kernels(world) as kernels:
             path = kernels.solve(
@@ -80,8 +93,8 @@ class FastRRTConnect(SafePlanner):
                 self.rng.bit_generator.random_raw(),
                 ask=None if is_conservative(world) else checker.motion_valid_batch,
                 stop=ptc,
-                max_iterations=self.max_iterations,
-                bound=self.bound,
+                max_iterations=max_iterations,
+                bound=bound,
             )
             counts = kernels.statistics()
             graph = self.grown(lambda: sound_tree(kernels.trees[0]), lambda: sound_tree(kernels.trees[1]))

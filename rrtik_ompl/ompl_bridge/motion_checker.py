@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Protocol
 
@@ -87,10 +87,9 @@ class SpaceChecker:
     def motion_valid(self, a: Vector, b: Vector) -> bool:
         """Whether the straight motion from a to b, shapes (n,), is free; a itself is taken to be."""
         self.checked_motions += 1
-        return all(self._short_motion_valid(*ends) for ends in self._pieces(a, b))
-
-    def _pieces(self, a: Vector, b: Vector) -> Iterable[tuple[Vector, Vector]]:
-        return pairwise(pieces(a, b, self._io.turning)) if self._io.turns else ((a, b),)
+        if not self._io.turns:
+            return self._short_motion_valid(a, b)
+        return all(self._short_motion_valid(*ends) for ends in pairwise(pieces(a, b, self._io.turning)))
 
     def _short_motion_valid(self, a: Vector, b: Vector) -> bool:
         self._io.write(self._a, a)

@@ -9,6 +9,7 @@ import numpy as np
 from ompl import base as ob
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.errors import InputError
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.results import IllPosed
 from rrtik_ompl.ompl_bridge.states import StateIO
@@ -26,7 +27,9 @@ def starts_and_goals(
 
     Raises:
         IllPosed: If there is no valid start, or the goal cannot be sampled.
+        InputError: If goal or objective are of a space with another number of coordinates.
     """
+    _refuse_other_spaces(definition, io.dof)
     inputs.restart()
     starts, goals = _starts(inputs, io), []
     if not starts:
@@ -38,6 +41,14 @@ def starts_and_goals(
             raise IllPosed(ob.PlannerStatus.UNRECOGNIZED_GOAL_TYPE, text)
         goals = _goals(inputs, io, goal, stop)
     return np.array(starts), np.array(goals).reshape(-1, io.dof)
+
+
+def _refuse_other_spaces(definition: ob.ProblemDefinition, dof: int) -> None:
+    """States of another space would be read and written beyond their memory."""
+    for what, part in (("goal", definition.getGoal()), ("objective", definition.getOptimizationObjective())):
+        count = dof if part is None else part.getSpaceInformation().getStateDimension()
+        if count != dof:
+            raise InputError(f"{what}: is of another space, of {count} coordinates; that of the problem has {dof}")
 
 
 def _starts(inputs: ob.PlannerInputStates, io: StateIO) -> list[Vector]:

@@ -70,11 +70,12 @@ class RrtConnect:
             stop: Called before every sample and every edge; true ends the search.
         """
         rules, motion_free = self._rules, self._motion_free
+        lower, extent = rules.lower, rules.upper - rules.lower
         while not stop() and self.iterations < self._limit:
             self.iterations += 1
             side = self._side = self._next_side()
             growing, other = self.trees[side], self.trees[1 - side]
-            vertex = extend(growing, self._rng.uniform(rules.lower, rules.upper), rules, motion_free)
+            vertex = extend(growing, lower + extent * self._rng.random(len(lower)), rules, motion_free)
             if vertex is None:
                 continue
             met = reach(other, growing.row(vertex), rules, motion_free, stop)

@@ -184,6 +184,56 @@ def test_a_problem_without_start_or_goal_says_so() -> None:
     assert (status, "none is given" in str(planner.error)) == ("Invalid goal", True)
 
 
+@pytest.mark.parametrize("what", ["goal", "objective"])
+def test_a_goal_or_an_objective_of_another_space_is_refused_in_a_line(what: str) -> None:
+    other = ob.SpaceInformation(ob.RealVectorStateSpace(7))
+    setup = small_problem()
+    if what == "goal":
+        setup.setGoal(ob.GoalStates(other))
+    else:
+        setup.setOptimizationObjective(ob.PathLengthOptimizationObjective(other))
+    status, planner = solve(setup)
+    assert status == "Crash"
+    assert planner.failure is not None
+    assert planner.failure.refused
+    assert planner.failure.summary == f"{what}: is of another space, of 7 coordinates; that of the problem has 3"
+
+
+def test_a_goal_without_samples_is_an_invalid_goal_at_once() -> None:
+    class Empty(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no types
+        def maxSampleCount(self) -> int:
+            return 0
+
+        def sampleGoal(self, _: Any) -> None:
+            raise AssertionError("there is nothing to sample")
+
+        def distanceGoal(self, _: Any) -> float:
+            return 1.0
+
+    setup = small_problem()
+    setup.setGoal(Empty(setup.getSpaceInformation()))
+    status, planner = solve(setup)
+    assert (status, "none is given" in str(planner.error)) == ("Invalid goal", True)
+
+
+def test_a_checker_that_takes_longer_than_the_search_may_ends_it_after_one_call() -> None:
+    calls = [0]
+
+    def valid(_: Any) -> bool:
+        calls[0] += 1
+        time.sleep(0.05)
+        return True
+
+    setup = small_problem(valid)
+    planner = Recorder(setup.getSpaceInformation())
+    setup.setPlanner(planner)
+    setup.setup()
+    before = calls[0]
+    assert str(planner.solve(0.01)) == "Timeout"
+    assert planner.reason == "the time was up before a goal configuration was asked for"
+    assert calls[0] == before + 1  # the start; a call that never returns cannot be ended from inside its process
+
+
 def test_missing_bounds_are_reported_by_solve() -> None:
     setup = small_problem()
     planner = Recorder(setup.getSpaceInformation())

@@ -1,0 +1,31 @@
+"""AORRTC in kernels: RRT-Connect in the space of configurations and costs, below an ever lower bound. Source: [15]."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.ompl_bridge import MotionChecker, SearchResult, Stop
+from rrtik_planners.restart_shorten import RestartShorten
+
+SAMPLES = 3000  # that are drawn to find another path, times how many were looked for in vain
+ROOM = 0.5  # of the best length, by which the first path may be longer before it is shortened
+
+
+class FastAORRTC(RestartShorten):
+    """As :class:`RestartShorten`, but each further path has to stay below a length before it is shortened.
+
+    The trees take only what a path below that length can lead through, by the costs of AORRTC [15]. The bound begins at
+    one and a half times the best length and comes nearer to it as long as nothing is gained; the number of samples
+    grows meanwhile. Where there are no kernels, further paths are as long as they come. OMPL's own planner of that kind
+    is called AORRTC.
+    """
+
+    ompl_name: ClassVar[str] = "FastAORRTC"
+
+    def another(
+        self, starts: Matrix, goals: Matrix, best: float, idle: int, checker: MotionChecker, ptc: Stop
+    ) -> SearchResult:
+        """See :meth:`RestartShorten.another`."""
+        bound = best * (1.0 + ROOM / idle)
+        return self.between(starts, goals, checker, ptc, bound=bound, max_iterations=SAMPLES * idle)

@@ -1,0 +1,127 @@
+"""Plan again and again by RRT-Connect, shorten each path, keep the best: other seeds lead past obstacles elsewhere."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+from ompl import base as ob
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.fast.search.connect_layout import KERNELS
+from rrtik_ompl.fast.search.shortcut_layout import KERNELS as SHORTCUTS
+from rrtik_ompl.fast.search.taut.layout import KERNELS as TAUT
+from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
+from rrtik_ompl.shortening.best import best_in_time
+from rrtik_ompl.shortening.task import Task
+from rrtik_ompl.transitions import route_length
+from rrtik_ompl.world.motion_queries import has_kernels
+from rrtik_planners.fast_rrt_connect import FastRRTConnect
+
+PATIENCE = 60
+QUICK_CHECKS = 120  # motions that are checked to see what a path is worth
+WORTH = 1.2  # times the length of the best path, above which one is not shortened further
+SETTLED = 1e-2  # of the length, gained less than which a path is not shortened again
+GAIN = 1e-4  # of the length, below which nothing is gained
+
+
+class RestartShorten(FastRRTConnect):
+    """RRT-Connect anew with other random numbers, each path shortened, until the time is up or nothing is gained.
+
+    `plan(improve=)` does the same for any planner and proves what it finds; this is for those who name a planner, in
+    OMPL's Benchmark for instance. ``progress`` has the length over time.
+    """
+
+    kernels: ClassVar[tuple[str, ...]] = (KERNELS, SHORTCUTS, TAUT)
+    anytime: ClassVar[bool] = True
+    supports_iteration_limit: ClassVar[bool] = False
+    proof_iterations: ClassVar[int] = 0
+    portfolio_turn: ClassVar[int] = 0
+
+    ompl_name: ClassVar[str] = "RestartShorten"
+
+    def __init__(
+        self,
+        si: ob.SpaceInformation,
+        *,
+        world: MotionQueries | None = None,
+        seed: int | None = None,
+        range: float | None = None,
+        domain: float | None = None,
+        patience: int = PATIENCE,
+    ) -> None:
+        """Make a planner.
+
+        Args:
+            si: ``ompl.base.SpaceInformation`` of real coordinates and angles.
+            world: Checks configurations and motions instead of ``si``, if given.
+            seed: At least 0; drawn from OMPL's if None.
+            range: See :class:`FastRRTConnect`.
+            domain: Likewise.
+            patience: Plans in a row of which nothing is gained, after which the search ends; 0 ends it at the first
+                path, shortened.
+
+        Raises:
+            InputError: If an option is out of range or the space is of another kind.
+        """
+        super().__init__(si, world=world, seed=seed, range=range, domain=domain)
+        if isinstance(patience, bool) or not isinstance(patience, int) or patience < 0:
+            raise InputError(f"patience must be a whole number of at least 0, got {patience!r}")
+        self.patience = patience
+        self.setName(self.ompl_name)
+
+    def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
+        """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
+        begun, best, course = time.perf_counter(), np.inf, []
+        found = last = self.between(starts, goals, checker, ptc)
+        least = np.linalg.norm(starts[:, None] - goals[None], axis=2).min()
+        plans, idle, iterations = 1, 0, int(last.statistics["iterations"])
+        while found.path is not None:
+            if last.path is not None:
+                route = self._shortened(last.path, best, plans, checker, ptc)
+                length = route_length(route)
+                if not course or length < best * (1.0 - GAIN):
+                    idle, best, found = 0, length, replace(last, path=route)
+                    course.append((time.perf_counter() - begun, length))
+            if idle >= self.patience or ptc() or best <= least * (1.0 + GAIN):
+                break
+            plans, idle = plans + 1, idle + 1
+            last = self.another(starts, goals, best, idle, checker, ptc)
+            iterations += int(last.statistics["iterations"])
+        counts = {**found.statistics, "iterations": iterations, "plans": plans}
+        return replace(found, statistics=counts, progress=tuple(course))
+
+    def another(
+        self, starts: Matrix, goals: Matrix, best: float, idle: int, checker: MotionChecker, ptc: Stop
+    ) -> SearchResult:
+        """Another path. For subclasses.
+
+        Args:
+            starts: Free configurations, shape (s, n).
+            goals: Likewise, shape (g, n).
+            best: Length of the shortest path so far.
+            idle: Plans since it was found, this one counted.
+            checker: Checks motions.
+            ptc: True when it is time to stop.
+        """
+        return self.between(starts, goals, checker, ptc)
+
+    def _shortened(self, path: Matrix, best: float, number: int, checker: MotionChecker, ptc: Stop) -> Matrix:
+        """A path after a few checks, and after more as long as they gain something, if it may become the best."""
+        motions = self._world if has_kernels(self._world, SHORTCUTS) else checker
+        assert motions is not None
+        before = np.inf
+        for turn in range(100):
+            task = Task(motions, checks=QUICK_CHECKS, seed=100 * number + turn, stop=ptc)
+            found = best_in_time(path, task)
+            checker.checked_motions += task.asked if motions is self._world else 0
+            if not checker.motion_valid_batch(found[:-1], found[1:]).all():  # parts of free motions, asked otherwise
+                break
+            path, length = found, route_length(found)
+            if length > WORTH * best or length > before * (1.0 - SETTLED) or ptc():
+                break
+            before = length
+        return path
