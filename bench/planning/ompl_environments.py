@@ -45,11 +45,15 @@ class Environment:
 
 @dataclass(frozen=True)
 class Runs:
-    """Runs of a planner in an environment: seconds of each, whether it was exact, how many paths fail OMPL's check."""
+    """Runs of a planner in an environment: seconds of each, whether it was exact, how many paths fail OMPL's check.
+
+    ``asked``: how many states of each run the checker was asked about.
+    """
 
     seconds: Vector
     exact: Mask
     refused: int
+    asked: Vector
 
 
 def grid(folder: Path) -> Environment:
@@ -146,6 +150,18 @@ def setup_of(environment: Environment, query: Matrix) -> og.SimpleSetup:
     return setup
 
 
+def counted(setup: og.SimpleSetup, free: Callable[[ob.State], bool]) -> list[int]:
+    """Have a setup count the states that its checker is asked about; the count is the only item."""
+    count = [0]
+
+    def checked(state: ob.State) -> bool:
+        count[0] += 1
+        return free(state)
+
+    setup.setStateValidityChecker(checked)
+    return count
+
+
 def made(planner: type[ob.Planner], si: ob.SpaceInformation, seed: int, reach: float | None) -> ob.Planner:
     """A planner with a seed, and with the range of the environment if it takes one."""
     if planner in OURS:
@@ -175,19 +191,21 @@ def limit(end: float) -> Callable[[], bool]:
 
 def measured(environment: Environment, planner: type[ob.Planner], runs: int) -> Runs:
     """All queries of an environment, each so many times."""
-    seconds, exact, refused = [], [], 0
+    seconds, exact, refused, asked = [], [], 0, []
     for seed in range(runs):
         for query in environment.queries:
             setup = setup_of(environment, query)
+            count = counted(setup, environment.free)
             setup.setPlanner(made(planner, setup.getSpaceInformation(), seed, environment.range))
             setup.setup()
             begin = process_time()
             condition = ob.PlannerTerminationCondition(limit(begin + LIMIT))
             status = str(setup.getPlanner().solve(condition))
             seconds.append(process_time() - begin)
+            asked.append(count[0])
             exact.append(status == "Exact solution")
             refused += exact[-1] and not setup.getSolutionPath().check()
-    return Runs(np.array(seconds), np.array(exact), refused)
+    return Runs(np.array(seconds), np.array(exact), refused, np.array(asked))
 
 
 def environments(folder: Path) -> Iterator[Environment]:
@@ -201,7 +219,7 @@ def page(folder: Path, runs: int) -> Report:
     """Measure, and say what came out."""
     report = Report("OMPL's environments, without a World", "python bench/planning/ompl_environments.py FOLDER")
     planners = (og.RRTConnect, *OURS)
-    rows, late, slow, refused = [], [], [], 0
+    rows, questions, late, slow, refused = [], [], [], [], 0
     for environment in environments(folder):
         found = {planner: measured(environment, planner, runs) for planner in planners}
         mark = found[og.RRTConnect]
@@ -216,6 +234,7 @@ def page(folder: Path, runs: int) -> Report:
             late += [f"{planner.__name__} in {environment.name}"] if (mark.exact & ~each.exact).any() else []
             slow += [f"{planner.__name__} in {environment.name}"] if middle > allowed else []
         rows.append(row)
+        questions.append([environment.name, *(f"{np.median(each.asked):.0f}" for each in found.values())])
         print(" | ".join(row), flush=True)
     cells = (len(planners) - 1) * len(rows)
     report.bar("planner and environment: no time-out where RRTConnect solves", f"{cells} of {cells}",
@@ -225,6 +244,8 @@ def page(folder: Path, runs: int) -> Report:
     report.bar("exact paths that OMPL's own check refuses", "0", str(refused), refused == 0)
     heads = ["environment", *(planner.__name__ for planner in planners)]
     report.table(f"Solved and median [ms of the processor], at most {LIMIT:g} s a run", heads, rows)
+    text = "Where a planner of ours asks no more than RRTConnect and takes longer, the rest is its own loop in Python."
+    report.table("States that the checker was asked about, median", heads, questions, text=text)
     report.note("Time-outs where RRTConnect solves", "; ".join(late) or "none.")
     report.note("Slower than wanted", "; ".join(slow) or "none.")
     report.note(

@@ -75,15 +75,19 @@ class RestartShorten(FastRRTConnect):
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
-        begun, best, course = time.perf_counter(), np.inf, []
+        course: list[tuple[float, float]] = []
+        begun, best = time.perf_counter(), np.inf
         found = last = self.between(starts, goals, checker, ptc)
         least = np.linalg.norm(starts[:, None] - goals[None], axis=2).min()
         plans, idle, iterations = 1, 0, int(last.statistics["iterations"])
         while found.path is not None:
             if last.path is not None:
+                if not course:
+                    best = route_length(last.path)
+                    course.append((time.perf_counter() - begun, best))
                 route = self._shortened(last.path, best, plans, checker, ptc)
                 length = route_length(route)
-                if not course or length < best * (1.0 - GAIN):
+                if length < best * (1.0 - GAIN):
                     idle, best, found = 0, length, replace(last, path=route)
                     course.append((time.perf_counter() - begun, length))
             if idle >= self.patience or ptc() or best <= least * (1.0 + GAIN):
