@@ -23,7 +23,7 @@ def scene_feed(
 
     Args:
         pictures: In the order of time, such as ``pictures_from(source)``. The first that is used has the time 0.
-        sensor: Detects the objects. One that smooths lags behind motions; ``Sensor(..., smooth=False)`` does not.
+        sensor: Detects the objects.
         scene: Further obstacles, none if None. An obstacle with the name of an object of the map has the pose that is
             given here until that object is seen.
 

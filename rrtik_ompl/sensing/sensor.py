@@ -143,7 +143,7 @@ class Sensor:
         taken, other = (second, first) if found.other_branch else (first, second)
         if found.sure:  # by this picture or those before it
             other = None, np.inf
-        pose = CornerPose(found.T_camera_object, other[0], taken[1], other[1], pose.covariance)
+        pose = CornerPose(found.T_camera_object, other[0], taken[1], other[1], found.covariance)
         return replace(sight, pose=pose, refused=refused)
 
 

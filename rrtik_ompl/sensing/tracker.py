@@ -1,7 +1,7 @@
-"""Poses over time: the right one of two is chosen, outliers are left out, noise is smoothed without lag.
+"""Poses over time: the right one of two is chosen, outliers are left out, noise is smoothed (`motion_filter`).
 
-Smoothing is the one-euro filter (Casiez, Roussel and Vogel, 2012 [53]): the faster an object moves, the less it is
-smoothed.
+The covariance of a smoothed pose is that of its own picture, and how far smoothing has moved it from there: errors of a
+picture repeat themselves in the next ones, so that smoothing steadies poses and does not make them more certain.
 """
 
 from __future__ import annotations
@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import TAU, Vector
+from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.sensing.markers.corner_pose import ALIGNED_SIGMA, CornerPose, turn_between
+from rrtik_ompl.sensing.motion_filter import MotionFilter
 from rrtik_ompl.sensing.sight import Sighting
 
 OUTLIER_LIMIT = 5.0  # standard deviations
@@ -27,57 +28,20 @@ SWITCH_BELIEF = 0.8  # that the other pose needs to be taken; more than one pict
 CERTAIN_BELIEF = 0.99  # more than any number of doubtful pictures gives: errors of lens and blur repeat themselves
 
 
-@dataclass(slots=True)
-class OneEuro:
-    """A low-pass filter whose cut-off grows with speed.
-
-    Attributes:
-        cutoff: At rest [Hz].
-        gain: Further cut-off per speed [Hz / (unit/s)].
-        speed_cutoff: Of the speed's own filter [Hz].
-    """
-
-    cutoff: float
-    gain: float
-    speed_cutoff: float = 1.0
-    _value: Vector | None = None
-    _speed: Vector | None = None
-
-    def __call__(self, value: Vector, seconds: float) -> Vector:
-        """The smoothed value, ``seconds`` after the one before."""
-        if self._value is None or self._speed is None:
-            self._value, self._speed = value.copy(), np.zeros_like(value)
-            return self._value
-        speed = (value - self._value) / seconds
-        self._speed = self._speed + _share(self.speed_cutoff, seconds) * (speed - self._speed)
-        cutoff = self.cutoff + self.gain * float(np.linalg.norm(self._speed))
-        self._value = self._value + _share(cutoff, seconds) * (value - self._value)
-        return self._value
-
-    @property
-    def value(self) -> Vector:
-        """The smoothed value; only after the first call."""
-        if self._value is None:
-            raise RuntimeError("nothing was smoothed yet")
-        return self._value
-
-    def restart(self) -> None:
-        """Forget everything."""
-        self._value = self._speed = None
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Tracked:
     """A tracked pose.
 
     Attributes:
-        T_camera_object: The smoothed pose; that of before if the sighting was an outlier.
+        T_camera_object: The smoothed pose; the expected one if the sighting was an outlier.
+        covariance: As of a `CornerPose`, for the smoothed pose. Shape (6, 6).
         outlier: The sighting was left out.
         other_branch: Of the two poses of the sighting the second one was taken, which explains its picture less well.
         sure: This picture, or those before it, leave no doubt which of two poses is the right one.
     """
 
     T_camera_object: pin.SE3
+    covariance: Matrix
     outlier: bool
     other_branch: bool
     sure: bool
@@ -92,19 +56,13 @@ class PoseTracker:
     other has most of the belief, which no single doubtful picture can give it.
     """
 
-    def __init__(self, cutoff: float = 0.5, gain: float = 5.0) -> None:
-        """Begin without a pose.
-
-        Args:
-            cutoff: Of the one-euro filters at rest [Hz].
-            gain: Further cut-off per metre (or radian) a second.
-        """
-        self._place, self._turn = OneEuro(cutoff, gain), OneEuro(cutoff, gain)
+    def __init__(self) -> None:
+        """Begin without a pose."""
+        self._filter = MotionFilter()
         self._time = -np.inf
         self._branches: list[pin.SE3] = []  # poses of the last sighting, not smoothed
         self._belief: Vector = np.ones(0)  # in each of them
         self._last: pin.SE3 | None = None  # the one of them that is followed
-        self._origin: pin.SE3 | None = None  # rotations are smoothed as vectors about this one
         self._strays = 0
 
     def update(self, sight: Sighting, time: float) -> Tracked:
@@ -123,12 +81,20 @@ class PoseTracker:
         outlier = not switched and self._is_outlier(branches[taken], sight, seconds)
         self._strays = self._strays + 1 if outlier else 0
         if outlier and not settled and self._strays < MAX_OUTLIERS:
-            return Tracked(self._smooth_pose(), True, taken == 1, self._sure(self._belief))
-        if outlier or switched:
-            self._place.restart()
-            self._turn.restart()
+            return Tracked(self._filter.ahead(seconds), pose.covariance, True, taken == 1, self._sure(self._belief))
+        begin = outlier or switched or self._last is None
         self._time, self._branches, self._belief, self._last = time, branches, belief, branches[taken]
-        return Tracked(self._smoothed(branches[taken], seconds), False, taken == 1, self._sure(belief))
+        smooth = self._smoothed(branches[taken], pose.covariance, None if begin else seconds)
+        return Tracked(*smooth, False, taken == 1, self._sure(belief))
+
+    def _smoothed(self, seen: pin.SE3, covariance: Matrix, seconds: float | None) -> tuple[pin.SE3, Matrix]:
+        """A pose and its covariance, ``seconds`` after the one before it that it goes on from."""
+        if seconds is None:
+            self._filter.restart(seen, covariance)
+            return seen, covariance
+        found = self._filter.update(seen, covariance, seconds)
+        moved = np.concatenate([found.translation - seen.translation, pin.log3(found.rotation @ seen.rotation.T)])
+        return found, frozen(covariance + np.outer(moved, moved))
 
     def _believed(self, branches: list[pin.SE3], errors: Vector, pose: CornerPose, seconds: float) -> Vector:
         """Belief that each pose of a new sighting is the true one; sums to 1."""
@@ -165,20 +131,3 @@ class PoseTracker:
             shift > OUTLIER_LIMIT * sight.pose.position_sigma + MAX_SPEED * seconds
             or turn > OUTLIER_LIMIT * sight.pose.rotation_sigma + MAX_TURN_RATE * seconds
         )
-
-    def _smoothed(self, pose: pin.SE3, seconds: float) -> pin.SE3:
-        if self._origin is None or np.linalg.norm(pin.log3(self._origin.T @ pose.rotation)) > 1.0:
-            self._origin = pose.rotation.copy()
-            self._turn.restart()
-        self._place(pose.translation, seconds)
-        self._turn(pin.log3(self._origin.T @ pose.rotation), seconds)
-        return self._smooth_pose()
-
-    def _smooth_pose(self) -> pin.SE3:
-        origin = np.eye(3) if self._origin is None else self._origin
-        return pin.SE3(origin @ pin.exp3(self._turn.value), self._place.value.copy())
-
-
-def _share(cutoff: float, seconds: float) -> float:
-    """Of a new value, in a first-order low-pass filter."""
-    return 1.0 / (1.0 + 1.0 / (TAU * cutoff * seconds))

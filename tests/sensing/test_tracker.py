@@ -119,14 +119,31 @@ def test_one_outlier_is_left_out_and_a_new_place_is_believed_in_the_end():
 
 def test_smoothing_steadies_what_stands_still_and_follows_what_moves():
     rng, tracker, out = np.random.default_rng(1), PoseTracker(), []
+    spread = sight_at(facing([0.3, 0, 0], [0.0, 0.0, 1.0])).pose.covariance
     for k in range(200):
-        T = facing([0.3, 0, 0], np.array([0.0, 0.0, 1.0]) + 3e-4 * rng.standard_normal(3))
+        T = facing([0.3, 0, 0], np.array([0.0, 0.0, 1.0]) + rng.multivariate_normal(np.zeros(3), spread[:3, :3]))
         out.append(tracker.update(sight_at(T), k / 30).T_camera_object.translation)
-    assert np.std(np.array(out)[50:, 2]) < 0.4 * 3e-4
+    assert np.std(np.array(out)[50:, 2]) < 0.4 * np.sqrt(spread[2, 2])
     for k in range(200, 260):
         T = facing([0.3, 0, 0], [0.2 * (k - 199) / 30, 0.0, 1.0])
         last = tracker.update(sight_at(T), k / 30).T_camera_object.translation
-    assert abs(last[0] - 0.2 * 60 / 30) < 0.05
+    assert abs(last[0] - 0.2 * 60 / 30) < 1e-4
+
+
+@settings(max_examples=6, deadline=None)
+@given(st.floats(0.02, 0.15), st.floats(0.1, 0.5), st.sampled_from([10.0, 15.0, 30.0]), st.integers(0, 99))
+def test_what_sways_is_followed_within_its_covariance(reach, often, rate, seed):
+    rng, tracker, errors, within = np.random.default_rng(seed), PoseTracker(), [], []
+    spread = sight_at(facing([0.3, 0, 0], [0.0, 0.0, 1.0])).pose.covariance
+    for k in range(60):
+        true = np.array([reach * np.sin(6.283 * often * k / rate), 0.0, 1.0])
+        noise = rng.multivariate_normal(np.zeros(3), spread[:3, :3])
+        found = tracker.update(sight_at(facing([0.3, 0, 0], true + noise)), k / rate)
+        away = found.T_camera_object.translation - true
+        errors.append(np.linalg.norm(away))
+        within.append(away @ np.linalg.solve(found.covariance[:3, :3], away) <= 9.0)
+    assert np.median(errors) < 1.5e-3
+    assert np.mean(within) >= 0.95
 
 
 def test_times_must_increase():

@@ -26,7 +26,7 @@ class Calibration:
 
     Attributes:
         camera: The camera.
-        sigmas: Standard deviations of fx, fy, cx, cy [pixels]. Shape (4,).
+        sigmas: Standard deviations of fx, fy, cx, cy [pixels]; the camera has them, too. Shape (4,).
         error: Root mean square reprojection error over all views [pixels].
         view_errors: Of each photograph; NaN where it was not used. Shape (m,).
         unused: For each photograph, why it was not used; empty if it was.
@@ -72,8 +72,9 @@ def calibrate(pictures: Sequence[NDArray[np.uint8]], board: cv2.aruco.CharucoBoa
     view_errors = np.full(len(grays), np.nan)
     view_errors[used] = np.ravel(each)
     height, width = grays[0].shape
-    camera = Camera(matrix, width, height, np.ravel(distortion)[:5])
-    return Calibration(camera, frozen(np.ravel(sigmas)[:4]), float(error), frozen(view_errors), tuple(unused))
+    doubts = np.ravel(sigmas)[:9]
+    camera = Camera(matrix, width, height, np.ravel(distortion)[:5], sigmas=doubts)
+    return Calibration(camera, frozen(doubts[:4]), float(error), frozen(view_errors), tuple(unused))
 
 
 def _solve(views: Sequence[tuple[Any, Any]], shape: tuple[int, ...]) -> Any:

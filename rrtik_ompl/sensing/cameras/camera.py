@@ -26,20 +26,32 @@ class Camera:
         distortion: Brown's k1, k2, p1, p2, k3 [59]. Shape (5,).
         width: Of the picture, in pixels.
         height: Of the picture, in pixels.
+        sigmas: Standard deviations of fx, fy, cx, cy [pixels] and of the five numbers of the lens: what the
+            calibration is not sure of, 0 where it says nothing. Shape (9,).
     """
 
     matrix: Matrix
     distortion: Vector
     width: int
     height: int
+    sigmas: Vector
 
     __reduce__ = as_value
 
-    def __init__(self, matrix: ArrayLike, width: int, height: int, distortion: ArrayLike = (0.0,) * 5) -> None:
+    def __init__(
+        self,
+        matrix: ArrayLike,
+        width: int,
+        height: int,
+        distortion: ArrayLike = (0.0,) * 5,
+        *,
+        sigmas: ArrayLike = (0.0,) * 9,
+    ) -> None:
         """Check and copy the intrinsics.
 
         Raises:
-            InputError: If the matrix is not that of a pinhole, a number is not finite or the size is not positive.
+            InputError: If the matrix is not that of a pinhole, a number is not finite, the size is not positive, or a
+                standard deviation is negative.
         """
         given = finite_array(matrix, (3, 3), "camera matrix")
         expected = [[given[0, 0], 0.0, given[0, 2]], [0.0, given[1, 1], given[1, 2]], [0.0, 0.0, 1.0]]
@@ -47,7 +59,11 @@ class Camera:
             raise InputError("camera matrix must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] with fx, fy > 0, no skew")
         if int(width) != width or int(height) != height or width < 1 or height < 1:
             raise InputError(f"camera size must be two positive whole numbers, got {width} x {height}")
+        doubts = finite_array(sigmas, (9,), "camera sigmas")
+        if (doubts < 0.0).any():
+            raise InputError(f"camera sigmas must be 0 or more, got {doubts.min():g}")
         object.__setattr__(self, "matrix", frozen(given))
+        object.__setattr__(self, "sigmas", frozen(doubts))
         object.__setattr__(self, "distortion", frozen(finite_array(distortion, (5,), "camera distortion")))
         object.__setattr__(self, "width", int(width))
         object.__setattr__(self, "height", int(height))
@@ -81,3 +97,10 @@ class Camera:
         shift = np.ascontiguousarray(translation, dtype=np.float64)
         _, slopes = cv2.projectPoints(rows[:, None], ORIGIN, shift, self.matrix, self.distortion)
         return np.hstack([slopes[:, 3:6], slopes[:, :3]])
+
+    def doubt(self, points: ArrayLike) -> Matrix:
+        """Covariance of the pixels of points in the frame of the camera, by `sigmas`. Shape (2 m, 2 m) [pixels^2]."""
+        rows = np.ascontiguousarray(points, dtype=np.float64)
+        _, slopes = cv2.projectPoints(rows[:, None], ORIGIN, ORIGIN, self.matrix, self.distortion)
+        each = slopes[:, 6:15] * self.sigmas
+        return np.asarray(each @ each.T, dtype=np.float64)

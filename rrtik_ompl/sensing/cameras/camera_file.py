@@ -27,12 +27,16 @@ class CameraEntry(Section):
     distortion: Annotated[list[Number], Field(min_length=4, max_length=5)] = [0.0] * 5
     error_px: NotNegative | None = Field(None, description="root mean square reprojection error of the calibration")
     sigmas_px: Vector4 | None = Field(None, description="standard deviations of fx, fy, cx, cy")
+    distortion_sigmas: Annotated[list[NotNegative], Field(min_length=4, max_length=5)] | None = Field(
+        None, description="standard deviations of the distortion"
+    )
     view_errors_px: Numbers | None = Field(None, description="of each photograph that was used")
 
     def build(self) -> Camera:
         """The camera."""
         matrix = [[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]]
-        return Camera(matrix, self.size[0], self.size[1], (*self.distortion, 0.0)[:5])
+        doubts = (*(self.sigmas_px or (0.0,) * 4), *(*(self.distortion_sigmas or (0.0,) * 5), 0.0)[:5])
+        return Camera(matrix, self.size[0], self.size[1], (*self.distortion, 0.0)[:5], sigmas=doubts)
 
 
 class CameraFile(Section):
@@ -64,9 +68,10 @@ def save_camera(camera: Camera | Calibration, path: str | os.PathLike[str]) -> N
     (fx, _, cx), (_, fy, cy), _ = lens.matrix.tolist()
     data: dict[str, Any] = {"size": [lens.width, lens.height], "fx": fx, "fy": fy, "cx": cx, "cy": cy}
     data["distortion"] = lens.distortion.tolist()
+    if lens.sigmas.any():
+        data["sigmas_px"], data["distortion_sigmas"] = lens.sigmas[:4].tolist(), lens.sigmas[4:].tolist()
     if isinstance(camera, Calibration):
         data["error_px"] = camera.error
-        data["sigmas_px"] = camera.sigmas.tolist()
         data["view_errors_px"] = [e for e in camera.view_errors.tolist() if e == e]
     elif not isinstance(camera, Camera):
         raise InputError(f"camera to save must be a Camera or a Calibration, got {type(camera).__name__}")

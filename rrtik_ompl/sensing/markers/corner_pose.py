@@ -160,6 +160,10 @@ def _covariance(
     back = np.linalg.pinv(slopes)
     away = (camera.project(turned + pose.translation) - pixels).ravel()
     if spread is None:
-        return frozen(max(sigma**2, float(away @ away) / len(points)) * (back @ back.T))
-    surprise = float(away @ np.linalg.solve(spread, away)) / MAX_SURPRISE
-    return frozen(max(surprise, 1.0) * (back @ spread @ back.T))
+        found = max(sigma**2, float(away @ away) / len(points)) * (back @ back.T)
+    else:
+        surprise = float(away @ np.linalg.solve(spread, away)) / MAX_SURPRISE
+        found = max(surprise, 1.0) * (back @ spread @ back.T)
+    if camera.sigmas.any():
+        found = found + back @ camera.doubt(turned + pose.translation) @ back.T
+    return frozen(found)
