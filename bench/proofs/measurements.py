@@ -23,6 +23,7 @@ from rrtik_ompl.collision.bodies import Body, link_bodies
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.generated_problems import generated_problem
 from rrtik_ompl.ompl_bridge.attempt import Attempt, attempt
+from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem, densely_checked
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
 from rrtik_ompl.robot import Robot
@@ -33,7 +34,8 @@ from rrtik_ompl.world import World
 
 PLATE, NEEDLE = 1e-4, 2e-4  # [m] thickness, radius
 PLANNERS = ("fastrrtconnect", "bicrdt", "RRTConnect")
-FEWEST = 10.0  # [s] for fewest-moves
+SECONDS = 2.0  # for a plan
+FEWEST = 2.0  # [s] for fewest-moves
 BRIEF = 1e-6  # share of a motion
 TURNS = 5
 THIN = 6  # obstacles added to a generated scene
@@ -89,25 +91,29 @@ def planned(arm: str, family: str, seed: int) -> Judged:
     problem = thin_problem(arm, family, seed)
     if problem is None:
         return Judged(found=False)
-    found = rrtik.plan(problem, PLANNERS[seed % len(PLANNERS)], seed=seed)
+    found = rrtik.plan(problem, PLANNERS[seed % len(PLANNERS)], seed=seed, seconds=SECONDS)
     if found.path is None or found.path.proof is None:
         return Judged(found=False)
     cut = deepest_cut(problem.world, found.path)
     return Judged(True, bool(found.proven), found.path.proof.clearance, cut, found.path.length)
 
 
-def shortened(arm: str, family: str, seed: int, method: ShorteningMethod) -> Judged:
-    """A path shortened by one method, and as it was done before there were proofs: densely checked, no clearance."""
+def shortened(arm: str, family: str, seed: int) -> list[Judged]:
+    """A path shortened by every method; those for single-joint moves take BiCRDT's, the others RRT-Connect's."""
     problem = thin_problem(arm, family, seed)
-    single = METHODS[method].moves_only
-    raw = None if problem is None else rrtik.plan(problem, "bicrdt" if single else "fastrrtconnect", seed=seed).path
-    if problem is None or raw is None or len(raw.waypoints) < 3:
+    if problem is None:
+        return [Judged(found=False)] * len(METHODS)
+    paths = {
+        single: rrtik.plan(problem, "bicrdt" if single else "fastrrtconnect", seed=seed, seconds=SECONDS).path
+        for single in (False, True)
+    }
+    return [_shortened(problem, paths[METHODS[method].keeps_moves], method, seed) for method in METHODS]
+
+
+def _shortened(problem: Problem, raw: JointPath | None, method: ShorteningMethod, seed: int) -> Judged:
+    if raw is None or len(raw.waypoints) < 3:
         return Judged(found=False)
-    seconds = FEWEST if single else None
-    short = rrtik.shorten(raw, problem, method=method, seed=seed, seconds=seconds)
-    dense = densely_checked(problem)
-    task = Task(dense.world, seed=seed, clearance=0.0, seconds=np.inf if seconds is None else seconds)
-    old = raw.with_waypoints(METHODS[method].run(raw.waypoints, task, dense))
+    short, old = before_and_after(problem, raw, method, seed)
     proof = short.proof
     return Judged(
         found=True,
@@ -118,6 +124,17 @@ def shortened(arm: str, family: str, seed: int, method: ShorteningMethod) -> Jud
         before=old.length,
         cut_before=deepest_cut(problem.world, old),
     )
+
+
+def before_and_after(
+    problem: Problem, raw: JointPath, method: ShorteningMethod, seed: int
+) -> tuple[JointPath, JointPath]:
+    """A path as a method shortens it, and as it was done before there were proofs: densely checked, no clearance."""
+    seconds = FEWEST if METHODS[method].moves_only else None
+    short = rrtik.shorten(raw, problem, method=method, seed=seed, seconds=seconds)
+    dense = densely_checked(problem)
+    task = Task(dense.world, seed=seed, clearance=0.0, seconds=np.inf if seconds is None else seconds)
+    return short, raw.with_waypoints(METHODS[method].run(raw.waypoints, task, dense))
 
 
 def planted(arm: str, seed: int) -> tuple[int, int, int]:

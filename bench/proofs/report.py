@@ -1,6 +1,7 @@
 """Measure proofs of motions: what they cost, what they find, and what is left of shortened paths.
 
-Usage: ``python bench/proofs/report.py [--scenes 6] [--shortened 4] [--mbm FOLDER] [--every 2] [--out FILE]``
+Usage: ``python bench/proofs/report.py [--scenes 6] [--shortened 4] [--plane 30] [--certificates 60] [--mbm FOLDER]
+       [--every 2] [--out FILE]``
 
 FOLDER holds mbm_panda and mbm_ur5 (MotionBenchMaker problems with their URDF); without it those rows are left out.
 An interrupted run goes on where it was.
@@ -9,12 +10,16 @@ An interrupted run goes on where it was.
 from __future__ import annotations
 
 import argparse
+from collections import Counter
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 
+from bench.proofs.certificates import verified
 from bench.proofs.measurements import Judged, Timed, batch_ratio, benchmark_problem, planned, planted, shortened
+from bench.proofs.plane import plane_shortened
+from bench.proofs.tampering import TAMPERINGS
 from bench.shared.parts import Parts, add_options
 from rrtik_bench.report.machine import processes, processor
 from rrtik_bench.report.page import Report
@@ -24,13 +29,14 @@ from rrtik_ompl.shortening import METHODS
 ARMS = ("panda", "ur5", "titan4", "puma560", "planar3", "planar10", "xarm7", "ur5_gripper")
 SHORTENED_ARMS = ("panda", "ur5", "titan4", "planar3")
 DEEP = 1e-6  # [m]
+ROUND = 20  # certificates at a time
 BARS = {"panda": (0.1, 0.8, 6.0), "ur5": (0.15, 2.0, 50.0)}  # [ms] proof alone, median of the rest, p95 or worst
 BEFORE = {"panda": "12.4", "ur5": "82"}  # [ms] median of the sampled second check before there were proofs
 
 
 def plans(report: Report, measure: Parts, scenes: int, arms: list[str]) -> None:
     """Plans on generated scenes with thin plates and needles."""
-    parts = list(product(arms, FAMILIES, range(scenes)))
+    parts = [(arm, family, seed) for seed, arm, family in product(range(scenes), arms, FAMILIES)]
     found = measure(planned, parts)
     rows = []
     for arm in arms:
@@ -47,11 +53,11 @@ def plans(report: Report, measure: Parts, scenes: int, arms: list[str]) -> None:
 
 def shortenings(report: Report, measure: Parts, scenes: int, arms: list[str]) -> None:
     """Shortened paths of every method, beside those that were checked in steps alone."""
-    parts = list(product(arms, FAMILIES, range(scenes), METHODS))
-    found = measure(shortened, parts)
+    parts = [(arm, family, seed) for seed, arm, family in product(range(scenes), arms, FAMILIES)]
+    found = [dict(zip(METHODS, each, strict=True)) for each in measure(shortened, parts)]
     rows = []
     for method in METHODS:
-        own = [each for part, each in zip(parts, found, strict=True) if part[3] == method and each.found]
+        own = [each[method] for each in found if each[method].found]
         sound = [each for each in own if each.cut_before <= DEEP]
         longer = np.sum([each.length for each in sound]) / max(np.sum([each.before for each in sound]), 1e-9) - 1.0
         old = sum(each.cut_before > DEEP for each in own)
@@ -61,11 +67,37 @@ def shortenings(report: Report, measure: Parts, scenes: int, arms: list[str]) ->
             report.bar(f"{method}: length beside before", "within 0.5 %", f"{100 * longer:+.2f} %", longer <= 0.005)
     heads = ["method", *HEADS, "length beside before (those that cut nothing)", "paths that cut before, deepest"]
     report.table("Shortened paths", heads, rows, text=SHORTENED)
-    done = [each for each in found if each.found]
+    done = [path for each in found for path in each.values() if path.found]
     proven = [each for each in done if each.proven]
     cuts, share = sum(each.cut > DEEP for each in proven), len(proven) / max(len(done), 1)
     report.bar("proven shortened paths that cut something", "0", f"{cuts} of {len(proven)}", cuts == 0)
     report.bar("shortened paths that are proven", ">= 99 %", f"{100 * share:.1f} % of {len(done)}", share >= 0.99)
+
+
+def in_the_plane(report: Report, measure: Parts, cases: int) -> None:
+    """Shortened paths of planar arms before exact geometry."""
+    found = [dict(zip(METHODS, each, strict=True)) for each in measure(plane_shortened, [(k,) for k in range(cases)])]
+    rows, cuts, proven = [], 0, 0
+    for method in METHODS:
+        own = [each[method] for each in found if each[method].found]
+        now, before = (sum(getattr(each, name) > DEEP for each in own) for name in ("cut", "cut_before"))
+        sure = sum(each.proven for each in own)
+        rows.append([method, f"{len(own)}", f"{sure}", f"{now}", f"{before}"])
+        cuts, proven = cuts + now, proven + sure
+    report.table("Planar arms before exact geometry", PLANE_HEADS, rows, text=PLANE)
+    report.bar("planar arms: shortened paths that cut something, by exact geometry", "0", f"{cuts}", cuts == 0)
+
+
+def certificates(report: Report, measure: Parts, paths: int) -> None:
+    """Certificates of random paths, and as many falsified in each way."""
+    rounds = paths // ROUND
+    found = sum((Counter(each) for each in measure(verified, [(ROUND, seed) for seed in range(rounds)])), Counter())
+    wrong = sum(count for name, count in found.items() if name.startswith("WRONG"))
+    refused = {name: found[f"{name}: refused"] for name in TAMPERINGS}
+    rows = [[name, f"{count}", f"{found[f'WRONG: {name}: accepted']}"] for name, count in refused.items()]
+    report.table("Falsified certificates", ["falsified by", "refused", "accepted"], rows, text=FALSIFIED)
+    text = f"{found['accepted']} of {rounds * ROUND} accepted; {sum(refused.values())} falsified ones refused"
+    report.bar("certificates: all accepted, all falsified ones refused", "all", text, wrong == 0)
 
 
 def thin(report: Report, measure: Parts, seeds: int, arms: list[str]) -> None:
@@ -126,7 +158,17 @@ GENERATED = (
 )
 SHORTENED = (
     "The same scenes and judge. Before: the same method with the same seed, motions checked in steps half as long as "
-    "the motion resolution, without clearance and proofs. fewest-moves has 10 s each time."
+    "the motion resolution, without clearance and proofs. fewest-moves has 2 s each time. axis, "
+    "axis-rounds and fewest-moves take paths of single-joint moves, the others straight motions."
+)
+PLANE_HEADS = ["method", "paths", "proven", "paths that cut", "before"]
+PLANE = (
+    "Arms of 2 to 4 links among discs and rectangles, drawn at random; how deep a motion cuts is bounded from both "
+    "sides in plane geometry alone, so nothing is stepped over. A cut is deeper than 1 um. Before: as above."
+)
+FALSIFIED = (
+    "Certificates of random paths of six robots are written, read and verified by the module that knows neither "
+    "kernels nor planners; then each is falsified in every way that it allows."
 )
 MBM = (
     "`plan(problem, 'fastrrtconnect')` of every problem, kernels warm, robot known; proof of one path: `World.prove` "
@@ -141,6 +183,8 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, default=6, help="of each arm and family")
     parser.add_argument("--shortened", type=int, default=4, help="scenes of each arm and family that are shortened")
     parser.add_argument("--planted", type=int, default=15, help="rounds of planted obstacles of each arm")
+    parser.add_argument("--plane", type=int, default=30, help="arms in the plane whose paths are shortened")
+    parser.add_argument("--certificates", type=int, default=60, help="paths whose certificates are falsified")
     parser.add_argument("--arms", nargs="+", default=list(ARMS))
     parser.add_argument("--mbm", type=Path, help="folder with mbm_panda and mbm_ur5")
     parser.add_argument("--every", type=int, default=2, help="every so many-th of these problems")
@@ -154,6 +198,8 @@ def main() -> None:
         plans(report, measure, options.scenes, options.arms)
         thin(report, measure, options.planted, options.arms)
         shortenings(report, measure, options.shortened, [arm for arm in SHORTENED_ARMS if arm in options.arms])
+        in_the_plane(report, measure, options.plane)
+        certificates(report, measure, options.certificates)
         report.finish(options.out)
 
 
