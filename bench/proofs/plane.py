@@ -51,7 +51,7 @@ def deepest_cut(arm: PlaneArm, route: NDArray[np.float64]) -> float:
         most = [float(np.abs(b - a)[: k + 1] @ np.cumsum(arm.lengths[: k + 1][::-1])[::-1]) for k in range(len(a))]
         for link, way in enumerate(most):
             least = _least(arm, (a, b), link, way, least)
-    return -least
+    return max(-least, 0.0)
 
 
 def _least(arm: PlaneArm, ends: Motion, link: int, way: float, least: float) -> float:
