@@ -1,0 +1,142 @@
+"""Attacks on the public face, the servers and long work: how many, and what broke; makes `bench/reports/robustness.md`.
+
+    python bench/robustness/report.py --calls 1000000 --messages 10000 --faults 25 --plans 20000 --pages 2000
+
+The stored page says at which sizes it was made. What is done stands beside the page until that is written: an
+interrupted run goes on where it was.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from bench import fuzz
+from bench.robustness import bad_clients, bad_pages, faults
+from bench.robustness.long_work import WORK
+from bench.shared.parts import Parts, add_options
+from rrtik_bench.report.machine import processes
+from rrtik_bench.report.page import Report
+from rrtik_ompl import load_problem, plan, view
+
+PAGE = "robustness.md"
+CALLS, MESSAGES = fuzz.BATCH, 480  # of a part
+LOOKS = 4
+FLAT_MB = 1.0
+PEERS: dict[str, tuple[str, Callable[[int, int], list[str]]]] = {
+    "line server": ("a client of the arm's line: the arm stops, the next is served", bad_clients.line_server),
+    "line arm": ("a server of an arm: the line comes back, no joints that cannot be", bad_clients.arm_of_a_line),
+    "page": ("a browser at `rrtik show`: the page is served, under no other name", bad_clients.page_server),
+    "pilot": ("pages at `rrtik pilot`: watchers move nothing, the arm stops", bad_pages.pilot_server),
+}
+
+
+def calls(first: int, count: int) -> list[str]:
+    """Calls of the fuzz from a number on; what was wrong."""
+    with TemporaryDirectory() as folder:
+        return [f"{seed}: {wrong}" for seed, wrong in fuzz.run(first, count, Path(folder))]
+
+
+def messages(peer: str, first: int, count: int) -> list[str]:
+    """Messages to a peer from a number on; the rules that it did not keep."""
+    return PEERS[peer][1](first, count)
+
+
+def trials(work: str, kind: str, first: int, count: int) -> list[str]:
+    """Trials of a fault from a number on; what was lost, doubled or half."""
+    return faults.trials(work, kind, first, count)
+
+
+def memory(what: str, count: int) -> list[float]:
+    """Resident memory [MB] after each quarter of many plans or pages in one process; the first one warms up."""
+    problem, sizes = load_problem("planar3_boxes"), list[float]()
+    with TemporaryDirectory() as folder:
+        for number in range(1, count + 1):
+            path = plan(problem, "bicrdt", seed=1 if what == "pages" else number).path
+            if what == "pages":
+                view(problem, path, html=Path(folder) / "page.html")
+            if number % max(count // LOOKS, 1) == 0:
+                gc.collect()
+                sizes.append(_resident())
+    return sizes
+
+
+def _resident() -> float:
+    words = Path("/proc/self/statm").read_text(encoding="ascii").split()
+    return int(words[1]) * 4096 / 1e6
+
+
+def main() -> int:
+    """Attack, and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    add_options(parser, PAGE)
+    for name, usual in (("calls", 2000), ("messages", 960), ("faults", 5), ("plans", 400), ("pages", 40)):
+        parser.add_argument(f"--{name}", type=int, default=usual)
+    given = parser.parse_args()
+    command = " ".join(f"--{name} {getattr(given, name)}" for name in ("calls", "messages", "faults", "plans", "pages"))
+    report = Report("Nothing breaks it", f"python bench/robustness/report.py {command}", processes(given.jobs))
+    report.intro = (
+        "Wanted are 1,000,000 calls, 10,000 messages to each server, 2,000 kills and interrupts, 20,000 plans and "
+        "2,000 pages; the numbers below are those of this run."
+    )
+    with Parts(given.out, given.jobs) as parts:
+        _calls(report, parts(calls, _blocks(given.calls, CALLS)), given.calls)
+        _peers(report, parts, given.messages)
+        _faults(report, parts, given.faults)
+        for what, count in (("plans", given.plans), ("pages", given.pages)):
+            _memory(report, what, count, parts(memory, [(what, count)])[0])
+    return report.finish(given.out)
+
+
+def _blocks(count: int, size: int) -> list[tuple[int, int]]:
+    return [(first, min(size, count - first)) for first in range(0, count, size)]
+
+
+def _calls(report: Report, found: Sequence[list[str]], count: int) -> None:
+    wrong = [each for part in found for each in part]
+    report.bar("calls of the fuzz", "no crash, no hang, no raw exception", f"{len(wrong)} of {count:,}", not wrong)
+    report.note("Finds of the fuzz", _listed(wrong))
+
+
+def _peers(report: Report, parts: Parts, count: int) -> None:
+    rows, wrong = [], list[str]()
+    for peer, (rule, _) in PEERS.items():
+        found = [each for part in parts(messages, [(peer, *b) for b in _blocks(count, MESSAGES)]) for each in part]
+        rows.append([peer, rule, f"{count:,}", str(len(found))])
+        wrong += [f"{peer}, {each}" for each in found]
+    measured = f"{len(wrong)} broken in {count:,} messages to each of {len(PEERS)}"
+    report.bar("messages of mutating peers", "pilot and arm keep their rules", measured, not wrong)
+    report.table("Mutating peers", ["peer", "rule", "messages", "broken"], rows, text=_listed(wrong))
+
+
+def _faults(report: Report, parts: Parts, count: int) -> None:
+    rows, wrong, whole = [], list[str](), 0
+    for work in WORK:
+        counts = []
+        for kind in faults.KINDS:
+            n = 1 if kind == "clock" else count
+            (found,) = parts(trials, [(work, kind, 0, n)])
+            counts.append(f"{len(found)} of {n}")
+            wrong += [f"{work}, {kind}, {each}" for each in found]
+            whole += n
+        rows.append([work, *counts])
+    wanted = "nothing lost that was said to be done, nothing doubled, no half file"
+    report.bar("kills, interrupts, full disks, clocks", wanted, f"{len(wrong)} in {whole} trials", not wrong)
+    report.table("Faults of long work", ["work", *faults.KINDS], rows, text=_listed(wrong))
+
+
+def _memory(report: Report, what: str, count: int, sizes: Sequence[float]) -> None:
+    grown = sizes[-1] - sizes[0] if len(sizes) > 1 else 0.0
+    measured = f"{grown:+.1f} MB over the last {count - count // LOOKS:,}"
+    report.bar(f"{count:,} {what} in one process", f"flat to {FLAT_MB:g} MB after warm-up", measured, grown <= FLAT_MB)
+
+
+def _listed(wrong: Sequence[str]) -> str:
+    return "None." if not wrong else "\n".join(f"- `{each.replace('`', '')[:300]}`" for each in wrong)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
