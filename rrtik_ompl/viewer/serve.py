@@ -79,6 +79,9 @@ class PageServer:
 class _Server(socketserver.ThreadingTCPServer):
     allow_reuse_address = True
     daemon_threads = True
+    request_queue_size = (
+        MOST_OPEN  # of those who wait to be taken; five are few for a browser, and others wait a second
+    )
     body = b""
 
     def __init__(self, address: tuple[str, int], handler: type[BaseHTTPRequestHandler]) -> None:

@@ -100,6 +100,15 @@ def test_more_connections_than_a_browser_has_are_closed(monkeypatch: pytest.Monk
             each.close()
 
 
+def test_as_many_as_may_be_open_can_wait_to_be_taken() -> None:
+    waiting = PageServer("page")  # which does not take them yet
+    lines = [socket.create_connection(("127.0.0.1", waiting.port), timeout=0.5) for _ in range(30)]
+    with waiting as server:
+        assert ask(server)[0] == 200
+        for each in lines:
+            each.close()
+
+
 def test_a_live_view_ends_with_a_line_when_its_server_has_ended(server: PageServer) -> None:
     server._server.shutdown()
     with pytest.raises(InputError, match="has ended; show it again"):
