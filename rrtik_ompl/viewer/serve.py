@@ -9,7 +9,7 @@ import time
 from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler
-from typing import Any
+from typing import TypeAlias
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.viewer.page import POLICY
@@ -18,6 +18,8 @@ ADDRESS = "127.0.0.1"
 MOST_OPEN = 64  # connections at a time; a browser has some six
 OPEN_SECONDS = 60.0  # of a connection at most, however slowly its bytes trickle
 LOOK_SECONDS = 0.5
+
+Taken: TypeAlias = socket.socket | tuple[bytes, socket.socket]  # the second of packets, of which there are none here
 
 
 class PageServer:
@@ -79,16 +81,14 @@ class PageServer:
 class _Server(socketserver.ThreadingTCPServer):
     allow_reuse_address = True
     daemon_threads = True
-    request_queue_size = (
-        MOST_OPEN  # of those who wait to be taken; five are few for a browser, and others wait a second
-    )
+    request_queue_size = MOST_OPEN  # of those who wait to be taken; whoever finds no place waits a second
     body = b""
 
     def __init__(self, address: tuple[str, int], handler: type[BaseHTTPRequestHandler]) -> None:
-        self._open: dict[socket.socket, float] = {}
+        self._open: dict[Taken, float] = {}
         super().__init__(address, handler)
 
-    def process_request(self, request: Any, client_address: Any) -> None:
+    def process_request(self, request: Taken, client_address: object) -> None:
         """Answer in a thread of its own; close at once where too many are open."""
         if len(self._open) >= MOST_OPEN:
             self.shutdown_request(request)
@@ -96,7 +96,7 @@ class _Server(socketserver.ThreadingTCPServer):
         self._open[request] = time.monotonic()
         super().process_request(request, client_address)
 
-    def shutdown_request(self, request: Any) -> None:
+    def shutdown_request(self, request: Taken) -> None:
         """End a connection."""
         self._open.pop(request, None)
         super().shutdown_request(request)
@@ -107,9 +107,10 @@ class _Server(socketserver.ThreadingTCPServer):
         for each, begin in list(self._open.items()):
             if begin < oldest:
                 with suppress(OSError):
+                    assert isinstance(each, socket.socket)
                     each.shutdown(socket.SHUT_RDWR)
 
-    def handle_error(self, request: Any, client_address: Any) -> None:
+    def handle_error(self, request: Taken, client_address: object) -> None:
         """Print nothing: that a browser has gone, or talks nonsense, concerns nobody here."""
 
 
