@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from rrtik_ompl.catalog import list_problems as list_problems
     from rrtik_ompl.catalog import list_robots as list_robots
     from rrtik_ompl.catalog import load_robot as load_robot
+    from rrtik_ompl.certificates.certificate import Certificate as Certificate
+    from rrtik_ompl.certificates.certificate import load_certificate as load_certificate
+    from rrtik_ompl.certificates.verify import verify_certificate as verify_certificate
+    from rrtik_ompl.certificates.write import certificate_of as certificate_of
     from rrtik_ompl.constraints.shorthands import inside as inside
     from rrtik_ompl.constraints.shorthands import on_line as on_line
     from rrtik_ompl.constraints.shorthands import on_plane as on_plane
@@ -124,6 +128,9 @@ else:
     _HOMES = {
         "catalog": ("list_problems", "list_robots", "load_robot"),
         "benchmark.batch": ("plan_batch",),
+        "certificates.certificate": ("Certificate", "load_certificate"),
+        "certificates.verify": ("verify_certificate",),
+        "certificates.write": ("certificate_of",),
         "description.padding": ("padded",),
         "constraints.shorthands": ("inside", "on_line", "on_plane", "orientation_of", "upright"),
         "errors": ("InputError", "PlannerError", "ProblemError", "RrtikError", "UnknownNameError"),

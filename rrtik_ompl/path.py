@@ -173,7 +173,7 @@ class JointPath:
             edge = int((moved(self.waypoints[:-1], self.waypoints[1:]).sum(axis=1) > 1).argmax())
             raise InputError(
                 f"path: edge {edge + 1} moves several joints at once ({together}); it is no list of moves: "
-                "convert it with one_joint_moves(path, world)"
+                "convert it with one_joint_moves(path, problem)"
             )
         joints, units = changes.argmax(axis=1), joint_units(self.prismatic)
         return tuple(

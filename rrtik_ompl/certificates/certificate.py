@@ -63,6 +63,15 @@ class Certificate:
         waypoints: Shape (k, dof), read-only.
         motions: One for each motion; a path of one waypoint has one that stands still.
         version: Of the format.
+
+    Example:
+        >>> problem = rrtik.load_problem("planar3_boxes")
+        >>> path = rrtik.plan(problem, seed=1).path
+        >>> found = rrtik.certificate_of(problem.world, path)
+        >>> rrtik.verify_certificate(found, problem.world, path.waypoints)
+        ''
+        >>> rrtik.verify_certificate(found, problem.world, path.waypoints[::-1])
+        'it is for another path: waypoints differ'
     """
 
     robot: str
@@ -115,6 +124,11 @@ def load_certificate(path: str | os.PathLike[str]) -> Certificate:
 
     Raises:
         InputError: If the file is missing, too large, or no certificate; the message names the file and the field.
+
+    Example:
+        >>> rrtik.load_certificate("absent.json")
+        Traceback (most recent call last):
+        rrtik_ompl.errors.InputError: absent.json: ...
     """
     known_ending(path, (".json",), "certificate")
     text = read_text(path)

@@ -38,7 +38,7 @@ Poses = tuple[NDArray[np.float64], Matrix]  # rotations, shape (n, 3, 3), and or
 Side = tuple[int, int, int, int, float, float]  # motion, pair, a solid of each body, begin and width of an interval
 
 
-def verify(certificate: Certificate, world: World, waypoints: ArrayLike, *, clearance: float = 0.0) -> str:
+def verify_certificate(certificate: Certificate, world: World, waypoints: ArrayLike, *, clearance: float = 0.0) -> str:
     """The first fault of a certificate in one line; "" if it proves that a path is free.
 
     Args:

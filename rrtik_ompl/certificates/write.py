@@ -24,6 +24,11 @@ def certificate_of(world: World, path: JointPath, clearance: float = 0.0) -> Cer
 
     Raises:
         InputError: If the path is another robot's, the clearance is negative or infinite, or the scene has a cloud.
+
+    Example:
+        >>> problem = rrtik.load_problem("planar3_boxes")
+        >>> path = rrtik.plan(problem, seed=1).path
+        >>> rrtik.certificate_of(problem.world, path, path.proof.clearance).save("proof.json")
     """
     require(world, World, "world of a certificate")
     require(path, JointPath, "path of a certificate")

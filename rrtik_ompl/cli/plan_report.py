@@ -193,10 +193,10 @@ def certified(problem: Problem, path: JointPath, proof: Path) -> tuple[str, bool
         InputError: If the file is missing or is no certificate.
     """
     from rrtik_ompl.certificates.certificate import load_certificate
-    from rrtik_ompl.certificates.verify import verify
+    from rrtik_ompl.certificates.verify import verify_certificate
 
     found = load_certificate(proof)
-    fault = verify(found, problem.world, path.waypoints)
+    fault = verify_certificate(found, problem.world, path.waypoints)
     if not fault and abs(path.start - problem.start).max() > 1e-6:
         fault = "the path does not begin at the start of the problem"
     if not fault and not problem.reached(path.end):

@@ -62,8 +62,7 @@ def replan(  # noqa: D417 - the settings are described in one place
         scene_feed: The scene over time: a scene whose obstacles state their motion, a function of time [s], or
             pairs of a time and a scene; the problem's scene if None. The obstacles' names and shapes stay the same.
             A feed with fewer scenes than ticks makes obstacles jump; their speed is that of the jump in one tick.
-        step, rate, planner, max_edge, margin, clearance, speed_bound, limits, lookahead_ticks, seconds, repair_budget,
-            seed: See :class:`ReplanSettings`.
+        step: This and all arguments that are not explained here: see :class:`ReplanSettings`.
         goal_feed: A goal that moves: the configuration at a time [s], in place of the problem's goal.
             It is reached when the robot is where it was at the begin of the last tick.
         record: A ``.json`` file for the record; it is written on Ctrl-C and errors too, once there is a tick.

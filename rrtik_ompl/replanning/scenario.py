@@ -41,7 +41,7 @@ class Scenario:
     settings: ReplanSettings
     goal_feed: GoalFeed | None = None
 
-    def run(  # noqa: D417 - three are described together
+    def run(
         self,
         scene_feed: Source | None = None,
         *,
@@ -52,7 +52,9 @@ class Scenario:
         """Replan, with some settings changed; see :func:`rrtik_ompl.replanning.replan`.
 
         Args:
-            scene_feed, record, clock: See :func:`rrtik_ompl.replanning.replan`.
+            scene_feed: This and the next two: see :func:`rrtik_ompl.replanning.replan`.
+            record: The same.
+            clock: The same.
             changes: Attributes of :class:`rrtik_ompl.replanning.ReplanSettings` that differ from the scenario's.
 
         Raises:

@@ -53,7 +53,8 @@ class PointCloud(_Kept, Shape):
         points: Shape (n, 3) [m].
         radius: See above.
         invalid: Whether points that are not finite are refused or dropped.
-        source, scale: See above.
+        source: See above.
+        scale: See above.
 
     Raises:
         InputError: If there is no point, points are not numbers or not finite, or the radius is no length.

@@ -82,7 +82,7 @@ def fewest_moves(
     rows = finite_array(waypoints, (None, world.robot.dof), "waypoints")
     if len(rows) > 1 and not single_joint(rows[np.append(True, (np.diff(rows, axis=0) != 0.0).any(axis=1))]):
         raise InputError(
-            "path to shorten: an edge moves several joints at once; convert it first with one_joint_moves(path, world)"
+            "path to shorten: an edge moves several joints at once; use one_joint_moves(path, problem) first"
         )
     if rounds < 0:
         raise InputError(f"rounds: expected at least 0, got {rounds}")

@@ -7,7 +7,7 @@ import pytest
 
 import rrtik_ompl as rrtik
 from bench.proofs.cases import random_scene
-from rrtik_ompl.certificates.verify import verify
+from rrtik_ompl.certificates.verify import verify_certificate
 from rrtik_ompl.certificates.write import certificate_of
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.world import World
@@ -45,7 +45,7 @@ def test_what_a_lying_prover_says_of_a_motion_that_collides_is_refused(name, dep
         forged = certificate_of(world, path)
         if forged is not None:
             lies += 1
-            assert verify(forged, world, path.waypoints)
+            assert verify_certificate(forged, world, path.waypoints)
     assert lies >= 5
 
 
@@ -61,6 +61,6 @@ def test_what_is_proven_for_a_slower_motion_does_not_hold_for_a_faster_one(name)
             continue
         half = certificate_of(world, JointPath.of(robot, [a, middle]))
         path = JointPath.of(robot, [a, b])
-        assert verify(replace(half, waypoints=path.waypoints), world, path.waypoints)
+        assert verify_certificate(replace(half, waypoints=path.waypoints), world, path.waypoints)
         refused += 1
     assert refused >= 3

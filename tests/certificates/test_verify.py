@@ -15,7 +15,7 @@ from bench.proofs.cases import random_cases, random_scene
 from bench.proofs.certificates import main
 from bench.proofs.tampering import TAMPERINGS
 from rrtik_ompl.certificates.certificate import from_document
-from rrtik_ompl.certificates.verify import Motions, verify
+from rrtik_ompl.certificates.verify import Motions, verify_certificate
 from rrtik_ompl.certificates.write import certificate_of
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.proof import layout, log
@@ -47,8 +47,8 @@ def cases(tmp_path_factory):
 def test_a_certificate_of_a_proven_path_holds_also_when_read_again(name, cases):
     for world, path, certificate in ((case.world, case.path, case.certificate) for case in cases(name)):
         again = from_document(json.loads(json.dumps(certificate.document())))
-        assert verify(certificate, world, path.waypoints) == ""
-        assert verify(again, world, path.waypoints, clearance=0.001) == ""
+        assert verify_certificate(certificate, world, path.waypoints) == ""
+        assert verify_certificate(again, world, path.waypoints, clearance=0.001) == ""
         assert again.entries == certificate.entries
         assert (again.waypoints == path.waypoints).all()
         assert world.prover._packed.table.intact()
@@ -62,7 +62,7 @@ def test_what_is_tampered_with_is_refused(name, kind, seed, cases):
     falsified = TAMPERINGS[kind](case, rng)
     if falsified is None:
         pytest.skip("there is nothing to tamper with")
-    fault = verify(*falsified)
+    fault = verify_certificate(*falsified)
     assert fault
     assert "\n" not in fault
 
@@ -76,8 +76,8 @@ def test_a_gap_of_an_obstacle_less_than_a_millimetre_away_is_looked_at_closely()
     path = JointPath.of(robot, [a, b])
     certificate = certificate_of(near, path)
     assert max(motion.intervals[:, 0].max() for motion in certificate.motions) >= 6
-    assert verify(certificate, near, path.waypoints) == ""
-    assert "not shown apart" in verify(replace(certificate, clearance=2e-5), near, path.waypoints)
+    assert verify_certificate(certificate, near, path.waypoints) == ""
+    assert "not shown apart" in verify_certificate(replace(certificate, clearance=2e-5), near, path.waypoints)
 
 
 def test_what_an_arm_holds_and_what_it_may_touch_are_part_of_the_scene():
@@ -88,9 +88,9 @@ def test_what_an_arm_holds_and_what_it_may_touch_are_part_of_the_scene():
     start = np.array([0.0, -1.2, 1.0, -1.0, -1.5, 0.0])
     path = JointPath.of(robot, [start, start + np.array([-0.6, 0.2, 0.1, 0.3, 0.0, 1.0])])
     certificate = certificate_of(world, path)
-    assert verify(certificate, world, path.waypoints) == ""
+    assert verify_certificate(certificate, world, path.waypoints) == ""
     for other in (Scene([post]), Scene([post], attached=[replace(tool, allow=("forearm_link",))])):
-        assert verify(certificate, World(robot, other), path.waypoints) == "it is for another scene"
+        assert verify_certificate(certificate, World(robot, other), path.waypoints) == "it is for another scene"
 
 
 def test_a_path_that_is_not_proven_has_no_certificate():
@@ -109,7 +109,7 @@ def test_a_path_that_stands_still_has_a_certificate():
     for rows in ([q], [q, q], [q, q, q + 0.01]):
         path = JointPath.of(robot, rows)
         certificate = certificate_of(world, path)
-        assert verify(certificate, world, path.waypoints) == ""
+        assert verify_certificate(certificate, world, path.waypoints) == ""
         assert len(certificate.motions) == max(1, len(rows) - 1)
 
 
@@ -118,7 +118,7 @@ def test_a_base_that_touches_an_obstacle_has_none_and_a_forged_one_is_refused(ca
     floor = Obstacle("slab", Box([1.0, 1.0, 0.1]), rrtik.pose([0.0, 0.0, 0.0]))
     world = World(case.world.robot, Scene([floor]))
     assert certificate_of(world, case.path) is None
-    fault = verify(replace(case.certificate, scene_digest=scene_of(world)), world, case.path.waypoints)
+    fault = verify_certificate(replace(case.certificate, scene_digest=scene_of(world)), world, case.path.waypoints)
     assert "touch and never move" in fault
 
 
@@ -134,13 +134,15 @@ def test_entries_of_no_pair_part_or_interval_are_refused(cases):
     for solid, interval in (([0, 0, 0, 0], [0, 0]), ([0, 99, 1, 0], [0, 0]), (first.solids[0], [60, 0])):
         changed = replace(first, solids=first.solids.copy(), intervals=first.intervals.copy())
         changed.solids[0], changed.intervals[0] = solid, interval
-        fault = verify(replace(case.certificate, motions=(changed, *others)), case.world, case.path.waypoints)
+        fault = verify_certificate(
+            replace(case.certificate, motions=(changed, *others)), case.world, case.path.waypoints
+        )
         assert fault.startswith("motion 1: no parts")
 
 
 def test_a_larger_clearance_than_the_certificate_has_is_not_shown_by_it(cases):
     case = cases("titan4")[0]
-    assert "clearance" in verify(case.certificate, case.world, case.path.waypoints, clearance=0.002)
+    assert "clearance" in verify_certificate(case.certificate, case.world, case.path.waypoints, clearance=0.002)
 
 
 @pytest.mark.parametrize("name", ["panda", "slider"])
@@ -171,7 +173,7 @@ def test_the_log_grows_where_it_is_too_small_and_costs_nothing_afterwards(cases,
     packed = case.world.prover._packed
     monkeypatch.setattr(log.logged, "__defaults__", (1,))
     again = certificate_of(case.world, case.path, 0.001)
-    assert verify(again, case.world, case.path.waypoints) == ""
+    assert verify_certificate(again, case.world, case.path.waypoints) == ""
     assert again.entries == case.certificate.entries
     assert packed.table.intact()
     assert packed.table.header[layout.LOG_ROOM] == 0

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.certificates.verify import verify
+from rrtik_ompl.certificates.verify import verify_certificate
 from rrtik_ompl.certificates.write import certificate_of
 from rrtik_ompl.description.padding import padded
 from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError
@@ -154,9 +154,9 @@ def test_paths_and_certificates_keep_it():
     assert found.proven
     assert rooms(problem.world, found.path.resample(0.02).waypoints, {"link6": 0.3}).min() >= -1e-9
     certificate = certificate_of(problem.world, found.path)
-    assert verify(certificate, problem.world, found.path.waypoints) == ""
+    assert verify_certificate(certificate, problem.world, found.path.waypoints) == ""
     for other in ({}, {"link6": 0.31}, {"link5": 0.3}):
-        assert verify(certificate, World(padded(robot, other), Scene([wall])), found.path.waypoints) != ""
+        assert verify_certificate(certificate, World(padded(robot, other), Scene([wall])), found.path.waypoints) != ""
 
 
 def test_no_padding_is_as_before():

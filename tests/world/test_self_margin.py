@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.certificates.verify import verify
+from rrtik_ompl.certificates.verify import verify_certificate
 from rrtik_ompl.certificates.write import certificate_of
 from rrtik_ompl.collision.digests import scene_digest
 from rrtik_ompl.collision.overlap_depth import OverlapDepth
@@ -165,9 +165,9 @@ def test_paths_keep_the_margin(method):
     for path in (found.path, short):
         assert own_gaps(problem.world, path.resample(0.02).waypoints).min() >= 0.05 - 1e-9
         certificate = certificate_of(problem.world, path)
-        assert verify(certificate, problem.world, path.waypoints) == ""
+        assert verify_certificate(certificate, problem.world, path.waypoints) == ""
         for other in (0.0, 0.04, 0.06):
-            fault = verify(certificate, folding(other).world, path.waypoints)
+            fault = verify_certificate(certificate, folding(other).world, path.waypoints)
             assert fault == "it is for another self margin, 0.05 m"
 
 
@@ -182,7 +182,7 @@ def test_a_verifier_finds_a_margin_that_is_not_kept():
         self_margin=wide.self_margin,
         scene_digest=scene_digest(wide.bodies, wide.pairs),
     )
-    assert "are not shown apart" in verify(forged, wide, path.waypoints)
+    assert "are not shown apart" in verify_certificate(forged, wide, path.waypoints)
 
 
 def test_a_start_that_does_not_keep_it_is_refused_in_one_line_with_the_pair():

@@ -1,0 +1,100 @@
+"""What MkDocs is told about the pages: their links to the rest of the repository, and the pages of the public names."""
+
+from __future__ import annotations
+
+import re
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from mkdocs.structure.files import File, Files
+
+import rrtik_ompl
+
+ROOT = Path(__file__).resolve().parents[2]
+LINK = re.compile(r"\]\((\.\./[^)\s#]+)(#[^)\s]*)?\)")
+PICTURES = ROOT / "bench" / "reports"
+PICTURE = re.compile(
+    r"\]\((?:https://raw\.githubusercontent\.com/rrtik-ompl/rrtik-ompl/main|\.\.)/bench/reports/([\w.-]+\.png)\)"
+)
+# The pages of the public names, and the modules that each of them is of, by how their names begin.
+REFERENCE = {
+    "Robots and scenes": ("catalog", "robot", "description", "scene", "shapes", "files", "poses", "world"),
+    "Goals and problems": ("goal", "task_region", "constraints", "problem", "problem_files"),
+    "Plans and paths": ("planning", "path", "shortening", "moves", "search", "benchmark", "viewer", "plots"),
+    "Certificates": ("certificates",),
+    "Inverse kinematics": ("ik", "reach"),
+    "Lines of the tip and tasks": ("tip_motion", "tasks"),
+    "Trajectories and following": ("trajectory", "following"),
+    "Moving obstacles": ("replanning",),
+    "Own OMPL code": ("ompl_bridge",),
+    "Errors": ("errors",),
+}
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Add the front page, which is the README, the pictures, and one page for each group of public names."""
+    files.append(File.generated(config, "index.md", content=_front_page()))
+    for picture in PICTURES.glob("*.png"):
+        files.append(File.generated(config, f"pictures/{picture.name}", abs_src_path=str(picture)))
+    for title, names in _groups().items():
+        text = [f"# {title}", *(f"::: {name}" for name in names)]
+        files.append(File.generated(config, _reference_file(title), content="\n\n".join(text) + "\n"))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
+    """Point links that leave the folder of the documents to the repository.
+
+    Raises:
+        FileNotFoundError: If there is no such file in it.
+    """
+    folder = ROOT / "docs" / Path(page.file.src_uri).parent
+
+    def target(found: re.Match[str]) -> str:
+        file = (folder / found[1]).resolve()
+        if file.is_relative_to(ROOT / "docs"):
+            return found[0]
+        if not file.exists():
+            raise FileNotFoundError(f"{page.file.src_uri}: no {found[1]} in the repository")
+        kind = "tree" if file.is_dir() else "blob"
+        return f"]({config.repo_url}/{kind}/main/{file.relative_to(ROOT).as_posix()}{found[2] or ''})"
+
+    up = "../" * page.file.src_uri.count("/")
+    return LINK.sub(target, PICTURE.sub(rf"]({up}pictures/\1)", markdown))
+
+
+def _front_page() -> str:
+    """The README, with its links as seen from the folder of the documents."""
+
+    def moved(found: re.Match[str]) -> str:
+        return f"]({found[1].removeprefix('docs/')})" if found[1].startswith("docs/") else f"](../{found[1]})"
+
+    text = (
+        (ROOT / "README.md").read_text(encoding="utf-8").replace("](docs/README.md)", "](docs/tutorials/first_plan.md)")
+    )
+    return re.sub(r"\]\((?!https?:|#)([^)]+)\)", moved, text)
+
+
+def _groups() -> dict[str, list[str]]:
+    """For each page the full names of what is on it.
+
+    Raises:
+        ValueError: If a public name has no page.
+    """
+    groups: dict[str, list[str]] = {title: [] for title in REFERENCE}
+    for name in rrtik_ompl.__all__:
+        value = getattr(rrtik_ompl, name)
+        home = value.__module__ if hasattr(value, "__module__") else value.__name__.rpartition(".")[0]
+        full = f"{home}.{name}"
+        assert getattr(import_module(home), name) is value
+        part = full.split(".")[1]
+        title = next((title for title, parts in REFERENCE.items() if part in parts), None)
+        if title is None:
+            raise ValueError(f"{full} is on no page: give '{part}' one in REFERENCE of docs/site/pages.py")
+        groups[title].append(full)
+    return groups
+
+
+def _reference_file(title: str) -> str:
+    return f"reference/{title.lower().replace(' ', '_')}.md"
