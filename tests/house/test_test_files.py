@@ -6,7 +6,8 @@ TESTS = ROOT / "tests"
 
 
 ROOMS = {file.parent.name for file in (ROOT / "rrtik_ompl").glob("*/__init__.py")}
-OTHERS = {"bench", "docs", "helpers", "house", "planners", "planning", "robots", "spine"}  # modules of the root: the last two
+# Modules of the root are tested in the last two.
+OTHERS = {"bench", "docs", "helpers", "house", "planners", "robots", "planning", "spine"}
 
 
 def test_every_room_has_its_folder():
