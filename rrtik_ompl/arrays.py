@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, at_most
 
 Vector: TypeAlias = NDArray[np.float64]  # shape (n,)
 Matrix: TypeAlias = NDArray[np.float64]  # shape (m, n)
@@ -71,6 +71,20 @@ def bounded_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) -
     if (largest := np.abs(array).max(initial=0.0)) > LARGEST:
         raise InputError(f"{what}: found {largest:g}, more than {LARGEST:g}; check units: metres, radians")
     return array
+
+
+def usable_waypoints(rows: Matrix) -> Matrix:
+    """Finite waypoints of a path, shape (k, n).
+
+    Raises:
+        InputError: If there are none or too many, or a number is larger than ``LARGEST``.
+    """
+    if rows.size == 0:
+        raise InputError("path waypoints: a path needs at least one configuration of at least one joint")
+    at_most(len(rows), MOST_ROWS, "path waypoints")
+    if (most := np.abs(rows).max()) > LARGEST:
+        raise InputError(f"path waypoints: found {most:g}, more than {LARGEST:g} rad or m; check units")
+    return rows
 
 
 def _has_shape(array: NDArray[np.float64], shape: tuple[int | None, ...]) -> bool:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import copy
 import os
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import LARGEST, MOST_ROWS, Mask, Matrix, Vector, finite_array, frozen, number_rows, positive
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, number_rows, positive, usable_waypoints
 from rrtik_ompl.copies import as_value
-from rrtik_ompl.errors import InputError, at_most, in_file, listed, name_of, require
+from rrtik_ompl.errors import InputError, in_file, listed, name_of, require
 from rrtik_ompl.files.tables import FORMATS, dumps, loads
 from rrtik_ompl.files.text import known_ending, read_text, write_text
 from rrtik_ompl.robot import Robot
@@ -86,12 +85,7 @@ class JointPath:
         robot_name: str = "",
         continuous: ArrayLike | None = None,
     ) -> None:
-        rows = finite_array(waypoints, (None, None), "path waypoints")
-        if rows.size == 0:
-            raise InputError("path waypoints: a path needs at least one configuration of at least one joint")
-        at_most(len(rows), MOST_ROWS, "path waypoints")
-        if (most := np.abs(rows).max()) > LARGEST:
-            raise InputError(f"path waypoints: found {most:g}, more than {LARGEST:g} rad or m; check units")
+        rows = usable_waypoints(finite_array(waypoints, (None, None), "path waypoints"))
         count = rows.shape[1]
         joint_names = (f"joint{k + 1}" for k in range(count)) if joint_names is None else joint_names
         names = tuple(name_of(name, "a joint of a path") for name in listed(joint_names, "joint names of a path"))
@@ -99,12 +93,7 @@ class JointPath:
         sliding, endless = (number_rows(mask, "mask of a path's joints").reshape(-1).astype(bool) for mask in given)
         if not len(names) == count == sliding.size == endless.size:
             raise InputError(f"path: waypoints have {count} columns, but {len(names)} joint names were given")
-        object.__setattr__(self, "waypoints", frozen(rows))
-        object.__setattr__(self, "joint_names", names)
-        object.__setattr__(self, "prismatic", frozen(sliding, bool))
-        object.__setattr__(self, "robot_name", robot_name)
-        object.__setattr__(self, "continuous", frozen(endless, bool))
-        object.__setattr__(self, "proof", None)
+        _fill(self, frozen(rows), names, frozen(sliding, bool), robot_name, frozen(endless, bool))
 
     def __repr__(self) -> str:
         k, n = self.waypoints.shape
@@ -120,9 +109,11 @@ class JointPath:
         """
         require(robot, Robot, "robot of a path")
         rows = np.asarray(waypoints)
-        if rows.dtype != np.float64 or rows.shape[1:] != (robot.dof,):
+        if rows.dtype != np.float64 or rows.shape[1:] != (robot.dof,) or not np.isfinite(rows).all():
             rows = finite_array(waypoints, (None, robot.dof), f"path waypoints of robot '{robot.name}'")
-        return cls(robot.onto_limits(rows), robot.joint_names, robot.prismatic, robot.name, robot.continuous)
+        kinds = frozen(robot.prismatic, bool), frozen(robot.continuous, bool)
+        rows = frozen(usable_waypoints(robot.onto_limits(rows)))
+        return _fill(object.__new__(cls), rows, robot.joint_names, kinds[0], robot.name, kinds[1])
 
     def with_waypoints(self, waypoints: ArrayLike) -> JointPath:
         """The same joints, other waypoints."""
@@ -217,9 +208,9 @@ class JointPath:
             InputError: If the path is another robot's, there is no world, or the clearance is negative or infinite.
         """
         require(world, World, "world of a path's proof")
-        other = copy.copy(self)
-        object.__setattr__(other, "proof", world.prove(self.waypoints, clearance=clearance, seconds=seconds))
-        return other
+        proof = world.prove(self.waypoints, clearance=clearance, seconds=seconds)
+        known = self.waypoints, self.joint_names, self.prismatic, self.robot_name, self.continuous
+        return _fill(object.__new__(type(self)), *known, proof)
 
     @property
     def proven(self) -> bool:
@@ -253,6 +244,16 @@ class JointPath:
             "transitions": self.transitions,
             "waypoints": self.waypoints.tolist(),
         }
+
+
+def _fill(path: JointPath, *values: object) -> JointPath:
+    """A path with the values of its attributes, in their order; nothing is checked, and there may be no proof."""
+    for name, value in zip(_ATTRIBUTES, (*values, None), strict=False):
+        object.__setattr__(path, name, value)
+    return path
+
+
+_ATTRIBUTES = tuple(each.name for each in fields(JointPath))
 
 
 def proved_as_clear(path: JointPath, world: World, clearance: float) -> JointPath:

@@ -15,6 +15,7 @@ from rrtik_ompl.goal import (
     PoseGoal,
     TipGoal,
     as_task_region,
+    has_continuous,
     joint_difference,
     parts_of,
     tip_errors,
@@ -201,6 +202,8 @@ def _walked_to(robot: Robot, goal: TipGoal, number: int, starts: Matrix, rng: np
 
 def _turns(problem: Problem, q: Vector) -> Matrix:
     """The configuration and, for each continuous joint, the same posture reached the other way round."""
+    if not has_continuous(problem.world.robot):
+        return q[None]
     rows = [np.array(q)]
     for joint in np.flatnonzero(problem.world.robot.continuous):
         other = np.array(q)

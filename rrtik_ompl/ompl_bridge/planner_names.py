@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from functools import cache
 
 from rrtik_ompl import catalog
 from rrtik_ompl.errors import InputError, UnknownNameError
@@ -61,10 +62,14 @@ def find_planner(name: str) -> PlannerFactory:
     if is_planner_file(name):
         return planner_of_file(name)
     bare = name.removeprefix(_OMPL_PREFIX).removesuffix(_MOVEIT_SUFFIX).lower()
-    wheel = {key.lower(): value for key, value in ompl_planners().items()}
-    if bare in wheel:
-        found: PlannerFactory = wheel[bare]
-        return found
+    if bare in _wheel():
+        return _wheel()[bare]
     if bare in catalog.list_planners():
         return catalog.find_planner(bare)  # type: ignore[no-any-return]
     raise UnknownNameError("planner", name, list_planners())
+
+
+@cache
+def _wheel() -> Mapping[str, PlannerFactory]:
+    """OMPL's planners by their names in lower case."""
+    return {name.lower(): planner for name, planner in ompl_planners().items()}

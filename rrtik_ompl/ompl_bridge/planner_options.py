@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from functools import lru_cache
 from typing import Any, TypeGuard
 
 from ompl import base as ob
@@ -22,6 +23,7 @@ def is_safe(factory: PlannerFactory) -> TypeGuard[type[SafePlanner]]:
     return isinstance(factory, type) and issubclass(factory, SafePlanner)
 
 
+@lru_cache(maxsize=64)
 def planner_options(factory: PlannerFactory) -> tuple[str, ...]:
     """Names of the options that a planner takes, sorted; those of OMPL's planners in snake case."""
     if is_safe(factory):

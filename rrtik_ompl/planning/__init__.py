@@ -31,6 +31,8 @@ MAX_RESTARTS = 1_000_000
 BOUND_OPTION = "bound"  # of planners that can be told how long a path may be
 MAX_SECONDS = 1e9  # thirty years; OMPL's clock overflows at about nine times as much
 PROOF_MODES: tuple[ProofMode, ...] = get_args(ProofMode)
+OBJECTIVES: tuple[PathObjective, ...] = get_args(PathObjective)
+STRATEGIES: tuple[ImproveStrategy, ...] = get_args(ImproveStrategy)
 
 
 def plan(
@@ -116,8 +118,8 @@ def plan(
     check_clearance(problem.world, clearance, fixed_ends(problem))
     how = Improvement(
         not_negative(improve, "improve"),
-        one_of(get_args(PathObjective), objective, "objective"),
-        one_of(get_args(ImproveStrategy), strategy, "strategy of improve"),
+        one_of(OBJECTIVES, objective, "objective"),
+        one_of(STRATEGIES, strategy, "strategy of improve"),
     )
     found = _search_of(problem, planner)(request)
     found = _improved(problem, planner, found, request, how) if found.found and how.seconds > 0.0 else found

@@ -10,7 +10,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.choices import ProofMode
-from rrtik_ompl.goal import JointGoal, TipGoal
+from rrtik_ompl.goal import JointGoal, TipGoal, has_continuous
 from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.ompl_bridge.attempt import EFFORT_ITERATIONS, EFFORT_MOTIONS, Attempt, attempt
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
@@ -70,7 +70,7 @@ class Search:
         wanted = {"clearance": clearance} if self._traits.leaves_room and clearance is not None else {}
         self._parameters = {**wanted, **parameters}
         self._aimless = self._traits.finds_goals and isinstance(problem.goal, TipGoal)
-        self._long_ways = joints and bool(problem.robot.continuous.any()) and len(seeds) > 1
+        self._long_ways = joints and has_continuous(problem.robot) and len(seeds) > 1
         ruled = any(option in parameters for option in MOVE_RULES)
         self._check = SecondCheck(problem, name, proof, clearance, self._traits, ruled=ruled)
         self._strict: dict[bool, Problem] = {}  # by whether motions have to be proven
@@ -140,12 +140,14 @@ class Search:
         """Of a brief attempt on what the kernels can prove; None where it finds nothing or cannot prove an end."""
         if not self._traits.supports_iteration_limit or self._problem.world.accuracy != "exact":
             return None
+        if self._aimless and not self._traits.kernels:
+            return None
         proven = self._problem.with_accuracy("conservative")
-        if not self._traits.kernels:  # a planner that runs in kernels finds out itself, in a few microseconds
-            aims = aims[proven.world.valid_batch(aims)]
-            if len(aims) == 0 or not proven.world.valid(proven.start):
-                return None
-        return self._accepted(self._attempt(proven, 0, aims, self._left(), effort=1))
+        free = proven.world.valid_batch(np.concatenate([proven.start[None], aims]))
+        aims = aims[free[1:]]
+        if not free[0] or (len(aims) == 0 and not self._aimless):
+            return None
+        return self._accepted(self._attempt(proven, 0, aims, self._left(), effort=1, checked=True))
 
     def _path(self, number: int, aims: Matrix) -> JointPath | None:
         """Of an attempt with exact checks, with room to spare as soon as a path was not proven."""

@@ -104,7 +104,7 @@ class SecondCheck:
             self.reason += f": {outcome.reason}" if outcome.reason else ""
             return None
         problem, path = self._problem, JointPath.of(self._problem.robot, outcome.rows)
-        if not (path.start == problem.start).all() or not problem.reached(path.end):
+        if not (path.start == problem.start).all() or not _at_goal(problem, path.end):
             self.reason = f"the path of {self._name} does not lead from the start to the goal"
             self.rejected += 1
             return None
@@ -166,6 +166,12 @@ def fixed_ends(problem: Problem) -> dict[str, Vector]:
     """The configurations that every path of a problem passes, by what they are."""
     goal = problem.goal
     return {"start": problem.start} | ({"goal": goal.q} if isinstance(goal, JointGoal) else {})
+
+
+def _at_goal(problem: Problem, q: Vector) -> bool:
+    """Whether a configuration, shape (dof,), is at the goal; most are its joint values to the bit."""
+    goal = problem.goal
+    return bool(isinstance(goal, JointGoal) and (q == goal.q).all()) or problem.reached(q)
 
 
 def _rank(path: JointPath) -> tuple[int, float]:

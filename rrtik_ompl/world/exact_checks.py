@@ -74,7 +74,7 @@ class ExactChecker:
         """Which rows, shape (m, dof), are free of collision. Shape (m,)."""
         answers = self.fast.classify(self._robot.joint_values(rows), resolve=not self.conservative)
         free: Mask = answers == FREE
-        if not self.conservative:
+        if not self.conservative and not free.all():
             undecided = rows[answers == UNDECIDED]
             doubtful = self.fast.undecided_pairs(self._robot.joint_values(undecided))
             configurations = self._robot.pinocchio_configuration(undecided)

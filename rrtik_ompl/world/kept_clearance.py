@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -38,7 +39,8 @@ def room_between(world: World, ends: Matrix, clearance: float | None) -> Room | 
         clearance: Wanted [m]; None for a millimetre, or less if the ends have less.
     """
     wanted = CLEARANCE if clearance is None else clearance
-    for searched in (wanted + min(wanted, SPARE), *(wanted * 0.5**k for k in range(HALVINGS)), 0.0):
+    less = (wanted * 0.5**k for k in range(HALVINGS))
+    for searched in chain((wanted + min(wanted, SPARE),), less, (0.0,)):
         if world.motions_proven(ends, ends, clearance=searched).all():
             return Room(min(wanted, searched), searched)
     return None
