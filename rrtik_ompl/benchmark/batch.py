@@ -38,7 +38,7 @@ def plan_batch(
     Args:
         problems: Names of shipped problems, or files.
         planner: Name of one of :func:`rrtik_ompl.list_planners`; None: as of :func:`rrtik_ompl.plan`.
-        seconds: For planning, each [s]; a query that takes 30 s more than thrice as long is killed.
+        seconds: Wall time for planning, each [s]; a query that takes 30 s more than thrice as long is killed.
         seed: Of all of them.
         parameters: Options of the planner.
         shorten: A method of shortening, "none", or "by-kind": axis for single-joint moves.

@@ -40,7 +40,7 @@ def plan(
     planner: Annotated[
         str | None, typer.Option(help="See: rrtik list planners. If left out, the problem's, or else auto.")
     ] = None,
-    seconds: Annotated[float, typer.Option(help="Time limit [s].")] = 5.0,
+    seconds: Annotated[float, typer.Option(help="Limit of wall time [s].")] = 5.0,
     seed: Annotated[int | None, typer.Option(help="The same seed gives the same path; drawn if left out.")] = None,
     restarts: Annotated[int, typer.Option(help="New attempts at most, if one gives up early.")] = 20,
     parameter: Annotated[

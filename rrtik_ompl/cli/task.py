@@ -78,7 +78,7 @@ def straight(
 
 def task(
     task: Annotated[str, typer.Argument(help="A shipped task (see: rrtik list tasks) or a YAML file with task:.")],
-    seconds: Annotated[float, typer.Option(help="Time limit [s].")] = 10.0,
+    seconds: Annotated[float, typer.Option(help="Limit of wall time [s].")] = 10.0,
     seed: Annotated[int, typer.Option(help="The same seed gives the same plan.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Save all motions with their worlds: .json.")] = None,
     trajectory: Annotated[

@@ -74,7 +74,7 @@ def solve_ik(
         all: Every solution that the method finds, not just one: a closed form gives all there are (of a singular
             pose representatives), a numeric one those it comes across, full turns of a joint counted apart.
         world: If given, solutions in collision are left out. Its robot must be this one.
-        seconds: Time that a numeric method may take; the clock is read between rounds, of which the first is done.
+        seconds: Wall time that a numeric method may take; the clock is read between rounds, of which the first is done.
         seed: Of the random numbers; the same seed gives the same answer as long as the time does not cut in.
 
     Raises:

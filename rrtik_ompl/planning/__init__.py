@@ -70,7 +70,7 @@ def plan(
         planner: Name of one of :func:`list_planners` (``geometric::`` may stand before OMPL's names), or a planner
             class that is built from a SpaceInformation alone. "auto" lets several search one after the other, until
             one finds a path, and shortens that a little. None: what the problem names, or else "auto".
-        seconds: Time limit for all attempts together [s].
+        seconds: Limit of wall time for all attempts together [s]; a busy machine gets less done in it.
         seed: The same seed gives the same path, as long as the time limit does not cut in; drawn if None. PRM and
             PRMstar work by the clock, so theirs may differ.
         restarts: Further attempts at most.
@@ -141,7 +141,7 @@ def plan_counted(problem: Problem, iterations: int, *, seconds: float, seed: int
     Args:
         problem: What to solve.
         iterations: Of each planner.
-        seconds: Time limit on top of that [s].
+        seconds: Limit of wall time on top of that [s].
         seed: Of everything random.
     """
     return run_portfolio(problem, Request(seconds, seed, RESTARTS, {}, "preferred", None, iterations))

@@ -52,7 +52,7 @@ def run_planner(problem: Problem, name: str, factory: PlannerFactory, request: R
     if path is None and elapsed >= request.seconds:
         attempts = search.totals["attempts"]
         tried = f"{attempts} attempt{'s' * (attempts != 1)}"
-        reason = f"no path within {request.seconds:g} s ({tried}; the last one: {reason or 'out of time'})"
+        reason = f"no path within {request.seconds:g} s of wall time ({tried}; the last one: {reason or 'out of time'})"
     return Plan(path is not None, path, reason, elapsed, name, request.seed, MappingProxyType(search.totals))
 
 

@@ -16,7 +16,7 @@ class Request:
     """What `plan()` is asked for beside the problem and the planner; every value has been checked.
 
     Attributes:
-        seconds: Time limit [s].
+        seconds: Limit of wall time [s].
         seed: Of everything random.
         restarts: Further attempts at most.
         parameters: Options of the planner.

@@ -160,7 +160,7 @@ class Roadmap:
         Args:
             start: Shape (dof,), rad or m.
             goal: Likewise.
-            seconds: When to give up [s].
+            seconds: Wall time after which to give up [s].
 
         Returns:
             The path, or None if the roadmap has none; `plan()` with the planner "roadmap" then adds one.

@@ -125,8 +125,8 @@ def shorten(
             the same class. "corners" pulls every bend to the corner that it goes round: nearer to that shortest path
             than "retraction" in its finest steps, with fewer checks. "shortcut" is a random cut that takes waypoints
             as ends too and pulls them straight. "ompl" is OMPL's PathSimplifier.
-        seconds: Time limit [s]. With a limit, random methods go on until nothing is gained any more; without one they
-            make a fixed number of tries, so that a seed always gives the same path.
+        seconds: Limit of wall time [s]. With one, random methods go on until nothing is gained any more; without one
+            they make a fixed number of tries, so that a seed always gives the same path.
         checks: Most motions that are checked (tries, in random methods), a limit that always gives the same path: 100
             take some milliseconds. None for no such limit; "ompl" and "fewest-moves" know no other than time.
         seed: Of the random methods.

@@ -33,7 +33,7 @@ class Task:
 
     Args:
         motions: A world, or anything else that checks straight motions.
-        seconds: Time limit [s].
+        seconds: Limit of wall time [s].
         checks: Most motions that are checked; then the time is up.
         seed: See above.
         one_joint: See above.

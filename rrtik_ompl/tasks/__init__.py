@@ -96,7 +96,7 @@ class Task:
         Args:
             world: Robot and scene at the beginning.
             start: Configuration, shape (dof,), or the name of a posture.
-            seconds: Time limit [s].
+            seconds: Limit of wall time [s].
             seed: The same seed gives the same plan, as long as the time limit does not cut in.
 
         Raises:

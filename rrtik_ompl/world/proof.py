@@ -29,7 +29,7 @@ from rrtik_ompl.world.arm_cache import Pairs, strokes
 LARGEST_VALUE = 1e3  # [rad] or [m] of a joint, up to which rounding is bounded
 PROOF_KERNELS = "proof.proof_kernels"
 SPARE = 1e-10  # [m] that a proof which is written down keeps beyond ROOM: who verifies it rounds in other places
-MOTIONS_AT_ONCE = 64  # between two looks at the clock
+MOTIONS_AT_ONCE = 64  # in one call of the kernel, between two looks at the clock; Ctrl-C waits no longer
 FEW = 200  # configurations
 PROVEN, NOT_LOOKED_AT = -1, -2  # in the place of a pair's number
 DOUBLE, INT = 8, 4  # bytes of a number
@@ -203,12 +203,12 @@ class Prover:
         pairs, places = np.full(count, NOT_LOOKED_AT, dtype=np.int32), np.full(count, np.nan)
         table = ProofTable(packed.table.address)
         at, found, where = (tails.ctypes.data, heads.ctypes.data), pairs.ctypes.data, places.ctypes.data
-        some, looked, open_ = count if seconds is None else MOTIONS_AT_ONCE, 0, 0
-        for first in range(0, count, some):
+        looked, open_ = 0, 0
+        for first in range(0, count, MOTIONS_AT_ONCE):
             if first > 0 and seconds is not None and time.monotonic() - begin > seconds:
                 break
             skipped = DOUBLE * joints * first
-            number = min(some, count - first)
+            number = min(MOTIONS_AT_ONCE, count - first)
             sinks = (found + INT * first, where + DOUBLE * first)
             open_ += kernels.prove(table, at[0] + skipped, at[1] + skipped, number, *sinks)
             looked += number

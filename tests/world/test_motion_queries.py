@@ -1,5 +1,7 @@
 """The one interface of motion checks, and RRT-Connect on any of them."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,8 @@ from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.search.rrt_connect import ConnectRules, RrtConnect, extend, path_between, reach, straight_path
 from rrtik_ompl.search.tree import ConfigurationTree
 from rrtik_ompl.world.motion_queries import (
+    CALL_TARGET_SECONDS,
+    FIRST_BATCH,
     BatchedMotionQueries,
     MotionQueries,
     OutOfTime,
@@ -118,3 +122,16 @@ def test_batches_give_the_answers_of_one_call_and_end_when_it_is_time():
     assert not queries.in_time(A, B).any()
     with pytest.raises(OutOfTime):
         queries(A, B)
+
+
+def test_batches_grow_while_the_machine_is_busy_with_something_else():
+    sizes = []
+
+    def kept_waiting(tails, _):
+        sizes.append(len(tails))
+        time.sleep(2.0 * CALL_TARGET_SECONDS)  # no work of ours
+        return np.ones(len(tails), dtype=bool)
+
+    rows = np.zeros((7 * FIRST_BATCH, 2))
+    assert BatchedMotionQueries(kept_waiting)(rows, rows).all()
+    assert sizes == [FIRST_BATCH, 2 * FIRST_BATCH, 4 * FIRST_BATCH]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from time import perf_counter
+from time import thread_time
 from typing import Any
 
 import numpy as np
@@ -89,13 +89,13 @@ class CrdtSearch:
     def advance(self, stop: Callable[[], Any]) -> bool:
         """Go on to the next solution; False if ``stop()`` or the limit of iterations came first."""
         while not stop():
-            begin, until = perf_counter(), self.iterations + self._budget
+            begin, until = thread_time(), self.iterations + self._budget
             status = self._go_on(until)
-            while status in (crdt_layout.ASKING, crdt_layout.FULL) and perf_counter() - begin < MAX_PAUSE:
+            while status in (crdt_layout.ASKING, crdt_layout.FULL) and thread_time() - begin < MAX_PAUSE:
                 status = self._go_on(until)
             if status in (crdt_layout.SOLVED, crdt_layout.EXHAUSTED):
                 return status == crdt_layout.SOLVED
-            self._pace(perf_counter() - begin)
+            self._pace(thread_time() - begin)
         return False
 
     def meeting(self) -> tuple[Matrix, Matrix]:
