@@ -47,11 +47,11 @@ def merge_moves(waypoints: ArrayLike, tolerance: float = SAME) -> Matrix:
         Shape (m, n), m <= k; a single row if nothing moves.
     """
     rows = _rows(waypoints)
-    kept: list[int] = [0]
+    values, kept = rows.tolist(), [0]  # lists: most routes are short, and numpy takes longer for a row
     for i in range(1, len(rows)):
-        while len(kept) > 1 and _same_joint(rows, kept[-2], kept[-1], i, tolerance):
+        while len(kept) > 1 and _same_joint(*(values[k] for k in (*kept[-2:], i)), tolerance):
             kept.pop()
-        if moved(rows[kept[-1]], rows[i], tolerance).any():
+        if _moved_joints(values[kept[-1]], values[i], tolerance):
             kept.append(i)
         elif len(kept) > 1:  # a null move: its end takes the place of its beginning, so that the last row is exact
             kept[-1] = i
@@ -108,10 +108,15 @@ def _edge_routes(n: int, l: int, m: int) -> int:  # noqa: E741
     return int(factorial(n * l) // factorial(l) ** n)
 
 
-def _same_joint(rows: Matrix, a: int, b: int, c: int, tolerance: float) -> bool:
+def _same_joint(a: list[float], b: list[float], c: list[float], tolerance: float) -> bool:
     """Whether a -> b and b -> c move one and the same joint."""
-    first, second = moved(rows[a], rows[b], tolerance), moved(rows[b], rows[c], tolerance)
-    return bool(first.sum() == 1 and np.array_equal(first, second))
+    first = _moved_joints(a, b, tolerance)
+    return len(first) == 1 and first == _moved_joints(b, c, tolerance)
+
+
+def _moved_joints(a: list[float], b: list[float], tolerance: float) -> list[int]:
+    """Numbers of the joints that differ by more than the tolerance."""
+    return [joint for joint, (x, y) in enumerate(zip(a, b, strict=True)) if abs(x - y) > tolerance]
 
 
 def _rows(waypoints: ArrayLike) -> Matrix:

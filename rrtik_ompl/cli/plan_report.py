@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich import box
@@ -15,10 +15,12 @@ from rrtik_ompl.ompl_bridge.planner_names import AUTO, is_auto
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning import Plan
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.trajectory import RateLimits, Trajectory, motion_report
 from rrtik_ompl.transitions import lower_bound
 from rrtik_ompl.units import reading, shown_unit
 from rrtik_ompl.world.route_check import how_checked
+
+if TYPE_CHECKING:
+    from rrtik_ompl.trajectory import RateLimits, Trajectory
 
 
 def moves_table(path: JointPath) -> Table:
@@ -51,6 +53,8 @@ def waypoints_table(path: JointPath) -> Table:
 
 def peaks_table(trajectory: Trajectory, limits: RateLimits) -> Table:
     """One row per joint: its largest velocity, acceleration and jerk beside their limits; degrees, or metres."""
+    from rrtik_ompl.trajectory import motion_report  # whoever plans alone does not wait for it
+
     heads = (f"{what}{end}" for what in ("velocity", "acceleration", "jerk") for end in ("", " limit"))
     table = Table("joint", *heads, "unit", "switches/s", box=box.SIMPLE_HEAD, pad_edge=False)
     for column in (*table.columns[1:-2], table.columns[-1]):
@@ -150,6 +154,8 @@ def document(problem: Problem, plan: Plan, path: JointPath | None, shorten_secon
 
 def timing_document(problem: Problem, trajectory: Trajectory, limits: RateLimits) -> dict[str, Any]:
     """A timed motion for machines: duration and each joint's peaks (a jerk of null is a jump of acceleration)."""
+    from rrtik_ompl.trajectory import motion_report
+
     peaks, report = trajectory.peaks(), motion_report(trajectory, limits)
     return {
         "problem": problem.name,

@@ -25,11 +25,6 @@ from rrtik_ompl.world import World
 FilePath = str | os.PathLike[str]
 
 
-def is_motion_bench_maker(data: Mapping[str, Any]) -> bool:
-    """Whether the top level of a YAML file has the keys of a PlanningScene or of a MotionPlanRequest."""
-    return "version" not in data and any(key in data for key in ("robot_model_name", "goal_constraints"))
-
-
 def load_motion_bench_maker(
     scene_path: FilePath, request_path: FilePath | None = None, robot: Robot | FilePath | None = None
 ) -> Problem:

@@ -6,6 +6,7 @@ A MotionBenchMaker file (scene or request) is recognised by its keys and read as
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,6 @@ from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml, write_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_files.goal import GoalSection, StartSection, build_goal, goal_data
-from rrtik_ompl.problem_files.motion_bench_maker import is_motion_bench_maker, load_motion_bench_maker
 from rrtik_ompl.problem_files.path_constraints import ConstraintSection, build_constraints, constraint_data
 from rrtik_ompl.problem_files.robot import RobotEntry, robot_data
 from rrtik_ompl.problem_files.run import RunSection
@@ -76,7 +76,9 @@ def load_problem(name_or_file: FilePath, *, robot: Robot | FilePath | None = Non
     """
     path = problem_path(name_or_file)
     document = _read(path)
-    if is_motion_bench_maker(document.data):
+    if _is_motion_bench_maker(document.data):
+        from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker  # takes long, and few need it
+
         return load_motion_bench_maker(path, robot=robot)
     entry = parse(document, ProblemFile)
     world = _world(document, entry, robot)
@@ -93,6 +95,11 @@ def load_problem(name_or_file: FilePath, *, robot: Robot | FilePath | None = Non
             line = document.lines[(error.part,)]
             error.args = (f"{path}:{line}: {error}",)
             raise
+
+
+def _is_motion_bench_maker(data: Mapping[str, Any]) -> bool:
+    """Whether the top level of a YAML file has the keys of a PlanningScene or of a MotionPlanRequest."""
+    return "version" not in data and any(key in data for key in ("robot_model_name", "goal_constraints"))
 
 
 def _read(path: Path) -> YamlDocument:
