@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from contextlib import suppress
 
 
 def main() -> None:
@@ -14,11 +15,15 @@ def main() -> None:
     usual = signal.getsignal(signal.SIGINT)
     if usual is signal.default_int_handler:  # not in a shell's background, where Ctrl-C is ignored
         signal.signal(signal.SIGINT, _leave)
-    from rrtik_ompl.cli.app import run
+    from rrtik_ompl.cli.app import INTERRUPTED, run
 
     signal.signal(signal.SIGINT, usual)
     code = run()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # everything is written and said
+    if code == INTERRUPTED:  # whoever interrupts does not wait until all libraries are taken down
+        with suppress(OSError):  # the reader may have gone
+            sys.stdout.flush()
+        os._exit(code)
     sys.exit(code)
 
 

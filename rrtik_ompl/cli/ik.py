@@ -70,7 +70,9 @@ def inverse_kinematics(
     method: Annotated[str, typer.Option(help="auto, or see: rrtik list ik.")] = "auto",
     tolerance_mm: Annotated[float | None, typer.Option(help="Of the position [mm]; 1 if left out.")] = None,
     tolerance_deg: Annotated[float | None, typer.Option(help="Of the orientation [deg]; 0.57 if left out.")] = None,
-    seconds: Annotated[float | None, typer.Option(help="Wall time for a numeric method [s]; per pose with --poses.")] = None,
+    seconds: Annotated[
+        float | None, typer.Option(help="Wall time for a numeric method [s]; per pose with --poses.")
+    ] = None,
     seed: Annotated[int, typer.Option(help="The same seed gives the same answer.")] = 0,
     poses: Annotated[Path | None, typer.Option(help="Many poses or points: .csv, .json or .yaml.")] = None,
     trajectory: Annotated[

@@ -306,6 +306,17 @@ def test_ctrl_c_while_the_program_loads_is_one_line():
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "rrtik: interrupted; no file is half-written\n")
 
 
+def test_an_interrupted_command_says_everything_and_takes_nothing_down():
+    code = (
+        "import atexit, rrtik_ompl.cli.app as app\n"
+        "atexit.register(print, 'taken down')\n"
+        "app.run = lambda: print('said') or app.INTERRUPTED\n"
+        "from rrtik_ompl.cli.entry import main; main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, check=False)
+    assert (done.returncode, done.stdout) == (130, "said\n")
+
+
 def test_rrtik_alone_prints_the_help(capsys):
     code, _, err = rrtik(capsys)
     assert code == 2

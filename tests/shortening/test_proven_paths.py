@@ -1,5 +1,7 @@
 """shorten(), one_joint_moves() and blended motions: what they return is proven, with a clearance."""
 
+import signal
+
 import numpy as np
 import pytest
 
@@ -81,3 +83,20 @@ def test_the_proof_of_a_motion_names_the_piece_that_touches(question):
     t = motion.times[gaps[0].motion] + gaps[0].share * np.diff(motion.times)[gaps[0].motion]
     near = motion(np.linspace(max(t - 0.05, 0.0), t + 0.05, 201)).positions
     assert not problem.world.with_clearance(0.001).valid_batch(near).all()
+
+
+@pytest.mark.parametrize("method", ["auto", "shortcut", "retraction", "fewest-moves"])
+def test_ctrl_c_leaves_a_shortening_at_once_and_the_next_one_is_as_ever(question, method):
+    problem, raw = question
+    path = rrtik.plan(problem, "bicrdt", seed=2).path if method == "fewest-moves" else raw
+    usual = rrtik.shorten(path, problem, method=method, seed=3)
+    looks = []
+
+    def interrupt():
+        looks.append(signal.raise_signal(signal.SIGINT))
+        return False
+
+    with pytest.raises(KeyboardInterrupt):
+        rrtik.shorten(path, problem, method=method, seed=3, stop=interrupt)
+    assert looks == []
+    assert np.array_equal(rrtik.shorten(path, problem, method=method, seed=3).waypoints, usual.waypoints)

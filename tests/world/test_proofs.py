@@ -1,6 +1,7 @@
 """Motions that are proven free for their whole length."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import coal
 import numpy as np
@@ -153,6 +154,15 @@ def test_a_still_motion_and_the_limits():
 
 
 @pytest.mark.kernels
+def test_a_long_route_is_proven_motion_by_motion_as_in_single_questions():
+    world = rrtik.load_problem("planar3_boxes").world
+    rows = np.random.default_rng(1).uniform(*world.robot.finite_range(), (150, world.robot.dof))
+    single = [world.motion_proven(a, b) for a, b in pairwise(rows)]
+    assert 10 < sum(single) < 139
+    assert [gap.motion for gap in world.prove(rows).unproven] == np.flatnonzero(~np.array(single)).tolist()
+    assert world.motions_proven(rows[:-1], rows[1:]).tolist() == single
+
+
 def test_what_a_plan_returns_says_what_is_proven():
     problem = rrtik.load_problem("titan4_prisms")
     plan = rrtik.plan(problem, seed=1)
