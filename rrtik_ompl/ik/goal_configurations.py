@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -83,6 +84,7 @@ class GoalSearch:
         self.exhausted = isinstance(problem.goal, JointGoal)
         self._problem, self._rounds, self._found = problem, 0, self.rows
         self._unheld = self.rows  # at the goal, whether or not they keep path constraints
+        self._certain = False  # whether nothing random was in the first round
         if isinstance(problem.goal, JointGoal):
             self.rows = frozen(_turns(problem, problem.goal.q) if all_turns else problem.goal.q[None])
         else:
@@ -100,6 +102,11 @@ class GoalSearch:
         goal, world, known = self._problem.goal, self._problem.world, len(self.rows)
         if self.exhausted or isinstance(goal, JointGoal):
             return False
+        if self._rounds == 0 and self._problem in _first_rounds and not isinstance(goal, MultiGoal):
+            self._draw(goal)
+            self._rounds = 1
+            self.rows, self._found, self.exhausted = _first_rounds[self._problem]
+            return len(self.rows) > 0
         if isinstance(goal, MultiGoal):
             kept = world.constraints.regions if isinstance(world, HoldingWorld) else ()
             start, scene = self._problem.start, world.scene
@@ -115,6 +122,8 @@ class GoalSearch:
         self._found = np.vstack([self._found, found])
         self.rows = frozen(np.vstack([self.rows, _chosen(self._problem, free, self.rows)])[:LARGEST])
         self.exhausted |= self._rounds >= LAST_ROUND or len(self.rows) >= LARGEST
+        if self._certain and self._rounds == 1 and not self._problem.constraints:
+            _first_rounds[self._problem] = self.rows, self._found, self.exhausted
         return len(self.rows) > known
 
     @property
@@ -144,15 +153,19 @@ class GoalSearch:
         amounts = [sum(sum(region.outside(q)) for region in regions) for q in self._unheld]
         return world.constraints.explain(self._unheld[int(np.argmin(amounts))])
 
+    def _draw(self, goal: TipGoal) -> tuple[list[Target], int]:
+        """The random numbers of a round: targets and a seed."""
+        return list(targets(goal, DRAWS, self._rng)), int(self._rng.integers(2**31))
+
     def _round(self, goal: TipGoal) -> Matrix:
         """Configurations at the goal, in collision or not, by the method whose turn it is, shape (m, dof)."""
         problem, rng, number = self._problem, self._rng, self._rounds
         robot, parts = problem.world.robot, parts_of(goal)
-        drawn = targets(goal, DRAWS, rng)
-        seed = int(rng.integers(2**31))
+        drawn, seed = self._draw(goal)
         free = any(leaves_freedom(part) for part in parts)
         if _fits("closed-form", robot, drawn) and (number == 0 or (free and number % 2 == 0)):
-            self.exhausted = not free and len(parts) <= DRAWS and not leaves_a_curve(robot, drawn)
+            self._certain = not free and len(parts) <= DRAWS
+            self.exhausted = self._certain and not leaves_a_curve(robot, drawn)
             return solve_ik(robot, goal, method="closed-form", near=problem.start, all=True, seed=seed).solutions
         if number == 1 and _fits("mb-rrt", robot, drawn):
             return solve_ik(
@@ -161,6 +174,11 @@ class GoalSearch:
         starts = rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
         starts[0] = problem.start
         return _walked(robot, goal, starts, number, rng)
+
+
+# First rounds that take all branches of a closed form, in which nothing is random: rows, all that was found, and
+# whether that is all there is. A portfolio, and a path that is being improved, ask for them plan after plan.
+_first_rounds: WeakKeyDictionary[Problem, tuple[Matrix, Matrix, bool]] = WeakKeyDictionary()
 
 
 def _miss(problem: Problem, goal: TipGoal) -> str:

@@ -13,6 +13,7 @@ from ompl import geometric as og
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal, joint_difference
+from rrtik_ompl.ik import goal_configurations
 from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.ompl_bridge import GoalSampler, StateIO
 from rrtik_ompl.ompl_bridge.planner_traits import ompl_planners, traits_of
@@ -309,3 +310,36 @@ main()
     run = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=False, timeout=120)
     assert run.returncode == 0, run.stderr
     assert "leaked" not in run.stderr
+
+
+@pytest.mark.parametrize(
+    "name", ["titan4_regular", "titan4_axis1"]
+)  # the branches are all there is; or members of a curve
+def test_the_branches_of_a_closed_form_are_found_once_for_a_problem_whatever_the_seed(name, monkeypatch):
+    problem = load_problem(name)
+
+    def rounds(problem, seed):
+        search = GoalSearch(problem, seed)
+        first = search.first()
+        if not search.exhausted:
+            search.more()
+        return first, search.rows, search.exhausted
+
+    fresh = [rounds(Problem(problem.world, problem.start, problem.goal), seed) for seed in (1, 2)]
+    assert np.array_equal(fresh[0][0], fresh[1][0])
+    GoalSearch(problem, 1).first()
+    asked = []
+    solve = goal_configurations.solve_ik
+    monkeypatch.setattr(goal_configurations, "solve_ik", lambda *a, **b: asked.append(b["method"]) or solve(*a, **b))
+    for seed, wanted in zip((1, 2), fresh, strict=True):
+        known = rounds(problem, seed)
+        assert all(np.array_equal(one, other) for one, other in zip(known, wanted, strict=True))
+    assert "closed-form" not in asked
+
+
+def test_what_random_numbers_decide_is_searched_for_anew():
+    problem = load_problem("titan4_bar")
+    rows = [GoalSearch(problem, seed).first() for seed in (1, 2, 1)]
+    assert np.array_equal(rows[0], rows[2])
+    fresh = GoalSearch(Problem(problem.world, problem.start, problem.goal), 2).first()
+    assert np.array_equal(rows[1], fresh)
