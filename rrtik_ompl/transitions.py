@@ -49,7 +49,7 @@ def merge_moves(waypoints: ArrayLike, tolerance: float = SAME) -> Matrix:
     rows = _rows(waypoints)
     values, kept = rows.tolist(), [0]  # lists: most routes are short, and numpy takes longer for a row
     for i in range(1, len(rows)):
-        while len(kept) > 1 and _same_joint(*(values[k] for k in (*kept[-2:], i)), tolerance):
+        while len(kept) > 1 and _same_joint(values[kept[-2]], values[kept[-1]], values[i], tolerance):
             kept.pop()
         if _moved_joints(values[kept[-1]], values[i], tolerance):
             kept.append(i)
