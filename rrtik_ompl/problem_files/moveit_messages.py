@@ -24,8 +24,8 @@ else:
 class PoseMessage(BaseModel):
     """A pose."""
 
-    position: Vector3 = Field(default=[0.0, 0.0, 0.0])
-    orientation: Vector4 = Field(default=list(IDENTITY_QUATERNION))
+    position: Vector3 = Field(default_factory=lambda: [0.0, 0.0, 0.0])
+    orientation: Vector4 = Field(default_factory=lambda: list(IDENTITY_QUATERNION))
 
     def build(self) -> Any:
         """The pose as ``pinocchio.SE3``."""
@@ -62,10 +62,10 @@ class CollisionObject(BaseModel):
     id: Name
     header: Header = Field(default_factory=Header)  # made anew in a fifth of the time of a copy
     pose: PoseMessage = Field(default_factory=PoseMessage)
-    primitives: list[Primitive] = Field(default=[])
-    primitive_poses: list[PoseMessage] = Field(default=[])
-    meshes: list[Any] = Field(default=[])
-    planes: list[Any] = Field(default=[])
+    primitives: list[Primitive] = Field(default_factory=list)
+    primitive_poses: list[PoseMessage] = Field(default_factory=list)
+    meshes: list[Any] = Field(default_factory=list)
+    planes: list[Any] = Field(default_factory=list)
 
     def check_frame(self, known: tuple[str, ...]) -> None:
         """Refuse an object whose coordinates refer to a frame other than the world's."""
@@ -89,8 +89,8 @@ class CollisionObject(BaseModel):
 class AllowedMatrix(BaseModel):
     """Which pairs of names may touch."""
 
-    entry_names: list[str] = Field(default=[])
-    entry_values: list[list[bool]] = Field(default=[])
+    entry_names: list[str] = Field(default_factory=list)
+    entry_values: list[list[bool]] = Field(default_factory=list)
 
     def pairs(self) -> Iterator[tuple[str, str]]:
         """The pairs that may touch, each once."""
@@ -106,7 +106,7 @@ class AllowedMatrix(BaseModel):
 class WorldMessage(BaseModel):
     """The obstacles."""
 
-    collision_objects: list[CollisionObject] = Field(default=[])
+    collision_objects: list[CollisionObject] = Field(default_factory=list)
 
 
 class SceneMessage(BaseModel):
@@ -134,7 +134,7 @@ class Transform(BaseModel):
 class BaseState(BaseModel):
     """State of the joint between world and base."""
 
-    transforms: list[Transform] = Field(default=[])
+    transforms: list[Transform] = Field(default_factory=list)
 
 
 class RobotState(BaseModel):
@@ -166,15 +166,15 @@ class JointConstraint(BaseModel):
 class Region(BaseModel):
     """Volume that a link has to reach: only its primitives are looked at."""
 
-    primitives: list[Primitive] = Field(default=[])
-    primitive_poses: list[PoseMessage] = Field(default=[])
+    primitives: list[Primitive] = Field(default_factory=list)
+    primitive_poses: list[PoseMessage] = Field(default_factory=list)
 
 
 class PositionConstraint(BaseModel):
     """The link has to be inside a region."""
 
     link_name: Name
-    target_point_offset: dict[str, Number] | list[Number] = Field(default=[])
+    target_point_offset: dict[str, Number] | list[Number] = Field(default_factory=list)
     constraint_region: Region
 
     def ball(self) -> tuple[list[float], float]:
@@ -205,9 +205,9 @@ class OrientationConstraint(BaseModel):
 class Constraints(BaseModel):
     """What the end of the motion has to satisfy."""
 
-    joint_constraints: list[JointConstraint] = Field(default=[])
-    position_constraints: list[PositionConstraint] = Field(default=[])
-    orientation_constraints: list[OrientationConstraint] = Field(default=[])
+    joint_constraints: list[JointConstraint] = Field(default_factory=list)
+    position_constraints: list[PositionConstraint] = Field(default_factory=list)
+    orientation_constraints: list[OrientationConstraint] = Field(default_factory=list)
 
     @property
     def links(self) -> tuple[str, ...]:
