@@ -141,7 +141,7 @@ class Builder:
         else:
             self._add(plain_value(text) if event.implicit[0] else text, 1, 1, event.anchor, event)
 
-    def _open(self, event: yaml.CollectionStartEvent, value: Any) -> None:
+    def _open(self, event: yaml.CollectionStartEvent, value: object) -> None:
         if event.tag is not None:
             raise self._error(event, f"tag '{event.tag}' cannot be used; write the value alone")
         parent, group = self._stack[-1] if self._stack else None, Group(value, _line(event), event.anchor)
@@ -168,7 +168,7 @@ class Builder:
             raise self._error(event, "a key must be a word, found a list or a group")
         return place
 
-    def _add(self, value: Any, size: int, height: int, anchor: str | None, event: yaml.Event) -> None:
+    def _add(self, value: object, size: int, height: int, anchor: str | None, event: yaml.Event) -> None:
         """Put a finished value where it belongs and keep count of what the file unfolds to."""
         if anchor is not None:
             self._anchors[anchor] = (value, size, height)
